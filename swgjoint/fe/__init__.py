@@ -1,0 +1,1 @@
+"""Finite elements of the drive; the only place where scikit-fem is imported."""

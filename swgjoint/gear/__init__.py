@@ -1,0 +1,1 @@
+"""Geometry of the drive: design, tooth profiles, wave generators, kinematics."""

@@ -1,0 +1,53 @@
+"""Layouts, signed ratios and the two angles that carry all periodicity."""
+
+from __future__ import annotations
+
+from typing import Literal, get_args
+
+Layout = Literal["circular_spline_fixed", "flexspline_fixed", "wave_generator_fixed"]
+LAYOUTS: tuple[str, ...] = get_args(Layout)
+
+# alpha = wave generator relative to the circular spline, beta = wave generator
+# relative to the flexspline, as (d/dtheta, d/dpsi) of the input and output angle.
+_ANGLES: dict[str, tuple[tuple[int, int], tuple[int, int]]] = {
+    "circular_spline_fixed": ((1, 0), (1, -1)),
+    "flexspline_fixed": ((1, -1), (1, 0)),
+    "wave_generator_fixed": ((0, -1), (-1, 0)),
+}
+
+
+def ratio(layout: str, teeth_flexspline: int, teeth_circular_spline: int) -> float:
+    """Signed ratio i of input to output rotation.
+
+    With the wave generator as input, :math:`i = z_D/(z_D - z_F)`, D driven, F fixed:
+    -60 with the circular spline fixed and +61 with the flexspline fixed for 120/122
+    teeth. With the wave generator fixed the flexspline is the input.
+
+    Source:
+        Thesis eq. (2.2), after Musser.
+    """
+    if layout == "circular_spline_fixed":
+        return teeth_flexspline / (teeth_flexspline - teeth_circular_spline)
+    if layout == "flexspline_fixed":
+        return teeth_circular_spline / (teeth_circular_spline - teeth_flexspline)
+    if layout == "wave_generator_fixed":
+        return teeth_circular_spline / teeth_flexspline
+    raise ValueError(f"layout {layout!r} unknown; accepted: {', '.join(LAYOUTS)}")
+
+
+def angle_coefficients(layout: str) -> tuple[tuple[int, int], tuple[int, int]]:
+    """Derivatives of alpha and of beta by (theta, psi)."""
+    return _ANGLES[layout]
+
+
+def periodicity(layout: str, teeth_flexspline: int, teeth_circular_spline: int) -> int:
+    """Cycles per input turn in which a perfect gear repeats.
+
+    The tooth count of the fixed member; with the wave generator fixed that of the
+    input member, the flexspline.
+    """
+    return (
+        teeth_circular_spline
+        if layout == "circular_spline_fixed"
+        else teeth_flexspline
+    )

@@ -1,0 +1,1 @@
+"""The drive as a compliant transmission of a MuJoCo joint."""

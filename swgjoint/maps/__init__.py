@@ -1,0 +1,1 @@
+"""The reduced drive: samples, potential map, file format."""

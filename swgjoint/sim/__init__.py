@@ -1,0 +1,1 @@
+"""Scenes, trajectories, runs and metrics."""
