@@ -1,0 +1,40 @@
+"""Progress of long work: a callback that libraries call and the command line shows."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable
+
+Progress = Callable[[str, int, int], None]
+"""Called with (stage, done, total)."""
+
+
+def silent(stage: str, done: int, total: int) -> None:
+    """Show nothing."""
+
+
+class StderrProgress:
+    """One line per stage on stderr, rewritten in a terminal, sparse in a log."""
+
+    def __init__(self) -> None:
+        self._stage = ""
+        self._start = 0.0
+        self._shown = 0.0
+
+    def __call__(self, stage: str, done: int, total: int) -> None:
+        """Show the stage, the share done and the time left."""
+        now = time.monotonic()
+        if stage != self._stage:
+            self._stage, self._start, self._shown = stage, now, 0.0
+        last = done >= total
+        live = sys.stderr.isatty()
+        if not last and now - self._shown < (0.1 if live else 5.0):
+            return
+        self._shown = now
+        spent = now - self._start
+        left = spent / done * (total - done) if done else 0.0
+        tail = f"{spent:.1f} s" if last else f"{left:.0f} s left"
+        end = "\n" if last or not live else ""
+        start = "\r\x1b[K" if live else ""
+        print(f"{start}{stage}: {done}/{total} {tail}", end=end, file=sys.stderr)
