@@ -1,0 +1,270 @@
+"""Faults of an input file, all at once: one line per fault with path, value, unit.
+
+Shared by every TOML file of the package: designs, scenes, sweeps.
+"""
+
+from __future__ import annotations
+
+import itertools
+import re
+import tomllib
+from collections.abc import Mapping
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic_core import ErrorDetails
+
+from swgjoint.errors import InputError
+
+MAX_BYTES = 2_000_000
+"""No input file of ours is longer; a longer one is not read."""
+
+# the last part of a key that is a unit, as written in messages
+_UNITS = {
+    "per_mm": "1/mm",
+    "kg_m3": "kg/m³",
+    "kgm2": "kg·m²",
+    "Nm_rad": "N·m/rad",
+    "rad_s": "rad/s",
+    "mm": "mm",
+    "um": "µm",
+    "m": "m",
+    "deg": "deg",
+    "rad": "rad",
+    "arcmin": "arcmin",
+    "GPa": "GPa",
+    "MPa": "MPa",
+    "Nm": "N·m",
+    "kg": "kg",
+    "rpm": "rpm",
+    "Hz": "Hz",
+    "s": "s",
+    "percent": "%",
+}
+_BOUNDS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
+_BOUND_ERRORS = {
+    "greater_than",
+    "greater_than_equal",
+    "less_than",
+    "less_than_equal",
+}
+_TYPES = {
+    "float_type": "a number",
+    "int_type": "a whole number",
+    "int_from_float": "a whole number",
+    "string_type": "a text in quotes",
+    "bool_type": "true or false",
+    "finite_number": "a finite number",
+    "tuple_type": "a list",
+    "list_type": "a list",
+    "model_type": "a table",
+    "model_attributes_type": "a table",
+    "dict_type": "a table",
+}
+
+Model = TypeVar("Model", bound=BaseModel)
+
+
+class Section(BaseModel):
+    """One table of an input file: strict, frozen, no unknown keys."""
+
+    model_config = ConfigDict(
+        strict=True, extra="forbid", frozen=True, allow_inf_nan=False
+    )
+
+
+class Fault(ValueError):
+    """Faults between several keys: (path below the table, message)."""
+
+    def __init__(self, *lines: tuple[str, str]) -> None:
+        super().__init__("; ".join(f"{path}: {text}" for path, text in lines))
+        self.lines = lines
+
+
+def unit_of(key: str) -> str:
+    """Unit that a key carries in its last part, or the empty string."""
+    for suffix, unit in _UNITS.items():
+        if key == suffix or key.endswith("_" + suffix):
+            return unit
+    return ""
+
+
+def read_toml(
+    path: Path, *, what: str, error: type[InputError] = InputError
+) -> dict[str, Any]:
+    """Parse a TOML file; every failure is one line.
+
+    Raises:
+        InputError: If the file is missing, too long, not UTF-8 or not TOML.
+    """
+    try:
+        size = path.stat().st_size
+        if size > MAX_BYTES:
+            raise error(f"{path}: {size} bytes; a {what} has at most {MAX_BYTES}")
+        return parse_toml(path.read_bytes().decode(), where=str(path), error=error)
+    except OSError as exc:
+        raise error(f"{path}: cannot read the {what}: {exc.strerror}") from None
+    except UnicodeDecodeError as exc:
+        raise error(f"{path}: not UTF-8 text at byte {exc.start}") from None
+
+
+def parse_toml(
+    text: str, *, where: str, error: type[InputError] = InputError
+) -> dict[str, Any]:
+    """Parse TOML text; a syntax error is one line."""
+    try:
+        return tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, RecursionError) as exc:
+        raise error(f"{where}: not valid TOML: {exc}") from None
+
+
+def validated(
+    model: type[Model],
+    data: Mapping[str, Any],
+    *,
+    where: str,
+    error: type[InputError] = InputError,
+) -> Model:
+    """The model filled from plain data.
+
+    Raises:
+        InputError: With one line per fault: file, key path, value with unit, accepted.
+    """
+    try:
+        return model.model_validate(dict(data))
+    except ValidationError as exc:
+        lines: list[str] = []
+        for detail in exc.errors(include_url=False):
+            lines += [f"{where}: {line}" for line in _lines(model, detail)]
+        raise error("\n".join(dict.fromkeys(lines))) from None
+
+
+def _lines(model: type[BaseModel], detail: ErrorDetails) -> list[str]:
+    """Message of one pydantic error, without the file name."""
+    path, owner, info = _walk(model, detail["loc"])
+    key = path.rpartition(".")[2].partition("[")[0]
+    kind, ctx = detail["type"], detail.get("ctx", {})
+    value = detail["input"]
+    if kind == "value_error":
+        fault = ctx.get("error")
+        if isinstance(fault, Fault):
+            prefix = f"{path}." if path else ""
+            return [f"{prefix}{below}: {text}" for below, text in fault.lines]
+        return [f"{path}: {fault}"]
+    if kind == "extra_forbidden":
+        accepted = sorted(owner.model_fields) if owner else []
+        near = get_close_matches(key, accepted, n=1, cutoff=0.5)
+        hint = f"did you mean {near[0]}? " if near else ""
+        return [f"{path}: unknown key; {hint}accepted here: {', '.join(accepted)}"]
+    if kind == "missing":
+        return [f"{path}: missing; accepted: {_accepted(info, key)}"]
+    if kind == "union_tag_not_found":
+        tags = ", ".join(repr(_tag(m)) for m in _models_in(info.annotation))
+        return [f"{path}.kind: missing; accepted: {tags}"]
+    if kind == "union_tag_invalid":
+        tags = ctx["expected_tags"]
+        near = get_close_matches(str(ctx["tag"]), re.findall(r"\w+", tags), n=1)
+        hint = f"did you mean {near[0]}? " if near else ""
+        return [f"{path}.kind = {ctx['tag']!r}: {hint}accepted: {tags}"]
+    if kind == "literal_error":
+        return [f"{path} = {_shown(value, '')}: accepted: {ctx['expected']}"]
+    if kind in _BOUND_ERRORS:
+        return [f"{path} = {_shown(value, key)}: accepted: {_accepted(info, key)}"]
+    if kind in _TYPES:
+        wanted = _TYPES[kind]
+        if info is not None and (limits := _limits(info, key)):
+            wanted += f" {limits}"
+        return [f"{path} = {_shown(value, '')}: accepted: {wanted}"]
+    return [f"{path} = {_shown(value, key)}: {detail['msg']}"]
+
+
+def _walk(
+    model: type[BaseModel], loc: tuple[int | str, ...]
+) -> tuple[str, type[BaseModel] | None, Any]:
+    """Dotted path, owning model and field of a location.
+
+    pydantic puts the tag of a discriminated union into the location; it is no part of
+    the file's path and is left out.
+    """
+    path, owner, info = "", model, None
+    here: type[BaseModel] | None = model
+    options: dict[str, type[BaseModel]] = {}
+    for part in loc:
+        if options and part in options:
+            here, options = options[str(part)], {}
+            continue
+        if isinstance(part, int):
+            path += f"[{part}]"
+            continue
+        path += f".{part}" if path else part
+        if here is None:
+            continue
+        owner, info = here, here.model_fields.get(part)
+        models = _models_in(info.annotation) if info is not None else []
+        union = info is not None and info.discriminator is not None
+        options = {_tag(m): m for m in models} if union else {}
+        here = models[0] if len(models) == 1 and not union else None
+    if here is not None and loc:
+        owner = owner if info is not None and here is not model else here
+    return path, owner, info
+
+
+def _tag(model: type[BaseModel]) -> str:
+    return str(model.model_fields["kind"].default)
+
+
+def _models_in(annotation: Any) -> list[type[BaseModel]]:
+    """Models that a type annotation holds, through unions and Annotated."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    found: list[type[BaseModel]] = []
+    for argument in getattr(annotation, "__args__", ()):
+        found += _models_in(argument)
+    return found
+
+
+def _limits(info: Any, key: str) -> str:
+    """Bounds of a field with unit, e.g. ``> 0 mm and <= 20 mm``."""
+    unit = unit_of(key)
+    metadata = list(info.metadata)
+    for inner in getattr(info.annotation, "__args__", ()):  # items of a list, X | None
+        metadata += getattr(inner, "__metadata__", ())
+    fields = [getattr(item, "metadata", [item]) for item in metadata]
+    parts = [
+        f"{sign} {getattr(item, name):g}{' ' + unit if unit else ''}"
+        for item in itertools.chain(*fields)
+        for name, sign in _BOUNDS.items()
+        if getattr(item, name, None) is not None
+    ]
+    return " and ".join(parts)
+
+
+def _accepted(info: Any, key: str) -> str:
+    limits = _limits(info, key) if info is not None else ""
+    if limits:
+        return limits
+    annotation = getattr(info, "annotation", None)
+    if _models_in(annotation):
+        return "a table"
+    unit = unit_of(key)
+    names: dict[Any, str] = {
+        float: "a number",
+        int: "a whole number",
+        str: "a text in quotes",
+    }
+    name = names.get(annotation, "a value")
+    return f"{name} in {unit}" if unit else name
+
+
+def _shown(value: Any, key: str) -> str:
+    """Value as the file has it, cut to a line, with its unit."""
+    text = (
+        {True: "true", False: "false"}[value]
+        if value is True or value is False
+        else (f"{value:g}" if isinstance(value, float) else repr(value))
+    )
+    text = text if len(text) <= 60 else text[:57] + "..."
+    unit = unit_of(key)
+    return f"{text} {unit}" if unit else text
