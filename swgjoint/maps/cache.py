@@ -1,0 +1,120 @@
+"""Content-addressed cache of drive maps in the user's cache folder."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import logging
+import os
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from swgjoint import __version__
+from swgjoint.errors import InputError, MapFileError
+from swgjoint.json_text import plain
+from swgjoint.maps.drive_map import DriveMap
+from swgjoint.maps.file import SCHEMA_VERSION
+
+_log = logging.getLogger(__name__)
+
+_CODE = ("arrays.py", "gear", "fe", "maps")
+"""Parts of the package whose code decides the content of a map."""
+
+
+def cache_folder() -> Path | None:
+    """Folder of the cache: ``SWGJOINT_CACHE``, else the platform's; None if off.
+
+    An empty ``SWGJOINT_CACHE`` switches the cache off.
+    """
+    named = os.environ.get("SWGJOINT_CACHE")
+    if named is not None:
+        return Path(named) if named.strip() else None
+    try:
+        if sys.platform == "darwin":
+            return Path.home() / "Library" / "Caches" / "swgjoint"
+        if sys.platform == "win32":
+            local = os.environ.get("LOCALAPPDATA")
+            base = Path(local) if local else Path.home() / "AppData" / "Local"
+            return base / "swgjoint" / "Cache"
+        # XDG base directories: a relative path is to be ignored
+        xdg = os.environ.get("XDG_CACHE_HOME", "")
+        base = Path(xdg) if os.path.isabs(xdg) else Path.home() / ".cache"
+        return base / "swgjoint"
+    except RuntimeError:  # no home folder
+        return None
+
+
+@lru_cache
+def code_version() -> str:
+    """Hash of the code that decides the content of a map, and of its file schema.
+
+    With it no map computed by other code is ever taken from the cache, also while the
+    package is being changed.
+    """
+    digest = hashlib.sha256(f"{__version__} {SCHEMA_VERSION}".encode())
+    package = Path(__file__).resolve().parents[1]
+    for part in _CODE:
+        path = package / part
+        for file in [path] if path.is_file() else sorted(path.rglob("*.py")):
+            digest.update(file.relative_to(package).as_posix().encode())
+            digest.update(file.read_bytes())
+    return digest.hexdigest()
+
+
+def key_of(parts: Mapping[str, Any]) -> str:
+    """Hash of the given parts and of the code, 64 hexadecimal digits."""
+    content = {"code": code_version(), "parts": plain(parts)}
+    text = json.dumps(content, sort_keys=True, separators=(",", ":"), allow_nan=False)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def cached(
+    parts: Mapping[str, Any],
+    build: Callable[[], DriveMap],
+    *,
+    name: str | None = None,
+) -> DriveMap:
+    """The map of the given parts, from the cache or built and then kept.
+
+    Safe under concurrent writers: an entry appears whole, under a name that only its
+    content decides. A damaged entry is built again; a cache that cannot be written is
+    reported to the log and not used.
+
+    Args:
+        parts: Everything that decides the result: content hash of the design, level,
+            options. JSON values.
+        build: Called when there is no sound entry.
+        name: Name that the map shall carry; it is no part of the content.
+    """
+    folder = cache_folder()
+    if folder is None:
+        drive = build()
+        return drive if name is None else replace(drive, name=name)
+    key = key_of(parts)
+    path = folder / "maps" / key[:2] / f"{key}.swg"
+    drive = _sound(path) or _built(path, build)
+    return drive if name in (None, drive.name) else replace(drive, name=name)
+
+
+def _sound(path: Path) -> DriveMap | None:
+    if not path.exists():
+        return None
+    try:
+        return DriveMap.load(path)
+    except MapFileError as exc:
+        _log.warning("cache entry ignored and built again: %s", exc)
+        return None
+
+
+def _built(path: Path, build: Callable[[], DriveMap]) -> DriveMap:
+    drive = build()
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        drive.save(path)
+    except (OSError, InputError) as exc:
+        _log.warning("map not kept in the cache: %s", exc)
+    return drive

@@ -1,0 +1,61 @@
+"""What every sound map fulfils, beyond shapes and finiteness."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from swgjoint.maps.drive_map import DriveMap
+
+JUMP = 1e-6
+"""Largest jump of a coefficient or its slope at a knot, of its largest value."""
+
+
+def check_map(drive: DriveMap) -> None:
+    """Refuse a map that no drive can have.
+
+    Teeth and ratings must make sense, the mean torque must not fall with the torsion,
+    and the potential and the torque must be continuous at the knots.
+
+    Raises:
+        ValueError: Naming the first fault.
+    """
+    z_fs, z_cs = drive.teeth_flexspline, drive.teeth_circular_spline
+    if not 0 < z_fs < z_cs <= 100_000:
+        raise ValueError(
+            f"teeth {z_fs} and {z_cs}; accepted: 0 < flexspline < circular"
+        )
+    r = drive.ratings
+    torques = np.array([r.rated_torque, r.repeated_peak, r.momentary_peak, r.T1, r.T2])
+    if not (np.isfinite(torques).all() and (torques > 0).all()):
+        raise ValueError(f"ratings {torques.tolist()} N·m; accepted: > 0 N·m")
+    if not 0 <= drive.damping_ratio <= 10:
+        raise ValueError(f"damping ratio {drive.damping_ratio}; accepted: 0 to 10")
+    if len(drive.orders) > 100_000 or not (abs(drive.orders.astype(float)) < 1e6).all():
+        raise ValueError("orders; accepted: up to 100000 of less than 1e6 per turn")
+
+    knots = drive.torsion_knots
+    # far beyond any drive, far below overflow of the products below
+    for key in ("torsion_knots", "potential", "end_stiffness", "kinematic_error"):
+        if np.abs(getattr(drive, key)).max() > 1e60:
+            raise ValueError(f"{key} holds a value above 1e60")
+    if np.abs(drive.kinematic_error).max() > np.pi or np.abs(knots).max() > np.pi:
+        raise ValueError("torsion or kinematic error above half a turn")
+
+    d = np.diff(knots)[None, None, :, None]
+    c = drive.potential
+    powers = d ** np.arange(5)
+    value = (c * powers).sum(axis=-1)
+    slope = (c[..., 1:] * np.arange(1, 5) * powers[..., :4]).sum(axis=-1)
+    for name, end, start in (
+        ("potential", value, c[..., 0]),
+        ("torque", slope, c[..., 1]),
+    ):
+        scale = np.abs(start).max() + np.abs(end).max()
+        if (np.abs(end[..., :-1] - start[..., 1:]) > JUMP * scale).any():
+            raise ValueError(f"{name} jumps at a knot of the torsion")
+    # flat where clearance leaves the output free, never falling but for round-off
+    torque = np.append(c[0, 0, :, 1], slope[0, 0, -1])
+    if (np.diff(torque) < -1e-9 * np.abs(torque).max()).any() or (
+        drive.end_stiffness[0, 0] <= 0
+    ).any():
+        raise ValueError("mean torque falls with the torsion")

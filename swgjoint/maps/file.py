@@ -1,0 +1,257 @@
+"""The ``.swg`` file: a drive map as an uncompressed npz with a JSON header.
+
+Members: ``header.npy`` (JSON text as bytes) and the arrays of
+:class:`~swgjoint.maps.drive_map.DriveMap`. The reader trusts nothing: no member is
+compressed or pickled, sizes are checked against the bytes that are there before
+anything is allocated, and the map must be finite, increasing and continuous.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import platform
+import re
+import stat
+import struct
+import zipfile
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any, Literal, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint import __version__
+from swgjoint.errors import InputError, MapFileError
+from swgjoint.faults import Section, validated
+from swgjoint.files import write_whole
+from swgjoint.json_text import json_text
+from swgjoint.maps.checks import check_map
+from swgjoint.maps.drive_map import DriveMap, Ratings
+
+SCHEMA_VERSION = 1
+MAX_BYTES = 64_000_000
+"""A map with a thousand harmonics and a hundred knots is below 10 MB."""
+
+_ARRAYS: dict[str, tuple[str, int, str]] = {
+    "torsion_knots": ("<f8", 1, "rad"),
+    "orders": ("<i8", 2, "cycles per turn of alpha, beta"),
+    "potential": ("<f8", 4, "J/rad^k"),
+    "end_stiffness": ("<f8", 3, "N·m/rad"),
+    "kinematic_error": ("<f8", 2, "rad"),
+}
+_NPY = re.compile(
+    rb"\x93NUMPY\x01\x00(?P<length>..)\{'descr': '(?P<dtype>[<|][fiuc][0-9]{1,2})', "
+    rb"'fortran_order': False, 'shape': \((?P<shape>[0-9, ]{1,60})\), \} *\n",
+    re.DOTALL,
+)
+_END = struct.Struct("<4s4H2LH")  # end of the central directory, PKZIP APPNOTE 4.3.16
+
+Map = TypeVar("Map", bound=DriveMap)
+
+
+class RatingsHeader(Section):
+    """Torques of the catalogue [N·m]."""
+
+    rated_torque: float
+    repeated_peak: float
+    momentary_peak: float
+    T1: float
+    T2: float
+    source: str
+
+
+class Header(Section):
+    """The JSON header of a ``.swg`` file."""
+
+    format: Literal["swgjoint drive map"]
+    schema_version: int
+    units: dict[str, str]
+    versions: dict[str, str]
+    name: str
+    level: str
+    layout: str
+    teeth_flexspline: int
+    teeth_circular_spline: int
+    damping_ratio: float
+    ratings: RatingsHeader
+    info: dict[str, Any]
+
+
+def map_bytes(drive: DriveMap) -> bytes:
+    """The content of a ``.swg`` file; the same map gives the same bytes."""
+    header = {
+        "format": "swgjoint drive map",
+        "schema_version": SCHEMA_VERSION,
+        "units": {key: unit for key, (_, _, unit) in _ARRAYS.items()}
+        | {"ratings": "N·m"},
+        "versions": {
+            "swgjoint": __version__,
+            "numpy": np.__version__,
+            "python": platform.python_version(),
+        },
+        "name": drive.name,
+        "level": drive.level,
+        "layout": drive.layout,
+        "teeth_flexspline": drive.teeth_flexspline,
+        "teeth_circular_spline": drive.teeth_circular_spline,
+        "damping_ratio": float(drive.damping_ratio),
+        "ratings": asdict(drive.ratings),
+        "info": dict(drive.info),
+    }
+    text = json_text(header, indent=None).encode()
+    members = {"header": np.frombuffer(text, dtype=np.uint8)}
+    members |= {
+        key: np.ascontiguousarray(getattr(drive, key), dtype=dtype)
+        for key, (dtype, _, _) in _ARRAYS.items()
+    }
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w", zipfile.ZIP_STORED) as archive:
+        for key, array in members.items():
+            member = io.BytesIO()
+            np.lib.format.write_array(member, array, version=(1, 0), allow_pickle=False)
+            # ZipInfo's own date, 1980, keeps the bytes independent of the clock
+            archive.writestr(zipfile.ZipInfo(f"{key}.npy"), member.getvalue())
+    return out.getvalue()
+
+
+def write_map(drive: DriveMap, path: str | Path) -> None:
+    """Write a ``.swg`` file, whole or not at all.
+
+    Raises:
+        InputError: If the file cannot be written.
+        ValueError: If the map would be refused by the reader.
+    """
+    check_map(drive)
+    write_whole(path, map_bytes(drive))
+
+
+def read_map(path: str | Path, cls: type[Map]) -> Map:
+    """Read a ``.swg`` file.
+
+    Raises:
+        MapFileError: In one line, if the file is missing, damaged, hostile or of
+            another schema version.
+    """
+    try:
+        return map_from_bytes(_content(Path(path)), cls)
+    except OSError as exc:
+        raise MapFileError(f"map {path}: cannot be read: {exc.strerror}") from None
+    except (ValueError, zipfile.BadZipFile, NotImplementedError, EOFError) as exc:
+        lines = str(exc).splitlines() or [type(exc).__name__]
+        more = f" (and {len(lines) - 1} more)" if len(lines) > 1 else ""
+        raise MapFileError(f"map {path}: {lines[0]}{more}") from None
+
+
+def map_from_bytes(data: bytes, cls: type[Map]) -> Map:
+    """A map from the content of a ``.swg`` file.
+
+    Raises:
+        ValueError: If the content is not a sound map.
+    """
+    members = _members(data)
+    header = _header(members.pop("header"))
+    arrays = {
+        key: _array(members[key], key, dtype, ndim)
+        for key, (dtype, ndim, _) in _ARRAYS.items()
+    }
+    drive = cls(
+        name=header.name,
+        level=header.level,
+        layout=header.layout,
+        teeth_flexspline=header.teeth_flexspline,
+        teeth_circular_spline=header.teeth_circular_spline,
+        damping_ratio=header.damping_ratio,
+        ratings=Ratings(**header.ratings.model_dump()),
+        info=header.info,
+        **arrays,
+    )
+    check_map(drive)
+    return drive
+
+
+def _content(path: Path) -> bytes:
+    """The bytes of a regular file that is not too long."""
+    status = path.stat()
+    if not stat.S_ISREG(status.st_mode):
+        raise MapFileError("not a file")
+    if status.st_size > MAX_BYTES:
+        raise MapFileError(f"{status.st_size} bytes; accepted: at most {MAX_BYTES}")
+    with path.open("rb") as file:
+        return file.read(MAX_BYTES)
+
+
+def _members(data: bytes) -> dict[str, bytes]:
+    """Bytes of every member of the archive, checked against its directory."""
+    names = {f"{key}.npy" for key in ("header", *_ARRAYS)}
+    if len(data) < _END.size or not data.startswith(b"PK\x03\x04"):
+        raise MapFileError(f"not a .swg file ({len(data)} bytes)")
+    signature, disk, first, here, entries, size, _, comment = _END.unpack(
+        data[-_END.size :]
+    )
+    if signature != b"PK\x05\x06" or comment or disk or first or here != entries:
+        raise MapFileError("truncated or damaged: no end of the archive")
+    zip64 = data[-_END.size - 20 : -_END.size].startswith(b"PK\x06\x07")
+    if entries != len(names) or size > 4096 or zip64:
+        raise MapFileError(f"{entries} members; accepted: {', '.join(sorted(names))}")
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        infos = archive.infolist()
+        if {info.filename for info in infos} != names:
+            found = ", ".join(sorted(info.filename[:40] for info in infos))
+            raise MapFileError(f"members {found}; needed {', '.join(sorted(names))}")
+        for info in infos:
+            if info.compress_type != zipfile.ZIP_STORED or info.flag_bits & 1:
+                raise MapFileError(f"member {info.filename} is compressed or encrypted")
+            if info.compress_size != info.file_size:
+                raise MapFileError(f"member {info.filename} has two sizes")
+        claimed = sum(info.file_size for info in infos)
+        if claimed > len(data):
+            raise MapFileError(f"members claim {claimed} bytes of {len(data)}")
+        # read() checks the CRC of each member
+        return {info.filename[:-4]: archive.read(info) for info in infos}
+
+
+def _array(data: bytes, name: str, dtype: str, ndim: int) -> NDArray[Any]:
+    """One array; shape and dtype must agree with the number of bytes.
+
+    The header of the member is matched as text: nothing of it is evaluated.
+    """
+    head = _NPY.match(data)
+    if head is None or int.from_bytes(head["length"], "little") != head.end() - 10:
+        raise MapFileError(f"{name}: not a plain array of format 1.0")
+    found = head["dtype"].decode()
+    if found != dtype:
+        raise MapFileError(f"{name} has dtype {found}; needed {dtype}")
+    shape = tuple(int(n) for n in head["shape"].decode().split(",") if n.strip())
+    if len(shape) != ndim or 0 in shape:
+        raise MapFileError(f"{name} has shape {shape}; needed {ndim} axes, none empty")
+    body = memoryview(data)[head.end() :]
+    needed = np.dtype(dtype).itemsize
+    for n in shape:
+        needed *= n
+    if needed != len(body):
+        raise MapFileError(f"{name} has shape {shape} but {len(body)} bytes")
+    return np.frombuffer(body, dtype=dtype).reshape(shape)
+
+
+def _header(data: bytes) -> Header:
+    """The checked JSON header."""
+    text = _array(data, "header", "|u1", 1).tobytes()
+    try:
+        content = json.loads(text, parse_constant=_refuse)
+    except (ValueError, RecursionError) as exc:
+        raise MapFileError(f"header is not JSON: {exc}") from None
+    if not isinstance(content, dict):
+        raise MapFileError("header is not a JSON object")
+    version = content.get("schema_version")
+    if version != SCHEMA_VERSION:
+        raise MapFileError(
+            f"schema version {str(version)[:20]}; accepted: {SCHEMA_VERSION};"
+            " build the map again with 'swgjoint map'"
+        )
+    return validated(Header, content, where="header", error=MapFileError)
+
+
+def _refuse(constant: str) -> None:
+    raise InputError(f"{constant} is not a number")

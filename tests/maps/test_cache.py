@@ -1,0 +1,131 @@
+"""The cache of maps: built once, never damaged, never in the way."""
+
+from __future__ import annotations
+
+import multiprocessing
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from swgjoint.maps import cache
+from swgjoint.maps.cache import cache_folder, cached, key_of
+from swgjoint.maps.drive_map import DriveMap
+from swgjoint.maps.file import map_bytes
+
+
+class Builder:
+    """Builds a linear map and counts."""
+
+    def __init__(self, stiffness: float = 1e4) -> None:
+        self.count, self.stiffness = 0, stiffness
+
+    def __call__(self) -> DriveMap:
+        """Build one more."""
+        self.count += 1
+        return DriveMap.linear(self.stiffness)
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.setenv("SWGJOINT_CACHE", str(tmp_path / "cache"))
+    return tmp_path / "cache"
+
+
+def test_built_once(folder):
+    """The second request of the same parts is answered from the folder, bitwise."""
+    build = Builder()
+    first = cached({"design": "a", "level": "2d"}, build)
+    second = cached({"level": "2d", "design": "a"}, build)
+    assert build.count == 1
+    assert map_bytes(first) == map_bytes(second)
+
+
+def test_other_parts_other_entry(folder):
+    """Any other part gives another entry."""
+    build = Builder()
+    cached({"design": "a", "level": "2d"}, build)
+    cached({"design": "a", "level": "3d"}, build)
+    assert build.count == 2
+
+
+def test_other_code_other_entry(folder, monkeypatch):
+    """A map that other code computed is not used."""
+    build = Builder()
+    cached({"design": "a"}, build)
+    monkeypatch.setattr(cache, "code_version", lambda: "other")
+    cached({"design": "a"}, build)
+    assert build.count == 2
+
+
+def test_damaged_entry_is_built_again(folder, caplog):
+    """A damaged entry is reported, ignored and replaced."""
+    build = Builder()
+    cached({"design": "a"}, build)
+    (entry,) = folder.rglob("*.swg")
+    entry.write_bytes(entry.read_bytes()[:-30])
+    cached({"design": "a"}, build)
+    assert build.count == 2
+    assert "ignored" in caplog.text
+    cached({"design": "a"}, build)
+    assert build.count == 2
+
+
+def test_empty_variable_switches_off(monkeypatch):
+    """With an empty SWGJOINT_CACHE every request builds."""
+    monkeypatch.setenv("SWGJOINT_CACHE", "")
+    build = Builder()
+    cached({"design": "a"}, build)
+    cached({"design": "a"}, build)
+    assert build.count == 2
+    assert cache_folder() is None
+
+
+def test_platform_folder(monkeypatch):
+    """Without the variable the folder follows the platform; relative XDG is ignored."""
+    monkeypatch.delenv("SWGJOINT_CACHE", raising=False)
+    monkeypatch.setattr(cache.sys, "platform", "linux")
+    monkeypatch.setenv("XDG_CACHE_HOME", "/x/cache")
+    assert cache_folder() == Path("/x/cache/swgjoint")
+    monkeypatch.setenv("XDG_CACHE_HOME", "relative")
+    assert cache_folder() == Path.home() / ".cache" / "swgjoint"
+
+
+def test_unwritable_folder_is_no_obstacle(tmp_path, monkeypatch, caplog):
+    """Where the folder cannot be made the map is built and the log says so."""
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("SWGJOINT_CACHE", str(tmp_path / "file"))
+    build = Builder()
+    cached({"design": "a"}, build)
+    assert build.count == 1
+    assert "not kept" in caplog.text
+
+
+def test_name_is_not_content(folder):
+    """Two designs that differ in their name share an entry and keep their names."""
+    build = Builder()
+    assert cached({"design": "a"}, build, name="one").name == "one"
+    assert cached({"design": "a"}, build, name="two").name == "two"
+    assert build.count == 1
+
+
+def _write_many(parts: dict[str, str], stiffness: float) -> int:
+    sound = 0
+    for _ in range(40):
+        entry = cache.cache_folder() / "maps" / key_of(parts)[:2]
+        entry = entry / f"{key_of(parts)}.swg"
+        cache._built(entry, Builder(stiffness))
+        sound += cache._sound(entry) is not None
+    return sound
+
+
+def test_concurrent_writers(folder):
+    """Writers of the same entry at the same time never leave a damaged one."""
+    context = multiprocessing.get_context("spawn")
+    with context.Pool(3) as pool:
+        counts = pool.starmap(_write_many, [({"d": "a"}, k) for k in (1e4, 2e4, 3e4)])
+    assert counts == [40, 40, 40]
+    (entry,) = [p for p in folder.rglob("*") if p.is_file()]
+    drive = DriveMap.load(entry)
+    assert round(drive.mean_stiffness) in (10000, 20000, 30000)
+    assert map_bytes(replace(drive)) == entry.read_bytes()

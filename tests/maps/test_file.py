@@ -1,0 +1,277 @@
+"""The ``.swg`` file: what is written comes back, what is damaged is refused."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import struct
+import zipfile
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from swgjoint.errors import InputError, MapFileError
+from swgjoint.maps.drive_map import DriveMap
+from swgjoint.maps.file import MAX_BYTES, map_bytes
+
+ARRAYS = ("torsion_knots", "orders", "potential", "end_stiffness", "kinematic_error")
+
+
+def same(a: DriveMap, b: DriveMap) -> bool:
+    """Bitwise equality of everything a map holds."""
+    fields = set(a.__dataclass_fields__) - set(ARRAYS)
+    return all(getattr(a, key) == getattr(b, key) for key in fields) and all(
+        getattr(a, key).tobytes() == getattr(b, key).tobytes()
+        and getattr(a, key).shape == getattr(b, key).shape
+        for key in ARRAYS
+    )
+
+
+def repacked(data: bytes, compression: int = zipfile.ZIP_STORED, **members) -> bytes:
+    """The archive with some members replaced, added or (None) left out."""
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        content = {name: archive.read(name) for name in archive.namelist()}
+    for key, value in members.items():
+        content[f"{key}.npy"] = value
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w", compression) as archive:
+        for name, value in content.items():
+            if value is not None:
+                archive.writestr(name, value)
+    return out.getvalue()
+
+
+def npy(array: np.ndarray, **options) -> bytes:
+    out = io.BytesIO()
+    np.lib.format.write_array(out, np.asarray(array), **options)
+    return out.getvalue()
+
+
+def header_of(data: bytes) -> dict:
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        return json.loads(np.load(io.BytesIO(archive.read("header.npy"))).tobytes())
+
+
+def header_npy(header: object) -> bytes:
+    text = header if isinstance(header, bytes) else json.dumps(header).encode()
+    return npy(np.frombuffer(text, dtype=np.uint8))
+
+
+def refusal(tmp_path: Path, data: bytes) -> str:
+    """The one line with which a file is refused."""
+    path = tmp_path / "hostile.swg"
+    path.write_bytes(data)
+    with pytest.raises(MapFileError) as caught:
+        DriveMap.load(path)
+    message = str(caught.value)
+    assert "\n" not in message
+    assert message.startswith(f"map {path}: ")
+    assert len(message) < 500 + len(str(path))
+    return message
+
+
+def test_round_trip_is_bitwise(synthetic_map, tmp_path):
+    """A saved map is loaded with every bit of its arrays and all its fields."""
+    drive = replace(synthetic_map, info={"residual": {"torque_Nm": 1e-3}, "angles": 24})
+    drive.save(tmp_path / "a.swg")
+    assert same(DriveMap.load(tmp_path / "a.swg"), drive)
+    assert os.listdir(tmp_path) == ["a.swg"]
+
+
+def test_same_map_same_bytes(synthetic_map):
+    """The content depends on the map alone, not on the clock."""
+    assert map_bytes(synthetic_map) == map_bytes(replace(synthetic_map))
+
+
+def test_numpy_reads_the_file_without_pickle(synthetic_map, tmp_path):
+    """Any numpy reads the arrays; the header names the units."""
+    synthetic_map.save(tmp_path / "a.swg")
+    with np.load(tmp_path / "a.swg", allow_pickle=False) as arrays:
+        assert np.array_equal(arrays["potential"], synthetic_map.potential)
+        header = json.loads(arrays["header"].tobytes())
+    assert header["units"]["torsion_knots"] == "rad"
+    assert header["schema_version"] == 1
+
+
+def test_info_that_is_no_number_becomes_null(synthetic_map, tmp_path):
+    """NaN in the provenance is stored as null, never as invalid JSON."""
+    replace(synthetic_map, info={"x": float("nan")}).save(tmp_path / "a.swg")
+    assert DriveMap.load(tmp_path / "a.swg").info == {"x": None}
+
+
+def test_every_truncation_is_refused(synthetic_map, tmp_path):
+    """A file cut anywhere is refused in one line."""
+    data = map_bytes(synthetic_map)
+    for cut in [*range(0, 120), *range(120, len(data), 97), len(data) - 1]:
+        refusal(tmp_path, data[:cut])
+
+
+@settings(
+    max_examples=300,
+    deadline=None,
+    derandomize=True,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
+@given(where=st.floats(0, 1, exclude_max=True), bits=st.integers(1, 255))
+def test_a_changed_byte_never_gives_another_map(synthetic_map, tmp_path, where, bits):
+    """A file with a flipped byte is refused, or the byte did not matter."""
+    data = bytearray(map_bytes(synthetic_map))
+    data[int(where * len(data))] ^= bits
+    path = tmp_path / "flipped.swg"
+    path.write_bytes(data)
+    try:
+        drive = DriveMap.load(path)
+    except MapFileError as exc:
+        assert "\n" not in str(exc)
+    else:
+        assert same(drive, synthetic_map)
+
+
+def test_every_byte_of_the_directory(synthetic_map, tmp_path):
+    """Each byte of the archive's directory set to 0 and to 255 is refused or idle."""
+    data = map_bytes(synthetic_map)
+    path = tmp_path / "flipped.swg"
+    refused = 0
+    for at in range(data.index(b"PK\x01\x02"), len(data)):
+        for value in (0, 255):
+            changed = bytearray(data)
+            changed[at] = value
+            path.write_bytes(changed)
+            try:
+                assert same(DriveMap.load(path), synthetic_map)
+            except MapFileError as exc:
+                assert "\n" not in str(exc)
+                refused += 1
+    assert refused > 300
+
+
+@settings(
+    max_examples=200,
+    deadline=None,
+    derandomize=True,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
+@given(junk=st.binary(max_size=400))
+def test_junk_is_refused(tmp_path, junk):
+    """Bytes that were never a map are refused in one line."""
+    refusal(tmp_path, junk)
+    refusal(tmp_path, b"PK\x03\x04" + junk)
+
+
+def test_wrong_arrays(synthetic_map, tmp_path):
+    """Wrong shape, dtype, order, NaN and pickled objects are refused."""
+    data = map_bytes(synthetic_map)
+    c = synthetic_map.potential
+    nan = np.where(np.arange(c.size).reshape(c.shape) == 3, np.nan, c)
+    cases = {
+        "shape": {"potential": npy(c[:, :, 1:])},
+        "axes": {"potential": npy(c[0])},
+        "none empty": {"orders": npy(np.zeros((0, 2), dtype=np.int64))},
+        "<f4": {"potential": npy(c.astype(np.float32))},
+        "finite": {"potential": npy(nan)},
+        "increasing": {"torsion_knots": npy(synthetic_map.torsion_knots[::-1])},
+        "plain array": {"potential": npy(np.asfortranarray(c))},
+        "format 1.0": {"potential": npy(c, version=(2, 0))},
+        "falls": {"potential": npy(-c)},
+        "1e60": {"end_stiffness": npy(synthetic_map.end_stiffness * 1e90)},
+        "jumps": {"potential": npy(c + np.arange(8)[:, None])},
+        "1e6": {"orders": npy(synthetic_map.orders * 2**62)},
+    }
+    for word, members in cases.items():
+        assert word in refusal(tmp_path, repacked(data, **members)), word
+    pickled = npy(np.array([{"a": 1}], dtype=object), allow_pickle=True)
+    assert "plain array" in refusal(tmp_path, repacked(data, potential=pickled))
+
+
+def test_wrong_members(synthetic_map, tmp_path):
+    """Missing, additional, doubled and compressed members are refused."""
+    data = map_bytes(synthetic_map)
+    assert "members" in refusal(tmp_path, repacked(data, potential=None))
+    assert "members" in refusal(tmp_path, repacked(data, extra=npy(np.zeros(3))))
+    swapped = repacked(data, potential=None, other=npy(np.zeros(3)))
+    assert "needed" in refusal(tmp_path, swapped)
+    squeezed = repacked(data, zipfile.ZIP_DEFLATED)
+    assert "compressed" in refusal(tmp_path, squeezed)
+
+
+def test_zip_bomb(synthetic_map, tmp_path):
+    """A member that unpacks to a gigabyte is refused without unpacking it."""
+    data = map_bytes(synthetic_map)
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as archive:
+        with zipfile.ZipFile(io.BytesIO(data)) as sound:
+            for name in sound.namelist()[1:]:
+                archive.writestr(name, sound.read(name))
+        with archive.open("header.npy", "w") as member:
+            for _ in range(100):
+                member.write(bytes(10_000_000))
+    assert "compressed" in refusal(tmp_path, out.getvalue())
+
+
+def test_huge_claims(synthetic_map, tmp_path):
+    """Sizes that are claimed and not there are refused before allocation."""
+    data = map_bytes(synthetic_map)
+    head = (
+        b"{'descr': '<f8', 'fortran_order': False, 'shape': (900000000000, 8, 1, 5), }"
+    )
+    claim = b"\x93NUMPY\x01\x00" + struct.pack("<H", 118) + head.ljust(117) + b"\n"
+    assert "bytes" in refusal(tmp_path, repacked(data, potential=claim + bytes(40)))
+    # both sizes of the first entry of the directory: a member of 4 GB
+    at = data.index(b"PK\x01\x02")
+    large = data[: at + 20] + b"\xf0\xff\xff\xff" * 2 + data[at + 28 :]
+    assert "claim" in refusal(tmp_path, large)
+    with (tmp_path / "long.swg").open("wb") as file:
+        file.truncate(MAX_BYTES + 1)
+    with pytest.raises(MapFileError, match="at most"):
+        DriveMap.load(tmp_path / "long.swg")
+
+
+def test_wrong_headers(synthetic_map, tmp_path):
+    """A header of another schema, with wrong types or no JSON is refused."""
+    data = map_bytes(synthetic_map)
+    header = header_of(data)
+    ratings = header["ratings"]
+    cases = {
+        "schema version 2": {**header, "schema_version": 2},
+        "header: layout": {k: v for k, v in header.items() if k != "layout"},
+        "unknown key": {**header, "code": "x"},
+        "teeth_flexspline": {**header, "teeth_flexspline": 120.5},
+        "teeth 120 and 120": {**header, "teeth_circular_spline": 120},
+        "layout 'x'": {**header, "layout": "x"},
+        "ratings": {**header, "ratings": {**ratings, "T1": -1.0}},
+        "rated_torque": {**header, "ratings": {**ratings, "rated_torque": 10**400}},
+        "damping": {**header, "damping_ratio": -1},
+        "not a JSON object": [1, 2],
+        "not JSON": b"{" * 100_000,
+        "NaN": b'{"a": NaN}',
+        "integer string": b'{"a": ' + b"9" * 100_000 + b"}",
+        "'utf-8'": b'{"a": "\xff"}',
+    }
+    for word, changed in cases.items():
+        message = refusal(tmp_path, repacked(data, header=header_npy(changed)))
+        assert word.lower() in message.lower(), message
+
+
+def test_what_is_not_a_file(tmp_path):
+    """A folder, a missing file and a device are refused in one line."""
+    with pytest.raises(MapFileError, match="not a file"):
+        DriveMap.load(tmp_path)
+    with pytest.raises(MapFileError, match=r"cannot be read: No such file"):
+        DriveMap.load(tmp_path / "none.swg")
+    with pytest.raises(MapFileError, match="not a file"):
+        DriveMap.load("/dev/zero")
+
+
+def test_an_unsound_map_is_not_written(synthetic_map, tmp_path):
+    """What the reader would refuse is not written, and nothing is left behind."""
+    falling = replace(synthetic_map, potential=-synthetic_map.potential)
+    with pytest.raises(ValueError, match="falls"):
+        falling.save(tmp_path / "a.swg")
+    with pytest.raises(InputError, match="cannot write"):
+        synthetic_map.save(tmp_path / "none" / "a.swg")
+    assert os.listdir(tmp_path) == []
