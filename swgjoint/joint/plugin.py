@@ -1,0 +1,178 @@
+"""The engine plugin ``swgjoint.drive``: its library, its text attributes, a self-test.
+
+Development: one line builds the library in place, see ``swgjoint/plugin/README.md``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from swgjoint.errors import ComputationError
+from swgjoint.maps.drive_map import DriveMap
+
+NAME = "swgjoint.drive"
+MUJOCO_VERSION = "4.0.0"
+"""The version whose libmujoco the plugin is linked to (soname and struct layout)."""
+
+NUMERICAL_DAMPING = 0.1
+"""Share of a backward step mixed in for torsion modes that the step cannot resolve.
+
+Zero below h w = 0.5, 0.03 of critical at h w = 2; must be positive for the scheme to
+hold on stiff joints.
+"""
+PASSES = 2
+"""Evaluations of the map in a step: one prediction of the pair, then the force."""
+TENDON_STIFFNESS = (1e-9, 0.0, 1.0)
+"""Polynomial of the carrier tendon; its cubic turns a length into a tangent."""
+
+
+def library() -> Path:
+    """Where the installed package keeps the plugin library."""
+    return Path(__file__).parents[1] / "plugin" / "libswgjoint_plugin.so"
+
+
+@cache
+def load() -> None:
+    """Register the plugin with MuJoCo; does nothing when called again.
+
+    Raises:
+        ComputationError: If MuJoCo has another version or the library is not built.
+    """
+    if mujoco.__version__ != MUJOCO_VERSION:
+        raise ComputationError(
+            f"mujoco {mujoco.__version__} is installed, the drive plugin needs "
+            f"{MUJOCO_VERSION}: pip install mujoco=={MUJOCO_VERSION}"
+        )
+    path = library()
+    if not path.exists():
+        raise ComputationError(
+            f"the drive plugin for mujoco {MUJOCO_VERSION} is not built ({path} is "
+            "missing): reinstall swgjoint with a C++ compiler present, or use level "
+            "'rigid' or 'linear'"
+        )
+    try:
+        mujoco.mj_loadPluginLibrary(str(path))
+    except Exception as error:
+        raise ComputationError(
+            f"MuJoCo {MUJOCO_VERSION} does not load {path}: {error}"
+        ) from error
+
+
+def _text(values: np.ndarray) -> str:
+    # repr gives the shortest text that reads back to the same bits
+    return " ".join(repr(float(v)) for v in np.ravel(values))
+
+
+def config(
+    drive: DriveMap,
+    *,
+    damping: float,
+    numerical_damping: float = NUMERICAL_DAMPING,
+    passes: int = PASSES,
+) -> dict[str, str]:
+    """Text attributes of an instance; the model then needs no file.
+
+    Args:
+        drive: Map to evaluate.
+        damping: Torque per torsion rate [N·m·s/rad].
+        numerical_damping: See :data:`NUMERICAL_DAMPING` [-].
+        passes: See :data:`PASSES`.
+    """
+    return {
+        "ratio": repr(drive.ratio),
+        "orders": " ".join(str(int(n)) for n in np.ravel(drive.angle_orders)),
+        "knots": _text(drive.torsion_knots),
+        "potential": _text(drive.potential),
+        "end_stiffness": _text(drive.end_stiffness),
+        "kinematic_error": _text(drive.kinematic_error),
+        "damping": repr(float(damping)),
+        "numerical_damping": repr(float(numerical_damping)),
+        "passes": str(int(passes)),
+    }
+
+
+_SELF_TEST = """
+<mujoco>
+  <extension><plugin plugin="swgjoint.drive"><instance name="d">{config}</instance>
+  </plugin></extension>
+  <option timestep="0.002" integrator="discrete" gravity="0 0 0"/>
+  <worldbody>
+    <body><plugin instance="d"/>
+      <inertial pos="0 0 0" mass="1" diaginertia="4e-5 4e-5 4e-5"/>
+      <joint name="m" axis="0 0 1"/></body>
+    <body><inertial pos="0 0 0" mass="1" diaginertia="1 1 .5"/>
+      <joint name="l" axis="0 0 1"/></body>
+  </worldbody>
+  <tendon><fixed name="d" stiffness="1e-9 0 1" springlength="0">
+    <joint joint="m" coef="{coef!r}"/><joint joint="l" coef="-1"/></fixed></tendon>
+</mujoco>
+"""
+
+
+def metric_error() -> float:
+    """Difference of one step from (M + h² p g g')⁻¹ h f, relative to the step.
+
+    The scheme hands direction g and stiffness p to the engine through ``ten_J`` and
+    ``ten_length``, which no document promises; this asks the installed engine.
+    """
+    from swgjoint.joint.reference import Motion, scheme_force
+
+    load()
+    drive = DriveMap.linear(2e4)
+    drive = replace(
+        drive,
+        orders=np.array([[0, 0], [4, 0]]),
+        potential=np.concatenate([drive.potential, 0.0 * drive.potential]),
+        end_stiffness=np.concatenate([drive.end_stiffness, 0.0 * drive.end_stiffness]),
+        kinematic_error=np.array([[0.0, 0.0], [3e-4, 2e-4]]),
+    )
+    damping, h = 3.0, 0.002
+    keys = config(drive, damping=damping)
+    text = "".join(f'<config key="{k}" value="{v}"/>' for k, v in keys.items())
+    model = mujoco.MjModel.from_xml_string(
+        _SELF_TEST.format(config=text, coef=1.0 / drive.ratio)
+    )
+    data = mujoco.MjData(model)
+    data.qpos[:] = 0.3, 0.3 / drive.ratio + 1e-3
+    data.qvel[:] = v = np.array([20.0, 0.1])
+    inertia = np.array([4e-5, 0.5])
+    force = scheme_force(
+        drive,
+        Motion(
+            theta=0.3,
+            psi=float(data.qpos[1]),
+            theta_rate=v[0],
+            psi_rate=v[1],
+            rotor_weight=1.0 / inertia[0],
+            link_weight=1.0 / inertia[1],
+        ),
+        timestep=h,
+        damping=damping,
+    )
+    g = np.array([force.g_theta, force.g_psi])
+    metric = np.diag(inertia) + h * h * force.metric * np.outer(g, g)
+    expected = np.linalg.solve(metric, h * np.array([force.theta, force.psi]))
+    mujoco.mj_step(model, data)
+    return float(np.linalg.norm(data.qvel - v - expected) / np.linalg.norm(expected))
+
+
+@cache
+def require_metric() -> None:
+    """Refuse the discrete integrator if the engine does not take the metric.
+
+    Raises:
+        ComputationError: With the way out.
+    """
+    error = metric_error()
+    if not error < 1e-9:
+        raise ComputationError(
+            f"MuJoCo {mujoco.__version__} does not take the drive's stiffness into "
+            f"its discrete integrator (step wrong by {error:.1e} of itself): set "
+            "integrator RK4 and a step below 0.3 over the fastest torsion frequency "
+            "[rad/s]"
+        )

@@ -1,0 +1,50 @@
+// The engine plugin swgjoint.drive: one drive between a rotor and a link hinge.
+#ifndef SWGJOINT_PLUGIN_DRIVE_H_
+#define SWGJOINT_PLUGIN_DRIVE_H_
+
+#include <mujoco/mujoco.h>
+
+#include <memory>
+
+#include "drive_map.h"
+
+namespace swgjoint {
+
+class Drive {
+ public:
+  // Reads the attributes of an instance; null after mju_warning on a bad one.
+  static std::unique_ptr<Drive> Create(const mjModel* m, int instance);
+
+  // Adds the force and, for the discrete integrator, hands its linearisation over.
+  void Compute(const mjModel* m, mjData* d, int instance);
+
+  // After the step: keeps the acceleration that all other forces caused.
+  void Advance(const mjModel* m, mjData* d, int instance) const;
+
+  void Forget() { step_ = Step(); }
+
+  static void RegisterPlugin();
+
+ private:
+  // What Compute found and Advance needs, within one step.
+  struct Step {
+    bool scheme = false;
+    mjtNum v_rotor = 0, v_link = 0, w_rotor = 0, w_link = 0;  // velocity, 1/inertia
+    mjtNum force = 0, metric = 0;                             // lam, p
+    DriveValue value;
+  };
+
+  void AddGradient(const mjModel* m, mjData* d);
+  void AddScheme(const mjModel* m, mjData* d, int instance);
+
+  DriveMap map_;
+  mjtNum damping_ = 0, numerical_damping_ = 0;
+  int passes_ = 0;
+  int tendon_ = -1, entry_rotor_ = -1, entry_link_ = -1;  // tendon, entries of ten_J
+  int q_rotor_ = -1, q_link_ = -1, v_rotor_ = -1, v_link_ = -1;  // addresses
+  Step step_;
+};
+
+}  // namespace swgjoint
+
+#endif  // SWGJOINT_PLUGIN_DRIVE_H_

@@ -1,0 +1,80 @@
+// Potential map of one drive: V(torsion, angles) and its discrete gradient.
+// The same law as swgjoint/maps/drive_map.py; formulas in README.md.
+#ifndef SWGJOINT_PLUGIN_DRIVE_MAP_H_
+#define SWGJOINT_PLUGIN_DRIVE_MAP_H_
+
+#include <string>
+#include <vector>
+
+namespace swgjoint {
+
+// Text attributes of an instance, as they stand in the model.
+struct DriveText {
+  const char* ratio;
+  const char* orders;
+  const char* knots;
+  const char* potential;
+  const char* end_stiffness;
+  const char* kinematic_error;
+};
+
+// Reads a whole string of numbers; returns false unless every character is used
+// and every number is finite.
+bool ParseNumbers(const char* text, std::vector<double>* out);
+
+// V and its derivatives at one state (Gradient) or over one step (Secant).
+struct DriveValue {
+  double g_theta = 0, g_psi = 0;  // d(torsion)/d(theta, psi)
+  double torque = 0;              // dV/d(torsion) at fixed angles [N m]
+  double slope = 0;               // d(torque)/d(torsion at the end of the step)
+  double stiffness_begin = 0, stiffness_end = 0;  // d2V/d(torsion)2 [N m/rad]
+  double e_theta = 0, e_psi = 0;  // dV/d(theta, psi) at fixed torsion [N m]
+};
+
+class DriveMap {
+ public:
+  // On failure returns false and says in `error` which attribute is wrong.
+  bool Parse(const DriveText& text, std::string* error);
+
+  double ratio() const { return ratio_; }
+
+  // Gradient of V at one state.
+  void Gradient(double theta, double psi, DriveValue* out);
+
+  // Sets the state from which the following Secant calls step.
+  void Begin(double theta, double psi);
+
+  // Discrete gradient from the begin state to begin + (dtheta, dpsi):
+  // (torque g + e) . (dtheta, dpsi) is the change of V, to round-off.
+  void Secant(double dtheta, double dpsi, DriveValue* out);
+
+ private:
+  // How cos and sin of one harmonic follow from those of earlier ones.
+  struct Recipe {
+    int a = -1, b = -1;  // harmonics whose phases add; a < 0: call sin and cos
+    double sign = 1;     // phase = phase_a + sign * phase_b
+  };
+
+  int Segment(double torsion) const;
+  void Rotate(double theta, double psi, double* c, double* s) const;
+  void Combine(int segment, const double* wa, const double* wb,
+               double out[5]) const;
+
+  int n_ = 0;         // harmonics, the mean first
+  int segments_ = 0;  // intervals between knots and the two continuations
+  bool moves_theta_ = false, moves_psi_ = false;
+  double ratio_ = 1;
+  std::vector<double> knots_;
+  std::vector<double> base_;   // (segments) torsion about which a segment expands
+  std::vector<double> table_;  // (segments, n, 10): A0..A4, B0..B4
+  std::vector<double> n_theta_, n_psi_, error_cos_, error_sin_;
+  std::vector<Recipe> recipe_;
+
+  // scratch of (n), so that nothing is allocated in a step
+  double torsion_ = 0;  // at the begin state
+  std::vector<double> c_, s_, ch_, sh_, wa_, wb_, ta_, tb_, pa_, pb_;
+};
+
+}  // namespace swgjoint
+
+#endif  // SWGJOINT_PLUGIN_DRIVE_MAP_H_
