@@ -1,0 +1,7 @@
+"""``python -m swgjoint``."""
+
+import sys
+
+from swgjoint.cli.main import main
+
+sys.exit(main())

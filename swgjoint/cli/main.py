@@ -1,0 +1,161 @@
+"""Entry point of the ``swgjoint`` command.
+
+Only the module of the chosen command is imported, so that ``--help`` is immediate. A
+command module has ``configure(parser)``, ``run(args) -> dict`` (the JSON object) and
+``report(result) -> str`` (for the terminal); optionally ``status(result) -> int``.
+``args.progress`` is the callback for long work.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from difflib import get_close_matches
+from importlib import import_module
+from typing import Any, NoReturn
+
+from swgjoint import __version__
+from swgjoint.errors import InputError, SwgError
+from swgjoint.progress import StderrProgress
+
+COMMANDS = {
+    "demo": "the bundled scene, from finite elements to the recording and a picture",
+    "profile": "tooth profile of both members: report and picture",
+    "meshing": "simulation of meshing with finite elements",
+    "map": "build the map of a drive and save it",
+    "run": "simulate an arm with its drives",
+    "view": "open a recording",
+    "doctor": "versions, engine plugin, cache, optional parts",
+}
+
+BAD_INPUT = 2
+FAILED = 1
+INTERRUPTED = 130
+BROKEN_PIPE = 141
+
+
+class Parser(argparse.ArgumentParser):
+    """Parser whose errors are one line on stderr, exit status 2."""
+
+    def error(self, message: str) -> NoReturn:
+        """Print the fault and where help is."""
+        self.exit(BAD_INPUT, f"{self.prog}: {message}; see '{self.prog} --help'\n")
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command.
+
+    Returns:
+        Exit status: 0, 1 for a computation that failed, 2 for bad input.
+    """
+    arguments = list(sys.argv[1:] if argv is None else argv)
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):  # an ASCII terminal shows ? for a unit
+            stream.reconfigure(errors="replace")
+    try:
+        if arguments and arguments[0] in COMMANDS:
+            return _command(arguments[0], arguments[1:])
+        return _top(arguments)
+    except BrokenPipeError:
+        # the reader left; the interpreter must not complain when it flushes
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        return BROKEN_PIPE
+    except KeyboardInterrupt:
+        print("swgjoint: interrupted", file=sys.stderr)
+        return INTERRUPTED
+
+
+def _top(arguments: list[str]) -> int:
+    width = max(map(len, COMMANDS)) + 2
+    listing = "\n".join(f"  {name:{width}}{text}" for name, text in COMMANDS.items())
+    parser = Parser(
+        prog="swgjoint",
+        usage="swgjoint COMMAND ... [--json]",
+        description="From the tooth geometry of a strain wave gear to robot behaviour.",
+        epilog=f"commands:\n{listing}\n\n'swgjoint COMMAND --help' shows its options.",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        allow_abbrev=False,
+    )
+    parser.add_argument("--version", action="version", version=__version__)
+    parser.add_argument("command", nargs="?", help=argparse.SUPPRESS)
+    args, _ = parser.parse_known_args(arguments)
+    if args.command is None:
+        if arguments:
+            parser.error(f"unknown option {arguments[0]}")
+        parser.print_help(sys.stderr)
+        return BAD_INPUT
+    near = get_close_matches(args.command, COMMANDS, n=1)
+    hint = f"did you mean {near[0]}? " if near else ""
+    if args.command in COMMANDS:
+        parser.error(f"options stand after the command: swgjoint {args.command} ...")
+    parser.error(
+        f"unknown command {args.command!r}; {hint}one of {', '.join(COMMANDS)}"
+    )
+
+
+def _command(name: str, arguments: list[str]) -> int:
+    module = import_module(f"swgjoint.cli.{name}")
+    parser = Parser(
+        prog=f"swgjoint {name}", description=COMMANDS[name], allow_abbrev=False
+    )
+    module.configure(parser)
+    parser.add_argument(
+        "--json", action="store_true", help="one JSON object on stdout, nothing else"
+    )
+    args = parser.parse_args(arguments)
+    args.progress = StderrProgress()
+    warnings.showwarning = _show_warning
+    try:
+        if args.json:
+            from swgjoint.json_text import json_text
+
+            with _stdout_on_stderr():
+                result = module.run(args)
+            print(json_text(result, ascii_only=True))
+        else:
+            result = module.run(args)
+            print(module.report(result))
+        sys.stdout.flush()
+    except SwgError as exc:
+        return _refuse(name, str(exc), BAD_INPUT if _is_input(exc) else FAILED)
+    except BrokenPipeError:
+        raise
+    except OSError as exc:  # disk full, no permission: nothing that we can repair
+        what = f"{exc.filename}: " if exc.filename else ""
+        return _refuse(name, f"{what}{exc.strerror or exc}", FAILED)
+    except MemoryError:
+        return _refuse(name, "out of memory: use a smaller refinement", FAILED)
+    status = getattr(module, "status", None)
+    return int(status(result)) if status else 0
+
+
+def _is_input(exc: SwgError) -> bool:
+    return isinstance(exc, InputError)
+
+
+def _refuse(name: str, message: str, status: int) -> int:
+    for line in message.splitlines():
+        print(f"swgjoint {name}: {line}", file=sys.stderr)
+    return status
+
+
+def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
+    print(f"swgjoint: warning: {message}", file=sys.stderr)
+
+
+@contextmanager
+def _stdout_on_stderr() -> Iterator[None]:
+    """Send what libraries print, also from C, to stderr."""
+    kept, sys.stdout = sys.stdout, sys.stderr
+    copy = os.dup(1)
+    try:
+        os.dup2(2, 1)
+        yield
+    finally:
+        sys.stdout = kept
+        os.dup2(copy, 1)
+        os.close(copy)
