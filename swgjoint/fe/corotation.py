@@ -1,0 +1,156 @@
+r"""Corotational sectors: large rotations, small strains within a sector.
+
+Each sector s has one frame, rotated by :math:`\varphi_s` against its place in the
+undeformed ring; :math:`\varphi_s` is the best-fit rotation of its two faces. With y the
+node positions seen in that frame, the energy is
+
+.. math:: E = \tfrac12 d^T \hat K d - F^T A d - \tfrac12 F^T C F + \dots, \quad
+    d = y - X .
+
+The gradient and the tangent below are exact for dead forces F in the sector frame.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.fe.superelement import Superelement
+
+Array = NDArray[np.float64]
+
+
+def rotate(vectors: Array, angle: Array | float) -> Array:
+    """Rotate plane vectors (..., 2) counter-clockwise by angles (...)."""
+    cos, sin = np.cos(angle), np.sin(angle)
+    x, y = vectors[..., 0], vectors[..., 1]
+    return np.stack([cos * x - sin * y, sin * x + cos * y], axis=-1)
+
+
+def turned(vectors: Array) -> Array:
+    """Rotate plane vectors by a right angle: J v."""
+    return np.stack([-vectors[..., 1], vectors[..., 0]], axis=-1)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Frames:
+    """Kinematics of all sectors at one state; n = 2 n_a."""
+
+    angle: Array
+    """Rotation from the tooth frame to the global frame [rad]. Shape (N,)."""
+    position: Array
+    """y, skeleton positions in the sector frames [m]. Shape (N, n)."""
+    displacement: Array
+    """d = y - X [m]. Shape (N, n)."""
+    spin: Array
+    """Gamma, derivative of the frame angle by y [rad/m]. Shape (N, n); zero if linear."""
+    gyration: Array
+    """Sum X_c . y_c over the face nodes, C [m^2]. Shape (N,)."""
+
+
+def sector_frames(
+    element: Superelement,
+    positions: Array,
+    place: Array,
+    *,
+    fixed: Array | None = None,
+) -> Frames:
+    """Frames of the sectors.
+
+    Args:
+        element: The condensed sector.
+        positions: Skeleton nodes in the global frame (N, n_a, 2) [m].
+        place: Angle of each sector in the undeformed ring (N,) [rad].
+        fixed: Frame rotations to keep instead of fitting them (linear level) [rad].
+    """
+    reference = element.skeleton
+    size = element.face_size
+    faces = np.r_[0:size, len(reference) - size : len(reference)]
+    x_c = reference[faces] - reference[faces].mean(axis=0)
+    seen = rotate(positions, -place[:, None])
+    n = len(positions)
+    if fixed is None:
+        cross = np.einsum("ci,sci->s", turned(x_c), seen[:, faces])
+        dot = np.einsum("ci,sci->s", x_c, seen[:, faces])
+        phi = np.arctan2(cross, dot)
+    else:
+        phi = fixed
+    y = rotate(seen, -phi[:, None])
+    spin = np.zeros_like(y)
+    gyration = np.einsum("ci,sci->s", x_c, y[:, faces])
+    if fixed is None:
+        # d phi = sum X_c x dy_c / C = sum (J X_c) . dy_c / C
+        spin[:, faces] = turned(x_c) / gyration[:, None, None]
+    return Frames(
+        angle=place + phi,
+        position=y.reshape(n, -1),
+        displacement=(y - reference).reshape(n, -1),
+        spin=spin.reshape(n, -1),
+        gyration=gyration,
+    )
+
+
+def elastic_energy(element: Superelement, frames: Frames, flank_force: Array) -> Array:
+    """Strain energy of each sector, flank forces included (N,) [J].
+
+    1/2 d_a K d_a + 1/2 F C F: the flank displacement d_b = A d_a + C F splits the energy
+    of the uncondensed sector into these two parts.
+    """
+    d = frames.displacement
+    return np.asarray(
+        0.5 * np.einsum("si,ij,sj->s", d, element.stiffness, d)
+        + 0.5
+        * np.einsum(
+            "si,ij,sj->s", flank_force, element.flank_compliance, flank_force
+        )
+    )
+
+
+def projected(frames: Frames, force: Array) -> Array:
+    r"""Gradient by the positions seen in the sector frame: P^T f.
+
+    .. math:: P = I - (J y)\,\Gamma^T
+    """
+    j_y = turned(frames.position.reshape(*force.shape[:-1], -1, 2)).reshape(force.shape)
+    return np.asarray(
+        force - frames.spin * np.einsum("si,si->s", force, j_y)[:, None]
+    )
+
+
+def tangent(element: Superelement, frames: Frames, force: Array) -> Array:
+    r"""Second derivative of the energy by the positions, in the sector frames.
+
+    .. math::
+        H = P^T \hat K P + \Gamma (Jf)^T + (Jf)\Gamma^T
+            + \frac{m}{C}(\Gamma X_c^T + X_c\Gamma^T) - (f\cdot y)\Gamma\Gamma^T,
+        \quad m = f\cdot Jy .
+
+    Args:
+        element: The condensed sector.
+        frames: From :func:`sector_frames`.
+        force: f, nodal forces in the sector frames (N, n) [N].
+
+    Returns:
+        Symmetric matrices (N, n, n) [N/m].
+    """
+    n_sectors, n = force.shape
+    gamma = frames.spin
+    stiffness = element.stiffness
+    if not gamma.any():
+        return np.broadcast_to(stiffness, (n_sectors, n, n)).copy()
+    y = frames.position
+    j_y = turned(y.reshape(n_sectors, -1, 2)).reshape(n_sectors, n)
+    j_f = turned(force.reshape(n_sectors, -1, 2)).reshape(n_sectors, n)
+    # P^T K P = K - Gamma (K Jy)^T - (K Jy) Gamma^T + (Jy K Jy) Gamma Gamma^T
+    k_jy = j_y @ stiffness
+    quadratic = np.einsum("si,si->s", j_y, k_jy) - np.einsum("si,si->s", force, y)
+    moment = np.einsum("si,si->s", force, j_y)
+    # Gamma = J X_c / C, hence X_c = -C J Gamma
+    x_c = -turned(gamma.reshape(n_sectors, -1, 2)).reshape(n_sectors, n)
+    x_c *= frames.gyration[:, None]
+    column = j_f - k_jy + (moment / frames.gyration)[:, None] * x_c
+    column += 0.5 * quadratic[:, None] * gamma
+    outer = gamma[:, :, None] * column[:, None, :]
+    return np.asarray(stiffness + outer + outer.transpose(0, 2, 1))

@@ -1,0 +1,101 @@
+"""Direct solution of rings of condensed sectors."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg.lapack import dgbtrf, dgbtrs
+
+Array = NDArray[np.float64]
+
+
+class SingularRingError(ArithmeticError):
+    """The ring of sectors has a zero pivot."""
+
+
+class CyclicFactor:
+    """Factorised ring: each sector couples its first face, its inside, its last face.
+
+    The insides are eliminated sector by sector; the faces form a cyclic block
+    tridiagonal matrix, which becomes banded when the ring is folded (order 0, N-1, 1,
+    N-2, ...) and is factorised by LAPACK.
+    """
+
+    def __init__(self, blocks: Array, face: int) -> None:
+        """Factorise.
+
+        Args:
+            blocks: Sector matrices (N, n, n), degrees of freedom in the order first
+                face, inside, last face; the last face of a sector is the first of the
+                next, of the last sector that of sector 0.
+            face: Degrees of freedom of a face.
+
+        Raises:
+            SingularRingError: If a pivot vanishes.
+        """
+        n_sectors, n, _ = blocks.shape
+        self._face, self._sectors = face, n_sectors
+        inner = slice(face, n - face)
+        outer = np.r_[0:face, n - face : n]
+        self._outer, self._inner = outer, inner
+        try:
+            self._inverse = np.linalg.inv(blocks[:, inner, inner])
+        except np.linalg.LinAlgError as error:
+            raise SingularRingError from error
+        self._coupling = blocks[:, inner][:, :, outer]
+        self._reach = self._inverse @ self._coupling
+        schur = blocks[:, outer][:, :, outer] - np.einsum(
+            "sio,sip->sop", self._coupling, self._reach
+        )
+        order = np.empty(n_sectors, dtype=np.int64)
+        order[0::2] = np.arange((n_sectors + 1) // 2)
+        order[1::2] = n_sectors - 1 - np.arange(n_sectors // 2)
+        position = np.empty_like(order)
+        position[order] = np.arange(n_sectors)
+        self._order = order
+        # neighbours are at most two places apart in the folded order
+        band = 3 * face - 1 if n_sectors > 2 else 2 * face - 1
+        size = n_sectors * face
+        packed = np.zeros((3 * band + 1, size))
+        first = position
+        last = np.roll(position, -1)
+        dofs = np.concatenate(
+            [
+                first[:, None] * face + np.arange(face),
+                last[:, None] * face + np.arange(face),
+            ],
+            axis=1,
+        )
+        rows = np.broadcast_to(dofs[:, :, None], schur.shape)
+        columns = np.broadcast_to(dofs[:, None, :], schur.shape)
+        np.add.at(packed, (2 * band + rows - columns, columns), schur)
+        self._band = band
+        self._lu, self._pivots, info = dgbtrf(packed, band, band, overwrite_ab=True)
+        if info != 0:
+            raise SingularRingError
+
+    def solve(self, rhs: Array) -> Array:
+        """Solve for many right-hand sides given per sector.
+
+        Args:
+            rhs: Contributions of each sector (N, n, k); those of a shared face add up.
+
+        Returns:
+            Solution at the degrees of freedom of each sector (N, n, k).
+        """
+        face, n = self._face, rhs.shape[1]
+        inside = rhs[:, self._inner]
+        outer = rhs[:, self._outer] - np.einsum("sio,sik->sok", self._reach, inside)
+        faces = outer[:, :face] + np.roll(outer[:, face:], 1, axis=0)
+        folded = faces[self._order].reshape(self._sectors * face, -1)
+        solved, info = dgbtrs(self._lu, self._band, self._band, folded, self._pivots)
+        if info != 0:
+            raise SingularRingError
+        faces = np.empty_like(faces)
+        faces[self._order] = solved.reshape(self._sectors, face, -1)
+        result = np.empty_like(rhs)
+        result[:, :face] = faces
+        result[:, n - face :] = np.roll(faces, -1, axis=0)
+        both = result[:, self._outer]
+        result[:, self._inner] = self._inverse @ inside - self._reach @ both
+        return result

@@ -1,0 +1,140 @@
+"""Static condensation of one tooth sector to the nodes that a drive model needs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+from scipy.sparse.linalg import splu
+
+from swgjoint.fe.elasticity import (
+    nodal_stress_operator,
+    plane_stress_basis,
+    stiffness_matrix,
+)
+from swgjoint.fe.sector_mesh import SectorMesh
+from swgjoint.gear.profile import ToothProfile
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Superelement:
+    r"""Condensed sector, in the frame of its tooth (tooth centred on +y).
+
+    Skeleton nodes (a): first face, inner bore nodes, last face. Flank nodes (b): right
+    then left flank, without those on the faces. With the flanks loaded by forces F,
+
+    .. math:: d_b = A d_a + C F, \quad
+        f_a = \hat K d_a - A^T F, \quad
+        \sigma = M_a d_a + M_F F .
+
+    Vectors list x and y of node after node.
+    """
+
+    sectors: int
+    skeleton: Array
+    """Reference positions of the skeleton nodes [m]. Shape (n_a, 2)."""
+    face_size: int
+    stiffness: Array
+    """K hat [N/m]. Shape (2 n_a, 2 n_a)."""
+    flank_from_skeleton: Array
+    """A. Shape (2 n_b, 2 n_a)."""
+    flank_compliance: Array
+    """C [m/N]. Shape (2 n_b, 2 n_b)."""
+    stress_from_skeleton: Array
+    """M_a [Pa/m]. Shape (n_nodes, 3, 2 n_a)."""
+    stress_from_flank: Array
+    """M_F [Pa/N]. Shape (n_nodes, 3, 2 n_b)."""
+    mesh: SectorMesh
+    profile: ToothProfile
+    spline: CubicSpline
+    """Weights of the flank nodes at an arc length, C2 between the nodes."""
+
+    @property
+    def flank_size(self) -> int:
+        """Nodes of one flank."""
+        return self.flank_compliance.shape[0] // 4
+
+    @property
+    def bore_size(self) -> int:
+        """Bore nodes inside the sector, faces excluded."""
+        return len(self.skeleton) - 2 * self.face_size
+
+    @property
+    def flank_range(self) -> tuple[float, float]:
+        """Arc length over which a flank can touch: tip arc to root arc [m]."""
+        low, high = self.profile.range_of("tip", "root")
+        return max(low, float(self.spline.x[0])), min(high, float(self.spline.x[-1]))
+
+
+def condense(
+    mesh: SectorMesh,
+    profile: ToothProfile,
+    *,
+    youngs_modulus: float,
+    poisson_ratio: float,
+    width: float,
+) -> Superelement:
+    """Condense a sector mesh, in real arithmetic, once per member.
+
+    Args:
+        mesh: Sector of one tooth.
+        profile: Its flank.
+        youngs_modulus: [Pa].
+        poisson_ratio: [-].
+        width: Face width [m].
+    """
+    basis = plane_stress_basis(mesh.mesh)
+    matrix = stiffness_matrix(basis, youngs_modulus, poisson_ratio, width)
+    skeleton = np.concatenate([mesh.face_first, mesh.bore[1:-1], mesh.face_last])
+    flank = np.concatenate([mesh.flank_right[:-1], mesh.flank_left[:-1]])
+
+    def dofs(nodes: Index) -> Index:
+        return np.asarray(basis.nodal_dofs[:, nodes].T.ravel(), dtype=np.int64)
+
+    a, b = dofs(skeleton), dofs(flank)
+    kept = np.concatenate([a, b])
+    inner = np.setdiff1d(np.arange(basis.N), kept)
+    columns = matrix.tocsc()
+    factor = splu(
+        columns[np.ix_(inner, inner)],
+        permc_spec="MMD_AT_PLUS_A",
+        options={"SymmetricMode": True},
+    )
+    inner_from_kept = -factor.solve(columns[np.ix_(inner, kept)].toarray())
+    reduced = columns[np.ix_(kept, kept)].toarray()
+    reduced += columns[np.ix_(kept, inner)] @ inner_from_kept
+    reduced = 0.5 * (reduced + reduced.T)
+
+    n = a.size
+    compliance = np.linalg.inv(reduced[n:, n:])
+    compliance = 0.5 * (compliance + compliance.T)
+    flank_from_skeleton = -compliance @ reduced[n:, :n]
+    stiffness = reduced[:n, :n] + reduced[:n, n:] @ flank_from_skeleton
+    stiffness = 0.5 * (stiffness + stiffness.T)
+
+    operator = nodal_stress_operator(basis, youngs_modulus, poisson_ratio).tocsc()
+    from_kept = (
+        operator[:, kept].toarray() + operator[:, inner] @ inner_from_kept
+    )
+    from_a = from_kept[:, :n] + from_kept[:, n:] @ flank_from_skeleton
+    from_flank = from_kept[:, n:] @ compliance
+    nodes = mesh.mesh.p.shape[1]
+    stations = mesh.flank_stations[:-1]
+    return Superelement(
+        sectors=profile.teeth,
+        skeleton=np.ascontiguousarray(mesh.mesh.p[:, skeleton].T),
+        face_size=len(mesh.face_first),
+        stiffness=stiffness,
+        flank_from_skeleton=flank_from_skeleton,
+        flank_compliance=compliance,
+        stress_from_skeleton=from_a.reshape(nodes, 3, -1),
+        stress_from_flank=from_flank.reshape(nodes, 3, -1),
+        mesh=mesh,
+        profile=profile,
+        spline=CubicSpline(stations, np.eye(stations.size)),
+    )
