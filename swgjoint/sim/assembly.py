@@ -1,0 +1,252 @@
+"""From a scene to a compiled model: arm, drives, motors, loads."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.errors import InputError
+from swgjoint.joint.attach import attach
+from swgjoint.joint.drive import JointDrive
+from swgjoint.maps.drive_map import DriveMap
+from swgjoint.progress import Progress, silent
+from swgjoint.sim.control import add_actuators, control_gains, feedforward
+from swgjoint.sim.drives import check_joint_names, drive_of
+from swgjoint.sim.rigid_arm import RigidArm, compile_spec
+from swgjoint.sim.scene import Scene
+from swgjoint.sim.scene_sections import JointSection
+from swgjoint.sim.trajectory import Trajectory, constant_speed, sweep
+from swgjoint.sim.transmission import Transmission
+from swgjoint.units import deg
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Assembly:
+    """A scene ready to run. Axes of joints follow ``joints``."""
+
+    scene: Scene
+    arm: RigidArm
+    model: mujoco.MjModel
+    joints: tuple[str, ...]
+    transmissions: tuple[Transmission, ...]
+    trajectory: Trajectory
+    stiffness: Array
+    """Control gain on the motor angle [N·m/rad]. Shape (n_joints,)."""
+    damping: Array
+    """Control gain on the motor speed [N·m·s/rad]. Shape (n_joints,)."""
+    load: Array
+    """Torque of the load against every joint [N·m]. Shape (n_joints,)."""
+    link_torque: Array
+    """Drive torque that the rigid arm needs on the motion [N·m]. (n, n_joints)."""
+    feedforward: Array
+    """Motor torque of the feed-forward [N·m]. Shape (n, n_joints)."""
+    link_position: NDArray[np.intp]
+    """Addresses of the link angles in qpos. Shape (n_joints,)."""
+    link_velocity: NDArray[np.intp]
+    motor_position: NDArray[np.intp]
+    """Addresses of the motor angles in qpos, -1 for a rigid joint. (n_joints,)."""
+    motor_velocity: NDArray[np.intp]
+
+    @property
+    def ratio(self) -> Array:
+        """Signed ratios. Shape (n_joints,)."""
+        return np.array([t.ratio for t in self.transmissions])
+
+    @property
+    def rotor_inertia(self) -> Array:
+        """[kg·m²] about the motor axes. Shape (n_joints,)."""
+        return np.array([t.rotor_inertia for t in self.transmissions])
+
+
+def assemble(
+    scene: Scene,
+    *,
+    drives: Mapping[str, DriveMap] | None = None,
+    progress: Progress = silent,
+) -> Assembly:
+    """Build the model of a scene.
+
+    Args:
+        scene: The scene.
+        drives: Maps that stand for drive references of the scene; others are loaded
+            or built.
+        progress: Called while maps are built.
+
+    Raises:
+        InputError: If a joint or drive does not exist or does not fit.
+    """
+    arm = RigidArm(scene.arm, tool_site=scene.tool_site)
+    check_joint_names(
+        {
+            "joints": set(scene.joints),
+            "load": set(scene.load),
+            **{f"trajectory.{k}": v for k, v in scene.trajectory.named_joints.items()},
+        },
+        arm.joints,
+        where=scene.where,
+        arm=scene.arm,
+    )
+    sections = _complete_sections(scene, arm.joints)
+    trajectory = trajectory_of(scene, arm.joints)
+    known = dict(drives or {})
+    spec = arm.spec()
+    spec.option.timestep = scene.simulation.step_s
+    spec.option.integrator = getattr(
+        mujoco.mjtIntegrator, f"mjINT_{scene.simulation.integrator.upper()}"
+    )
+
+    transmissions = []
+    for name, section, speed in zip(
+        arm.joints, sections, trajectory.top_speed, strict=True
+    ):
+        drive = drive_of(section, known=known, progress=progress)
+        attached = attach(
+            spec,
+            joint=name,
+            drive=drive,
+            level=section.level or "full",
+            rotor_inertia=section.rotor_inertia_kgm2 or 0.0,
+            damping_ratio=section.damping_ratio,
+            # a joint at rest carries every order
+            max_input_speed=float(abs(drive.ratio) * speed) or None,
+        )
+        transmissions.append(transmission_of(attached, drive))
+
+    load = np.array(
+        [
+            _load_torque(scene, name, t.drive)
+            for name, t in zip(arm.joints, transmissions, strict=True)
+        ]
+    )
+    ratio = np.array([t.ratio for t in transmissions])
+    rotor = np.array([t.rotor_inertia for t in transmissions])
+    stiffness, damping = control_gains(
+        scene.controller, rotor + arm.inertia(trajectory.position[0]) / ratio**2
+    )
+    add_actuators(spec, transmissions, stiffness, damping, load)
+    model = compile_spec(spec, where=f"scene {scene.name!r}")
+    link_torque = load + arm.torques(
+        trajectory.position, trajectory.velocity, trajectory.acceleration
+    )
+    return Assembly(
+        scene=scene,
+        arm=arm,
+        model=model,
+        joints=arm.joints,
+        transmissions=tuple(transmissions),
+        trajectory=trajectory,
+        stiffness=stiffness,
+        damping=damping,
+        load=load,
+        link_torque=link_torque,
+        feedforward=feedforward(
+            scene.controller.feedforward,
+            weight=load + arm.gravity(trajectory.position),
+            link_torque=link_torque,
+            acceleration=trajectory.acceleration,
+            ratio=ratio,
+            rotor_inertia=rotor,
+        ),
+        **_addresses(model, arm.joints, transmissions),
+    )
+
+
+def trajectory_of(scene: Scene, joints: tuple[str, ...]) -> Trajectory:
+    """The commanded motion of all joints of an arm."""
+    section, timing = scene.trajectory, scene.simulation
+    start = np.array([section.start_deg.get(name, 0.0) for name in joints]) * deg
+    if section.kind == "constant_speed":
+        speed = np.array([section.speed_deg_s.get(name, 0.0) for name in joints])
+        return constant_speed(
+            start=start,
+            speed=speed * deg,
+            duration=timing.duration_s,
+            step=timing.step_s,
+            settle=section.settle_s,
+        )
+    end = [
+        section.end_deg.get(name, section.start_deg.get(name, 0.0)) for name in joints
+    ]
+    return sweep(
+        start=start,
+        end=np.array(end) * deg,
+        duration=timing.duration_s,
+        step=timing.step_s,
+        hold=section.hold_s,
+        ramp=section.ramp_s,
+        settle=section.settle_s,
+    )
+
+
+def transmission_of(attached: JointDrive, drive: DriveMap) -> Transmission:
+    """What the compiled model contains of one joint's drive."""
+    law: DriveMap | None = None
+    if attached.level == "full":
+        law = attached.drive
+    elif attached.level == "linear":
+        law = DriveMap.linear(
+            attached.stiffness,
+            layout=drive.layout,
+            teeth_flexspline=drive.teeth_flexspline,
+            teeth_circular_spline=drive.teeth_circular_spline,
+            rated_torque=drive.ratings.rated_torque,
+            name=drive.name,
+        )
+    return Transmission(attached=attached, drive=drive, law=law)
+
+
+def _complete_sections(
+    scene: Scene, joints: tuple[str, ...]
+) -> tuple[JointSection, ...]:
+    """Settings of all joints; refuses what is missing, all at once."""
+    sections = tuple(scene.of_joint(name) for name in joints)
+    lines = []
+    for name, section in zip(joints, sections, strict=True):
+        if section.drive is None and section.linear is None:
+            lines.append(
+                f"{scene.where}: joints.{name}.drive: missing; accepted: drive or"
+                " linear, here or in [defaults]"
+            )
+        if section.rotor_inertia_kgm2 is None:
+            lines.append(
+                f"{scene.where}: joints.{name}.rotor_inertia_kgm2: missing; accepted:"
+                " > 0 kg·m² and <= 1 kg·m², here or in [defaults]"
+            )
+    if lines:
+        raise InputError("\n".join(lines))
+    return sections
+
+
+def _load_torque(scene: Scene, joint: str, drive: DriveMap) -> float:
+    load = scene.load.get(joint)
+    if load is None:
+        return 0.0
+    if load.torque_Nm is not None:
+        return load.torque_Nm
+    return (load.rated_fraction or 0.0) * drive.ratings.rated_torque
+
+
+def _addresses(
+    model: mujoco.MjModel, joints: tuple[str, ...], transmissions: list[Transmission]
+) -> dict[str, NDArray[np.intp]]:
+    """Where link and motor angles lie in the state."""
+    rotors = [
+        None if t.law is None else model.joint(t.attached.rotor) for t in transmissions
+    ]
+    links = [model.joint(name) for name in joints]
+    return {
+        "link_position": np.array([j.qposadr[0] for j in links], dtype=np.intp),
+        "link_velocity": np.array([j.dofadr[0] for j in links], dtype=np.intp),
+        "motor_position": np.array(
+            [-1 if j is None else j.qposadr[0] for j in rotors], dtype=np.intp
+        ),
+        "motor_velocity": np.array(
+            [-1 if j is None else j.dofadr[0] for j in rotors], dtype=np.intp
+        ),
+    }

@@ -1,0 +1,184 @@
+"""Figures of a run, defined once; keys and units are those of the JSON output.
+
+All joint figures are taken over the constant-speed part of the motion, at every step.
+
+Torque ripple of the arm in motion: output torque of the drive, less the torque that
+the rigid arm needs at the same instant of the commanded motion (its weight changes
+with the pose), less the straight line that remains. The line holds the mean and the
+slow effect of sagging; nothing above half a cycle per record is touched.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.sim.orders import OrderLine, strongest_lines
+from swgjoint.units import arcmin, mm, rpm
+
+if TYPE_CHECKING:
+    from swgjoint.sim.run import Run
+
+Array = NDArray[np.float64]
+
+PHASE_STEP = 0.5
+"""Largest phase of an order per step that counts as resolved [rad]."""
+NOISE = 1e-6
+"""Lines below this share of the rated torque, or of one arcmin, are round-off."""
+RIPPLE_OF = "arm in motion, rigid-arm torque and straight line removed"
+
+
+def run_metrics(run: Run) -> dict[str, Any]:
+    """Figures of all joints and of the tool under the keys of the JSON output."""
+    return {
+        "joints": {name: joint_metrics(run, j) for j, name in enumerate(run.joints)},
+        "tool": tool_metrics(run),
+        "window_s": [float(t) for t in run.time[run.steady][[0, -1]]],
+        "ripple_of": RIPPLE_OF,
+        "steps_per_s": run.steps_per_second,
+    }
+
+
+def joint_metrics(run: Run, j: int) -> dict[str, Any]:
+    """Figures of one joint; torsion and error are zero, never absent, if rigid."""
+    transmission = run.assembly.transmissions[j]
+    drive, window = transmission.drive, run.steady
+    rated = drive.ratings.rated_torque
+    angle = run.motor_position[window, j]
+    ripple = torque_ripple(run, j)
+    highest = highest_resolved_order(run, j)
+    error = run.transmission_error[window, j] / arcmin
+    lines = _lines(angle, ripple, highest, floor=NOISE * rated)
+    error_lines = _lines(angle, error, highest, floor=NOISE)
+    return {
+        "level": transmission.level,
+        "drive": drive.name,
+        "source": drive.level,
+        "ripple_rms_percent": float(100.0 * np.sqrt(np.mean(ripple**2)) / rated),
+        "ripple_pp_percent": float(100.0 * np.ptp(ripple) / rated),
+        "orders": [
+            {
+                "order": line.order,
+                "amplitude_Nm": line.amplitude,
+                "amplitude_percent": 100.0 * line.amplitude / rated,
+            }
+            for line in lines
+        ],
+        "transmission_error_orders": [
+            {"order": line.order, "amplitude_arcmin": line.amplitude}
+            for line in error_lines
+        ],
+        "unresolved": [
+            {
+                "order": left.order,
+                "error_arcmin": left.error / arcmin,
+                "torque_Nm": left.torque,
+            }
+            for left in transmission.attached.unresolved
+        ],
+        "highest_resolved_order": highest,
+        "transmission_error_arcmin": spread(error),
+        "torsion_arcmin": spread(run.torsion[window, j] / arcmin),
+        "input_turns": float(abs(angle[-1] - angle[0]) / (2.0 * np.pi)),
+        "ratings": use_of_ratings(run, j),
+    }
+
+
+def torque_ripple(run: Run, j: int) -> Array:
+    """Ripple of one joint over the constant-speed part [N·m]. Shape (n_window,)."""
+    needed = run.assembly.link_torque[run.steady, j]
+    rest = run.output_torque[run.steady, j] - needed
+    x = np.linspace(-1.0, 1.0, rest.size)
+    basis = np.polynomial.legendre.legvander(x, 1)
+    return np.asarray(rest - basis @ np.linalg.lstsq(basis, rest, rcond=None)[0])
+
+
+def highest_resolved_order(run: Run, j: int) -> float | None:
+    """Highest order per input turn that the step carries; None for a joint at rest."""
+    speed = np.abs(run.assembly.ratio[j] * run.assembly.trajectory.steady_velocity[j])
+    if speed == 0.0:
+        return None
+    return float(PHASE_STEP / (run.assembly.scene.simulation.step_s * speed))
+
+
+def spread(values: Array) -> dict[str, float]:
+    """Mean, root mean square and peak to peak of a signal, in its unit."""
+    return {
+        "mean": float(np.mean(values)),
+        "rms": float(np.sqrt(np.mean(values**2))),
+        "pp": float(np.ptp(values)),
+    }
+
+
+def use_of_ratings(run: Run, j: int) -> dict[str, Any]:
+    """Torques and speed of one joint over the whole run against the ratings.
+
+    The cubed mean weights with the speed of the output,
+    (sum |T|³ |n| / sum |n|)^(1/3), as catalogues do; at rest it is that over time.
+    """
+    transmission = run.assembly.transmissions[j]
+    ratings = transmission.drive.ratings
+    torque = np.abs(run.output_torque[:, j])
+    speed = np.abs(run.velocity[:, j])
+    moving = run.assembly.trajectory.top_speed[j] > 0.0
+    weight = speed if moving else np.ones_like(speed)
+    cubed = float(np.average(torque**3, weights=weight) ** (1.0 / 3.0))
+    peak = float(torque.max())
+    low, high = transmission.drive.torque_range
+    return {
+        "rated_Nm": ratings.rated_torque,
+        "repeated_peak_Nm": ratings.repeated_peak,
+        "momentary_peak_Nm": ratings.momentary_peak,
+        "source": ratings.source,
+        "peak_Nm": peak,
+        "cubed_mean_Nm": cubed,
+        "input_speed_rpm": float(np.abs(run.motor_velocity[:, j]).max() / rpm),
+        "within": bool(cubed <= ratings.rated_torque and peak <= ratings.repeated_peak),
+        "map_range_Nm": [low, high],
+        "within_map": bool(
+            low <= run.output_torque[:, j].min()
+            and run.output_torque[:, j].max() <= high
+        ),
+    }
+
+
+def tool_metrics(run: Run) -> dict[str, Any]:
+    """Errors of the tool against the commanded path; None where it cannot be told."""
+    if run.tool_position.shape[1] == 0:
+        return {
+            "ap_mm": None,
+            "rp_mm": None,
+            "path_rms_mm": None,
+            "missing": {"tool": "the arm has no such site"},
+        }
+    error = run.tool_error() / mm
+    return {
+        "ap_mm": float(error[-1]),
+        "rp_mm": None,
+        "path_rms_mm": float(np.sqrt(np.mean(error**2))),
+        "path_max_mm": float(error.max()),
+        "against": "commanded path; ap_mm at the last pose, approached once",
+        "missing": {"rp_mm": "repeatability needs repeated approaches of a pose"},
+    }
+
+
+def against_rigid(run: Run, rigid: Run) -> dict[str, float]:
+    """Distance of the tool from that of the rigid arm on the same motion [mm]."""
+    error = run.tool_error(rigid) / mm
+    steady = error[run.steady]
+    return {
+        "mean_mm": float(error.mean()),
+        "rms_mm": float(np.sqrt(np.mean(error**2))),
+        "max_mm": float(error.max()),
+        "pp_mm": float(np.ptp(steady)),
+    }
+
+
+def _lines(
+    angle: Array, signal: Array, highest: float | None, *, floor: float
+) -> tuple[OrderLine, ...]:
+    if highest is None:
+        return ()
+    return strongest_lines(angle, signal, highest=highest, floor=floor)

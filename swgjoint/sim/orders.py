@@ -1,0 +1,160 @@
+r"""Order analysis: lines of a signal per turn of the wave generator.
+
+The signal is resampled at equal steps of the input angle, a cubic trend is removed and
+a Hann window finds the lines one after the other, strongest first. Their amplitudes
+come from one least-squares fit of all lines and the trend together,
+
+.. math:: x(\theta) = \sum_{j<4} c_j \theta^j
+    + \sum_k a_k \cos(n_k \theta) + b_k \sin(n_k \theta),
+
+so they are neither lowered by the window nor by an order between two bins.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+TREND_DEGREE = 3
+PADDING = 8
+
+
+@dataclass(frozen=True, kw_only=True)
+class OrderLine:
+    """One line of an order spectrum."""
+
+    order: float
+    """Cycles per turn of the wave generator."""
+    amplitude: float
+    """Zero to peak, in the unit of the signal."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class OrderSpectrum:
+    """Amplitude over order with a Hann window, for pictures."""
+
+    order: Array
+    """Cycles per turn. Shape (n,)."""
+    amplitude: Array
+    """Zero to peak of a lone line at that order, unit of the signal. Shape (n,)."""
+
+
+def resample(angle: Array, signal: Array) -> tuple[Array, Array] | None:
+    """The signal at equal steps of the angle, or None where the angle stands still.
+
+    Args:
+        angle: Input angle [rad], monotone but for small wobble. Shape (n,).
+        signal: Any unit. Shape (n,).
+
+    Returns:
+        Angle from 0 [rad] and signal, both of shape (n,).
+    """
+    from scipy.interpolate import CubicSpline
+
+    travel = (angle - angle[0]) * np.sign(angle[-1] - angle[0])
+    if travel.size < 16 or travel[-1] < np.pi:
+        return None
+    # a drive that vibrates back and forth would not be a function of its angle
+    keep = np.concatenate([[True], travel[1:] > np.maximum.accumulate(travel)[:-1]])
+    if keep.mean() < 0.5:
+        return None
+    grid = np.linspace(0.0, travel[-1], travel.size)
+    return grid, np.asarray(CubicSpline(travel[keep], signal[keep])(grid))
+
+
+def order_spectrum(angle: Array, signal: Array) -> OrderSpectrum | None:
+    """Amplitude spectrum over the input angle; None where the input stands still."""
+    even = resample(angle, signal)
+    return None if even is None else _spectrum(even[0], _detrend(*even))
+
+
+def strongest_lines(
+    angle: Array,
+    signal: Array,
+    *,
+    highest: float,
+    count: int = 3,
+    floor: float = 0.0,
+) -> tuple[OrderLine, ...]:
+    """The strongest lines of a signal, strongest first.
+
+    Args:
+        angle: Input angle [rad]. Shape (n,).
+        signal: Any unit. Shape (n,).
+        highest: Largest order to look for; what the step resolves.
+        count: Number of lines.
+        floor: Lines below this amplitude are noise and left out.
+
+    Returns:
+        At most ``count`` lines; none where the input turns less than half a turn.
+        Orders below one half or below two cycles in the record belong to the trend.
+    """
+    even = resample(angle, signal)
+    if even is None:
+        return ()
+    grid, values = even
+    turns = grid[-1] / (2.0 * np.pi)
+    lowest = max(0.5, 2.0 / turns)
+    orders: list[float] = []
+    residual, amplitudes = _fit(grid, values, orders)
+    while len(orders) < count:
+        spectrum = _spectrum(grid, residual)
+        allowed = (spectrum.order >= lowest) & (spectrum.order <= highest)
+        for known in orders:  # leakage of a line that wanders is not a second line
+            allowed &= np.abs(spectrum.order - known) > 2.0 / turns
+        if not allowed.any():
+            break
+        peak = int(np.argmax(np.where(allowed, spectrum.amplitude, -1.0)))
+        if spectrum.amplitude[peak] <= floor:
+            break
+        orders.append(_refine(spectrum, peak))
+        residual, amplitudes = _fit(grid, values, orders)
+    lines = [
+        OrderLine(order=order, amplitude=float(amplitude))
+        for order, amplitude in zip(orders, amplitudes, strict=True)
+        if amplitude > floor
+    ]
+    return tuple(sorted(lines, key=lambda line: -line.amplitude))
+
+
+def _detrend(grid: Array, values: Array) -> Array:
+    return _fit(grid, values, [])[0]
+
+
+def _fit(grid: Array, values: Array, orders: list[float]) -> tuple[Array, Array]:
+    """Residual of trend and lines fitted together, and the amplitudes of the lines."""
+    x = 2.0 * grid / grid[-1] - 1.0
+    columns = [np.polynomial.legendre.legvander(x, TREND_DEGREE)]
+    for order in orders:
+        columns += [np.cos(order * grid)[:, None], np.sin(order * grid)[:, None]]
+    basis = np.hstack(columns)
+    # normal equations: a handful of columns, well conditioned, 10x faster than lstsq
+    weights = np.linalg.lstsq(basis.T @ basis, basis.T @ values, rcond=1e-12)[0]
+    pairs = weights[TREND_DEGREE + 1 :].reshape(-1, 2)
+    return values - basis @ weights, np.hypot(pairs[:, 0], pairs[:, 1])
+
+
+def _spectrum(grid: Array, values: Array) -> OrderSpectrum:
+    """Hann-windowed, zero-padded amplitude spectrum over orders."""
+    window = np.hanning(values.size)
+    size = int(2 ** np.ceil(np.log2(PADDING * values.size)))
+    amplitude = 2.0 * np.abs(np.fft.rfft(window * values, size)) / window.sum()
+    step = grid[1] - grid[0]
+    return OrderSpectrum(
+        order=2.0 * np.pi * np.fft.rfftfreq(size, step), amplitude=amplitude
+    )
+
+
+def _refine(spectrum: OrderSpectrum, peak: int) -> float:
+    """Order of a peak between the bins, by a parabola through the log amplitude."""
+    if peak == 0 or peak == spectrum.order.size - 1:
+        return float(spectrum.order[peak])
+    near = np.log(np.maximum(spectrum.amplitude[peak - 1 : peak + 2], 1e-300))
+    bend = near[0] - 2.0 * near[1] + near[2]
+    shift = 0.5 * (near[0] - near[2]) / bend if bend < 0.0 else 0.0
+    spacing = spectrum.order[1] - spectrum.order[0]
+    return float(spectrum.order[peak] + np.clip(shift, -0.5, 0.5) * spacing)

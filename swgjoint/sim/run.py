@@ -1,0 +1,230 @@
+"""Run a scene: the arm under its controller, recorded at every step."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+from mujoco.rollout import Rollout
+from numpy.typing import NDArray
+
+from swgjoint.errors import ComputationError
+from swgjoint.maps.drive_map import DriveMap
+from swgjoint.progress import Progress, silent
+from swgjoint.sim.assembly import Assembly, assemble
+from swgjoint.sim.contains import contents
+from swgjoint.sim.control import control_inputs, motor_torque
+from swgjoint.sim.equilibrium import start_state
+from swgjoint.sim.metrics import run_metrics
+from swgjoint.sim.scene import Scene
+
+Array = NDArray[np.float64]
+
+_CHUNK = 1000  # steps between two signs of life
+_STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Run:
+    """A recorded run; arrays hold every state, the first included.
+
+    Angles and torques at the output side unless named motor; n states, joints in the
+    order of ``joints``. Torques and torsions are the drive's law at the recorded state.
+    """
+
+    name: str
+    assembly: Assembly
+    joints: tuple[str, ...]
+    time: Array
+    """[s]. Shape (n,)."""
+    position: Array
+    """Link angles [rad]. Shape (n, n_joints)."""
+    velocity: Array
+    """Link speeds [rad/s]. Shape (n, n_joints)."""
+    motor_position: Array
+    """Input angles [rad]; those of an ideal gear for a rigid joint. (n, n_joints)."""
+    motor_velocity: Array
+    """[rad/s]. Shape (n, n_joints)."""
+    reference: Array
+    """Commanded link angles [rad]. Shape (n, n_joints)."""
+    torsion: Array
+    """[rad]. Shape (n, n_joints)."""
+    transmission_error: Array
+    """Output minus ideal output [rad]. Shape (n, n_joints)."""
+    output_torque: Array
+    """That the drive exerts on the link [N·m]. Shape (n, n_joints)."""
+    motor_torque: Array
+    """[N·m]. Shape (n, n_joints)."""
+    tool_position: Array
+    """Tool in the world [m]. Shape (n, 3), or (n, 0) where the arm has no tool."""
+    tool_reference: Array
+    """Tool on the commanded motion without any error [m]. Same shape."""
+    wall: float
+    """Time that the steps took [s]."""
+
+    @property
+    def steps_per_second(self) -> float:
+        """Simulation steps per second of wall time."""
+        return (self.time.size - 1) / self.wall
+
+    @property
+    def steady(self) -> slice:
+        """Samples of the constant-speed part."""
+        return self.assembly.trajectory.steady
+
+    @property
+    def contains(self) -> dict[str, Any]:
+        """What the compiled model contains, and what was left out and why."""
+        return contents(self.assembly)
+
+    def tool_error(self, other: Run | None = None) -> Array:
+        """Distance of the tool from that of another run [m]. Shape (n,).
+
+        Args:
+            other: A run of the same motion, usually the rigid arm; None compares with
+                the commanded path.
+        """
+        reference = self.tool_reference if other is None else other.tool_position
+        return np.asarray(np.linalg.norm(self.tool_position - reference, axis=1))
+
+    def metrics(self) -> dict[str, Any]:
+        """Figures of the run under the keys of ``swgjoint run --json``."""
+        return run_metrics(self)
+
+    def to_rerun(self, path: str | Path) -> Path:
+        """Write the recording for the rerun viewer; see :mod:`swgjoint.view`."""
+        from swgjoint.view.recording import write_recording
+
+        return write_recording({"": self}, path)
+
+
+def run_scene(
+    scene: Scene | str | Path,
+    *,
+    overrides: Mapping[str, Any] | Iterable[str] | None = None,
+    drives: Mapping[str, DriveMap] | None = None,
+    name: str | None = None,
+    progress: Progress = silent,
+) -> Run:
+    """Simulate a scene from an equilibrium to its end.
+
+    Args:
+        scene: A scene, the path of a scene file, or the name of a bundled one.
+        overrides: Dotted keys of the scene with other values, as a mapping or as
+            ``key=value`` texts.
+        drives: Maps that stand for the scene's drive references of these names.
+        name: What recordings and progress call the run; default: the scene's name.
+        progress: Called with the steps done.
+
+    Raises:
+        InputError: If the scene, a drive or a joint cannot be used.
+        ComputationError: If the start is out of balance or the motion diverges.
+    """
+    if not isinstance(scene, Scene):
+        scene = Scene.load_file(scene, overrides)
+    elif overrides:
+        scene = scene.with_changes(overrides)
+    assembly = assemble(scene, drives=drives, progress=progress)
+    return simulate(assembly, name=name or scene.name, progress=progress)
+
+
+def simulate(assembly: Assembly, *, name: str, progress: Progress = silent) -> Run:
+    """Run an assembled scene; see :func:`run_scene`."""
+    model, path = assembly.model, assembly.trajectory
+    inputs = control_inputs(assembly)
+    data = mujoco.MjData(model)
+    data.qpos[:], data.qvel[:] = start_state(assembly)
+    mujoco.mj_forward(model, data)
+    state = np.empty(mujoco.mj_stateSize(model, _STATE))
+    mujoco.mj_getState(model, data, state, _STATE)
+
+    # the engine's own rollout: no Python between two steps, every state recorded
+    states = np.empty((path.time.size, state.size))
+    states[0] = state
+    steps = len(inputs)
+    begin = time.perf_counter()
+    with Rollout(nthread=0) as rollout:
+        for first in range(0, steps, _CHUNK):
+            last = min(first + _CHUNK, steps)
+            got, _ = rollout.rollout(
+                model,
+                data,
+                states[first][None],
+                inputs[None, first:last],
+                initial_warmstart=data.qacc_warmstart[None],
+            )
+            states[first + 1 : last + 1] = got[0]
+            _check_finite(assembly, data, states[first + 1 : last + 1])
+            progress(f"run {name}", last, steps)
+    return _recorded(assembly, name, states, time.perf_counter() - begin)
+
+
+def _check_finite(assembly: Assembly, data: mujoco.MjData, states: Array) -> None:
+    """Stop a run that diverged; the engine would go on with a reset state."""
+    nq, nv = assembly.model.nq, assembly.model.nv
+    bad = any(
+        data.warning[kind].number
+        for kind in (
+            mujoco.mjtWarning.mjWARN_BADQPOS,
+            mujoco.mjtWarning.mjWARN_BADQVEL,
+            mujoco.mjtWarning.mjWARN_BADQACC,
+        )
+    )
+    speed = np.abs(states[:, 1 + nq : 1 + nq + nv])
+    if bad or not np.isfinite(states).all() or speed.max() > 1e6:
+        step = assembly.scene.simulation.step_s
+        raise ComputationError(
+            f"scene {assembly.scene.name!r}: the motion diverged before"
+            f" t = {states[-1, 0]:.3f} s with a step of {step:g} s and integrator"
+            f" {assembly.scene.simulation.integrator}; use a smaller simulation.step_s"
+            " or integrator discrete"
+        )
+
+
+def _recorded(assembly: Assembly, name: str, states: Array, wall: float) -> Run:
+    """Signals of all joints from the recorded states."""
+    model, path, ratio = assembly.model, assembly.trajectory, assembly.ratio
+    q = states[:, 1 : 1 + model.nq]
+    v = states[:, 1 + model.nq : 1 + model.nq + model.nv]
+    position, velocity = q[:, assembly.link_position], v[:, assembly.link_velocity]
+    flexible = assembly.motor_position >= 0
+    theta, theta_rate = ratio * position, ratio * velocity
+    theta[:, flexible] = q[:, assembly.motor_position[flexible]]
+    theta_rate[:, flexible] = v[:, assembly.motor_velocity[flexible]]
+
+    motor = motor_torque(assembly, theta, theta_rate)
+    # rigid: what the motor gives less what its rotor takes; the integrator's own
+    # acceleration is the velocity difference of the step that led to the state
+    step = assembly.scene.simulation.step_s
+    rotor_rate = np.diff(theta_rate, axis=0, prepend=theta_rate[:1]) / step
+    output = ratio * (motor - assembly.rotor_inertia * rotor_rate)
+    torsion, error = np.zeros_like(position), np.zeros_like(position)
+    for j in np.flatnonzero(flexible):
+        got = assembly.transmissions[j].signals(
+            theta[:, j], position[:, j], theta_rate[:, j], velocity[:, j]
+        )
+        torsion[:, j], error[:, j] = got.torsion, got.transmission_error
+        output[:, j] = got.torque
+    return Run(
+        name=name,
+        assembly=assembly,
+        joints=assembly.joints,
+        time=path.time,
+        position=position,
+        velocity=velocity,
+        motor_position=theta,
+        motor_velocity=theta_rate,
+        reference=path.position,
+        torsion=torsion,
+        transmission_error=error,
+        output_torque=output,
+        motor_torque=motor,
+        tool_position=assembly.arm.tool_positions(position),
+        tool_reference=assembly.arm.tool_positions(path.position),
+        wall=wall,
+    )

@@ -1,0 +1,237 @@
+"""A scene file: an arm, its drives, a motion, a controller and a time step."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any, Self
+
+from pydantic import Field, PrivateAttr, model_validator
+
+from swgjoint.errors import InputError
+from swgjoint.faults import Fault, Section, parse_toml, read_toml, validated
+from swgjoint.models_path import find
+from swgjoint.sim.scene_sections import (
+    ConstantSpeed,
+    Controller,
+    JointSection,
+    Level,
+    Load,
+    Recording,
+    Simulation,
+    Sweep,
+    TrajectorySection,
+)
+
+
+class Scene(Section):
+    """One scene: attributes mirror the tables and keys of the file, units included."""
+
+    name: str
+    description: str = ""
+    arm: str
+    """Path or bundled name of an MJCF file."""
+    tool_site: str = "tool"
+    """Site whose position is the tool; the arm may have none."""
+    defaults: JointSection = JointSection()
+    """Drive of every hinge joint that does not say otherwise."""
+    joints: dict[str, JointSection] = Field(default_factory=dict)
+    trajectory: TrajectorySection
+    controller: Controller = Controller()
+    load: dict[str, Load] = Field(default_factory=dict)
+    """Constant torque that the load exerts against a joint."""
+    simulation: Simulation
+    recording: Recording = Recording()
+
+    _where: str = PrivateAttr(default="scene")
+
+    @property
+    def where(self) -> str:
+        """What messages call this scene: its file or its name."""
+        return self._where
+
+    @model_validator(mode="after")
+    def _times_fit(self) -> Self:
+        duration, step = self.simulation.duration_s, self.simulation.step_s
+        needed = self.trajectory.shortest_s
+        faults = []
+        if duration <= needed:
+            faults.append(
+                (
+                    "simulation.duration_s",
+                    f"{duration:g} s; accepted: more than the {needed:g} s that holds,"
+                    " ramps and settling of the trajectory take",
+                )
+            )
+        if duration / step > 2_000_000:
+            faults.append(
+                (
+                    "simulation.step_s",
+                    f"{step:g} s makes {duration / step:.3g} steps; accepted: at most"
+                    " 2000000 steps in a run",
+                )
+            )
+        if faults:
+            raise Fault(*faults)
+        return self
+
+    @classmethod
+    def load_file(
+        cls,
+        reference: str | Path,
+        overrides: Mapping[str, Any] | Iterable[str] | None = None,
+    ) -> Self:
+        """Read a scene file, given as a path or as the name of a bundled one.
+
+        Args:
+            reference: Path or bundled name.
+            overrides: Dotted keys with new values, as a mapping or as ``key=value``
+                texts whose value is read as TOML (a bare word is a text).
+
+        Raises:
+            InputError: With one line per fault of the file.
+        """
+        path = find(reference, "scenes", ".toml", what="scene")
+        data = read_toml(path, what="scene")
+        _anchor_paths(data, path.parent)
+        return cls.from_data(data, where=str(path), overrides=overrides)
+
+    @classmethod
+    def from_toml(cls, text: str, where: str = "scene") -> Self:
+        """A scene from the text of a scene file; ``where`` names it in messages."""
+        return cls.from_data(parse_toml(text, where=where), where=where)
+
+    @classmethod
+    def from_data(
+        cls,
+        data: Mapping[str, Any],
+        *,
+        where: str = "scene",
+        overrides: Mapping[str, Any] | Iterable[str] | None = None,
+    ) -> Self:
+        """A scene from plain tables; all faults are listed at once."""
+        merged = _merged(data, overrides, where)
+        lines: list[str] = []
+        # tables keyed by joint are checked one by one, so that messages know their keys
+        for table, model in (("joints", JointSection), ("load", Load)):
+            entries = merged.get(table)
+            if not isinstance(entries, dict):
+                continue
+            faulty = [
+                line
+                for joint, entry in entries.items()
+                if isinstance(entry, dict)
+                for line in _faults_of(model, entry, f"{where}: {table}.{joint}")
+            ]
+            if faulty:
+                lines += faulty
+                merged[table] = {}
+        try:
+            scene = validated(cls, merged, where=where)
+        except InputError as exc:
+            lines += str(exc).split("\n")
+        if lines:
+            raise InputError("\n".join(dict.fromkeys(lines)))
+        scene._where = where
+        return scene
+
+    def with_changes(self, overrides: Mapping[str, Any] | Iterable[str]) -> Self:
+        """A checked copy with other values for some dotted keys."""
+        data = self.model_dump(exclude_unset=True)
+        return self.from_data(data, where=self.where, overrides=overrides)
+
+    def with_drive(self, drive: str) -> Self:
+        """A copy in which every joint has this drive."""
+        return self._with_all(drive=drive, linear=None)
+
+    def with_level(self, level: Level) -> Self:
+        """A copy in which every joint has this level."""
+        return self._with_all(level=level)
+
+    def _with_all(self, **values: Any) -> Self:
+        defaults = self.defaults.model_copy(update=values)
+        joints = {
+            name: joint.model_copy(update={key: None for key in values})
+            for name, joint in self.joints.items()
+        }
+        copy = self.model_copy(update={"defaults": defaults, "joints": joints})
+        copy._where = self._where
+        return copy
+
+    def of_joint(self, name: str) -> JointSection:
+        """Settings of one joint, its own over the defaults."""
+        return self.joints.get(name, JointSection()).over(self.defaults)
+
+
+def _faults_of(model: type[Section], entry: dict[str, Any], path: str) -> list[str]:
+    """Lines about one table that lies at a dotted path of the file."""
+    try:
+        validated(model, entry, where="\0")
+    except InputError as exc:
+        return [line.replace("\0: ", f"{path}.", 1) for line in str(exc).split("\n")]
+    return []
+
+
+def _merged(
+    data: Mapping[str, Any],
+    overrides: Mapping[str, Any] | Iterable[str] | None,
+    where: str,
+) -> dict[str, Any]:
+    """Deep copy of the tables with the overrides in place."""
+
+    def copied(value: Any) -> Any:
+        if isinstance(value, Mapping):
+            return {key: copied(item) for key, item in value.items()}
+        return value
+
+    merged: dict[str, Any] = copied(data)
+    pairs = (
+        overrides.items()
+        if isinstance(overrides, Mapping)
+        else [parse_override(text) for text in overrides or ()]
+    )
+    for key, value in pairs:
+        *tables, last = key.split(".")
+        table = merged
+        for name in tables:
+            table = table.setdefault(name, {})
+            if not isinstance(table, dict):
+                raise InputError(f"{where}: {key}: {name} is not a table")
+        # a drive by name and a linear one exclude each other: the new one wins
+        table.pop({"drive": "linear", "linear": "drive"}.get(last, ""), None)
+        table[last] = value
+    return merged
+
+
+def parse_override(text: str) -> tuple[str, Any]:
+    """``key=value`` of the command line as a dotted key and a TOML value."""
+    key, equals, value = text.partition("=")
+    key = key.strip()
+    if not equals or not all(key.split(".")):
+        raise InputError(
+            f"override {text!r}: accepted: key=value with a dotted key, for example"
+            " simulation.step_s=0.0005"
+        )
+    try:
+        return key, tomllib.loads(f"value = {value}")["value"]
+    except tomllib.TOMLDecodeError:
+        return key, value.strip()  # a bare word: a name or a path
+
+
+def _anchor_paths(data: dict[str, Any], folder: Path) -> None:
+    """Make paths in a scene file relative to that file, names stay names."""
+
+    def anchor(table: Any, key: str) -> None:
+        value = table.get(key) if isinstance(table, dict) else None
+        if isinstance(value, str) and "\0" not in value and (folder / value).is_file():
+            table[key] = str(folder / value)
+
+    anchor(data, "arm")
+    anchor(data.get("defaults"), "drive")
+    joints = data.get("joints")
+    for joint in joints.values() if isinstance(joints, dict) else ():
+        anchor(joint, "drive")
+
+
+__all__ = ["ConstantSpeed", "Scene", "Sweep", "parse_override"]

@@ -1,0 +1,171 @@
+"""The tables of a scene file, with the same names as in the file."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self, get_args
+
+from pydantic import Field, model_validator
+
+from swgjoint.faults import Fault, Section
+
+Level = Literal["rigid", "linear", "full"]
+LEVELS: tuple[str, ...] = get_args(Level)
+Integrator = Literal["discrete", "RK4"]
+FeedForward = Literal["none", "gravity", "gravity_inertia"]
+
+Positive = Annotated[float, Field(gt=0)]
+Seconds = Annotated[float, Field(ge=0, le=10_000)]
+Degrees = Annotated[float, Field(ge=-3_600, le=3_600)]
+
+
+class LinearDrive(Section):
+    """A drive of constant stiffness without kinematic error."""
+
+    stiffness_Nm_rad: Positive
+    teeth_flexspline: Annotated[int, Field(ge=40, le=400)] = 200
+    teeth_circular_spline: Annotated[int, Field(ge=42, le=412)] = 202
+    rated_torque_Nm: Positive = 100.0
+
+
+class JointSection(Section):
+    """Drive of one joint; what is absent comes from ``[defaults]``."""
+
+    drive: str | None = None
+    """Design (path or bundled name) or ``.swg`` file."""
+    linear: LinearDrive | None = None
+    level: Level | None = None
+    rotor_inertia_kgm2: Annotated[float, Field(gt=0, le=1)] | None = None
+    """Rotor with wave generator about the motor axis."""
+    damping_ratio: Annotated[float, Field(ge=0, le=1)] | None = None
+    """Of the torsional vibration; None takes that of the drive."""
+
+    @model_validator(mode="after")
+    def _one_drive(self) -> Self:
+        if self.drive is not None and self.linear is not None:
+            raise Fault(("drive", "given beside linear; accepted: one of the two"))
+        return self
+
+    def over(self, base: JointSection) -> JointSection:
+        """These settings, completed by others."""
+        own = self.model_dump(exclude_none=True)
+        values = {key: getattr(self, key) for key in own}
+        rest = base.model_dump(exclude_none=True)
+        if "drive" in own or "linear" in own:
+            rest = {k: v for k, v in rest.items() if k not in ("drive", "linear")}
+        return JointSection(**{key: getattr(base, key) for key in rest} | values)
+
+
+class Sweep(Section):
+    """All joints together from start to end: rest, ramp, constant speed, ramp, rest."""
+
+    kind: Literal["sweep"] = "sweep"
+    hold_s: Seconds = 0.2
+    ramp_s: Annotated[float, Field(gt=0, le=10_000)] = 1.0
+    settle_s: Seconds = 0.0
+    """Start of the constant-speed part that the metrics leave out."""
+    start_deg: dict[str, Degrees] = Field(default_factory=dict)
+    """Joint angles; a joint that is not named starts at 0."""
+    end_deg: dict[str, Degrees] = Field(default_factory=dict)
+    """Joint angles; a joint that is not named stays."""
+
+    @property
+    def shortest_s(self) -> float:
+        """Time without any constant-speed part [s]."""
+        return 2.0 * (self.hold_s + self.ramp_s) + self.settle_s
+
+    @property
+    def named_joints(self) -> dict[str, set[str]]:
+        """Joints that each key names."""
+        return {"start_deg": set(self.start_deg), "end_deg": set(self.end_deg)}
+
+
+class ConstantSpeed(Section):
+    """Constant joint speeds from the first instant."""
+
+    kind: Literal["constant_speed"] = "constant_speed"
+    settle_s: Seconds = 0.0
+    """Start that the metrics leave out."""
+    start_deg: dict[str, Degrees] = Field(default_factory=dict)
+    speed_deg_s: dict[str, Degrees]
+
+    @property
+    def shortest_s(self) -> float:
+        """Time without any part that the metrics use [s]."""
+        return self.settle_s
+
+    @property
+    def named_joints(self) -> dict[str, set[str]]:
+        """Joints that each key names."""
+        return {
+            "start_deg": set(self.start_deg),
+            "speed_deg_s": set(self.speed_deg_s),
+        }
+
+
+TrajectorySection = Annotated[Sweep | ConstantSpeed, Field(discriminator="kind")]
+
+
+class Controller(Section):
+    r"""Position control of every motor on its own encoder.
+
+    .. math:: \tau = k_p (\theta_r - \theta) + k_d (\dot\theta_r - \dot\theta)
+        + \tau_\text{ff}, \quad \theta_r = i q_r.
+
+    Gains either from a natural frequency and a damping ratio, which hold for a rigid
+    drive, :math:`k_p = J\omega^2`, :math:`k_d = 2\zeta J\omega` with
+    :math:`J = J_m + J_l(q_0)/i^2`, or given outright.
+    """
+
+    kind: Literal["pd"] = "pd"
+    natural_frequency_Hz: Annotated[float, Field(gt=0, le=1_000)] | None = None
+    damping_ratio: Annotated[float, Field(gt=0, le=10)] | None = None
+    stiffness_Nm_rad: Annotated[float, Field(gt=0)] | None = None
+    """Motor side, N·m of motor torque per rad of motor angle."""
+    damping_Nms_rad: Annotated[float, Field(ge=0)] | None = None
+    feedforward: FeedForward = "gravity"
+    """Torques of the rigid arm on the reference motion, and of the constant load."""
+
+    @model_validator(mode="after")
+    def _one_pair(self) -> Self:
+        by_frequency = (self.natural_frequency_Hz, self.damping_ratio)
+        by_gain = (self.stiffness_Nm_rad, self.damping_Nms_rad)
+        if by_gain == (None, None):
+            return self
+        if None in by_gain or by_frequency != (None, None):
+            raise Fault(
+                (
+                    "stiffness_Nm_rad",
+                    "accepted: stiffness_Nm_rad with damping_Nms_rad, or"
+                    " natural_frequency_Hz with damping_ratio, not both",
+                )
+            )
+        return self
+
+
+class Load(Section):
+    """Constant torque of the load against a joint; the drive exerts the same."""
+
+    torque_Nm: float | None = None
+    rated_fraction: Annotated[float, Field(ge=-5, le=5)] | None = None
+    """Share of the drive's rated torque."""
+
+    @model_validator(mode="after")
+    def _one_value(self) -> Self:
+        if (self.torque_Nm is None) == (self.rated_fraction is None):
+            raise Fault(("torque_Nm", "accepted: either torque_Nm or rated_fraction"))
+        return self
+
+
+class Simulation(Section):
+    """Duration and time stepping."""
+
+    duration_s: Annotated[float, Field(gt=0, le=10_000)]
+    step_s: Annotated[float, Field(ge=1e-6, le=0.02)] = 0.001
+    integrator: Integrator = "discrete"
+
+
+class Recording(Section):
+    """What goes into the recording; joint signals are kept at every step."""
+
+    pose_rate_Hz: Annotated[float, Field(gt=0, le=10_000)] = 50.0
+    """Rate of the body poses that the viewer shows."""

@@ -1,0 +1,115 @@
+"""Commanded joint motions on the time grid of a run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Trajectory:
+    """Position, velocity and acceleration of every joint at every step."""
+
+    time: Array
+    """Start of every step and the end of the last one [s]. Shape (n,)."""
+    position: Array
+    """[rad]. Shape (n, n_joints)."""
+    velocity: Array
+    """[rad/s]. Shape (n, n_joints)."""
+    acceleration: Array
+    """[rad/s²]. Shape (n, n_joints)."""
+    steady: slice
+    """Samples of the constant-speed part that the metrics use."""
+    steady_velocity: Array
+    """Speed of that part [rad/s]. Shape (n_joints,)."""
+
+    @property
+    def top_speed(self) -> Array:
+        """Largest commanded speed of every joint [rad/s]. Shape (n_joints,)."""
+        return np.asarray(np.abs(self.velocity).max(axis=0))
+
+
+def smooth_ramp(x: Array) -> tuple[Array, Array, Array]:
+    r"""Integral, value and slope of the smooth step :math:`10x^3 - 15x^4 + 6x^5`.
+
+    Value and first two derivatives vanish or agree at both ends, so a velocity that
+    follows it gives a position that is three times continuously differentiable.
+    """
+    return (
+        x**4 * (2.5 - 3.0 * x + x**2),
+        x**3 * (10.0 - 15.0 * x + 6.0 * x**2),
+        30.0 * x**2 * (1.0 - x) ** 2,
+    )
+
+
+def sweep(
+    *,
+    start: Array,
+    end: Array,
+    duration: float,
+    step: float,
+    hold: float,
+    ramp: float,
+    settle: float = 0.0,
+) -> Trajectory:
+    """Rest, smooth ramp to constant speed, smooth ramp to rest; all joints together.
+
+    Args:
+        start: First position [rad]. Shape (n_joints,).
+        end: Last position [rad]. Shape (n_joints,).
+        duration: Whole time [s], more than ``2 (hold + ramp) + settle``.
+        step: Time step [s].
+        hold: Rest before and after [s].
+        ramp: Time of either ramp [s].
+        settle: Time after the first ramp that the metrics leave out [s].
+    """
+    time = time_grid(duration, step)
+    top = duration - hold - ramp  # the second ramp starts here
+    speed = (end - start) / (top - hold)
+    up = np.clip((time - hold) / ramp, 0.0, 1.0)
+    down = np.clip((time - top) / ramp, 0.0, 1.0)
+    cruise = np.clip(time - hold - ramp, 0.0, top - hold - ramp)
+    up_s, up_v, up_a = smooth_ramp(up)
+    down_s, down_v, down_a = smooth_ramp(down)
+    path = ramp * up_s + cruise + ramp * (down - down_s)
+    return Trajectory(
+        time=time,
+        position=start + path[:, None] * speed,
+        velocity=(up_v - down_v)[:, None] * speed,
+        acceleration=((up_a - down_a) / ramp)[:, None] * speed,
+        steady=_window(time, hold + ramp + settle, top),
+        steady_velocity=speed,
+    )
+
+
+def constant_speed(
+    *, start: Array, speed: Array, duration: float, step: float, settle: float = 0.0
+) -> Trajectory:
+    """Constant speed from the first instant; arguments as for :func:`sweep`."""
+    time = time_grid(duration, step)
+    return Trajectory(
+        time=time,
+        position=start + time[:, None] * speed,
+        velocity=np.broadcast_to(speed, (time.size, speed.size)).copy(),
+        acceleration=np.zeros((time.size, speed.size)),
+        steady=_window(time, settle, duration),
+        steady_velocity=speed,
+    )
+
+
+def time_grid(duration: float, step: float) -> Array:
+    """Times of all states of a run, first and last included [s]."""
+    return np.asarray(np.arange(round(duration / step) + 1) * step)
+
+
+def _window(time: Array, first: float, last: float) -> slice:
+    """Samples between two times, ends included."""
+    tolerance = 1e-9
+    return slice(
+        int(np.searchsorted(time, first - tolerance)),
+        int(np.searchsorted(time, last + tolerance)),
+    )

@@ -1,0 +1,69 @@
+"""One driven joint of a run: the law between motor and link, evaluated on arrays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.joint.drive import JointDrive, JointSignals
+from swgjoint.maps.drive_map import DriveMap
+
+Array = NDArray[np.float64]
+
+_CHUNK = 1024  # samples at once: the coefficient table of a chunk stays in the cache
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Transmission:
+    """Drive of one joint as the compiled model contains it."""
+
+    attached: JointDrive
+    drive: DriveMap
+    """The whole map; ratings, name and validity come from it."""
+    law: DriveMap | None
+    """The map that the model carries: without unresolved harmonics, of constant
+    stiffness at level ``linear``, None at level ``rigid``."""
+
+    @property
+    def joint(self) -> str:
+        """Name of the link joint."""
+        return self.attached.joint
+
+    @property
+    def level(self) -> str:
+        """``rigid``, ``linear`` or ``full``."""
+        return self.attached.level
+
+    @property
+    def ratio(self) -> float:
+        """Signed ratio i, output = input / i."""
+        return self.attached.ratio
+
+    @property
+    def rotor_inertia(self) -> float:
+        """[kg·m²] about the motor axis."""
+        return self.attached.rotor_inertia
+
+    def signals(
+        self, theta: Array, psi: Array, theta_rate: Array, psi_rate: Array
+    ) -> JointSignals:
+        """Torsion, transmission error and output torque of recorded states. (n,).
+
+        The law at the true positions and velocities of each state; not for ``rigid``.
+        """
+        pieces = [
+            self.attached.signals(
+                theta[k : k + _CHUNK],
+                psi[k : k + _CHUNK],
+                theta_rate[k : k + _CHUNK],
+                psi_rate[k : k + _CHUNK],
+            )
+            for k in range(0, theta.size, _CHUNK)
+        ]
+        return JointSignals(
+            torsion=np.concatenate([p.torsion for p in pieces]),
+            transmission_error=np.concatenate([p.transmission_error for p in pieces]),
+            torque=np.concatenate([p.torque for p in pieces]),
+        )
