@@ -11,7 +11,7 @@ import tomllib
 from collections.abc import Mapping
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_origin
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import ErrorDetails
@@ -191,6 +191,7 @@ def _walk(
     path, owner, info = "", model, None
     here: type[BaseModel] | None = model
     options: dict[str, type[BaseModel]] = {}
+    named = False  # the next part is a name that the file chose, not a field
     for part in loc:
         if options and part in options:
             here, options = options[str(part)], {}
@@ -199,13 +200,15 @@ def _walk(
             path += f"[{part}]"
             continue
         path += f".{part}" if path else part
-        if here is None:
+        if named or here is None:
+            named = False
             continue
         owner, info = here, here.model_fields.get(part)
         models = _models_in(info.annotation) if info is not None else []
         union = info is not None and info.discriminator is not None
         options = {_tag(m): m for m in models} if union else {}
         here = models[0] if len(models) == 1 and not union else None
+        named = info is not None and get_origin(info.annotation) is dict
     if here is not None and loc:
         owner = owner if info is not None and here is not model else here
     return path, owner, info

@@ -1,0 +1,142 @@
+"""``swgjoint meshing``: the simulation of meshing of a design."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from typing import Any
+
+from swgjoint.cli.text import table
+from swgjoint.errors import InputError
+from swgjoint.files import output_folder, write_whole
+from swgjoint.json_text import json_text, plain
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Design, torque, positions of the wave generator, kind of model."""
+    parser.add_argument("design", metavar="DESIGN", help="design file or bundled name")
+    parser.add_argument(
+        "--model",
+        choices=("2d", "3d"),
+        help="fidelity; default 3d for a design with a cup, else 2d",
+    )
+    parser.add_argument(
+        "--torque",
+        type=float,
+        metavar="NM",
+        help="torque that the drive exerts on the output; default: rated torque",
+    )
+    parser.add_argument(
+        "--steps",
+        type=int,
+        default=35,
+        metavar="N",
+        help="wave-generator positions k TURNS/N, k = 0 to N-1; default 35",
+    )
+    parser.add_argument(
+        "--turn",
+        type=float,
+        default=0.5,
+        metavar="TURNS",
+        help="turns of the input; default 0.5",
+    )
+    kind = parser.add_mutually_exclusive_group()
+    kind.add_argument(
+        "--nonlinear",
+        dest="nonlinear",
+        action="store_true",
+        default=True,
+        help="large rotations (default)",
+    )
+    kind.add_argument(
+        "--linear", dest="nonlinear", action="store_false", help="small displacements"
+    )
+    parser.add_argument(
+        "--half", action="store_true", help="half model: perfect geometry, even teeth"
+    )
+    parser.add_argument(
+        "--out", metavar="DIR", help="write meshing.json and meshing.png there"
+    )
+
+
+def run(args: argparse.Namespace) -> dict[str, Any]:
+    """Run the simulation; the result has the keys of ``MeshingRun.to_json``."""
+    _check(args)
+    folder = output_folder(args.out) if args.out else None
+    from swgjoint.fe.meshing import simulate_meshing
+    from swgjoint.gear.design import Design
+    from swgjoint.maps.catalogue import ratings_of
+
+    design = Design.load(args.design)
+    torque = ratings_of(design).rated_torque if args.torque is None else args.torque
+    model = args.model or ("3d" if design.cup is not None else "2d")
+    meshing = simulate_meshing(
+        design,
+        model=model,
+        torque=torque,
+        steps=args.steps,
+        turn=args.turn,
+        nonlinear=args.nonlinear,
+        half=args.half,
+        progress=args.progress,
+    )
+    result: dict[str, Any] = plain(meshing.to_json())
+    result["files"] = []
+    if folder is not None:
+        from swgjoint.view.meshing_plots import meshing_picture
+
+        picture = meshing_picture(result)
+        folder.mkdir(parents=True, exist_ok=True)
+        result["files"] = [str(folder / f"meshing.{end}") for end in ("json", "png")]
+        write_whole(folder / "meshing.json", json_text(result) + "\n")
+        write_whole(folder / "meshing.png", picture)
+    return result
+
+
+def _check(args: argparse.Namespace) -> None:
+    """Refuse options outside their range before anything is computed."""
+    faults = []
+    if args.torque is not None and not abs(args.torque) <= 1e6:
+        faults.append(f"--torque {args.torque:g} N·m; accepted: -1e6 to 1e6 N·m")
+    if not 1 <= args.steps <= 100_000:
+        faults.append(f"--steps {args.steps}; accepted: 1 to 100000")
+    if not math.isfinite(args.turn) or not 0 < abs(args.turn) <= 1000:
+        faults.append(f"--turn {args.turn:g} turns; accepted: up to 1000, not 0")
+    if faults:
+        raise InputError("\n".join(faults))
+
+
+def report(result: dict[str, Any]) -> str:
+    """Stresses of the set-up and over the turn, what the run was, its outcome."""
+    kinds = ("tensile", "compressive", "von_mises")
+    rows = []
+    for member in ("flexspline", "circular_spline"):
+        for state in result["setup_MPa"]:
+            if state.get(member):
+                values = [state[member].get(kind) for kind in kinds]
+                rows.append((f"{member} {state['state']}", *values))
+        mean = result.get(member) and result[member].get("average_max_MPa")
+        if mean:
+            values = [mean.get(kind) for kind in kinds]
+            rows.append((f"{member} mean of the maxima", *values))
+    lines = [
+        f"meshing of {result.get('design', 'the design')}:"
+        f" {result['nodes']} nodes, {result['elements']} elements,"
+        f" {result['steps']} positions, {result['wall_s']:.1f} s",
+        table(rows, header=("[MPa]", "tensile", "compressive", "von Mises")),
+    ]
+    steps = result["per_step"]
+    for key, text in (
+        ("wave_generator_torque_Nm", "mean wave-generator torque [N·m]"),
+        ("pairs_in_contact", "mean pairs in contact"),
+    ):
+        values = [v for v in steps.get(key) or [] if v is not None]
+        if values:
+            lines.append(f"{text}: {sum(values) / len(values):.5g}")
+    error = [v for v in steps.get("output_error_arcsec") or [] if v is not None]
+    if error:
+        lines.append(
+            f"output error, peak to peak: {max(error) - min(error):.4g} arcsec"
+        )
+    lines.append(f"outcome: {result['outcome']}")
+    return "\n".join([*lines, *(f"wrote {name}" for name in result["files"])])

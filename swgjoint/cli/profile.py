@@ -1,0 +1,181 @@
+"""``swgjoint profile``: the teeth of a design as numbers and as a picture."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+from swgjoint.cli.text import table
+from swgjoint.files import output_folder, write_whole
+from swgjoint.json_text import json_text
+
+if TYPE_CHECKING:
+    from swgjoint.gear.profile import ToothProfile
+
+MEMBERS = ("flexspline", "circular_spline")
+TANGENCY_RAD = 1e-10
+"""Largest corner at a junction of two segments that counts as tangent [rad]."""
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Design and output folder."""
+    parser.add_argument("design", metavar="DESIGN", help="design file or bundled name")
+    parser.add_argument(
+        "--out", metavar="DIR", help="write profile.json and profile.png there"
+    )
+
+
+def run(args: argparse.Namespace) -> dict[str, Any]:
+    """Build and check both tooth profiles.
+
+    Returns:
+        Per member ``straight_length_mm``, radii, widths and ``segments``; ``points``
+        of both right flanks from tip to root [mm]; ``checks``; ``files``.
+    """
+    folder = output_folder(args.out) if args.out else None
+    from swgjoint.gear.design import Design
+    from swgjoint.gear.profile import tooth_profile
+
+    design = Design.load(args.design)
+    profiles = {member: tooth_profile(design, member) for member in MEMBERS}
+    result: dict[str, Any] = {"design": design.drive.name}
+    result |= {member: _numbers(profile) for member, profile in profiles.items()}
+    result["points"] = {m: _points(profile) for m, profile in profiles.items()}
+    result["checks"] = [
+        check | {"member": member}
+        for member, profile in profiles.items()
+        for check in _checks(profile)
+    ]
+    result["files"] = []
+    if folder is not None:
+        from swgjoint.view.profile_plots import profile_picture
+
+        picture = profile_picture(design, profiles)
+        folder.mkdir(parents=True, exist_ok=True)
+        result["files"] = [str(folder / f"profile.{end}") for end in ("json", "png")]
+        write_whole(folder / "profile.json", json_text(result) + "\n")
+        write_whole(folder / "profile.png", picture)
+    return result
+
+
+def report(result: dict[str, Any]) -> str:
+    """One column per member, then the checks."""
+    keys = [key for key in result["flexspline"] if key != "segments"]
+    rows = [(key, *(result[member][key] for member in MEMBERS)) for key in keys]
+    names = dict.fromkeys(s["name"] for m in MEMBERS for s in result[m]["segments"])
+    for name in names:
+        lengths = [
+            next(
+                (s["length_mm"] for s in result[m]["segments"] if s["name"] == name), 0
+            )
+            for m in MEMBERS
+        ]
+        rows.append((f"length of {name} [mm]", *lengths))
+    text = table(rows, header=("", "flexspline", "circular spline"))
+    checks = [
+        f"{'ok ' if check['ok'] else 'BAD'} {check['member']}: {check['name']}"
+        f" ({check['value']:.4g} {check['unit']})"
+        for check in result["checks"]
+    ]
+    files = [f"wrote {name}" for name in result["files"]]
+    return "\n".join([f"tooth profile of {result['design']}", text, *checks, *files])
+
+
+def status(result: dict[str, Any]) -> int:
+    """1 if a check failed."""
+    return 0 if all(check["ok"] for check in result["checks"]) else 1
+
+
+def _numbers(profile: ToothProfile) -> dict[str, Any]:
+    from swgjoint.units import mm
+
+    thickness = _width_at_pitch(profile)
+    return {
+        "teeth": profile.teeth,
+        "straight_length_mm": profile.straight_length / mm,
+        "pitch_radius_mm": profile.pitch_radius / mm,
+        "tip_radius_mm": profile.addendum_radius / mm,
+        "root_radius_mm": profile.dedendum_radius / mm,
+        "thickness_at_pitch_mm": thickness / mm,
+        "segments": [
+            {
+                "name": part.name,
+                "length_mm": part.length / mm,
+                "radius_mm": part.radius / mm if part.radius else None,
+            }
+            for part in profile.segments
+        ],
+    }
+
+
+def _width_at_pitch(profile: ToothProfile) -> float:
+    """Thickness of the tooth along the pitch circle [m]."""
+    import numpy as np
+    from scipy.optimize import brentq
+
+    def height(s: float) -> float:
+        (point,), _, _ = profile.evaluate(np.array([s]))
+        return float(np.hypot(*point)) - profile.pitch_radius
+
+    s = brentq(height, 0.0, float(profile.stations[-1]), xtol=1e-15)
+    (point,), _, _ = profile.evaluate(np.array([s]))
+    return 2.0 * profile.pitch_radius * float(np.arctan2(point[0], point[1]))
+
+
+def _points(profile: ToothProfile, per_segment: int = 24) -> list[list[float]]:
+    """Flank points [mm], every junction among them."""
+    import numpy as np
+
+    from swgjoint.units import mm
+
+    stations = profile.stations
+    parts = [
+        np.linspace(a, b, per_segment, endpoint=False) for a, b in pairwise(stations)
+    ]
+    points, _, _ = profile.evaluate(np.concatenate([*parts, stations[-1:]]))
+    return [[float(x) / mm, float(y) / mm] for x, y in points]
+
+
+def _checks(profile: ToothProfile) -> list[dict[str, Any]]:
+    """Closed and tangent at every junction, nothing of negative length."""
+    import numpy as np
+
+    from swgjoint.units import mm
+
+    corner = gap = 0.0
+    stations = profile.stations
+    for k, (left, right) in enumerate(pairwise(profile.segments)):
+        gap = max(gap, float(np.hypot(*np.subtract(left.end, right.start))))
+        before = _normal(profile, k, left.angle_end)
+        after = _normal(profile, k + 1, right.angle_start)
+        cross = before[0] * after[1] - before[1] * after[0]
+        dot = before[0] * after[0] + before[1] * after[1]
+        corner = max(corner, abs(float(np.arctan2(cross, dot))))
+    shortest = min(part.length for part in profile.segments)
+    (last,), _, _ = profile.evaluate(stations[-1:])
+    end = abs(float(np.arctan2(last[0], last[1])) - profile.half_pitch)
+    return [
+        _check("segments meet", gap / mm, "mm", gap < 1e-12),
+        _check("junctions are tangent", corner, "rad", corner < TANGENCY_RAD),
+        _check("shortest segment", shortest / mm, "mm", shortest > 0),
+        _check("flank ends in the middle of the gap", end, "rad", end < 1e-12),
+    ]
+
+
+def _normal(profile: ToothProfile, k: int, angle: float) -> tuple[float, float]:
+    """Outward normal of segment k, of an arc in the direction ``angle``."""
+    import numpy as np
+
+    part, stations = profile.segments[k], profile.stations
+    if part.radius == 0.0:
+        middle = 0.5 * (stations[k] + stations[k + 1])
+        _, (normal,), _ = profile.evaluate(np.array([middle]))
+        return float(normal[0]), float(normal[1])
+    sign = 1.0 if part.convex else -1.0
+    return sign * math.cos(angle), sign * math.sin(angle)
+
+
+def _check(name: str, value: float, unit: str, ok: bool) -> dict[str, Any]:
+    return {"name": name, "value": value, "unit": unit, "ok": bool(ok)}

@@ -1,0 +1,51 @@
+"""Pictures of a simulation of meshing."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping
+from typing import Any
+
+_KINDS = {"tensile": "tab:red", "compressive": "tab:blue", "von_mises": "0.3"}
+
+
+def meshing_picture(result: Mapping[str, Any]) -> bytes:
+    """PNG of the per-step maxima, error, wave-generator torque and contact.
+
+    Args:
+        result: The JSON object of ``swgjoint meshing``.
+    """
+    from matplotlib.figure import Figure
+
+    steps = result["per_step"]
+    angle = steps["angle_deg"]
+    figure = Figure(figsize=(9, 8), layout="constrained")
+    stress, error, torque, pairs = figure.subplots(4, 1, sharex=True)
+    for kind, colour in _KINDS.items():
+        label = kind.replace("_", " ")
+        stress.plot(angle, _gaps(steps[f"{kind}_MPa"]), ".-", color=colour, label=label)
+    stress.set_ylabel("largest stress in\nthe flexspline [MPa]")
+    stress.legend(ncols=3, fontsize="small")
+    for ax, key, label in (
+        (error, "output_error_arcsec", "output error\n[arcsec]"),
+        (torque, "wave_generator_torque_Nm", "wave-generator\ntorque [N·m]"),
+        (pairs, "pairs_in_contact", "tooth pairs\nin contact"),
+    ):
+        ax.plot(angle, _gaps(steps[key]), ".-", color="tab:green")
+        ax.set_ylabel(label)
+    pairs.set_xlabel("wave-generator angle [deg]")
+    for ax in (stress, error, torque, pairs):
+        ax.grid(alpha=0.3)
+        ax.ticklabel_format(axis="y", useOffset=False)
+    name = result.get("design", "drive")
+    torque_Nm = result.get("torque_Nm")
+    load = f", {torque_Nm:g} N·m at the output" if torque_Nm is not None else ""
+    figure.suptitle(f"Meshing of {name}{load}: {result['outcome']}", fontsize="medium")
+    out = io.BytesIO()
+    figure.savefig(out, format="png", dpi=120)
+    return out.getvalue()
+
+
+def _gaps(values: list[float | None]) -> list[float]:
+    """Failed steps leave a gap in the line."""
+    return [float("nan") if value is None else value for value in values]
