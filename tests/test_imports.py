@@ -1,0 +1,157 @@
+"""Imports point one way and stay cheap."""
+
+from __future__ import annotations
+
+import ast
+import json
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import swgjoint
+
+PACKAGE = Path(swgjoint.__file__).parent
+CHAIN = ("gear", "maps", ("fe", "joint"), "sim", "view", "control", "envs", "study")
+CHAIN = (*CHAIN, "cli")
+RANK = {
+    name: rank
+    for rank, level in enumerate(CHAIN)
+    for name in ([level] if isinstance(level, str) else level)
+}
+EXCEPTION = ("sim/run.py", "view")
+"""``Run.to_rerun`` loads the view when called: the one arrow that points back."""
+
+
+def modules() -> list[Path]:
+    return sorted(PACKAGE.rglob("*.py"))
+
+
+def imports(path: Path) -> Iterator[tuple[str, bool]]:
+    """Imported names of a file and whether they are imported at import time."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    parents = {c: p for p in ast.walk(tree) for c in ast.iter_child_nodes(p)}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: relative import"
+            names = [f"{node.module}.{alias.name}" for alias in node.names]
+        else:
+            continue
+        at_import, only_types, up = True, False, node
+        while up in parents:
+            up = parents[up]
+            if isinstance(up, ast.FunctionDef | ast.AsyncFunctionDef):
+                at_import = False
+            if isinstance(up, ast.If) and "TYPE_CHECKING" in ast.unparse(up.test):
+                only_types = True
+        if not only_types:
+            yield from ((name, at_import) for name in names)
+
+
+def part_of(path: Path) -> str | None:
+    """Sub-package of a file; None for the base modules beside them."""
+    inside = path.relative_to(PACKAGE).parts
+    return inside[0] if len(inside) > 1 else None
+
+
+def test_every_part_has_its_place():
+    """Each sub-package with Python code is named in the chain of arrows."""
+    parts = {part_of(path) for path in modules()} - {None, "plugin"}
+    assert parts <= set(RANK)
+
+
+def test_arrows():
+    """A part imports only itself, the parts to its left and the base modules."""
+    wrong, backwards = [], []
+    for path in modules():
+        here = part_of(path)
+        inside = path.relative_to(PACKAGE).as_posix()
+        for name, at_import in imports(path):
+            words = name.split(".")
+            if words[0] != "swgjoint" or len(words) < 2 or words[1] not in RANK:
+                continue
+            there = words[1]
+            if here is None:
+                # base modules know no part; the entry point starts the command line
+                if inside != "__main__.py":
+                    wrong.append(f"{inside} imports {name}")
+            elif there != here and RANK[there] >= RANK[here]:
+                if (inside, there) == EXCEPTION and not at_import:
+                    backwards.append(name)
+                else:
+                    wrong.append(f"{inside} imports {name}")
+    assert wrong == []
+
+
+def test_scikit_fem_lives_in_fe_only():
+    """No other part imports scikit-fem, not even inside a function."""
+    users = {
+        part_of(path)
+        for path in modules()
+        for name, _ in imports(path)
+        if name.split(".")[0] == "skfem"
+    }
+    assert users == {"fe"}
+
+
+def test_heavy_parts_are_imported_when_used():
+    """rerun, matplotlib and optional packages are imported inside functions only."""
+    heavy = {"rerun", "matplotlib", "pyvista", "pinocchio", "casadi", "jinja2", "dask"}
+    found = [
+        f"{path.relative_to(PACKAGE)} imports {name}"
+        for path in modules()
+        for name, at_import in imports(path)
+        if at_import and name.split(".")[0] in heavy
+    ]
+    assert found == []
+
+
+def test_mujoco_is_imported_by_the_joint_and_what_uses_it():
+    """Geometry, finite elements and maps work without the engine."""
+    users = {
+        part_of(path)
+        for path in modules()
+        for name, _ in imports(path)
+        if name.split(".")[0] == "mujoco"
+    }
+    assert users & {None, "gear", "maps", "fe"} == set()
+
+
+def loaded_by(statement: str) -> set[str]:
+    """Top-level packages outside the standard library that a statement loads."""
+    code = (
+        "import sys; before = set(sys.modules)\n"
+        f"{statement}\n"
+        "import json; print(json.dumps(sorted(set(sys.modules) - before)))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-I", "-c", code], capture_output=True, text=True, check=True
+    )
+    names = {name.split(".")[0] for name in json.loads(done.stdout)}
+    return names - set(sys.stdlib_module_names)
+
+
+def test_importing_the_package_is_cheap():
+    """``import swgjoint`` loads nothing outside the standard library but numpy."""
+    assert loaded_by("import swgjoint") <= {"swgjoint", "numpy"}
+
+
+def test_help_loads_no_package():
+    """The command line's own module loads nothing outside the standard library."""
+    assert loaded_by("import swgjoint.cli.main") <= {"swgjoint"}
+
+
+@pytest.mark.parametrize("name", swgjoint._PUBLIC)
+def test_public_names_resolve(name):
+    """Every public name is there and says what it is."""
+    assert getattr(swgjoint, name).__doc__
+
+
+def test_unknown_names_are_refused():
+    """A name that is not public is an AttributeError."""
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        _ = swgjoint.nothing
