@@ -122,7 +122,7 @@ def ratings_of(design: Design) -> Ratings:
         size_factor, 1.0 / size_factor, ratio / row.ratio, row.ratio / ratio
     ) <= FITS_WITHIN * (1.0 + 1e-12)
 
-    rated = row.rated_torque * scale
+    rated = given.rated_torque_Nm or row.rated_torque * scale
     repeated = given.repeated_peak_Nm or row.repeated_peak * scale
     momentary = given.momentary_peak_Nm or row.momentary_peak * scale
     if given.repeated_peak_Nm is None:
