@@ -14,7 +14,7 @@ class ActiveSetError(ArithmeticError):
 
 
 def solve_mixed(
-    matrix: Array, offset: Array, inequalities: int, start: Array
+    matrix: Array, offset: Array, inequalities: int, multipliers: int, start: Array
 ) -> tuple[Array, Array]:
     r"""Solve :math:`g = q + M z` with unilateral and free unknowns.
 
@@ -29,6 +29,8 @@ def solve_mixed(
             Shape (n, n).
         offset: q. Shape (n,).
         inequalities: m.
+        multipliers: How many of the last unknowns are multipliers of equations; the
+            other free ones are displacements, whose diagonal is negative or vanishes.
         start: Guess of the active set, booleans (m,).
 
     Returns:
@@ -40,6 +42,9 @@ def solve_mixed(
     n, m = len(offset), inequalities
     active = start.copy()
     scale = np.sqrt(np.abs(np.diag(matrix))) + 1e-300
+    if 0 < m < n:  # the diagonal of a free unknown may vanish
+        size = np.abs(matrix[m:, :m] / scale[:m]).max(axis=1)
+        scale[m:] = np.maximum(scale[m:], size)
     scaled = matrix / scale[:, None] / scale
     q = offset / scale
     tolerance = 1e-12 * max(float(np.abs(q).max(initial=0.0)), 1e-300)
@@ -50,8 +55,11 @@ def solve_mixed(
         if not bad.any():
             return z / scale, active
         active = active ^ bad
-    z = _least_squares(scaled, q, m)
-    return z / scale, z[:m] > 0.0
+    active = _least_squares(scaled, q, m, multipliers)
+    z = _solve_active(scaled, q, active)
+    if (np.where(active, -z[:m], -(q + scaled @ z)[:m]) > 1e3 * tolerance).any():
+        raise ActiveSetError("active set cycles")
+    return z / scale, active
 
 
 def _solve_active(matrix: Array, offset: Array, active: NDArray[np.bool_]) -> Array:
@@ -66,16 +74,28 @@ def _solve_active(matrix: Array, offset: Array, active: NDArray[np.bool_]) -> Ar
     return z
 
 
-def _least_squares(matrix: Array, offset: Array, m: int) -> Array:
-    """Minimise z.Mz/2 + q.z over the unilateral unknowns, the free ones eliminated."""
-    coupling, block = matrix[:m, m:], matrix[m:, m:]
+def _least_squares(
+    matrix: Array, offset: Array, m: int, multipliers: int
+) -> NDArray[np.bool_]:
+    """Active set of a minimum of z.Mz/2 + q.z under z >= 0.
+
+    Multipliers are eliminated; a free displacement becomes a weighted equation.
+    """
+    reduced, q = matrix, offset
+    for k in range(len(offset) - 1, len(offset) - 1 - multipliers, -1):
+        column = reduced[:k, k] / reduced[k, k]
+        q = q[:k] - column * q[k]
+        reduced = reduced[:k, :k] - np.outer(column, reduced[k, :k])
+    rows, right = [], []
+    for k in range(m, len(q)):
+        weight = 1.0 / np.sqrt(max(-reduced[k, k], 1e-8))
+        rows.append(weight * reduced[k, :m])
+        right.append(-weight * q[k])
     try:
-        reach = np.linalg.solve(block, np.column_stack([coupling.T, offset[m:]]))
-        reduced = matrix[:m, :m] - coupling @ reach[:, :m]
-        shift = 1e-14 * float(np.trace(reduced)) / m
-        lower = np.linalg.cholesky(reduced + shift * np.eye(m))
-        target = -np.linalg.solve(lower, offset[:m] - coupling @ reach[:, m])
-        z, _ = nnls(lower.T, target)
+        lower = np.linalg.cholesky(reduced[:m, :m] + 1e-12 * np.eye(m))
+        rows.extend(lower.T)
+        right.extend(-np.linalg.solve(lower, q[:m]))
+        z, _ = nnls(np.array(rows), np.array(right))
     except (np.linalg.LinAlgError, RuntimeError) as error:
         raise ActiveSetError(f"no contact forces found: {error}") from error
-    return np.concatenate([z, -(reach[:, m] + reach[:, :m] @ z)])
+    return np.asarray(z > 0.0)

@@ -423,7 +423,7 @@ class RingModel:
                 guess = offset[:m] < 0.0
                 if state.contacts is not None and len(state.tooth_force):
                     guess = _match(contacts, state.contacts)
-            multipliers, active = solve_mixed(matrix, offset, m, guess)
+            multipliers, active = solve_mixed(matrix, offset, m, free - 1, guess)
             force = multipliers[:m]
 
             step = base + response[:, :, :count] @ multipliers
