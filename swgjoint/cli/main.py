@@ -16,6 +16,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from difflib import get_close_matches
 from importlib import import_module
+from types import ModuleType
 from typing import Any, NoReturn
 
 from swgjoint import __version__
@@ -108,20 +109,13 @@ def _command(name: str, arguments: list[str]) -> int:
     )
     args = parser.parse_args(arguments)
     args.progress = StderrProgress()
-    warnings.showwarning = _show_warning
     try:
-        if args.json:
-            from swgjoint.json_text import json_text
-
-            with _stdout_on_stderr():
-                result = module.run(args)
-            print(json_text(result, ascii_only=True))
-        else:
-            result = module.run(args)
-            print(module.report(result))
-        sys.stdout.flush()
+        with warnings.catch_warnings():
+            warnings.showwarning = _show_warning
+            result = _result(module, args)
     except SwgError as exc:
-        return _refuse(name, str(exc), BAD_INPUT if _is_input(exc) else FAILED)
+        bad_input = isinstance(exc, InputError)
+        return _refuse(name, str(exc), BAD_INPUT if bad_input else FAILED)
     except BrokenPipeError:
         raise
     except OSError as exc:  # disk full, no permission: nothing that we can repair
@@ -133,8 +127,19 @@ def _command(name: str, arguments: list[str]) -> int:
     return int(status(result)) if status else 0
 
 
-def _is_input(exc: SwgError) -> bool:
-    return isinstance(exc, InputError)
+def _result(module: ModuleType, args: argparse.Namespace) -> dict[str, Any]:
+    """Run the command and print its result."""
+    if args.json:
+        from swgjoint.json_text import json_text
+
+        with _stdout_on_stderr():
+            result: dict[str, Any] = module.run(args)
+        print(json_text(result, ascii_only=True))
+    else:
+        result = module.run(args)
+        print(module.report(result))
+    sys.stdout.flush()
+    return result
 
 
 def _refuse(name: str, message: str, status: int) -> int:

@@ -32,10 +32,12 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     """
     start = time.perf_counter()
     path = check_output_file(args.output, ".swg")
-    from swgjoint.fe.build_map import build_map
     from swgjoint.gear.design import Design
 
     design = Design.load(args.design)
+    # the finite elements take half a second to import: not before the design is sound
+    from swgjoint.fe.build_map import build_map
+
     drive = build_map(design, model=args.model, progress=args.progress)
     drive.save(path)
     info = dict(drive.info)

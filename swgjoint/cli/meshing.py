@@ -63,11 +63,13 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     """Run the simulation; the result has the keys of ``MeshingRun.to_json``."""
     _check(args)
     folder = output_folder(args.out) if args.out else None
-    from swgjoint.fe.meshing import simulate_meshing
     from swgjoint.gear.design import Design
-    from swgjoint.maps.catalogue import ratings_of
 
     design = Design.load(args.design)
+    # the finite elements take half a second to import: not before the design is sound
+    from swgjoint.fe.meshing import simulate_meshing
+    from swgjoint.maps.catalogue import ratings_of
+
     torque = ratings_of(design).rated_torque if args.torque is None else args.torque
     model = args.model or ("3d" if design.cup is not None else "2d")
     meshing = simulate_meshing(

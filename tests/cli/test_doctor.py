@@ -1,0 +1,110 @@
+"""The doctor tells what is there and what is missing."""
+
+from __future__ import annotations
+
+import json
+import sys
+
+import pytest
+
+from swgjoint.cli import doctor
+from swgjoint.cli.main import main
+from swgjoint.errors import ComputationError
+from swgjoint.joint import plugin
+
+
+def run(capsys) -> tuple[int, dict]:
+    status = main(["doctor", "--json"])
+    return status, json.loads(capsys.readouterr().out)
+
+
+def by_name(result: dict) -> dict[str, dict]:
+    return {check["name"]: check for check in result["checks"]}
+
+
+def test_plugin_and_models_are_there(capsys):
+    """The engine plugin loads, bundled models and cache are found."""
+    _, result = run(capsys)
+    checks = by_name(result)
+    for name in ("python", "engine plugin", "bundled models", "cache"):
+        assert checks[name]["ok"], checks[name]
+
+
+def test_ok_is_about_required_parts(capsys):
+    """``ok`` and the status follow the required checks alone."""
+    status, result = run(capsys)
+    required = [check["ok"] for check in result["checks"] if check["required"]]
+    assert result["ok"] == all(required)
+    assert status == (0 if result["ok"] else 1)
+    assert {c["name"] for c in result["checks"] if not c["required"]} == {
+        f"extra {name}" for name in doctor.EXTRAS
+    }
+
+
+def test_plugin_that_does_not_load(capsys, monkeypatch):
+    """A plugin for another MuJoCo makes the installation unusable, with the reason."""
+
+    def load():
+        raise ComputationError("needs mujoco 4.0.0: pip install mujoco==4.0.0")
+
+    monkeypatch.setattr(plugin, "load", load)
+    status, result = run(capsys)
+    assert status == 1
+    assert not result["ok"]
+    assert "pip install mujoco==4.0.0" in by_name(result)["engine plugin"]["detail"]
+
+
+def test_mujoco_that_is_missing(capsys, monkeypatch):
+    """Without mujoco the doctor still answers."""
+    monkeypatch.delitem(sys.modules, "swgjoint.joint.plugin")
+    monkeypatch.delattr("swgjoint.joint.plugin")
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    _, result = run(capsys)
+    assert "cannot be imported" in by_name(result)["engine plugin"]["detail"]
+
+
+def test_cache_folder(capsys, monkeypatch, tmp_path):
+    """The cache is where the variable says, off when it is empty, or refused."""
+    for value, ok, word in (
+        (str(tmp_path / "new" / "deep"), True, "deep"),
+        ("", True, "switched off"),
+        ("/dev/null/x", False, "not writable"),
+    ):
+        monkeypatch.setenv("SWGJOINT_CACHE", value)
+        _, result = run(capsys)
+        check = by_name(result)["cache"]
+        assert (check["ok"], word in check["detail"]) == (ok, True)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_missing_extras_say_how_to_get_them(monkeypatch, capsys):
+    """An absent optional part names its modules and the pip command."""
+    monkeypatch.setattr(doctor, "EXTRAS", {"none": ("no_such_module",)})
+    _, result = run(capsys)
+    check = by_name(result)["extra none"]
+    assert not check["ok"]
+    assert check["detail"].endswith("pip install 'swgjoint[none]'")
+
+
+def test_required_packages_come_from_the_metadata(monkeypatch):
+    """Requirements of the base install, not those of extras."""
+    monkeypatch.setattr(
+        doctor.metadata,
+        "requires",
+        lambda name: [
+            "numpy>=2.0",
+            "mujoco==4.0.0",
+            'cma>=4 ; extra == "tune"',
+            "a [b]",
+        ],
+    )
+    assert doctor.required_packages() == ["swgjoint", "numpy", "mujoco", "a"]
+
+
+@pytest.mark.parametrize("ok", [True, False])
+def test_report(ok):
+    """The table has a line per check and a verdict."""
+    check = {"name": "x", "ok": ok, "required": True, "detail": "why"}
+    text = doctor.report({"ok": ok, "checks": [check]})
+    assert text.splitlines()[0].split() == ["x", "ok" if ok else "MISSING", "why"]
+    assert ("not usable" in text) is not ok

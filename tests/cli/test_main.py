@@ -1,0 +1,237 @@
+"""The command line frame: status, one line per fault, JSON and nothing else."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import time
+from importlib import import_module
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from swgjoint import __version__
+from swgjoint.cli import main as frame
+from swgjoint.cli.main import COMMANDS, main
+from swgjoint.errors import ComputationError, DesignError, MissingExtraError
+
+
+@pytest.fixture
+def command(monkeypatch):
+    """Let the command ``doctor`` do something else; its work is the argument."""
+
+    def replaced(work, **more):
+        module = SimpleNamespace(
+            configure=lambda parser: parser.add_argument("--size", type=float),
+            run=work,
+            report=lambda result: f"report of {result}",
+            **more,
+        )
+        monkeypatch.setattr(frame, "import_module", lambda name: module)
+
+    return replaced
+
+
+def shell(*arguments: str, **options) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "swgjoint", *arguments],
+        capture_output=True,
+        text=True,
+        **options,
+    )
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_every_command_is_there(name, capsys):
+    """Each command of the table has its module, its help and --json."""
+    module = import_module(f"swgjoint.cli.{name}")
+    assert callable(module.run)
+    assert callable(module.report)
+    with pytest.raises(SystemExit) as left:
+        main([name, "--help"])
+    assert left.value.code == 0
+    assert "--json" in capsys.readouterr().out
+
+
+def test_help_lists_the_commands(capsys):
+    """--help goes to stdout and names every command."""
+    with pytest.raises(SystemExit) as left:
+        main(["--help"])
+    assert left.value.code == 0
+    out = capsys.readouterr().out
+    assert all(f"  {name}" in out for name in COMMANDS)
+
+
+def test_help_is_quick():
+    """--help answers within 0.15 s beyond the start of Python."""
+
+    def best(*arguments: str) -> float:
+        times = []
+        for _ in range(5):
+            start = time.perf_counter()
+            subprocess.run(
+                [sys.executable, *arguments], capture_output=True, check=True
+            )
+            times.append(time.perf_counter() - start)
+        return min(times)
+
+    assert best("-m", "swgjoint", "--help") - best("-c", "") < 0.15
+
+
+def test_version(capsys):
+    """--version prints the version alone."""
+    with pytest.raises(SystemExit) as left:
+        main(["--version"])
+    assert left.value.code == 0
+    assert capsys.readouterr().out == f"{__version__}\n"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["meshin"], "did you mean meshing?"),
+        (["--jsn"], "unknown option --jsn"),
+        (["--json", "doctor"], "options stand after the command"),
+        (["doctor", "--bad"], "unrecognized arguments: --bad"),
+        (["doctor", "--js"], "unrecognized arguments: --js"),
+        (["map", "reference-2d"], "required: -o"),
+        (["meshing", "reference-2d", "--steps", "x"], "invalid int value"),
+        (["meshing", "reference-2d", "--linear", "--nonlinear"], "not allowed with"),
+    ],
+)
+def test_wrong_arguments(arguments, message, capsys):
+    """A wrong command or option is one line on stderr with status 2."""
+    with pytest.raises(SystemExit) as left:
+        main(arguments)
+    assert left.value.code == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.count("\n") == 1
+    assert message in err
+
+
+@pytest.mark.parametrize(
+    ("error", "status", "lines"),
+    [
+        (DesignError("a.toml: x\na.toml: y"), 2, ["a.toml: x", "a.toml: y"]),
+        (ComputationError("did not settle"), 1, ["did not settle"]),
+        (MissingExtraError("needs casadi"), 1, ["needs casadi"]),
+        (OSError(28, "No space left on device", "a.png"), 1, None),
+        (MemoryError(), 1, None),
+    ],
+)
+@pytest.mark.parametrize("options", [[], ["--json"]])
+def test_errors_are_lines(command, capsys, error, status, lines, options):
+    """Errors are lines on stderr, stdout stays empty, the status says which kind."""
+
+    def work(args):
+        raise error
+
+    command(work)
+    assert main(["doctor", *options]) == status
+    out, err = capsys.readouterr()
+    assert out == ""
+    found = err.splitlines()
+    if lines is None:
+        assert len(found) == 1
+    else:
+        assert found == [f"swgjoint doctor: {line}" for line in lines]
+
+
+def test_a_defect_is_not_hidden(command):
+    """An error that is not ours keeps its traceback."""
+
+    def work(args):
+        raise ZeroDivisionError
+
+    command(work)
+    with pytest.raises(ZeroDivisionError):
+        main(["doctor"])
+
+
+def test_json_is_alone_on_stdout(command, capfd):
+    """With --json what the work prints, from Python or C, goes to stderr."""
+
+    def work(args):
+        print("from python")
+        sys.stdout.flush()
+        os.write(1, b"from c\n")
+        return {
+            "a": np.float64(1.5),
+            "b": np.arange(3),
+            "c": [np.nan, np.inf],
+            "d": "µ",
+        }
+
+    command(work)
+    assert main(["doctor", "--json"]) == 0
+    out, err = capfd.readouterr()
+    assert json.loads(out) == {"a": 1.5, "b": [0, 1, 2], "c": [None, None], "d": "µ"}
+    assert "from python" in err
+    assert "from c" in err
+
+
+def test_terminal_report(command, capsys):
+    """Without --json the report is printed; options and progress reach the work."""
+
+    def work(args):
+        args.progress("stage", 2, 2)
+        return {"size": args.size}
+
+    command(work)
+    assert main(["doctor", "--size", "3"]) == 0
+    out, err = capsys.readouterr()
+    assert out == "report of {'size': 3.0}\n"
+    assert "stage: 2/2" in err
+
+
+def test_status_of_a_result(command):
+    """A command may turn its result into a status."""
+    command(lambda args: {}, status=lambda result: 1)
+    assert main(["doctor"]) == 1
+
+
+def test_interrupt(command, capsys):
+    """Ctrl-C ends with status 130 and one word."""
+
+    def work(args):
+        raise KeyboardInterrupt
+
+    command(work)
+    assert main(["doctor"]) == 130
+    assert capsys.readouterr().err == "swgjoint: interrupted\n"
+
+
+def test_reader_that_leaves():
+    """A closed pipe is no error message."""
+    reader, writer = os.pipe()
+    os.close(reader)
+    done = subprocess.run(
+        [sys.executable, "-m", "swgjoint", "doctor"],
+        stdout=writer,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    os.close(writer)
+    assert done.returncode == 141
+    assert "Error" not in done.stderr
+
+
+def test_no_command():
+    """Without a command the help is shown on stderr, status 2."""
+    done = shell()
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert "commands:" in done.stderr
+
+
+def test_ascii_terminal():
+    """A terminal without Unicode gets JSON that reads the same, and no traceback."""
+    environment = {**os.environ, "PYTHONIOENCODING": "ascii", "SWGJOINT_CACHE": "µ"}
+    done = shell("doctor", "--json", env=environment)
+    checks = {check["name"]: check for check in json.loads(done.stdout)["checks"]}
+    assert checks["cache"]["detail"] == "µ"
+    assert shell("doctor", env=environment).stderr == ""
