@@ -155,7 +155,9 @@ def joint_equilibrium(
         theta, psi = scale * x
         on_input, on_output = law.forces(theta, psi)
         motor = motor_torque + stiffness * (motor_reference - theta)
-        return scale * np.array([-on_input - motor, output_torque - on_output])
+        return np.asarray(
+            scale * np.array([-on_input - motor, output_torque - on_output])
+        )
 
     x = np.array(
         [

@@ -63,6 +63,7 @@ def joint_metrics(run: Run, j: int) -> dict[str, Any]:
                 "order": line.order,
                 "amplitude_Nm": line.amplitude,
                 "amplitude_percent": 100.0 * line.amplitude / rated,
+                "drive_order": drive_order(run, j, line.order),
             }
             for line in lines
         ],
@@ -101,6 +102,20 @@ def highest_resolved_order(run: Run, j: int) -> float | None:
     if speed == 0.0:
         return None
     return float(PHASE_STEP / (run.assembly.scene.simulation.step_s * speed))
+
+
+def drive_order(run: Run, j: int, order: float) -> float | None:
+    """The order of the joint's own drive that a line belongs to, None for others.
+
+    Others are vibrations of the arm, products of two orders, and the orders of other
+    joints, which reach this one through the arm.
+    """
+    attached = run.assembly.transmissions[j].attached
+    if attached.level != "full" or not attached.kept_orders:
+        return None
+    near = min(attached.kept_orders, key=lambda kept: abs(kept - order))
+    turns = np.ptp(run.motor_position[run.steady, j]) / (2.0 * np.pi)
+    return near if abs(near - order) <= 0.5 / turns else None
 
 
 def spread(values: Array) -> dict[str, float]:

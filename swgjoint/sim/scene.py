@@ -195,13 +195,18 @@ def _merged(
         *tables, last = key.split(".")
         table = merged
         for name in tables:
+            _make_room(table, name)
             table = table.setdefault(name, {})
             if not isinstance(table, dict):
                 raise InputError(f"{where}: {key}: {name} is not a table")
-        # a drive by name and a linear one exclude each other: the new one wins
-        table.pop({"drive": "linear", "linear": "drive"}.get(last, ""), None)
+        _make_room(table, last)
         table[last] = value
     return merged
+
+
+def _make_room(table: dict[str, Any], key: str) -> None:
+    """A drive by name and a linear one exclude each other: the new one wins."""
+    table.pop({"drive": "linear", "linear": "drive"}.get(key, ""), None)
 
 
 def parse_override(text: str) -> tuple[str, Any]:

@@ -1,0 +1,124 @@
+"""``swgjoint demo``: from the tooth geometry of two drives to a moving arm."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from pathlib import Path
+from typing import Any
+
+from swgjoint.cli.run import joint_table, notes
+from swgjoint.cli.text import table
+from swgjoint.files import output_folder
+
+SCENE = "ur5e-sweep"
+DRIVES = {"elliptical": "reference-2d", "simplified": "reference-2d-simplified"}
+"""Wave generators that are compared, as bundled designs."""
+FOLDER = "swgjoint-demo"
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Output folder."""
+    parser.add_argument(
+        "--out",
+        metavar="DIR",
+        default=FOLDER,
+        help=f"folder that receives the files, default ./{FOLDER}",
+    )
+
+
+def run(args: argparse.Namespace) -> dict[str, Any]:
+    """Build both maps, run the arm with each and rigid, write recording and picture.
+
+    Returns:
+        ``map`` (figures of both maps), ``metrics`` (of the three runs, with
+        ``tool_against_rigid``), ``files``, ``wall_s``.
+    """
+    start = time.perf_counter()
+    folder = output_folder(args.out)
+    from swgjoint.sim.drives import load_drive
+    from swgjoint.sim.metrics import against_rigid
+    from swgjoint.sim.run import run_scene
+    from swgjoint.sim.scene import Scene
+
+    maps = {name: load_drive(name, progress=args.progress) for name in DRIVES.values()}
+    scene = Scene.load_file(SCENE)
+    scenes = {
+        **{label: scene.with_drive(drive) for label, drive in DRIVES.items()},
+        "rigid": scene.with_level("rigid"),
+    }
+    runs = {
+        label: run_scene(changed, drives=maps, name=label, progress=args.progress)
+        for label, changed in scenes.items()
+    }
+    rigid = runs["rigid"]
+    metrics = {
+        label: {
+            **result.metrics(),
+            "tool_against_rigid": against_rigid(result, rigid),
+            "contains": result.contains,
+        }
+        for label, result in runs.items()
+    }
+    files = _write(folder, runs, rigid, args.progress)
+    return {
+        "scene": scene.name,
+        "map": {
+            label: {
+                "design": drive,
+                "level": maps[drive].level,
+                "stiffness_Nm_rad": maps[drive].mean_stiffness,
+                "harmonics": len(maps[drive].orders) - 1,
+                "torque_range_Nm": maps[drive].torque_range,
+                "rated_torque_Nm": maps[drive].ratings.rated_torque,
+                "info": dict(maps[drive].info),
+            }
+            for label, drive in DRIVES.items()
+        },
+        "metrics": metrics,
+        "files": files,
+        "wall_s": time.perf_counter() - start,
+    }
+
+
+def _write(folder: Path, runs: Any, rigid: Any, progress: Any) -> list[str]:
+    from swgjoint.view.plots import comparison_png
+    from swgjoint.view.recording import write_recording
+
+    progress("recording and picture", 0, 2)
+    recording = write_recording(runs, folder / "run.rrd", rigid=rigid)
+    progress("recording and picture", 1, 2)
+    picture = comparison_png(runs, folder / "demo.png", rigid=rigid)
+    progress("recording and picture", 2, 2)
+    return [str(recording), str(picture)]
+
+
+def report(result: dict[str, Any]) -> str:
+    """Tables of drives, joints and tool, and where the files are."""
+    lines = []
+    for label, item in result["map"].items():
+        low, high = item["torque_range_Nm"]
+        lines.append(
+            f"{label}: {item['design']}, {item['level']} finite elements,"
+            f" {item['stiffness_Nm_rad']:.4g} N·m/rad, {item['harmonics']} harmonics,"
+            f" {low:.3g} to {high:.3g} N·m"
+        )
+    for label, metrics in result["metrics"].items():
+        lines += ["", f"UR5e, {label}:", joint_table(metrics["joints"])]
+        lines += notes(metrics["joints"])
+    rows = [
+        (
+            label,
+            *[
+                f"{metrics['tool_against_rigid'][key]:.4f}"
+                for key in ("mean_mm", "rms_mm", "max_mm", "pp_mm")
+            ],
+            f"{metrics['steps_per_s']:.0f}",
+        )
+        for label, metrics in result["metrics"].items()
+    ]
+    header = ("", "mean", "rms", "largest", "pp at speed", "steps/s")
+    lines += ["", "tool against the rigid arm [mm]:", table(rows, header=header), ""]
+    lines += [f"wrote {path}" for path in result["files"]]
+    lines += [f"{result['wall_s']:.1f} s; watch it: swgjoint view {result['files'][0]}"]
+    return "\n".join(lines)

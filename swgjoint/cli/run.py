@@ -1,0 +1,154 @@
+"""``swgjoint run``: simulate an arm with its drives."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from swgjoint.cli.text import table
+from swgjoint.files import output_folder
+
+JOINT_HEADER = (
+    "joint",
+    "level",
+    "torsion",
+    "pp",
+    "trans. error",
+    "pp",
+    "ripple pp",
+    "rms",
+    "strongest orders (%)",
+    "unresolved",
+)
+JOINT_UNITS = ("", "", "arcmin", "arcmin", "arcmin", "arcmin", "%", "%", "", "")
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Scene, changes, output folder."""
+    parser.add_argument("scene", metavar="SCENE", help="scene file or bundled name")
+    parser.add_argument(
+        "--set",
+        metavar="KEY=VALUE",
+        action="append",
+        default=[],
+        dest="overrides",
+        help="change a key of the scene, e.g. simulation.step_s=0.0005; repeatable",
+    )
+    parser.add_argument(
+        "--out", metavar="DIR", help="folder that receives run.rrd; none if absent"
+    )
+
+
+def run(args: argparse.Namespace) -> dict[str, Any]:
+    """Simulate the scene.
+
+    Returns:
+        ``joints``, ``tool``, ``steps_per_s``, ``contains``, ``files`` and the rest of
+        :meth:`swgjoint.sim.run.Run.metrics`.
+    """
+    folder = output_folder(args.out) if args.out else None
+    from swgjoint.sim.run import run_scene
+    from swgjoint.sim.scene import Scene
+
+    scene = Scene.load_file(args.scene, args.overrides)
+    result = run_scene(scene, progress=args.progress)
+    files = []
+    if folder is not None:
+        files.append(str(result.to_rerun(folder / "run.rrd")))
+    return {
+        "scene": scene.name,
+        **result.metrics(),
+        "contains": result.contains,
+        "files": files,
+    }
+
+
+def report(result: dict[str, Any]) -> str:
+    """Table of the joints, error of the tool, what the model contains."""
+    contains = result["contains"]
+    lines = [
+        f"scene {result['scene']}, constant speed from"
+        f" {result['window_s'][0]:.3g} to {result['window_s'][1]:.3g} s",
+        joint_table(result["joints"]),
+        *notes(result["joints"]),
+        tool_line(result["tool"]),
+        f"model: {contains['degrees_of_freedom']} degrees of freedom,"
+        f" {contains['tendons']} tendons, {contains['plugin_instances']} plugin"
+        f" instances, {contains['integrator']} at {1e3 * contains['step_s']:g} ms,"
+        f" {result['steps_per_s']:.3g} steps/s",
+        *[
+            f"left out in {item['joint']}: {item['part']}: {item['reason']}"
+            for item in contains["left_out"]
+        ],
+        *[f"wrote {path}" for path in result["files"]],
+    ]
+    return "\n".join(line for line in lines if line)
+
+
+def joint_table(joints: dict[str, Any]) -> str:
+    """One line per joint: torsion, transmission error, ripple, orders."""
+    return table([JOINT_UNITS, *map(joint_row, joints.items())], header=JOINT_HEADER)
+
+
+def joint_row(item: tuple[str, dict[str, Any]]) -> tuple[str, ...]:
+    """Figures of one joint as the table shows them."""
+    name, joint = item
+    torsion, error = joint["torsion_arcmin"], joint["transmission_error_arcmin"]
+    return (
+        name.removesuffix("_joint"),
+        joint["level"],
+        f"{torsion['mean']:.3f}",
+        f"{torsion['pp']:.3f}",
+        f"{error['mean']:.3f}",
+        f"{error['pp']:.3f}",
+        f"{joint['ripple_pp_percent']:.3f}",
+        f"{joint['ripple_rms_percent']:.3f}",
+        "  ".join(
+            f"{line['order']:.1f}{'' if line['drive_order'] else '*'}"
+            f" ({line['amplitude_percent']:.3f})"
+            for line in joint["orders"]
+        )
+        or "-",
+        _orders(joint["unresolved"]),
+    )
+
+
+def notes(joints: dict[str, Any]) -> list[str]:
+    """What marks in the table mean, and warnings about the validity of figures."""
+    lines = []
+    if any(not line["drive_order"] for j in joints.values() for line in j["orders"]):
+        lines.append(
+            "* no order of this joint's drive: vibration, modulation or another joint"
+        )
+    for name, joint in joints.items():
+        ratings = joint["ratings"]
+        if not ratings["within_map"]:
+            low, high = ratings["map_range_Nm"]
+            lines.append(
+                f"{name}: torque up to {ratings['peak_Nm']:.3g} N·m leaves the map"
+                f" ({low:.3g} to {high:.3g} N·m), which continues linearly there"
+            )
+        if not ratings["within"]:
+            lines.append(
+                f"{name}: above its ratings: cubed mean"
+                f" {ratings['cubed_mean_Nm']:.3g} of {ratings['rated_Nm']:.3g} N·m,"
+                f" peak {ratings['peak_Nm']:.3g}"
+                f" of {ratings['repeated_peak_Nm']:.3g} N·m"
+            )
+    return lines
+
+
+def tool_line(tool: dict[str, Any]) -> str:
+    """Error of the tool in one line."""
+    if tool["path_rms_mm"] is None:
+        return ""
+    return (
+        f"tool against the commanded path: {tool['path_rms_mm']:.4f} mm rms,"
+        f" {tool['path_max_mm']:.4f} mm at most, {tool['ap_mm']:.4f} mm at the end"
+    )
+
+
+def _orders(unresolved: list[dict[str, Any]]) -> str:
+    """Orders that were left out, the first few."""
+    names = [f"{left['order']:.4g}" for left in unresolved]
+    return " ".join(names[:3] + (["..."] if len(names) > 3 else [])) or "-"

@@ -1,0 +1,130 @@
+"""Default layout of a recording: the arm beside plots of one joint per tab."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from swgjoint.sim.run import Run
+
+SPACING = 0.75
+"""Distance between the arms of several runs [m]."""
+
+_PLOTS = (
+    ("torsion [arcmin]", "torsion_arcmin", True),
+    ("transmission error [arcmin]", "transmission_error_arcmin", True),
+    ("output torque [N·m]", "output_torque_Nm", False),
+)
+
+
+def blueprint_of(runs: Mapping[str, Run]) -> Any:
+    """Layout for runs of one motion, see :func:`swgjoint.view.recording`."""
+    import rerun.blueprint as rrb
+
+    first = next(iter(runs.values()))
+    prefixes = {label: f"/{label}/" if label else "/" for label in runs}
+    # torsion and error of a rigid arm are a line at zero that would set the scale
+    flexible = [label for label, run in runs.items() if not is_rigid(run)] or list(runs)
+    tabs = [
+        rrb.Vertical(
+            *[
+                _plot(
+                    title,
+                    [
+                        f"{prefixes[label]}joint/{joint}/{name}"
+                        for label in (flexible if of_flexible else runs)
+                    ],
+                )
+                for title, name, of_flexible in _PLOTS
+            ],
+            name=joint.removesuffix("_joint"),
+        )
+        for joint in joints_by_interest(runs)
+    ]
+    right: list[Any] = [rrb.Tabs(*tabs, active_tab=0)]
+    if first.tool_position.shape[1]:
+        paths = [f"{prefixes[label]}tool/error_mm" for label in flexible]
+        right.append(_plot("tool error [mm]", paths))
+    return rrb.Blueprint(
+        rrb.Horizontal(
+            rrb.Spatial3DView(
+                name=f"{first.assembly.scene.name}",
+                contents=[f"+ {p}**" for p in prefixes.values()],
+                eye_controls=_eye(runs),
+                line_grid=True,
+                background=[30, 33, 38],
+            ),
+            rrb.Vertical(*right, row_shares=[3.2, 1.0][: len(right)]),
+            column_shares=[1.0, 1.25],
+        ),
+        rrb.TimePanel(state="collapsed", timeline="time"),
+        rrb.SelectionPanel(state="hidden"),
+        rrb.BlueprintPanel(state="hidden"),
+        auto_views=False,
+        auto_layout=False,
+    )
+
+
+def is_rigid(run: Run) -> bool:
+    """Whether no joint of a run has torsion."""
+    return all(t.level == "rigid" for t in run.assembly.transmissions)
+
+
+def joints_by_interest(runs: Mapping[str, Run]) -> list[str]:
+    """Joints, the one with the largest resolved ripple first.
+
+    A joint whose drive has unresolved orders comes after those that show all of theirs.
+    """
+    first = next(iter(runs.values()))
+    window = first.steady
+
+    def key(j: int) -> tuple[bool, float]:
+        resolved = all(
+            not run.assembly.transmissions[j].attached.unresolved
+            for run in runs.values()
+        )
+        swing = max(
+            float(
+                np.ptp(
+                    run.output_torque[window, j] - run.assembly.link_torque[window, j]
+                )
+            )
+            for run in runs.values()
+        )
+        return not resolved, -swing
+
+    return [first.joints[j] for j in sorted(range(len(first.joints)), key=key)]
+
+
+def _plot(title: str, contents: list[str]) -> Any:
+    import rerun.blueprint as rrb
+
+    return rrb.TimeSeriesView(
+        name=title,
+        contents=[f"+ {path}" for path in contents],
+        plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.RightTop),
+        axis_x=rrb.TimeAxis(link=rrb.components.LinkAxis.LinkToGlobal),
+    )
+
+
+def _eye(runs: Mapping[str, Run]) -> Any:
+    """Camera that sees all arms: from the front, a little to the side and above."""
+    import rerun.blueprint as rrb
+
+    first = next(iter(runs.values()))
+    model = first.assembly.arm.model
+    reach = max(0.4, float(model.stat.extent))
+    distance = 1.1 * reach + 0.42 * SPACING * (len(runs) - 1)
+    target = [0.25 * reach, 0.0, 0.28 * reach]
+    return rrb.EyeControls3D(
+        position=[
+            target[0] + 1.25 * distance,
+            -0.45 * distance,
+            target[2] + 0.55 * distance,
+        ],
+        look_target=target,
+        eye_up=[0.0, 0.0, 1.0],
+    )

@@ -1,0 +1,67 @@
+"""Shapes of an arm as rerun archetypes, from the geoms of its compiled model."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+_GEOM = mujoco.mjtGeom
+
+
+def shape_of(model: mujoco.MjModel, geom: int) -> Any | None:
+    """One geom in its own frame, None for a kind that is not drawn.
+
+    Cylinders, capsules, spheres, ellipsoids, boxes and meshes are drawn; planes and
+    height fields are scenery.
+    """
+    import rerun as rr
+
+    size, color = model.geom_size[geom], color_of(model, geom)
+    solid = {"colors": [color], "fill_mode": rr.components.FillMode.Solid}
+    match int(model.geom_type[geom]):
+        case _GEOM.mjGEOM_CYLINDER:
+            return rr.Cylinders3D(lengths=[2.0 * size[1]], radii=[size[0]], **solid)
+        case _GEOM.mjGEOM_CAPSULE:
+            # rerun's capsule starts at its origin, MuJoCo's is centred
+            return rr.Capsules3D(
+                lengths=[2.0 * size[1]],
+                radii=[size[0]],
+                translations=[[0.0, 0.0, -size[1]]],
+                **solid,
+            )
+        case _GEOM.mjGEOM_BOX:
+            return rr.Boxes3D(half_sizes=[size], **solid)
+        case _GEOM.mjGEOM_SPHERE:
+            return rr.Ellipsoids3D(half_sizes=[[size[0]] * 3], **solid)
+        case _GEOM.mjGEOM_ELLIPSOID:
+            return rr.Ellipsoids3D(half_sizes=[size], **solid)
+        case _GEOM.mjGEOM_MESH:
+            return _mesh(model, int(model.geom_dataid[geom]), color)
+    return None
+
+
+def color_of(model: mujoco.MjModel, geom: int) -> list[int]:
+    """Colour of a geom, of its material where it has one, 0 to 255. Shape (4,)."""
+    material = int(model.geom_matid[geom])
+    rgba = model.mat_rgba[material] if material >= 0 else model.geom_rgba[geom]
+    return [round(255 * float(value)) for value in rgba]
+
+
+def quaternion_xyzw(wxyz: NDArray[np.float64]) -> NDArray[np.float64]:
+    """MuJoCo's quaternions in rerun's order. Shape (..., 4)."""
+    return np.roll(wxyz, -1, axis=-1)
+
+
+def _mesh(model: mujoco.MjModel, mesh: int, color: list[int]) -> Any:
+    import rerun as rr
+
+    first, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
+    face, faces = int(model.mesh_faceadr[mesh]), int(model.mesh_facenum[mesh])
+    return rr.Mesh3D(
+        vertex_positions=model.mesh_vert[first : first + count],
+        triangle_indices=model.mesh_face[face : face + faces],
+        albedo_factor=color,
+    )
