@@ -128,7 +128,7 @@ def scheme_force(
         # (M + h² p g g') dv = h (M other - lam g - e), M diagonal
         free = h * (other - weight * (lam * s.g + s.e))
         metric = np.eye(2) + h**2 * p * np.outer(weight * s.g, s.g)
-        dv = np.linalg.solve(metric, free)
+        dv = np.asarray(np.linalg.solve(metric, free), float)
     p = max(p, 1e-9)
     force = -lam * s.g - s.e
     return SchemeForce(

@@ -1,0 +1,187 @@
+"""Where a drive's integration holds, and which step would do where it does not.
+
+Bounds of the discrete scheme, with n the orders per input turn, e and V the amplitudes
+of kinematic error and of cogging energy, T the repeated peak torque, K the stiffness, J
+the rotor, C = T sum n²e + sum n²V the curvature that the metric does not hold:
+
+- h <= 5 ms, tested no further;
+- h n |theta rate| <= 0.5: a shorter wave is not carried by the step;
+- h² C <= 0.5 (J + J_link/i²) and C <= 0.5 (K/i² + J/h²): beyond, the rotor snaps
+  between several positions of equilibrium within a step and gains energy;
+- i sum n e <= 0.56 and K_max <= 30 K: tested no further.
+
+Tested on random joints (K 1e2..1e7 N·m/rad, rotor 1e-7..1e-3, link 1e-4..1e2 kg·m², i
+30..160, low orders and tooth order, side bands, ripple 2-5 %, hardening 3 to 30, steps
+0.5-5 ms, full torque let go and free running): of about 2900 runs inside none diverged
+and one gained more than 5 % of its energy. Not a proof: the step is one linearised
+solve with two evaluations.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import floor, inf, log10, sqrt
+
+import numpy as np
+
+from swgjoint.errors import ComputationError
+from swgjoint.joint.drive import JointDrive, input_orders
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bound:
+    """One inequality, value <= limit."""
+
+    what: str
+    value: float
+    limit: float
+    timestep: float | None
+    """Largest step that meets it [s]; None if no step does."""
+
+    @property
+    def ok(self) -> bool:
+        """Whether it is met."""
+        return self.value <= self.limit * (1.0 + 1e-9)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Region:
+    """Whether one joint is inside the region at a step."""
+
+    joint: str
+    timestep: float
+    bounds: tuple[Bound, ...]
+
+    @property
+    def ok(self) -> bool:
+        """Whether every bound is met."""
+        return all(bound.ok for bound in self.bounds)
+
+    @property
+    def suggested_timestep(self) -> float | None:
+        """Largest step to two digits that meets every bound [s]; None if none does."""
+        steps = [bound.timestep for bound in self.bounds if not bound.ok]
+        if None in steps:
+            return None
+        step = min([self.timestep, *(s for s in steps if s is not None)])
+        if step == self.timestep:
+            return step
+        digit = 10.0 ** (floor(log10(step)) - 1)
+        return floor(step / digit) * digit
+
+    @property
+    def message(self) -> str:
+        """One line: ``ok``, or what is exceeded and the step that would do."""
+        broken = [b for b in self.bounds if not b.ok]
+        if not broken:
+            return "ok"
+        what = "; ".join(f"{b.what} = {b.value:.3g} > {b.limit:.3g}" for b in broken)
+        step = self.suggested_timestep
+        way_out = (
+            "no step helps: use a drive with less kinematic error, or level linear"
+            if step is None
+            else f"a step of {1e3 * step:.2g} ms would do"
+        )
+        return (
+            f"joint {self.joint!r} at a step of {1e3 * self.timestep:.3g} ms is "
+            f"outside the integrator's region: {what}; {way_out}"
+        )
+
+    def require(self) -> None:
+        """Raise unless inside.
+
+        Raises:
+            ComputationError: With :attr:`message`.
+        """
+        if not self.ok:
+            raise ComputationError(self.message)
+
+
+def check_region(
+    drive: JointDrive,
+    *,
+    timestep: float,
+    max_input_speed: float = 0.0,
+    integrator: str = "discrete",
+) -> Region:
+    """Whether a joint's integration holds at a step; see the module for the bounds.
+
+    Args:
+        drive: What :func:`swgjoint.joint.attach.attach` returned.
+        timestep: Step h [s].
+        max_input_speed: Largest speed of the rotor [rad/s].
+        integrator: ``discrete``; for ``RK4`` and the others, which take the drive as an
+            explicit force, the bound is on h times the fastest torsion frequency.
+    """
+    if drive.level == "rigid" or (drive.level == "linear" and integrator == "discrete"):
+        bounds: tuple[Bound, ...] = ()
+    elif integrator == "discrete":
+        bounds = _discrete_bounds(drive, timestep, abs(max_input_speed))
+    else:
+        bounds = _explicit_bounds(drive, timestep, integrator)
+    return Region(joint=drive.joint, timestep=timestep, bounds=bounds)
+
+
+def _discrete_bounds(drive: JointDrive, h: float, speed: float) -> tuple[Bound, ...]:
+    m, i, rotor = drive.drive, abs(drive.ratio), drive.rotor_inertia
+    n = input_orders(m)[1:]
+    e = np.hypot(*m.kinematic_error[1:].T)
+    energy = np.hypot(*np.moveaxis(m.coefficients(m.torsion_knots), -1, 0))[:, 1:]
+    curvature = float(
+        m.ratings.repeated_peak * np.sum(n**2 * e) + np.sum(n**2 * energy.max(axis=0))
+    )
+    order = float(n.max(initial=0.0))
+    inertia = rotor + drive.link_inertia / i**2
+    held = drive.stiffness / i**2
+    surplus = 2.0 * curvature - held  # what J/h² has to carry
+    return (
+        Bound(what="step h [s]", value=h, limit=5e-3, timestep=5e-3),
+        Bound(
+            what="phase step h n |theta rate| [rad]",
+            value=h * order * speed,
+            limit=0.5,
+            timestep=0.5 / (order * speed) if order * speed else inf,
+        ),
+        Bound(
+            what="h² C/(J + J_link/i²)",
+            value=h**2 * curvature / inertia,
+            limit=0.5,
+            timestep=sqrt(0.5 * inertia / curvature) if curvature else inf,
+        ),
+        Bound(
+            what="C/(K/i² + J/h²)",
+            value=curvature / (held + rotor / h**2),
+            limit=0.5,
+            timestep=sqrt(rotor / surplus) if surplus > 0.0 else inf,
+        ),
+        Bound(
+            what="slope of the kinematic error at the rotor, i sum n e",
+            value=i * float(np.sum(n * e)),
+            limit=0.56,
+            timestep=None,
+        ),
+        Bound(
+            what="largest over mean stiffness",
+            value=m.max_stiffness / drive.stiffness,
+            limit=30.0,
+            timestep=None,
+        ),
+    )
+
+
+def _explicit_bounds(drive: JointDrive, h: float, integrator: str) -> tuple[Bound, ...]:
+    stiffness = drive.stiffness
+    if drive.level == "full":
+        stiffness = drive.drive.max_stiffness
+    rotor = drive.ratio**2 * drive.rotor_inertia
+    frequency = sqrt(stiffness * (1.0 / rotor + 1.0 / drive.link_inertia))
+    # stability ends at 2.8 for RK4 and 2 for a semi-implicit step, in free oscillation
+    limit = 2.0 if integrator.upper() == "RK4" else 1.0
+    return (
+        Bound(
+            what=f"h times the fastest torsion frequency under {integrator}",
+            value=h * frequency,
+            limit=limit,
+            timestep=limit / frequency,
+        ),
+    )

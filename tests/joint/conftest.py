@@ -1,0 +1,91 @@
+"""Two-mass models of one joint, and maps that move with both angles."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import mujoco
+import numpy as np
+import pytest
+
+from swgjoint.joint.attach import attach
+from swgjoint.joint.drive import JointDrive
+from swgjoint.maps.drive_map import DriveMap
+
+TWO_MASS = """
+<mujoco>
+  <option timestep="{step}" integrator="{integrator}" gravity="0 0 0"/>
+  <worldbody>
+    <body name="link" pos="0 0 .5">
+      <joint name="j" axis="0 0 1" {joint}/>
+      <inertial pos="0 0 0" mass="3" diaginertia=".3 .3 {link}"/>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+
+
+@dataclass(frozen=True, eq=False)
+class Bench:
+    """A compiled model with one driven joint."""
+
+    model: mujoco.MjModel
+    data: mujoco.MjData
+    drive: JointDrive
+    q: np.ndarray
+    """qpos addresses of rotor and link."""
+    v: np.ndarray
+
+    def place(self, theta: float, psi: float, *rates: float) -> None:
+        """Set the state of rotor and link."""
+        self.data.qpos[self.q] = theta, psi
+        if rates:
+            self.data.qvel[self.v] = rates
+
+    def energy(self, *, midpoint: bool = False) -> float:
+        """Kinetic energy and V, at q or half a step back where the scheme lives."""
+        d = self.data
+        inertia = np.array([self.drive.rotor_inertia, self.drive.link_inertia])
+        v = d.qvel[self.v]
+        x = d.qpos[self.q] - 0.5 * midpoint * self.model.opt.timestep * v
+        drive = self.drive.drive
+        potential = drive.energy(drive.torsion(*x), *x)
+        return float(0.5 * np.sum(inertia * v**2) + potential)
+
+
+def make_bench(
+    drive: DriveMap,
+    *,
+    step: float = 1e-3,
+    integrator: str = "discrete",
+    link: float = 0.4,
+    joint: str = "",
+    **keys: object,
+) -> Bench:
+    text = TWO_MASS.format(step=step, integrator=integrator, link=link, joint=joint)
+    spec = mujoco.MjSpec.from_string(text)
+    keys = {"rotor_inertia": 4e-5, "damping_ratio": 0.0, **keys}
+    got = attach(spec, joint="j", drive=drive, **keys)  # type: ignore[arg-type]
+    model = spec.compile()
+    joints = [model.joint(name) for name in (got.rotor, "j")]
+    return Bench(
+        model,
+        mujoco.MjData(model),
+        got,
+        np.array([int(j.qposadr[0]) for j in joints]),
+        np.array([int(j.dofadr[0]) for j in joints]),
+    )
+
+
+@pytest.fixture
+def bench() -> Callable[..., Bench]:
+    return make_bench
+
+
+@pytest.fixture(
+    params=["circular_spline_fixed", "flexspline_fixed", "wave_generator_fixed"]
+)
+def any_layout(request: pytest.FixtureRequest, synthetic_map: DriveMap) -> DriveMap:
+    """The synthetic map with side bands, in each layout: moves with theta and psi."""
+    return replace(synthetic_map, layout=request.param)

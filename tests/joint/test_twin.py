@@ -1,0 +1,88 @@
+"""The plugin against its numpy twin, and the forces against the potential."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import pytest
+
+from swgjoint.joint.reference import (
+    Motion,
+    gradient_force,
+    scheme_force,
+)
+
+
+def random_motion(bench, rng, spread=1.5):
+    """A state whose torsion lies on both sides of the outer knots."""
+    drive = bench.drive.drive
+    theta = rng.uniform(-8, 8)
+    psi = theta / drive.ratio + spread * rng.uniform(-1, 1) * drive.torsion_knots[-1]
+    rates = rng.normal(0, 30), rng.normal(0, 0.5)
+    other = rng.normal(0, 300), rng.normal(0, 5)
+    bench.place(theta, psi, *rates)
+    bench.data.plugin_state[:] = other
+    mujoco.mj_forward(bench.model, bench.data)
+    weight = bench.data.qLDiagInv[bench.v]
+    return Motion(
+        theta=theta,
+        psi=psi,
+        theta_rate=rates[0],
+        psi_rate=rates[1],
+        rotor_weight=weight[0],
+        link_weight=weight[1],
+        rotor_acceleration=other[0],
+        link_acceleration=other[1],
+    )
+
+
+def scale(drive):
+    """Largest torque of the sampled range [N·m]."""
+    return max(abs(t) for t in drive.torque_range)
+
+
+@pytest.mark.parametrize("integrator", ["RK4", "Euler", "implicitfast"])
+def test_gradient_force_equals_twin(bench, any_layout, integrator):
+    """Without the scheme the plugin's force is minus the gradient plus damping."""
+    b = bench(any_layout, damping_ratio=0.05)
+    b.model.opt.integrator = getattr(
+        mujoco.mjtIntegrator, "mjINT_" + integrator.upper()
+    )
+    rng = np.random.default_rng(1)
+    for _ in range(100):
+        motion = random_motion(b, rng)
+        want = gradient_force(any_layout, motion, damping=b.drive.damping)
+        got = b.data.qfrc_passive[b.v]
+        ratio = abs(any_layout.ratio)
+        np.testing.assert_allclose(
+            got * [ratio, 1.0],
+            np.multiply(want, [ratio, 1.0]),
+            rtol=0,
+            atol=1e-12 * scale(any_layout) * (1 if ratio > 2 else 5),
+        )
+
+
+def test_scheme_force_equals_twin(bench, any_layout):
+    """Force, direction and stiffness that the scheme hands over equal the twin's."""
+    b = bench(any_layout, damping_ratio=0.05)
+    rng = np.random.default_rng(2)
+    t = b.model.tendon(b.drive.tendon).id
+    row = b.model.ten_J_rowadr[t]
+    entries = [row + list(b.model.ten_J_colind[row:]).index(dof) for dof in b.v]
+    h = b.model.opt.timestep
+    for _ in range(100):
+        motion = random_motion(b, rng)
+        want = scheme_force(any_layout, motion, timestep=h, damping=b.drive.damping)
+        a, _, c = 1e-9, 0.0, 1.0
+        metric = a + 3 * c * b.data.ten_length[t] ** 2
+        assert metric == pytest.approx(want.metric, rel=1e-8)
+        g = np.array([want.g_theta, want.g_psi])
+        np.testing.assert_allclose(b.data.ten_J[entries], g, rtol=1e-12)
+        # the engine's shift along the tendon is cancelled by the plugin
+        shift = h * want.metric * b.data.ten_velocity[t] * g
+        np.testing.assert_allclose(
+            b.data.qfrc_passive[b.v],
+            np.array([want.theta, want.psi]) + shift,
+            rtol=0,
+            atol=1e-12 * scale(any_layout) + 1e-12 * np.abs(shift).max(),
+        )
