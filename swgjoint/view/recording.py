@@ -175,12 +175,16 @@ def _log_arm(stream: Any, prefix: str, run: Run, color: tuple[int, int, int]) ->
     rows = pose_rows(run)
     places, turns = arm.body_poses(run.position[rows])
     for body in range(1, model.nbody):
+        path = f"{prefix}arm/{model.body(body).name}"
+        place, turn = places[:, body], quaternion_xyzw(turns[:, body])
+        if model.body_weldid[body] == 0:  # fixed to the world
+            pose = rr.Transform3D(translation=place[0], quaternion=turn[0])
+            stream.log(path, pose, static=True)
+            continue
         stream.send_columns(
-            f"{prefix}arm/{model.body(body).name}",
+            path,
             indexes=[rr.TimeColumn(TIMELINE, duration=run.time[rows])],
-            columns=rr.Transform3D.columns(
-                translation=places[:, body], quaternion=quaternion_xyzw(turns[:, body])
-            ),
+            columns=rr.Transform3D.columns(translation=place, quaternion=turn),
         )
     if run.tool_reference.shape[1]:
         stream.log(
