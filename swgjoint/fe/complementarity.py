@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 
 class ActiveSetError(ArithmeticError):
@@ -14,8 +15,8 @@ class ActiveSetError(ArithmeticError):
 
 
 def solve_mixed(
-    matrix: Array, offset: Array, inequalities: int, multipliers: int, start: Array
-) -> tuple[Array, Array]:
+    matrix: Array, offset: Array, inequalities: int, multipliers: int, start: Mask
+) -> tuple[Array, Mask]:
     r"""Solve :math:`g = q + M z` with unilateral and free unknowns.
 
     .. math:: 0 \le z_i \perp g_i \ge 0 \quad (i < m), \qquad g_i = 0 \quad (i \ge m)
@@ -62,7 +63,7 @@ def solve_mixed(
     return z / scale, active
 
 
-def _solve_active(matrix: Array, offset: Array, active: NDArray[np.bool_]) -> Array:
+def _solve_active(matrix: Array, offset: Array, active: Mask) -> Array:
     n, m = len(offset), len(active)
     index = np.concatenate([np.flatnonzero(active), np.arange(m, n)])
     z = np.zeros(n)
@@ -74,9 +75,7 @@ def _solve_active(matrix: Array, offset: Array, active: NDArray[np.bool_]) -> Ar
     return z
 
 
-def _least_squares(
-    matrix: Array, offset: Array, m: int, multipliers: int
-) -> NDArray[np.bool_]:
+def _least_squares(matrix: Array, offset: Array, m: int, multipliers: int) -> Mask:
     """Active set of a minimum of z.Mz/2 + q.z under z >= 0.
 
     Multipliers are eliminated; a free displacement becomes a weighted equation.

@@ -45,7 +45,7 @@ class Frames:
     displacement: Array
     """d = y - X [m]. Shape (N, n)."""
     spin: Array
-    """Gamma, derivative of the frame angle by y [rad/m]. Shape (N, n); zero if linear."""
+    """Gamma, derivative of the frame angle by y [rad/m]. (N, n); zero if linear."""
     gyration: Array
     """Sum X_c . y_c over the face nodes, C [m^2]. Shape (N,)."""
 
@@ -95,16 +95,14 @@ def sector_frames(
 def elastic_energy(element: Superelement, frames: Frames, flank_force: Array) -> Array:
     """Strain energy of each sector, flank forces included (N,) [J].
 
-    1/2 d_a K d_a + 1/2 F C F: the flank displacement d_b = A d_a + C F splits the energy
-    of the uncondensed sector into these two parts.
+    1/2 d_a K d_a + 1/2 F C F: the flank displacement d_b = A d_a + C F splits the
+    energy of the uncondensed sector into these two parts.
     """
     d = frames.displacement
     return np.asarray(
         0.5 * np.einsum("si,ij,sj->s", d, element.stiffness, d)
         + 0.5
-        * np.einsum(
-            "si,ij,sj->s", flank_force, element.flank_compliance, flank_force
-        )
+        * np.einsum("si,ij,sj->s", flank_force, element.flank_compliance, flank_force)
     )
 
 
@@ -114,9 +112,7 @@ def projected(frames: Frames, force: Array) -> Array:
     .. math:: P = I - (J y)\,\Gamma^T
     """
     j_y = turned(frames.position.reshape(*force.shape[:-1], -1, 2)).reshape(force.shape)
-    return np.asarray(
-        force - frames.spin * np.einsum("si,si->s", force, j_y)[:, None]
-    )
+    return np.asarray(force - frames.spin * np.einsum("si,si->s", force, j_y)[:, None])
 
 
 def tangent(element: Superelement, frames: Frames, force: Array) -> Array:

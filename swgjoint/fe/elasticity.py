@@ -38,7 +38,7 @@ def stiffness_matrix(
     lame = youngs_modulus * poisson_ratio / (1.0 - poisson_ratio**2)
     shear = youngs_modulus / (2.0 * (1.0 + poisson_ratio))
 
-    @BilinearForm
+    @BilinearForm  # type: ignore[untyped-decorator]
     def elasticity(u: Any, v: Any, w: Any) -> Any:
         strain = sym_grad(u)
         stress = 2.0 * shear * strain + lame * eye(trace(strain), 2)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from skfem import ElementQuad1
@@ -27,7 +27,7 @@ class ElementQuadIncompatible(ElementQuad1):  # type: ignore[misc]
     """
 
     interior_dofs = 2
-    dofnames = ["u", "bx", "by"]
+    dofnames: ClassVar[list[str]] = ["u", "bx", "by"]
     doflocs = np.array(
         [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.5, 0.5], [0.5, 0.5]]
     )

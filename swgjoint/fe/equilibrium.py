@@ -64,6 +64,8 @@ class State:
     """Moment of the tooth forces on the flexspline, whole drive [N·m]."""
     energy: float = 0.0
     """Strain energy, whole drive [J]."""
+    compliance: float = 0.0
+    """Rotation per torque at the active contacts, whole drive [rad/(N·m)]."""
     outcome: Outcome = Outcome.CONVERGED
     history: tuple[float, ...] = ()
     """Largest displacement increment of every iteration [m]."""
@@ -294,9 +296,7 @@ class RingModel:
 
             # elastic forces and tangent in the sector frames
             compliance_force = state.flank_force @ element.flank_compliance
-            d_b = (
-                frames.displacement @ element.flank_from_skeleton.T + compliance_force
-            )
+            d_b = frames.displacement @ element.flank_from_skeleton.T + compliance_force
             elastic = frames.displacement @ element.stiffness
             total = elastic - state.flank_force @ element.flank_from_skeleton
             gradient = projected(frames, elastic)
@@ -389,15 +389,11 @@ class RingModel:
             base = solved[:, :, 0] + value
             response = solved[:, :, 1:]
 
-            free = 2 if rotation is not None else 1
-            count = m + free
-            matrix = np.empty((count, count))
-            offset = np.empty(count)
-            lever = free_rows[:, :, :count]
+            # unknowns: contact forces, displacement of the anchor, torque multiplier
+            matrix = np.empty((m + 2, m + 2))
+            offset = np.empty(m + 2)
             if contacts is not None and m:
-                matrix[:m] = np.einsum(
-                    "kn,knl->kl", rows, response[contacts.sector][:, :, :count]
-                )
+                matrix[:m] = np.einsum("kn,knl->kl", rows, response[contacts.sector])
                 local = contacts.weight @ element.flank_compliance
                 same = contacts.sector[:, None] == contacts.sector[None, :]
                 matrix[:m, :m] += np.where(same, local @ contacts.weight.T, 0.0)
@@ -410,20 +406,20 @@ class RingModel:
                     )
                     + np.einsum("kn,kn->k", rows, base[contacts.sector])
                 )
-            matrix[m:] = np.einsum(
-                "snf,snl->fl", lever[:, :, m:], response[:, :, :count]
-            )
+            matrix[m:] = np.einsum("snf,snl->fl", free_rows[:, :, m:], response)
             matrix[:m, m:] = matrix[m:, :m].T
             matrix[m, m] -= 1.0 / anchor_stiffness
-            offset[m:] = np.einsum("snf,sn->f", lever[:, :, m:], base)
-            if rotation is not None:
-                offset[m + 1] += psi - rotation
+            offset[m:] = np.einsum("snf,sn->f", free_rows[:, :, m:], base)
+            offset[m + 1] += psi - (rotation or 0.0)
+            count = m + (2 if rotation is not None else 1)
             guess = np.zeros(m, dtype=bool)
             if contacts is not None and m:
                 guess = offset[:m] < 0.0
                 if state.contacts is not None and len(state.tooth_force):
                     guess = _match(contacts, state.contacts)
-            multipliers, active = solve_mixed(matrix, offset, m, free - 1, guess)
+            multipliers, active = solve_mixed(
+                matrix[:count, :count], offset[:count], m, count - m - 1, guess
+            )
             force = multipliers[:m]
 
             step = base + response[:, :, :count] @ multipliers
@@ -433,9 +429,7 @@ class RingModel:
             largest = float(np.abs(shift).max())
             history.append(largest)
             if not np.isfinite(largest) or largest > 0.1:
-                return replace(
-                    state, outcome=Outcome.DIVERGED, history=tuple(history)
-                )
+                return replace(state, outcome=Outcome.DIVERGED, history=tuple(history))
             damping = min(1.0, self.lobe_height / largest)
 
             # wave-generator forces from the rows of the known displacements
@@ -460,9 +454,14 @@ class RingModel:
                 np.add.at(
                     flank_force, contacts.sector, force[:, None] * contacts.weight
                 )
+            held = np.flatnonzero(active)
+            holding = np.append(held, m)
+            reach = matrix[holding, m + 1]
+            compliance = matrix[m + 1, m + 1] - reach @ np.linalg.solve(
+                matrix[np.ix_(holding, holding)], reach
+            )
             # faces and bores of each sector; a shared face appears once
             moved = x + damping * shift
-            held = np.flatnonzero(active)
             state = replace(
                 state,
                 faces=moved[:, :size],
@@ -473,6 +472,7 @@ class RingModel:
                 contacts=contacts.chosen(held) if contacts is not None else None,
                 tooth_force=force[held],
                 rotation=psi,
+                compliance=float(compliance) / self.copies,
                 torque=(
                     torque
                     if torque is not None
@@ -499,9 +499,7 @@ class RingModel:
         row = carried + spin * (arm - np.einsum("kn,kn->k", carried, j_y))[:, None]
         return _to_basis(turn[s], row)
 
-    def _finished(
-        self, state: State, outcome: Outcome, history: list[float]
-    ) -> State:
+    def _finished(self, state: State, outcome: Outcome, history: list[float]) -> State:
         frames = self.frames(state)
         nodes = self.skeleton(state)[:, self._bore_nodes]
         _, normal, _ = self._wave_generator(nodes, state.wave_generator_angle)

@@ -118,9 +118,7 @@ def condense(
     stiffness = 0.5 * (stiffness + stiffness.T)
 
     operator = nodal_stress_operator(basis, youngs_modulus, poisson_ratio).tocsc()
-    from_kept = (
-        operator[:, kept].toarray() + operator[:, inner] @ inner_from_kept
-    )
+    from_kept = operator[:, kept].toarray() + operator[:, inner] @ inner_from_kept
     from_a = from_kept[:, :n] + from_kept[:, n:] @ flank_from_skeleton
     from_flank = from_kept[:, n:] @ compliance
     nodes = mesh.mesh.p.shape[1]

@@ -47,7 +47,5 @@ def periodicity(layout: str, teeth_flexspline: int, teeth_circular_spline: int) 
     input member, the flexspline.
     """
     return (
-        teeth_circular_spline
-        if layout == "circular_spline_fixed"
-        else teeth_flexspline
+        teeth_circular_spline if layout == "circular_spline_fixed" else teeth_flexspline
     )

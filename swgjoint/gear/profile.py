@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from swgjoint.errors import DesignError
 from swgjoint.gear.design import Design
+from swgjoint.gear.design_sections import Member, QuadrupleCircularArc
 from swgjoint.units import deg, mm
 
 Array = NDArray[np.float64]
@@ -186,13 +187,12 @@ def tooth_profile(design: Design, member: str) -> ToothProfile:
         DesignError: If the kind is not available or the tooth cannot be built.
     """
     spec = design.flexspline if member == "flexspline" else design.circular_spline
-    kind = spec.profile.kind
-    if kind != "qca":
+    if not isinstance(spec.profile, QuadrupleCircularArc):
         raise DesignError(
-            f"{design.drive.name}: {member}.profile.kind = {kind!r} cannot be built "
-            "yet; available: 'qca'"
+            f"{design.drive.name}: {member}.profile.kind = {spec.profile.kind!r} cannot "
+            "be built yet; available: 'qca'"
         )
-    return _quadruple_arc(design, member)
+    return _quadruple_arc(design, member, spec, spec.profile)
 
 
 def _reach(
@@ -220,7 +220,9 @@ def _reach(
     return above[0]
 
 
-def _quadruple_arc(design: Design, member: str) -> ToothProfile:
+def _quadruple_arc(
+    design: Design, member: str, spec: Member, p: QuadrupleCircularArc
+) -> ToothProfile:
     """Quadruple circular arc profile.
 
     External teeth follow thesis section 3.3.3 (eqs 3.21-3.49); for internal teeth the
@@ -229,8 +231,7 @@ def _quadruple_arc(design: Design, member: str) -> ToothProfile:
     equations are circle intersections and are solved in closed form.
     """
     internal = member == "circular_spline"
-    spec = design.circular_spline if internal else design.flexspline
-    drive, p = design.drive, spec.profile
+    drive = design.drive
     teeth = drive.teeth_circular_spline if internal else drive.teeth_flexspline
     where = f"{drive.name}: {member}"
     side = -1.0 if internal else 1.0

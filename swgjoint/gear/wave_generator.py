@@ -111,13 +111,6 @@ class Simplified:
         )
 
 
-def bore_radius(design: Design) -> float:
-    """Undeformed inner radius of the flexspline [m] (thesis eq. 3.1)."""
-    drive, fs = design.drive, design.flexspline
-    pitch = drive.teeth_flexspline * drive.module_mm / 2.0
-    return (pitch - fs.dedendum_coefficient * drive.module_mm - fs.rim_mm) * mm
-
-
 def lobe_height(design: Design) -> float:
     """Radial deflection at the lobe, half of m (z_cs - z_fs) [m]."""
     drive = design.drive
@@ -132,7 +125,7 @@ def wave_generator(design: Design) -> WaveGenerator:
         DesignError: If the kind is not available or does not fit.
     """
     spec = design.wave_generator
-    r, w0 = bore_radius(design), lobe_height(design)
+    r, w0 = design.flexspline_inner_radius, lobe_height(design)  # (3.1)
     if spec.kind not in ("elliptical", "simplified"):
         raise DesignError(
             f"{design.drive.name}: wave_generator.kind = {spec.kind!r} cannot be built "

@@ -1,0 +1,144 @@
+"""The 2D model of a design and the continuation of its equilibria."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from swgjoint.errors import DesignError, Outcome
+from swgjoint.fe.equilibrium import RingModel, State
+from swgjoint.fe.sector_mesh import sector_mesh
+from swgjoint.fe.superelement import condense
+from swgjoint.gear.design import Design
+from swgjoint.gear.profile import tooth_profile
+from swgjoint.gear.wave_generator import lobe_height, wave_generator
+from swgjoint.units import mm
+
+HALVINGS = 5
+
+_Step = Callable[[State, float, State], State]
+
+
+def can_halve(design: Design) -> bool:
+    """Whether half a turn maps the drive onto itself (two lobes, even teeth)."""
+    drive = design.drive
+    return (
+        drive.teeth_flexspline % 2 == 0
+        and drive.teeth_circular_spline % 2 == 0
+        and design.lobes == 2
+    )
+
+
+def check_modelled(design: Design, model: str) -> None:
+    """Refuse what the 2D model does not contain yet.
+
+    Raises:
+        DesignError: One line per key.
+    """
+    drive, tolerances = design.drive, design.tolerances
+    faults = []
+    if model != "2d":
+        faults.append(f"model {model!r} is not available yet; available: '2d'")
+    if drive.layout != "circular_spline_fixed":
+        faults.append(
+            f"drive.layout = {drive.layout!r} is not available yet; available: "
+            "'circular_spline_fixed'"
+        )
+    if design.friction.tooth_coefficient > 0.0:
+        faults.append(
+            f"friction.tooth_coefficient = {design.friction.tooth_coefficient:g} is "
+            "not modelled yet; accepted: 0"
+        )
+    faults += [
+        f"tolerances.{key} = {value:g} is not modelled yet; accepted: 0"
+        for key, value in tolerances.model_dump().items()
+        if key != "seed" and value
+    ]
+    if faults:
+        raise DesignError("\n".join(f"{drive.name}: {fault}" for fault in faults))
+
+
+def ring_model(
+    design: Design, *, half: bool = False, nonlinear: bool = True
+) -> RingModel:
+    """2D model with a rigid circular spline.
+
+    Raises:
+        DesignError: If the design cannot be built or the half model does not apply.
+    """
+    if half and not can_halve(design):
+        drive = design.drive
+        raise DesignError(
+            f"{drive.name}: a half model needs even tooth counts and two lobes, not "
+            f"{drive.teeth_flexspline}/{drive.teeth_circular_spline} teeth and "
+            f"{design.lobes} lobes"
+        )
+    profile = tooth_profile(design, "flexspline")
+    material = design.material_of("flexspline")
+    mesh = sector_mesh(profile, design.flexspline.rim_mm * mm, design.mesh.refinement)
+    element = condense(
+        mesh,
+        profile,
+        youngs_modulus=material.youngs_modulus,
+        poisson_ratio=material.poisson_ratio,
+        width=design.drive.face_width_mm * mm,
+    )
+    return RingModel(
+        element=element,
+        wave_generator=wave_generator(design),
+        circular_spline=tooth_profile(design, "circular_spline"),
+        lobe_height=lobe_height(design),
+        half=half,
+        nonlinear=nonlinear,
+    )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Continuation:
+    """Follows equilibria in torque and angle; halves a step that fails."""
+
+    model: RingModel
+    ratio: float
+
+    def deflected(self) -> State:
+        """Wave generator in place, no tooth contact, no rotation."""
+        return self.model.solve(self.model.at_rest(), rotation=0.0, teeth=False)
+
+    def meshed(self, deflected: State) -> State:
+        """Teeth in contact, the flexspline not rotated."""
+        return self.model.solve(deflected, rotation=0.0)
+
+    def to_torque(self, state: State, torque: float) -> State:
+        """Change the torque at a fixed wave generator; the last good state if stuck."""
+        return self._follow(
+            state,
+            lambda s, part, start: self.model.solve(
+                s, torque=start.torque + part * (torque - start.torque)
+            ),
+        )
+
+    def to_angle(self, state: State, angle: float) -> State:
+        """Turn the wave generator at constant torque."""
+        d_angle = angle - state.wave_generator_angle
+
+        def step(s: State, part: float, start: State) -> State:
+            alpha = start.wave_generator_angle + part * d_angle
+            ahead = (alpha - s.wave_generator_angle) / self.ratio
+            guess = self.model.moved(s, alpha, s.rotation + ahead)
+            return self.model.solve(guess, torque=start.torque)
+
+        return self._follow(state, step)
+
+    def _follow(self, state: State, step: _Step) -> State:
+        """Go from part 0 to 1 of a change; a failed try halves the increment."""
+        current, done, increment = state, 0.0, 1.0
+        while done < 1.0:
+            target = min(1.0, done + increment)
+            tried = step(current, target, state)
+            if tried.outcome.ok:
+                current, done = tried, target
+            elif increment <= 0.5**HALVINGS:
+                return replace(current, outcome=tried.outcome, history=tried.history)
+            else:
+                increment *= 0.5
+        return replace(current, outcome=Outcome.CONVERGED)

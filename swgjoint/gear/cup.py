@@ -1,0 +1,41 @@
+"""Closed-form torsion of the cup or hat behind the teeth."""
+
+from __future__ import annotations
+
+from math import pi
+
+from swgjoint.gear.design import Design
+from swgjoint.units import mm
+
+
+def cup_torsional_stiffness(design: Design) -> float:
+    r"""Torsional stiffness of the thin cylinder and the diaphragm in series.
+
+    .. math::
+        \frac1K = \frac{L}{2\pi G r^3 t} + \frac{1}{4\pi G t}
+            \left|\frac{1}{r_b^2} - \frac{1}{r^2}\right|
+
+    with the wall t of thesis eq. (3.50), both parts of the same thickness, r the mean
+    radius of the cylinder, r_b the bore (cup) or the clamped outer edge (hat). The
+    fillet and the elliptical shape are left out.
+
+    Args:
+        design: A design with a cup.
+
+    Returns:
+        Stiffness [N·m/rad].
+
+    Source:
+        Bredt's formula for a closed thin section; pure shear of an annular plate.
+    """
+    cup = design.cup
+    if cup is None:
+        raise ValueError(f"{design.drive.name} has no [cup]")
+    material = design.material_of("flexspline")
+    shear = material.youngs_modulus / (2.0 * (1.0 + material.poisson_ratio))
+    wall = cup.thickness_coefficient * design.flexspline.rim_mm * mm
+    radius = design.flexspline_inner_radius + 0.5 * wall
+    edge = cup.bore_radius_mm * mm
+    cylinder = 2.0 * pi * shear * radius**3 * wall / (cup.length_mm * mm)
+    plate = 4.0 * pi * shear * wall / abs(1.0 / edge**2 - 1.0 / radius**2)
+    return 1.0 / (1.0 / cylinder + 1.0 / plate)

@@ -1,0 +1,261 @@
+r"""From sampled equilibria to a potential.
+
+At every angle the samples give the potential and its first two derivatives by the
+torsion at the sampled torques: strain energy, torque, tangent stiffness,
+
+.. math:: V = U(T, \varphi) - \overline{U(0, \varphi)}, \quad
+    V' = T, \quad V'' = \left(\frac{d\Delta}{dT}\right)^{-1} .
+
+They are carried to common knots by quintic Hermite interpolation, a Fourier transform
+over the angle gives the harmonics, and each harmonic becomes a chain of quartics with
+these values at the knots. The input torque of the simulation takes no part and must
+come out as the derivative of V.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import comb
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import BPoly
+
+from swgjoint.maps.drive_map import DriveMap
+from swgjoint.maps.samples import MapSamples
+
+Array = NDArray[np.float64]
+
+KEEP = 0.01
+"""Harmonics are kept whose share of the kinematic error, or of the input-torque
+ripple, reaches this part of the largest one."""
+
+
+def quartic_chain(knots: Array, values: Array) -> tuple[Array, Array]:
+    """Piecewise quartics with given value, slope and second derivative at the knots.
+
+    Every interval is cut in half; the two quartics share value and three derivatives
+    in the middle.
+
+    Args:
+        knots: Shape (n,).
+        values: V, V' and V'' at the knots. Shape (3, n).
+
+    Returns:
+        Breakpoints (2 n - 1,) and ascending coefficients (2 n - 2, 5).
+    """
+    # on [0, 2] with the cut at 1: left a0..a4, right in powers of (x - 1); the right
+    # one follows from the left by continuity of order three, up to its b4
+    condition = np.zeros((3, 3))
+    known = np.zeros((3, 3))
+    for row in range(3):  # derivative at x = 2
+        fall = [np.prod(np.arange(k, k - row, -1)) for k in range(5)]
+        for k in range(3):
+            known[row, k] = fall[k] * 2.0 ** (k - row) if k >= row else 0.0
+        for column, k in enumerate((3, 4)):
+            # (x)^k continued to order three beyond the cut
+            taylor = [comb(k, j) for j in range(4)]
+            condition[row, column] = sum(
+                t * np.prod(np.arange(j, j - row, -1))
+                for j, t in enumerate(taylor)
+                if j >= row
+            )
+        condition[row, 2] = fall[4]
+    half = 0.5 * np.diff(knots)
+    scale = half ** np.arange(3)[:, None]
+    start, end = values[:, :-1] * scale, values[:, 1:] * scale
+    low = start / np.array([[1.0], [1.0], [2.0]])  # a0, a1, a2
+    a3, a4, b4 = np.linalg.solve(condition, end - known @ low)
+    left = np.stack([*low, a3, a4])
+    right = np.stack(
+        [sum(comb(k, j) * left[k] for k in range(j, 5)) for j in range(4)] + [b4]
+    )
+    pieces = np.stack([left, right], axis=-1)  # (5, n - 1, 2)
+    pieces = pieces / (half[:, None] ** np.arange(5)[:, None, None])
+    breaks = np.sort(np.concatenate([knots, knots[:-1] + half]))
+    return breaks, pieces.reshape(5, -1).T
+
+
+def fit_map(samples: MapSamples, *, keep: float = KEEP) -> DriveMap:
+    """Fit the potential map; its ``info`` holds residuals and the energy check.
+
+    Args:
+        samples: Equilibria over one period.
+        keep: Threshold for harmonics, see :data:`KEEP`; 0 keeps all.
+    """
+    zero = int(np.flatnonzero(samples.torque == 0.0)[0])
+    n_angles = samples.input_angle.size
+    unloaded = samples.output_error[zero]
+    e0 = unloaded - unloaded.mean()
+    torsion = unloaded - samples.output_error  # (n_torques, n_angles)
+    energy = samples.energy - samples.energy[zero].mean()
+
+    # common knots: the mean torsions, ends inside the sampled range of every angle
+    knots = torsion.mean(axis=1)
+    knots[zero] = 0.0
+    knots[0], knots[-1] = torsion[0].max(), torsion[-1].min()
+    table = np.empty((3, n_angles, knots.size))
+    for k in range(n_angles):
+        data = np.stack([energy[:, k], samples.torque, 1.0 / samples.compliance[:, k]])
+        curve = BPoly.from_derivatives(torsion[:, k], data.T)
+        table[:, k] = [curve(knots, nu) for nu in range(3)]
+    modes = _modes(np.moveaxis(table, 1, 0))  # (n_modes, 2, 3, n_knots)
+    error_modes = _modes(e0)
+    count = len(modes)
+    chains = [
+        [quartic_chain(knots, modes[k, c]) for c in range(2)] for k in range(count)
+    ]
+    breaks = chains[0][0][0]
+    potential = np.array([[chain[1] for chain in pair] for pair in chains])
+    ends = modes[:, :, 2][:, :, [0, -1]]
+    _clip_ends(ends, knots, modes[0, 0, 1])
+
+    p, q = samples.order
+    full = DriveMap(
+        name=samples.name,
+        level=samples.level,
+        layout=samples.layout,
+        teeth_flexspline=samples.teeth_flexspline,
+        teeth_circular_spline=samples.teeth_circular_spline,
+        torsion_knots=breaks,
+        orders=np.arange(count)[:, None] * np.array([[p, q]]),
+        potential=potential,
+        end_stiffness=ends,
+        kinematic_error=np.concatenate([np.zeros((1, 2)), error_modes[1:]]),
+        ratings=samples.ratings,
+        damping_ratio=samples.damping_ratio,
+    )
+    strength = harmonic_strength(full)
+    kept = np.ones(count, dtype=bool)
+    largest = strength[1:].max(axis=0, initial=0.0)
+    kept[1:] = (strength[1:] > keep * np.maximum(largest, 1e-300)).any(axis=1)
+    fitted = full.with_harmonics(kept)
+    info = dict(samples.info)
+    info |= {
+        "harmonics": _describe(full, strength, kept),
+        "residual": residual(fitted, samples) | {"threshold": keep},
+        "energy_check": energy_check(fitted, samples),
+        "stiffness_range_Nm_rad": stiffness_range(fitted),
+        "torque_range_Nm": [float(v) for v in fitted.torque_range],
+    }
+    return replace(fitted, info=info)
+
+
+def _modes(values: Array) -> Array:
+    """Cosine and sine amplitudes over the first axis. (n_modes, 2, ...).
+
+    The highest mode of an even count is left out: its phase is not determined.
+    """
+    n = len(values)
+    spectrum = np.fft.rfft(values, axis=0)[: (n + 1) // 2] / n
+    spectrum[1:] *= 2.0
+    return np.stack([spectrum.real, -spectrum.imag], axis=1)
+
+
+def _clip_ends(ends: Array, knots: Array, mean_torque: Array) -> None:
+    """Keep the continuation stable: a positive, bounded slope at every angle."""
+    secant = (mean_torque[-1] - mean_torque[0]) / (knots[-1] - knots[0])
+    ends[0, 0] = np.clip(ends[0, 0], 0.1 * secant, 3.0 * secant)
+    swing = np.hypot(ends[1:, 0], ends[1:, 1]).sum(axis=0)
+    scale = np.minimum(1.0, 0.5 * ends[0, 0] / np.maximum(swing, 1e-300))
+    ends[1:] *= scale
+
+
+def harmonic_strength(drive: DriveMap) -> Array:
+    """Kinematic error [rad] and input-torque ripple [N·m] of each harmonic.
+
+    The ripple is the amplitude of T de0/dtheta + dV/dtheta at rated torque of either
+    sign, the larger one. Shape (n_harmonics, 2).
+    """
+    error = np.hypot(*drive.kinematic_error.T)
+    n_theta = np.abs(drive.angle_orders[:, 0])
+    ripple = np.zeros(len(error))
+    for sign in (-1.0, 1.0):
+        load = sign * drive.ratings.rated_torque
+        x = drive.mean_torsion(load)
+        both = load * drive.kinematic_error + drive.coefficients(x)
+        ripple = np.maximum(ripple, n_theta * np.hypot(*both.T))
+    return np.stack([error, ripple], axis=-1)
+
+
+def residual(drive: DriveMap, samples: MapSamples) -> dict[str, float]:
+    """What the map misses of its own samples.
+
+    Returns:
+        Largest deviation of e0 [rad] and of the torque at the sampled positions [N·m],
+        inside the range of the map.
+    """
+    theta = np.broadcast_to(samples.input_angle, samples.output_error.shape)
+    zero = int(np.flatnonzero(samples.torque == 0.0)[0])
+    offset = samples.output_error[zero].mean()
+    psi = theta / drive.ratio + samples.output_error - offset
+    e0, _, _ = drive.error_at(drive.phases(theta, psi))
+    x = drive.torsion(theta, psi)
+    torque = drive.torque(x, theta, psi)
+    inside = (x >= drive.torsion_knots[0]) & (x <= drive.torsion_knots[-1])
+    wanted = np.broadcast_to(samples.torque[:, None], x.shape)
+    error = samples.output_error[zero] - offset
+    return {
+        "kinematic_error_rad": float(np.abs(e0[zero] - error).max()),
+        "torque_Nm": float(np.abs(torque - wanted)[inside].max()),
+    }
+
+
+def stiffness_range(drive: DriveMap) -> list[float]:
+    """Smallest and largest stiffness over torsion and angle [N·m/rad].
+
+    A smallest one that is not positive would make an equilibrium unstable.
+    """
+    knots = drive.torsion_knots
+    x = np.linspace(knots[0], knots[-1], 12 * knots.size)[:, None]
+    theta = np.linspace(0.0, 2.0 * np.pi / max(1, drive.orders.max()), 97)
+    stiffness = drive.stiffness(x, theta, theta / drive.ratio)
+    return [float(stiffness.min()), float(stiffness.max())]
+
+
+def energy_check(drive: DriveMap, samples: MapSamples) -> dict[str, float]:
+    """The map's input torque against that of the simulation, which it has not seen.
+
+    Returns:
+        ``input_torque_pp_Nm``: largest peak-to-peak of the simulated ripple over the
+        torques; ``input_torque_error_Nm``: largest deviation of the map from it;
+        ``relative``: their ratio; ``strain_energy_relative``: largest deviation of the
+        energy difference against no load, relative to its largest value.
+    """
+    theta = np.broadcast_to(samples.input_angle, samples.output_error.shape)
+    zero = int(np.flatnonzero(samples.torque == 0.0)[0])
+    psi = theta / drive.ratio + samples.output_error - samples.output_error[zero].mean()
+    on_input, _ = drive.forces(theta, psi)
+    error = np.abs(-on_input - samples.input_torque)
+    inside = (samples.torque > drive.torque_range[0]) & (
+        samples.torque < drive.torque_range[1]
+    )
+    ripple = np.ptp(samples.input_torque, axis=1)
+    energy = drive.energy(drive.torsion(theta, psi), theta, psi)
+    gain = samples.energy - samples.energy[zero]
+    wrong = (energy - energy[zero]) - gain
+    return {
+        "input_torque_pp_Nm": float(ripple[inside].max()),
+        "input_torque_error_Nm": float(error[inside].max()),
+        "relative": float((error[inside].max(axis=1) / ripple[inside]).max()),
+        "strain_energy_relative": float(np.abs(wrong).max() / np.abs(gain).max()),
+    }
+
+
+def _describe(
+    drive: DriveMap, strength: Array, kept: NDArray[np.bool_]
+) -> list[dict[str, Any]]:
+    return [
+        {
+            "alpha": int(p),
+            "beta": int(q),
+            "per_input_turn": float(abs(n_theta + n_psi / drive.ratio)),
+            "kinematic_error_rad": float(error),
+            "input_torque_Nm": float(ripple),
+            "kept": bool(keep),
+        }
+        for (p, q), (n_theta, n_psi), (error, ripple), keep in zip(
+            drive.orders, drive.angle_orders, strength, kept, strict=True
+        )
+    ]
