@@ -260,6 +260,7 @@ def _add_rotor(
     body = place.parent.add_body(name=name, pos=place.pos, quat=place.quat)
     body.explicitinertial = True
     body.mass = ROTOR_MASS
+    body.ipos = np.zeros(3)  # unset, it is not written to XML
     # a ball: the spin about the axis is what counts, and no axis needs aligning
     body.inertia = np.full(3, inertia)
     hinge = body.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_HINGE)

@@ -70,8 +70,9 @@ std::unique_ptr<Drive> Drive::Create(const mjModel* m, int instance) {
     return Refuse(m, instance, "its tendon does not join a rotor and a link joint");
   }
   const int rotor = m->wrap_objid[wrap], link = m->wrap_objid[wrap + 1];
+  // XML keeps six digits of a coefficient; nothing below is computed from it
   if (m->jnt_type[rotor] != mjJNT_HINGE || m->jnt_type[link] != mjJNT_HINGE ||
-      std::fabs(m->wrap_prm[wrap] * drive->map_.ratio() - 1) > 1e-9 ||
+      std::fabs(m->wrap_prm[wrap] * drive->map_.ratio() - 1) > 1e-5 ||
       m->wrap_prm[wrap + 1] != -1) {
     return Refuse(m, instance, "its tendon is not rotor hinge/ratio - link hinge");
   }

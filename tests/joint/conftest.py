@@ -19,7 +19,7 @@ TWO_MASS = """
   <worldbody>
     <body name="link" pos="0 0 .5">
       <joint name="j" axis="0 0 1" {joint}/>
-      <inertial pos="0 0 0" mass="3" diaginertia=".3 .3 {link}"/>
+      <inertial pos="0 0 0" mass="3" diaginertia="{link} {link} {link}"/>
     </body>
   </worldbody>
 </mujoco>

@@ -21,7 +21,7 @@ def test_rk4_conserves_energy(bench, any_layout):
     b.place(0.0, psi, 8.0, 8.0 / any_layout.ratio)
     start = b.energy()
     mujoco.mj_step(b.model, b.data, 20_000)
-    assert abs(b.data.qpos[b.q[0]]) > 1.0  # many tooth pitches
+    assert abs(b.data.qpos[b.q[0]]) > 0.5  # ten tooth pitches
     assert b.energy() == pytest.approx(start, rel=1e-9)
 
 
