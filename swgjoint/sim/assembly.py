@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from swgjoint.errors import InputError
 from swgjoint.joint.attach import attach
 from swgjoint.joint.drive import JointDrive
+from swgjoint.joint.region import check_region
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.progress import Progress, silent
 from swgjoint.sim.control import add_actuators, control_gains, feedforward
@@ -80,6 +81,8 @@ def assemble(
 
     Raises:
         InputError: If a joint or drive does not exist or does not fit.
+        ComputationError: If a joint lies outside the region in which its integration
+            holds; the message names the bound and the step that would do.
     """
     arm = RigidArm(scene.arm, tool_site=scene.tool_site)
     check_joint_names(
@@ -116,6 +119,12 @@ def assemble(
             # a joint at rest carries every order
             max_input_speed=float(abs(drive.ratio) * speed) or None,
         )
+        check_region(
+            attached,
+            timestep=scene.simulation.step_s,
+            max_input_speed=float(abs(drive.ratio) * speed),
+            integrator=scene.simulation.integrator,
+        ).require()
         transmissions.append(transmission_of(attached, drive))
 
     load = np.array(

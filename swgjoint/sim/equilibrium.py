@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
@@ -48,6 +49,34 @@ def start_state(assembly: Assembly) -> tuple[Array, Array]:
     motor_rate = path.velocity[0] * assembly.ratio
     qvel[assembly.motor_velocity[flexible]] = motor_rate[flexible]
     return qpos, qvel
+
+
+def set_start(assembly: Assembly, data: mujoco.MjData) -> None:
+    """Put a simulation at its start, with what the plugin remembers of the last step.
+
+    The plugin predicts a step from the accelerations that all but the drive gave in the
+    step before; in balance they cancel those of the drive. Without them the first step
+    would be predicted as if the load were let go.
+    """
+    model = assembly.model
+    mujoco.mj_resetData(model, data)
+    data.qpos[:], data.qvel[:] = start_state(assembly)
+    mujoco.mj_forward(model, data)
+    for j, transmission in enumerate(assembly.transmissions):
+        plugin = transmission.attached.plugin
+        if transmission.law is None or plugin is None:
+            continue
+        rotor, link = assembly.motor_velocity[j], assembly.link_velocity[j]
+        theta = float(data.qpos[assembly.motor_position[j]])
+        psi = float(data.qpos[assembly.link_position[j]])
+        on_input, on_output = transmission.law.forces(theta, psi)
+        instance = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_PLUGIN, plugin)
+        first = model.plugin_stateadr[instance]
+        data.plugin_state[first : first + 2] = [
+            -data.qLDiagInv[rotor] * float(on_input),
+            -data.qLDiagInv[link] * float(on_output),
+        ]
+    mujoco.mj_forward(model, data)
 
 
 def _balance(assembly: Assembly, shift: float) -> tuple[Array, Array]:

@@ -19,7 +19,7 @@ from swgjoint.progress import Progress, silent
 from swgjoint.sim.assembly import Assembly, assemble
 from swgjoint.sim.contains import contents
 from swgjoint.sim.control import control_inputs, motor_torque
-from swgjoint.sim.equilibrium import start_state
+from swgjoint.sim.equilibrium import set_start
 from swgjoint.sim.metrics import run_metrics
 from swgjoint.sim.scene import Scene
 
@@ -138,8 +138,7 @@ def simulate(assembly: Assembly, *, name: str, progress: Progress = silent) -> R
     model, path = assembly.model, assembly.trajectory
     inputs = control_inputs(assembly)
     data = mujoco.MjData(model)
-    data.qpos[:], data.qvel[:] = start_state(assembly)
-    mujoco.mj_forward(model, data)
+    set_start(assembly, data)
     state = np.empty(mujoco.mj_stateSize(model, _STATE))
     mujoco.mj_getState(model, data, state, _STATE)
 

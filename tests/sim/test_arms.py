@@ -1,0 +1,63 @@
+"""The bundled arms against their sources."""
+
+import numpy as np
+import pytest
+
+from swgjoint.errors import InputError
+from swgjoint.sim.rigid_arm import RigidArm
+
+UR5E = RigidArm("ur5e")
+
+
+def test_the_ur5e_has_the_inertia_of_its_source():
+    """Masses of the six links as in the source; shapes carry none."""
+    masses = [3.7, 8.393, 2.275, 1.219, 1.219, 0.1889]
+    np.testing.assert_allclose(UR5E.model.body_mass[2:], masses)
+    assert UR5E.model.body_mass[:2].sum() == 0.0
+    # principal inertias of a rigid body obey the triangle inequality
+    inertia = np.sort(UR5E.model.body_inertia[2:], axis=1)
+    assert (inertia[:, 0] + inertia[:, 1] >= inertia[:, 2]).all()
+
+
+def test_the_ur5e_reaches_as_far_as_its_links():
+    """Stretched out, the tool lies at the sum of the link lengths of the source."""
+    tool = UR5E.tool_positions(np.zeros((1, 6)))[0]
+    # x: upper arm, forearm; y: the offsets; z: base height less wrist 2
+    expected = [0.425 + 0.392, 0.138 - 0.131 + 0.127 + 0.098, 0.163 - 0.1]
+    np.testing.assert_allclose(tool, expected, atol=1e-6)  # rounded quaternions
+
+
+def test_weight_of_the_stretched_arm_by_hand():
+    """Shoulder and elbow carry the link masses times their horizontal distances."""
+    torque = UR5E.gravity(np.zeros((1, 6)))[0]
+    g, wrist = 9.81, 2 * 1.219 + 0.1889
+    elbow = 2.275 * 0.196 + wrist * 0.392
+    shoulder = 8.393 * 0.2125 + 2.275 * 0.425 + wrist * 0.425 + elbow
+    np.testing.assert_allclose(torque[1:3], [-g * shoulder, -g * elbow], rtol=1e-5)
+    assert abs(torque[0]) < 1e-9
+
+
+def test_inverse_dynamics_is_linear_in_the_acceleration():
+    """The torque of an acceleration is the inertia times it, joint by joint."""
+    q = np.array([[0.1, -1.7, 1.6, -1.3, -1.5, 0.2]])
+    zero = np.zeros_like(q)
+    for j in range(6):
+        push = zero.copy()
+        push[0, j] = 1.0
+        gained = UR5E.torques(q, zero, push) - UR5E.gravity(q)
+        assert gained[0, j] == pytest.approx(UR5E.inertia(q[0])[j], rel=1e-9)
+
+
+def test_an_arm_with_another_kind_of_joint_is_refused(tmp_path):
+    """A slide is named with its type; broken XML is one line."""
+    arm = tmp_path / "arm.xml"
+    arm.write_text(
+        "<mujoco><worldbody><body><joint name='lift' type='slide'/>"
+        "<geom size='1'/></body></worldbody></mujoco>"
+    )
+    with pytest.raises(InputError, match="joint 'lift' is of type slide"):
+        RigidArm(str(arm))
+    arm.write_text("<mujoco><worldbody>")
+    with pytest.raises(InputError, match="not an MJCF arm") as caught:
+        RigidArm(str(arm))
+    assert "\n" not in str(caught.value)

@@ -1,0 +1,99 @@
+"""The commands run and demo, from the command line."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from swgjoint.cli.main import main
+from swgjoint.maps.drive_map import DriveMap
+
+LINEAR = "defaults.linear={stiffness_Nm_rad=2e4,rated_torque_Nm=50.0}"
+SHORT = ["--set", LINEAR, "--set", "simulation.duration_s=1.0"]
+
+
+def test_run_gives_one_json_object_and_a_recording(tmp_path, capsys):
+    """All keys of the contract; torsion of a linear drive is T/K."""
+    assert main(["run", "bench", *SHORT, "--out", str(tmp_path / "new"), "--json"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    joint = result["joints"]["joint"]
+    wanted = (
+        "level", "ripple_rms_percent", "ripple_pp_percent", "orders", "unresolved",
+        "transmission_error_arcmin", "torsion_arcmin", "ratings",
+    )  # fmt: skip
+    assert set(wanted) <= set(joint)
+    assert {"ap_mm", "rp_mm", "path_rms_mm"} <= set(result["tool"])
+    assert {"steps_per_s", "contains", "files"} <= set(result)
+    assert joint["torsion_arcmin"]["mean"] == pytest.approx(
+        50 / 2e4 * 10800 / 3.14159265
+    )
+    assert [Path(f).name for f in result["files"]] == ["run.rrd"]
+    assert all(Path(f).is_file() for f in result["files"])
+
+
+def test_run_prints_a_table(tmp_path, capsys):
+    """Without a folder nothing is written and the table names the joint."""
+    assert main(["run", "bench", *SHORT]) == 0
+    text = capsys.readouterr().out
+    assert "torsion" in text
+    assert "\njoint " in text
+    assert "wrote" not in text
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["run", "nope"], "scene 'nope' is neither a file nor in models/scenes"),
+        (["run", "bench", "--set", "simulation.step=1"], "did you mean step_s?"),
+        (["run", "bench", "--set", "defaults.drive=x.swg"], "x.swg"),
+        (["run", "bench", "--set", "defaults.drive=nope"], "design 'nope'"),
+        (["run", "bench", "--set", "arm=nope"], "arm 'nope'"),
+        (["run", "bench", "--set", LINEAR, "--set", "load.elbow.torque_Nm=1.0"],
+         "load.elbow: no such joint in arm 'bench'; accepted: joint"),
+        (["run", "bench", "--set", "simulation.step_s=-1.0"], "-1 s"),
+        (["view", "missing.rrd"], "missing.rrd"),
+    ],
+)  # fmt: skip
+def test_bad_input_is_one_line_and_nothing_is_written(
+    arguments, message, tmp_path, capsys, monkeypatch
+):
+    """Status 2, one line on stderr, no folder."""
+    monkeypatch.chdir(tmp_path)
+    extra = ["--out", "out"] if arguments[0] == "run" else []
+    assert main([*arguments, *extra]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert message in captured.err
+    assert len(captured.err.splitlines()) == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_demo_compares_two_drives_with_the_rigid_arm(
+    synthetic_map: DriveMap, tmp_path, capsys, monkeypatch
+):
+    """Maps, figures of three runs, files; the rigid arm has no error of its own."""
+    soft = DriveMap.linear(2e4, teeth_flexspline=120, teeth_circular_spline=122)
+    maps = {"reference-2d": synthetic_map, "reference-2d-simplified": soft}
+    monkeypatch.setattr(
+        "swgjoint.sim.drives.load_drive", lambda name, progress: maps[name]
+    )
+    assert main(["demo", "--out", str(tmp_path / "demo"), "--json"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert set(result["map"]) == {"elliptical", "simplified"}
+    metrics = result["metrics"]
+    assert set(metrics) == {"elliptical", "simplified", "rigid"}
+    assert metrics["rigid"]["tool_against_rigid"]["max_mm"] == 0.0
+    assert metrics["simplified"]["tool_against_rigid"]["mean_mm"] > 0.1
+    lift = metrics["elliptical"]["joints"]["shoulder_lift_joint"]
+    assert lift["unresolved"] == []
+    assert lift["orders"][0]["order"] == pytest.approx(122.0, abs=0.2)
+    pan = metrics["elliptical"]["joints"]["shoulder_pan_joint"]
+    assert [item["order"] for item in pan["unresolved"]] == [122.0]
+    assert {Path(f).name for f in result["files"]} == {"run.rrd", "demo.png"}
+    assert result["wall_s"] < 25.0
+
+    from swgjoint.cli.demo import report
+
+    text = report(result)
+    assert "tool against the rigid arm" in text
+    assert "shoulder_lift" in text

@@ -1,0 +1,98 @@
+"""Figures of a run."""
+
+import numpy as np
+import pytest
+
+from swgjoint.maps.drive_map import DriveMap
+from swgjoint.sim.metrics import against_rigid, spread, torque_ripple
+from swgjoint.sim.run import run_scene
+from swgjoint.units import arcmin
+
+LINEAR = DriveMap.linear(2e4, teeth_flexspline=120, teeth_circular_spline=122)
+
+
+def test_spread_of_a_sine():
+    """Mean, root mean square and peak to peak of a sine about a constant."""
+    x = 3.0 + 2.0 * np.sin(np.linspace(0.0, 2.0 * np.pi, 4001))
+    got = spread(x)
+    assert got["mean"] == pytest.approx(3.0, rel=1e-3)
+    assert got["rms"] == pytest.approx(np.sqrt(9.0 + 2.0), rel=1e-3)
+    assert got["pp"] == pytest.approx(4.0, rel=1e-6)
+
+
+def test_a_linear_joint_has_torsion_and_no_ripple(bench):
+    """Constant load on a constant stiffness: T/K, no orders, nothing unresolved."""
+    joint = bench(LINEAR).metrics()["joints"]["joint"]
+    assert joint["torsion_arcmin"]["mean"] == pytest.approx(1e-3 / arcmin)
+    assert joint["transmission_error_arcmin"]["mean"] == pytest.approx(-1e-3 / arcmin)
+    assert joint["ripple_pp_percent"] < 1e-6
+    assert joint["orders"] == []
+    assert joint["unresolved"] == []
+    assert joint["ratings"]["cubed_mean_Nm"] == pytest.approx(20.0)
+
+
+def test_a_rigid_joint_gives_zeros(bench, synthetic_map):
+    """All figures are finite, torsion and error are exactly zero."""
+    joint = bench(synthetic_map, defaults__level="rigid").metrics()["joints"]["joint"]
+    zeros = {"mean": 0.0, "rms": 0.0, "pp": 0.0}
+    assert joint["torsion_arcmin"] == zeros
+    assert joint["transmission_error_arcmin"] == zeros
+    assert joint["ripple_pp_percent"] < 1e-6
+    assert joint["orders"] == []
+
+
+def test_the_tooth_order_is_found_where_the_step_carries_it(bench, synthetic_map):
+    """At 30 rpm the strongest ripple line is the tooth order 122 of the map."""
+    run = bench(synthetic_map, simulation__duration_s=4.0)
+    joint = run.metrics()["joints"]["joint"]
+    assert joint["unresolved"] == []
+    assert joint["highest_resolved_order"] > 122.0
+    first = joint["orders"][0]
+    assert first["order"] == pytest.approx(122.0, abs=0.05)
+    assert first["drive_order"] == 122.0
+    # peak to peak of the ripple is at least that of its strongest line
+    assert joint["ripple_pp_percent"] > 1.8 * first["amplitude_percent"] > 0.0
+    assert joint["ripple_rms_percent"] >= 0.6 * first["amplitude_percent"]
+
+
+def test_a_too_fast_sweep_reports_the_tooth_order_and_shows_no_false_line(
+    bench, synthetic_map
+):
+    """At 300 rpm order 122 is left out, listed, and nothing takes its place."""
+    run = bench(
+        synthetic_map,
+        trajectory__speed_deg_s__joint=30.0,
+        simulation__duration_s=4.0,
+        trajectory__settle_s=1.0,
+    )
+    joint = run.metrics()["joints"]["joint"]
+    assert [left["order"] for left in joint["unresolved"]] == [122.0]
+    assert joint["unresolved"][0]["error_arcmin"] > 0.0
+    assert joint["highest_resolved_order"] < 122.0
+    kept = run.assembly.transmissions[0].attached.kept_orders
+    assert joint["orders"]
+    for line in joint["orders"]:  # orders of the drive, their sums and multiples
+        products = [abs(a + b) for a in kept for b in (*kept, *(-k for k in kept), 0.0)]
+        assert min(abs(line["order"] - n) for n in products) < 0.3
+    assert any("122" in item["part"] for item in run.contains["left_out"])
+
+
+def test_weight_is_no_ripple():
+    """An arm with linear drives whose load changes with the pose has no ripple."""
+    run = run_scene(
+        "ur5e-sweep",
+        overrides={"simulation.duration_s": 5.0},
+        drives={"reference-2d": LINEAR},
+    )
+    lift = run.joints.index("shoulder_lift_joint")
+    torque = run.output_torque[run.steady, lift]
+    assert np.ptp(torque) > 5.0
+    assert np.ptp(torque_ripple(run, lift)) < 2e-3 * np.ptp(torque)
+
+
+def test_the_rigid_arm_is_its_own_reference(bench, synthetic_map):
+    """A run compared with itself has no tool error; a flexible one sags by T/K r."""
+    rigid = bench(LINEAR, defaults__level="rigid")
+    assert against_rigid(rigid, rigid)["max_mm"] == 0.0
+    flexible = against_rigid(bench(LINEAR), rigid)
+    assert flexible["mean_mm"] == pytest.approx(1e-3 * 500.0, rel=1e-4)

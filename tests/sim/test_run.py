@@ -1,0 +1,197 @@
+"""Runs of the bench: closed forms, balance, equality with twins."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from swgjoint.errors import ComputationError, InputError
+from swgjoint.maps.drive_map import DriveMap
+from swgjoint.sim.assembly import assemble
+from swgjoint.sim.control import control_inputs
+from swgjoint.sim.equilibrium import set_start
+from swgjoint.sim.run import run_scene
+from swgjoint.sim.scene import Scene
+
+LINEAR = DriveMap.linear(2e4, teeth_flexspline=120, teeth_circular_spline=122)
+
+
+@pytest.mark.parametrize("level", ["linear", "full"])
+def test_a_linear_joint_under_constant_load_twists_by_torque_over_stiffness(
+    bench, level
+):
+    """Torsion is T/K from the first instant to the last, the error is its negative."""
+    run = bench(LINEAR, defaults__level=level)
+    np.testing.assert_allclose(run.torsion, 20.0 / 2e4, rtol=1e-9)
+    np.testing.assert_allclose(run.transmission_error, -20.0 / 2e4, rtol=1e-9)
+    np.testing.assert_allclose(run.output_torque, 20.0, rtol=1e-9)
+    # the motor carries T/i, signed: the ratio is -60
+    np.testing.assert_allclose(run.motor_torque, -20.0 / 60.0, rtol=1e-6)
+
+
+def test_a_nonlinear_joint_twists_as_its_map_says(bench, plain_map):
+    """The torsion under load is that of the mean curve."""
+    run = bench(plain_map, load__joint__torque_Nm=45.0)
+    np.testing.assert_allclose(run.torsion, plain_map.mean_torsion(45.0), rtol=1e-8)
+
+
+def test_a_rigid_joint_has_no_torsion_and_carries_the_load(bench, synthetic_map):
+    """Torsion and error are zero, link and motor move as one, torque is the load."""
+    run = bench(synthetic_map, defaults__level="rigid")
+    assert not run.torsion.any()
+    assert not run.transmission_error.any()
+    np.testing.assert_allclose(run.motor_position, -60.0 * run.position)
+    np.testing.assert_allclose(run.output_torque[1:], 20.0, rtol=1e-9)
+    np.testing.assert_allclose(run.position, run.reference, atol=1e-12)
+
+
+def test_a_joint_at_rest_stays_at_rest(bench, synthetic_map):
+    """The start is an equilibrium: with load and cogging, nothing moves."""
+    run = bench(
+        synthetic_map,
+        trajectory__speed_deg_s__joint=0.0,
+        trajectory__start_deg={"joint": 17.0},
+    )
+    # 1e-9 rad is a thousandth of a millionth of the torsion of 1e-3 rad
+    assert np.ptp(run.position, axis=0).max() < 1e-9
+    np.testing.assert_allclose(run.output_torque, 20.0, rtol=1e-6)
+
+
+def test_the_arm_starts_with_its_weight_on_the_drives(synthetic_map):
+    """All six joints of the UR5e rest in balance with gravity, none is ringing."""
+    run = run_scene(
+        "ur5e-sweep",
+        overrides={"simulation.duration_s": 4.0, "trajectory.hold_s": 0.3},
+        drives={"reference-2d": synthetic_map},
+    )
+    rest = run.time < 0.29
+    needed = run.assembly.arm.gravity(run.position[:1])
+    np.testing.assert_allclose(run.output_torque[:1], needed, atol=1e-6)
+    assert np.abs(run.output_torque[0]).max() > 10.0
+    swing = np.ptp(run.output_torque[rest], axis=0)
+    assert swing.max() < 1e-4  # of torques of 15 N·m
+
+
+def test_energy_balances(bench, synthetic_map):
+    """Work of the motor is work on the load, plus stored energy, plus the damper's."""
+    h = 2.5e-4
+    run = bench(
+        synthetic_map,
+        simulation={"duration_s": 2.0, "step_s": h},
+        defaults__damping_ratio=0.1,
+    )
+    drive = run.assembly.transmissions[0]
+    theta, psi = run.motor_position[:, 0], run.position[:, 0]
+    theta_rate, psi_rate = run.motor_velocity[:, 0], run.velocity[:, 0]
+    # the loop acts at the end of a step, over the way of that step
+    motor = np.sum(run.motor_torque[1:, 0] * np.diff(theta))
+    load = 20.0 * (psi[-1] - psi[0])
+    kinetic = 0.5 * (1e-4 * theta_rate**2 + 1.0 * psi_rate**2)
+    elastic = drive.law.energy(drive.law.torsion(theta, psi), theta, psi)
+    stored = np.diff((kinetic + elastic)[[0, -1]])[0]
+    rate = np.gradient(run.torsion[:, 0], run.time)
+    damped = drive.attached.damping * np.sum(rate**2) * h
+    assert damped > 1e-3 * load  # the ripple costs something, or this tests nothing
+    # 2 J of work balance to 6e-6 J; the damper's share is 3.5e-3 J
+    assert motor - load - stored == pytest.approx(damped, rel=0.01)
+
+
+def test_levels_agree_where_the_map_is_linear(bench):
+    """A linear map in the plugin moves the arm like the native spring."""
+    moves = dict(
+        trajectory={
+            "kind": "sweep",
+            "hold_s": 0.05,
+            "ramp_s": 0.15,
+            "end_deg": {"joint": 1.0},
+        },
+        simulation__step_s=1e-4,
+    )
+    native = bench(LINEAR, defaults__level="linear", **moves)
+    plugin = bench(LINEAR, defaults__level="full", **moves)
+    swing = np.ptp(native.torsion)
+    assert swing > 1e-5
+    # the native spring is damped by the step itself, h w / 2
+    assert np.abs(native.torsion - plugin.torsion).max() < 0.02 * swing
+
+
+def test_the_rollout_equals_single_steps(bench, synthetic_map):
+    """States of the engine's rollout are those of a plain loop, bit by bit."""
+    run = bench(synthetic_map)
+    model = run.assembly.model
+    data = mujoco.MjData(model)
+    set_start(run.assembly, data)
+    joint = run.assembly.link_position[0]
+    for k, inputs in enumerate(control_inputs(run.assembly)):
+        assert data.qpos[joint] == run.position[k, 0]
+        data.ctrl[:] = inputs
+        mujoco.mj_step(model, data)
+
+
+def test_tool_error_follows_from_the_joint_error(bench, synthetic_map):
+    """The tool lies at 0.5 m: its error is the chord of the link error."""
+    run = bench(synthetic_map)
+    link = run.position[:, 0] - run.reference[:, 0]
+    np.testing.assert_allclose(run.tool_error(), np.abs(2 * 0.5 * np.sin(link / 2)))
+    assert run.tool_error(run).max() == 0.0
+
+
+def test_a_run_that_diverges_is_a_failure_with_advice(bench, plain_map):
+    """A motor loop too stiff for an explicit step ends with step and remedy."""
+    with pytest.raises(ComputationError, match=r"diverged .* use a smaller"):
+        bench(
+            plain_map,
+            defaults__level="rigid",
+            simulation={"integrator": "RK4", "step_s": 0.005, "duration_s": 5.0},
+            controller={"natural_frequency_Hz": 500.0, "damping_ratio": 1.0},
+            trajectory={"kind": "sweep", "hold_s": 0.5, "end_deg": {"joint": 5.0}},
+        )
+
+
+def test_a_step_outside_the_region_is_refused_before_it_runs(bench):
+    """The joint's own bound is named with the step that would do."""
+    stiff = DriveMap.linear(1e7, teeth_flexspline=120, teeth_circular_spline=122)
+    with pytest.raises(ComputationError, match=r"joint 'joint' .* would do"):
+        bench(stiff, simulation={"integrator": "RK4", "step_s": 0.005, "duration_s": 1})
+
+
+def test_contents_name_what_is_in_the_model(bench, synthetic_map):
+    """Rigid adds nothing; linear a rotor and a tendon; full a plugin instance too."""
+    found = {
+        level: bench(synthetic_map, defaults__level=level).contains
+        for level in ("rigid", "linear", "full")
+    }
+    counts = ("degrees_of_freedom", "tendons", "plugin_instances")
+    assert [found["rigid"][key] for key in counts] == [1, 0, 0]
+    assert [found["linear"][key] for key in counts] == [2, 1, 0]
+    assert [found["full"][key] for key in counts] == [2, 1, 1]
+    assert "level rigid" in found["rigid"]["left_out"][0]["part"]
+    assert found["full"]["left_out"] == []
+
+
+def test_unknown_joints_are_refused_together():
+    """Every key that names a joint the arm does not have gives one line."""
+    scene = Scene.load_file(
+        "bench",
+        {
+            "joints.elbow.level": "full",
+            "trajectory.speed_deg_s.wrist": 1.0,
+            "load.knee.torque_Nm": 1.0,
+        },
+    )
+    with pytest.raises(InputError) as caught:
+        assemble(scene, drives={"reference-2d": LINEAR})
+    lines = str(caught.value).splitlines()
+    assert len(lines) == 3
+    assert all(
+        "no such joint in arm 'bench'; accepted: joint" in line for line in lines
+    )
+
+
+def test_a_joint_without_drive_or_rotor_is_refused():
+    """What a joint lacks is named with the place where it belongs."""
+    scene = Scene.load_file("bench").with_changes({"defaults": {}})
+    with pytest.raises(InputError) as caught:
+        assemble(scene)
+    text = str(caught.value)
+    assert "joints.joint.drive: missing" in text
+    assert "joints.joint.rotor_inertia_kgm2: missing" in text

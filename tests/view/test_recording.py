@@ -1,0 +1,124 @@
+"""Recordings and pictures: read back and compared with memory."""
+
+import json
+
+import numpy as np
+import pytest
+from rerun.chunk import RrdReader
+
+from swgjoint.errors import InputError
+from swgjoint.maps.drive_map import DriveMap
+from swgjoint.sim.run import Run, run_scene
+from swgjoint.units import mm
+from swgjoint.view.plots import comparison_png
+from swgjoint.view.recording import pose_rows, signals_of, write_recording
+
+SHORT = {"simulation.duration_s": 1.0, "trajectory.settle_s": 0.2}
+
+
+@pytest.fixture
+def run(synthetic_map: DriveMap) -> Run:
+    return run_scene("bench", overrides=SHORT, drives={"reference-2d": synthetic_map})
+
+
+def columns(path, entity: str, component: str) -> tuple[np.ndarray, np.ndarray]:
+    """Times [s] and values of one component of one entity of a recording."""
+    times, values = [], []
+    for chunk in RrdReader(path).stream():
+        if chunk.entity_path != entity or chunk.is_static:
+            continue
+        batch = chunk.to_record_batch()
+        if component not in batch.schema.names:
+            continue
+        times.append(batch.column("time").cast("int64").to_numpy() * 1e-9)
+        values += [item[0] for item in batch.column(component).to_pylist()]
+    return np.concatenate(times), np.array(values)
+
+
+def test_the_recording_holds_what_the_metrics_were_computed_from(run, tmp_path):
+    """Every signal of every joint comes back bit by bit, at every step."""
+    path = run.to_rerun(tmp_path / "run.rrd")
+    for name, expected in signals_of(run, 0).items():
+        time, values = columns(path, f"/joint/joint/{name}", "Scalars:scalars")
+        np.testing.assert_allclose(time, run.time, atol=1e-9)
+        np.testing.assert_array_equal(values, expected)
+    _, error = columns(path, "/tool/error_mm", "Scalars:scalars")
+    np.testing.assert_array_equal(error, run.tool_error() / mm)
+
+
+def test_the_arm_moves_in_the_recording(run, tmp_path):
+    """Poses of the load are those of the link angle about the vertical axis."""
+    path = run.to_rerun(tmp_path / "run.rrd")
+    rows = pose_rows(run)
+    assert rows[0] == 0
+    assert rows[-1] == run.time.size - 1
+    time, turns = columns(path, "/arm/load", "Transform3D:quaternion")
+    _, places = columns(path, "/arm/load", "Transform3D:translation")
+    np.testing.assert_allclose(time, run.time[rows], atol=1e-9)
+    np.testing.assert_allclose(places, np.tile([0, 0, 0.25], (rows.size, 1)), atol=1e-6)
+    angle = 2.0 * np.arctan2(turns[:, 2], turns[:, 3])  # x, y, z, w
+    np.testing.assert_allclose(angle, run.position[rows, 0], atol=1e-6)  # float32
+    assert np.ptp(angle) > 0.04
+
+
+def test_the_recording_carries_geometry_and_a_layout(run, tmp_path):
+    """Every geom is there once, and a blueprint comes with the file."""
+    path = run.to_rerun(tmp_path / "run.rrd")
+    reader = RrdReader(path)
+    assert len(reader.blueprints()) == 1
+    static = {c.entity_path for c in reader.stream() if c.is_static}
+    shapes = {"/arm/stand/foot", "/arm/stand/housing", "/arm/load/flange"}
+    assert shapes | {"/arm/load/bar", "/tool/path"} <= static
+
+
+def test_several_runs_share_one_recording(run, synthetic_map, tmp_path):
+    """Runs lie below their names; tool errors refer to the rigid arm."""
+    rigid = run_scene(
+        "bench",
+        overrides={**SHORT, "defaults.level": "rigid"},
+        drives={"reference-2d": synthetic_map},
+    )
+    path = write_recording(
+        {"soft": run, "rigid": rigid}, tmp_path / "both.rrd", rigid=rigid
+    )
+    _, soft = columns(path, "/soft/joint/joint/torsion_arcmin", "Scalars:scalars")
+    _, none = columns(path, "/rigid/joint/joint/torsion_arcmin", "Scalars:scalars")
+    assert soft.min() > 1.0
+    assert not none.any()
+    _, error = columns(path, "/soft/tool/error_mm", "Scalars:scalars")
+    np.testing.assert_array_equal(error, run.tool_error(rigid) / mm)
+
+
+def test_a_recording_is_written_whole_or_not_at_all(run, tmp_path, monkeypatch):
+    """A failure on the way leaves neither the file nor a part of it."""
+
+    def fail(*_: object) -> None:
+        raise RuntimeError("no pose")
+
+    monkeypatch.setattr("swgjoint.view.recording._log_arm", fail)
+    with pytest.raises(RuntimeError, match="no pose"):
+        run.to_rerun(tmp_path / "run.rrd")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_picture_compares_the_runs(run, tmp_path):
+    """One PNG of readable size; a folder that does not exist is refused."""
+    path = comparison_png({"soft": run}, tmp_path / "demo.png")
+    data = path.read_bytes()
+    assert data.startswith(b"\x89PNG")
+    width, height = (int.from_bytes(data[k : k + 4], "big") for k in (16, 20))
+    assert width > 1000
+    assert height > 800
+    with pytest.raises(InputError):
+        comparison_png({"soft": run}, tmp_path / "none" / "demo.png")
+
+
+def test_figures_can_be_recomputed_from_the_recording(run, tmp_path):
+    """Torsion figures of the JSON output follow from the recorded samples."""
+    path = run.to_rerun(tmp_path / "run.rrd")
+    _, torsion = columns(path, "/joint/joint/torsion_arcmin", "Scalars:scalars")
+    window = torsion[run.steady]
+    figures = run.metrics()["joints"]["joint"]["torsion_arcmin"]
+    assert figures["mean"] == pytest.approx(window.mean(), rel=1e-12)
+    assert figures["pp"] == pytest.approx(np.ptp(window), rel=1e-12)
+    assert json.dumps(run.metrics(), allow_nan=False)
