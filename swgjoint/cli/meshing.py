@@ -118,13 +118,15 @@ def report(result: dict[str, Any]) -> str:
                 values = [state[member].get(kind) for kind in kinds]
                 rows.append((f"{member} {state['state']}", *values))
         mean = result.get(member) and result[member].get("average_max_MPa")
-        if mean:
-            values = [mean.get(kind) for kind in kinds]
+        values = [mean.get(kind) for kind in kinds] if mean else []
+        if any(value is not None for value in values):  # null while it is rigid
             rows.append((f"{member} mean of the maxima", *values))
+    label = result.get("label") or {}
     lines = [
         f"meshing of {result.get('design', 'the design')}:"
         f" {result['nodes']} nodes, {result['elements']} elements,"
         f" {result['steps']} positions, {result['wall_s']:.1f} s",
+        "validity: " + ", ".join(f"{k} {v}" for k, v in label.items() if v is not None),
         table(rows, header=("[MPa]", "tensile", "compressive", "von Mises")),
     ]
     steps = result["per_step"]

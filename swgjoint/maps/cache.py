@@ -18,10 +18,11 @@ from swgjoint.errors import InputError, MapFileError
 from swgjoint.json_text import plain
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.file import SCHEMA_VERSION
+from swgjoint.models_path import models_path
 
 _log = logging.getLogger(__name__)
 
-_CODE = ("arrays.py", "gear", "fe", "maps")
+_CODE = ("arrays.py", "units.py", "gear", "fe", "maps")
 """Parts of the package whose code decides the content of a map."""
 
 
@@ -57,12 +58,16 @@ def code_version() -> str:
     """
     digest = hashlib.sha256(f"{__version__} {SCHEMA_VERSION}".encode())
     package = Path(__file__).resolve().parents[1]
-    for part in _CODE:
-        path = package / part
-        for file in [path] if path.is_file() else sorted(path.rglob("*.py")):
-            digest.update(file.relative_to(package).as_posix().encode())
-            digest.update(file.read_bytes())
+    files = [file for part in _CODE for file in _python_files(package / part)]
+    # the catalogue gives a design the ratings that it does not state
+    files += sorted((models_path() / "catalogue").glob("*.csv"))
+    for file in files:
+        digest.update(file.name.encode() + b"\0" + file.read_bytes())
     return digest.hexdigest()
+
+
+def _python_files(path: Path) -> list[Path]:
+    return [path] if path.is_file() else sorted(path.rglob("*.py"))
 
 
 def key_of(parts: Mapping[str, Any]) -> str:

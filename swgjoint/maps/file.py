@@ -97,7 +97,10 @@ def map_bytes(drive: DriveMap) -> bytes:
         "teeth_flexspline": drive.teeth_flexspline,
         "teeth_circular_spline": drive.teeth_circular_spline,
         "damping_ratio": float(drive.damping_ratio),
-        "ratings": asdict(drive.ratings),
+        "ratings": {
+            key: value if key == "source" else float(value)
+            for key, value in asdict(drive.ratings).items()
+        },
         "info": dict(drive.info),
     }
     text = json_text(header, indent=None).encode()

@@ -7,6 +7,7 @@ import os
 import pytest
 
 from swgjoint.cli.main import main
+from swgjoint.maps.file import map_bytes
 from swgjoint.models_path import models_path
 
 REFERENCE = (models_path() / "drives" / "reference-2d.toml").read_text()
@@ -105,3 +106,53 @@ def test_all_faults_of_the_options_at_once(here, capsys):
     """Every wrong option has its line."""
     err = refused(capsys, "meshing", "reference-2d", "--torque", "inf", "--steps", "-1")
     assert err.count("\n") == 2
+
+
+BENCH = (models_path() / "scenes" / "bench.toml").read_text()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("[load.joint]", "[load.elbow]", "elbow"),
+        ("joint = 3.0", "shoulder = 3.0", "shoulder"),
+        ('level = "full"', 'levl = "full"', "did you mean level?"),
+        ("step_s = 0.001", "step_s = -0.001", "simulation.step_s = -0.001 s"),
+        (
+            'drive = "reference-2d"',
+            'drive = "reference-2e"',
+            "did you mean reference-2d",
+        ),
+        (
+            'drive = "reference-2d"',
+            'drive = "cut.swg"',
+            "cut.swg: truncated or damaged",
+        ),
+        ('drive = "reference-2d"', 'drive = "none.swg"', "none.swg"),
+        ('arm = "bench"', 'arm = "bnch"', "bnch"),
+    ],
+)
+def test_scenes(here, capsys, synthetic_map, old, new, message):
+    """Unknown joints and keys, a truncated or missing map: refused in one line."""
+    assert old in BENCH
+    (here / "scene.toml").write_text(BENCH.replace(old, new, 1))
+    (here / "cut.swg").write_bytes(map_bytes(synthetic_map)[:-30])
+    err = refused(capsys, "run", "scene.toml", "--out", "out")
+    assert message in err
+    assert err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["none.toml"], "none.toml"),
+        (["bench", "--set", "simulation.stp_s=1"], "did you mean step_s?"),
+        (["bench", "--set", "joints.elbow.level=rigid"], "elbow"),
+        (["bench", "--set", "nonsense"], "nonsense"),
+    ],
+)
+def test_scene_options(here, capsys, arguments, message):
+    """A missing scene and a change of what is not there are refused in one line."""
+    err = refused(capsys, "run", *arguments, "--out", "out")
+    assert message in err
+    assert err.count("\n") == 1

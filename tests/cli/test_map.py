@@ -1,0 +1,67 @@
+"""``swgjoint map``: the map that was built lies in the file."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import pytest
+
+from swgjoint.cli.main import main
+from swgjoint.fe import build_map as builder
+from swgjoint.maps.drive_map import DriveMap
+from swgjoint.maps.file import map_bytes
+
+
+@pytest.fixture
+def built(monkeypatch, synthetic_map):
+    """Give the command a map without finite elements; the options that it asked for."""
+    seen = {}
+    info = {"residual": {"torque_Nm": 1e-3}, "energy_check": {"relative": 0.01}}
+    drive = replace(synthetic_map, info=info)
+
+    def build(design, **options):
+        options["progress"]("samples", 1, 1)
+        seen.update(options, design=design.drive.name)
+        return drive
+
+    monkeypatch.setattr(builder, "build_map", build)
+    return drive, seen
+
+
+def test_map_is_written(built, tmp_path, capsys):
+    """The file holds the map bitwise; the JSON object its record and stiffness."""
+    drive, seen = built
+    path = tmp_path / "a.swg"
+    options = ["-o", str(path), "--model", "2d", "--json"]
+    assert main(["map", "reference-2d", *options]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert map_bytes(DriveMap.load(path)) == map_bytes(drive)
+    assert result["residual"] == {"torque_Nm": 1e-3}
+    assert result["energy_check"] == {"relative": 0.01}
+    assert len(result["harmonics"]) == len(drive.orders)
+    assert result["stiffness_Nm_rad"] == pytest.approx(drive.mean_stiffness)
+    assert result["torque_range_Nm"] == pytest.approx(list(drive.torque_range))
+    assert result["files"] == [str(path)]
+    assert result["wall_s"] > 0
+    assert (seen["design"], seen["model"]) == ("reference-2d", "2d")
+
+
+def test_report(built, tmp_path, capsys):
+    """The terminal names the file, the residual and the energy check."""
+    path = tmp_path / "a.swg"
+    assert main(["map", "reference-2d", "-o", str(path)]) == 0
+    out = capsys.readouterr().out
+    assert str(path) in out.splitlines()[0]
+    assert "residual torque_Nm" in out
+    assert "energy check relative" in out
+
+
+@pytest.mark.parametrize("model", ["ring", "3d"])
+def test_fidelities_that_are_not_there(model, tmp_path, capsys):
+    """A fidelity that cannot be built yet is bad input in one line, nothing written."""
+    path = tmp_path / "a.swg"
+    assert main(["map", "reference-2d", "-o", str(path), "--model", model]) == 2
+    _, err = capsys.readouterr()
+    assert err.count("\n") == 1
+    assert not path.exists()

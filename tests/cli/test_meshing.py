@@ -1,0 +1,126 @@
+"""``swgjoint meshing``: the keys of the contract, filled with consistent numbers."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from swgjoint.cli.main import main
+
+TORQUE, STEPS, TURN = 12.0, 4, 0.006
+STRESSES = {"tensile", "compressive", "von_mises"}
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    """A short run of the reference with its files; (result, folder, stderr)."""
+    folder = tmp_path_factory.mktemp("meshing") / "out"
+    with pytest.MonkeyPatch.context() as patch:
+        lines: list[str] = []
+        patch.setattr("builtins.print", lambda *a, **k: lines.append(str(a[0])))
+        options = ["--torque", str(TORQUE), "--steps", str(STEPS), "--turn", str(TURN)]
+        arguments = ["reference-2d", *options, "--half", "--out", str(folder)]
+        assert main(["meshing", *arguments, "--json"]) == 0
+    return json.loads(lines[-1]), folder, lines[:-1]
+
+
+def test_keys_of_the_contract(run):
+    """Every key that the contract names is there, lists are as long as the steps."""
+    result, _, _ = run
+    assert {"nodes", "elements", "wall_s", "outcome", "label"} <= set(result)
+    assert result["steps"] == STEPS
+    assert result["outcome"] == "converged"
+    assert set(result["flexspline"]["average_max_MPa"]) == STRESSES
+    assert set(result["circular_spline"]["average_max_MPa"]) == STRESSES
+    per_step = result["per_step"]
+    assert {f"{kind}_MPa" for kind in STRESSES} <= set(per_step)
+    assert {
+        "pairs_in_contact",
+        "output_error_arcsec",
+        "wave_generator_torque_Nm",
+    } <= set(per_step)
+    assert {len(values) for values in per_step.values()} == {STEPS}
+    states = [state["state"] for state in result["setup_MPa"]]
+    assert states == ["wave_generator", "meshed", "torque"]
+    assert all(set(state["flexspline"]) == STRESSES for state in result["setup_MPa"])
+
+
+def test_positions(run):
+    """The wave generator stands at k turns/N, k = 0 to N - 1."""
+    angles = run[0]["per_step"]["angle_deg"]
+    wanted = [360.0 * TURN * k / STEPS for k in range(STEPS)]
+    assert angles == pytest.approx(wanted, abs=1e-12)
+
+
+def test_averages_are_means_of_the_steps(run):
+    """The average over the turn is the mean of the per-step maxima."""
+    result, _, _ = run
+    for kind, value in result["flexspline"]["average_max_MPa"].items():
+        values = result["per_step"][f"{kind}_MPa"]
+        assert value == pytest.approx(sum(values) / STEPS, rel=1e-12)
+
+
+def test_balance_reaches_the_output(run):
+    """Moment of the tooth forces plus wave-generator torque is T at every step."""
+    per_step = run[0]["per_step"]
+    for moment, input_torque in zip(
+        per_step["tooth_moment_Nm"], per_step["wave_generator_torque_Nm"], strict=True
+    ):
+        assert moment + input_torque == pytest.approx(TORQUE, rel=1e-6)
+
+
+def test_files(run):
+    """--out holds the same object and a picture; progress stayed off stdout."""
+    result, folder, others = run
+    assert sorted(p.name for p in folder.iterdir()) == ["meshing.json", "meshing.png"]
+    assert json.loads((folder / "meshing.json").read_text()) == result
+    assert (folder / "meshing.png").read_bytes().startswith(b"\x89PNG")
+    assert any("meshing: 4/4" in line for line in others)
+
+
+def test_report(run):
+    """The terminal shows the validity label, the stresses and the outcome."""
+    from swgjoint.cli.meshing import report
+
+    text = report(run[0])
+    assert "validity: model 2d, level nonlinear" in text
+    assert "outcome: converged" in text
+    mean = run[0]["flexspline"]["average_max_MPa"]["von_mises"]
+    assert f"{mean:.4g}" in text
+
+
+def test_rated_torque_is_the_default(monkeypatch):
+    """Without --torque the run is at the rated torque of the design."""
+    from swgjoint.fe import meshing
+
+    seen = {}
+
+    class Stop(Exception):
+        pass
+
+    def simulate(design, **options):
+        seen.update(options)
+        raise Stop
+
+    monkeypatch.setattr(meshing, "simulate_meshing", simulate)
+    with pytest.raises(Stop):
+        main(["meshing", "reference-2d", "--linear"])
+    del seen["progress"]
+    assert seen == {
+        "model": "2d",
+        "torque": 20.0,
+        "steps": 35,
+        "turn": 0.5,
+        "nonlinear": False,
+        "half": False,
+    }
+
+
+def test_three_dimensional_model_is_refused(capsys):
+    """A fidelity that is not there yet is bad input in one line."""
+    assert main(["meshing", "reference-2d", "--model", "3d"]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.count("\n") == 1
+    assert "3d" in err
