@@ -51,6 +51,8 @@ class ElementQuadIncompatible(ElementQuad1):  # type: ignore[misc]
         centre = np.array([[0.5], [0.5]])
         inverse = mapping.invDF(centre, tind)[:, :, :, 0]  # (2, 2, n_elements)
         scale = mapping.detDF(centre, tind) / mapping.detDF(X, tind)
-        grad = np.einsum("ijk,il->jkl", inverse, dphi) * scale
+        # one set of points for all elements, or one per element (facets)
+        points = "il" if np.ndim(X) == 2 else "ikl"
+        grad = np.einsum(f"ijk,{points}->jkl", inverse, dphi) * scale
         value = np.broadcast_to(phi, grad.shape[1:])
         return (DiscreteField(value=value, grad=grad),)

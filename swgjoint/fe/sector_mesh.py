@@ -17,6 +17,11 @@ Index = NDArray[np.int64]
 # elements of the thesis mesh per half tooth: along the flank, in depth below it, on the
 # inner (outer) diameter, and through the lower rim; 181 nodes and 146 elements a tooth
 FLANK, LAYERS, BORE, LOWER_RIM = 21, 3, 5, 2
+# depth of the centre point of the tooth mesh in halves of the rim (thesis Table 4.4)
+POSITIONING_FACTOR = 1.1
+# each of the three layers is this much thicker than the one above it: bending stress
+# peaks at the surface of the fillet ("finer elements near the tooth flanks", 4.3)
+LAYER_GROWTH = 1.5
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -61,7 +66,7 @@ def sector_mesh(profile: ToothProfile, rim: float, refinement: int) -> SectorMes
     n, layers = FLANK * refinement, LAYERS * refinement
     bore, lower = BORE * refinement, LOWER_RIM * refinement
     side = -1.0 if profile.internal else 1.0
-    middle = profile.dedendum_radius - side * 0.5 * rim
+    middle = profile.dedendum_radius - side * 0.5 * POSITIONING_FACTOR * rim
     inner = profile.dedendum_radius - side * rim
     names = [part.name for part in profile.segments]
     stations = profile.stations
@@ -80,12 +85,14 @@ def sector_mesh(profile: ToothProfile, rim: float, refinement: int) -> SectorMes
             np.stack([middle * np.sin(turn), middle * np.cos(turn)], axis=-1)[1:],
         ]
     )
-    depth = np.linspace(0.0, 1.0, layers + 1)[:, None, None]
+    thickness = LAYER_GROWTH ** (np.arange(layers) / refinement)
+    share = np.concatenate([[0.0], np.cumsum(thickness)]) / thickness.sum()
+    depth = share[:, None, None]
     block = (1.0 - depth) * flank + depth * edge  # (layers + 1, n + 1, 2)
     # the first row follows the top land, the last one the face of the sector
-    top = np.linspace(np.arctan2(flank[0, 0], flank[0, 1]), 0.0, layers + 1)
+    top = np.arctan2(flank[0, 0], flank[0, 1]) * (1.0 - share)
     block[:, 0] = profile.addendum_radius * np.stack([np.sin(top), np.cos(top)], -1)
-    radius = np.linspace(profile.dedendum_radius, middle, layers + 1)
+    radius = profile.dedendum_radius + share * (middle - profile.dedendum_radius)
     block[:, -1] = radius[:, None] * np.array([sin(half), cos(half)])
     # lower rim: from the middle of the rim to the bore
     radius = np.linspace(middle, inner, lower + 1)

@@ -121,6 +121,15 @@ def condense(
     from_kept = operator[:, kept].toarray() + operator[:, inner] @ inner_from_kept
     from_a = from_kept[:, :n] + from_kept[:, n:] @ flank_from_skeleton
     from_flank = from_kept[:, n:] @ compliance
+    # sectors travel a thousand times farther than they strain: make rigid translation
+    # free of force and stress to the last digit, not only to the solver's
+    move = np.tile(np.eye(2), (len(skeleton), 1)) / np.sqrt(len(skeleton))
+    strain = np.eye(n) - move @ move.T
+    stiffness = strain @ stiffness @ strain
+    from_a = from_a @ strain
+    carried = np.tile(np.eye(2), (len(flank), 1)) / np.sqrt(len(skeleton))
+    flank_from_skeleton += (carried - flank_from_skeleton @ move) @ move.T
+
     nodes = mesh.mesh.p.shape[1]
     stations = mesh.flank_stations[:-1]
     return Superelement(

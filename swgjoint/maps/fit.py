@@ -28,8 +28,8 @@ from swgjoint.maps.samples import MapSamples
 Array = NDArray[np.float64]
 
 KEEP = 0.01
-"""Harmonics are kept whose share of the kinematic error, or of the input-torque
-ripple, reaches this part of the largest one."""
+"""Harmonics are kept whose kinematic error, or input-torque ripple at some load, reaches
+this part of the largest one."""
 
 
 def quartic_chain(knots: Array, values: Array) -> tuple[Array, Array]:
@@ -135,7 +135,8 @@ def fit_map(samples: MapSamples, *, keep: float = KEEP) -> DriveMap:
     info |= {
         "harmonics": _describe(full, strength, kept),
         "residual": residual(fitted, samples) | {"threshold": keep},
-        "energy_check": energy_check(fitted, samples),
+        "energy_check": energy_check(fitted, samples)
+        | {"relative_all_harmonics": energy_check(full, samples)["relative"]},
         "stiffness_range_Nm_rad": stiffness_range(fitted),
         "torque_range_Nm": [float(v) for v in fitted.torque_range],
     }
@@ -165,18 +166,17 @@ def _clip_ends(ends: Array, knots: Array, mean_torque: Array) -> None:
 def harmonic_strength(drive: DriveMap) -> Array:
     """Kinematic error [rad] and input-torque ripple [N·m] of each harmonic.
 
-    The ripple is the amplitude of T de0/dtheta + dV/dtheta at rated torque of either
-    sign, the larger one. Shape (n_harmonics, 2).
+    The ripple is the amplitude of T de0/dtheta + dV/dtheta, at zero, rated and repeated
+    peak torque of either sign. Shape (n_harmonics, 6).
     """
-    error = np.hypot(*drive.kinematic_error.T)
+    columns = [np.hypot(*drive.kinematic_error.T)]
     n_theta = np.abs(drive.angle_orders[:, 0])
-    ripple = np.zeros(len(error))
-    for sign in (-1.0, 1.0):
-        load = sign * drive.ratings.rated_torque
+    peaks = (drive.ratings.rated_torque, drive.ratings.repeated_peak)
+    for load in (0.0, *peaks, *(-peak for peak in peaks)):
         x = drive.mean_torsion(load)
         both = load * drive.kinematic_error + drive.coefficients(x)
-        ripple = np.maximum(ripple, n_theta * np.hypot(*both.T))
-    return np.stack([error, ripple], axis=-1)
+        columns.append(n_theta * np.hypot(*both.T))
+    return np.stack(columns, axis=-1)
 
 
 def residual(drive: DriveMap, samples: MapSamples) -> dict[str, float]:
@@ -252,10 +252,10 @@ def _describe(
             "beta": int(q),
             "per_input_turn": float(abs(n_theta + n_psi / drive.ratio)),
             "kinematic_error_rad": float(error),
-            "input_torque_Nm": float(ripple),
+            "input_torque_Nm": float(max(ripple)),
             "kept": bool(keep),
         }
-        for (p, q), (n_theta, n_psi), (error, ripple), keep in zip(
+        for (p, q), (n_theta, n_psi), (error, *ripple), keep in zip(
             drive.orders, drive.angle_orders, strength, kept, strict=True
         )
     ]

@@ -1,0 +1,225 @@
+"""Simulation of meshing: balance, energy, symmetry, and an independent study."""
+
+from __future__ import annotations
+
+from functools import cache
+from math import pi
+
+import numpy as np
+import pytest
+
+from swgjoint.errors import DesignError
+from swgjoint.fe.drive2d import Continuation, ring_model
+from swgjoint.fe.meshing import simulate_meshing
+from swgjoint.fe.stress import nodal_stress
+from swgjoint.gear.design import Design
+
+TORQUE = 20.0
+PITCH = 2 * pi / 122
+
+
+@cache
+def reference(refinement=1, **changes):
+    design = Design.load("reference-2d")
+    return design.with_changes({"mesh.refinement": refinement, **changes})
+
+
+@cache
+def one_pitch(half=True):
+    """Two pitches of the ring gear at 20 N·m, 12 positions each, and one beyond."""
+    return simulate_meshing(
+        reference(), torque=TORQUE, steps=25, turn=25 / 12 / 122, half=half
+    )
+
+
+@cache
+def follow(half=True):
+    return Continuation(model=ring_model(reference(), half=half), ratio=-60.0)
+
+
+@cache
+def meshed():
+    return follow().meshed(follow().deflected())
+
+
+@pytest.mark.parametrize(("refinement", "tolerance"), [(1, 0.15), (4, 0.04)])
+def test_deflected_flexspline_meets_an_independent_study(refinement, tolerance):
+    """Stress by the wave generator alone against 289/200/282 MPa (CalculiX study)."""
+    run = simulate_meshing(reference(refinement), torque=0.0, steps=1, half=True)
+    state, found = run.setup[0]
+    assert state == "wave_generator"
+    values = [found.tensile, found.compressive, found.von_mises]
+    assert values == pytest.approx([289e6, 200e6, 282e6], rel=tolerance)
+
+
+def test_moments_balance_at_every_step():
+    """Moment of the tooth forces plus wave-generator torque equals the load."""
+    run = one_pitch()
+    total = run.series("tooth_moment") + run.series("wave_generator_torque")
+    assert np.abs(total - TORQUE).max() < 1e-6 * TORQUE
+
+
+def test_mean_input_torque_is_torque_over_ratio():
+    """Over whole pitches the wave-generator torque does the work of the output."""
+    torque = one_pitch().series("wave_generator_torque")[:24]
+    assert torque.mean() == pytest.approx(TORQUE / -60.0, rel=5e-3)
+    assert np.ptp(torque) > 1e-3  # and it does ripple
+
+
+def test_pattern_repeats_after_one_pitch():
+    """Error, energy and stress repeat after a pitch of the fixed member."""
+    run = one_pitch()
+    for name in ("output_error", "wave_generator_torque", "energy"):
+        values = run.series(name)
+        assert np.abs(values[12:] - values[:13]).max() < 1e-3 * np.ptp(values)
+
+
+def test_half_and_full_model_agree():
+    """Without tolerances half of the drive is the whole drive."""
+    half, full = one_pitch(), one_pitch(half=False)
+    for name in ("output_error", "wave_generator_torque", "energy"):
+        a, b = half.series(name), full.series(name)
+        assert np.abs(a - b).max() < 1e-9 * np.abs(a).max()
+
+
+def test_work_equals_energy():
+    """T_wg dtheta - T dpsi = dU by central differences at a smooth position."""
+    start = follow().to_torque(meshed(), TORQUE)
+    middle = follow().to_angle(start, 0.3 * PITCH)
+    h = 0.004 * PITCH
+    low, high = (follow().to_angle(middle, 0.3 * PITCH + s * h) for s in (-1, 1))
+    work = middle.wave_generator_torque * 2 * h
+    gained = high.energy - low.energy + TORQUE * (high.rotation - low.rotation)
+    assert gained == pytest.approx(work, rel=1e-5)
+
+
+def test_tangent_compliance_is_the_derivative_of_the_rotation():
+    """d(torsion)/dT of the converged system against differences."""
+    state = follow().to_angle(follow().to_torque(meshed(), TORQUE), 0.3 * PITCH)
+    low = follow().model.solve(state, torque=TORQUE - 0.01)
+    high = follow().model.solve(state, torque=TORQUE + 0.01)
+    slope = -(high.rotation - low.rotation) / 0.02
+    assert state.compliance == pytest.approx(slope, rel=1e-4)
+
+
+def test_mirrored_load_gives_mirrored_error():
+    """Reversed torque at the mirrored position: reversed rotation, same energy."""
+    zero = follow().to_torque(meshed(), 0.0)
+    plus = follow().to_angle(follow().to_torque(zero, 15.0), 0.2 * PITCH)
+    minus = follow().to_angle(follow().to_torque(zero, -15.0), -0.2 * PITCH)
+    assert plus.rotation == pytest.approx(-minus.rotation, rel=1e-6)
+    assert plus.energy == pytest.approx(minus.energy, rel=1e-9)
+    assert plus.wave_generator_torque == pytest.approx(
+        -minus.wave_generator_torque, rel=1e-6
+    )
+
+
+def test_nothing_penetrates():
+    """No flank point lies inside the circular spline, no bore node inside the cam."""
+    model = follow().model
+    state = follow().to_torque(meshed(), TORQUE)
+    frames = model.frames(state)
+    nodes = model.skeleton(state)[:, model._bore_nodes]
+    gap, _, _ = model._wave_generator(nodes, state.wave_generator_angle)
+    assert gap.min() > -1e-11
+    assert np.abs(gap[state.touching]).max() < 1e-11
+    assert state.pressure[state.touching].min() > 0.0
+    assert state.tooth_force.min() > 0.0
+    from swgjoint.fe.tooth_contact import ToothContact
+
+    element = model.element
+    flank = (
+        frames.displacement @ element.flank_from_skeleton.T
+        + state.flank_force @ element.flank_compliance
+    )
+    centre = frames.position.reshape(model.sectors, -1, 2).mean(axis=1)
+    found = ToothContact(
+        element=element,
+        circular_spline=model.circular_spline,
+        angle=frames.angle,
+        bearing=frames.angle - np.arctan2(centre[:, 0], centre[:, 1]),
+    ).search(flank, 1e-6, None)
+    assert found.gap.min() > -1e-11
+    # the weights are the derivative of the gap by the flank displacement
+    rng = np.random.default_rng(1)
+    direction = rng.normal(size=flank.shape)
+    h = 1e-8
+    contact = ToothContact(
+        element=element,
+        circular_spline=model.circular_spline,
+        angle=frames.angle,
+        bearing=frames.angle - np.arctan2(centre[:, 0], centre[:, 1]),
+    )
+    moved = [
+        contact._gather(
+            found.sector, found.side, found.station, flank + s * h * direction, 1.0
+        ).gap
+        for s in (-1, 1)
+    ]
+    slope = (moved[1] - moved[0]) / (2 * h)
+    ours = np.einsum("kb,kb->k", found.weight, direction[found.sector])
+    assert ours == pytest.approx(slope, rel=1e-4, abs=1e-5)
+
+
+def test_stress_is_continuous_across_the_faces():
+    """Both sectors of a face report the same stress, seen from their frames."""
+    model = follow().model
+    state = follow().deflected()
+    stress = nodal_stress(model, state)
+    mesh = model.element.mesh
+    trace = stress[..., 0] + stress[..., 1]
+    after = np.roll(trace[:, mesh.face_first], -1, axis=0)
+    assert np.allclose(trace[:, mesh.face_last], after, rtol=1e-9, atol=1e-3)
+
+
+def test_linear_level_runs_and_differs():
+    """The labelled linear level is another model: large rotations matter."""
+    linear = simulate_meshing(
+        reference(), torque=TORQUE, steps=2, turn=0.01, half=True, nonlinear=False
+    )
+    assert linear.to_json()["label"]["level"] == "linear"
+    total = linear.series("tooth_moment") + linear.series("wave_generator_torque")
+    assert linear.setup[0][1].tensile != pytest.approx(
+        one_pitch().setup[0][1].tensile, rel=0.01
+    )
+    assert np.isfinite(total).all()
+
+
+@pytest.mark.parametrize(
+    ("changes", "key"),
+    [
+        ({"drive.layout": "flexspline_fixed"}, "drive.layout"),
+        ({"friction.tooth_coefficient": 0.1}, "friction.tooth_coefficient"),
+        ({"tolerances.random_pitch_um": 2.0}, "tolerances.random_pitch_um"),
+    ],
+)
+def test_what_is_not_modelled_is_refused(changes, key):
+    """A key that the model cannot honour is named, not ignored."""
+    design = Design.load("reference-2d").with_changes(changes)
+    with pytest.raises(DesignError, match=key):
+        simulate_meshing(design, torque=1.0, steps=1)
+
+
+def test_half_model_of_odd_teeth_is_refused():
+    """Odd tooth counts put the lobes half a pitch apart."""
+    design = Design.load("reference-2d").with_changes(
+        {"drive.teeth_flexspline": 121, "drive.teeth_circular_spline": 123}
+    )
+    with pytest.raises(DesignError, match="even tooth counts"):
+        simulate_meshing(design, torque=1.0, steps=1, half=True)
+
+
+def test_json_has_the_contract_keys():
+    """Counts, labels and lists of the JSON object fit together."""
+    result = one_pitch().to_json()
+    assert result["steps"] == 25 == len(result["per_step"]["angle_deg"])
+    assert result["elements"] == 60 * 146
+    assert result["nodes"] == 60 * 175 + 6
+    assert [row["state"] for row in result["setup_MPa"]] == [
+        "wave_generator",
+        "meshed",
+        "torque",
+    ]
+    mean = result["flexspline"]["average_max_MPa"]["von_mises"]
+    assert mean == pytest.approx(np.mean(result["per_step"]["von_mises_MPa"]))
+    assert result["circular_spline"]["average_max_MPa"]["tensile"] is None

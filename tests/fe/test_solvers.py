@@ -1,0 +1,71 @@
+"""Ring solver and complementarity against dense twins."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from swgjoint.fe.complementarity import ActiveSetError, _least_squares, solve_mixed
+from swgjoint.fe.cyclic import CyclicFactor
+
+
+@pytest.mark.parametrize("sectors", [3, 4, 7, 60])
+def test_ring_solver_equals_a_dense_solution(sectors):
+    """The folded band solution is that of the assembled dense matrix."""
+    rng = np.random.default_rng(sectors)
+    face, inside = 4, 5
+    n, step = 2 * face + inside, face + inside
+    blocks = rng.normal(size=(sectors, n, n))
+    blocks = blocks @ blocks.transpose(0, 2, 1) + np.eye(n)
+    rhs = rng.normal(size=(sectors, n, 3))
+    dense, total = np.zeros((sectors * step,) * 2), np.zeros((sectors * step, 3))
+    index = [
+        np.r_[s * step : (s + 1) * step, (s + 1) % sectors * step + np.arange(face)]
+        for s in range(sectors)
+    ]
+    for s in range(sectors):
+        dense[np.ix_(index[s], index[s])] += blocks[s]
+        total[index[s]] += rhs[s]
+    exact = np.linalg.solve(dense, total)
+    found = CyclicFactor(blocks, face).solve(rhs)
+    for s in range(sectors):
+        assert np.abs(found[s] - exact[index[s]]).max() < 1e-12
+
+
+def random_problem(seed, m=12):
+    """A contact-like problem with one free displacement and one multiplier."""
+    rng = np.random.default_rng(seed)
+    n = m + 2
+    flexibility = rng.normal(size=(n, n + 3))
+    flexibility = flexibility @ flexibility.T
+    matrix = flexibility
+    matrix[m, m] = -1e-3 * matrix[m, m]
+    return matrix, rng.normal(size=n), m
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_complementarity_holds(seed):
+    """Forces and gaps are non-negative, one of each pair vanishes, equations hold."""
+    matrix, offset, m = random_problem(seed)
+    z, active = solve_mixed(matrix, offset, m, 1, np.zeros(m, dtype=bool))
+    gap = offset + matrix @ z
+    scale = np.abs(offset).max()
+    assert (z[:m] >= -1e-9).all() and (gap[:m] >= -1e-9 * scale).all()
+    assert np.abs(gap[m:]).max() < 1e-9 * scale
+    assert np.abs(z[:m] * gap[:m]).max() < 1e-8
+    assert (z[:m][~active] == 0.0).all()
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_least_squares_finds_the_same_active_set(seed):
+    """The fallback agrees with the active-set iteration."""
+    matrix, offset, m = random_problem(seed)
+    _, active = solve_mixed(matrix, offset, m, 1, np.zeros(m, dtype=bool))
+    assert (_least_squares(matrix, offset, m, 1) == active).all()
+
+
+def test_contradiction_is_reported():
+    """Two opposed gaps that no force can open end with an error, not with numbers."""
+    matrix = np.array([[1.0, -1.0], [-1.0, 1.0]])
+    with pytest.raises(ActiveSetError):
+        solve_mixed(matrix, np.array([-1.0, -1.0]), 2, 0, np.ones(2, dtype=bool))
