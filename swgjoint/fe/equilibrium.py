@@ -106,7 +106,7 @@ class RingModel:
     @cached_property
     def place(self) -> Array:
         """Angles of the sectors in the undeformed ring [rad]."""
-        return 2.0 * pi / self.element.sectors * np.arange(self.sectors)
+        return np.arange(self.sectors) * (2.0 * pi / self.element.sectors)
 
     @cached_property
     def reference(self) -> Array:

@@ -63,7 +63,7 @@ class MeshingRun:
         mesh = self.model.element.mesh
         per_sector = mesh.mesh.p.shape[1] - len(mesh.face_last)
         closing = len(mesh.face_last) if self.model.half else 0
-        return per_sector * self.model.sectors + closing
+        return int(per_sector * self.model.sectors + closing)
 
     @property
     def elements(self) -> int:

@@ -127,7 +127,7 @@ def sector_mesh(profile: ToothProfile, rim: float, refinement: int) -> SectorMes
 
     def find(wanted: Array) -> Index:
         distance = np.linalg.norm(points[None] - wanted[:, None], axis=-1)
-        return np.argmin(distance, axis=1).astype(np.int64)
+        return np.asarray(np.argmin(distance, axis=1), dtype=np.int64)
 
     face = np.concatenate([block[:, -1], rim_block[1:, -1]])
     bore_right = rim_block[-1]

@@ -57,7 +57,7 @@ class Superelement:
     @property
     def flank_size(self) -> int:
         """Nodes of one flank."""
-        return self.flank_compliance.shape[0] // 4
+        return int(self.flank_compliance.shape[0]) // 4
 
     @property
     def bore_size(self) -> int:

@@ -189,8 +189,8 @@ def tooth_profile(design: Design, member: str) -> ToothProfile:
     spec = design.flexspline if member == "flexspline" else design.circular_spline
     if not isinstance(spec.profile, QuadrupleCircularArc):
         raise DesignError(
-            f"{design.drive.name}: {member}.profile.kind = {spec.profile.kind!r} cannot "
-            "be built yet; available: 'qca'"
+            f"{design.drive.name}: {member}.profile.kind = {spec.profile.kind!r} "
+            "cannot be built yet; available: 'qca'"
         )
     return _quadruple_arc(design, member, spec, spec.profile)
 

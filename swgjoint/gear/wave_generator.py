@@ -102,13 +102,17 @@ class Simplified:
         )
 
     def outline(self, count: int) -> Array:
-        """Points at equal steps of the direction of the normal."""
-        t = np.linspace(0.0, 2.0 * np.pi, count)
-        half = self.major - self.pin_radius
-        y = self.pin_radius * np.cos(t)
-        return np.stack(
-            [-self.pin_radius * np.sin(t), y + np.copysign(half, np.cos(t))], axis=-1
-        )
+        """Points at equal steps of the arc length."""
+        r, half = self.pin_radius, self.major - self.pin_radius
+        quarter, straight = 0.5 * np.pi * r, 2.0 * half
+        s = np.linspace(0.0, 4.0 * quarter + 2.0 * straight, count)
+        # the second half of the outline is the first one turned by pi
+        turned = s > 2.0 * quarter + straight
+        s = np.where(turned, s - 2.0 * quarter - straight, s)
+        down = np.clip(s - quarter, 0.0, straight)
+        angle = (s - down) / r
+        points = np.stack([-r * np.sin(angle), r * np.cos(angle) + half - down], -1)
+        return np.where(turned[:, None], -points, points)
 
 
 def lobe_height(design: Design) -> float:

@@ -13,7 +13,7 @@ sampled torsion every coefficient continues as a parabola, the torque linearly.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Self
 
@@ -153,7 +153,7 @@ class DriveMap:
     def angle_orders(self) -> NDArray[np.int64]:
         """(d phi/d theta, d phi/d psi) of every harmonic. Shape (n_harmonics, 2)."""
         alpha, beta = angle_coefficients(self.layout)
-        return self.orders @ np.array([alpha, beta], dtype=np.int64)
+        return np.asarray(self.orders @ np.array([alpha, beta], dtype=np.int64))
 
     def phases(self, theta: ArrayLike, psi: ArrayLike) -> Array:
         """Phases of the harmonics [rad], appended as the last axis."""
@@ -199,7 +199,8 @@ class DriveMap:
         v1 = c[..., 1] + d * (2 * c[..., 2] + d * (3 * c[..., 3] + d * 4 * c[..., 4]))
         v2 = 2 * c[..., 2] + d * (6 * c[..., 3] + d * 12 * c[..., 4])
         out = (x - inside)[..., None, None]
-        k_end = np.where(out < 0, self.end_stiffness[..., 0], self.end_stiffness[..., 1])
+        low, high = self.end_stiffness[..., 0], self.end_stiffness[..., 1]
+        k_end = np.where(out < 0, low, high)
         if derivative == 0:
             return np.asarray(v0 + out * (v1 + 0.5 * out * k_end))
         if derivative == 1:
@@ -291,9 +292,7 @@ class DriveMap:
         raise ValueError(f"torque {torque} N·m is not reached by this map")
 
     def with_harmonics(self, keep: ArrayLike) -> Self:
-        """A copy with only the harmonics for which ``keep`` is true (the mean stays)."""
-        from dataclasses import replace
-
+        """A copy with the harmonics for which ``keep`` is true; the mean stays."""
         mask = np.array(keep, dtype=bool)
         mask[0] = True
         return replace(

@@ -28,8 +28,8 @@ from swgjoint.maps.samples import MapSamples
 Array = NDArray[np.float64]
 
 KEEP = 0.01
-"""Harmonics are kept whose kinematic error, or input-torque ripple at some load, reaches
-this part of the largest one."""
+"""Harmonics are kept whose kinematic error, or input-torque ripple at some load,
+reaches this part of the largest one."""
 
 
 def quartic_chain(knots: Array, values: Array) -> tuple[Array, Array]:

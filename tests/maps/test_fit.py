@@ -1,0 +1,126 @@
+"""Fitting a potential: a known one comes back, unseen torques agree."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from swgjoint.maps.drive_map import DriveMap, Ratings
+from swgjoint.maps.fit import fit_map, quartic_chain
+from swgjoint.maps.samples import MapSamples
+
+RATINGS = Ratings(rated_torque=20, repeated_peak=50, momentary_peak=90, T1=5, T2=15)
+N = 122
+
+
+def samples_of(
+    stiffness=2e4, swing=0.1, error=3e-6, cogging=2e-6, n_angles=24, n_torques=11
+):
+    """Equilibria of V = K x^2/2 (1 + h x^2)(1 + s cos phi) + c sin 2 phi, e0 known."""
+    hard = 4e4
+
+    def v(x, phi):
+        return 0.5 * stiffness * x**2 * (1 + hard * x**2) * (
+            1 + swing * np.cos(phi)
+        ) + cogging * np.sin(2 * phi)
+
+    def torque(x, phi):
+        return stiffness * x * (1 + 2 * hard * x**2) * (1 + swing * np.cos(phi))
+
+    theta = 2 * np.pi / N * np.arange(n_angles) / n_angles
+    phi = N * theta
+    levels = np.linspace(-50, 50, n_torques)
+    x = np.zeros((n_torques, n_angles))
+    for _ in range(50):  # Newton
+        k = stiffness * (1 + 6 * hard * x**2) * (1 + swing * np.cos(phi))
+        x -= (torque(x, phi) - levels[:, None]) / k
+    k = stiffness * (1 + 6 * hard * x**2) * (1 + swing * np.cos(phi))
+    e0 = error * np.cos(phi) + 0.3 * error * np.sin(2 * phi)
+    de0 = N * (-error * np.sin(phi) + 0.6 * error * np.cos(2 * phi))
+    base = 0.5 * stiffness * x**2 * (1 + hard * x**2)
+    dv = N * (-swing * np.sin(phi) * base + 2 * cogging * np.cos(2 * phi))
+    return MapSamples(
+        name="known",
+        level="2d",
+        layout="circular_spline_fixed",
+        teeth_flexspline=120,
+        teeth_circular_spline=122,
+        ratings=RATINGS,
+        damping_ratio=0.02,
+        order=(N, 0),
+        input_angle=theta,
+        torque=levels,
+        output_error=e0 - x + 5e-6,
+        energy=v(x, phi) + 0.02,
+        compliance=1 / k,
+        input_torque=levels[:, None] * (-1 / 60 + de0) + dv,
+    )
+
+
+def test_known_potential_comes_back():
+    """Unseen input torque within 0.5 % of its ripple, residuals small."""
+    samples = samples_of()
+    drive = fit_map(samples)
+    assert drive.info["energy_check"]["relative"] < 5e-3
+    assert drive.info["residual"]["torque_Nm"] < 5e-3
+    assert drive.info["residual"]["kinematic_error_rad"] < 1e-12
+    assert drive.info["stiffness_range_Nm_rad"][0] > 0.0
+    # the mean curve: K x (1 + 2 h x^2)
+    x = 0.7 * drive.torsion_knots[-1]
+    expected = 2e4 * x * (1 + 8e4 * x**2)
+    assert drive.coefficients(x, 1)[0, 0] == pytest.approx(expected, rel=1e-4)
+
+
+def test_integration_constant_is_the_cogging_energy():
+    """Without load the input feels the derivative of the strain energy."""
+    drive = fit_map(samples_of(error=0.0, cogging=2e-6, swing=0.0), keep=1e-6)
+    theta = np.linspace(0, 2 * np.pi / N, 50)
+    psi = theta / drive.ratio
+    on_input, on_output = drive.forces(theta, psi)
+    assert -on_input == pytest.approx(4e-6 * N * np.cos(2 * N * theta), rel=1e-6)
+    assert np.abs(on_output).max() < 1e-9
+
+
+def test_threshold_drops_small_harmonics_and_says_so():
+    """A high threshold keeps the largest harmonic only; the record lists the rest."""
+    full, sparse = fit_map(samples_of(), keep=0.0), fit_map(samples_of(), keep=0.9)
+    assert len(sparse.orders) < len(full.orders)
+    listed = sparse.info["harmonics"]
+    assert len(listed) == len(full.orders)
+    assert sum(h["kept"] for h in listed) == len(sparse.orders)
+    assert sparse.info["residual"]["kinematic_error_rad"] > 0.0
+
+
+def test_continuation_is_stable():
+    """Beyond the sampled range the stiffness stays positive at every angle."""
+    drive = fit_map(samples_of(swing=0.3))
+    far = 3 * drive.torsion_knots[[0, -1]][:, None]
+    theta = np.linspace(0, 2 * np.pi / N, 40)
+    assert (drive.stiffness(far, theta, theta / drive.ratio) > 0).all()
+
+
+def test_quartic_chain_meets_its_data():
+    """Value, slope and second derivative at uneven knots, C2 in the middles."""
+    knots = np.array([0.0, 0.3, 0.5, 1.1])
+    data = np.stack([np.exp(knots)] * 3)
+    breaks, coefficients = quartic_chain(knots, data)
+    pieces = [np.polynomial.Polynomial(c) for c in coefficients]
+    for k, piece in enumerate(pieces):
+        h = breaks[k + 1] - breaks[k]
+        for order in range(3):
+            part = piece.deriv(order) if order else piece
+            if k + 1 < len(pieces):
+                after = pieces[k + 1].deriv(order) if order else pieces[k + 1]
+                assert part(h) == pytest.approx(after(0.0), rel=1e-12)
+            if k % 2 == 0:
+                assert part(0.0) == pytest.approx(np.exp(breaks[k]), rel=1e-12)
+        assert piece(0.4 * h) == pytest.approx(np.exp(breaks[k] + 0.4 * h), rel=1e-3)
+
+
+def test_fit_gives_a_map_that_round_trips(tmp_path):
+    """The fitted map, its record included, survives its file."""
+    drive = fit_map(samples_of())
+    drive.save(tmp_path / "known.swg")
+    again = DriveMap.load(tmp_path / "known.swg")
+    assert np.array_equal(again.potential, drive.potential)
+    assert again.info["energy_check"] == drive.info["energy_check"]
