@@ -106,7 +106,9 @@ class RingModel:
     @cached_property
     def place(self) -> Array:
         """Angles of the sectors in the undeformed ring [rad]."""
-        return np.arange(self.sectors) * (2.0 * pi / self.element.sectors)
+        return np.asarray(
+            2.0 * pi / self.element.sectors * np.arange(self.sectors), float
+        )
 
     @cached_property
     def reference(self) -> Array:

@@ -177,7 +177,8 @@ class DriveMap:
     def torsion(self, theta: ArrayLike, psi: ArrayLike) -> Array:
         """Torsion theta/i + e0 - psi [rad]."""
         e0, _, _ = self.error_at(self.phases(theta, psi))
-        return np.asarray(theta, float) / self.ratio + e0 - np.asarray(psi, float)
+        ideal = np.asarray(theta, float) / self.ratio
+        return np.asarray(ideal + e0 - np.asarray(psi, float))
 
     # -- potential ------------------------------------------------------------
 
