@@ -20,6 +20,7 @@ from swgjoint.units import arcmin, mm, rpm
 
 if TYPE_CHECKING:
     from swgjoint.sim.run import Run
+    from swgjoint.sim.transmission import Transmission
 
 Array = NDArray[np.float64]
 
@@ -87,10 +88,14 @@ def joint_metrics(run: Run, j: int) -> dict[str, Any]:
     }
 
 
+def torque_deviation(run: Run, j: int) -> Array:
+    """Output torque less what the rigid arm needs at that instant [N·m]. Shape (n,)."""
+    return np.asarray(run.output_torque[:, j] - run.assembly.link_torque[:, j])
+
+
 def torque_ripple(run: Run, j: int) -> Array:
     """Ripple of one joint over the constant-speed part [N·m]. Shape (n_window,)."""
-    needed = run.assembly.link_torque[run.steady, j]
-    rest = run.output_torque[run.steady, j] - needed
+    rest = torque_deviation(run, j)[run.steady]
     x = np.linspace(-1.0, 1.0, rest.size)
     basis = np.polynomial.legendre.legvander(x, 1)
     return np.asarray(rest - basis @ np.linalg.lstsq(basis, rest, rcond=None)[0])
@@ -116,6 +121,23 @@ def drive_order(run: Run, j: int, order: float) -> float | None:
     near = min(attached.kept_orders, key=lambda kept: abs(kept - order))
     turns = np.ptp(run.motor_position[run.steady, j]) / (2.0 * np.pi)
     return near if abs(near - order) <= 0.5 / turns else None
+
+
+def strongest_left_out(transmission: Transmission) -> bool:
+    """Whether the strongest harmonic of a drive is among those left out.
+
+    Strength as angle: amplitude in the kinematic error, plus that in the torque at
+    rated torque over the stiffness.
+    """
+    attached = transmission.attached
+    if not attached.unresolved:
+        return False
+    kept, stiffness = attached.drive, attached.stiffness
+    torsion = kept.mean_torsion(kept.ratings.rated_torque)
+    strength = np.hypot(*kept.kinematic_error.T)
+    strength = strength + np.hypot(*kept.coefficients(torsion, 1).T) / stiffness
+    lost = max(left.error + left.torque / stiffness for left in attached.unresolved)
+    return bool(lost > strength[1:].max(initial=0.0))
 
 
 def spread(values: Array) -> dict[str, float]:

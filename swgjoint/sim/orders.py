@@ -21,6 +21,9 @@ Array = NDArray[np.float64]
 
 TREND_DEGREE = 3
 PADDING = 8
+SKIRT = 4.0
+"""Lines closer than this over the turns of the record are one line: twice the half
+width of the Hann window, since loads and amplitudes change along a motion."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,8 +107,8 @@ def strongest_lines(
     while len(orders) < count:
         spectrum = _spectrum(grid, residual)
         allowed = (spectrum.order >= lowest) & (spectrum.order <= highest)
-        for known in orders:  # leakage of a line that wanders is not a second line
-            allowed &= np.abs(spectrum.order - known) > 2.0 / turns
+        for known in orders:  # skirts of a line whose amplitude changes on the way
+            allowed &= np.abs(spectrum.order - known) > SKIRT / turns
         if not allowed.any():
             break
         peak = int(np.argmax(np.where(allowed, spectrum.amplitude, -1.0)))

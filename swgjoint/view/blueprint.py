@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+from swgjoint.sim.metrics import strongest_left_out, torque_deviation
 
 if TYPE_CHECKING:
     from swgjoint.sim.run import Run
 
 SPACING = 0.75
 """Distance between the arms of several runs [m]."""
-
-_PLOTS = (
-    ("torsion [arcmin]", "torsion_arcmin", True),
-    ("transmission error [arcmin]", "transmission_error_arcmin", True),
-    ("output torque [N·m]", "output_torque_Nm", False),
-)
 
 
 def blueprint_of(runs: Mapping[str, Run]) -> Any:
@@ -28,18 +24,29 @@ def blueprint_of(runs: Mapping[str, Run]) -> Any:
     prefixes = {label: f"/{label}/" if label else "/" for label in runs}
     # torsion and error of a rigid arm are a line at zero that would set the scale
     flexible = [label for label, run in runs.items() if not is_rigid(run)] or list(runs)
+
+    def plot(joint: str, title: str, signal: str, labels: Iterable[str]) -> Any:
+        paths = [f"{prefixes[label]}joint/{joint}/{signal}" for label in labels]
+        return _plot(title, paths)
+
     tabs = [
         rrb.Vertical(
-            *[
-                _plot(
-                    title,
-                    [
-                        f"{prefixes[label]}joint/{joint}/{name}"
-                        for label in (flexible if of_flexible else runs)
-                    ],
-                )
-                for title, name, of_flexible in _PLOTS
-            ],
+            rrb.Horizontal(
+                plot(joint, "torsion [arcmin]", "torsion_arcmin", flexible),
+                plot(
+                    joint,
+                    "transmission error [arcmin]",
+                    "transmission_error_arcmin",
+                    flexible,
+                ),
+            ),
+            plot(joint, "output torque [N·m]", "output_torque_Nm", runs),
+            plot(
+                joint,
+                "output torque less that of the rigid arm [N·m]",
+                "torque_deviation_Nm",
+                flexible,
+            ),
             name=joint.removesuffix("_joint"),
         )
         for joint in joints_by_interest(runs)
@@ -74,27 +81,21 @@ def is_rigid(run: Run) -> bool:
 
 
 def joints_by_interest(runs: Mapping[str, Run]) -> list[str]:
-    """Joints, the one with the largest resolved ripple first.
+    """Joints, the one with the largest ripple first.
 
-    A joint whose drive has unresolved orders comes after those that show all of theirs.
+    A joint whose strongest order is left out comes after those that show theirs.
     """
     first = next(iter(runs.values()))
     window = first.steady
 
     def key(j: int) -> tuple[bool, float]:
-        resolved = all(
-            not run.assembly.transmissions[j].attached.unresolved
-            for run in runs.values()
+        left_out = any(
+            strongest_left_out(run.assembly.transmissions[j]) for run in runs.values()
         )
         swing = max(
-            float(
-                np.ptp(
-                    run.output_torque[window, j] - run.assembly.link_torque[window, j]
-                )
-            )
-            for run in runs.values()
+            float(np.ptp(torque_deviation(run, j)[window])) for run in runs.values()
         )
-        return not resolved, -swing
+        return left_out, -swing
 
     return [first.joints[j] for j in sorted(range(len(first.joints)), key=key)]
 

@@ -10,7 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from swgjoint.files import write_whole
-from swgjoint.sim.metrics import highest_resolved_order, torque_ripple
+from swgjoint.sim.metrics import (
+    highest_resolved_order,
+    strongest_left_out,
+    torque_ripple,
+)
 from swgjoint.sim.orders import order_spectrum
 from swgjoint.units import arcmin, mm
 from swgjoint.view.blueprint import is_rigid, joints_by_interest
@@ -25,8 +29,8 @@ def comparison_png(
 ) -> Path:
     """Torsion, transmission error, ripple with its orders, and tool error of runs.
 
-    The time plots show the joint with the largest ripple among those whose orders are
-    all resolved; the bars show all joints.
+    The time plots show the joint with the largest ripple among those whose strongest
+    order is resolved; the bars show all joints.
 
     Args:
         runs: Runs by name.
@@ -107,7 +111,7 @@ def _bars(axis: Any, runs: Mapping[str, Run], colors: Mapping[str, Any]) -> None
     ticks = []
     for j, joint in enumerate(first.joints):
         left_out = any(
-            run.assembly.transmissions[j].attached.unresolved for run in runs.values()
+            strongest_left_out(run.assembly.transmissions[j]) for run in runs.values()
         )
         name = joint.removesuffix("_joint").replace("_", " ")
         ticks.append(f"{name} *" if left_out else name)
@@ -121,7 +125,7 @@ def _bars(axis: Any, runs: Mapping[str, Run], colors: Mapping[str, Any]) -> None
         places = np.arange(len(heights)) + (k - 0.5 * (len(runs) - 1)) * width
         axis.bar(places, heights, width, color=colors[label], label=label)
     axis.set_xticks(range(len(ticks)), ticks, fontsize=8)
-    axis.set_xlabel("* too fast for the step: orders left out, see unresolved")
+    axis.set_xlabel("* too fast for the step: strongest order left out")
 
 
 def _label(axis: Any, title: str, y: str) -> None:

@@ -7,6 +7,7 @@ Entity paths, below ``<run>/`` where a recording holds several runs:
 ``arm/<body>/<geom>``                  shape, once
 ``tool/path``                          commanded path of the tool, once
 ``joint/<joint>/output_torque_Nm``     torque of the drive on the link
+``joint/<joint>/torque_deviation_Nm``  the same less that of the rigid arm
 ``joint/<joint>/motor_torque_Nm``
 ``joint/<joint>/torsion_arcmin``
 ``joint/<joint>/transmission_error_arcmin``
@@ -31,6 +32,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from swgjoint.sim.metrics import torque_deviation
 from swgjoint.units import arcmin, deg, mm
 from swgjoint.view.blueprint import SPACING, blueprint_of
 from swgjoint.view.geometry import quaternion_xyzw, shape_of
@@ -86,6 +88,7 @@ def signals_of(run: Run, j: int) -> dict[str, Array]:
     """Signals of one joint under the names and in the units of the recording."""
     return {
         "output_torque_Nm": run.output_torque[:, j],
+        "torque_deviation_Nm": torque_deviation(run, j),
         "motor_torque_Nm": run.motor_torque[:, j],
         "torsion_arcmin": run.torsion[:, j] / arcmin,
         "transmission_error_arcmin": run.transmission_error[:, j] / arcmin,
