@@ -88,7 +88,7 @@ def attach(
     _positive("max_phase_step", max_phase_step, "rad")
     if level != "rigid":
         _check_option(spec, level)
-    place = _find_place(spec, joint)
+    place = _find_place(spec, joint, rotor_inertia)
 
     ratio = drive.ratio
     stiffness = drive.mean_stiffness
@@ -201,7 +201,27 @@ class _Place:
     inertia: float
 
 
-def _find_place(spec: mujoco.MjSpec, name: str) -> _Place:
+def _check_compiler(spec: mujoco.MjSpec, rotor_inertia: float) -> None:
+    """Refuse compiler settings that would change the rotor's inertia."""
+    compiler = spec.compiler
+    if compiler.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE:
+        raise InputError(
+            "compiler inertiafromgeom is true, so a rotor without geoms would have no "
+            "inertia; accepted: auto, false"
+        )
+    if compiler.settotalmass > 0.0:
+        raise InputError(
+            f"compiler settotalmass {compiler.settotalmass} kg scales the rotor's "
+            "inertia too; accepted: not set"
+        )
+    if compiler.boundinertia > rotor_inertia:
+        raise InputError(
+            f"compiler boundinertia {compiler.boundinertia} kg·m² is above the rotor's "
+            f"inertia {rotor_inertia} kg·m²; accepted: at most that"
+        )
+
+
+def _find_place(spec: mujoco.MjSpec, name: str, rotor_inertia: float) -> _Place:
     found = spec.joint(name)
     if found is None:
         known = ", ".join(j.name for j in spec.joints if j.name) or "none"
@@ -214,14 +234,7 @@ def _find_place(spec: mujoco.MjSpec, name: str) -> _Place:
             raise InputError(
                 f"joint {name!r} has a drive already: {taken!r} is in the model"
             )
-    if (
-        spec.compiler.inertiafromgeom
-        == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
-    ):
-        raise InputError(
-            "compiler inertiafromgeom is true, so a rotor without geoms would have no "
-            "inertia; accepted: auto, false"
-        )
+    _check_compiler(spec, rotor_inertia)
     body = found.parent
     if body.joints[0].name != name:
         raise InputError(

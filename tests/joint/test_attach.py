@@ -217,6 +217,21 @@ def test_second_drive_on_a_joint_is_refused(spec, synthetic_map):
         attach(spec, joint="elbow", drive=synthetic_map, rotor_inertia=4e-5)
 
 
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("inertiafromgeom", mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE),
+        ("settotalmass", 20.0),
+        ("boundinertia", 1e-3),
+    ],
+)
+def test_compiler_that_changes_the_rotor(spec, synthetic_map, key, value):
+    """A compiler setting that would change the rotor's inertia is refused by name."""
+    setattr(spec.compiler, key, value)
+    with pytest.raises(InputError, match=key):
+        attach(spec, joint="elbow", drive=synthetic_map, rotor_inertia=4e-5)
+
+
 def test_options_that_break_the_scheme(spec, synthetic_map):
     """PGS is refused; noslip and implicitfast warn; RK4 is kept."""
     keys = {"joint": "elbow", "drive": synthetic_map, "rotor_inertia": 4e-5}
