@@ -152,16 +152,14 @@ def spread(values: Array) -> dict[str, float]:
 def use_of_ratings(run: Run, j: int) -> dict[str, Any]:
     """Torques and speed of one joint over the whole run against the ratings.
 
-    The cubed mean weights with the speed of the output,
-    (sum |T|³ |n| / sum |n|)^(1/3), as catalogues do; at rest it is that over time.
+    At rest the cubed mean is that over time.
     """
     transmission = run.assembly.transmissions[j]
     ratings = transmission.drive.ratings
     torque = np.abs(run.output_torque[:, j])
     speed = np.abs(run.velocity[:, j])
     moving = run.assembly.trajectory.top_speed[j] > 0.0
-    weight = speed if moving else np.ones_like(speed)
-    cubed = float(np.average(torque**3, weights=weight) ** (1.0 / 3.0))
+    cubed = cubed_mean(torque, speed if moving else np.ones_like(speed))
     peak = float(torque.max())
     low, high = transmission.drive.torque_range
     return {
@@ -179,6 +177,17 @@ def use_of_ratings(run: Run, j: int) -> dict[str, Any]:
             and run.output_torque[:, j].max() <= high
         ),
     }
+
+
+def cubed_mean(torque: Array, speed: Array) -> float:
+    """Mean load torque as catalogues define it, (sum |T|³ |n| / sum |n|)^(1/3) [N·m].
+
+    Args:
+        torque: Output torque at equal steps of time [N·m]. Shape (n,).
+        speed: Output speed, any unit, not zero throughout. Shape (n,).
+    """
+    weight = np.abs(speed)
+    return float(np.average(np.abs(torque) ** 3, weights=weight) ** (1.0 / 3.0))
 
 
 def tool_metrics(run: Run) -> dict[str, Any]:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from swgjoint.maps.drive_map import DriveMap
-from swgjoint.sim.metrics import against_rigid, spread, torque_ripple
+from swgjoint.sim.metrics import against_rigid, cubed_mean, spread, torque_ripple
 from swgjoint.sim.run import run_scene
 from swgjoint.units import arcmin
 
@@ -18,6 +18,12 @@ def test_spread_of_a_sine():
     assert got["mean"] == pytest.approx(3.0, rel=1e-3)
     assert got["rms"] == pytest.approx(np.sqrt(9.0 + 2.0), rel=1e-3)
     assert got["pp"] == pytest.approx(4.0, rel=1e-6)
+
+
+def test_the_cubed_mean_weights_with_the_speed():
+    """Two phases by hand: 10 N·m at speed 1 and -20 N·m at speed 3."""
+    got = cubed_mean(np.array([10.0, -20.0]), np.array([1.0, -3.0]))
+    assert got == pytest.approx(((1e3 * 1 + 8e3 * 3) / 4) ** (1 / 3))
 
 
 def test_a_linear_joint_has_torsion_and_no_ripple(bench):

@@ -44,6 +44,23 @@ def test_a_rigid_joint_has_no_torsion_and_carries_the_load(bench, synthetic_map)
     np.testing.assert_allclose(run.position, run.reference, atol=1e-12)
 
 
+def test_feedforward_of_the_inertia_lets_the_rigid_arm_follow(bench, synthetic_map):
+    """With weight, load and inertia fed forward the control loop has nothing to do."""
+    sweep = {"kind": "sweep", "hold_s": 0.1, "ramp_s": 0.2, "end_deg": {"joint": 10.0}}
+    # the engine's positions lead by half a step of travel: a fine step
+    timing = {"duration_s": 1.0, "step_s": 1e-4}
+    keys = dict(defaults__level="rigid", trajectory=sweep, simulation=timing)
+    exact = bench(synthetic_map, controller__feedforward="gravity_inertia", **keys)
+    plain = bench(synthetic_map, controller__feedforward="gravity", **keys)
+    lag = np.abs(exact.position - exact.reference).max()
+    assert lag < 0.02 * np.abs(plain.position - plain.reference).max()
+    # the drive gives load and link inertia, 1 kg·m²; its rotor is none of the link's
+    needed = 20.0 + 1.0 * exact.assembly.trajectory.acceleration
+    assert np.ptp(needed) > 3.0
+    # a step behind: jerk times the step
+    np.testing.assert_allclose(exact.output_torque, needed, atol=0.02)
+
+
 def test_a_joint_at_rest_stays_at_rest(bench, synthetic_map):
     """The start is an equilibrium: with load and cogging, nothing moves."""
     run = bench(
@@ -69,6 +86,24 @@ def test_the_arm_starts_with_its_weight_on_the_drives(synthetic_map):
     assert np.abs(run.output_torque[0]).max() > 10.0
     swing = np.ptp(run.output_torque[rest], axis=0)
     assert swing.max() < 1e-4  # of torques of 15 N·m
+
+
+def test_the_ur5e_is_stable_at_two_milliseconds(synthetic_map):
+    """Twice the step gives the same torsion where it matters, and no vibration."""
+    fine, coarse = (
+        run_scene(
+            "ur5e-sweep",
+            overrides={"simulation.duration_s": 6.0, "simulation.step_s": step},
+            drives={"reference-2d": synthetic_map},
+        )
+        for step in (1e-3, 2e-3)
+    )
+    window, half = fine.steady, coarse.steady
+    np.testing.assert_allclose(
+        fine.torsion[window].mean(axis=0), coarse.torsion[half].mean(axis=0), atol=3e-6
+    )
+    assert (np.ptp(coarse.torsion[half], axis=0) < 1e-3).all()
+    assert np.ptp(fine.position, axis=0).max() > 0.5
 
 
 def test_energy_balances(bench, synthetic_map):
