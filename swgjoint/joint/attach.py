@@ -2,25 +2,17 @@
 
 from __future__ import annotations
 
-import warnings
-from dataclasses import dataclass
-from typing import Any
-
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.errors import InputError
 from swgjoint.joint import plugin
 from swgjoint.joint.drive import JointDrive, UnresolvedOrder, prune
+from swgjoint.joint.elements import add_rotor, add_tendon
+from swgjoint.joint.place import check_option, find_place
 from swgjoint.maps.drive_map import DriveMap
-from swgjoint.units import deg
 
 LEVELS = ("rigid", "linear", "full")
-ROTOR_MASS = 1e-9
-"""Mass of the rotor body [kg]; the arm's model already holds the motor's mass."""
-
-_INTEGRATOR = mujoco.mjtIntegrator
 
 
 def attach(
@@ -87,8 +79,8 @@ def attach(
         _positive("max_input_speed", max_input_speed, "rad/s")
     _positive("max_phase_step", max_phase_step, "rad")
     if level != "rigid":
-        _check_option(spec, level)
-    place = _find_place(spec, joint, rotor_inertia)
+        check_option(spec, level)
+    place = find_place(spec, joint, rotor_inertia)
 
     ratio = drive.ratio
     stiffness = drive.mean_stiffness
@@ -99,8 +91,8 @@ def attach(
     if level == "full":
         plugin.load()
         if spec.option.integrator in (
-            _INTEGRATOR.mjINT_EULER,
-            _INTEGRATOR.mjINT_DISCRETE,
+            mujoco.mjtIntegrator.mjINT_EULER,
+            mujoco.mjtIntegrator.mjINT_DISCRETE,
         ):
             plugin.require_metric()
         if max_input_speed is not None:
@@ -119,14 +111,14 @@ def attach(
     else:
         names["rotor"] = rotor = f"{joint}_rotor"
         names["tendon"] = tendon = f"{joint}_drive"
-        body = _add_rotor(spec, place, rotor, rotor_inertia, ratio)
+        body = add_rotor(spec, place, rotor, rotor_inertia, ratio)
         if level == "linear":
-            _add_tendon(
+            add_tendon(
                 spec, tendon, rotor, joint, ratio, (stiffness, 0.0, 0.0), damping
             )
         else:
             names["plugin"] = tendon
-            _add_tendon(spec, tendon, rotor, joint, ratio, plugin.TENDON_STIFFNESS, 0.0)
+            add_tendon(spec, tendon, rotor, joint, ratio, plugin.TENDON_STIFFNESS, 0.0)
             spec.activate_plugin(plugin.NAME)
             instance = spec.add_plugin(
                 name=tendon, plugin_name=plugin.NAME, active=True
@@ -137,8 +129,8 @@ def attach(
             body.plugin.name = tendon
             body.plugin.plugin_name = plugin.NAME
             body.plugin.active = True
-        if spec.option.integrator == _INTEGRATOR.mjINT_EULER:
-            spec.option.integrator = _INTEGRATOR.mjINT_DISCRETE
+        if spec.option.integrator == mujoco.mjtIntegrator.mjINT_EULER:
+            spec.option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
     return JointDrive(
         joint=joint,
         rotor=names["rotor"],
@@ -158,182 +150,3 @@ def attach(
 def _positive(name: str, value: float, unit: str) -> None:
     if not (np.isfinite(value) and value > 0.0):
         raise InputError(f"{name} {value} {unit}; accepted: a finite number > 0")
-
-
-def _check_option(spec: mujoco.MjSpec, level: str) -> None:
-    """Refuse or warn about options under which a drive does not hold."""
-    integrator = _INTEGRATOR(spec.option.integrator)
-    name = integrator.name.removeprefix("mjINT_").lower()
-    if integrator in (_INTEGRATOR.mjINT_EULER, _INTEGRATOR.mjINT_DISCRETE):
-        if spec.option.solver == mujoco.mjtSolver.mjSOL_PGS:
-            raise InputError(
-                "solver PGS leaves tendons out of the discrete integrator's metric and "
-                "would integrate the drive explicitly; accepted: Newton, CG"
-            )
-        if spec.option.noslip_iterations > 0:
-            warnings.warn(
-                "noslip_iterations > 0 solves contacts without the drives' stiffness; "
-                "set it to 0 with drives",
-                stacklevel=3,
-            )
-    elif integrator != _INTEGRATOR.mjINT_RK4:
-        what = (
-            "drops the rotor-link terms of the tendon's damping"
-            if level == "linear"
-            else "integrates the drive explicitly"
-        )
-        warnings.warn(
-            f"integrator {name} {what}; use discrete, or RK4 as the reference",
-            stacklevel=3,
-        )
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Place:
-    """Where a joint stands in the compiled model."""
-
-    joint: Any
-    parent: Any
-    pos: NDArray[np.float64]
-    quat: NDArray[np.float64]
-    axis: NDArray[np.float64]
-    ref: float
-    inertia: float
-
-
-def _check_compiler(spec: mujoco.MjSpec, rotor_inertia: float) -> None:
-    """Refuse compiler settings that would change the rotor's inertia."""
-    compiler = spec.compiler
-    if compiler.inertiafromgeom == mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE:
-        raise InputError(
-            "compiler inertiafromgeom is true, so a rotor without geoms would have no "
-            "inertia; accepted: auto, false"
-        )
-    if compiler.settotalmass > 0.0:
-        raise InputError(
-            f"compiler settotalmass {compiler.settotalmass} kg scales the rotor's "
-            "inertia too; accepted: not set"
-        )
-    if compiler.boundinertia > rotor_inertia:
-        raise InputError(
-            f"compiler boundinertia {compiler.boundinertia} kg·m² is above the rotor's "
-            f"inertia {rotor_inertia} kg·m²; accepted: at most that"
-        )
-
-
-def _find_place(spec: mujoco.MjSpec, name: str, rotor_inertia: float) -> _Place:
-    found = spec.joint(name)
-    if found is None:
-        known = ", ".join(j.name for j in spec.joints if j.name) or "none"
-        raise InputError(f"joint {name!r} is not in the model; its joints: {known}")
-    if found.type != mujoco.mjtJoint.mjJNT_HINGE:
-        kind = mujoco.mjtJoint(found.type).name.removeprefix("mjJNT_").lower()
-        raise InputError(f"joint {name!r} is a {kind} joint; a drive needs a hinge")
-    for taken in (f"{name}_rotor", f"{name}_drive"):
-        if spec.body(taken) or spec.joint(taken) or spec.tendon(taken):
-            raise InputError(
-                f"joint {name!r} has a drive already: {taken!r} is in the model"
-            )
-    _check_compiler(spec, rotor_inertia)
-    body = found.parent
-    if body.joints[0].name != name:
-        raise InputError(
-            f"joint {name!r} is not the first joint of body {body.name!r}; give it a "
-            "body of its own"
-        )
-    copy = spec.copy()
-    copy.compiler.fusestatic = False  # keeps every body where the spec has it
-    try:
-        model = copy.compile()
-    except ValueError as error:
-        raise InputError(f"the model does not compile: {error}") from error
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    mass = np.zeros((model.nv, model.nv))
-    mujoco.mj_fullM(model, data, mass)
-    j = int(model.joint(name).id)
-    b, dof = int(model.jnt_bodyid[j]), int(model.jnt_dofadr[j])
-    offset = np.zeros(3)
-    mujoco.mju_rotVecQuat(offset, model.jnt_pos[j], model.body_quat[b])
-    return _Place(
-        joint=found,
-        parent=body.parent,
-        pos=model.body_pos[b] + offset,
-        quat=model.body_quat[b].copy(),
-        axis=model.jnt_axis[j].copy(),
-        ref=float(model.qpos0[model.jnt_qposadr[j]]),
-        inertia=float(mass[dof, dof] - model.dof_armature[dof]),
-    )
-
-
-def _add_rotor(
-    spec: mujoco.MjSpec, place: _Place, name: str, inertia: float, ratio: float
-) -> Any:
-    """Rotor body and hinge at the joint's place, nothing inherited from defaults."""
-    body = place.parent.add_body(name=name, pos=place.pos, quat=place.quat)
-    body.explicitinertial = True
-    body.mass = ROTOR_MASS
-    body.ipos = np.zeros(3)  # unset, it is not written to XML
-    # a ball: the spin about the axis is what counts, and no axis needs aligning
-    body.inertia = np.full(3, inertia)
-    hinge = body.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_HINGE)
-    hinge.pos = np.zeros(3)
-    hinge.axis = place.axis
-    hinge.stiffness = np.zeros(3)
-    hinge.damping = np.zeros(3)
-    hinge.springdamper = np.zeros(2)
-    hinge.springyield = 0.0
-    hinge.armature = 0.0
-    hinge.frictionloss = 0.0
-    hinge.limited = mujoco.mjtLimited.mjLIMITED_FALSE
-    hinge.actfrclimited = mujoco.mjtLimited.mjLIMITED_FALSE
-    hinge.ref = place.ref * ratio / (deg if spec.compiler.degree else 1.0)
-    place.joint.armature = 0.0
-    _extend_keys(spec, name, place.joint.name, ratio)
-    return body
-
-
-def _add_tendon(
-    spec: mujoco.MjSpec,
-    name: str,
-    rotor: str,
-    link: str,
-    ratio: float,
-    stiffness: tuple[float, float, float],
-    damping: float,
-) -> None:
-    """Fixed tendon of length theta/i - psi, nothing inherited from defaults."""
-    tendon = spec.add_tendon(name=name)
-    tendon.stiffness = np.array(stiffness)
-    tendon.damping = np.array([damping, 0.0, 0.0])
-    tendon.springlength = np.zeros(2)
-    tendon.springyield = 0.0
-    tendon.armature = 0.0
-    tendon.frictionloss = 0.0
-    tendon.limited = mujoco.mjtLimited.mjLIMITED_FALSE
-    tendon.actfrclimited = mujoco.mjtLimited.mjLIMITED_FALSE
-    tendon.wrap_joint(rotor, 1.0 / ratio)
-    tendon.wrap_joint(link, -1.0)
-
-
-def _extend_keys(spec: mujoco.MjSpec, rotor: str, link: str, ratio: float) -> None:
-    """Give every keyframe the rotor's position and velocity, without torsion."""
-    if not any(len(key.qpos) or len(key.qvel) for key in spec.keys):
-        return
-    bare = spec.copy()
-    for key in list(bare.keys):
-        bare.delete(key)
-    model = bare.compile()
-    m, j = model.joint(rotor), model.joint(link)
-    for field, old, new in (
-        ("qpos", int(j.qposadr[0]), int(m.qposadr[0])),
-        ("qvel", int(j.dofadr[0]), int(m.dofadr[0])),
-    ):
-        size = model.nq if field == "qpos" else model.nv
-        # addresses after the rotor have moved up by one
-        source = old - (old > new)
-        for key in spec.keys:
-            values = list(getattr(key, field))
-            if len(values) == size - 1:
-                values.insert(new, ratio * values[source])
-                setattr(key, field, values)

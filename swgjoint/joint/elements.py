@@ -1,0 +1,87 @@
+"""Rotor, tendon and keyframes that a drive adds to a spec."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from swgjoint.joint.place import Place
+from swgjoint.units import deg
+
+ROTOR_MASS = 1e-9
+"""Mass of the rotor body [kg]; the arm's model already holds the motor's mass."""
+
+
+def add_rotor(
+    spec: mujoco.MjSpec, place: Place, name: str, inertia: float, ratio: float
+) -> Any:
+    """Rotor body and hinge at the joint's place, nothing inherited from defaults."""
+    body = place.parent.add_body(name=name, pos=place.pos, quat=place.quat)
+    body.explicitinertial = True
+    body.mass = ROTOR_MASS
+    body.ipos = np.zeros(3)  # unset, it is not written to XML
+    # a ball: the spin about the axis is what counts, and no axis needs aligning
+    body.inertia = np.full(3, inertia)
+    hinge = body.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_HINGE)
+    hinge.pos = np.zeros(3)
+    hinge.axis = place.axis
+    hinge.stiffness = np.zeros(3)
+    hinge.damping = np.zeros(3)
+    hinge.springdamper = np.zeros(2)
+    hinge.springyield = 0.0
+    hinge.armature = 0.0
+    hinge.frictionloss = 0.0
+    hinge.limited = mujoco.mjtLimited.mjLIMITED_FALSE
+    hinge.actfrclimited = mujoco.mjtLimited.mjLIMITED_FALSE
+    hinge.ref = place.ref * ratio / (deg if spec.compiler.degree else 1.0)
+    place.joint.armature = 0.0
+    _extend_keys(spec, name, place.joint.name, ratio)
+    return body
+
+
+def add_tendon(
+    spec: mujoco.MjSpec,
+    name: str,
+    rotor: str,
+    link: str,
+    ratio: float,
+    stiffness: tuple[float, float, float],
+    damping: float,
+) -> None:
+    """Fixed tendon of length theta/i - psi, nothing inherited from defaults."""
+    tendon = spec.add_tendon(name=name)
+    tendon.stiffness = np.array(stiffness)
+    tendon.damping = np.array([damping, 0.0, 0.0])
+    tendon.springlength = np.zeros(2)
+    tendon.springyield = 0.0
+    tendon.armature = 0.0
+    tendon.frictionloss = 0.0
+    tendon.limited = mujoco.mjtLimited.mjLIMITED_FALSE
+    tendon.actfrclimited = mujoco.mjtLimited.mjLIMITED_FALSE
+    tendon.wrap_joint(rotor, 1.0 / ratio)
+    tendon.wrap_joint(link, -1.0)
+
+
+def _extend_keys(spec: mujoco.MjSpec, rotor: str, link: str, ratio: float) -> None:
+    """Give every keyframe the rotor's position and velocity, without torsion."""
+    if not any(len(key.qpos) or len(key.qvel) for key in spec.keys):
+        return
+    bare = spec.copy()
+    for key in list(bare.keys):
+        bare.delete(key)
+    model = bare.compile()
+    m, j = model.joint(rotor), model.joint(link)
+    for field, old, new in (
+        ("qpos", int(j.qposadr[0]), int(m.qposadr[0])),
+        ("qvel", int(j.dofadr[0]), int(m.dofadr[0])),
+    ):
+        size = model.nq if field == "qpos" else model.nv
+        # addresses after the rotor have moved up by one
+        source = old - (old > new)
+        for key in spec.keys:
+            values = list(getattr(key, field))
+            if len(values) == size - 1:
+                values.insert(new, ratio * values[source])
+                setattr(key, field, values)
