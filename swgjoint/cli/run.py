@@ -97,12 +97,12 @@ def joint_row(item: tuple[str, dict[str, Any]]) -> tuple[str, ...]:
     return (
         name.removesuffix("_joint"),
         joint["level"],
-        f"{torsion['mean']:.3f}",
-        f"{torsion['pp']:.3f}",
-        f"{error['mean']:.3f}",
-        f"{error['pp']:.3f}",
-        f"{joint['ripple_pp_percent']:.3f}",
-        f"{joint['ripple_rms_percent']:.3f}",
+        fixed(torsion["mean"]),
+        fixed(torsion["pp"]),
+        fixed(error["mean"]),
+        fixed(error["pp"]),
+        fixed(joint["ripple_pp_percent"]),
+        fixed(joint["ripple_rms_percent"]),
         "  ".join(
             f"{line['order']:.1f}{'' if line['drive_order'] else '*'}"
             f" ({line['amplitude_percent']:.3f})"
@@ -111,6 +111,11 @@ def joint_row(item: tuple[str, dict[str, Any]]) -> tuple[str, ...]:
         or "-",
         _orders(joint["unresolved"]),
     )
+
+
+def fixed(value: float, digits: int = 3) -> str:
+    """A number with fixed digits, without a sign on zero."""
+    return f"{round(value, digits) + 0.0:.{digits}f}"
 
 
 def notes(joints: dict[str, Any]) -> list[str]:

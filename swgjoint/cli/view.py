@@ -15,6 +15,8 @@ from urllib.parse import quote
 
 from swgjoint.errors import ComputationError, InputError
 
+_VIEWERS: list[subprocess.Popen[bytes]] = []
+
 RRD_MAGIC = (b"RRF", b"RRIO")
 """First bytes of a recording, compressed or not."""
 
@@ -98,13 +100,16 @@ def _viewer() -> Path:
 
 
 def _start(command: list[str]) -> subprocess.Popen[bytes]:
-    return subprocess.Popen(
+    """Start a viewer that outlives this command."""
+    process = subprocess.Popen(
         command,
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
         start_new_session=True,
     )
+    _VIEWERS.append(process)  # Python would complain about one that it forgets
+    return process
 
 
 def _free_port() -> int:

@@ -59,10 +59,11 @@ def _left_out(transmission: Transmission) -> list[dict[str, str]]:
             {"part": _LEFT_OUT[attached.level], "reason": "the scene asks for no more"}
         )
     if attached.unresolved:
-        orders = ", ".join(f"{u.order:.4g}" for u in attached.unresolved)
+        left = [f"{u.order:.4g}" for u in attached.unresolved]
+        orders = f"orders {left[0]} to {left[-1]}" if left[1:] else f"order {left[0]}"
         items.append(
             {
-                "part": f"orders {orders} per input turn",
+                "part": f"{orders} per input turn ({len(left)} harmonics)",
                 "reason": "the step cannot carry them at the speed of this joint",
             }
         )

@@ -28,6 +28,8 @@ PHASE_STEP = 0.5
 """Largest phase of an order per step that counts as resolved [rad]."""
 NOISE = 1e-6
 """Lines below this share of the rated torque, or of one arcmin, are round-off."""
+SLACK = 1.01
+"""Ratings have two or three digits; a run at rated torque is within them."""
 RIPPLE_OF = "arm in motion, rigid-arm torque and straight line removed"
 
 
@@ -170,7 +172,10 @@ def use_of_ratings(run: Run, j: int) -> dict[str, Any]:
         "peak_Nm": peak,
         "cubed_mean_Nm": cubed,
         "input_speed_rpm": float(np.abs(run.motor_velocity[:, j]).max() / rpm),
-        "within": bool(cubed <= ratings.rated_torque and peak <= ratings.repeated_peak),
+        "within": bool(
+            cubed <= SLACK * ratings.rated_torque
+            and peak <= SLACK * ratings.repeated_peak
+        ),
         "map_range_Nm": [low, high],
         "within_map": bool(
             low <= run.output_torque[:, j].min()

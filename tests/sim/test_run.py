@@ -170,8 +170,11 @@ def test_tool_error_follows_from_the_joint_error(bench, synthetic_map):
     assert run.tool_error(run).max() == 0.0
 
 
-def test_a_run_that_diverges_is_a_failure_with_advice(bench, plain_map):
+def test_a_run_that_diverges_is_a_failure_with_advice(
+    bench, plain_map, tmp_path, monkeypatch
+):
     """A motor loop too stiff for an explicit step ends with step and remedy."""
+    monkeypatch.chdir(tmp_path)  # the engine leaves its log in the current folder
     with pytest.raises(ComputationError, match=r"diverged .* use a smaller"):
         bench(
             plain_map,

@@ -1,11 +1,14 @@
 """Recordings and pictures: read back and compared with memory."""
 
 import json
+from urllib.request import urlopen
 
 import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
+from swgjoint.cli.main import main
+from swgjoint.cli.view import _VIEWERS
 from swgjoint.errors import InputError
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.run import Run, run_scene
@@ -122,3 +125,20 @@ def test_figures_can_be_recomputed_from_the_recording(run, tmp_path):
     assert figures["mean"] == pytest.approx(window.mean(), rel=1e-12)
     assert figures["pp"] == pytest.approx(np.ptp(window), rel=1e-12)
     assert json.dumps(run.metrics(), allow_nan=False)
+
+
+def test_the_view_command_serves_a_page_on_loopback(run, tmp_path, capsys):
+    """The page answers at the printed address until the viewer is ended."""
+    path = run.to_rerun(tmp_path / "run.rrd")
+    assert main(["view", str(path), "--web", "--json"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    try:
+        assert result["url"].startswith("http://127.0.0.1:")
+        with urlopen(result["url"], timeout=20) as page:
+            assert page.status == 200
+            assert b"<html" in page.read().lower()
+    finally:
+        for process in _VIEWERS:
+            process.terminate()
+            process.wait(timeout=20)
+        _VIEWERS.clear()
