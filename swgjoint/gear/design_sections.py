@@ -90,6 +90,18 @@ class QuadrupleCircularArc(Section):
     root_radius_mm: Millimetre
     straight_split: Annotated[float, Field(ge=0, le=1)] = 0.5
 
+    @model_validator(mode="after")
+    def _straight_is_none_or_real(self) -> QuadrupleCircularArc:
+        # shorter ones leave no direction in double precision
+        if 0.0 < self.straight_mm < 1e-6:
+            raise Fault(
+                (
+                    "straight_mm",
+                    f"{self.straight_mm:g} mm; accepted: 0, or 1e-06 mm and more",
+                )
+            )
+        return self
+
 
 class DoubleCircularArc(Section):
     """Two arcs and the straight segment that results, thesis 3.3.2."""

@@ -188,6 +188,7 @@ def test_all_faults_at_once(reference):
         ({"drive.teeth_circular_spline": 121}, "a multiple of the lobes"),
         ({"drive.teeth_circular_spline": 123}, "accepted: cosine, table"),
         ({"flexspline.rim_mm": 59.2}, "leaves no bore; accepted: < 59.2 mm"),
+        ({"flexspline.profile.straight_mm": 1e-9}, "accepted: 0, or 1e-06 mm"),
         ({"flexspline.profile.kind": "dca"}, "tip_radius_mm: unknown key"),
         ({"wave_generator.kind": "four_roller"}, "aperture_deg: missing"),
         ({"wave_generator": {"minor_axis_coefficient": 1}}, "kind: missing"),
