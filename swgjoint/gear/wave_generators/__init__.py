@@ -1,0 +1,1 @@
+"""Outlines of wave generators, one kind per module."""

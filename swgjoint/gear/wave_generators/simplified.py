@@ -1,0 +1,56 @@
+"""The simplified wave generator."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from swgjoint.gear.wave_generators.curve import Array, ClosedCurve
+
+
+@dataclass(frozen=True, kw_only=True)
+class Simplified(ClosedCurve):
+    """Two semicircles joined by straight lines (thesis eqs 3.2 and 3.3)."""
+
+    major: float
+    pin_radius: float
+
+    @property
+    def perimeter(self) -> float:
+        """Two semicircles and two straight lines [m]."""
+        straight = 2.0 * (self.major - self.pin_radius)
+        return 2.0 * (np.pi * self.pin_radius + straight)
+
+    def evaluate(self, s: ArrayLike) -> tuple[Array, Array, Array]:
+        """Quarter circle, line, semicircle, line, quarter circle."""
+        r, half = self.pin_radius, self.major - self.pin_radius
+        quarter, straight = 0.5 * np.pi * r, 2.0 * half
+        s = np.mod(np.asarray(s, dtype=float), self.perimeter)
+        # the second half of the outline is the first one turned by pi
+        turned = s > 0.5 * self.perimeter
+        s = np.where(turned, s - 0.5 * self.perimeter, s)
+        down = np.clip(s - quarter, 0.0, straight)
+        angle = (s - down) / r
+        normals = np.stack([-np.sin(angle), np.cos(angle)], axis=-1)
+        points = r * normals
+        points[..., 1] += half - down
+        # a quarter circle starts at the apex and ends there, after the turned half too
+        sign = np.where(turned, -1.0, 1.0)[..., None]
+        line = (s > quarter) & (s < quarter + straight)
+        return sign * points, sign * normals, np.where(line, 0.0, 1.0 / r)
+
+    def signed_distance(self, points: Array) -> tuple[Array, Array, Array]:
+        """Distance to the segment that joins the two centres, less the radius."""
+        half = self.major - self.pin_radius
+        foot = np.clip(points[:, 1], -half, half)
+        rel = np.stack([points[:, 0], points[:, 1] - foot], axis=-1)
+        r = np.hypot(rel[:, 0], rel[:, 1])
+        normal = rel / np.maximum(r, 1e-300)[:, None]
+        round_part = np.abs(points[:, 1]) > half
+        return (
+            r - self.pin_radius,
+            normal,
+            np.where(round_part, 1.0 / self.pin_radius, 0.0),
+        )
