@@ -72,7 +72,7 @@ def refusal(tmp_path: Path, data: bytes) -> str:
     assert "\n" not in message
     assert message.startswith(f"map {path}: ")
     assert len(message) < 500 + len(str(path))
-    return message
+    return message.removeprefix(f"map {path}: ")
 
 
 def test_round_trip_is_bitwise(synthetic_map, tmp_path):
