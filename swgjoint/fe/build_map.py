@@ -15,7 +15,7 @@ from swgjoint.fe.drive2d import (
     check_modelled,
     ring_model,
 )
-from swgjoint.fe.equilibrium import State
+from swgjoint.fe.state import State
 from swgjoint.gear.cup import cup_torsional_stiffness
 from swgjoint.gear.design import Design
 from swgjoint.gear.kinematics import angle_coefficients, periodicity

@@ -44,6 +44,9 @@ class Frames:
     """y, skeleton positions in the sector frames [m]. Shape (N, n)."""
     displacement: Array
     """d = y - X [m]. Shape (N, n)."""
+    deformation: Array
+    """d without its mean: sectors travel a thousand times farther than they deform, and
+    the digits of the travel would drown those of the energy [m]. Shape (N, n)."""
     spin: Array
     """Gamma, derivative of the frame angle by y [rad/m]. (N, n); zero if linear."""
     gyration: Array
@@ -78,6 +81,7 @@ def sector_frames(
     else:
         phi = fixed
     y = rotate(seen, -phi[:, None])
+    moved = y - reference
     spin = np.zeros_like(y)
     gyration = np.einsum("ci,sci->s", x_c, y[:, faces])
     if fixed is None:
@@ -86,7 +90,8 @@ def sector_frames(
     return Frames(
         angle=place + phi,
         position=y.reshape(n, -1),
-        displacement=(y - reference).reshape(n, -1),
+        displacement=moved.reshape(n, -1),
+        deformation=(moved - moved.mean(axis=1, keepdims=True)).reshape(n, -1),
         spin=spin.reshape(n, -1),
         gyration=gyration,
     )
@@ -98,7 +103,7 @@ def elastic_energy(element: Superelement, frames: Frames, flank_force: Array) ->
     1/2 d_a K d_a + 1/2 F C F: the flank displacement d_b = A d_a + C F splits the
     energy of the uncondensed sector into these two parts.
     """
-    d = frames.displacement
+    d = frames.deformation
     return np.asarray(
         0.5 * np.einsum("si,ij,sj->s", d, element.stiffness, d)
         + 0.5

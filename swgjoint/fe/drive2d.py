@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from swgjoint.errors import DesignError, Outcome
-from swgjoint.fe.equilibrium import RingModel, State
+from swgjoint.fe.equilibrium import Load, NewtonSolver
+from swgjoint.fe.ring import RingModel
 from swgjoint.fe.sector_mesh import sector_mesh
+from swgjoint.fe.state import State
 from swgjoint.fe.superelement import condense
 from swgjoint.gear.design import Design
 from swgjoint.gear.profile import tooth_profile
@@ -99,21 +101,26 @@ class Continuation:
 
     model: RingModel
     ratio: float
+    solver: NewtonSolver = field(default_factory=NewtonSolver)
 
     def deflected(self) -> State:
         """Wave generator in place, no tooth contact, no rotation."""
-        return self.model.solve(self.model.at_rest(), rotation=0.0, teeth=False)
+        return self.solver(
+            self.model, self.model.at_rest(), Load(rotation=0.0, teeth=False)
+        )
 
     def meshed(self, deflected: State) -> State:
         """Teeth in contact, the flexspline not rotated."""
-        return self.model.solve(deflected, rotation=0.0)
+        return self.solver(self.model, deflected, Load(rotation=0.0))
 
     def to_torque(self, state: State, torque: float) -> State:
         """Change the torque at a fixed wave generator; the last good state if stuck."""
         return self._follow(
             state,
-            lambda s, part, start: self.model.solve(
-                s, torque=start.torque + part * (torque - start.torque)
+            lambda s, part, start: self.solver(
+                self.model,
+                s,
+                Load(torque=start.torque + part * (torque - start.torque)),
             ),
         )
 
@@ -125,7 +132,7 @@ class Continuation:
             alpha = start.wave_generator_angle + part * d_angle
             ahead = (alpha - s.wave_generator_angle) / self.ratio
             guess = self.model.moved(s, alpha, s.rotation + ahead)
-            return self.model.solve(guess, torque=start.torque)
+            return self.solver(self.model, guess, Load(torque=start.torque))
 
         return self._follow(state, step)
 

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from swgjoint.errors import ComputationError, Outcome
 from swgjoint.fe.drive2d import Continuation, check_modelled, ring_model
-from swgjoint.fe.equilibrium import RingModel, State
+from swgjoint.fe.ring import RingModel
+from swgjoint.fe.state import State
 from swgjoint.fe.stress import StressMaxima, flexspline_maxima
 from swgjoint.gear.cup import cup_torsional_stiffness
 from swgjoint.gear.design import Design

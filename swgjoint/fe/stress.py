@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.fe.elasticity import stress_maxima
-from swgjoint.fe.equilibrium import RingModel, State
+from swgjoint.fe.ring import RingModel
+from swgjoint.fe.state import State
 
 Array = NDArray[np.float64]
 
@@ -20,7 +21,7 @@ def nodal_stress(model: RingModel, state: State) -> Array:
     """
     element, frames = model.element, model.frames(state)
     nodes = len(element.stress_from_skeleton)
-    stress = frames.displacement @ element.stress_from_skeleton.reshape(nodes * 3, -1).T
+    stress = frames.deformation @ element.stress_from_skeleton.reshape(nodes * 3, -1).T
     stress += state.flank_force @ element.stress_from_flank.reshape(nodes * 3, -1).T
     stress = stress.reshape(model.sectors, nodes, 3)
     first, last = element.mesh.face_first, element.mesh.face_last

@@ -47,6 +47,25 @@ class Contacts:
     def __len__(self) -> int:
         return len(self.sector)
 
+    @classmethod
+    def none(cls, flank_dofs: int) -> Contacts:
+        """No contact at all."""
+        empty, index = np.zeros(0), np.zeros(0, dtype=np.int64)
+        return cls(
+            sector=index,
+            side=index,
+            station=empty,
+            gap=empty,
+            normal=np.zeros((0, 2)),
+            point=np.zeros((0, 2)),
+            weight=np.zeros((0, flank_dofs)),
+        )
+
+    def on_flanks_of(self, others: Contacts) -> NDArray[np.bool_]:
+        """Which points lie on a flank on which others lie. Shape (n,)."""
+        key, other = 2 * self.sector + self.side, 2 * others.sector + others.side
+        return np.isin(key, other)
+
     def chosen(self, index: Index) -> Contacts:
         """The candidates with the given indices."""
         return Contacts(

@@ -37,7 +37,7 @@ def energy(element, place, x):
 
 def gradient(element, place, x):
     frames = sector_frames(element, x, place)
-    force = projected(frames, frames.displacement @ element.stiffness)
+    force = projected(frames, frames.deformation @ element.stiffness)
     return rotate(force.reshape(x.shape), frames.angle[:, None]).reshape(3, -1)
 
 
@@ -84,7 +84,7 @@ def test_tangent_is_the_derivative_of_the_gradient(element):
     place, x = deformed(element, 1e-5)
     x = rotate(x, 0.3)
     frames = sector_frames(element, x, place)
-    force = frames.displacement @ element.stiffness
+    force = frames.deformation @ element.stiffness
     matrix = tangent(element, frames, force)
     rng = np.random.default_rng(6)
     direction = rng.normal(size=x.shape)

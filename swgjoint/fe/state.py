@@ -1,0 +1,50 @@
+"""One equilibrium of the drive, as the solver leaves it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.errors import Outcome
+from swgjoint.fe.tooth_contact import Contacts
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class State:
+    """One equilibrium, or the start of the search for one. Global frame, SI."""
+
+    faces: Array
+    """Positions of the first face of each sector (N, n_face, 2) [m]."""
+    bores: Array
+    """Positions of the bore nodes inside the sectors (N, n_bore, 2) [m]."""
+    pressure: Array
+    """Normal force of the wave generator on its nodes (N, n_bore + 1) [N]."""
+    touching: Mask
+    """Which of those nodes touch."""
+    flank_force: Array
+    """Tooth forces as nodal forces in the sector frames (N, 2 n_b) [N]."""
+    contacts: Contacts | None = None
+    """Points that carry force."""
+    tooth_force: Array = field(default_factory=lambda: np.zeros(0))
+    """Normal force of every contact [N]. Shape (n_contacts,)."""
+    wave_generator_angle: float = 0.0
+    rotation: float = 0.0
+    """Best-fit rotation of the bore [rad]."""
+    torque: float = 0.0
+    """Torque T that the flexspline exerts on its load, whole drive [N·m]."""
+    wave_generator_torque: float = 0.0
+    """External torque on the wave generator, whole drive [N·m]."""
+    tooth_moment: float = 0.0
+    """Moment of the tooth forces on the flexspline, whole drive [N·m]."""
+    energy: float = 0.0
+    """Strain energy, whole drive [J]."""
+    compliance: float = 0.0
+    """Rotation per torque at the active contacts, whole drive [rad/(N·m)]."""
+    outcome: Outcome = Outcome.CONVERGED
+    history: tuple[float, ...] = ()
+    """Largest displacement increment of every iteration [m]."""
