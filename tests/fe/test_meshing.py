@@ -204,3 +204,28 @@ def test_json_has_the_contract_keys():
     mean = result["flexspline"]["average_max_MPa"]["von_mises"]
     assert mean == pytest.approx(np.mean(result["per_step"]["von_mises_MPa"]))
     assert result["circular_spline"]["average_max_MPa"]["tensile"] is None
+
+
+def test_cup_adds_its_torsion_in_series():
+    """At level 2d a cup twists the output by T/K and stores T^2/(2 K), and is named."""
+    cup = {
+        "length_mm": 40.0,
+        "thickness_coefficient": 0.8,
+        "fillet_mm": 2.0,
+        "bore_radius_mm": 20.0,
+    }
+    with_cup, without = (
+        simulate_meshing(
+            Design.load("reference-2d").with_changes(changes),
+            torque=TORQUE,
+            steps=1,
+            half=True,
+        )
+        for changes in ({"cup": cup}, {})
+    )
+    stiffness = with_cup.cup_stiffness
+    twist = with_cup.series("output_error") - without.series("output_error")
+    assert twist == pytest.approx(-TORQUE / stiffness, rel=1e-6)
+    gained = with_cup.series("energy") - without.series("energy")
+    assert gained == pytest.approx(0.5 * TORQUE**2 / stiffness, rel=1e-6)
+    assert "closed-form" in with_cup.to_json()["label"]["cup"]
