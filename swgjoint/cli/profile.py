@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import math
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -15,8 +14,6 @@ if TYPE_CHECKING:
     from swgjoint.gear.profile import ToothProfile
 
 MEMBERS = ("flexspline", "circular_spline")
-TANGENCY_RAD = 1e-10
-"""Largest corner at a junction of two segments that counts as tangent [rad]."""
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -142,17 +139,12 @@ def _checks(profile: ToothProfile) -> list[dict[str, Any]]:
     """Closed and tangent at every junction, nothing of negative length."""
     import numpy as np
 
+    from swgjoint.gear.profile import TANGENCY_RAD
     from swgjoint.units import mm
 
-    corner = gap = 0.0
-    stations = profile.stations
-    for k, (left, right) in enumerate(pairwise(profile.segments)):
-        gap = max(gap, float(np.hypot(*np.subtract(left.end, right.start))))
-        before = _normal(profile, k, left.angle_end)
-        after = _normal(profile, k + 1, right.angle_start)
-        cross = before[0] * after[1] - before[1] * after[0]
-        dot = before[0] * after[0] + before[1] * after[1]
-        corner = max(corner, abs(float(np.arctan2(cross, dot))))
+    junctions, stations = profile.junctions(), profile.stations
+    gap = max(junction.gap for junction in junctions)
+    corner = max((j.corner for j in junctions if not j.edge), default=0.0)
     shortest = min(part.length for part in profile.segments)
     (last,), _, _ = profile.evaluate(stations[-1:])
     end = abs(float(np.arctan2(last[0], last[1])) - profile.half_pitch)
@@ -162,19 +154,6 @@ def _checks(profile: ToothProfile) -> list[dict[str, Any]]:
         _check("shortest segment", shortest / mm, "mm", shortest > 0),
         _check("flank ends in the middle of the gap", end, "rad", end < 1e-12),
     ]
-
-
-def _normal(profile: ToothProfile, k: int, angle: float) -> tuple[float, float]:
-    """Outward normal of segment k, of an arc in the direction ``angle``."""
-    import numpy as np
-
-    part, stations = profile.segments[k], profile.stations
-    if part.radius == 0.0:
-        middle = 0.5 * (stations[k] + stations[k + 1])
-        _, (normal,), _ = profile.evaluate(np.array([middle]))
-        return float(normal[0]), float(normal[1])
-    sign = 1.0 if part.convex else -1.0
-    return sign * math.cos(angle), sign * math.sin(angle)
 
 
 def _check(name: str, value: float, unit: str, ok: bool) -> dict[str, Any]:

@@ -66,8 +66,8 @@ class Superelement:
 
     @property
     def flank_range(self) -> tuple[float, float]:
-        """Arc length over which a flank can touch: tip arc to root arc [m]."""
-        low, high = self.profile.range_of("tip", "root")
+        """Arc length over which a flank can touch: between the lands [m]."""
+        low, high = self.profile.contact_range
         return max(low, float(self.spline.x[0])), min(high, float(self.spline.x[-1]))
 
 
