@@ -1,0 +1,100 @@
+"""Outlines composed of arcs, lines and parabolas."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from swgjoint.gear.wave_generators.curve import Array, ClosedCurve
+from swgjoint.gear.wave_generators.pieces import Piece
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Chain(ClosedCurve):
+    """Closed convex chain of pieces, the first one starting on the +y axis."""
+
+    pieces: tuple[Piece, ...]
+    major: float = field(init=False)
+    """Largest radius [m]."""
+
+    def __post_init__(self) -> None:
+        largest = max(piece.largest_radius() for piece in self.pieces)
+        object.__setattr__(self, "major", largest)
+
+    @cached_property
+    def stations(self) -> Array:
+        """Arc length at the junctions, both ends included (n_pieces + 1,) [m]."""
+        lengths = [piece.length for piece in self.pieces]
+        return np.concatenate([[0.0], np.cumsum(lengths)])
+
+    @property
+    def perimeter(self) -> float:
+        """Length of the closed outline [m]."""
+        return float(self.stations[-1])
+
+    def evaluate(self, s: ArrayLike) -> tuple[Array, Array, Array]:
+        """Every piece at its share of the arc length; a junction is the next piece."""
+        s = np.mod(np.asarray(s, dtype=float), self.perimeter)
+        last = len(self.pieces) - 1
+        owner = np.clip(np.searchsorted(self.stations, s, side="right") - 1, 0, last)
+        points, normals = np.empty((*s.shape, 2)), np.empty((*s.shape, 2))
+        curvature = np.empty(s.shape)
+        for k in np.unique(owner):
+            here = owner == k
+            points[here], normals[here], curvature[here] = self.pieces[k].at(
+                s[here] - self.stations[k]
+            )
+        return points, normals, curvature
+
+    @cached_property
+    def _starts(self) -> tuple[Array, Array]:
+        """Points and tangents at the starts of the pieces. Shapes (n_pieces, 2)."""
+        at = [piece.at(np.zeros(1)) for piece in self.pieces]
+        normals = np.concatenate([normal for _, normal, _ in at])
+        tangents = np.stack([-normals[:, 1], normals[:, 0]], axis=-1)
+        return np.concatenate([point for point, _, _ in at]), tangents
+
+    def signed_distance(self, points: Array) -> tuple[Array, Array, Array]:
+        """The nearest foot over all pieces between whose end normals a point lies."""
+        starts, tangents = self._starts
+        # a junction's normal divides the plane into before and after, (n_pieces, n)
+        after = np.einsum("kj,nj->kn", tangents, points)
+        after = after >= np.einsum("kj,kj->k", tangents, starts)[:, None]
+        strip = after & ~np.roll(after, -1, axis=0)
+        # deep inside, the normals of a parabola cross: look everywhere
+        strip |= ~strip.any(axis=0)
+        n = len(points)
+        nearest = np.full(n, np.inf)
+        distance, curvature = np.empty(n), np.empty(n)
+        normals = np.empty((n, 2))
+        for piece, inside in zip(self.pieces, strip, strict=True):
+            index = np.flatnonzero(inside)
+            if not index.size:
+                continue
+            foot, normal, bend = piece.at(piece.foot(points[index]))
+            rel = points[index] - foot
+            size = np.hypot(rel[:, 0], rel[:, 1])
+            better = size < nearest[index]
+            take = index[better]
+            nearest[take] = size[better]
+            distance[take] = np.sum(rel[better] * normal[better], axis=-1)
+            normals[take], curvature[take] = normal[better], bend[better]
+        return distance, normals, curvature
+
+    def corners(self) -> Array:
+        """Turn of the tangent at the junctions, zero where smooth (n_pieces,) [rad]."""
+        _, after = self._starts
+        ends = [piece.at(np.array([piece.length]))[1][0] for piece in self.pieces]
+        before = np.array([[-n[1], n[0]] for n in ends])
+        after = np.roll(after, -1, axis=0)
+        cross = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
+        return np.asarray(np.arctan2(cross, np.sum(before * after, axis=-1)))
+
+    def gaps(self) -> Array:
+        """Distance between the end of a piece and the start of the next (n,) [m]."""
+        starts, _ = self._starts
+        ends = [piece.at(np.array([piece.length]))[0][0] for piece in self.pieces]
+        return np.asarray(np.hypot(*(np.array(ends) - np.roll(starts, -1, axis=0)).T))

@@ -1,0 +1,194 @@
+"""Arcs, straight lines and parabolas that outlines are composed of.
+
+Every piece is traversed counter-clockwise about the axis and bulges outwards (a line
+does not); its parameter is the arc length from its start.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from math import asinh, cos, hypot, sin, sqrt
+from typing import Protocol
+
+import numpy as np
+
+from swgjoint.gear.wave_generators.curve import Array
+
+Point = tuple[float, float]
+
+
+class Piece(Protocol):
+    """One smooth part of an outline."""
+
+    @property
+    def length(self) -> float:
+        """Arc length [m]."""
+        ...
+
+    def at(self, s: Array) -> tuple[Array, Array, Array]:
+        """Points (n, 2) [m], outward normals (n, 2), curvatures (n,) [1/m]."""
+        ...
+
+    def foot(self, points: Array) -> Array:
+        """Arc length of the nearest point of the piece (n,) [m].
+
+        For points outside, or inside by less than the radius of curvature.
+        """
+        ...
+
+    def largest_radius(self) -> float:
+        """Largest distance of the piece from the axis [m]."""
+        ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class Arc:
+    """Circular arc from the normal direction ``start`` to ``end`` > start [rad]."""
+
+    centre: Point
+    radius: float
+    start: float
+    end: float
+
+    @property
+    def length(self) -> float:
+        """Arc length [m]."""
+        return self.radius * (self.end - self.start)
+
+    def at(self, s: Array) -> tuple[Array, Array, Array]:
+        """See :class:`Piece`."""
+        angle = self.start + s / self.radius
+        normals = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+        points = np.asarray(self.centre) + self.radius * normals
+        return points, normals, np.full(np.shape(s), 1.0 / self.radius)
+
+    def foot(self, points: Array) -> Array:
+        """See :class:`Piece`."""
+        middle, half = 0.5 * (self.start + self.end), 0.5 * (self.end - self.start)
+        rel = points - np.asarray(self.centre)
+        c, d = cos(middle), sin(middle)  # angle from the middle: no branch cut near
+        angle = np.arctan2(rel[:, 1] * c - rel[:, 0] * d, rel[:, 0] * c + rel[:, 1] * d)
+        return self.radius * (np.clip(angle, -half, half) + half)
+
+    def largest_radius(self) -> float:
+        """See :class:`Piece`."""
+        ends, normals, _ = self.at(np.array([0.0, self.length]))
+        # the far point from the axis lies beyond the centre, if the arc reaches there
+        ox, oy = self.centre
+        side = normals[:, 0] * oy - normals[:, 1] * ox
+        if side[0] >= 0.0 >= side[1]:
+            return hypot(ox, oy) + self.radius
+        return float(np.hypot(*ends.T).max())
+
+
+@dataclass(frozen=True, kw_only=True)
+class Line:
+    """Straight line."""
+
+    start: Point
+    end: Point
+
+    @cached_property
+    def length(self) -> float:
+        """Arc length [m]."""
+        return hypot(self.end[0] - self.start[0], self.end[1] - self.start[1])
+
+    @cached_property
+    def _direction(self) -> Array:
+        return np.subtract(self.end, self.start) / self.length
+
+    def at(self, s: Array) -> tuple[Array, Array, Array]:
+        """See :class:`Piece`."""
+        s = np.asarray(s, dtype=float)
+        direction = self._direction
+        points = np.asarray(self.start) + s[:, None] * direction
+        normals = np.broadcast_to([direction[1], -direction[0]], points.shape)
+        return points, normals, np.zeros(s.shape)
+
+    def foot(self, points: Array) -> Array:
+        """See :class:`Piece`."""
+        along = (points - np.asarray(self.start)) @ self._direction
+        return np.asarray(np.clip(along, 0.0, self.length))
+
+    def largest_radius(self) -> float:
+        """See :class:`Piece`."""
+        return max(hypot(*self.start), hypot(*self.end))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parabola:
+    r"""Part of the parabola apex + R(turn) (x, -a_p x^2) from x = start down to end.
+
+    Arc length from the apex :math:`(u\sqrt{1 + u^2} + \sinh^{-1} u)/(4 a_p)` with
+    u = 2 a_p x.
+    """
+
+    apex: Point
+    coefficient: float
+    """a_p [1/m]."""
+    start: float
+    end: float
+    turn: float = 0.0
+    """Rotation about the apex, counter-clockwise [rad]."""
+
+    def _from_apex(self, x: float) -> float:
+        u = 2.0 * self.coefficient * x
+        return (u * sqrt(1.0 + u * u) + asinh(u)) / (4.0 * self.coefficient)
+
+    @cached_property
+    def length(self) -> float:
+        """Arc length [m]."""
+        return self._from_apex(self.start) - self._from_apex(self.end)
+
+    @cached_property
+    def _rotation(self) -> Array:
+        """Rows are the directions of the local axes."""
+        c, d = cos(self.turn), sin(self.turn)
+        return np.array([[c, d], [-d, c]])
+
+    def at(self, s: Array) -> tuple[Array, Array, Array]:
+        """See :class:`Piece`; the arc length is inverted by Newton's method."""
+        a = self.coefficient
+        wanted = self._from_apex(self.start) - np.asarray(s, dtype=float)
+        u = 2.0 * a * wanted
+        for _ in range(30):
+            speed = np.sqrt(1.0 + u * u)
+            step = (0.5 * (u * speed + np.arcsinh(u)) - 2.0 * a * wanted) / speed
+            u = u - step
+            if np.max(np.abs(step), initial=0.0) < 1e-15:
+                break
+        x = u / (2.0 * a)
+        size = np.sqrt(1.0 + u * u)
+        local = np.stack([x, -0.5 * u * x], axis=-1)
+        normals = np.stack([u / size, 1.0 / size], axis=-1)  # (3.7)
+        points = np.asarray(self.apex) + local @ self._rotation
+        return points, normals @ self._rotation, 2.0 * a / size**3
+
+    def foot(self, points: Array) -> Array:
+        """See :class:`Piece`.
+
+        The perpendicular through (p, q) meets the parabola at the root of
+        2 a^2 x^3 + (1 + 2 a q) x = p, the only one above the centre of curvature.
+        """
+        a = self.coefficient
+        p, q = ((points - np.asarray(self.apex)) @ self._rotation.T).T
+        linear = np.maximum(1.0 + 2.0 * a * q, 1e-6)
+        # x^3 + 3 k^2 x = h through x = 2 k sinh(t), sinh(3 t) = h/(2 k^3)
+        k = np.sqrt(linear / 6.0) / a
+        x = 2.0 * k * np.sinh(np.arcsinh(p / (4.0 * a * a * k**3)) / 3.0)
+        for _ in range(2):  # polish the rounding of sinh
+            slope = 6.0 * (a * x) ** 2 + linear
+            x = x - (2.0 * a * a * x**3 + linear * x - p) / slope
+        u = 2.0 * a * np.clip(x, self.end, self.start)
+        along = (u * np.sqrt(1.0 + u * u) + np.arcsinh(u)) / (4.0 * a)
+        return np.asarray(self._from_apex(self.start) - along)
+
+    def largest_radius(self) -> float:
+        """See :class:`Piece`."""
+        a = self.coefficient
+        ox, oy = -self._rotation @ np.asarray(self.apex)
+        roots = np.roots([2.0 * a * a, 0.0, 1.0 + 2.0 * a * oy, -ox])
+        real = roots.real[np.abs(roots.imag) < 1e-9 * np.abs(roots).max()]
+        x = np.clip(np.append(real, [self.start, self.end]), self.end, self.start)
+        return float(np.hypot(x - ox, a * x * x + oy).max())
