@@ -168,6 +168,11 @@ def tooth_profile(design: Design, member: str) -> ToothProfile:
         DesignError: If the tooth cannot be built; one line that names the key.
     """
     # builders are imported here, they import this module
+    spec = design.flexspline if member == "flexspline" else design.circular_spline
+    if spec.profile.kind == "involute":
+        from swgjoint.gear.involute import involute_profile
+
+        return involute_profile(design, member)
     from swgjoint.gear.arc_profiles import arc_profile
 
     return arc_profile(design, member)
