@@ -168,18 +168,22 @@ class Parabola:
     def foot(self, points: Array) -> Array:
         """See :class:`Piece`.
 
-        The perpendicular through (p, q) meets the parabola at the root of
-        2 a^2 x^3 + (1 + 2 a q) x = p, the only one above the centre of curvature.
+        The perpendicular through (p, q) meets the parabola at the largest root of
+        x^3 + c x = h with c = (1 + 2 a q)/(2 a^2), h = |p|/(2 a^2). Newton's method
+        from above, where the cubic is convex, goes down to it monotonically.
         """
         a = self.coefficient
         p, q = ((points - np.asarray(self.apex)) @ self._rotation.T).T
-        linear = np.maximum(1.0 + 2.0 * a * q, 1e-6)
-        # x^3 + 3 k^2 x = h through x = 2 k sinh(t), sinh(3 t) = h/(2 k^3)
-        k = np.sqrt(linear / 6.0) / a
-        x = 2.0 * k * np.sinh(np.arcsinh(p / (4.0 * a * a * k**3)) / 3.0)
-        for _ in range(2):  # polish the rounding of sinh
-            slope = 6.0 * (a * x) ** 2 + linear
-            x = x - (2.0 * a * a * x**3 + linear * x - p) / slope
+        c, h = (1.0 + 2.0 * a * q) / (2.0 * a * a), np.abs(p) / (2.0 * a * a)
+        x = np.cbrt(h) + np.sqrt(np.maximum(-c, 0.0))
+        x = np.where(c > 0.0, np.minimum(x, h / np.where(c > 0.0, c, 1.0)), x)
+        for _ in range(60):
+            slope = np.maximum(3.0 * x * x + c, 1e-300)
+            step = (x * (x * x + c) - h) / slope
+            x = x - step
+            if np.all(np.abs(step) <= 1e-15 * np.abs(x)):
+                break
+        x = np.copysign(x, p)
         u = 2.0 * a * np.clip(x, self.end, self.start)
         along = (u * np.sqrt(1.0 + u * u) + np.arcsinh(u)) / (4.0 * a)
         return np.asarray(self._from_apex(self.start) - along)
