@@ -185,7 +185,7 @@ def sample_map(
             "label": {
                 "model": "2d",
                 "level": "nonlinear",
-                "circular_spline": "rigid",
+                "circular_spline": "elastic, outside fixed",
                 "cup": None if cup is None else "closed-form torsion in series",
             },
             "ratings_source": ratings.source,

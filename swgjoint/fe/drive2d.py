@@ -6,12 +6,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 from swgjoint.errors import DesignError, Outcome
+from swgjoint.fe.circular_spline import CircularSpline, ring_compliance
 from swgjoint.fe.equilibrium import Load, NewtonSolver
 from swgjoint.fe.ring import RingModel
 from swgjoint.fe.sector_mesh import sector_mesh
 from swgjoint.fe.state import State
-from swgjoint.fe.superelement import condense
-from swgjoint.gear.design import Design
+from swgjoint.fe.superelement import Superelement, condense
+from swgjoint.gear.design import Design, MemberName
 from swgjoint.gear.profile import tooth_profile
 from swgjoint.gear.wave_generator import lobe_height, wave_generator
 from swgjoint.units import mm
@@ -61,9 +62,20 @@ def check_modelled(design: Design, model: str) -> None:
 
 
 def ring_model(
-    design: Design, *, half: bool = False, nonlinear: bool = True
+    design: Design,
+    *,
+    half: bool = False,
+    nonlinear: bool = True,
+    elastic_circular_spline: bool = True,
 ) -> RingModel:
-    """2D model with a rigid circular spline.
+    """2D model of a design.
+
+    Args:
+        design: The drive.
+        half: Half of the drive, closed by its symmetry.
+        nonlinear: Large rotations of the sectors.
+        elastic_circular_spline: Whether the circular spline deforms; its outer
+            diameter is fixed.
 
     Raises:
         DesignError: If the design cannot be built or the half model does not apply.
@@ -75,23 +87,29 @@ def ring_model(
             f"{drive.teeth_flexspline}/{drive.teeth_circular_spline} teeth and "
             f"{design.lobes} lobes"
         )
-    profile = tooth_profile(design, "flexspline")
-    material = design.material_of("flexspline")
-    mesh = sector_mesh(profile, design.flexspline.rim_mm * mm, design.mesh.refinement)
-    element = condense(
-        mesh,
+    ring = CircularSpline(profile=tooth_profile(design, "circular_spline"))
+    if elastic_circular_spline:
+        element = _sector(design, "circular_spline")
+        ring = replace(ring, compliance=ring_compliance(element))
+    return RingModel(
+        element=_sector(design, "flexspline"),
+        wave_generator=wave_generator(design),
+        circular_spline=ring,
+        lobe_height=lobe_height(design),
+        half=half,
+        nonlinear=nonlinear,
+    )
+
+
+def _sector(design: Design, member: MemberName) -> Superelement:
+    profile, material = tooth_profile(design, member), design.material_of(member)
+    rim = getattr(design, member).rim_mm * mm
+    return condense(
+        sector_mesh(profile, rim, design.mesh.refinement),
         profile,
         youngs_modulus=material.youngs_modulus,
         poisson_ratio=material.poisson_ratio,
         width=design.drive.face_width_mm * mm,
-    )
-    return RingModel(
-        element=element,
-        wave_generator=wave_generator(design),
-        circular_spline=tooth_profile(design, "circular_spline"),
-        lobe_height=lobe_height(design),
-        half=half,
-        nonlinear=nonlinear,
     )
 
 

@@ -51,6 +51,8 @@ class NewtonSolver:
     smallest effect of interest, a tenth of a micrometre."""
     patience: int = 25
     """Iterations after which the wave-generator set changes at one node at a time."""
+    thorough_below: float = 1e-8
+    """Increment below which contact is searched between the nodes, too [m]."""
     largest_step: float = 0.1
     """Displacement increment beyond which the search has left the drive [m]."""
 
@@ -67,7 +69,8 @@ class NewtonSolver:
                 ring = linearise(model, state, load.torque)
                 # after the first steps only close candidates matter
                 reach = 2e-5 if iteration > 2 else 1e-4
-                step = _solve_linear(model, state, ring, load, reach)
+                thorough = bool(history) and history[-1] < self.thorough_below
+                step = _solve_linear(model, state, ring, load, reach, thorough)
                 history.append(step.largest)
                 if not step.largest < self.largest_step:
                     return replace(
@@ -77,7 +80,8 @@ class NewtonSolver:
                 state, settled = _advance(
                     model, state, ring, step, damping, iteration >= self.patience
                 )
-                if settled and damping == 1.0 and step.largest < self.step_tolerance:
+                small = step.largest < self.step_tolerance and damping == 1.0
+                if settled and small and thorough:
                     return _finished(model, state, Outcome.CONVERGED, history)
         except ActiveSetError as error:
             singular = "singular" in str(error)
@@ -113,7 +117,12 @@ class _Step:
 
 
 def _solve_linear(
-    model: RingModel, state: State, ring: Linearised, load: Load, reach: float
+    model: RingModel,
+    state: State,
+    ring: Linearised,
+    load: Load,
+    reach: float,
+    thorough: bool,
 ) -> _Step:
     """Condense the ring to its contact forces, solve for them, go back.
 
@@ -124,7 +133,9 @@ def _solve_linear(
     element = model.element
     contacts, rows = ring.no_contacts, np.zeros((0, ring.gradient.shape[1]))
     if load.teeth:
-        contacts = ring.search.search(ring.flank, reach, state.contacts)
+        contacts = ring.search.search(
+            ring.flank, reach, state.contacts, thorough=thorough
+        )
         rows = ring.gap_gradient(contacts)
     m = len(contacts)
     levers = np.zeros((*ring.gradient.shape, m + 2))
@@ -144,11 +155,19 @@ def _solve_linear(
     local = contacts.weight @ element.flank_compliance
     same = contacts.sector[:, None] == contacts.sector[None, :]
     matrix[:m, :m] += np.where(same, local @ contacts.weight.T, 0.0)
+    ring_compliance = model.circular_spline.compliance
+    if ring_compliance is not None:
+        matrix[:m, :m] += ring_compliance.between(
+            contacts.tooth, contacts.ring_weight, model.ring_teeth
+        )
     matrix[m:] = np.einsum("snf,snl->fl", levers[:, :, m:], response)
     matrix[:m, m:] = matrix[m:, :m].T
     matrix[m, m] -= 1.0 / ring.anchor_stiffness
     # gaps as if the old tooth forces were gone; the new ones bring their own share
     old = np.einsum("kb,kb->k", local, state.flank_force[contacts.sector])
+    old += np.einsum(
+        "kb,kb->k", contacts.ring_weight, ring.search.ring_flank[contacts.tooth]
+    )
     moved = np.einsum("kn,kn->k", rows, base[contacts.sector])
     offset[:m] = contacts.gap - old + moved
     offset[m:] = np.einsum("snf,sn->f", levers[:, :, m:], base)
@@ -205,6 +224,12 @@ def _advance(
         step.contacts.sector,
         step.force[:, None] * step.contacts.weight,
     )
+    ring_force = np.zeros_like(state.ring_force)
+    np.add.at(
+        ring_force,
+        step.contacts.tooth,
+        step.force[:, None] * step.contacts.ring_weight,
+    )
     # faces and bores of each sector; a shared face appears once
     size, inside = model.element.face_size, model.element.bore_size
     moved = model.skeleton(state) + damping * step.shift
@@ -215,6 +240,7 @@ def _advance(
         pressure=step.pressure,
         touching=state.touching ^ bad,
         flank_force=flank_force,
+        ring_force=ring_force,
         contacts=step.contacts,
         tooth_force=step.force,
         rotation=ring.rotation,
@@ -240,6 +266,7 @@ def _finished(
             state.tooth_force @ np.einsum("ki,ki->k", turned(c.point), c.normal)
         )
     energy = float(elastic_energy(model.element, frames, state.flank_force).sum())
+    energy += 0.5 * float(np.sum(state.ring_force * model.ring_displacement(state)))
     return replace(
         state,
         outcome=outcome,

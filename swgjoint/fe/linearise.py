@@ -59,7 +59,8 @@ class Linearised:
     @property
     def no_contacts(self) -> Contacts:
         """An empty set of candidates."""
-        return Contacts.none(self.flank.shape[1])
+        ring = self.search.circular_spline
+        return Contacts.none(self.flank.shape[1], ring.flank_dofs)
 
     def anchored(self) -> Array:
         """Tangent with the anchor spring, known components replaced by identity."""
@@ -171,6 +172,7 @@ def linearise(model: RingModel, state: State, torque: float | None) -> Linearise
         search=ToothContact(
             element=element,
             circular_spline=model.circular_spline,
+            ring_flank=model.ring_displacement(state),
             angle=frames.angle,
             bearing=frames.angle - np.arctan2(centre[:, 0], centre[:, 1]),
         ),

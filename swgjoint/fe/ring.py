@@ -1,6 +1,6 @@
 """The ring of sectors between wave generator and circular spline: its geometry.
 
-Everything in the frame of the circular spline, which is rigid and fixed.
+Everything in the frame of the circular spline, whose outside is fixed.
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
+from swgjoint.fe.circular_spline import CircularSpline
 from swgjoint.fe.corotation import Frames, rotate, sector_frames, turned
 from swgjoint.fe.state import State
 from swgjoint.fe.superelement import Superelement
-from swgjoint.gear.profile import ToothProfile
 from swgjoint.gear.wave_generator import WaveGenerator
 
 Array = NDArray[np.float64]
@@ -27,7 +27,7 @@ class RingModel:
 
     element: Superelement
     wave_generator: WaveGenerator
-    circular_spline: ToothProfile
+    circular_spline: CircularSpline
     lobe_height: float
     """Radial deflection at the lobes [m]."""
     half: bool = False
@@ -38,6 +38,11 @@ class RingModel:
     def sectors(self) -> int:
         """Sectors in the model."""
         return self.element.sectors // (2 if self.half else 1)
+
+    @property
+    def ring_teeth(self) -> int:
+        """Teeth of the circular spline in the model."""
+        return self.circular_spline.profile.teeth // self.copies
 
     @property
     def copies(self) -> int:
@@ -112,6 +117,7 @@ class RingModel:
             pressure=np.zeros(gap.shape),
             touching=gap < 0.01 * w0,
             flank_force=np.zeros((self.sectors, 4 * element.flank_size)),
+            ring_force=np.zeros((self.ring_teeth, self.circular_spline.flank_dofs)),
             wave_generator_angle=alpha,
             rotation=rotation,
         )
@@ -147,48 +153,48 @@ class RingModel:
         Displacements in polar components travel with the wave generator through the
         teeth, interpolated between sectors; the flexspline turns rigidly.
         """
-        n = self.sectors
         pitch = 2.0 * pi / self.element.sectors
-        d_rotation = rotation - state.rotation
-        shift = (alpha - state.wave_generator_angle - d_rotation) / pitch
-        whole = int(np.floor(shift))
-        part = shift - whole
+        ring_pitch = 2.0 * pi / self.circular_spline.profile.teeth
+        d_alpha = alpha - state.wave_generator_angle
+        shift = (d_alpha - (rotation - state.rotation)) / pitch
         size, inside = self.element.face_size, self.element.bore_size
-
-        def travel(values: Array, sign: float) -> Array:
-            def at(k: int) -> Array:
-                out = np.roll(values, k, axis=0).copy()
-                turns = (np.arange(n) - k) // n
-                out[turns % 2 != 0] *= sign
-                return out
-
-            # cubic Lagrange between four neighbouring sectors
-            t = part
-            return (
-                t * (t + 1) * (t - 1) / 6 * at(whole + 2)
-                - t * (t - 2) * (t + 1) / 2 * at(whole + 1)
-                + (t - 1) * (t - 2) * (t + 1) / 2 * at(whole)
-                - t * (t - 1) * (t - 2) / 6 * at(whole - 1)
-            )
-
         local = rotate(
             np.concatenate([state.faces, state.bores], axis=1),
             -(self.place + state.rotation)[:, None],
         )
         # displacements in sector frames repeat after half a turn
-        local = (
-            travel(local - self.element.skeleton[: size + inside], 1.0)
-            + self.element.skeleton[: size + inside]
+        still = self.element.skeleton[: size + inside]
+        x = rotate(
+            still + _travelled(local - still, shift),
+            (self.place + rotation)[:, None],
         )
-        x = rotate(local, (self.place + rotation)[:, None])
-        nearest = int(np.round(shift))
         return replace(
             state,
             faces=x[:, :size],
             bores=x[:, size:],
-            pressure=travel(state.pressure, 1.0),
-            touching=np.roll(state.touching, nearest, axis=0),
-            flank_force=travel(state.flank_force, 1.0),
+            pressure=_travelled(state.pressure, shift),
+            touching=np.roll(state.touching, round(shift), axis=0),
+            flank_force=_travelled(state.flank_force, shift),
+            ring_force=_travelled(state.ring_force, d_alpha / ring_pitch),
             wave_generator_angle=alpha,
             rotation=rotation,
         )
+
+    def ring_displacement(self, state: State) -> Array:
+        """Flank displacement of the circular spline (N_c, 2 n_c) [m]."""
+        compliance = self.circular_spline.compliance
+        if compliance is None:
+            return state.ring_force
+        return compliance.displacement(state.ring_force)
+
+
+def _travelled(values: Array, shift: float) -> Array:
+    """Rows moved on by a fraction of the ring, cubic between four neighbours."""
+    whole = int(np.floor(shift))
+    t = shift - whole
+    return np.asarray(
+        t * (t + 1) * (t - 1) / 6 * np.roll(values, whole + 2, axis=0)
+        - t * (t - 2) * (t + 1) / 2 * np.roll(values, whole + 1, axis=0)
+        + (t - 1) * (t - 2) * (t + 1) / 2 * np.roll(values, whole, axis=0)
+        - t * (t - 1) * (t - 2) / 6 * np.roll(values, whole - 1, axis=0)
+    )

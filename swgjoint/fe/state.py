@@ -28,6 +28,8 @@ class State:
     """Which of those nodes touch."""
     flank_force: Array
     """Tooth forces as nodal forces in the sector frames (N, 2 n_b) [N]."""
+    ring_force: Array
+    """The same on the circular spline, in the frames of its teeth (N_c, 2 n_c) [N]."""
     contacts: Contacts | None = None
     """Points that carry force."""
     tooth_force: Array = field(default_factory=lambda: np.zeros(0))

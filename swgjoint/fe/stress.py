@@ -10,27 +10,48 @@ from numpy.typing import NDArray
 from swgjoint.fe.elasticity import stress_maxima
 from swgjoint.fe.ring import RingModel
 from swgjoint.fe.state import State
+from swgjoint.fe.superelement import Superelement
 
 Array = NDArray[np.float64]
 
 
-def nodal_stress(model: RingModel, state: State) -> Array:
-    """Stress xx, yy, xy at the nodes, in the sector frames [Pa]. (N, n_nodes, 3).
+def flexspline_stress(model: RingModel, state: State) -> Array:
+    """Stress xx, yy, xy at the nodes, in the sector frames [Pa]. (N, n_nodes, 3)."""
+    frames = model.frames(state)
+    return _nodal_stress(
+        model.element, frames.deformation, state.flank_force, frames.angle
+    )
 
-    Nodes on the faces get the mean of the two sectors that share them.
-    """
-    element, frames = model.element, model.frames(state)
+
+def circular_spline_stress(model: RingModel, state: State) -> Array | None:
+    """The same in the frames of the circular spline's teeth; None if it is rigid."""
+    compliance = model.circular_spline.compliance
+    if compliance is None:
+        return None
+    teeth = np.arange(model.ring_teeth)
+    return _nodal_stress(
+        compliance.element,
+        compliance.skeleton_displacement(state.ring_force),
+        state.ring_force,
+        np.asarray(2.0 * np.pi / model.circular_spline.profile.teeth * teeth, float),
+    )
+
+
+def _nodal_stress(
+    element: Superelement, deformation: Array, flank_force: Array, angle: Array
+) -> Array:
+    """Stress of every sector; nodes on the faces get the mean of their two sectors."""
     nodes = len(element.stress_from_skeleton)
-    stress = frames.deformation @ element.stress_from_skeleton.reshape(nodes * 3, -1).T
-    stress += state.flank_force @ element.stress_from_flank.reshape(nodes * 3, -1).T
-    stress = stress.reshape(model.sectors, nodes, 3)
+    stress = deformation @ element.stress_from_skeleton.reshape(nodes * 3, -1).T
+    stress += flank_force @ element.stress_from_flank.reshape(nodes * 3, -1).T
+    stress = stress.reshape(len(angle), nodes, 3)
     first, last = element.mesh.face_first, element.mesh.face_last
     # angle of each sector's frame seen from the one before it
-    step = np.roll(frames.angle, -1) - frames.angle
+    step = (np.roll(angle, -1) - angle)[:, None]
     after = np.roll(stress[:, first], -1, axis=0)
-    mean = 0.5 * (stress[:, last] + _turned(after, step[:, None]))
+    mean = 0.5 * (stress[:, last] + _turned(after, step))
     stress[:, last] = mean
-    stress[:, first] = np.roll(_turned(mean, -step[:, None]), 1, axis=0)
+    stress[:, first] = np.roll(_turned(mean, -step), 1, axis=0)
     return stress
 
 
@@ -45,25 +66,43 @@ def _turned(stress: Array, angle: Array) -> Array:
 
 @dataclass(frozen=True, kw_only=True)
 class StressMaxima:
-    """Largest stresses of one member at one state [Pa]; compression as a magnitude."""
+    """Largest nodal stresses of one member [Pa]; compression as a magnitude."""
 
     tensile: float
     compressive: float
     von_mises: float
 
+    @classmethod
+    def of(cls, stress: Array) -> StressMaxima:
+        """Maxima over all nodes of stresses (..., 3)."""
+        tensile, compressive, von_mises = stress_maxima(stress)
+        return cls(
+            tensile=float(tensile.max()),
+            compressive=float(compressive.max()),
+            von_mises=float(von_mises.max()),
+        )
+
     def to_json(self) -> dict[str, float]:
         """Values in MPa."""
-        return {
-            key: getattr(self, key) / 1e6
-            for key in ("tensile", "compressive", "von_mises")
-        }
+        return {kind: getattr(self, kind) / 1e6 for kind in KINDS}
 
 
-def flexspline_maxima(model: RingModel, state: State) -> StressMaxima:
-    """Largest nodal stresses of the flexspline."""
-    tensile, compressive, von_mises = stress_maxima(nodal_stress(model, state))
-    return StressMaxima(
-        tensile=float(tensile.max()),
-        compressive=float(compressive.max()),
-        von_mises=float(von_mises.max()),
-    )
+KINDS = ("tensile", "compressive", "von_mises")
+
+
+@dataclass(frozen=True, kw_only=True)
+class MemberMaxima:
+    """Largest stresses of both members at one state."""
+
+    flexspline: StressMaxima
+    circular_spline: StressMaxima | None
+    """None while it is rigid."""
+
+    @classmethod
+    def at(cls, model: RingModel, state: State) -> MemberMaxima:
+        """Recover the stresses of a state."""
+        ring = circular_spline_stress(model, state)
+        return cls(
+            flexspline=StressMaxima.of(flexspline_stress(model, state)),
+            circular_spline=None if ring is None else StressMaxima.of(ring),
+        )

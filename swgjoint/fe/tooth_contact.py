@@ -1,27 +1,28 @@
 """Closest points between the deformed flexspline flanks and the circular spline.
 
-Both flanks are smooth: the analytic profile of the flexspline tooth carries a
-displacement interpolated by a cubic spline through the flank nodes, the circular spline
-is analytic. Facets would leak their chord error, about a micrometre, into a kinematic
-error that is itself a matter of micrometres.
+Both flanks are smooth: analytic profiles that carry displacements interpolated by cubic
+splines through the flank nodes. Facets would leak their chord error, about a
+micrometre, into a kinematic error that is itself a matter of micrometres.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from math import pi
 
 import numpy as np
 from numpy.typing import NDArray
 
+from swgjoint.fe.circular_spline import CircularSpline, Feet, FlankSplines
 from swgjoint.fe.corotation import rotate
 from swgjoint.fe.superelement import Superelement
-from swgjoint.gear.profile import ToothProfile
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 SAMPLES_PER_NODE = 2
+DENSE_SAMPLES = 8
 REFINEMENTS = 6
 MERGE = 1e-6  # of the flank: points closer than that are one contact
 
@@ -43,12 +44,17 @@ class Contacts:
     """Position in the sector frame [m]. Shape (n, 2)."""
     weight: Array
     """Derivative of the gap by the flank displacements. Shape (n, 2 n_b)."""
+    tooth: Index
+    """Tooth of the circular spline."""
+    ring_weight: Array
+    """Derivative of the gap by that tooth's flank displacements; no columns if it is
+    rigid. Shape (n, 2 n_c)."""
 
     def __len__(self) -> int:
         return len(self.sector)
 
     @classmethod
-    def none(cls, flank_dofs: int) -> Contacts:
+    def none(cls, flank_dofs: int, ring_dofs: int) -> Contacts:
         """No contact at all."""
         empty, index = np.zeros(0), np.zeros(0, dtype=np.int64)
         return cls(
@@ -59,6 +65,8 @@ class Contacts:
             normal=np.zeros((0, 2)),
             point=np.zeros((0, 2)),
             weight=np.zeros((0, flank_dofs)),
+            tooth=index,
+            ring_weight=np.zeros((0, ring_dofs)),
         )
 
     def on_flanks_of(self, others: Contacts) -> NDArray[np.bool_]:
@@ -78,16 +86,36 @@ _MIRROR = np.array([[1.0, 1.0], [-1.0, 1.0]])  # by side, into the right flank's
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ToothContact:
-    """Search for contact candidates at one state; the circular spline is rigid."""
+    """Search for contact candidates at one state."""
 
     element: Superelement
-    circular_spline: ToothProfile
+    circular_spline: CircularSpline
+    ring_flank: Array
+    """Displacement of the circular spline's flank nodes in the frames of its teeth, one
+    row per tooth of the model; no columns if rigid [m]. Shape (N_c, 2 n_c)."""
     angle: Array
     """Angles of the sector frames (N,) [rad]."""
     bearing: Array
     """Polar angles of the teeth, which tell the tooth space they enter (N,) [rad]."""
 
-    def search(self, flank: Array, reach: float, held: Contacts | None) -> Contacts:
+    @cached_property
+    def _ring_flanks(self) -> FlankSplines | None:
+        """Displacements of the ring's flanks, mirrored; flank 2 tooth + side."""
+        ring = self.circular_spline
+        if not ring.flank_dofs:
+            return None
+        shaped = self.ring_flank.reshape(-1, 2, ring.flank_dofs // 4, 2)
+        shaped = shaped * _MIRROR[:, None, :]
+        return FlankSplines.through(ring.spline, shaped.reshape(-1, *shaped.shape[2:]))
+
+    def search(
+        self,
+        flank: Array,
+        reach: float,
+        held: Contacts | None,
+        *,
+        thorough: bool = True,
+    ) -> Contacts:
         """Local minima of the gap along every flank, and the points that held before.
 
         The gap must not be negative anywhere on a flank: a condition on a continuum.
@@ -99,27 +127,25 @@ class ToothContact:
             flank: Displacement of the flank nodes in the sector frames (N, 2 n_b) [m].
             reach: Candidates with a larger gap are left out [m].
             held: Points of the last iteration that carry force.
+            thorough: Whether to look between the nodes with the displaced circular
+                spline; conforming flanks have minima less than a node apart.
         """
         element = self.element
         size = element.flank_size
         low, high = element.flank_range
-        s = np.linspace(low, high, SAMPLES_PER_NODE * size)
-        base, _, _ = element.profile.evaluate(s)
-        weights = element.spline(s)  # (n_samples, size)
         # flanks in their mirrored frames: (N, 2 sides, size, 2)
         shaped = flank.reshape(-1, 2, size, 2) * _MIRROR[:, None, :]
-        points = base + weights @ shaped
-        # a flank can touch only where it reaches below the ring's tip circle
-        ring = self.circular_spline
-        deep = np.hypot(points[..., 0], points[..., 1]).max(axis=-1)
-        sector, side = np.nonzero(deep > ring.addendum_radius)
-        mirrored = shaped[sector, side]
-        gap, _, _, _ = self._gaps(
-            points[sector, side].reshape(-1, 2),
-            np.repeat(sector, s.size),
-            np.repeat(side, s.size),
+        sides = shaped.reshape(-1, size, 2)
+        sector, side = np.divmod(np.arange(len(sides)), 2)
+        s, gap, sector, side = self._sampled(
+            SAMPLES_PER_NODE, sides, sector, side, rigid=True
         )
-        gap = gap.reshape(-1, s.size)
+        near = gap.min(axis=1, initial=np.inf) < reach + 0.02 * (high - low)
+        gap, sector, side = gap[near], sector[near], side[near]
+        if thorough:
+            s, gap, sector, side = self._sampled(
+                DENSE_SAMPLES, shaped[sector, side], sector, side, rigid=False
+            )
         padded = np.pad(gap, ((0, 0), (1, 1)), constant_values=np.inf)
         minimum = (
             np.isfinite(gap)
@@ -127,44 +153,71 @@ class ToothContact:
             & (gap < padded[:, 2:])
             & (gap < reach + 0.02 * (high - low))
         )
-        flank_index, k = np.nonzero(minimum)
-        station = self._refine(
-            s[k],
-            mirrored[flank_index],
-            sector[flank_index],
-            side[flank_index],
-            s[1] - s[0],
-        )
-        sector, side = sector[flank_index], side[flank_index]
+        index, k = np.nonzero(minimum)
+        sector, side = sector[index], side[index]
+        station = self._refine(s[k], shaped[sector, side], sector, side, s[1] - s[0])
         if held is not None and len(held):
             key, old_key = 2 * sector + side, 2 * held.sector + held.side
-            near = (key[:, None] == old_key) & (
+            same = (key[:, None] == old_key) & (
                 np.abs(station[:, None] - held.station) < MERGE * (high - low)
             )
-            stay = ~near.any(axis=0)
+            stay = ~same.any(axis=0)
             sector = np.concatenate([sector, held.sector[stay]])
             side = np.concatenate([side, held.side[stay]])
             station = np.concatenate([station, held.station[stay]])
         return self._gather(sector, side, station, flank, reach)
 
-    def _gaps(
-        self, points: Array, sector: Index, side: Index
-    ) -> tuple[Array, Array, Array, Array]:
-        """Gap, normal and curvature of the ring for points in the mirrored frames.
+    def _sampled(
+        self, per_node: int, sides: Array, sector: Index, side: Index, *, rigid: bool
+    ) -> tuple[Array, Array, Index, Index]:
+        """Gaps at equal steps along those flanks that reach into the circular spline.
 
-        The normal comes in the mirrored sector frame; the last value is the angle from
-        the mirrored sector frame to the mirrored frame of the ring tooth.
+        Args:
+            per_node: Samples per flank node.
+            sides: Displacements of the flanks in their mirrored frames (n, size, 2).
+            sector: Sector of each flank (n,).
+            side: Side of each flank (n,).
+            rigid: Whether to leave the circular spline's own micrometres out.
+
+        Returns:
+            Stations (n_samples,), gaps (n_deep, n_samples), sectors and sides.
         """
+        element = self.element
+        s = np.linspace(*element.flank_range, per_node * element.flank_size)
+        base, _, _ = element.profile.evaluate(s)
+        points = base + element.spline(s) @ sides
+        # a flank can touch only where it reaches beyond the ring's tip circle
+        farthest = np.hypot(points[..., 0], points[..., 1]).max(axis=-1)
+        deep = farthest > self.circular_spline.profile.addendum_radius
+        sector, side = sector[deep], side[deep]
+        seen = self._feet(
+            points[deep].reshape(-1, 2),
+            np.repeat(sector, s.size),
+            np.repeat(side, s.size),
+            rigid=rigid,
+        )
+        return s, seen.feet.gap.reshape(-1, s.size), sector, side
+
+    def _feet(
+        self, points: Array, sector: Index, side: Index, *, rigid: bool = False
+    ) -> _Seen:
+        """Feet on the circular spline of points in the mirrored sector frames."""
         ring = self.circular_spline
-        pitch = 2.0 * pi / ring.teeth
+        teeth = ring.profile.teeth
+        pitch = 2.0 * pi / teeth
         sign = np.where(side == 0, 1.0, -1.0)
         # mirrored global frame: the tooth stands at sign * angle; a right flank faces
         # the left flank of the next ring tooth clockwise, half a pitch from the space
-        space = np.round(sign * self.bearing[sector] / pitch) * pitch
-        turn = sign * self.angle[sector] - space + 0.5 * pitch
+        space = np.round(sign * self.bearing[sector] / pitch)
+        turn = sign * self.angle[sector] - (space - 0.5) * pitch
         seen = rotate(points, turn) * _MIRROR[1]
-        gap, normal, curvature = ring.signed_distance(seen)
-        return gap, rotate(normal * _MIRROR[1], -turn), curvature, turn
+        # ring tooth j stands half a pitch counter-clockwise from space j
+        tooth = np.where(side == 0, space - 1, -space).astype(np.int64)
+        tooth %= len(self.ring_flank)
+        flanks = None if rigid else self._ring_flanks
+        feet = ring.feet(seen, flanks, 2 * tooth + 1 - side)
+        normal = rotate(feet.normal * _MIRROR[1], -turn)
+        return _Seen(feet=feet, normal=normal, tooth=tooth)
 
     def _refine(
         self,
@@ -187,9 +240,9 @@ class ToothContact:
             # tangent of the profile from tip to root: the outward normal turned back
             tangent = np.stack([outward[:, 1], -outward[:, 0]], axis=-1)
             tangent = tangent + np.einsum("ks,ksi->ki", d_spline(s), mirrored)
-            _, normal, ring_curvature, _ = self._gaps(point, sector, side)
-            slope = np.einsum("ki,ki->k", normal, tangent)
-            relative = curvature + ring_curvature
+            seen = self._feet(point, sector, side)
+            slope = np.einsum("ki,ki->k", seen.normal, tangent)
+            relative = curvature + seen.feet.curvature
             # the bracket holds the minimum: shrink it, and stay inside
             high_s = np.where(slope > 0.0, s, high_s)
             low_s = np.where(slope <= 0.0, s, low_s)
@@ -214,17 +267,39 @@ class ToothContact:
         base, _, _ = element.profile.evaluate(station)
         mirror = _MIRROR[side]
         point = base * mirror + np.einsum("ks,ksi->ki", spline, shaped)
-        gap, normal, _, _ = self._gaps(point * mirror, sector, side)
-        normal = normal * mirror
+        seen = self._feet(point * mirror, sector, side)
+        normal = seen.normal * mirror
         weight = np.zeros((n, 2, size, 2))
         weight[np.arange(n), side] = spline[:, :, None] * normal[:, None, :]
         found = Contacts(
             sector=sector,
             side=side,
             station=station,
-            gap=gap,
+            gap=seen.feet.gap,
             normal=normal,
             point=point,
             weight=weight.reshape(n, -1),
+            tooth=seen.tooth,
+            ring_weight=self._ring_weight(seen.feet, 1 - side),
         )
-        return found.chosen(np.flatnonzero(gap < reach))
+        return found.chosen(np.flatnonzero(found.gap < reach))
+
+    def _ring_weight(self, feet: Feet, facing: Index) -> Array:
+        """The gap closes as the ring's flank moves along its normal."""
+        n, dofs = len(facing), self.circular_spline.flank_dofs
+        if feet.station is None:
+            return np.zeros((n, 0))
+        weight = np.zeros((n, 2, dofs // 4, 2))
+        normal = feet.normal * _MIRROR[facing]
+        spline = self.circular_spline.spline(feet.station)
+        weight[np.arange(n), facing] = -spline[:, :, None] * normal[:, None, :]
+        return weight.reshape(n, -1)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Seen:
+    """Feet of points, with their normals back in the mirrored sector frames."""
+
+    feet: Feet
+    normal: Array
+    tooth: Index

@@ -1,0 +1,203 @@
+r"""The circular spline: rigid, or elastic on a fixed outer diameter.
+
+It does not rotate and strains little, so it is linear: the displacement of the flanks
+of tooth k under forces on the flanks of tooth j is a block :math:`G_{k-j}` of a
+block-circulant compliance, in the frames of the teeth. The outer diameter is held, so
+the blocks decay within a few teeth.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from swgjoint.fe.corotation import rotate
+from swgjoint.fe.cyclic import CyclicFactor
+from swgjoint.fe.superelement import Superelement
+from swgjoint.gear.profile import ToothProfile
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+NEGLIGIBLE = 1e-9
+"""Blocks below this part of the largest one are left out."""
+PROJECTIONS = 3
+"""Steps to the foot; each one reduces its error to the share gap times curvature."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Compliance:
+    """Response of the teeth to flank forces, by the offset k - j of the teeth."""
+
+    element: Superelement
+    offsets: Index
+    flank: Array
+    """G [m/N]. Shape (n_offsets, 2 n_b, 2 n_b)."""
+    skeleton: Array
+    """Displacement of the skeleton [m/N]. Shape (n_offsets, 2 n_a, 2 n_b)."""
+
+    def displacement(self, force: Array) -> Array:
+        """Flank displacement (N, 2 n_b) [m] under flank forces (N, 2 n_b) [N]."""
+        return self._respond(self.flank, force)
+
+    def skeleton_displacement(self, force: Array) -> Array:
+        """Skeleton displacement in the frames of the teeth (N, 2 n_a) [m]."""
+        return self._respond(self.skeleton, force)
+
+    def _respond(self, blocks: Array, force: Array) -> Array:
+        result = np.zeros((len(force), blocks.shape[1]))
+        for offset, block in zip(self.offsets, blocks, strict=True):
+            result += np.roll(force, offset, axis=0) @ block.T
+        return result
+
+    def between(self, tooth: Index, weight: Array, teeth: int) -> Array:
+        """Compliance between contact points (n, n) [m/N].
+
+        Args:
+            tooth: Tooth of each point (n,).
+            weight: Derivative of its gap by the flank displacement (n, 2 n_b).
+            teeth: Teeth in the model.
+        """
+        apart = (tooth[:, None] - tooth[None, :]) % teeth
+        result = np.zeros((len(tooth), len(tooth)))
+        for offset, block in zip(self.offsets, self.flank, strict=True):
+            here = apart == offset % teeth
+            if here.any():
+                result += np.where(here, weight @ block @ weight.T, 0.0)
+        return result
+
+
+def ring_compliance(element: Superelement) -> Compliance:
+    """Compliance of a circular spline whose outer diameter is fixed.
+
+    Args:
+        element: Condensed sector of the circular spline.
+    """
+    n_teeth, size = element.sectors, element.face_size
+    n_a = len(element.skeleton)
+    pitch = 2.0 * np.pi / n_teeth
+    # degrees of freedom of the last face are those of the next tooth's first face, in
+    # the next tooth's frame
+    turn = np.eye(2 * n_a)
+    corner = rotate(np.eye(2), np.array(pitch)).T
+    for node in range(n_a - size, n_a):
+        turn[2 * node : 2 * node + 2, 2 * node : 2 * node + 2] = corner
+    matrix = turn.T @ element.stiffness @ turn
+    outside = np.r_[size - 1 : n_a - size, n_a - 1]  # outer diameter and its corners
+    held = np.concatenate([2 * outside, 2 * outside + 1])
+    matrix[held] = 0.0
+    matrix[:, held] = 0.0
+    matrix[held, held] = float(np.mean(np.diag(element.stiffness)))
+    load = turn.T @ element.flank_from_skeleton.T
+    load[held] = 0.0
+    rhs = np.zeros((n_teeth, *load.shape))
+    rhs[0] = load
+    factor = CyclicFactor(np.broadcast_to(matrix, (n_teeth, *matrix.shape)), 2 * size)
+    skeleton = turn @ factor.solve(rhs)
+    flank = element.flank_from_skeleton @ skeleton
+    flank[0] += element.flank_compliance
+    strength = np.abs(flank).max(axis=(1, 2))
+    kept = np.flatnonzero(strength > NEGLIGIBLE * strength.max())
+    offsets = np.where(kept > n_teeth // 2, kept - n_teeth, kept)
+    return Compliance(
+        element=element, offsets=offsets, flank=flank[kept], skeleton=skeleton[kept]
+    )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CircularSpline:
+    """Surface of the circular spline as the flexspline's teeth see it."""
+
+    profile: ToothProfile
+    compliance: Compliance | None = None
+    """None for a rigid circular spline."""
+
+    @property
+    def flank_dofs(self) -> int:
+        """Degrees of freedom of the flanks of one tooth, 0 if rigid."""
+        return 0 if self.compliance is None else self.compliance.flank.shape[1]
+
+    @property
+    def spline(self) -> CubicSpline:
+        """Weights of the flank nodes at an arc length (elastic only)."""
+        assert self.compliance is not None
+        return self.compliance.element.spline
+
+    def feet(self, points: Array, flanks: FlankSplines | None, index: Index) -> Feet:
+        """Closest points of a right flank, exact for the deformed curve.
+
+        Args:
+            points: In the frame of a ring tooth, mirrored to its right flank (n, 2).
+            flanks: Displacements of flanks in that frame; None for rigid ones.
+            index: Which of the flanks each point faces (n,).
+        """
+        gap, normal, curvature = self.profile.signed_distance(points)
+        if flanks is None:
+            return Feet(gap=gap, normal=normal, curvature=curvature)
+        low, high = float(self.spline.x[0]), float(self.spline.x[-1])
+        outside = ~np.isfinite(gap)
+        foot = points - np.where(outside, 0.0, gap)[:, None] * normal
+        s = self._station(foot, low, high)
+        side = -1.0 if self.profile.internal else 1.0
+        for _ in range(PROJECTIONS):
+            base, outward, curvature = self.profile.evaluate(s)
+            moved, slope = flanks.at(index, s)
+            tangent = side * np.stack([outward[:, 1], -outward[:, 0]], axis=-1) + slope
+            rest = points - base - moved
+            size = np.hypot(tangent[:, 0], tangent[:, 1])
+            unit = tangent / size[:, None]
+            normal = side * np.stack([-unit[:, 1], unit[:, 0]], axis=-1)
+            gap = rest[:, 0] * normal[:, 0] + rest[:, 1] * normal[:, 1]
+            along = (rest[:, 0] * unit[:, 0] + rest[:, 1] * unit[:, 1]) / size
+            s = np.clip(s + along / (1.0 + curvature * gap), low, high)
+        gap = np.where(outside, np.inf, gap)
+        return Feet(gap=gap, normal=normal, curvature=curvature, station=s)
+
+    def _station(self, foot: Array, low: float, high: float) -> Array:
+        """Arc length of points on the rigid flank, from their distance to the axis."""
+        table = np.linspace(low, high, 400)
+        points, _, _ = self.profile.evaluate(table)
+        radius = np.hypot(points[:, 0], points[:, 1])
+        order = np.argsort(radius)
+        wanted = np.hypot(foot[:, 0], foot[:, 1])
+        return np.interp(wanted, radius[order], table[order])
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FlankSplines:
+    """Displacements of many flanks as cubic splines along the profile."""
+
+    breaks: Array
+    coefficients: Array
+    """Ascending powers of (s - break). Shape (n_flanks, n_intervals, 4, 2)."""
+
+    @classmethod
+    def through(cls, spline: CubicSpline, nodes: Array) -> FlankSplines:
+        """Splines through node displacements (n_flanks, n_nodes, 2)."""
+        cardinal = np.asarray(spline.c)[::-1]  # (4, n_intervals, n_nodes)
+        return cls(
+            breaks=np.asarray(spline.x),
+            coefficients=np.einsum("pjn,fni->fjpi", cardinal, nodes, optimize=True),
+        )
+
+    def at(self, flank: Index, s: Array) -> tuple[Array, Array]:
+        """Displacement and its derivative by s, (n, 2) each."""
+        j = np.searchsorted(self.breaks, s, side="right") - 1
+        j = np.clip(j, 0, len(self.breaks) - 2)
+        c, d = self.coefficients[flank, j], (s - self.breaks[j])[:, None]
+        value = c[:, 0] + d * (c[:, 1] + d * (c[:, 2] + d * c[:, 3]))
+        return value, c[:, 1] + d * (2.0 * c[:, 2] + d * 3.0 * c[:, 3])
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Feet:
+    """Feet of points on a flank of the circular spline."""
+
+    gap: Array
+    normal: Array
+    curvature: Array
+    station: Array | None = None
+    """Arc length on the profile, of an elastic one [m]."""

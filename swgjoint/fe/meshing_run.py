@@ -1,0 +1,138 @@
+"""Results of a simulation of meshing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.errors import Outcome
+from swgjoint.fe.ring import RingModel
+from swgjoint.fe.state import State
+from swgjoint.fe.stress import KINDS, MemberMaxima, StressMaxima
+from swgjoint.fe.superelement import Superelement
+from swgjoint.gear.design import Design
+from swgjoint.units import arcsec, deg
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MeshingStep:
+    """Results at one wave-generator position."""
+
+    wave_generator_angle: float
+    """[rad]."""
+    output_error: float
+    """Output angle minus theta/i, from the undeformed position [rad]."""
+    wave_generator_torque: float
+    """External torque on the wave generator [N·m]."""
+    tooth_moment: float
+    """Moment of the tooth forces on the flexspline [N·m]."""
+    energy: float
+    """Strain energy [J]."""
+    pairs_in_contact: int
+    contact_nodes: int
+    """Bore nodes that touch the wave generator, whole drive."""
+    stress: MemberMaxima
+    iterations: int
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MeshingRun:
+    """A simulation of meshing."""
+
+    design: Design
+    model: RingModel
+    torque: float
+    steps: tuple[MeshingStep, ...]
+    setup: tuple[tuple[str, MemberMaxima], ...]
+    last_state: State
+    outcome: Outcome
+    cup_stiffness: float | None
+    wall_s: float
+
+    def _members(self) -> list[tuple[Superelement, int]]:
+        ring = self.model.circular_spline.compliance
+        flexspline = (self.model.element, self.model.sectors)
+        if ring is None:
+            return [flexspline]
+        return [flexspline, (ring.element, self.model.ring_teeth)]
+
+    @property
+    def nodes(self) -> int:
+        """Nodes before condensation, of the deformable members."""
+        total = 0
+        for element, sectors in self._members():
+            face = element.face_size
+            total += (element.mesh.mesh.p.shape[1] - face) * sectors
+            total += face if self.model.half else 0
+        return int(total)
+
+    @property
+    def elements(self) -> int:
+        """Elements before condensation, of the deformable members."""
+        return sum(int(e.mesh.mesh.t.shape[1]) * n for e, n in self._members())
+
+    def series(self, name: str) -> Array:
+        """One quantity of :class:`MeshingStep` over the steps."""
+        return np.array([getattr(step, name) for step in self.steps], dtype=float)
+
+    def to_json(self) -> dict[str, Any]:
+        """The JSON object of ``swgjoint meshing``; per-step stress: flexspline."""
+        elastic = self.model.circular_spline.compliance is not None
+        stress = [step.stress.flexspline.to_json() for step in self.steps]
+        cup = None if self.cup_stiffness is None else "closed-form torsion in series"
+        return {
+            "design": self.design.drive.name,
+            "label": {
+                "model": "2d",
+                "level": "nonlinear" if self.model.nonlinear else "linear",
+                "circular_spline": "elastic, outside fixed" if elastic else "rigid",
+                "half": self.model.half,
+                "cup": cup,
+            },
+            "torque_Nm": self.torque,
+            "nodes": self.nodes,
+            "elements": self.elements,
+            "steps": len(self.steps),
+            "wall_s": self.wall_s,
+            "outcome": self.outcome.name.lower(),
+            "flexspline": _averages([s.stress.flexspline for s in self.steps]),
+            "circular_spline": _averages(
+                [s.stress.circular_spline for s in self.steps]
+            ),
+            "per_step": {
+                "angle_deg": list(self.series("wave_generator_angle") / deg),
+                **{f"{kind}_MPa": [row[kind] for row in stress] for kind in KINDS},
+                "pairs_in_contact": [step.pairs_in_contact for step in self.steps],
+                "output_error_arcsec": list(self.series("output_error") / arcsec),
+                "wave_generator_torque_Nm": list(self.series("wave_generator_torque")),
+                "tooth_moment_Nm": list(self.series("tooth_moment")),
+                "energy_J": list(self.series("energy")),
+                "iterations": [step.iterations for step in self.steps],
+            },
+            "setup_MPa": [
+                {
+                    "state": name,
+                    "flexspline": maxima.flexspline.to_json(),
+                    "circular_spline": None
+                    if maxima.circular_spline is None
+                    else maxima.circular_spline.to_json(),
+                }
+                for name, maxima in self.setup
+            ],
+        }
+
+
+def _averages(maxima: list[StressMaxima | None]) -> dict[str, Any]:
+    """Means of the per-step maxima, null for a rigid member."""
+    rows = [m.to_json() for m in maxima if m is not None]
+    return {
+        "average_max_MPa": {
+            kind: float(np.mean([row[kind] for row in rows])) if rows else None
+            for kind in KINDS
+        }
+    }

@@ -1,0 +1,93 @@
+"""The elastic circular spline: reciprocity, symmetry, feet on deformed flanks."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.sparse.linalg import spsolve
+
+from swgjoint.fe.circular_spline import FlankSplines
+from swgjoint.fe.drive2d import ring_model
+from swgjoint.fe.elasticity import plane_stress_basis, stiffness_matrix
+from swgjoint.gear.design import Design
+
+
+@cache
+def ring():
+    return ring_model(Design.load("reference-2d")).circular_spline
+
+
+def test_compliance_is_reciprocal():
+    """A force here moves a tooth there as much as the other way round."""
+    compliance = ring().compliance
+    blocks = dict(zip(compliance.offsets.tolist(), compliance.flank, strict=True))
+    for offset, block in blocks.items():
+        assert np.abs(block - blocks[-offset].T).max() < 1e-12 * np.abs(block).max()
+    force = np.random.default_rng(1).normal(size=(122, ring().flank_dofs))
+    assert np.sum(force * compliance.displacement(force)) > 0.0
+
+
+def test_compliance_between_points_is_that_of_the_fields():
+    """Pair compliances against the displacement field of one force at a time."""
+    compliance = ring().compliance
+    rng = np.random.default_rng(2)
+    tooth = np.array([3, 3, 4, 120])
+    weight = rng.normal(size=(4, ring().flank_dofs))
+    found = compliance.between(tooth, weight, 122)
+    for k in range(4):
+        force = np.zeros((122, ring().flank_dofs))
+        force[tooth[k]] = weight[k]
+        field = compliance.displacement(force)
+        assert found[:, k] == pytest.approx(
+            np.einsum("nb,nb->n", weight, field[tooth]), rel=1e-12, abs=1e-18
+        )
+
+
+def test_lone_tooth_meets_an_uncondensed_sector():
+    """With the neighbours held too, a tooth bends as the full sector mesh says."""
+    element = ring().compliance.element
+    mesh = element.mesh
+    basis = plane_stress_basis(mesh.mesh)
+    design = Design.load("reference-2d")
+    material = design.material_of("circular_spline")
+    matrix = stiffness_matrix(
+        basis, material.youngs_modulus, material.poisson_ratio, 0.01
+    )
+    skeleton = np.concatenate([mesh.face_first, mesh.bore[1:-1], mesh.face_last])
+    free = np.setdiff1d(np.arange(basis.N), basis.nodal_dofs[:, skeleton].ravel())
+    load = np.zeros(basis.N)
+    load[basis.nodal_dofs[0, mesh.flank_right[5]]] = 1.0
+    u = np.zeros(basis.N)
+    u[free] = spsolve(matrix[free][:, free].tocsc(), load[free])
+    force = np.zeros(4 * element.flank_size)
+    force[2 * 5] = 1.0
+    flank = np.concatenate([mesh.flank_right[:-1], mesh.flank_left[:-1]])
+    assert element.flank_compliance @ force == pytest.approx(
+        u[basis.nodal_dofs[:, flank].T.ravel()], rel=1e-8, abs=1e-18
+    )
+
+
+def test_feet_on_a_deformed_flank():
+    """Distance to the displaced curve against the nearest of many of its points."""
+    surface = ring()
+    stations = surface.spline.x
+    wave = 2e-5 * np.stack([np.sin(3e3 * stations), np.cos(2e3 * stations)], axis=-1)
+    flanks = FlankSplines.through(surface.spline, wave[None])
+    s = np.linspace(*surface.compliance.element.flank_range, 40)[2:-2]
+    base, normal, _ = surface.profile.evaluate(s)
+    points = base + 3e-5 * normal
+    index = np.zeros(len(s), dtype=int)
+    feet = surface.feet(points, flanks, index)
+    dense = np.linspace(stations[0], stations[-1], 200_001)
+    curve = surface.profile.evaluate(dense)[0]
+    curve = curve + flanks.at(np.zeros(dense.size, dtype=int), dense)[0]
+    nearest = np.array([np.hypot(*(curve - p).T).min() for p in points])
+    assert np.abs(feet.gap) == pytest.approx(nearest, abs=1e-9)
+    spline = surface.spline(feet.station) @ wave
+    moved, slope = flanks.at(index, feet.station)
+    assert np.allclose(moved, spline, atol=1e-15)
+    h = 1e-8
+    steps = [flanks.at(index, feet.station + k * h)[0] for k in (-1, 1)]
+    assert slope == pytest.approx((steps[1] - steps[0]) / (2 * h), abs=1e-6)
