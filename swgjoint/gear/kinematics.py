@@ -40,6 +40,19 @@ def angle_coefficients(layout: str) -> tuple[tuple[int, int], tuple[int, int]]:
     return _ANGLES[layout]
 
 
+def member_angles(layout: str, theta: float, psi: float) -> tuple[float, float, float]:
+    """Rotation of wave generator, flexspline and circular spline [rad].
+
+    Relative to the fixed member, with theta that of the input and psi of the output.
+    """
+    angles = {
+        "circular_spline_fixed": (theta, psi, 0.0),
+        "flexspline_fixed": (theta, 0.0, psi),
+        "wave_generator_fixed": (0.0, theta, psi),
+    }
+    return angles[layout]
+
+
 def periodicity(layout: str, teeth_flexspline: int, teeth_circular_spline: int) -> int:
     """Cycles per input turn in which a perfect gear repeats.
 
