@@ -27,6 +27,7 @@ from swgjoint.gear.design_sections import (
     Tolerances,
     WaveGenerator,
 )
+from swgjoint.gear.family import family_design, family_member
 from swgjoint.gear.material import Material
 from swgjoint.models_path import bundled_names, find
 from swgjoint.toml_text import toml_text
@@ -111,13 +112,19 @@ class Design(Section):
     def load(cls, reference: str | Path) -> Self:
         """Read a design file, given as a path or as the name of a bundled one.
 
+        ``size-NN-RRR`` names a drive of the family by rule, shipped file or not; see
+        :mod:`swgjoint.gear.family`.
+
         Raises:
             DesignError: With one line per fault of the file.
         """
         try:
             path = find(reference, "drives", ".toml", what="design")
         except InputError as exc:
-            raise DesignError(str(exc)) from None
+            member = family_member(str(reference).removesuffix(".toml"))
+            if member is None:
+                raise DesignError(f"{exc}; any size-NN-RRR by rule") from None
+            return cls.model_validate(family_design(*member))
         data = read_toml(path, what="design", error=DesignError)
         return validated(cls, data, where=str(path), error=DesignError)
 
@@ -126,6 +133,8 @@ class Design(Section):
         """A bundled design by its name, whatever files lie in the current folder."""
         names = bundled_names("drives", ".toml")
         if name not in names:
+            if (member := family_member(name)) is not None:
+                return cls.model_validate(family_design(*member))
             raise DesignError(
                 f"design {name!r} not in models/drives; available: {', '.join(names)}"
             )
