@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from math import pi
+from operator import attrgetter
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.errors import ComputationError
-from swgjoint.fe.drive2d import (
-    Continuation,
-    can_halve,
-    check_modelled,
-    ring_model,
-)
+from swgjoint.fe.continuation import Continuation
+from swgjoint.fe.drive2d import can_halve, check_modelled, ring_model
 from swgjoint.fe.state import State
 from swgjoint.gear.cup import cup_torsional_stiffness
 from swgjoint.gear.design import Design
@@ -83,7 +81,9 @@ def sample_map(
     teeth = (drive.teeth_flexspline, drive.teeth_circular_spline)
     cycles = periodicity(drive.layout, *teeth)
     follow = Continuation(
-        model=ring_model(design, half=can_halve(design)), ratio=design.ratio
+        model=ring_model(design, half=can_halve(design)),
+        ratio=design.ratio,
+        layout=drive.layout,
     )
     cup = None if design.cup is None else cup_torsional_stiffness(design)
     parts = np.array(LEVELS) * ratings.repeated_peak
@@ -148,23 +148,24 @@ def sample_map(
     state, second = table[check][-1], []
     for k in range(angles):
         state = follow.to_angle(state, period + float(theta[k]))
-        second.append(state.rotation if state.outcome.ok else np.nan)
+        second.append(follow.output_angle(state) if state.outcome.ok else np.nan)
         tick("second pitch")
 
     used = torque[kept]
     twist = np.zeros_like(used) if cup is None else used / cup
     states = [table[j] for j in kept]
 
-    def collect(name: str) -> Array:
-        return np.array([[getattr(s, name) for s in line] for line in states])
+    def collect(quantity: Callable[[State], float]) -> Array:
+        return np.array([[quantity(state) for state in line] for line in states])
 
-    error = collect("rotation") - theta / design.ratio - twist[:, None]
-    energy = collect("energy") + 0.5 * (used * twist)[:, None]
+    error = collect(follow.output_angle) - theta / design.ratio - twist[:, None]
+    energy = collect(attrgetter("energy")) + 0.5 * (used * twist)[:, None]
     again = np.array(second) - (period + theta) / design.ratio
     first = error[kept.index(check)] + twist[kept.index(check)]
-    (p, p_psi), (q, q_psi) = angle_coefficients(drive.layout)
-    order = (cycles, 0) if (p, p_psi) == (1, 0) else (0, cycles)
-    assert (q, q_psi) != (0, 0)
+    # the pattern follows the gear angle that depends on the input alone, written so
+    # that its phase grows with theta
+    alpha, beta = angle_coefficients(drive.layout)
+    order = (cycles, 0) if alpha == (1, 0) else (0, cycles * beta[0])
     return MapSamples(
         name=drive.name,
         level="2d",
@@ -178,8 +179,9 @@ def sample_map(
         torque=used,
         output_error=error,
         energy=energy,
-        compliance=collect("compliance") + (0.0 if cup is None else 1.0 / cup),
-        input_torque=collect("wave_generator_torque"),
+        compliance=collect(attrgetter("compliance"))
+        + (0.0 if cup is None else 1.0 / cup),
+        input_torque=collect(follow.input_torque),
         info={
             "design_hash": design.content_hash(),
             "label": {

@@ -2,24 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
-from swgjoint.errors import DesignError, Outcome
+from swgjoint.errors import DesignError
 from swgjoint.fe.circular_spline import CircularSpline, ring_compliance
-from swgjoint.fe.equilibrium import Load, NewtonSolver
 from swgjoint.fe.ring import RingModel
 from swgjoint.fe.sector_mesh import sector_mesh
-from swgjoint.fe.state import State
 from swgjoint.fe.superelement import Superelement, condense
 from swgjoint.gear.design import Design, MemberName
 from swgjoint.gear.profile import tooth_profile
 from swgjoint.gear.wave_generator import lobe_height, wave_generator
 from swgjoint.units import mm
-
-HALVINGS = 5
-
-_Step = Callable[[State, float, State], State]
 
 
 def can_halve(design: Design) -> bool:
@@ -42,11 +35,6 @@ def check_modelled(design: Design, model: str) -> None:
     faults = []
     if model != "2d":
         faults.append(f"model {model!r} is not available yet; available: '2d'")
-    if drive.layout != "circular_spline_fixed":
-        faults.append(
-            f"drive.layout = {drive.layout!r} is not available yet; available: "
-            "'circular_spline_fixed'"
-        )
     if design.friction.tooth_coefficient > 0.0:
         faults.append(
             f"friction.tooth_coefficient = {design.friction.tooth_coefficient:g} is "
@@ -111,59 +99,3 @@ def _sector(design: Design, member: MemberName) -> Superelement:
         poisson_ratio=material.poisson_ratio,
         width=design.drive.face_width_mm * mm,
     )
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Continuation:
-    """Follows equilibria in torque and angle; halves a step that fails."""
-
-    model: RingModel
-    ratio: float
-    solver: NewtonSolver = field(default_factory=NewtonSolver)
-
-    def deflected(self) -> State:
-        """Wave generator in place, no tooth contact, no rotation."""
-        return self.solver(
-            self.model, self.model.at_rest(), Load(rotation=0.0, teeth=False)
-        )
-
-    def meshed(self, deflected: State) -> State:
-        """Teeth in contact, the flexspline not rotated."""
-        return self.solver(self.model, deflected, Load(rotation=0.0))
-
-    def to_torque(self, state: State, torque: float) -> State:
-        """Change the torque at a fixed wave generator; the last good state if stuck."""
-        return self._follow(
-            state,
-            lambda s, part, start: self.solver(
-                self.model,
-                s,
-                Load(torque=start.torque + part * (torque - start.torque)),
-            ),
-        )
-
-    def to_angle(self, state: State, angle: float) -> State:
-        """Turn the wave generator at constant torque."""
-        d_angle = angle - state.wave_generator_angle
-
-        def step(s: State, part: float, start: State) -> State:
-            alpha = start.wave_generator_angle + part * d_angle
-            ahead = (alpha - s.wave_generator_angle) / self.ratio
-            guess = self.model.moved(s, alpha, s.rotation + ahead)
-            return self.solver(self.model, guess, Load(torque=start.torque))
-
-        return self._follow(state, step)
-
-    def _follow(self, state: State, step: _Step) -> State:
-        """Go from part 0 to 1 of a change; a failed try halves the increment."""
-        current, done, increment = state, 0.0, 1.0
-        while done < 1.0:
-            target = min(1.0, done + increment)
-            tried = step(current, target, state)
-            if tried.outcome.ok:
-                current, done = tried, target
-            elif increment <= 0.5**HALVINGS:
-                return replace(current, outcome=tried.outcome, history=tried.history)
-            else:
-                increment *= 0.5
-        return replace(current, outcome=Outcome.CONVERGED)

@@ -27,18 +27,32 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True, kw_only=True)
 class Load:
-    """What is prescribed: the torque or the rotation of the output."""
+    """What is prescribed.
+
+    The torque alone: the flexspline is the output. The rotation alone: the flexspline
+    is held. Both: the flexspline is held and the circular spline is the output.
+    """
 
     torque: float | None = None
-    """T that the flexspline exerts on its load, whole drive [N·m]."""
+    """T that the output exerts on its load, whole drive [N·m]."""
     rotation: float | None = None
-    """Best-fit rotation of the bore [rad]."""
+    """Best-fit rotation of the flexspline's bore [rad]."""
     teeth: bool = True
     """Whether the teeth touch."""
 
     def __post_init__(self) -> None:
-        if (self.torque is None) == (self.rotation is None):
-            raise ValueError("give either torque or rotation")
+        if self.torque is None and self.rotation is None:
+            raise ValueError("give a torque, a rotation, or both")
+
+    @property
+    def on_flexspline(self) -> float | None:
+        """Torque that the flexspline exerts on a load [N·m]."""
+        return self.torque if self.rotation is None else None
+
+    @property
+    def on_ring(self) -> float | None:
+        """Torque that the circular spline exerts on a load [N·m]."""
+        return self.torque if self.rotation is not None else None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,7 +80,7 @@ class NewtonSolver:
         settled = False
         try:
             for iteration in range(self.max_iterations):
-                ring = linearise(model, state, load.torque)
+                ring = linearise(model, state, load.on_flexspline)
                 # after the first steps only close candidates matter
                 reach = 2e-5 if iteration > 2 else 1e-4
                 thorough = bool(history) and history[-1] < self.thorough_below
@@ -102,7 +116,10 @@ class _Step:
     force: Array
     """Their forces [N]."""
     torque: float
+    holding_torque: float
     compliance: float
+    ring_turn: float
+    """Increment of the circular spline's rotation [rad]."""
     increment: Array
     """In the node bases (N, n) [m]."""
     shift: Array
@@ -149,9 +166,13 @@ def _solve_linear(
     solved = CyclicFactor(ring.anchored(), 2 * element.face_size).solve(columns)
     base, response = solved[:, :, 0] + ring.value, solved[:, :, 1:]
 
-    # unknowns: contact forces, displacement of the anchor, torque multiplier
-    matrix, offset = np.empty((m + 2, m + 2)), np.empty(m + 2)
-    matrix[:m] = np.einsum("kn,knl->kl", rows, response[contacts.sector])
+    # unknowns: contact forces, displacement of the anchor, rotation of the circular
+    # spline, multiplier of the flexspline's rotation
+    matrix, offset = np.zeros((m + 3, m + 3)), np.zeros(m + 3)
+    own = np.r_[0 : m + 1, m + 2]
+    matrix[np.ix_(np.arange(m), own)] = np.einsum(
+        "kn,knl->kl", rows, response[contacts.sector]
+    )
     local = contacts.weight @ element.flank_compliance
     same = contacts.sector[:, None] == contacts.sector[None, :]
     matrix[:m, :m] += np.where(same, local @ contacts.weight.T, 0.0)
@@ -160,9 +181,14 @@ def _solve_linear(
         matrix[:m, :m] += ring_compliance.between(
             contacts.tooth, contacts.ring_weight, model.ring_teeth
         )
-    matrix[m:] = np.einsum("snf,snl->fl", levers[:, :, m:], response)
-    matrix[:m, m:] = matrix[m:, :m].T
+    last_two = np.array([m, m + 2])
+    matrix[np.ix_(last_two, own)] = np.einsum("snf,snl->fl", levers[:, :, m:], response)
+    matrix[:m, last_two] = matrix[last_two, :m].T
     matrix[m, m] -= 1.0 / ring.anchor_stiffness
+    # turning the circular spline towards the teeth closes the gap by the lever arm
+    arm = np.einsum("ki,ki->k", turned(contacts.point), contacts.normal)
+    matrix[:m, m + 1] = matrix[m + 1, :m] = -arm
+    offset[m + 1] = -(load.on_ring or 0.0) / model.copies
     # gaps as if the old tooth forces were gone; the new ones bring their own share
     old = np.einsum("kb,kb->k", local, state.flank_force[contacts.sector])
     old += np.einsum(
@@ -170,38 +196,60 @@ def _solve_linear(
     )
     moved = np.einsum("kn,kn->k", rows, base[contacts.sector])
     offset[:m] = contacts.gap - old + moved
-    offset[m:] = np.einsum("snf,sn->f", levers[:, :, m:], base)
-    offset[m + 1] += ring.rotation - (load.rotation or 0.0)
+    offset[last_two] = np.einsum("snf,sn->f", levers[:, :, m:], base)
+    offset[m + 2] += ring.rotation - (load.rotation or 0.0)
 
-    count = m + (1 if load.rotation is None else 2)
+    used = np.arange(m + 1)
+    if load.on_ring is not None:
+        used = np.append(used, m + 1)
+    if load.rotation is not None:
+        used = np.append(used, m + 2)
     guess = offset[:m] < 0.0
     if state.contacts is not None and len(state.contacts):
         guess = contacts.on_flanks_of(state.contacts)
-    z, active = solve_mixed(
-        matrix[:count, :count], offset[:count], m, count - m - 1, guess
+    found, active = solve_mixed(
+        matrix[np.ix_(used, used)],
+        offset[used],
+        m,
+        int(load.rotation is not None),
+        guess,
     )
-    held = np.append(np.flatnonzero(active), m)
-    to_torque = matrix[held, m + 1]
-    compliance = matrix[m + 1, m + 1] - to_torque @ np.linalg.solve(
-        matrix[np.ix_(held, held)], to_torque
-    )
+    z = np.zeros(m + 3)
+    z[used] = found
+    held = np.concatenate([np.flatnonzero(active), used[m:]])
+    compliance = _output_compliance(matrix, held, m, load)
 
-    increment = base + response[:, :, :count] @ z
+    increment = base + response @ z[own]
     residual = ring.gradient + np.einsum("sij,sj->si", ring.hessian, increment)
     np.subtract.at(residual, contacts.sector, z[:m, None] * rows)
-    torque = load.torque
-    if torque is None:
-        residual -= z[m + 1] * ring.rotation_gradient
-        torque = -model.copies * float(z[m + 1])
+    residual -= z[m + 2] * ring.rotation_gradient
+    holding = model.copies * float(z[m + 2])
+    held = np.flatnonzero(active)
     return _Step(
-        contacts=contacts.chosen(held[:-1]),
-        force=z[held[:-1]],
-        torque=torque,
-        compliance=float(compliance) / model.copies,
+        contacts=contacts.chosen(held),
+        force=z[held],
+        torque=-holding if load.torque is None else load.torque,
+        holding_torque=holding if load.on_flexspline is None else -load.on_flexspline,
+        compliance=compliance / model.copies,
+        ring_turn=float(z[m + 1]),
         increment=increment,
         shift=ring.in_global_frame(increment),
         pressure=np.where(state.touching, ring.normal_rows(residual), 0.0),
     )
+
+
+def _output_compliance(
+    matrix: Array, held: NDArray[np.int64], m: int, load: Load
+) -> float:
+    """Rotation of the output against its load, per torque of the model."""
+    system = matrix[np.ix_(held, held)]
+    if load.on_ring is not None:
+        unit = (held == m + 1).astype(float)
+        return -float(np.linalg.solve(system, unit)[held == m + 1][0])
+    held = held[held <= m]
+    reach = matrix[held, m + 2]
+    system = matrix[np.ix_(held, held)]
+    return float(matrix[m + 2, m + 2] - reach @ np.linalg.solve(system, reach))
 
 
 def _advance(
@@ -244,8 +292,10 @@ def _advance(
         contacts=step.contacts,
         tooth_force=step.force,
         rotation=ring.rotation,
+        ring_rotation=state.ring_rotation + damping * step.ring_turn,
         compliance=step.compliance,
         torque=step.torque,
+        holding_torque=step.holding_torque,
     )
     return new, not bool(bad.any())
 

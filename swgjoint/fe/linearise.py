@@ -152,6 +152,7 @@ def linearise(model: RingModel, state: State, torque: float | None) -> Linearise
     anchor = np.zeros((model.sectors, 2 * n_a))
     anchor[0, :2] = turned(x[0, 0]) / np.hypot(*x[0, 0])
     centre = frames.position.reshape(model.sectors, n_a, 2).mean(axis=1)
+    seen = frames.angle - state.ring_rotation
     return Linearised(
         element=element,
         frames=frames,
@@ -173,8 +174,8 @@ def linearise(model: RingModel, state: State, torque: float | None) -> Linearise
             element=element,
             circular_spline=model.circular_spline,
             ring_flank=model.ring_displacement(state),
-            angle=frames.angle,
-            bearing=frames.angle - np.arctan2(centre[:, 0], centre[:, 1]),
+            angle=seen,
+            bearing=seen - np.arctan2(centre[:, 0], centre[:, 1]),
         ),
     )
 

@@ -6,7 +6,8 @@ import time
 from math import pi
 
 from swgjoint.errors import ComputationError, Outcome
-from swgjoint.fe.drive2d import Continuation, check_modelled, ring_model
+from swgjoint.fe.continuation import Continuation
+from swgjoint.fe.drive2d import check_modelled, ring_model
 from swgjoint.fe.meshing_run import MeshingRun, MeshingStep
 from swgjoint.fe.ring import RingModel
 from swgjoint.fe.state import State
@@ -55,7 +56,7 @@ def simulate_meshing(
         nonlinear=nonlinear,
         elastic_circular_spline=elastic_circular_spline,
     )
-    follow = Continuation(model=ring, ratio=design.ratio)
+    follow = Continuation(model=ring, ratio=design.ratio, layout=design.drive.layout)
     cup = None if design.cup is None else cup_torsional_stiffness(design)
 
     def checked(state: State, what: str) -> State:
@@ -79,13 +80,15 @@ def simulate_meshing(
         if k > 0:
             state = checked(
                 follow.to_angle(state, angle),
-                f"the wave-generator position {angle / deg:g} deg",
+                f"the input position {angle / deg:g} deg",
             )
         twist = 0.0 if cup is None else torque / cup
         rows.append(
             MeshingStep(
-                wave_generator_angle=angle,
-                output_error=state.rotation - twist - angle / design.ratio,
+                input_angle=angle,
+                wave_generator_angle=state.wave_generator_angle,
+                output_error=follow.output_angle(state) - twist - angle / design.ratio,
+                input_torque=follow.input_torque(state),
                 wave_generator_torque=state.wave_generator_torque,
                 tooth_moment=state.tooth_moment,
                 energy=state.energy + (0.0 if cup is None else 0.5 * torque**2 / cup),

@@ -23,10 +23,14 @@ Array = NDArray[np.float64]
 class MeshingStep:
     """Results at one wave-generator position."""
 
+    input_angle: float
+    """theta [rad]."""
     wave_generator_angle: float
-    """[rad]."""
+    """Against the frame in which the flexspline or circular spline stands [rad]."""
     output_error: float
     """Output angle minus theta/i, from the undeformed position [rad]."""
+    input_torque: float
+    """External torque on the input [N·m]."""
     wave_generator_torque: float
     """External torque on the wave generator [N·m]."""
     tooth_moment: float
@@ -89,6 +93,7 @@ class MeshingRun:
             "design": self.design.drive.name,
             "label": {
                 "model": "2d",
+                "layout": self.design.drive.layout,
                 "level": "nonlinear" if self.model.nonlinear else "linear",
                 "circular_spline": "elastic, outside fixed" if elastic else "rigid",
                 "half": self.model.half,
@@ -105,11 +110,12 @@ class MeshingRun:
                 [s.stress.circular_spline for s in self.steps]
             ),
             "per_step": {
-                "angle_deg": list(self.series("wave_generator_angle") / deg),
+                "angle_deg": list(self.series("input_angle") / deg),
                 **{f"{kind}_MPa": [row[kind] for row in stress] for kind in KINDS},
                 "pairs_in_contact": [step.pairs_in_contact for step in self.steps],
                 "output_error_arcsec": list(self.series("output_error") / arcsec),
                 "wave_generator_torque_Nm": list(self.series("wave_generator_torque")),
+                "input_torque_Nm": list(self.series("input_torque")),
                 "tooth_moment_Nm": list(self.series("tooth_moment")),
                 "energy_J": list(self.series("energy")),
                 "iterations": [step.iterations for step in self.steps],

@@ -147,8 +147,10 @@ class RingModel:
         gradient = (cosine * turned(x0) - sine * x0) / (sine**2 + cosine**2)
         return float(np.arctan2(sine, cosine)), gradient
 
-    def moved(self, state: State, alpha: float, rotation: float) -> State:
-        """Predictor: the field turned with the wave generator and the flexspline.
+    def moved(
+        self, state: State, alpha: float, rotation: float, ring_rotation: float
+    ) -> State:
+        """Predictor: the field turned with the wave generator and the members.
 
         Displacements in polar components travel with the wave generator through the
         teeth, interpolated between sectors; the flexspline turns rigidly.
@@ -175,9 +177,13 @@ class RingModel:
             pressure=_travelled(state.pressure, shift),
             touching=np.roll(state.touching, round(shift), axis=0),
             flank_force=_travelled(state.flank_force, shift),
-            ring_force=_travelled(state.ring_force, d_alpha / ring_pitch),
+            ring_force=_travelled(
+                state.ring_force,
+                (d_alpha - (ring_rotation - state.ring_rotation)) / ring_pitch,
+            ),
             wave_generator_angle=alpha,
             rotation=rotation,
+            ring_rotation=ring_rotation,
         )
 
     def ring_displacement(self, state: State) -> Array:

@@ -37,8 +37,12 @@ class State:
     wave_generator_angle: float = 0.0
     rotation: float = 0.0
     """Best-fit rotation of the bore [rad]."""
+    ring_rotation: float = 0.0
+    """Rotation of the circular spline [rad]."""
     torque: float = 0.0
-    """Torque T that the flexspline exerts on its load, whole drive [N·m]."""
+    """Torque T that the output exerts on its load, whole drive [N·m]."""
+    holding_torque: float = 0.0
+    """External torque on the flexspline, whole drive [N·m]."""
     wave_generator_torque: float = 0.0
     """External torque on the wave generator, whole drive [N·m]."""
     tooth_moment: float = 0.0
@@ -46,7 +50,7 @@ class State:
     energy: float = 0.0
     """Strain energy, whole drive [J]."""
     compliance: float = 0.0
-    """Rotation per torque at the active contacts, whole drive [rad/(N·m)]."""
+    """Tangent -d(output rotation)/dT at the active contacts [rad/(N·m)]."""
     outcome: Outcome = Outcome.CONVERGED
     history: tuple[float, ...] = ()
     """Largest displacement increment of every iteration [m]."""

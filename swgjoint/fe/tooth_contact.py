@@ -94,9 +94,10 @@ class ToothContact:
     """Displacement of the circular spline's flank nodes in the frames of its teeth, one
     row per tooth of the model; no columns if rigid [m]. Shape (N_c, 2 n_c)."""
     angle: Array
-    """Angles of the sector frames (N,) [rad]."""
+    """Angles of the sector frames against the circular spline (N,) [rad]."""
     bearing: Array
-    """Polar angles of the teeth, which tell the tooth space they enter (N,) [rad]."""
+    """Polar angles of the teeth against the circular spline, which tell the tooth space
+    that they enter (N,) [rad]."""
 
     @cached_property
     def _ring_flanks(self) -> FlankSplines | None:

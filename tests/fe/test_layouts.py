@@ -1,0 +1,109 @@
+"""The three layouts are one drive seen from three members."""
+
+from __future__ import annotations
+
+from functools import cache
+from math import pi
+
+import numpy as np
+import pytest
+
+from swgjoint.fe.continuation import Continuation
+from swgjoint.fe.drive2d import ring_model
+from swgjoint.fe.meshing import simulate_meshing
+from swgjoint.gear.design import Design
+
+TORQUE = 20.0
+LAYOUTS = {
+    "circular_spline_fixed": (-60.0, 122),
+    "flexspline_fixed": (61.0, 120),
+    "wave_generator_fixed": (122 / 120, 120),
+}
+
+
+@cache
+def run(layout):
+    """One pitch of the fixed (wave generator fixed: the input) member and one more."""
+    design = Design.load("reference-2d").with_changes({"drive.layout": layout})
+    teeth = LAYOUTS[layout][1]
+    return simulate_meshing(
+        design, torque=TORQUE, steps=25, turn=25 / 24 / teeth, half=True
+    )
+
+
+@cache
+def follow(layout):
+    design = Design.load("reference-2d")
+    return Continuation(
+        model=ring_model(design, half=True), ratio=LAYOUTS[layout][0], layout=layout
+    )
+
+
+@cache
+def loaded(layout):
+    f = follow(layout)
+    return f.to_torque(f.meshed(f.deflected()), TORQUE)
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_balance_and_mean_torque(layout):
+    """Moments balance at every step; the input does the output's work on average."""
+    result = run(layout)
+    teeth = result.series("tooth_moment")
+    if layout == "circular_spline_fixed":
+        balance = teeth + result.series("wave_generator_torque") - TORQUE
+    else:
+        balance = teeth + TORQUE  # the moment on the circular spline is T
+    assert np.abs(balance).max() < 1e-6 * TORQUE
+    mean = result.series("input_torque")[:24].mean()
+    assert mean == pytest.approx(TORQUE / LAYOUTS[layout][0], rel=5e-3)
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_pattern_repeats(layout):
+    """The error repeats after a pitch of the fixed member."""
+    error = run(layout).series("output_error")
+    assert abs(error[24] - error[0]) < 1e-3 * np.ptp(error)
+    assert np.ptp(error) < 1e-5
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_work_equals_energy(layout):
+    """T_in dtheta - T dpsi = dU by central differences at a smooth position."""
+    f, start = follow(layout), loaded(layout)
+    pitch = 2 * pi / LAYOUTS[layout][1]
+    middle = f.to_angle(start, 0.3 * pitch)
+    h = 0.004 * pitch
+    low, high = (f.to_angle(middle, 0.3 * pitch + s * h) for s in (-1, 1))
+    gained = high.energy - low.energy
+    gained += TORQUE * (f.output_angle(high) - f.output_angle(low))
+    assert gained == pytest.approx(f.input_torque(middle) * 2 * h, rel=1e-4)
+
+
+@pytest.mark.parametrize("layout", ["flexspline_fixed", "wave_generator_fixed"])
+def test_same_state_from_another_member(layout):
+    """The circular-spline-fixed state, turned along, is an equilibrium here too."""
+    one = follow("circular_spline_fixed").to_angle(
+        loaded("circular_spline_fixed"), 0.01
+    )
+    f = follow(layout)
+    beta = one.wave_generator_angle - one.rotation
+    theta = beta if layout == "flexspline_fixed" else -beta
+    other = f.to_torque(f.to_angle(loaded(layout), theta), -one.tooth_moment)
+    assert other.energy == pytest.approx(one.energy, rel=1e-9)
+    assert other.wave_generator_torque == pytest.approx(
+        one.wave_generator_torque, rel=1e-6
+    )
+    alpha = other.wave_generator_angle - other.ring_rotation
+    assert alpha == pytest.approx(one.wave_generator_angle, abs=1e-11)
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_tangent_compliance(layout):
+    """-d psi/dT of the converged system against differences."""
+    f = follow(layout)
+    state = f.to_angle(loaded(layout), 0.3 * 2 * pi / LAYOUTS[layout][1])
+    low, high = (f.to_torque(state, TORQUE + s * 0.01) for s in (-1, 1))
+    slope = -(f.output_angle(high) - f.output_angle(low)) / 0.02
+    # contact points that slide along their flanks are left out of the tangent
+    assert state.compliance == pytest.approx(slope, rel=1e-3)
