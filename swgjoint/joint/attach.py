@@ -8,11 +8,13 @@ import numpy as np
 from swgjoint.errors import InputError
 from swgjoint.joint import plugin
 from swgjoint.joint.drive import JointDrive, UnresolvedOrder, prune
-from swgjoint.joint.elements import add_rotor, add_tendon
+from swgjoint.joint.elements import add_native, add_rotor, add_tendon
+from swgjoint.joint.native import fit_native
 from swgjoint.joint.place import check_option, find_place
+from swgjoint.joint.prescribed import kinematic_part, ratio_variation
 from swgjoint.maps.drive_map import DriveMap
 
-LEVELS = ("rigid", "linear", "full")
+LEVELS = ("rigid", "kinematic", "linear", "native", "full")
 
 
 def attach(
@@ -28,13 +30,18 @@ def attach(
 ) -> JointDrive:
     """Turn a hinge into the output of a strain wave gear.
 
-    ``rigid`` gives the joint the reflected inertia i²J as armature. ``linear`` and
-    ``full`` add a rotor (body ``<joint>_rotor`` with a hinge of the same name, beside
-    the link under the same parent) and a tendon ``<joint>_drive`` with the length
-    theta/i - psi: a native spring and damper, or the carrier of the engine plugin's
-    instance of the same name, which evaluates ``drive``. The rotor takes the place of
-    the joint's own armature, which is set to 0. Keyframes grow by the rotor, at the
-    position without torsion.
+    ``rigid`` gives the joint the reflected inertia i²J as armature. ``kinematic`` is
+    the same model; its kinematic error comes in through the inputs of a commanded
+    motion, see :mod:`swgjoint.joint.prescribed`.
+
+    ``linear``, ``native`` and ``full`` add a rotor (body ``<joint>_rotor`` with a hinge
+    of the same name, beside the link under the same parent) and a tendon
+    ``<joint>_drive`` with the length theta/i - psi: a native spring and damper, the
+    same with a cubic part (and tendons ``<joint>_hysteresis<k>`` and rotor friction
+    where the map has them), or the carrier of the engine plugin's instance of the same
+    name, which evaluates ``drive``. The rotor takes the place of the joint's own
+    armature, which is set to 0. Keyframes grow by the rotor, at the position without
+    torsion.
 
     No actuator is added and none is changed. The motor belongs on the rotor::
 
@@ -43,16 +50,16 @@ def attach(
         motor.trntype = mujoco.mjtTrn.mjTRN_JOINT
         motor.gear[0] = 1.0 if got.rotor else got.ratio     # rigid: on the joint
 
-    ``linear`` and ``full`` replace MuJoCo's default integrator Euler by ``discrete``;
+    Levels with a rotor replace MuJoCo's default integrator Euler by ``discrete``;
     another one is kept: RK4 is the reference below its step limit. Under ``discrete``
-    the native spring of ``linear`` is damped by the step itself, about h w/2 of
-    critical at a torsion frequency w; ``full`` is not. Set the timestep first.
+    a native spring (``linear``, ``native``) is damped by the step itself, about h w/2
+    of critical at a torsion frequency w; ``full`` is not. Set the timestep first.
 
     Args:
         spec: Model to edit.
         joint: Name of a hinge, the first joint of its body.
         drive: Map of the drive.
-        level: ``rigid``, ``linear`` or ``full``.
+        level: ``rigid``, ``kinematic``, ``linear``, ``native`` or ``full``.
         rotor_inertia: Rotor and wave generator about their axis [kg·m²].
         damping_ratio: Share of critical damping of rotor against link with the link
             inertia at qpos0, the other joints held; that of the map if None [-].
@@ -78,7 +85,8 @@ def attach(
     if max_input_speed is not None:
         _positive("max_input_speed", max_input_speed, "rad/s")
     _positive("max_phase_step", max_phase_step, "rad")
-    if level != "rigid":
+    has_rotor = level not in ("rigid", "kinematic")
+    if has_rotor:
         check_option(spec, level)
     place = find_place(spec, joint, rotor_inertia)
 
@@ -95,17 +103,27 @@ def attach(
             mujoco.mjtIntegrator.mjINT_DISCRETE,
         ):
             plugin.require_metric()
-        if max_input_speed is not None:
-            drive, unresolved = prune(
-                drive,
-                timestep=float(spec.option.timestep),
-                max_input_speed=max_input_speed,
-                max_phase_step=max_phase_step,
-            )
+    if level == "kinematic":
+        drive = kinematic_part(drive)
+    if level in ("kinematic", "full") and max_input_speed is not None:
+        drive, unresolved = prune(
+            drive,
+            timestep=float(spec.option.timestep),
+            max_input_speed=max_input_speed,
+            max_phase_step=max_phase_step,
+        )
+    if level == "kinematic" and not ratio_variation(drive) < 1.0:
+        raise InputError(
+            f"map {drive.name!r}: its kinematic error turns the ratio by up to"
+            f" {ratio_variation(drive):.3g} of itself; accepted at level kinematic:"
+            " below 1"
+        )
+    spring = fit_native(drive) if level == "native" else None
 
     # nothing can fail from here on: the spec is edited whole or not at all
     names: dict[str, str | None] = {"rotor": None, "tendon": None, "plugin": None}
-    if level == "rigid":
+    hysteresis: tuple[str, ...] = ()
+    if not has_rotor:
         place.joint.armature = reflected
         damping = 0.0
     else:
@@ -116,6 +134,8 @@ def attach(
             add_tendon(
                 spec, tendon, rotor, joint, ratio, (stiffness, 0.0, 0.0), damping
             )
+        elif spring is not None:
+            hysteresis = add_native(spec, spring, tendon, rotor, joint, ratio, damping)
         else:
             names["plugin"] = tendon
             add_tendon(spec, tendon, rotor, joint, ratio, plugin.TENDON_STIFFNESS, 0.0)
@@ -144,6 +164,8 @@ def attach(
         damping=damping,
         drive=drive,
         unresolved=unresolved,
+        native=spring,
+        hysteresis=hysteresis,
     )
 
 

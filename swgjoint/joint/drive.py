@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swgjoint.errors import InputError
+from swgjoint.joint.native import NativeSpring
+from swgjoint.joint.prescribed import error_of_motor, motor_of_link
 from swgjoint.maps.drive_map import DriveMap
 
 Array = NDArray[np.float64]
@@ -45,7 +47,7 @@ class JointDrive:
     joint: str
     """Link joint."""
     rotor: str | None
-    """Rotor joint, input side; None for ``rigid``."""
+    """Rotor joint, input side; None for ``rigid`` and ``kinematic``."""
     tendon: str | None
     plugin: str | None
     """Plugin instance; only ``full`` has one."""
@@ -63,6 +65,10 @@ class JointDrive:
     """The map as simulated: without the unresolved harmonics."""
     unresolved: tuple[UnresolvedOrder, ...]
     """Harmonics left out, lowest order first."""
+    native: NativeSpring | None = None
+    """What ``native`` holds of the map; None at other levels."""
+    hysteresis: tuple[str, ...] = ()
+    """Tendons of the Jenkin elements, in the order of ``native.hysteresis``."""
 
     @property
     def kept_orders(self) -> tuple[float, ...]:
@@ -71,8 +77,8 @@ class JointDrive:
 
     @property
     def natural_frequency(self) -> float:
-        """Torsion mode of rotor against link, both else free [rad/s]; 0 for rigid."""
-        if self.level == "rigid":
+        """Torsion mode of rotor against link, both else free [rad/s]; 0 if rigid."""
+        if self.rotor is None:
             return 0.0
         rotor = self.ratio**2 * self.rotor_inertia
         reduced = rotor * self.link_inertia / (rotor + self.link_inertia)
@@ -90,7 +96,7 @@ class JointDrive:
         Taken at the positions and velocities that are passed in, so pass ``qpos`` and
         ``qvel`` of the same instant, as they stand after a step. The discrete scheme
         evaluates its force half a step earlier; what is given here is the law itself
-        at the true positions.
+        at the true positions. Hysteresis of ``native`` has a history and is not in it.
 
         Args:
             theta: Rotor positions [rad].
@@ -99,23 +105,26 @@ class JointDrive:
             psi_rate: Link velocities [rad/s].
 
         Raises:
-            InputError: For level ``rigid``, which has no rotor; see :meth:`observe`.
+            InputError: For ``rigid`` and ``kinematic``, which have no rotor; see
+                :meth:`observe`.
         """
-        if self.level == "rigid":
+        if self.rotor is None:
             raise InputError(
-                f"joint {self.joint!r} is rigid: it has no rotor to take signals from; "
-                "use observe(model, data)"
+                f"joint {self.joint!r} is {self.level}: it has no rotor to take "
+                "signals from; use observe(model, data)"
             )
         theta, psi, theta_rate, psi_rate = np.broadcast_arrays(
             *(np.asarray(x, float) for x in (theta, psi, theta_rate, psi_rate))
         )
         error = psi - theta / self.ratio
-        if self.level == "linear":
+        if self.level in ("linear", "native"):
             rate = theta_rate / self.ratio - psi_rate
+            spring = self.native
+            elastic = spring.torque(-error) if spring else -self.stiffness * error
             return JointSignals(
                 torsion=-error,
                 transmission_error=error,
-                torque=-self.stiffness * error + self.damping * rate,
+                torque=elastic + self.damping * rate,
             )
         _, e_theta, e_psi = self.drive.error_at(self.drive.phases(theta, psi))
         g_theta, g_psi = 1.0 / self.ratio + e_theta, -1.0 + e_psi
@@ -126,28 +135,64 @@ class JointDrive:
             torque=self.drive.forces(theta, psi)[1] - self.damping * rate * g_psi,
         )
 
+    def motor_angle(self, psi: ArrayLike) -> Array:
+        """Motor angle of a drive without torsion at link angles [rad].
+
+        For ``kinematic`` the solution of theta/i + e0 = psi, for others i psi.
+        """
+        if self.level == "kinematic":
+            return motor_of_link(self.drive, psi)
+        return self.ratio * np.asarray(psi, float)
+
+    def prescribed_error(self, theta: ArrayLike) -> Array:
+        """e0 that ``kinematic`` prescribes at motor angles [rad]; else 0.
+
+        Args:
+            theta: Commanded motor angles [rad].
+        """
+        if self.level == "kinematic":
+            return error_of_motor(self.drive, theta)
+        return np.zeros_like(np.asarray(theta, float))
+
     def observe(self, model: mujoco.MjModel, data: mujoco.MjData) -> JointSignals:
         """The same from an ``MjData`` after a step; arrays of shape ().
 
-        A rigid drive has no torsion and no error; its torque on the link is the
-        torque at the joint less what the reflected rotor inertia takes.
+        A drive without rotor has no torsion, and as error that of its map at the
+        motor angle that belongs to the link (``rigid``: none). Its torque on the link
+        is the torque at the joint less what the reflected rotor inertia takes.
         """
         joint = model.joint(self.joint)
         q, v = int(joint.qposadr[0]), int(joint.dofadr[0])
         if self.rotor is None:
             torque = data.qfrc_actuator[v] + data.qfrc_applied[v]
             torque = torque - self.ratio**2 * self.rotor_inertia * data.qacc[v]
-            zero = np.zeros(())
+            psi = np.asarray(data.qpos[q])
             return JointSignals(
-                torsion=zero, transmission_error=zero, torque=np.asarray(torque)
+                torsion=np.zeros(()),
+                transmission_error=psi - self.motor_angle(psi) / self.ratio,
+                torque=np.asarray(torque),
             )
         rotor = model.joint(self.rotor)
-        return self.signals(
+        got = self.signals(
             data.qpos[int(rotor.qposadr[0])],
             data.qpos[q],
             data.qvel[int(rotor.dofadr[0])],
             data.qvel[v],
         )
+        slip = sum(
+            _slipping(model, data, name, float(got.torsion)) for name in self.hysteresis
+        )
+        return replace(got, torque=got.torque + slip) if self.hysteresis else got
+
+
+def _slipping(
+    model: mujoco.MjModel, data: mujoco.MjData, tendon: str, torsion: float
+) -> float:
+    """Torque of one Jenkin element from the engine's own history [N·m]."""
+    t = int(model.tendon(tendon).id)
+    limit = float(model.tendon_springyield[t])
+    rest = float(data.plastic[model.tendon_plasticadr[t]])
+    return float(model.tendon_stiffness[t]) * min(max(torsion - rest, -limit), limit)
 
 
 def input_orders(drive: DriveMap) -> Array:

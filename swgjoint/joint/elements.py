@@ -7,6 +7,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from swgjoint.joint.native import NativeSpring
 from swgjoint.joint.place import Place
 from swgjoint.units import deg
 
@@ -49,19 +50,54 @@ def add_tendon(
     ratio: float,
     stiffness: tuple[float, float, float],
     damping: float,
+    springyield: float = 0.0,
 ) -> None:
     """Fixed tendon of length theta/i - psi, nothing inherited from defaults."""
     tendon = spec.add_tendon(name=name)
     tendon.stiffness = np.array(stiffness)
     tendon.damping = np.array([damping, 0.0, 0.0])
     tendon.springlength = np.zeros(2)
-    tendon.springyield = 0.0
+    tendon.springyield = springyield
     tendon.armature = 0.0
     tendon.frictionloss = 0.0
     tendon.limited = mujoco.mjtLimited.mjLIMITED_FALSE
     tendon.actfrclimited = mujoco.mjtLimited.mjLIMITED_FALSE
     tendon.wrap_joint(rotor, 1.0 / ratio)
     tendon.wrap_joint(link, -1.0)
+
+
+def add_native(
+    spec: mujoco.MjSpec,
+    spring: NativeSpring,
+    name: str,
+    rotor: str,
+    link: str,
+    ratio: float,
+    damping: float,
+) -> tuple[str, ...]:
+    """Polynomial spring, Jenkin tendons and rotor friction; only what there is.
+
+    Returns:
+        Names of the Jenkin tendons.
+    """
+    add_tendon(
+        spec, name, rotor, link, ratio, (spring.linear, 0.0, spring.cubic), damping
+    )
+    if spring.friction:
+        spec.joint(rotor).frictionloss = spring.friction
+    names = tuple(f"{link}_hysteresis{k}" for k in range(len(spring.hysteresis)))
+    for one, element in zip(names, spring.hysteresis, strict=True):
+        add_tendon(
+            spec,
+            one,
+            rotor,
+            link,
+            ratio,
+            (element.stiffness, 0.0, 0.0),
+            0.0,
+            springyield=element.yield_torque / element.stiffness,
+        )
+    return names
 
 
 def _extend_keys(spec: mujoco.MjSpec, rotor: str, link: str, ratio: float) -> None:

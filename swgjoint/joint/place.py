@@ -52,7 +52,7 @@ def check_option(spec: mujoco.MjSpec, level: str) -> None:
     elif integrator != mujoco.mjtIntegrator.mjINT_RK4:
         what = (
             "drops the rotor-link terms of the tendon's damping"
-            if level == "linear"
+            if level in ("linear", "native")
             else "integrates the drive explicitly"
         )
         warnings.warn(

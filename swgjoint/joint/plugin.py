@@ -53,7 +53,7 @@ def load() -> None:
         raise ComputationError(
             f"the drive plugin for mujoco {MUJOCO_VERSION} is not built ({path} is "
             "missing): reinstall swgjoint with a C++ compiler present, or use level "
-            "'rigid' or 'linear'"
+            "'rigid', 'kinematic', 'linear' or 'native'"
         )
     try:
         mujoco.mj_loadPluginLibrary(str(path))

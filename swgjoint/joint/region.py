@@ -114,7 +114,8 @@ def check_region(
         integrator: ``discrete``; for ``RK4`` and the others, which take the drive as an
             explicit force, the bound is on h times the fastest torsion frequency.
     """
-    if drive.level == "rigid" or (drive.level == "linear" and integrator == "discrete"):
+    native = drive.level in ("linear", "native")
+    if drive.rotor is None or (native and integrator == "discrete"):
         bounds: tuple[Bound, ...] = ()
     elif integrator == "discrete":
         bounds = _discrete_bounds(drive, timestep, abs(max_input_speed))
@@ -174,6 +175,10 @@ def _explicit_bounds(drive: JointDrive, h: float, integrator: str) -> tuple[Boun
     stiffness = drive.stiffness
     if drive.level == "full":
         stiffness = drive.drive.max_stiffness
+    elif drive.native is not None:
+        peak = drive.drive.mean_torsion(drive.drive.ratings.momentary_peak)
+        stiffness = drive.native.linear + 3.0 * drive.native.cubic * peak**2
+        stiffness += sum(element.stiffness for element in drive.native.hysteresis)
     rotor = drive.ratio**2 * drive.rotor_inertia
     frequency = sqrt(stiffness * (1.0 / rotor + 1.0 / drive.link_inertia))
     # stability ends at 2.8 for RK4 and 2 for a semi-implicit step, in free oscillation

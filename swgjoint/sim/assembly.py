@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from swgjoint.errors import InputError
 from swgjoint.joint.attach import attach
 from swgjoint.joint.drive import JointDrive
+from swgjoint.joint.native import native_map
 from swgjoint.joint.region import check_region
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.progress import Progress, silent
@@ -47,11 +48,16 @@ class Assembly:
     """Drive torque that the rigid arm needs on the motion [N·m]. (n, n_joints)."""
     feedforward: Array
     """Motor torque of the feed-forward [N·m]. Shape (n, n_joints)."""
+    prescribed: Array
+    """Kinematic error on the commanded motion at level ``kinematic``, 0 at others
+    [rad]. Shape (n, n_joints)."""
+    prescribed_rate: Array
+    """Its rate as the integrator's velocities have it [rad/s]. Same shape."""
     link_position: NDArray[np.intp]
     """Addresses of the link angles in qpos. Shape (n_joints,)."""
     link_velocity: NDArray[np.intp]
     motor_position: NDArray[np.intp]
-    """Addresses of the motor angles in qpos, -1 for a rigid joint. (n_joints,)."""
+    """Addresses of the motor angles in qpos, -1 without a rotor. (n_joints,)."""
     motor_velocity: NDArray[np.intp]
 
     @property
@@ -143,6 +149,7 @@ def assemble(
     link_torque = load + arm.torques(
         trajectory.position, trajectory.velocity, trajectory.acceleration
     )
+    prescribed, prescribed_rate = _prescribed(scene, trajectory.position, transmissions)
     return Assembly(
         scene=scene,
         arm=arm,
@@ -162,6 +169,8 @@ def assemble(
             ratio=ratio,
             rotor_inertia=rotor,
         ),
+        prescribed=prescribed,
+        prescribed_rate=prescribed_rate,
         **_addresses(model, arm.joints, transmissions),
     )
 
@@ -198,6 +207,8 @@ def transmission_of(attached: JointDrive, drive: DriveMap) -> Transmission:
     law: DriveMap | None = None
     if attached.level == "full":
         law = attached.drive
+    elif attached.native is not None:
+        law = native_map(drive, attached.native)
     elif attached.level == "linear":
         law = DriveMap.linear(
             attached.stiffness,
@@ -208,6 +219,26 @@ def transmission_of(attached: JointDrive, drive: DriveMap) -> Transmission:
             name=drive.name,
         )
     return Transmission(attached=attached, drive=drive, law=law)
+
+
+def _prescribed(
+    scene: Scene, position: Array, transmissions: list[Transmission]
+) -> tuple[Array, Array]:
+    """Error and rate that level ``kinematic`` prescribes on the motion."""
+    step = scene.simulation.step_s
+    # one more sample in front for the rate of the first, as if the motion went on
+    path = np.vstack([2.0 * position[:1] - position[1:2], position])
+    error = np.column_stack(
+        [
+            t.attached.prescribed_error(t.ratio * path[:, j])
+            for j, t in enumerate(transmissions)
+        ]
+    )
+    # positions of the discrete integrator change by the velocity after the step
+    rate = np.diff(error, axis=0) / step
+    if scene.simulation.integrator != "discrete":
+        rate = np.gradient(error, step, axis=0)[1:]
+    return error[1:], rate
 
 
 def _complete_sections(

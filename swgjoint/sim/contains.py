@@ -4,13 +4,18 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from swgjoint.joint.prescribed import ratio_variation
+
 if TYPE_CHECKING:
+    from swgjoint.joint.drive import JointDrive
     from swgjoint.sim.assembly import Assembly
     from swgjoint.sim.transmission import Transmission
 
 _LEFT_OUT = {
     "rigid": "torsion, kinematic error and torque ripple (level rigid)",
+    "kinematic": "torsion and the torque ripple of the stiffness (level kinematic)",
     "linear": "kinematic error, torque ripple and hardening (level linear)",
+    "native": "kinematic error and torque ripple (level native)",
 }
 
 
@@ -44,10 +49,30 @@ def _joint(transmission: Transmission) -> dict[str, Any]:
         "tendon": attached.tendon,
         "plugin": attached.plugin,
         "rotor_inertia_kgm2": attached.rotor_inertia,
-        "stiffness_Nm_rad": None if attached.level == "rigid" else attached.stiffness,
+        "stiffness_Nm_rad": None if attached.rotor is None else attached.stiffness,
         "damping_Nms_rad": attached.damping,
         "natural_frequency_Hz": attached.natural_frequency / 6.283185307179586,
-        "orders": list(attached.kept_orders) if attached.level == "full" else [],
+        "orders": list(attached.kept_orders)
+        if attached.level in ("kinematic", "full")
+        else [],
+        **_native(attached),
+    }
+
+
+def _native(attached: JointDrive) -> dict[str, Any]:
+    """The elements of level ``native``; nothing for others."""
+    spring = attached.native
+    if spring is None:
+        return {}
+    return {
+        "native": {
+            "linear_Nm_rad": spring.linear,
+            "cubic_Nm_rad3": spring.cubic,
+            "residual_Nm": spring.residual,
+            "fitted_to_Nm": spring.fitted_to,
+            "hysteresis": list(attached.hysteresis),
+            "friction_Nm": spring.friction,
+        }
     }
 
 
@@ -55,9 +80,22 @@ def _left_out(transmission: Transmission) -> list[dict[str, str]]:
     attached = transmission.attached
     items = []
     if attached.level in _LEFT_OUT:
-        items.append(
-            {"part": _LEFT_OUT[attached.level], "reason": "the scene asks for no more"}
+        reason = (
+            "no native form"
+            if attached.level == "native"
+            else "the scene asks for no more"
         )
+        items.append({"part": _LEFT_OUT[attached.level], "reason": reason})
+    if attached.level == "kinematic":
+        share = 100.0 * ratio_variation(attached.drive)
+        items.append(
+            {
+                "part": f"change of the ratio in the torque, up to {share:.2g} %",
+                "reason": "the error is prescribed on the commanded motion",
+            }
+        )
+    if attached.native is not None and attached.native.note:
+        items.append({"part": "the stiffness curve", "reason": attached.native.note})
     if attached.unresolved:
         left = [f"{u.order:.4g}" for u in attached.unresolved]
         orders = f"orders {left[0]} to {left[-1]}" if left[1:] else f"order {left[0]}"

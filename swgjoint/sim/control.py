@@ -76,7 +76,7 @@ def add_actuators(
 
     The loop is the actuator's own affine law, torque = control - kp angle - kd speed,
     because MuJoCo then solves it within the step: a light rotor under a stiff loop
-    stays stable where a loop evaluated once per step would not. At level ``rigid`` the
+    stays stable where a loop evaluated once per step would not. Without a rotor the
     motor acts on the joint through the gear, so angle and speed are the motor's too.
     """
     for actuator in list(spec.actuators):
@@ -107,16 +107,22 @@ def control_inputs(assembly: Assembly) -> Array:
     """Actuator inputs of every step, motors then loads. Shape (n_steps, n_inputs).
 
     The integrator ``discrete`` evaluates the loop at the end of the step, so the
-    reference of that instant goes in; others evaluate it at the start.
+    reference of that instant goes in; others evaluate it at the start. At level
+    ``kinematic`` the angle that the loop sees is off by the prescribed error, and the
+    rotor's inertia acts against that error's acceleration; see
+    :mod:`swgjoint.joint.prescribed`.
     """
     path, ratio = assembly.trajectory, assembly.ratio
     inputs = (
-        assembly.stiffness * ratio * path.position
-        + assembly.damping * ratio * path.velocity
+        assembly.stiffness * ratio * (path.position + assembly.prescribed)
+        + assembly.damping * ratio * (path.velocity + assembly.prescribed_rate)
         + assembly.feedforward
     )
-    at_end = assembly.scene.simulation.integrator == "discrete"
+    simulation = assembly.scene.simulation
+    at_end = simulation.integrator == "discrete"
     steps = inputs[1:] if at_end else inputs[:-1]
+    acceleration = np.diff(assembly.prescribed_rate, axis=0) / simulation.step_s
+    steps = steps + assembly.rotor_inertia * ratio * acceleration
     load = assembly.load[assembly.load != 0.0]
     return np.hstack([steps, np.broadcast_to(load, (len(steps), load.size))])
 

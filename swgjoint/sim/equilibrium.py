@@ -41,6 +41,9 @@ def start_state(assembly: Assembly) -> tuple[Array, Array]:
         (_, before), (_, after) = _balance(assembly, -0.1), _balance(assembly, 0.1)
         moving = link_rate != 0.0
         link_rate[moving] = ((after - before) / (0.2 * h))[moving]
+    # a prescribed error moves the link as the integrator's velocities have it
+    stiff = assembly.motor_position < 0
+    link_rate[stiff] = (path.velocity[0] + assembly.prescribed_rate[0])[stiff]
     model = assembly.model
     qpos, qvel = model.qpos0.copy(), np.zeros(model.nv)
     flexible = assembly.motor_position >= 0
@@ -101,6 +104,8 @@ def _balance(assembly: Assembly, shift: float) -> tuple[Array, Array]:
         last = psi.copy()
         for j, transmission in enumerate(assembly.transmissions):
             if transmission.law is None:
+                error = transmission.attached.prescribed_error(theta[j])
+                psi[j] = reference[j] + float(error)
                 continue
             psi[j] = link_equilibrium(transmission, theta[j], float(needed[j]))
             if not moving[j]:

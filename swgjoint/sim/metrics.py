@@ -118,7 +118,7 @@ def drive_order(run: Run, j: int, order: float) -> float | None:
     joints, which reach this one through the arm.
     """
     attached = run.assembly.transmissions[j].attached
-    if attached.level != "full" or not attached.kept_orders:
+    if attached.level not in ("kinematic", "full") or not attached.kept_orders:
         return None
     near = min(attached.kept_orders, key=lambda kept: abs(kept - order))
     turns = np.ptp(run.motor_position[run.steady, j]) / (2.0 * np.pi)

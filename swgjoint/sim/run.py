@@ -47,7 +47,8 @@ class Run:
     velocity: Array
     """Link speeds [rad/s]. Shape (n, n_joints)."""
     motor_position: Array
-    """Input angles [rad]; those of an ideal gear for a rigid joint. (n, n_joints)."""
+    """Input angles [rad]; without a rotor those that the gear, ideal or with its
+    prescribed error, gives the link angles. Shape (n, n_joints)."""
     motor_velocity: Array
     """[rad/s]. Shape (n, n_joints)."""
     reference: Array
@@ -192,17 +193,18 @@ def _recorded(assembly: Assembly, name: str, states: Array, wall: float) -> Run:
     v = states[:, 1 + model.nq : 1 + model.nq + model.nv]
     position, velocity = q[:, assembly.link_position], v[:, assembly.link_velocity]
     flexible = assembly.motor_position >= 0
-    theta, theta_rate = ratio * position, ratio * velocity
+    theta = ratio * (position - assembly.prescribed)
+    theta_rate = ratio * (velocity - assembly.prescribed_rate)
     theta[:, flexible] = q[:, assembly.motor_position[flexible]]
     theta_rate[:, flexible] = v[:, assembly.motor_velocity[flexible]]
 
     motor = motor_torque(assembly, theta, theta_rate)
-    # rigid: what the motor gives less what its rotor takes; the integrator's own
+    # no rotor: what the motor gives less what its rotor takes; the integrator's own
     # acceleration is the velocity difference of the step that led to the state
     step = assembly.scene.simulation.step_s
     rotor_rate = np.diff(theta_rate, axis=0, prepend=theta_rate[:1]) / step
     output = ratio * (motor - assembly.rotor_inertia * rotor_rate)
-    torsion, error = np.zeros_like(position), np.zeros_like(position)
+    torsion, error = np.zeros_like(position), assembly.prescribed.copy()
     for j in np.flatnonzero(flexible):
         got = assembly.transmissions[j].signals(
             theta[:, j], position[:, j], theta_rate[:, j], velocity[:, j]

@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from swgjoint.faults import Fault, Section
 
-Level = Literal["rigid", "linear", "full"]
+Level = Literal["rigid", "kinematic", "linear", "native", "full"]
 LEVELS: tuple[str, ...] = get_args(Level)
 Integrator = Literal["discrete", "RK4"]
 FeedForward = Literal["none", "gravity", "gravity_inertia"]

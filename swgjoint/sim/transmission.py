@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.joint.drive import JointDrive, JointSignals
+from swgjoint.joint.native import play_hysteresis
 from swgjoint.maps.drive_map import DriveMap
 
 Array = NDArray[np.float64]
@@ -23,8 +24,9 @@ class Transmission:
     drive: DriveMap
     """The whole map; ratings, name and validity come from it."""
     law: DriveMap | None
-    """The map that the model carries: without unresolved harmonics, of constant
-    stiffness at level ``linear``, None at level ``rigid``."""
+    """The map that the model carries between motor and link: without unresolved
+    harmonics, of constant stiffness at level ``linear``, the elastic polynomial at
+    ``native``; None at the levels without a rotor, ``rigid`` and ``kinematic``."""
 
     @property
     def joint(self) -> str:
@@ -33,7 +35,7 @@ class Transmission:
 
     @property
     def level(self) -> str:
-        """``rigid``, ``linear`` or ``full``."""
+        """One of :data:`swgjoint.joint.attach.LEVELS`."""
         return self.attached.level
 
     @property
@@ -51,7 +53,8 @@ class Transmission:
     ) -> JointSignals:
         """Torsion, transmission error and output torque of recorded states. (n,).
 
-        The law at the true positions and velocities of each state; not for ``rigid``.
+        The law at the true positions and velocities of each state; hysteresis is played
+        over the whole record. Not for the levels without a rotor.
         """
         pieces = [
             self.attached.signals(
@@ -62,8 +65,13 @@ class Transmission:
             )
             for k in range(0, theta.size, _CHUNK)
         ]
+        torsion = np.concatenate([p.torsion for p in pieces])
+        torque = np.concatenate([p.torque for p in pieces])
+        native = self.attached.native
+        if native is not None and native.hysteresis:
+            torque = torque + play_hysteresis(native.hysteresis, torsion)
         return JointSignals(
-            torsion=np.concatenate([p.torsion for p in pieces]),
+            torsion=torsion,
             transmission_error=np.concatenate([p.transmission_error for p in pieces]),
-            torque=np.concatenate([p.torque for p in pieces]),
+            torque=torque,
         )

@@ -194,7 +194,10 @@ def test_joint_that_takes_no_drive(spec, synthetic_map, joint, says):
     [
         ({"rotor_inertia": 0.0}, r"rotor_inertia 0.0 kg·m².*> 0"),
         ({"rotor_inertia": float("nan")}, "rotor_inertia nan"),
-        ({"level": "soft"}, "'soft' unknown; accepted: rigid, linear, full"),
+        (
+            {"level": "soft"},
+            "'soft' unknown; accepted: rigid, kinematic, linear, native, full",
+        ),
         ({"damping_ratio": -0.1}, "damping_ratio -0.1"),
         ({"max_input_speed": 0.0}, "max_input_speed 0.0 rad/s"),
     ],

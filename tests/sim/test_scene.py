@@ -41,7 +41,8 @@ def test_all_faults_are_listed_at_once():
     assert len(lines) == 4
     assert all(line.startswith("file.toml: ") for line in lines)
     text = "\n".join(lines)
-    assert "defaults.level = 'ful': accepted: 'rigid', 'linear' or 'full'" in text
+    levels = "'rigid', 'kinematic', 'linear', 'native' or 'full'"
+    assert f"defaults.level = 'ful': accepted: {levels}" in text
     assert "joints.joint.rotor_inertia_kgm2 = -5e-05 kg·m²: accepted: > 0" in text
     assert "trajectory.speed_deg_s.joint = '3': accepted: a number" in text
     assert "simulation.steps_s: unknown key; did you mean step_s?" in text

@@ -1,0 +1,168 @@
+r"""Level ``native``: what MuJoCo's own elements can hold of a drive, no plugin.
+
+The mean curve becomes the polynomial stiffness of a tendon,
+:math:`T(x) = a x + c x^3` with x = theta/i - psi; hysteresis becomes parallel tendons
+with ``springyield`` (Jenkin elements), friction the ``frictionloss`` of the rotor.
+
+The last two exist only where the map's ``info`` has them: ``hysteresis``, a list of
+``{"stiffness_Nm_rad": k, "yield_torque_Nm": f}``, and ``friction``,
+``{"input_Nm": f}``. Kinematic error and the angle harmonics of the torque have no
+native form.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.errors import InputError
+from swgjoint.maps.drive_map import DriveMap
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Jenkin:
+    """A spring in series with a slider: hysteresis that dissipates."""
+
+    stiffness: float
+    """While it sticks [N·m/rad]."""
+    yield_torque: float
+    """At which it slips [N·m]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class NativeSpring:
+    """Elastic and dissipative parts of a drive in native elements."""
+
+    linear: float
+    """a [N·m/rad], > 0."""
+    cubic: float
+    """c [N·m/rad³], >= 0: a softening spring has no stable native form."""
+    residual: float
+    """Root mean square of what the fit leaves of the mean curve [N·m]."""
+    fitted_to: float
+    """Torque up to which the fit was made [N·m]."""
+    note: str = ""
+    """What the fit could not follow."""
+    hysteresis: tuple[Jenkin, ...] = ()
+    friction: float = 0.0
+    """Constant friction torque at the input [N·m]."""
+
+    def torque(self, torsion: Array) -> Array:
+        """Elastic torque, without hysteresis [N·m]."""
+        return np.asarray(torsion * (self.linear + self.cubic * torsion**2))
+
+
+def fit_native(drive: DriveMap) -> NativeSpring:
+    """Least squares of a x + c x³ to the mean curve up to the repeated peak torque.
+
+    Where the curve softens (c < 0) the spring is linear with the map's mean
+    stiffness; where it has no stiffness about zero (a <= 0: clearance) a thousandth
+    of the mean stiffness stays. ``note`` says so.
+
+    Raises:
+        InputError: If the map's ``info`` has unusable hysteresis or friction.
+    """
+    low, high = drive.torque_range
+    peak = min(drive.ratings.repeated_peak, -low, high)
+    if not peak > 0.0:
+        peak = drive.ratings.rated_torque
+    x = np.linspace(drive.mean_torsion(-peak), drive.mean_torsion(peak), 401)
+    torque = drive.coefficients(x, 1)[:, 0, 0]
+    unit = float(np.abs(x).max())  # keeps the two columns of one size
+    u = x / unit
+    (a, c), *_ = np.linalg.lstsq(np.column_stack([u, u**3]), torque, rcond=None)
+    a, c, note = a / unit, c / unit**3, ""
+    # below round-off of the fit a linear curve stays linear
+    if abs(c) * unit**2 < 1e-9 * abs(a):
+        c = 0.0
+    if c < 0.0:
+        a, c = drive.mean_stiffness, 0.0
+        note = "the mean curve softens: linear with its mean stiffness"
+    elif a <= 0.0:
+        a = 1e-3 * drive.mean_stiffness
+        c = max(float(u**3 @ (torque - a * x)) / float(u**3 @ u**3) / unit**3, 0.0)
+        note = "the mean curve has no stiffness about zero: cubic"
+    rest = torque - x * (a + c * x**2)
+    return NativeSpring(
+        linear=float(a),
+        cubic=float(c),
+        residual=float(np.sqrt(np.mean(rest**2))),
+        fitted_to=float(peak),
+        note=note,
+        hysteresis=_hysteresis(drive),
+        friction=_friction(drive),
+    )
+
+
+def native_map(drive: DriveMap, spring: NativeSpring) -> DriveMap:
+    """The elastic part as a map: the law between motor and link of this level."""
+    end = 4.0 * max(
+        abs(drive.mean_torsion(sign * drive.ratings.momentary_peak)) for sign in (-1, 1)
+    )
+    energy = np.polynomial.Polynomial([0, 0, 0.5 * spring.linear, 0, spring.cubic / 4])
+    potential = np.zeros((1, 2, 1, 5))
+    shifted = energy(np.polynomial.Polynomial([-end, 1.0])).coef
+    potential[0, 0, 0, : shifted.size] = shifted
+    stiffness = spring.linear + 3.0 * spring.cubic * end**2
+    return replace(
+        drive,
+        torsion_knots=np.array([-end, end]),
+        orders=np.zeros((1, 2), dtype=np.int64),
+        potential=potential,
+        end_stiffness=np.array([[[stiffness, stiffness], [0.0, 0.0]]]),
+        kinematic_error=np.zeros((1, 2)),
+    )
+
+
+def play_hysteresis(elements: Sequence[Jenkin], torsion: Array) -> Array:
+    """Torque of the elements along a history of torsion [N·m]. Shapes (n,).
+
+    The sliders start at zero torsion, as the engine resets them.
+    """
+    total = np.zeros_like(torsion)
+    for element in elements:
+        force, last = 0.0, 0.0
+        for k, x in enumerate(torsion):
+            force += element.stiffness * (float(x) - last)
+            force = min(max(force, -element.yield_torque), element.yield_torque)
+            total[k] += force
+            last = float(x)
+    return total
+
+
+def _hysteresis(drive: DriveMap) -> tuple[Jenkin, ...]:
+    given = drive.info.get("hysteresis")
+    if given is None:
+        return ()
+    if not isinstance(given, Sequence) or isinstance(given, str):
+        raise InputError(f"info.hysteresis of {drive.name!r}; accepted: a list")
+    return tuple(
+        Jenkin(
+            stiffness=_number(drive, item, "hysteresis", "stiffness_Nm_rad"),
+            yield_torque=_number(drive, item, "hysteresis", "yield_torque_Nm"),
+        )
+        for item in given
+    )
+
+
+def _friction(drive: DriveMap) -> float:
+    given = drive.info.get("friction")
+    return 0.0 if given is None else _number(drive, given, "friction", "input_Nm")
+
+
+def _number(drive: DriveMap, item: Any, where: str, key: str) -> float:
+    value = item.get(key) if isinstance(item, Mapping) else None
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        value = None
+    if value is None or not (np.isfinite(value) and value > 0.0):
+        raise InputError(
+            f"info.{where}.{key} of map {drive.name!r} is {value}; accepted: a finite"
+            " number > 0"
+        )
+    return float(value)
