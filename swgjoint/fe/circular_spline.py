@@ -9,6 +9,7 @@ the blocks decay within a few teeth.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,8 +25,6 @@ Index = NDArray[np.int64]
 
 NEGLIGIBLE = 1e-9
 """Blocks below this part of the largest one are left out."""
-PROJECTIONS = 3
-"""Steps to the foot; each one reduces its error to the share gap times curvature."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -49,8 +48,9 @@ class Compliance:
 
     def _respond(self, blocks: Array, force: Array) -> Array:
         result = np.zeros((len(force), blocks.shape[1]))
+        loaded = np.flatnonzero(force.any(axis=1))
         for offset, block in zip(self.offsets, blocks, strict=True):
-            result += np.roll(force, offset, axis=0) @ block.T
+            result[(loaded + offset) % len(force)] += force[loaded] @ block.T
         return result
 
     def between(self, tooth: Index, weight: Array, teeth: int) -> Array:
@@ -126,23 +126,37 @@ class CircularSpline:
         assert self.compliance is not None
         return self.compliance.element.spline
 
-    def feet(self, points: Array, flanks: FlankSplines | None, index: Index) -> Feet:
+    def feet(
+        self,
+        points: Array,
+        flanks: FlankSplines | None,
+        index: Index,
+        *,
+        start: Array | None = None,
+        steps: int = 3,
+    ) -> Feet:
         """Closest points of a right flank, exact for the deformed curve.
 
         Args:
             points: In the frame of a ring tooth, mirrored to its right flank (n, 2).
             flanks: Displacements of flanks in that frame; None for rigid ones.
             index: Which of the flanks each point faces (n,).
+            start: Stations near the feet (n,); those of the rigid flank if None [m].
+            steps: Newton steps to the foot; each one leaves the share gap times
+                curvature of the error, and the gap is wrong by its square.
         """
-        gap, normal, curvature = self.profile.signed_distance(points)
-        if flanks is None:
-            return Feet(gap=gap, normal=normal, curvature=curvature)
-        low, high = float(self.spline.x[0]), float(self.spline.x[-1])
-        outside = ~np.isfinite(gap)
-        foot = points - np.where(outside, 0.0, gap)[:, None] * normal
-        s = self._station(foot, low, high)
+        outside = np.zeros(len(points), dtype=bool)
+        if flanks is None or start is None:
+            gap, normal, curvature = self.profile.signed_distance(points)
+            if flanks is None:
+                return Feet(gap=gap, normal=normal, curvature=curvature)
+            outside = ~np.isfinite(gap)
+            start = self._station(
+                points - np.where(outside, 0.0, gap)[:, None] * normal
+            )
+        s, low, high = start, flanks.breaks[0], flanks.breaks[-1]
         side = -1.0 if self.profile.internal else 1.0
-        for _ in range(PROJECTIONS):
+        for _ in range(steps):
             base, outward, curvature = self.profile.evaluate(s)
             moved, slope = flanks.at(index, s)
             tangent = side * np.stack([outward[:, 1], -outward[:, 0]], axis=-1) + slope
@@ -156,14 +170,19 @@ class CircularSpline:
         gap = np.where(outside, np.inf, gap)
         return Feet(gap=gap, normal=normal, curvature=curvature, station=s)
 
-    def _station(self, foot: Array, low: float, high: float) -> Array:
-        """Arc length of points on the rigid flank, from their distance to the axis."""
-        table = np.linspace(low, high, 400)
+    @cached_property
+    def _stations_by_radius(self) -> tuple[Array, Array]:
+        stations = self.spline.x
+        table = np.linspace(float(stations[0]), float(stations[-1]), 400)
         points, _, _ = self.profile.evaluate(table)
         radius = np.hypot(points[:, 0], points[:, 1])
         order = np.argsort(radius)
-        wanted = np.hypot(foot[:, 0], foot[:, 1])
-        return np.interp(wanted, radius[order], table[order])
+        return table[order], radius[order]
+
+    def _station(self, foot: Array) -> Array:
+        """Arc length of points on the rigid flank, from their distance to the axis."""
+        table, radius = self._stations_by_radius
+        return np.interp(np.hypot(foot[:, 0], foot[:, 1]), radius, table)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -196,11 +196,19 @@ class ToothContact:
             np.repeat(sector, s.size),
             np.repeat(side, s.size),
             rigid=rigid,
+            steps=2,
         )
         return s, seen.feet.gap.reshape(-1, s.size), sector, side
 
     def _feet(
-        self, points: Array, sector: Index, side: Index, *, rigid: bool = False
+        self,
+        points: Array,
+        sector: Index,
+        side: Index,
+        *,
+        rigid: bool = False,
+        start: Array | None = None,
+        steps: int = 3,
     ) -> _Seen:
         """Feet on the circular spline of points in the mirrored sector frames."""
         ring = self.circular_spline
@@ -216,7 +224,7 @@ class ToothContact:
         tooth = np.where(side == 0, space - 1, -space).astype(np.int64)
         tooth %= len(self.ring_flank)
         flanks = None if rigid else self._ring_flanks
-        feet = ring.feet(seen, flanks, 2 * tooth + 1 - side)
+        feet = ring.feet(seen, flanks, 2 * tooth + 1 - side, start=start, steps=steps)
         normal = rotate(feet.normal * _MIRROR[1], -turn)
         return _Seen(feet=feet, normal=normal, tooth=tooth)
 
@@ -234,14 +242,17 @@ class ToothContact:
         low_s = np.maximum(station - spacing, low)
         high_s = np.minimum(station + spacing, high)
         d_spline = element.spline.derivative()
-        s = station
+        s, foot = station, None
         for _ in range(REFINEMENTS):
             point, outward, curvature = element.profile.evaluate(s)
             point = point + np.einsum("ks,ksi->ki", element.spline(s), mirrored)
             # tangent of the profile from tip to root: the outward normal turned back
             tangent = np.stack([outward[:, 1], -outward[:, 0]], axis=-1)
             tangent = tangent + np.einsum("ks,ksi->ki", d_spline(s), mirrored)
-            seen = self._feet(point, sector, side)
+            seen = self._feet(
+                point, sector, side, start=foot, steps=3 if foot is None else 2
+            )
+            foot = seen.feet.station
             slope = np.einsum("ki,ki->k", seen.normal, tangent)
             relative = curvature + seen.feet.curvature
             # the bracket holds the minimum: shrink it, and stay inside

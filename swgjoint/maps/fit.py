@@ -226,8 +226,10 @@ def energy_check(drive: DriveMap, samples: MapSamples) -> dict[str, float]:
     theta = np.broadcast_to(samples.input_angle, samples.output_error.shape)
     zero = int(np.flatnonzero(samples.torque == 0.0)[0])
     psi = theta / drive.ratio + samples.output_error - samples.output_error[zero].mean()
-    on_input, _ = drive.forces(theta, psi)
-    error = np.abs(-on_input - samples.input_torque)
+    on_input, on_output = drive.forces(theta, psi)
+    # the ripple is what the input feels beyond the output's torque over the ratio
+    simulated = samples.input_torque - samples.torque[:, None] / drive.ratio
+    error = np.abs(-on_input - on_output / drive.ratio - simulated)
     inside = (samples.torque > drive.torque_range[0]) & (
         samples.torque < drive.torque_range[1]
     )
