@@ -12,7 +12,7 @@ sampled torsion every coefficient continues as a parabola, the torque linearly.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Self
@@ -44,7 +44,7 @@ class DriveMap:
 
     name: str
     level: str
-    """Fidelity of the source: ``ring``, ``2d``, ``3d``, ``catalogue``, ``linear``."""
+    """Source: ``ring``, ``2d``, ``3d``, ``catalogue``, ``measurement``, ``linear``."""
     layout: str
     teeth_flexspline: int
     teeth_circular_spline: int
@@ -130,6 +130,59 @@ class DriveMap:
         )
 
     @classmethod
+    def from_catalogue(cls, name: str) -> Self:
+        """The map of a catalogue drive such as ``CSG-25-100``: series, size, ratio.
+
+        Stiffness K1, K2, K3 and ratings of the shipped tables; no kinematic error and
+        no hysteresis, of which a catalogue gives bounds only (``info["stated"]``).
+
+        Raises:
+            InputError: With the nearest names, if there is no such row.
+        """
+        from swgjoint.maps.from_catalogue import map_from_catalogue
+
+        return map_from_catalogue(name, cls)
+
+    @classmethod
+    def from_measurement(
+        cls,
+        path: str | Path,
+        *,
+        teeth_flexspline: int,
+        teeth_circular_spline: int,
+        ratings: Ratings | float,
+        kinematic_error: str | Path | None = None,
+        **options: Any,
+    ) -> Self:
+        """The map of a measured drive; ``info["fit"]`` holds residuals.
+
+        Args:
+            path: CSV file of a torque-torsion loop, input locked, both signs of the
+                torque: ``torque_Nm`` and ``torsion_arcmin`` or ``torsion_rad``.
+            teeth_flexspline: z_fs.
+            teeth_circular_spline: z_cs.
+            ratings: Torques, or the rated torque alone [N·m].
+            kinematic_error: CSV file of one output turn without load: ``output_deg``
+                and ``error_arcmin``, output minus ideal output (also ``_rad``).
+            **options: ``layout``, ``orders``, ``intervals``, ``damping_ratio``,
+                ``name``; see :mod:`swgjoint.maps.measurement`.
+
+        Raises:
+            InputError: If a file or a value cannot be used.
+        """
+        from swgjoint.maps.measurement import map_from_measurement
+
+        return map_from_measurement(
+            path,
+            cls,
+            teeth_flexspline=teeth_flexspline,
+            teeth_circular_spline=teeth_circular_spline,
+            ratings=ratings,
+            kinematic_error=kinematic_error,
+            **options,
+        )
+
+    @classmethod
     def load(cls, path: str | Path) -> Self:
         """Read a ``.swg`` file; see :mod:`swgjoint.maps.file`."""
         from swgjoint.maps.file import read_map
@@ -141,6 +194,19 @@ class DriveMap:
         from swgjoint.maps.file import write_map
 
         write_map(self, path)
+
+    def spec_sheet(self, only: Collection[str] = ()) -> dict[str, Any]:
+        """Catalogue-style figures, measured on the map by the standard procedures.
+
+        Keys as ``swgjoint spec`` has them; None where the source cannot tell, with the
+        reason in ``missing``.
+
+        Args:
+            only: Keys that are wanted, all for none.
+        """
+        from swgjoint.maps.spec_sheet import spec_sheet
+
+        return spec_sheet(self, only)
 
     # -- kinematics -----------------------------------------------------------
 

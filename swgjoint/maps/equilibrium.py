@@ -1,0 +1,121 @@
+"""Where the output of a map stands at a given input angle and torque."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from swgjoint.errors import ComputationError
+from swgjoint.maps.drive_map import DriveMap
+
+Array = NDArray[np.float64]
+
+CHUNK = 2**14
+"""Angles times harmonics that are evaluated at once: they stay in the cache."""
+_NEWTON = 12
+_BISECTIONS = 400
+
+
+def output_angle(drive: DriveMap, theta: ArrayLike, torque: ArrayLike) -> Array:
+    """Output angle psi [rad] at which the drive exerts a torque on the output.
+
+    Newton steps from the mean curve; what they do not settle is bisected. Where
+    clearance leaves the output free at zero torque, the middle (e0) is taken.
+
+    Args:
+        drive: The map.
+        theta: Input angles [rad].
+        torque: T on the output [N·m], broadcast with the angles.
+
+    Raises:
+        ComputationError: If a torque is not reached by the map.
+    """
+    theta, torque = np.broadcast_arrays(
+        np.asarray(theta, float), np.asarray(torque, float)
+    )
+    flat_theta, flat_torque = theta.ravel(), torque.ravel()
+    # torsion of the mean curve over torque, for the start
+    knots = drive.torsion_knots
+    x = np.linspace(2.0 * knots[0], 2.0 * knots[-1], 801)
+    curve = drive.coefficients(x, 1)[:, 0, 0], x
+    size = max(1, CHUNK // len(drive.orders))
+    parts = [
+        _solve(drive, curve, flat_theta[k : k + size], flat_torque[k : k + size])
+        for k in range(0, flat_theta.size, size)
+    ]
+    return np.concatenate(parts).reshape(theta.shape)
+
+
+def _solve(
+    drive: DriveMap, curve: tuple[Array, Array], theta: Array, torque: Array
+) -> Array:
+    ideal = theta / drive.ratio
+    e0, _, _ = drive.error_at(drive.phases(theta, ideal))
+    twist = np.where(torque == 0.0, 0.0, np.interp(torque, *curve))
+    psi = ideal + e0 - twist
+    span = float(drive.torsion_knots[-1] - drive.torsion_knots[0])
+    # the round-off of psi itself, many times finer than any sensor
+    settled = 8.0 * np.finfo(float).eps * np.maximum(np.abs(ideal), span)
+    open_ = np.arange(theta.size)
+    for _ in range(_NEWTON):
+        here = psi[open_]
+        f, slope = _torque(drive, theta[open_], here)
+        f = f - torque[open_]
+        step = np.where(
+            f == 0.0, 0.0, f / np.where(slope > 0.0, slope, np.nan)
+        )  # the torque falls with psi
+        step = np.clip(step, -span, span)
+        psi[open_] = here + step
+        open_ = open_[~(np.abs(step) <= settled[open_])]
+        if not open_.size:
+            return psi
+    start = (ideal + e0 - twist)[open_]
+    psi[open_] = _bisect(drive, theta[open_], torque[open_], start, 0.01 * span)
+    return psi
+
+
+def _torque(drive: DriveMap, theta: Array, psi: Array) -> tuple[Array, Array]:
+    """T on the output, -dV/dpsi, and the stiffness at fixed angles."""
+    phases = drive.phases(theta, psi)
+    cos, sin = np.cos(phases), np.sin(phases)
+    e0, _, e_psi = drive.error_at(phases)
+    x = theta / drive.ratio + e0 - psi
+    first, second = drive.coefficients(x, 1), drive.coefficients(x, 2)
+    torque = np.sum(first[..., 0] * cos + first[..., 1] * sin, axis=-1)
+    stiffness = np.sum(second[..., 0] * cos + second[..., 1] * sin, axis=-1)
+    total = torque * (1.0 - e_psi)
+    n_psi = drive.angle_orders[:, 1]
+    if n_psi.any():
+        ab = drive.coefficients(x)
+        total = total - np.sum((ab[..., 1] * cos - ab[..., 0] * sin) * n_psi, axis=-1)
+    return total, stiffness
+
+
+def _bisect(
+    drive: DriveMap, theta: Array, torque: Array, start: Array, width: float
+) -> Array:
+    """The same to round-off where stiffness vanishes or jumps."""
+
+    def excess(psi: Array) -> Array:
+        return _torque(drive, theta, psi)[0] - torque
+
+    ends = []
+    for sign in (-1.0, 1.0):
+        end, wide = start + sign * width, np.full(start.size, width)
+        while (out := sign * excess(end) > 0.0).any():
+            if wide.max() > 1e9 * width:
+                raise ComputationError(
+                    f"torque {float(torque[out][0]):g} N·m is not reached by the map"
+                    f" {drive.name!r}"
+                )
+            wide[out] *= 2.0
+            end = np.where(out, end + sign * wide, end)
+        ends.append(end)
+    low, high = ends
+    for _ in range(_BISECTIONS):
+        middle = 0.5 * (low + high)
+        if not ((low < middle) & (middle < high)).any():
+            break
+        above = excess(middle) > 0.0
+        low, high = np.where(above, middle, low), np.where(above, high, middle)
+    return np.asarray(0.5 * (low + high))

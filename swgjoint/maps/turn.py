@@ -1,0 +1,154 @@
+"""One output turn of a map: transmission error, accuracy, ripple, order spectrum."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from math import ceil, gcd, pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.arrays import frozen_array
+from swgjoint.maps.drive_map import DriveMap
+from swgjoint.maps.equilibrium import CHUNK, output_angle
+
+Array = NDArray[np.float64]
+
+PER_WAVE = 16
+"""Samples of the shortest wave; with the parabola through each extreme the
+peak-to-peak value is within 0.1 %."""
+AT_LEAST = 64
+"""Samples of one period."""
+MAX_SAMPLES = 4_000_000
+LINES = 12
+"""Orders that a sheet lists."""
+FLOOR = 1e-3
+"""Lines below this part of the strongest one are left out."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Turn:
+    """A periodic signal of the gear over its period, known for the whole output turn.
+
+    The period is one cycle of the pattern where the pattern depends on the input angle
+    alone, else the number of turns after which all members are back together.
+    """
+
+    period_turns: Fraction
+    """Length of the period [input turns]."""
+    turns: float
+    """Input turns of one output turn."""
+    signal: Array
+    """Equally spaced over the period, end excluded. Shape (n,)."""
+
+    def __post_init__(self) -> None:
+        signal = frozen_array(self.signal, "signal", ndim=1)
+        object.__setattr__(self, "signal", signal)
+
+    def over_output_turn(self) -> tuple[Array, Array]:
+        """Input angle [rad] and signal over one output turn, both ends included."""
+        n = self.signal.size
+        step = 2.0 * pi * float(self.period_turns) / n
+        index = np.arange(round(2.0 * pi * self.turns / step) + 1)
+        return np.asarray(index * step, dtype=np.float64), self.signal[index % n]
+
+    def peak_to_peak(self) -> float:
+        """Largest minus smallest over one output turn, between the samples too."""
+        n = self.signal.size
+        step = float(self.period_turns) / n
+        turn = self.signal[: min(n, round(self.turns / step) + 1)]
+        # one more sample at each end, so that extremes there have both neighbours
+        closed = np.concatenate([self.signal[-1:], turn, [self.signal[turn.size % n]]])
+        return _peak(closed) + _peak(-closed)
+
+    def rms(self) -> float:
+        """Root mean square about the mean, over the period."""
+        return float(np.std(self.signal))
+
+    def lines(self) -> tuple[Array, Array]:
+        """Orders per input turn and amplitudes (zero to peak), the mean left out."""
+        amplitude = 2.0 * np.abs(np.fft.rfft(self.signal)) / self.signal.size
+        order = np.arange(amplitude.size) / float(self.period_turns)
+        return order[1:], amplitude[1:]
+
+
+def _peak(values: Array) -> float:
+    """Largest value, by the parabola through it and its neighbours."""
+    k = int(np.argmax(values[1:-1])) + 1
+    a, b, c = (float(v) for v in values[k - 1 : k + 2])
+    bend = a - 2.0 * b + c
+    return b if bend >= 0.0 else b - (a - c) ** 2 / (8.0 * bend)
+
+
+def period_of(drive: DriveMap) -> tuple[Fraction, int]:
+    """Period of a map's pattern [input turns] and samples that carry its orders."""
+    n_theta, n_psi = drive.angle_orders.T
+    # an exact ratio: input turns for whole output turns
+    ratio = Fraction(drive.ratio).limit_denominator(drive.teeth_circular_spline)
+    if not n_psi.any():
+        period = Fraction(1, gcd(*(int(n) for n in n_theta)) or 1)
+    else:
+        period = Fraction(abs(ratio.numerator))
+    highest = float(np.abs(n_theta + n_psi / drive.ratio).max())
+    samples = ceil(max(AT_LEAST, PER_WAVE * highest * float(period)))
+    return period, min(samples, MAX_SAMPLES)
+
+
+def _input_angles(drive: DriveMap) -> tuple[Fraction, Array]:
+    period, samples = period_of(drive)
+    return period, 2.0 * pi * float(period) * np.arange(samples) / samples
+
+
+def error_turn(drive: DriveMap, torque: float = 0.0) -> Turn:
+    """Transmission error psi - theta/i [rad] at constant output torque [N·m].
+
+    Slow motion in one direction; at no load it is the kinematic error, with the shift
+    that the cogging of the unloaded drive gives.
+    """
+    period, theta = _input_angles(drive)
+    error = output_angle(drive, theta, torque) - theta / drive.ratio
+    return Turn(period_turns=period, turns=abs(drive.ratio), signal=error)
+
+
+def ripple_turn(drive: DriveMap, torque: float) -> Turn:
+    """Output torque with the output held on its ideal motion [N·m].
+
+    psi = theta/i less the mean torsion at the given torque: the output follows the
+    ratio exactly, as if a stiff load turned at constant speed.
+    """
+    period, theta = _input_angles(drive)
+    psi = theta / drive.ratio - drive.mean_torsion(torque)
+    size = max(1, CHUNK // len(drive.orders))
+    parts = [
+        drive.forces(theta[k : k + size], psi[k : k + size])[1]
+        for k in range(0, theta.size, size)
+    ]
+    return Turn(
+        period_turns=period, turns=abs(drive.ratio), signal=np.concatenate(parts)
+    )
+
+
+def strongest_orders(turns: dict[str, Turn]) -> list[dict[str, float]]:
+    """Lines of several signals of one drive, the strongest of the first signal first.
+
+    Args:
+        turns: Signals by key, in the units wanted in the result.
+
+    Returns:
+        At most :data:`LINES` of each signal: ``order`` per input turn and the
+        amplitude (zero to peak) of every signal there.
+    """
+    spectra = {key: turn.lines() for key, turn in turns.items()}
+    found: dict[int, None] = {}
+    for _, amplitude in spectra.values():
+        largest = float(amplitude.max(initial=0.0))
+        for k in np.argsort(amplitude)[::-1][:LINES]:
+            if amplitude[k] > FLOOR * largest and largest > 0.0:
+                found[int(k)] = None
+    order = next(iter(spectra.values()))[0]
+    return [
+        {"order": float(order[k])}
+        | {key: float(amplitude[k]) for key, (_, amplitude) in spectra.items()}
+        for k in found
+    ]

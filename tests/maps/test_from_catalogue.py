@@ -1,0 +1,166 @@
+"""Catalogue drives: the procedures measure on the map what the tables state."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from swgjoint.errors import InputError
+from swgjoint.maps import from_catalogue as catalogue
+from swgjoint.maps.catalogue import table
+from swgjoint.maps.drive_map import DriveMap
+from swgjoint.maps.file import map_bytes, map_from_bytes
+from swgjoint.maps.from_catalogue import (
+    catalogue_faults,
+    catalogue_gaps,
+    catalogue_names,
+    is_catalogue_name,
+    stated_figures,
+    three_lines,
+)
+from swgjoint.maps.torsion_law import potential_of_stiffness, torque_at_knots
+
+
+@pytest.mark.parametrize("name", catalogue_names())
+def test_the_loop_returns_the_stiffness_of_the_row(name):
+    """K1, K2, K3 measured on the loop are those of the table within 2 %."""
+    drive = DriveMap.from_catalogue(name)
+    sheet = drive.spec_sheet(["K1_Nm_rad", "K2_Nm_rad", "K3_Nm_rad", "T1_Nm", "T2_Nm"])
+    _, size, ratio = name.split("-")
+    ratio_class = max(c for c in (30, 50, 80) if c <= int(ratio))
+    row = next(
+        row
+        for row in table("stiffness")
+        if (row["size"], row["ratio_class"]) == (int(size), ratio_class)
+    )
+    for k in ("K1", "K2", "K3"):
+        stated = 1e4 * row[f"{k}_1e4Nm_rad"]
+        assert sheet[f"{k}_Nm_rad"] == pytest.approx(stated, rel=0.02)
+    assert (sheet["T1_Nm"], sheet["T2_Nm"]) == (row["T1_Nm"], row["T2_Nm"])
+    assert drive.ratio == -int(ratio)
+
+
+def test_torsion_at_the_limits_by_hand():
+    """CSG-25-100: T1/K1 = 1.553 arcmin at 14 N·m, 3.89 arcmin at 48 N·m, odd."""
+    drive = DriveMap.from_catalogue("CSG-25-100")
+    arcmin = np.pi / 10800
+    for sign in (1, -1):
+        # the corners are rounded: the curve lies beside them by less than 1 %
+        at_T1, at_T2 = (drive.mean_torsion(sign * T) / arcmin for T in (14.0, 48.0))
+        assert at_T1 == pytest.approx(sign * 1.5525, rel=0.01)
+        assert at_T2 == pytest.approx(sign * (1.5525 + 2.3377), rel=0.01)
+        # beyond the corner it runs on the line of the catalogue
+        far = sign * (1.5525 + 2.3377 + 52.0 / 5.7e4 / arcmin)
+        assert drive.mean_torsion(sign * 100.0) / arcmin == pytest.approx(far, rel=1e-4)
+
+
+def test_map_is_sound_and_reaches_the_momentary_peak():
+    """A catalogue map passes the checks of the file and is stored without loss."""
+    for name in catalogue_names():
+        drive = DriveMap.from_catalogue(name)
+        again = map_from_bytes(map_bytes(drive), DriveMap)
+        assert map_bytes(again) == map_bytes(drive)
+        assert drive.torque_range[1] >= drive.ratings.momentary_peak * (1 - 1e-12)
+
+
+def test_what_a_catalogue_bounds_is_not_in_the_map():
+    """No kinematic error; the sheet has null and the catalogue's bound as reason."""
+    drive = DriveMap.from_catalogue("CSG-14-50")
+    assert not drive.kinematic_error.any()
+    assert drive.info["stated"]["transmission_accuracy_arcmin"] == 1.5
+    sheet = drive.spec_sheet()
+    assert sheet["transmission_accuracy_arcmin"] is None
+    assert "1.5 arcmin" in sheet["missing"]["transmission_accuracy_arcmin"]
+    assert sheet["hysteresis_loss_arcmin"] is None
+    assert "conservative" in sheet["missing"]["hysteresis_loss_arcmin"]
+    assert drive.info["stated"]["input_inertia_kgm2"] == pytest.approx(3.3e-6)
+
+
+def test_lost_motion_is_not_above_the_bound_of_the_size():
+    """The elastic lost motion stays below the one arcmin that the tables bound."""
+    bounds = {row["size"]: row["lost_motion_arcmin"] for row in table("accuracy")[:15]}
+    for name in catalogue_names():
+        lost = DriveMap.from_catalogue(name).spec_sheet(["lost_motion_arcmin"])
+        assert 0 < lost["lost_motion_arcmin"] <= bounds[int(name.split("-")[1])]
+
+
+def test_tables_agree_with_themselves(monkeypatch):
+    """The shipped tables have no contradiction; a swapped or misplaced digit is one."""
+    assert catalogue_faults() == []
+    rows = table("stiffness")
+    for key, value, word in (
+        ("K2_1e4Nm_rad", 0.3, "K1 < K2 < K3"),
+        ("K1_1e4Nm_rad", 0.0047, "median"),
+        ("T2_Nm", 1.0, "T1 < T2"),
+    ):
+        row = next(r for r in rows if (r["size"], r["ratio_class"]) == (14, 80))
+        changed = tuple({**r, key: value} if r is row else r for r in rows)
+        monkeypatch.setattr(
+            catalogue,
+            "table",
+            lambda name, c=changed: c if name[0] == "s" else table(name),
+        )
+        assert any(word in fault for fault in catalogue_faults())
+        with pytest.raises(InputError, match="size 14, class 80"):
+            DriveMap.from_catalogue("CSG-14-100")
+
+
+def test_gaps_are_listed():
+    """Rows without ratings or without a figure are named with what they lack."""
+    gaps = {gap["row"]: gap["missing"] for gap in catalogue_gaps()}
+    assert gaps["stiffness 8-30"] == ["ratings"]
+    assert gaps["accuracy CHA-14-30"] == ["ratings"]
+    assert "stiffness 14-50" not in gaps
+    for name in catalogue_names():
+        row = catalogue.find_row(name)
+        empty = [key for key, value in stated_figures(row).items() if value is None]
+        assert gaps.get(name, []) == empty
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("CSG-26-100", ["ratings.csv", "CSG-25-100"]),
+        ("CSG-25-70", ["CSG-25-80"]),
+        ("CHA-25-100", ["no ratings", "series CHA", "CSG-25-100"]),
+        ("csg25", ["SERIES-SIZE-RATIO", "CSG-25-100"]),
+        ("", ["SERIES-SIZE-RATIO"]),
+    ],
+)
+def test_unknown_names(name, words):
+    """A name without a row is refused in one line with the nearest ones."""
+    with pytest.raises(InputError) as caught:
+        DriveMap.from_catalogue(name)
+    assert all(word in str(caught.value) for word in words)
+    assert "\n" not in str(caught.value)
+
+
+def test_names_are_told_from_designs():
+    """A series with a number is the catalogue in any case; a design or file is not."""
+    assert DriveMap.from_catalogue(" csg-25-100 ").name == "CSG-25-100"
+    for text in ("CSG-25-100", "csg-8-30", "CHA-25-100", "hfuc20", "CSG"):
+        assert is_catalogue_name(text)
+    for text in ("size-25-100", "reference-2d", "csg.toml", "chain", "shg/a.toml"):
+        assert not is_catalogue_name(text)
+
+
+def test_potential_is_the_integral_of_the_stiffness():
+    """Torque and energy of the law against quadrature of a stiffness by hand."""
+    knots, stiffness = three_lines(10.0, 30.0, 1e4, 2e4, 3e4, largest=90.0)
+    potential, ends = potential_of_stiffness(knots, stiffness)
+    assert list(ends[0, 0]) == [3e4, 3e4]
+    x = np.linspace(0.0, knots[-1], 200_001)
+    k = np.interp(x, knots, stiffness)
+    step = x[1]
+    torque = np.concatenate([[0.0], np.cumsum(0.5 * (k[1:] + k[:-1]) * step)])
+    energy = np.concatenate([[0.0], np.cumsum(0.5 * (torque[1:] + torque[:-1]) * step)])
+    drive = DriveMap.linear(1e4)
+    fields = {key: getattr(drive, key) for key in drive.__dataclass_fields__}
+    fields |= {"torsion_knots": knots, "potential": potential, "end_stiffness": ends}
+    drive = DriveMap(**fields)
+    for sign in (1, -1):
+        ours = drive.coefficients(sign * x, 1)[:, 0, 0]
+        assert np.abs(ours - sign * torque).max() < 1e-6 * torque[-1]
+        ours = drive.coefficients(sign * x, 0)[:, 0, 0]
+        assert np.abs(ours - energy).max() < 1e-6 * energy[-1]
+    assert torque_at_knots(knots, stiffness)[-1] == pytest.approx(90.0, rel=1e-12)

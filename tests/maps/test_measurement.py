@@ -1,0 +1,231 @@
+"""Maps from measurements: what a known map was made to show comes back."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from swgjoint.errors import InputError
+from swgjoint.maps.drive_map import DriveMap, Ratings
+from swgjoint.maps.equilibrium import output_angle
+from swgjoint.maps.file import map_bytes
+from swgjoint.units import arcmin, deg
+
+TEETH = {"teeth_flexspline": 120, "teeth_circular_spline": 122}
+
+
+def write(path, header, *columns, comment="# rig 3\n"):
+    rows = "\n".join(
+        ",".join(f"{v:.17g}" for v in row) for row in zip(*columns, strict=True)
+    )
+    path.write_text(f"{comment}{header}\n{rows}\n")
+    return path
+
+
+def hysteresis_loop(drive, *, width=0.0, noise=0.0, shift=0.0, top=100.0, n=300):
+    """Torque and torsion of a loop about the mean curve of a map, twice around."""
+    rng = np.random.default_rng(11)
+    lap = np.concatenate([np.linspace(-top, top, n), np.linspace(top, -top, n)])
+    torque = np.concatenate([lap, lap])
+    x = np.array([drive.mean_torsion(T) for T in lap])
+    x = np.concatenate([x, x]) + shift
+    # the branches meet where the torque turns
+    x += (
+        np.where(np.gradient(torque) > 0, -0.5, 0.5) * width * (1 - (torque / top) ** 2)
+    )
+    return torque, x + noise * rng.standard_normal(x.size)
+
+
+@pytest.mark.parametrize("unit", ["arcmin", "rad"])
+def test_a_known_curve_comes_back(synthetic_map, tmp_path, unit):
+    """Torque over torsion within 0.2 % of the peak, although loop and zero are off."""
+    drive = synthetic_map.with_harmonics([True] + [False] * 4)
+    torque, x = hysteresis_loop(drive, width=1e-4, shift=2e-3, n=301)
+    factor = arcmin if unit == "arcmin" else 1.0
+    path = write(tmp_path / "a.csv", f"torque_Nm,torsion_{unit}", torque, x / factor)
+    found = DriveMap.from_measurement(path, ratings=synthetic_map.ratings, **TEETH)
+    inside = np.linspace(*found.torsion_knots[[0, -1]], 300)
+    ours = found.coefficients(inside, 1)[:, 0, 0]
+    wanted = drive.coefficients(inside, 1)[:, 0, 0]
+    assert np.abs(ours - wanted).max() < 0.002 * 100.0
+    report = found.info["fit"]["torsion"]
+    assert report["hysteresis_loss_arcmin"] == pytest.approx(1e-4 / arcmin, rel=1e-6)
+    assert report["torsion_at_zero_torque_arcmin"] == pytest.approx(
+        2e-3 / arcmin, rel=1e-3
+    )
+    assert report["residual_max_Nm"] < 0.2
+    assert found.coefficients(0.0, 1)[0, 0] == pytest.approx(0.0, abs=1e-9)
+    map_bytes(found)
+
+
+def test_a_catalogue_drive_comes_back(tmp_path):
+    """K1, K2, K3 of a measured catalogue drive within 2 %, noise 0.02 arcmin."""
+    drive = DriveMap.from_catalogue("CSG-25-100")
+    torque, x = hysteresis_loop(drive, width=2e-4, noise=0.02 * arcmin, top=210.0)
+    path = write(tmp_path / "a.csv", "torque_Nm,torsion_rad", torque, x)
+    found = DriveMap.from_measurement(
+        path,
+        teeth_flexspline=200,
+        teeth_circular_spline=202,
+        ratings=drive.ratings,
+        intervals=48,
+    )
+    keys = ["K1_Nm_rad", "K2_Nm_rad", "K3_Nm_rad"]
+    wanted, ours = drive.spec_sheet(keys), found.spec_sheet(keys)
+    for key in keys:
+        assert ours[key] == pytest.approx(wanted[key], rel=0.02)
+    # residuals are those of the noise: mean of two branches, 1/sqrt(2) of it or more
+    rms = found.info["fit"]["torsion"]["residual_rms_arcmin"]
+    assert 0.005 < rms < 0.02
+
+
+def test_the_curve_is_monotone_whatever_the_noise(synthetic_map, tmp_path):
+    """Stiffness stays positive with noise as large as a tenth of the travel."""
+    drive = synthetic_map.with_harmonics([True] + [False] * 4)
+    torque, x = hysteresis_loop(drive, noise=5e-4, n=40)
+    path = write(tmp_path / "a.csv", "torque_Nm,torsion_rad", torque, x)
+    found = DriveMap.from_measurement(path, ratings=50.0, **TEETH)
+    x = np.linspace(*(1.2 * found.torsion_knots[[0, -1]]), 500)
+    assert (found.coefficients(x, 2)[:, 0, 0] > 0).all()
+    assert "0.2 and 0.6 of rated" in found.ratings.source
+
+
+def error_record(drive, n=20_000, noise=0.0):
+    """Output angle and error [rad] of one output turn, unloaded, unequal steps."""
+    rng = np.random.default_rng(4)
+    theta = np.sort(rng.uniform(0.0, 2 * np.pi * abs(drive.ratio), n))
+    theta[[0, -1]] = 0.0, 2 * np.pi * abs(drive.ratio)
+    psi = output_angle(drive, theta, 0.0)
+    return psi, psi - theta / drive.ratio + noise * rng.standard_normal(n) + 3e-4
+
+
+def test_harmonics_come_back(tmp_path):
+    """Amplitude and phase of every order of alpha and beta, from output and error."""
+    orders = [(0, 0), (2, 0), (4, 0), (0, 2), (3, 1)]
+    rng = np.random.default_rng(1)
+    amplitudes = np.concatenate([[[0, 0]], 3e-5 * rng.uniform(0.2, 1, (4, 2))])
+    linear = DriveMap.linear(2e4, **TEETH)
+    fields = {k: getattr(linear, k) for k in linear.__dataclass_fields__}
+    potential = np.zeros((5, *linear.potential.shape[1:]))
+    ends = np.zeros((5, 2, 2))
+    potential[0], ends[0] = linear.potential[0], linear.end_stiffness[0]
+    fields |= {
+        "orders": np.array(orders),
+        "kinematic_error": amplitudes,
+        "potential": potential,
+        "end_stiffness": ends,
+    }
+    drive = DriveMap(**fields)
+    loop = write(
+        tmp_path / "loop.csv", "torque_Nm,torsion_rad", *hysteresis_loop(drive)
+    )
+    psi, error = error_record(drive)
+    record = write(
+        tmp_path / "error.csv",
+        "time_s,output_deg,error_arcmin",
+        np.arange(psi.size),
+        psi / deg,
+        error / arcmin,
+    )
+    found = DriveMap.from_measurement(
+        loop,
+        kinematic_error=record,
+        ratings=drive.ratings,
+        orders=[(1, 0), *orders[1:], (122, 0), (0, 5)],
+        **TEETH,
+    )
+    assert [tuple(pq) for pq in found.orders] == [(0, 0), *orders[1:]]
+    assert np.abs(found.kinematic_error - amplitudes).max() < 1e-10
+    report = found.info["fit"]["kinematic_error"]
+    assert report["residual_max_arcmin"] < 1e-6
+    assert [(d["alpha"], d["beta"]) for d in report["dropped"]] == [
+        (1, 0),
+        (122, 0),
+        (0, 5),
+    ]
+    key = "transmission_accuracy_arcmin"
+    assert found.spec_sheet([key])[key] == pytest.approx(drive.spec_sheet([key])[key])
+
+
+def test_orders_that_the_samples_cannot_tell_are_listed(synthetic_map, tmp_path):
+    """A coarse record gives the low orders and says which it cannot carry."""
+    drive = synthetic_map.with_harmonics([True, True, True, False, False])
+    loop = write(
+        tmp_path / "loop.csv", "torque_Nm,torsion_rad", *hysteresis_loop(drive)
+    )
+    psi, error = error_record(drive, n=2000)
+    record = write(
+        tmp_path / "e.csv", "output_deg,error_arcmin", psi / deg, error / arcmin
+    )
+    found = DriveMap.from_measurement(
+        loop,
+        kinematic_error=record,
+        ratings=50.0,
+        orders=[(2, 0), (4, 0), (122, 0)],
+        **TEETH,
+    )
+    assert found.info["fit"]["kinematic_error"]["unresolved"] == [[122, 0]]
+    assert [tuple(pq) for pq in found.orders] == [(0, 0), (2, 0), (4, 0)]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("torque_Nm,torsion\n1,2\n", "no column torsion_arcmin or torsion_rad"),
+        ("torque_Nm,torsion_rad\n1,2\n3\n", "line 3: 1 cells"),
+        ("# x\ntorque_Nm,torsion_rad\n1,x\n", "line 3: torsion_rad = 'x'"),
+        ("torque_Nm,torsion_rad\n1,nan\n", "accepted: a finite number"),
+        ("", "empty"),
+        ("torque_Nm,torsion_rad\n-1,0\n1,1\n", "2 samples"),
+        (
+            "torque_Nm,torsion_rad\n" + "\n".join(f"{k},{k}" for k in range(20)),
+            "accepted: both signs",
+        ),
+        (
+            "torque_Nm,torsion_rad\n" + "\n".join(f"{k},{-k}" for k in range(-9, 10)),
+            "torsion does not grow",
+        ),
+    ],
+)
+def test_bad_loops(tmp_path, text, message):
+    """A file that is no loop is refused in one line that names file and place."""
+    path = tmp_path / "bad.csv"
+    path.write_text(text)
+    with pytest.raises(InputError) as caught:
+        DriveMap.from_measurement(path, ratings=50.0, **TEETH)
+    assert message in str(caught.value)
+    assert "bad.csv" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_bad_options(synthetic_map, tmp_path):
+    """Missing file, half a turn, ratings and teeth that cannot be."""
+    drive = synthetic_map.with_harmonics([True, True, False, False, False])
+    loop = write(
+        tmp_path / "loop.csv", "torque_Nm,torsion_rad", *hysteresis_loop(drive)
+    )
+    psi, error = error_record(drive, n=2000)
+    half = write(
+        tmp_path / "half.csv",
+        "output_deg,error_arcmin",
+        psi[:1000] / deg,
+        error[:1000] / arcmin,
+    )
+    for path, options, message in (
+        (tmp_path / "none.csv", {}, "cannot be read"),
+        (loop, {"kinematic_error": half}, "accepted: one turn, 360 deg"),
+        (loop, {"ratings": -1.0}, "rated torque -1"),
+        (loop, {"layout": "x"}, "layout 'x'"),
+        (loop, {"intervals": 0}, "intervals 0"),
+    ):
+        with pytest.raises(InputError, match=message):
+            DriveMap.from_measurement(path, **{"ratings": 50.0, **TEETH, **options})
+    with pytest.raises(InputError, match="teeth 122 and 120"):
+        DriveMap.from_measurement(
+            loop, ratings=50.0, teeth_flexspline=122, teeth_circular_spline=120
+        )
+    given = Ratings(
+        rated_torque=1.0, repeated_peak=2.0, momentary_peak=3.0, T1=0.2, T2=0.6
+    )
+    found = DriveMap.from_measurement(loop, ratings=given, name="rig", **TEETH)
+    assert (found.name, found.ratings) == ("rig", given)
