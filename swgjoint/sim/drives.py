@@ -3,11 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from difflib import get_close_matches
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from swgjoint.errors import InputError
 from swgjoint.maps.drive_map import DriveMap
+from swgjoint.maps.from_catalogue import catalogue_names, is_catalogue_name
+from swgjoint.models_path import bundled_names
 from swgjoint.progress import Progress, silent
 from swgjoint.sim.scene_sections import JointSection, LinearDrive
+
+if TYPE_CHECKING:
+    from swgjoint.gear.design import Design
 
 
 def drive_of(
@@ -24,7 +32,7 @@ def drive_of(
         progress: Called while a map is built.
 
     Raises:
-        InputError: If the reference is no design and no map file.
+        InputError: If the reference is no design, map file or catalogue drive.
     """
     if section.linear is not None:
         return linear_map(section.linear)
@@ -46,14 +54,64 @@ def linear_map(section: LinearDrive) -> DriveMap:
     )
 
 
-def load_drive(reference: str, *, progress: Progress = silent) -> DriveMap:
-    """The map of a ``.swg`` file, or one built from a design (cached)."""
+def load_drive(
+    reference: str,
+    *,
+    model: str | None = None,
+    angles: int | None = None,
+    progress: Progress = silent,
+) -> DriveMap:
+    """The map of a ``.swg`` file, of the catalogue, or built from a design (cached).
+
+    Args:
+        reference: See :func:`find_drive`.
+        model: Fidelity for a design; None for its default.
+        angles: Wave-generator positions for a design; None for the default.
+        progress: Called while a map is built.
+
+    Raises:
+        InputError: If the reference is none of these, or a fidelity is given for what
+            is no design.
+    """
+    source = find_drive(reference)
+    if isinstance(source, DriveMap):
+        if model is not None:
+            raise InputError(
+                f"model {model!r} for {reference!r}, a map of level {source.level!r};"
+                " accepted: a design"
+            )
+        return source
+    from swgjoint.fe.build_map import build_map
+
+    if angles is None:
+        return build_map(source, model=model, progress=progress)
+    return build_map(source, model=model, angles=angles, progress=progress)
+
+
+def find_drive(reference: str) -> DriveMap | Design:
+    """What a drive reference names; nothing is built.
+
+    A name ending ``.swg`` is a map; an existing file or a bundled name is a design; a
+    name that begins with a catalogue series (``CSG-25-100``) is a catalogue drive.
+
+    Raises:
+        InputError: If it is none of these.
+    """
     if reference.endswith(".swg"):
         return DriveMap.load(reference)
-    from swgjoint.fe.build_map import build_map
     from swgjoint.gear.design import Design
 
-    return build_map(Design.load(reference), progress=progress)
+    file = Path(reference).is_file()
+    bundled = reference in bundled_names("drives", ".toml")
+    if not file and not bundled and is_catalogue_name(reference):
+        return DriveMap.from_catalogue(reference)
+    try:
+        return Design.load(reference)
+    except InputError as exc:
+        near = get_close_matches(reference.upper(), catalogue_names(), n=1, cutoff=0.8)
+        if file or not near:
+            raise
+        raise InputError(f"{exc}; in the catalogue: {near[0]}") from None
 
 
 def check_joint_names(
