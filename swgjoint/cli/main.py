@@ -28,6 +28,7 @@ COMMANDS = {
     "profile": "tooth profile of both members: report and picture",
     "meshing": "simulation of meshing with finite elements",
     "map": "build the map of a drive and save it",
+    "spec": "catalogue-style sheet of a design, a map or a catalogue drive",
     "run": "simulate an arm with its drives",
     "view": "open a recording",
     "doctor": "versions, engine plugin, cache, optional parts",

@@ -1,0 +1,170 @@
+"""``swgjoint spec``: catalogue-style sheet of a design, map or catalogue drive."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from typing import TYPE_CHECKING, Any
+
+from swgjoint.cli.text import table
+from swgjoint.files import output_folder, write_whole
+from swgjoint.json_text import json_text
+
+if TYPE_CHECKING:
+    from swgjoint.maps.spec_sheet import SpecSheet
+
+FEW_ANGLES = 3
+"""Wave-generator positions of a design's map where every wanted figure is read with the
+input locked at the first one."""
+
+_UNITS = {
+    "Nm": "N·m",
+    "Nm_rad": "N·m/rad",
+    "arcmin": "arcmin",
+    "percent": "%",
+    "mm": "N/mm",
+    "factor": "",
+}
+_SHOWN_ORDERS = 6
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Drive, fidelity, keys, output folder."""
+    parser.add_argument(
+        "drive",
+        metavar="FILE|DESIGN|NAME",
+        help="map (.swg), design file or bundled name, catalogue name (CSG-25-100)",
+    )
+    parser.add_argument(
+        "--model",
+        choices=("ring", "2d", "3d"),
+        help="fidelity for a design; default 3d for a design with a cup, else 2d",
+    )
+    parser.add_argument(
+        "--only",
+        metavar="KEY,...",
+        help="compute no more than these keys need: ratings alone need no finite"
+        " elements; stiffness, hysteresis loss and lost motion few positions",
+    )
+    parser.add_argument(
+        "--out", metavar="DIR", help="write spec.json and spec.png there"
+    )
+
+
+def run(args: argparse.Namespace) -> dict[str, Any]:
+    """Find or build the map and measure it.
+
+    Returns:
+        Every key of :data:`swgjoint.maps.spec_sheet.KEYS` (or those of ``--only``),
+        None where the source cannot tell, with the reason in ``missing``; ``design``,
+        ``validity``, ``files``, ``wall_s``.
+    """
+    start = time.perf_counter()
+    folder = output_folder(args.out) if args.out else None
+    from swgjoint.maps.spec_sheet import check_keys, measure_spec, validity
+
+    only = [] if args.only is None else [k.strip() for k in args.only.split(",")]
+    keys = check_keys(only)
+    drive, ratings, name = _drive(args, keys)
+    sheet = measure_spec(drive, ratings=ratings, only=keys)
+    result: dict[str, Any] = {"design": name, **sheet.as_dict()}
+    if drive is not None:
+        result["validity"] = validity(drive)
+        result["stated"] = drive.info.get("stated")
+    else:
+        result["validity"] = {"level": "design", "ratings": ratings.source}
+    result["files"] = []
+    if folder is not None:
+        _write(folder, result, sheet, start)
+    result["wall_s"] = time.perf_counter() - start
+    return result
+
+
+def _drive(args: argparse.Namespace, keys: tuple[str, ...]) -> tuple[Any, Any, str]:
+    """Map (None where ratings suffice), ratings and name."""
+    from swgjoint.maps.catalogue import ratings_of
+    from swgjoint.maps.drive_map import DriveMap
+    from swgjoint.maps.spec_sheet import needs_map, needs_turn
+    from swgjoint.sim.drives import find_drive, load_drive
+
+    if not needs_map(keys) and args.model is None:
+        source = find_drive(args.drive)
+        if not isinstance(source, DriveMap):
+            return None, ratings_of(source), source.drive.name
+        return source, source.ratings, source.name
+    drive = load_drive(
+        args.drive,
+        model=args.model,
+        angles=None if needs_turn(keys) else FEW_ANGLES,
+        progress=args.progress,
+    )
+    return drive, drive.ratings, drive.name
+
+
+def _write(folder: Any, result: dict[str, Any], sheet: SpecSheet, start: float) -> None:
+    from swgjoint.view.spec_plots import spec_picture
+
+    picture = spec_picture(result["design"], sheet)
+    folder.mkdir(parents=True, exist_ok=True)
+    result["files"] = [str(folder / f"spec.{end}") for end in ("json", "png")]
+    content = result | {"wall_s": time.perf_counter() - start}
+    write_whole(folder / "spec.json", json_text(content) + "\n")
+    write_whole(folder / "spec.png", picture)
+
+
+def report(result: dict[str, Any]) -> str:
+    """Figures with units, the strongest orders, what is missing and why."""
+    from swgjoint.maps.spec_sheet import KEYS
+
+    keys = [key for key in KEYS if key in result and key != "orders"]
+    stated = result.get("stated") or {}
+    header = ("", "measured", *(["stated"] if stated else []), "")
+    rows = []
+    for key in keys:
+        words, unit = _words(key)
+        more = [stated.get(key)] if stated else []
+        rows.append((words, result[key], *more, unit))
+    lines = [f"spec sheet of {result['design']} ({_source(result)})"]
+    if rows:
+        lines.append(table(rows, header=header))
+    if result.get("orders"):
+        columns = (
+            "kinematic_error_arcmin",
+            "transmission_error_arcmin",
+            "ripple_percent",
+        )
+        lines.append("strongest orders per input turn, zero to peak:")
+        lines.append(
+            table(
+                [
+                    (f"{line['order']:.6g}", *(line[key] for key in columns))
+                    for line in result["orders"][:_SHOWN_ORDERS]
+                ],
+                header=("", "no load [arcmin]", "rated load [arcmin]", "ripple [%]"),
+            )
+        )
+    reasons: dict[str, list[str]] = {}
+    for key, reason in result["missing"].items():
+        reasons.setdefault(reason, []).append(_words(key)[0])
+    lines += [f"- {', '.join(names)}: {reason}" for reason, names in reasons.items()]
+    lines += [f"wrote {name}" for name in result["files"]]
+    return "\n".join(lines)
+
+
+def _source(result: dict[str, Any]) -> str:
+    validity = result["validity"]
+    text = f"level {validity['level']}"
+    if validity.get("beyond_range"):
+        low, high = validity["torque_range_Nm"]
+        text += f"; loop leaves the sampled {low:.4g} to {high:.4g} N·m: continued"
+    return text
+
+
+def _words(key: str) -> tuple[str, str]:
+    """Key without its unit, and the unit."""
+    for suffix in sorted(_UNITS, key=len, reverse=True):
+        if key.endswith(f"_{suffix}"):
+            words = key.removesuffix(f"_{suffix}").removesuffix("_N")
+            words = key if suffix == "factor" else words
+            return words.replace("_", " "), _UNITS[suffix]
+    return key.replace("_", " "), ""

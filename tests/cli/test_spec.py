@@ -1,0 +1,147 @@
+"""``swgjoint spec``: figures, files, and no more work than the keys need."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from swgjoint.cli.main import main
+from swgjoint.fe import build_map as builder
+from swgjoint.maps.drive_map import DriveMap
+from swgjoint.sim.drives import load_drive
+
+CONTRACT = (
+    "K1_Nm_rad K2_Nm_rad K3_Nm_rad T1_Nm T2_Nm hysteresis_loss_arcmin"
+    " lost_motion_arcmin transmission_accuracy_arcmin orders ripple_rms_percent"
+    " fatigue_safety_factor radial_stiffness_N_mm wall_s"
+).split()
+
+
+@pytest.fixture
+def built(monkeypatch, synthetic_map):
+    """Give the command a map without finite elements; the options that it asked for."""
+    asked = []
+
+    def build(design, **options):
+        asked.append(options)
+        return synthetic_map
+
+    monkeypatch.setattr(builder, "build_map", build)
+    return asked
+
+
+def spec(capsys, *arguments: str) -> dict:
+    assert main(["spec", *arguments, "--json"]) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def test_catalogue_drive(capsys, tmp_path, monkeypatch):
+    """The JSON object has every key; null has its reason; the files are there."""
+    monkeypatch.chdir(tmp_path)
+    result = spec(capsys, "CSG-25-100", "--out", "out")
+    assert set(CONTRACT) <= set(result)
+    assert result["K1_Nm_rad"] == pytest.approx(3.1e4, rel=0.02)
+    assert result["transmission_accuracy_arcmin"] is None
+    empty = {k for k in CONTRACT if result[k] is None}
+    assert empty <= set(result["missing"])
+    assert result["stated"]["transmission_accuracy_arcmin"] == 1.0
+    assert result["files"] == ["out/spec.json", "out/spec.png"]
+    written = json.loads((tmp_path / "out/spec.json").read_text())
+    skip = {"wall_s"}
+    assert {k: v for k, v in written.items() if k not in skip} == {
+        k: v for k, v in result.items() if k not in skip
+    }
+    assert (tmp_path / "out/spec.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_map_file(capsys, tmp_path, synthetic_map):
+    """A saved map gives the sheet of the map that was saved."""
+    path = tmp_path / "a.swg"
+    synthetic_map.save(path)
+    keys = ["K2_Nm_rad", "lost_motion_arcmin"]
+    result = spec(capsys, str(path), "--only", ",".join(keys))
+    own = synthetic_map.spec_sheet(keys)
+    assert [result[k] for k in keys] == [own[k] for k in keys]
+    assert "K1_Nm_rad" not in result
+    assert result["wall_s"] > 0
+
+
+def test_only_what_a_design_needs(built, capsys):
+    """Ratings need no map; locked-input figures few positions; the turn all of them."""
+    assert spec(capsys, "reference-2d", "--only", "T1_Nm")["T1_Nm"] > 0
+    absent = spec(capsys, "reference-2d", "--only", "fatigue_safety_factor")
+    assert absent["fatigue_safety_factor"] is None
+    assert absent["missing"]["fatigue_safety_factor"]
+    assert built == []
+    spec(capsys, "reference-2d", "--only", "K1_Nm_rad,hysteresis_loss_arcmin,T2_Nm")
+    assert built.pop()["angles"] == 3
+    spec(capsys, "reference-2d", "--only", "ripple_pp_percent", "--model", "2d")
+    options = built.pop()
+    assert "angles" not in options
+    assert options["model"] == "2d"
+
+
+def test_report(capsys, tmp_path, synthetic_map):
+    """The terminal shows figures with units, orders, reasons and stated values."""
+    path = tmp_path / "a.swg"
+    synthetic_map.save(path)
+    assert main(["spec", str(path)]) == 0
+    out = capsys.readouterr().out
+    assert "spec sheet of synthetic" in out.splitlines()[0]
+    assert "N·m/rad" in out
+    assert "strongest orders" in out
+    assert "- radial stiffness: needs the finite elements" in out
+    assert main(["spec", "CSG-25-100", "--only", "K1_Nm_rad"]) == 0
+    (row,) = (r for r in capsys.readouterr().out.splitlines() if r.startswith("K1"))
+    assert row.split() == ["K1", "3.115e+04", "3.1e+04", "N·m/rad"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["CSG-26-100"], "nearest: CSG-25-100"),
+        (["CHA-25-100"], "no ratings"),
+        (["none.swg"], "none.swg"),
+        (["refrence-2d"], "did you mean reference-2d"),
+        (["CSG25100.toml"], "neither a file"),
+        (["CSG-25-100", "--model", "2d"], "accepted: a design"),
+        (["CSG-25-100", "--only", "K1_Nm_ra"], "did you mean K1_Nm_rad"),
+        (["CSG-25-100", "--only", ""], "accepted: T1_Nm"),
+        (["a\0b"], "is not a path"),
+        (["CSG-25-100", "--out", "file/x"], "is a file"),
+    ],
+)
+def test_bad_input(capsys, tmp_path, monkeypatch, arguments, message):
+    """One line on stderr, status 2, nothing written."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "file").write_text("")
+    assert main(["spec", *arguments]) == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.count("\n") == 1
+    assert message in err
+    assert [p.name for p in tmp_path.iterdir()] == ["file"]
+
+
+def test_scenes_resolve_the_same_references(tmp_path, monkeypatch, synthetic_map):
+    """A catalogue name, a map file; an existing file goes before the catalogue."""
+    assert load_drive("CSG-25-100").name == "CSG-25-100"
+    path = tmp_path / "a.swg"
+    synthetic_map.save(path)
+    assert load_drive(str(path)).name == "synthetic"
+    seen = []
+
+    def build(design, **options):
+        seen.append(design)
+        return DriveMap.linear(1e4)
+
+    monkeypatch.setattr(builder, "build_map", build)
+    monkeypatch.chdir(tmp_path)
+    from swgjoint.gear.design import Design
+    from swgjoint.models_path import models_path
+
+    text = (models_path() / "drives" / "reference-2d.toml").read_text()
+    (tmp_path / "CSG-25-100").write_text(text)
+    assert load_drive("CSG-25-100").name == "linear"
+    assert isinstance(seen[0], Design)
