@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from math import acos, atan2, cos, hypot, pi, sin, sqrt
 
-from swgjoint.errors import DesignError
 from swgjoint.gear.blank import Blank, blank
 from swgjoint.gear.design import Design
 from swgjoint.gear.design_sections import (
@@ -49,10 +48,7 @@ def arc_profile(design: Design, member: str) -> ToothProfile:
         return _double_arc(start, spec)
     if isinstance(spec, TwoArc):
         return _two_arc(start, spec)
-    raise DesignError(
-        f"{start.where}.profile.kind = {spec.kind!r} cannot be built yet; available: "
-        "'qca', 'dca', 'two_arc'"
-    )
+    raise AssertionError(f"{spec.kind} is no arc profile")
 
 
 def _along(origin: Point, step: float, direction: Point) -> Point:

@@ -173,6 +173,10 @@ def tooth_profile(design: Design, member: str) -> ToothProfile:
         from swgjoint.gear.involute import involute_profile
 
         return involute_profile(design, member)
+    if spec.profile.kind == "conjugate":
+        from swgjoint.gear.conjugate import conjugate_profile
+
+        return conjugate_profile(design, member)
     from swgjoint.gear.arc_profiles import arc_profile
 
     return arc_profile(design, member)

@@ -139,6 +139,7 @@ def smooth_curve(
     side: float,
     *,
     nodes: int = NODES,
+    dense: int = DENSE,
     edge: bool = False,
 ) -> SmoothCurve:
     """Curve through points and outward normals given by a smooth parameter.
@@ -150,16 +151,17 @@ def smooth_curve(
         last: Parameter at the root end.
         side: +1 for an external tooth, -1 for an internal one.
         nodes: Number of nodes, equally spaced along the curve.
+        dense: Number of points that lay out the nodes.
         edge: Whether the piece starts at an edge.
     """
     from scipy.interpolate import make_interp_spline
 
     # nodes at equal arc lengths, whatever the parameter does
-    dense = np.linspace(first, last, DENSE)
-    chord = np.hypot(*np.diff(trace(dense)[0], axis=0).T)
+    steps = np.linspace(first, last, dense)
+    chord = np.hypot(*np.diff(trace(steps)[0], axis=0).T)
     walked = np.concatenate([[0.0], np.cumsum(chord)])
     share = np.linspace(0.0, walked[-1], nodes)
-    points, normals = trace(np.interp(share, walked, dense))
+    points, normals = trace(np.interp(share, walked, steps))
     # arc length: the speed of a quintic spline over the chords, by quadrature
     chord = np.hypot(*np.diff(points, axis=0).T)
     u = np.concatenate([[0.0], np.cumsum(chord)])
