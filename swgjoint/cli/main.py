@@ -25,6 +25,7 @@ from swgjoint.progress import StderrProgress
 
 COMMANDS = {
     "demo": "the bundled scene, from finite elements to the recording and a picture",
+    "design": "whether designs can be built; their picture and outlines",
     "profile": "tooth profile of both members: report and picture",
     "meshing": "simulation of meshing with finite elements",
     "map": "build the map of a drive and save it",

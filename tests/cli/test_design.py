@@ -1,0 +1,246 @@
+"""``swgjoint design``: checks, picture, outlines; refusals with status 2."""
+
+from __future__ import annotations
+
+import json
+import time
+
+import numpy as np
+import pytest
+
+from swgjoint.cli.main import main
+from swgjoint.gear.design import Design
+from swgjoint.gear.profile import tooth_profile
+from swgjoint.gear.wave_generator import wave_generator
+from swgjoint.models_path import bundled_names
+
+LAYERS = ("flexspline", "circular_spline", "wave_generator")
+
+
+def outcome(capsys, *arguments):
+    """Status, JSON object of stdout, lines of stderr."""
+    status = main(["design", *arguments, "--json"])
+    out, err = capsys.readouterr()
+    return status, json.loads(out) if out else None, err.splitlines()
+
+
+def infeasible(tmp_path, changes):
+    """A design file that loads and cannot be built."""
+    design = Design.load("reference-2d").with_changes(changes)
+    path = tmp_path / "bad.toml"
+    path.write_text(design.to_toml())
+    return str(path)
+
+
+ROLLERS = {"kind": "four_roller", "aperture_deg": 10.0, "roller_radius_mm": 10.0}
+
+
+def test_check_lists_figures_against_limits(capsys):
+    """Keys of the contract; every figure of a feasible design is within its limit."""
+    status, result, lines = outcome(capsys, "check", "reference-2d-parabolic")
+    assert status == 0
+    assert lines == []
+    assert result["feasible"] is True
+    assert result["design"] == "reference-2d-parabolic"
+    for check in result["checks"]:
+        assert set(check) == {"name", "ok", "value", "unit", "limit"}
+        assert check["ok"] is True
+        name, value, limit = (check[key] for key in ("name", "value", "limit"))
+        if name.endswith("at most"):
+            assert value <= limit
+        elif name.endswith("at least"):
+            assert value >= limit
+        else:
+            assert name.endswith("above")
+            assert value > limit
+
+
+def test_all_presets_in_five_seconds(capsys):
+    """Several designs in one call: all bundled ones are feasible, quickly."""
+    names = bundled_names("drives", ".toml")
+    start = time.perf_counter()
+    status, result, lines = outcome(capsys, "check", *names)
+    assert time.perf_counter() - start < 5.0
+    assert status == 0
+    assert lines == []
+    assert result["feasible"] is True
+    assert [one["design"] for one in result["designs"]] == names
+    assert all(one["feasible"] for one in result["designs"])
+    assert {check["design"] for check in result["checks"]} == set(names)
+
+
+def test_infeasible_design_is_status_2_with_one_line_per_fault(tmp_path, capsys):
+    """Two faults, two lines with key, value and what is accepted."""
+    changes = {"wave_generator": ROLLERS, "circular_spline.dedendum_coefficient": 0.55}
+    path = infeasible(tmp_path, changes)
+    status, result, lines = outcome(capsys, "check", path)
+    assert status == 2
+    assert result["feasible"] is False
+    bad = [check["name"] for check in result["checks"] if not check["ok"]]
+    assert len(bad) == len(lines) == 2
+    assert all(line.startswith("swgjoint design: reference-2d: ") for line in lines)
+    assert all("accepted" in line for line in lines)
+    assert any("roller_radius_mm = 10 mm" in line for line in lines)
+    assert any("flexspline.addendum_coefficient = 0.6" in line for line in lines)
+
+
+def test_good_and_bad_designs_together(tmp_path, capsys):
+    """One bad design makes the call fail; the others are reported all the same."""
+    path = infeasible(tmp_path, {"wave_generator": ROLLERS})
+    status, result, lines = outcome(
+        capsys, "check", "reference-2d", path, "no-such-design"
+    )
+    assert status == 2
+    assert result["feasible"] is False
+    assert [one["feasible"] for one in result["designs"]] == [True, False, False]
+    assert len(lines) == 2
+
+
+@pytest.mark.parametrize("action", ["show", "export"])
+def test_infeasible_designs_write_nothing(action, tmp_path, capsys):
+    """No picture and no outline of what cannot be built; the folder is not made."""
+    path, folder = infeasible(tmp_path, {"wave_generator": ROLLERS}), tmp_path / "out"
+    status, result, lines = outcome(capsys, action, path, "--out", str(folder))
+    assert status == 2
+    assert result is None
+    assert len(lines) == 1
+    assert "roller_radius_mm = 10 mm" in lines[0]
+    assert not folder.exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("show", "reference-2d"), "needs --out DIR"),
+        (("export", "reference-2d"), "needs --out DIR"),
+        (("show", "reference-2d", "reference-3d", "--out", "x"), "one DESIGN, not 2"),
+        (("check", "reference-2d", "--out", "x"), "writes nothing"),
+        (("check", "no-such-design"), "neither a file nor"),
+    ],
+)
+def test_bad_calls(arguments, message, tmp_path, capsys, monkeypatch):
+    """One line, status 2, nothing written."""
+    monkeypatch.chdir(tmp_path)
+    status, _, lines = outcome(capsys, *arguments)
+    assert status == 2
+    assert len(lines) == 1
+    assert message in lines[0]
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    "name", ["reference-2d", "reference-2d-four-roller", "reference-2d-dca"]
+)
+def test_show_writes_a_picture(name, tmp_path, capsys):
+    """A PNG of the size of a page with more than one colour in it."""
+    from matplotlib.image import imread
+
+    status, result, _ = outcome(capsys, "show", name, "--out", str(tmp_path / "new"))
+    assert status == 0
+    assert result["files"] == [str(tmp_path / "new" / "design.png")]
+    image = imread(result["files"][0])
+    assert min(image.shape[:2]) > 600
+    # steel of both members and of the wave generator: red, blue, green areas
+    red, green, blue = (image[..., k] for k in range(3))
+    assert np.count_nonzero((red > green + 0.1) & (red > blue + 0.1)) > 5000
+    assert np.count_nonzero(blue > red + 0.1) > 5000
+    assert np.count_nonzero((green > red + 0.05) & (green > blue + 0.05)) > 5000
+
+
+# -- export: read back with a reader of our own ----------------------------------------
+
+
+def read_dxf(text):
+    """Polylines by layer: list of (points in mm, closed)."""
+    lines = text.splitlines()
+    pairs = list(zip(lines[::2], lines[1::2], strict=True))
+    assert pairs[0] == ("0", "SECTION")
+    assert pairs[-1] == ("0", "EOF")
+    assert ("1", "AC1009") in pairs
+    found, current, vertex = {}, None, None
+    for code, value in pairs:
+        if code == "0":
+            vertex = None
+            if value == "POLYLINE":
+                current = {"points": [], "closed": False, "layer": None}
+            elif value == "VERTEX":
+                vertex = [None, None]
+                current["points"].append(vertex)
+            elif value == "SEQEND":
+                layer = found.setdefault(current["layer"].lower(), [])
+                layer.append((np.array(current["points"], float), current["closed"]))
+                current = None
+        elif current is not None:
+            if code == "8":
+                current["layer"] = value
+            elif code in ("10", "20") and vertex is not None:
+                vertex[int(code) // 10 - 1] = float(value)
+            elif code == "70" and vertex is None:
+                current["closed"] = value == "1"
+    return found
+
+
+def read_csv(text):
+    """Points in mm by curve."""
+    head, *rows = text.splitlines()
+    assert head == "curve,x_mm,y_mm"
+    data = np.array([[float(x) for x in row.split(",")] for row in rows])
+    return [data[data[:, 0] == k, 1:] for k in np.unique(data[:, 0])]
+
+
+@pytest.fixture(params=["reference-2d-parabolic", "reference-2d-four-roller"])
+def exported(request, tmp_path, capsys):
+    folder = tmp_path / "out"
+    status, result, _ = outcome(capsys, "export", request.param, "--out", str(folder))
+    assert status == 0
+    assert sorted(result["files"]) == sorted(str(p) for p in folder.iterdir())
+    texts = {path.name: path.read_text() for path in folder.iterdir()}
+    return Design.load(request.param), result, texts
+
+
+def test_outlines_read_back(exported):
+    """DXF and CSV hold the same curves, on the geometry to 1e-9 m."""
+    design, result, texts = exported
+    drawing = read_dxf(texts["outlines.dxf"])
+    assert set(drawing) == set(LAYERS)
+    for layer in LAYERS:
+        curves = read_csv(texts[f"{layer}.csv"])
+        assert len(curves) == len(drawing[layer])
+        assert result["points"][layer] == sum(map(len, curves))
+        for points, (drawn, closed) in zip(curves, drawing[layer], strict=True):
+            assert points == pytest.approx(drawn, abs=0)
+            assert closed == (layer == "wave_generator")
+    outline = wave_generator(design)
+    for points, _ in drawing["wave_generator"]:
+        gap, _, _ = outline.signed_distance(points * 1e-3)
+        assert np.abs(gap).max() < 1e-9
+    for member in LAYERS[:2]:
+        ((points, _),) = drawing[member]
+        profile = tooth_profile(design, member)
+        right = points[: len(points) // 2 + 1] * 1e-3
+        # symmetric about the middle of the tooth, from gap to gap
+        assert points[::-1] * [-1, 1] == pytest.approx(points, abs=1e-12)
+        ends = np.arctan2(right[[0, -1], 0], right[[0, -1], 1])
+        assert ends == pytest.approx([profile.half_pitch, 0.0], abs=1e-12)
+        # the lands' ends project beyond their arcs by rounding: inside the range only
+        gap, _, _ = profile.signed_distance(right[1:-1])
+        assert np.abs(gap).max() < 1e-9
+        # and every junction is among the points
+        junctions, _, _ = profile.evaluate(profile.stations)
+        nearest = [np.hypot(*(right - p).T).min() for p in junctions]
+        assert max(nearest) < 1e-12
+
+
+def test_chords_stay_close(exported):
+    """Between the points the polygon leaves the geometry by less than 1 um."""
+    design, _, texts = exported
+    for points in read_csv(texts["wave_generator.csv"]):
+        middle = 0.5e-3 * (points + np.roll(points, -1, axis=0))
+        gap, _, _ = wave_generator(design).signed_distance(middle)
+        assert np.abs(gap).max() < 1e-6
+    for member in LAYERS[:2]:
+        (points,) = read_csv(texts[f"{member}.csv"])
+        right = points[: len(points) // 2 + 1] * 1e-3
+        middle = 0.5 * (right[1:] + right[:-1])
+        gap, _, _ = tooth_profile(design, member).signed_distance(middle)
+        assert np.abs(gap).max() < 1e-6
