@@ -61,3 +61,18 @@ def test_an_arm_with_another_kind_of_joint_is_refused(tmp_path):
     with pytest.raises(InputError, match="not an MJCF arm") as caught:
         RigidArm(str(arm))
     assert "\n" not in str(caught.value)
+
+
+def test_the_iiwa_has_the_mass_and_height_of_its_source():
+    """Seven links of the source's masses; upright, the flange is 1.265 m high."""
+    arm = RigidArm("iiwa7")
+    masses = [3.4525, 3.4821, 4.05623, 3.4822, 2.1633, 2.3466, 3.129]
+    np.testing.assert_allclose(arm.model.body_mass[2:], masses)
+    assert arm.model.body_mass[:2].sum() == 0.0
+    assert len(arm.joints) == 7
+    tool = arm.tool_positions(np.zeros((1, 7)))[0]
+    # 0.34 m shoulder, 0.4 m upper arm, 0.4 m forearm, 0.125 m wrist to flange
+    height = (0.15 + 0.19) + 2 * (0.21 + 0.19) + 0.081 + 0.044
+    np.testing.assert_allclose(tool, [0.0, 0.0, height], atol=1e-5)
+    # upright it carries no weight but what lies beside the axes
+    assert np.abs(arm.gravity(np.zeros((1, 7)))).max() < 9.81 * 22 * 0.06
