@@ -56,23 +56,36 @@ class DriveMap {
   };
 
   int Segment(double torsion) const;
+  int SegmentNear(int guess, double torsion) const;
+  void HalfStep(double dtheta, double dpsi);
+  template <bool kPsi>
+  void Weigh(const double* row, DriveValue* out);
+  void Work(int j1, double x1, DriveValue* out) const;
   void Rotate(double theta, double psi, double* c, double* s) const;
-  void Combine(int segment, const double* wa, const double* wb,
-               double out[5]) const;
+  void Combine(int segment, const double* weight, double out[5]) const;
 
   int n_ = 0;         // harmonics, the mean first
   int segments_ = 0;  // intervals between knots and the two continuations
-  bool moves_theta_ = false, moves_psi_ = false;
+  bool moves_psi_ = false;  // whether a harmonic depends on psi
   double ratio_ = 1;
+  double top_theta_ = 0, top_psi_ = 0;  // largest orders
   std::vector<double> knots_;
   std::vector<double> base_;   // (segments) torsion about which a segment expands
-  std::vector<double> table_;  // (segments, n, 10): A0..A4, B0..B4
-  std::vector<double> n_theta_, n_psi_, error_cos_, error_sin_;
+  std::vector<double> low_, high_;  // (segments) open interval of a segment
+  std::vector<double> table_;       // (segments, n, 10): A0, B0, .. A4, B4
+  std::vector<double> n_theta_, n_psi_;
+  std::vector<double> error_;  // (n, 2): amplitudes of cos and sin in e0
   std::vector<Recipe> recipe_;
 
-  // scratch of (n), so that nothing is allocated in a step
-  double torsion_ = 0;  // at the begin state
-  std::vector<double> c_, s_, ch_, sh_, wa_, wb_, ta_, tb_, pa_, pb_;
+  // begin state
+  double torsion_ = 0, d0_ = 0;
+  int j0_ = 0;  // segment; between steps the first guess, which changes no result
+  std::vector<double> c_, s_;  // (n) cos and sin of the phases
+
+  // step, of (n) or (n, 2), so that nothing is allocated
+  std::vector<double> eta_, sinc_, ch_;  // half the phase step, sin(eta)/eta, cos(eta)
+  std::vector<double> weight_, by_theta_, by_psi_;  // of A and B: mean, secants
+  double w_[5] = {}, u_theta_[5] = {}, u_psi_[5] = {};  // their sums in segment j0
 };
 
 }  // namespace swgjoint
