@@ -6,16 +6,19 @@ import numpy as np
 import pytest
 
 from swgjoint.errors import InputError
-from swgjoint.maps import from_catalogue as catalogue
+from swgjoint.maps import catalogue_stated
 from swgjoint.maps.catalogue import table
+from swgjoint.maps.catalogue_stated import (
+    catalogue_faults,
+    catalogue_gaps,
+    stated_figures,
+)
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.file import map_bytes, map_from_bytes
 from swgjoint.maps.from_catalogue import (
-    catalogue_faults,
-    catalogue_gaps,
     catalogue_names,
+    find_row,
     is_catalogue_name,
-    stated_figures,
     three_lines,
 )
 from swgjoint.maps.torsion_law import potential_of_stiffness, torque_at_knots
@@ -96,7 +99,7 @@ def test_tables_agree_with_themselves(monkeypatch):
         row = next(r for r in rows if (r["size"], r["ratio_class"]) == (14, 80))
         changed = tuple({**r, key: value} if r is row else r for r in rows)
         monkeypatch.setattr(
-            catalogue,
+            catalogue_stated,
             "table",
             lambda name, c=changed: c if name[0] == "s" else table(name),
         )
@@ -112,7 +115,7 @@ def test_gaps_are_listed():
     assert gaps["accuracy CHA-14-30"] == ["ratings"]
     assert "stiffness 14-50" not in gaps
     for name in catalogue_names():
-        row = catalogue.find_row(name)
+        row = find_row(name)
         empty = [key for key, value in stated_figures(row).items() if value is None]
         assert gaps.get(name, []) == empty
 

@@ -1,0 +1,139 @@
+"""Harmonics of a measured kinematic error."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.errors import InputError
+from swgjoint.gear.kinematics import angle_coefficients
+from swgjoint.gear.kinematics import ratio as signed_ratio
+from swgjoint.units import arcmin, deg
+
+Array = NDArray[np.float64]
+
+ORDERS: tuple[tuple[int, int], ...] = (
+    *((p, 0) for p in range(1, 7)),
+    *((0, q) for q in range(1, 7)),
+    (1, -1),
+    (2, -2),
+)
+"""(p, q) of p alpha + q beta that a record is searched for: low orders of either
+member, and the output turn itself."""
+KEEP = 0.01
+"""Harmonics are kept from this part of the largest one."""
+
+_PER_WAVE = 2.5  # samples that tell a wave
+_TURN = 0.98  # of a turn that a record must cover
+_REZERO = 4  # passes that settle the constant of a record
+_CONDITION = 1e4  # beyond, two orders of the record cannot be told apart
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ErrorFit:
+    """Harmonics of a measured kinematic error."""
+
+    orders: NDArray[np.int64]
+    """(p, q). Shape (n, 2)."""
+    amplitudes: Array
+    """Cosine and sine [rad]. Shape (n, 2)."""
+    report: dict[str, Any]
+
+
+def fit_error(
+    output: Array,
+    error: Array,
+    *,
+    layout: str,
+    teeth_flexspline: int,
+    teeth_circular_spline: int,
+    orders: Sequence[tuple[int, int]] = ORDERS,
+    where: str = "record",
+) -> ErrorFit:
+    """Harmonics of alpha and beta in a record of one output turn, by least squares.
+
+    Args:
+        output: Output angle psi [rad]. Shape (n,).
+        error: psi - theta/i, unloaded [rad]. Shape (n,).
+        layout: Which member is fixed.
+        teeth_flexspline: z_fs.
+        teeth_circular_spline: z_cs.
+        orders: (p, q) to look for; those that the samples cannot tell are listed.
+        where: Name of the record for messages.
+
+    Raises:
+        InputError: If the record is shorter than a turn or cannot tell the orders.
+    """
+    span = float(np.ptp(output)) if output.size else 0.0
+    if span < _TURN * 2.0 * np.pi or output.size < 16:
+        raise InputError(
+            f"{where}: {output.size} samples over {span / deg:g} deg of the output;"
+            " accepted: one turn, 360 deg, with at least 16 samples"
+        )
+    i = signed_ratio(layout, teeth_flexspline, teeth_circular_spline)
+    wanted = np.array([pq for pq in orders if tuple(pq) != (0, 0)], dtype=np.int64)
+    if wanted.ndim != 2 or wanted.shape[1] != 2:
+        raise InputError(f"orders {orders!r}; accepted: pairs (p, q) of whole numbers")
+    n = wanted @ np.array(angle_coefficients(layout), dtype=np.int64)
+    per_turn = np.abs(n[:, 0] * i + n[:, 1])
+    fits = per_turn * _PER_WAVE <= output.size / (span / (2.0 * np.pi))
+    unresolved = wanted[~fits].tolist()
+    wanted, n = wanted[fits], n[fits]
+    if not len(wanted):
+        raise InputError(
+            f"{where}: {output.size} samples tell none of the orders; accepted: at"
+            f" least {_PER_WAVE * per_turn.min():.0f} a turn"
+        )
+
+    def solve(n: NDArray[np.int64]) -> tuple[Array, Array]:
+        # the error is zeroed anywhere; its mean over the gear's angles turns the input
+        constant = 0.0
+        for _ in range(_REZERO):
+            theta = i * (output - error + constant)
+            phases = np.stack([theta, output], axis=-1) @ n.T.astype(float)
+            constant, pairs, rest = project(phases)
+        return pairs, rest
+
+    def project(columns: Array) -> tuple[float, Array, Array]:
+        parts = [np.ones((output.size, 1)), np.cos(columns), np.sin(columns)]
+        basis = np.hstack(parts)
+        weights, _, rank, sizes = np.linalg.lstsq(basis, error, rcond=None)
+        if rank < basis.shape[1] or sizes[0] > _CONDITION * sizes[-1]:
+            raise InputError(
+                f"{where}: its orders cannot be told apart; give fewer 'orders' or a"
+                " record of equal steps over the whole turn"
+            )
+        count = columns.shape[1]
+        pairs = np.stack([weights[1 : 1 + count], weights[1 + count :]], axis=-1)
+        return float(weights[0]), pairs, error - basis @ weights
+
+    pairs, _ = solve(n)
+    size = np.hypot(*pairs.T)
+    keep = size >= max(KEEP * float(size.max()), 1e-300)
+    dropped = [
+        {"alpha": int(p), "beta": int(q), "error_arcmin": float(a) / arcmin}
+        for (p, q), a in zip(wanted[~keep], size[~keep], strict=True)
+    ]
+    pairs, rest = solve(n[keep])
+    size = np.hypot(*pairs.T)
+    return ErrorFit(
+        orders=wanted[keep],
+        amplitudes=pairs,
+        report={
+            "samples": int(output.size),
+            "turns": span / (2.0 * np.pi),
+            "peak_to_peak_arcmin": float(np.ptp(error)) / arcmin,
+            "residual_rms_arcmin": float(np.sqrt(np.mean(rest**2))) / arcmin,
+            "residual_max_arcmin": float(np.abs(rest).max()) / arcmin,
+            "harmonics": [
+                {"alpha": int(p), "beta": int(q), "error_arcmin": float(a) / arcmin}
+                for (p, q), a in zip(wanted[keep], size, strict=True)
+            ],
+            "dropped": dropped,
+            "unresolved": unresolved,
+        },
+    )
