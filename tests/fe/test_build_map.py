@@ -7,7 +7,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from swgjoint.fe.build_map import build_map, sample_map
+from swgjoint.fe.build_map import build_map
+from swgjoint.fe.sampling import sample_map
 from swgjoint.gear.design import Design
 from swgjoint.maps.fit import fit_map
 
@@ -29,6 +30,9 @@ def test_map_of_a_design(layout):
     drive = fit_map(given, keep=0.0)
     second = drive.info["second_pitch"]
     assert second["largest_difference_rad"] < 1e-3 * second["peak_to_peak_rad"]
+    assert (
+        abs(drive.info["mirror"]["difference_rad"]) < 1e-3 * second["peak_to_peak_rad"]
+    )
     check = drive.info["energy_check"]
     assert check["strain_energy_relative"] < 1e-3
     # a dozen positions alias the corners of the ripple

@@ -1,0 +1,234 @@
+"""Equilibria of a design over torque and input angle, for its map."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from math import pi
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.errors import ComputationError
+from swgjoint.fe.continuation import Continuation
+from swgjoint.fe.drive2d import can_halve, ring_model
+from swgjoint.fe.state import State
+from swgjoint.gear.cup import cup_torsional_stiffness
+from swgjoint.gear.design import Design
+from swgjoint.gear.kinematics import angle_coefficients, periodicity
+from swgjoint.maps.catalogue import ratings_of
+from swgjoint.maps.samples import MapSamples
+from swgjoint.progress import Progress, silent
+
+Array = NDArray[np.float64]
+
+ANGLES = 48
+"""Input positions over one pitch: contact events leave corners in the error, and 24
+positions alias them into a tenth of the ripple, 48 into a few percent."""
+LEVELS = (0.05, 0.15, 0.35, 0.65, 1.0)
+"""Sampled torques, of both signs, as parts of the repeated peak torque."""
+SYMMETRIC = ("elliptical", "simplified", "parabolic", "four_roller", "cosine")
+"""Wave generators that are their own mirror image; the teeth always are."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Rows:
+    """Solved positions of each torque; the table grows position by position."""
+
+    follow: Continuation
+    tick: Callable[[], None]
+    states: dict[float, list[State]] = field(default_factory=dict)
+
+    def start(self, first: State, torques: list[float]) -> None:
+        """Load the first position from zero torque outwards until a solve fails."""
+        self.states[0.0] = [first]
+        for sign in (1.0, -1.0):
+            state = first
+            for torque in sorted((t for t in torques if t * sign > 0.0), key=abs):
+                state = self.follow.to_torque(state, torque)
+                if not state.outcome.ok:
+                    break
+                self.states[torque] = [state]
+                self.tick()
+
+    def advance(self, theta: float) -> None:
+        """Add a position to every torque; drop those that fail and those beyond."""
+        unloaded = self.follow.to_angle(self.states[0.0][-1], theta)
+        if not unloaded.outcome.ok:
+            raise ComputationError(
+                f"no equilibrium without torque at input angle {theta:g} rad: "
+                f"{unloaded.outcome.value}"
+            )
+        lost = set()
+        for torque in sorted(self.states, key=abs):
+            if torque == 0.0:
+                self.states[torque].append(unloaded)
+                continue
+            if (torque > 0.0) not in lost:
+                state = self.follow.to_angle(self.states[torque][-1], theta)
+                if not state.outcome.ok:
+                    state = self.follow.to_torque(unloaded, torque)
+                if state.outcome.ok:
+                    self.states[torque].append(state)
+                    self.tick()
+                    continue
+            lost.add(torque > 0.0)
+            del self.states[torque]
+
+    def table(self, torque: float, theta: Array) -> Array:
+        """Output error, energy, tangent compliance, input torque. Shape (4, n)."""
+        follow = self.follow
+        rows = [
+            (follow.output_angle(s), s.energy, s.compliance, follow.input_torque(s))
+            for s in self.states[torque]
+        ]
+        values = np.array(rows).T
+        values[0] -= theta / follow.ratio
+        return values
+
+
+def _mirrored(values: Array) -> Array:
+    """The same drive under the opposite torque, seen in a mirror.
+
+    At -T and -theta: opposite error and input torque, same energy and compliance.
+    """
+    back = np.roll(values[:, ::-1], 1, axis=1)
+    return np.asarray(back * np.array([-1.0, 1.0, 1.0, -1.0])[:, None])
+
+
+def sample_map(
+    design: Design, *, angles: int = ANGLES, progress: Progress = silent
+) -> MapSamples:
+    """Equilibria over one pitch and both signs of torque, by the nonlinear 2D model.
+
+    One pitch suffices without tolerances, and with a symmetric wave generator the
+    negative torques are the mirror image of the positive ones; both claims are checked
+    at rated torque and recorded. Torques at which a solve fails, and those beyond, are
+    left out, and the record says so.
+
+    Args:
+        design: The drive.
+        angles: Input positions over one pitch of the fixed member.
+        progress: Called with the stage, the solves done and their number.
+
+    Raises:
+        ComputationError: If the unloaded drive or small torques cannot be solved.
+    """
+    begin = time.perf_counter()
+    drive, ratings = design.drive, ratings_of(design)
+    cycles = periodicity(
+        drive.layout, drive.teeth_flexspline, drive.teeth_circular_spline
+    )
+    follow = Continuation(
+        model=ring_model(design, half=can_halve(design)),
+        ratio=design.ratio,
+        layout=drive.layout,
+    )
+    symmetric = design.wave_generator.kind in SYMMETRIC
+    parts = [part * ratings.repeated_peak for part in LEVELS]
+    torques = parts if symmetric else [-t for t in parts[::-1]] + parts
+    period = 2.0 * pi / cycles
+    theta = period * np.arange(angles) / angles
+    total, done = angles * (len(torques) + 2), 0
+
+    def tick() -> None:
+        nonlocal done
+        done += 1
+        progress(f"{drive.name}: equilibria", min(done, total), total)
+
+    rows = _Rows(follow=follow, tick=tick)
+    try:
+        rows.start(_unloaded(follow), torques)
+        for angle in theta[1:]:
+            rows.advance(float(angle))
+    except ComputationError as failure:
+        raise ComputationError(f"{drive.name}: {failure}") from failure
+
+    tables = {torque: rows.table(torque, theta) for torque in rows.states}
+    truncated = len(tables) < len(torques) + 1
+    # a second pitch, at the torque next to rated
+    check = min(tables, key=lambda t: abs(t - ratings.rated_torque))
+    state, second = rows.states[check][-1], []
+    for angle in theta:
+        state = follow.to_angle(state, period + float(angle))
+        ok = state.outcome.ok
+        second.append(follow.output_angle(state) if ok else np.nan)
+        tick()
+    again = np.array(second) - (period + theta) / design.ratio
+    info: dict[str, Any] = {
+        "second_pitch": {
+            "torque_Nm": check,
+            "largest_difference_rad": float(np.abs(again - tables[check][0]).max()),
+            "peak_to_peak_rad": float(np.ptp(tables[check][0])),
+        }
+    }
+    if symmetric:
+        opposite = {-t: _mirrored(values) for t, values in tables.items() if t}
+        solved = follow.to_torque(rows.states[0.0][1], -check)
+        there = follow.output_angle(solved) - theta[1] / design.ratio
+        there -= opposite[-check][0, 1]
+        info["mirror"] = {
+            "torque_Nm": -check,
+            "difference_rad": float(there) if solved.outcome.ok else None,
+        }
+        tables |= opposite
+
+    used = np.array(sorted(tables))
+    if used[0] >= 0.0 or used[-1] <= 0.0 or used.size < 5:
+        raise ComputationError(
+            f"{drive.name}: too few torques can be solved; the smallest is "
+            f"{parts[0]:g} N·m of {ratings.repeated_peak:g} N·m repeated peak"
+        )
+    error, energy, compliance, input_torque = np.array(
+        [tables[t] for t in used]
+    ).swapaxes(0, 1)
+    cup = None if design.cup is None else cup_torsional_stiffness(design)
+    if cup is not None:
+        error = error - (used / cup)[:, None]
+        energy = energy + (0.5 * used**2 / cup)[:, None]
+        compliance = compliance + 1.0 / cup
+    # the pattern follows the gear angle that depends on the input alone, written so
+    # that its phase grows with theta
+    alpha, beta = angle_coefficients(drive.layout)
+    return MapSamples(
+        name=drive.name,
+        level="2d",
+        layout=drive.layout,
+        teeth_flexspline=drive.teeth_flexspline,
+        teeth_circular_spline=drive.teeth_circular_spline,
+        ratings=ratings,
+        damping_ratio=design.joint.damping_ratio,
+        order=(cycles, 0) if alpha == (1, 0) else (0, cycles * beta[0]),
+        input_angle=theta,
+        torque=used,
+        output_error=error,
+        energy=energy,
+        compliance=compliance,
+        input_torque=input_torque,
+        info=info
+        | {
+            "design_hash": design.content_hash(),
+            "label": {
+                "model": "2d",
+                "level": "nonlinear",
+                "circular_spline": "elastic, outside fixed",
+                "cup": None if cup is None else "closed-form torsion in series",
+            },
+            "ratings_source": ratings.source,
+            "truncated": truncated,
+            "solves": done,
+            "sampling_wall_s": time.perf_counter() - begin,
+        },
+    )
+
+
+def _unloaded(follow: Continuation) -> State:
+    """The meshed drive at the first position without torque."""
+    state = follow.meshed(follow.deflected())
+    if state.outcome.ok:
+        state = follow.to_torque(state, 0.0)
+    if not state.outcome.ok:
+        raise ComputationError(f"no equilibrium without torque: {state.outcome.value}")
+    return state
