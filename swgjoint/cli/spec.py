@@ -70,7 +70,8 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     result: dict[str, Any] = {"design": name, **sheet.as_dict()}
     if drive is not None:
         result["validity"] = validity(drive)
-        result["stated"] = drive.info.get("stated")
+        stated = drive.info.get("stated")
+        result["stated"] = stated if isinstance(stated, dict) else None
     else:
         result["validity"] = {"level": "design", "ratings": ratings.source}
     result["files"] = []

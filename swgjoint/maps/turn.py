@@ -10,17 +10,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.arrays import frozen_array
+from swgjoint.errors import ComputationError
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.equilibrium import CHUNK, output_angle
 
 Array = NDArray[np.float64]
 
 PER_WAVE = 16
-"""Samples of the shortest wave; with the parabola through each extreme the
+"""Samples of the shortest strong wave; with the parabola through each extreme the
 peak-to-peak value is within 0.1 %."""
+AT_LEAST_PER_WAVE = 4
+"""Samples of the shortest wave of all, so that none is aliased."""
+STRONG = 0.02
+"""A wave is strong from this part of the largest one."""
 AT_LEAST = 64
 """Samples of one period."""
-MAX_SAMPLES = 4_000_000
+MAX_SAMPLES = 10_000_000
 LINES = 12
 """Orders that a sheet lists."""
 FLOOR = 1e-3
@@ -90,9 +95,29 @@ def period_of(drive: DriveMap) -> tuple[Fraction, int]:
         period = Fraction(1, gcd(*(int(n) for n in n_theta)) or 1)
     else:
         period = Fraction(abs(ratio.numerator))
-    highest = float(np.abs(n_theta + n_psi / drive.ratio).max())
-    samples = ceil(max(AT_LEAST, PER_WAVE * highest * float(period)))
-    return period, min(samples, MAX_SAMPLES)
+    orders = np.abs(n_theta + n_psi / drive.ratio)
+    size = _strengths(drive)
+    strong = orders[size > STRONG * size.max(initial=0.0)].max(initial=0.0)
+    waves = max(PER_WAVE * strong, AT_LEAST_PER_WAVE * orders.max())
+    samples = ceil(max(AT_LEAST, float(waves * period)))
+    if samples > MAX_SAMPLES:
+        raise ComputationError(
+            f"map {drive.name!r}: orders to {orders.max():g} per input turn over"
+            f" {float(period):g} turns need {samples} samples; at most {MAX_SAMPLES}:"
+            " leave out the highest harmonics"
+        )
+    return period, samples
+
+
+def _strengths(drive: DriveMap) -> Array:
+    """Error of each harmonic, and of its torque as torsion [rad]. (n_harmonics,)."""
+    size = np.hypot(*drive.kinematic_error.T)
+    torsions = [drive.mean_torsion(s * drive.ratings.rated_torque) for s in (-1, 0, 1)]
+    torque = np.hypot(*np.moveaxis(drive.coefficients(torsions, 1), -1, 0))
+    energy = np.hypot(*np.moveaxis(drive.coefficients(torsions), -1, 0))
+    torque = torque + np.abs(drive.angle_orders[:, 1]) * energy
+    torque[:, 0] = 0.0  # the mean is no wave
+    return np.asarray(size + torque.max(axis=0) / drive.mean_stiffness)
 
 
 def _input_angles(drive: DriveMap) -> tuple[Fraction, Array]:

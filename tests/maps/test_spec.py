@@ -251,3 +251,18 @@ def test_loop_starts_and_ends_at_rest(synthetic_map):
     assert (loop.torque.max(), loop.torque.min()) == (100.0, -100.0)
     assert np.argmax(loop.torque) < np.argmin(loop.torque)
     assert abs(loop.torsion[0]) < 1e-15
+
+
+def test_high_orders_are_not_aliased():
+    """A weak high order is sampled too; one beyond every bound is refused."""
+    orders = [(2, 0), (0, 300)]
+    drive = with_angles(DriveMap.linear(1e4), orders, [(1e-4, 0), (1e-6, 0)])
+    order, amplitude = error_turn(drive).lines()
+    high = order > 100
+    # between 2 alpha and 300 beta, 300 (1 + 1/100) per input turn
+    assert order[high][np.argmax(amplitude[high])] == pytest.approx(303.0)
+    assert amplitude[high].max() == pytest.approx(1e-6, rel=1e-3)
+    assert amplitude[~high].max() == pytest.approx(1e-4, rel=1e-6)
+    beyond = with_angles(DriveMap.linear(1e4), [(0, 900_000)], [(1e-4, 0)])
+    with pytest.raises(ComputationError, match="leave out the highest"):
+        error_turn(beyond)
