@@ -86,7 +86,7 @@ def _left_out(transmission: Transmission) -> list[dict[str, str]]:
             else "the scene asks for no more"
         )
         items.append({"part": _LEFT_OUT[attached.level], "reason": reason})
-    if attached.level == "kinematic":
+    if attached.level == "kinematic" and attached.kept_orders:
         share = 100.0 * ratio_variation(attached.drive)
         items.append(
             {
