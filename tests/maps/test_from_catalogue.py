@@ -167,3 +167,14 @@ def test_potential_is_the_integral_of_the_stiffness():
         ours = drive.coefficients(sign * x, 0)[:, 0, 0]
         assert np.abs(ours - energy).max() < 1e-6 * energy[-1]
     assert torque_at_knots(knots, stiffness)[-1] == pytest.approx(90.0, rel=1e-12)
+
+
+def test_law_starts_at_zero_inside_a_bend():
+    """V and T vanish at zero torsion also where the stiffness changes there."""
+    knots, stiffness = np.array([-0.3, 0.2, 0.5]), np.array([1.0, 4.0, 2.0])
+    potential, _ = potential_of_stiffness(knots, stiffness)
+    # k = 2.8 + 6 x on the first piece: V = 1.4 x^2 + x^3 by hand
+    at = np.polynomial.polynomial.polyval(np.array([0.0, 0.3, 0.5]), potential[0, 0, 0])
+    x = np.array([-0.3, 0.0, 0.2])
+    assert at == pytest.approx(1.4 * x**2 + x**3, abs=1e-15)
+    assert torque_at_knots(knots, stiffness)[1] == pytest.approx(0.56 + 0.12)
