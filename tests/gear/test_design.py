@@ -269,7 +269,7 @@ def test_files_that_are_no_designs(tmp_path):
             Design.load(reference)
         assert "\n" not in str(caught.value)
     assert "did you mean reference-2d?" in _refusal("reference-2e")
-    with pytest.raises(DesignError, match="available: .*reference-2d"):
+    with pytest.raises(DesignError, match=r"available: .*reference-2d"):
         Design.preset("none")
 
 

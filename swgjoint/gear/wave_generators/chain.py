@@ -37,15 +37,17 @@ class Chain(ClosedCurve):
 
     def evaluate(self, s: ArrayLike) -> tuple[Array, Array, Array]:
         """Every piece at its share of the arc length; a junction is the next piece."""
-        s = np.mod(np.asarray(s, dtype=float), self.perimeter)
+        along = self._within(s)
         last = len(self.pieces) - 1
-        owner = np.clip(np.searchsorted(self.stations, s, side="right") - 1, 0, last)
-        points, normals = np.empty((*s.shape, 2)), np.empty((*s.shape, 2))
-        curvature = np.empty(s.shape)
+        owner = np.clip(
+            np.searchsorted(self.stations, along, side="right") - 1, 0, last
+        )
+        points, normals = np.empty((*along.shape, 2)), np.empty((*along.shape, 2))
+        curvature = np.empty(along.shape)
         for k in np.unique(owner):
             here = owner == k
             points[here], normals[here], curvature[here] = self.pieces[k].at(
-                s[here] - self.stations[k]
+                along[here] - self.stations[k]
             )
         return points, normals, curvature
 

@@ -50,6 +50,10 @@ class ClosedCurve(ABC):
             outline at the foot (n,) [1/m], positive for a convex outline.
         """
 
+    def _within(self, s: ArrayLike) -> Array:
+        """The same arc length within the first turn."""
+        return np.asarray(np.mod(np.asarray(s, dtype=float), self.perimeter))
+
     def outline(self, count: int) -> Array:
         """Closed outline at equal steps of arc length. Shape (count, 2) [m]."""
         return self.evaluate(np.linspace(0.0, self.perimeter, count))[0]

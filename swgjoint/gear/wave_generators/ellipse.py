@@ -38,11 +38,11 @@ class Elliptical(ClosedCurve):
         from scipy.special import ellipeinc
 
         a, b = self.major, self.minor
-        s = np.mod(np.asarray(s, dtype=float), self.perimeter)
-        t = 2.0 * np.pi * s / self.perimeter
+        wanted = self._within(s)
+        t = 2.0 * np.pi * wanted / self.perimeter
         for _ in range(20):
             speed = np.hypot(b * np.cos(t), a * np.sin(t))
-            step = (b * ellipeinc(t, self._parameter) - s) / speed
+            step = (b * ellipeinc(t, self._parameter) - wanted) / speed
             t = t - step
             if np.max(np.abs(step), initial=0.0) < 1e-15:
                 break

@@ -92,19 +92,17 @@ def _tip_clearance(design: Design) -> float:
 def _radius_key(design: Design) -> str:
     """The key, with its value, that moves the largest radius."""
     spec = design.wave_generator
+    key = "parabola_coefficient_per_mm"
     if spec.kind == "parabolic":
-        value = spec.parabola_coefficient_per_mm
-        return f"parabola_coefficient_per_mm = {value:g} 1/mm"
+        return f"{key} = {spec.parabola_coefficient_per_mm:g} 1/mm"
     if spec.kind == "asymmetric_parabolic":
         if spec.rotation_deg:
             return f"rotation_deg = {spec.rotation_deg:g} deg"
         if spec.left is None or spec.right is None:
-            value = spec.parabola_coefficient_per_mm
-            return f"parabola_coefficient_per_mm = {value:g} 1/mm"
+            return f"{key} = {spec.parabola_coefficient_per_mm:g} 1/mm"
         sides = {"left": spec.left, "right": spec.right}
         name = min(sides, key=lambda side: sides[side].parabola_coefficient_per_mm)
-        value = sides[name].parabola_coefficient_per_mm
-        return f"{name}.parabola_coefficient_per_mm = {value:g} 1/mm"
+        return f"{name}.{key} = {sides[name].parabola_coefficient_per_mm:g} 1/mm"
     if spec.kind == "table":
         return f"radius_mm = {max(spec.radius_mm):g} mm"
     return f"kind = {spec.kind!r}"

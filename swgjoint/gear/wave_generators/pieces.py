@@ -69,7 +69,7 @@ class Arc:
         rel = points - np.asarray(self.centre)
         c, d = cos(middle), sin(middle)  # angle from the middle: no branch cut near
         angle = np.arctan2(rel[:, 1] * c - rel[:, 0] * d, rel[:, 0] * c + rel[:, 1] * d)
-        return self.radius * (np.clip(angle, -half, half) + half)
+        return np.asarray(self.radius * (np.clip(angle, -half, half) + half))
 
     def largest_radius(self) -> float:
         """See :class:`Piece`."""

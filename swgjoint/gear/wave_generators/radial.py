@@ -61,9 +61,9 @@ class Radial(ClosedCurve):
     def evaluate(self, s: ArrayLike) -> tuple[Array, Array, Array]:
         """Arc length inverted by Newton's method within the panels."""
         ends, lengths = self._panels
-        s = np.mod(np.asarray(s, dtype=float), lengths[-1])
-        panel = np.clip(np.searchsorted(lengths, s, "right") - 1, 0, len(ends) - 2)
-        start, wanted = ends[panel], s - lengths[panel]
+        along = self._within(s)
+        panel = np.clip(np.searchsorted(lengths, along, "right") - 1, 0, len(ends) - 2)
+        start, wanted = ends[panel], along - lengths[panel]
         share = wanted / (lengths[panel + 1] - lengths[panel])
         phi = start + share * (ends[panel + 1] - start)
         for _ in range(20):

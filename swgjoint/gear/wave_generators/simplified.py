@@ -27,18 +27,17 @@ class Simplified(ClosedCurve):
         """Quarter circle, line, semicircle, line, quarter circle."""
         r, half = self.pin_radius, self.major - self.pin_radius
         quarter, straight = 0.5 * np.pi * r, 2.0 * half
-        s = np.mod(np.asarray(s, dtype=float), self.perimeter)
+        along = self._within(s)
         # the second half of the outline is the first one turned by pi
-        turned = s > 0.5 * self.perimeter
-        s = np.where(turned, s - 0.5 * self.perimeter, s)
-        down = np.clip(s - quarter, 0.0, straight)
-        angle = (s - down) / r
+        turned = along > 0.5 * self.perimeter
+        along = np.where(turned, along - 0.5 * self.perimeter, along)
+        down = np.clip(along - quarter, 0.0, straight)
+        angle = (along - down) / r
         normals = np.stack([-np.sin(angle), np.cos(angle)], axis=-1)
         points = r * normals
         points[..., 1] += half - down
-        # a quarter circle starts at the apex and ends there, after the turned half too
         sign = np.where(turned, -1.0, 1.0)[..., None]
-        line = (s > quarter) & (s < quarter + straight)
+        line = (along > quarter) & (along < quarter + straight)
         return sign * points, sign * normals, np.where(line, 0.0, 1.0 / r)
 
     def signed_distance(self, points: Array) -> tuple[Array, Array, Array]:
