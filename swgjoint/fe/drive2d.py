@@ -16,12 +16,12 @@ from swgjoint.units import mm
 
 
 def can_halve(design: Design) -> bool:
-    """Whether half a turn maps the drive onto itself (two lobes, even teeth)."""
+    """Whether half a turn maps the drive onto itself: equal lobes, even teeth."""
     drive = design.drive
     return (
         drive.teeth_flexspline % 2 == 0
         and drive.teeth_circular_spline % 2 == 0
-        and design.lobes == 2
+        and wave_generator(design).folds % 2 == 0
     )
 
 
@@ -71,9 +71,10 @@ def ring_model(
     if half and not can_halve(design):
         drive = design.drive
         raise DesignError(
-            f"{drive.name}: a half model needs even tooth counts and two lobes, not "
+            f"{drive.name}: a half model needs even tooth counts and a wave generator "
+            "that half a turn maps onto itself, not "
             f"{drive.teeth_flexspline}/{drive.teeth_circular_spline} teeth and "
-            f"{design.lobes} lobes"
+            f"{design.wave_generator.kind}"
         )
     ring = CircularSpline(profile=tooth_profile(design, "circular_spline"))
     if elastic_circular_spline:
