@@ -63,8 +63,6 @@ class NewtonSolver:
     step_tolerance: float = 2e-12
     """Displacement increment at which the iteration ends [m]; about 1e-5 of the
     smallest effect of interest, a tenth of a micrometre."""
-    patience: int = 25
-    """Iterations after which the wave-generator set changes at one node at a time."""
     thorough_below: float = 1e-8
     """Increment below which contact is searched between the nodes, too [m]."""
     largest_step: float = 0.1
@@ -78,6 +76,7 @@ class NewtonSolver:
         """
         state, history = start, list[float]()
         settled = False
+        tried: set[bytes] = set()
         try:
             for iteration in range(self.max_iterations):
                 ring = linearise(model, state, load.on_flexspline)
@@ -91,9 +90,10 @@ class NewtonSolver:
                         state, outcome=Outcome.DIVERGED, history=tuple(history)
                     )
                 damping = min(1.0, model.lobe_height / step.largest)
-                state, settled = _advance(
-                    model, state, ring, step, damping, iteration >= self.patience
-                )
+                # a set that comes back would come back for ever
+                repeats = state.touching.tobytes() in tried
+                tried.add(state.touching.tobytes())
+                state, settled = _advance(model, state, ring, step, damping, repeats)
                 small = step.largest < self.step_tolerance and damping == 1.0
                 if settled and small and thorough:
                     return _finished(model, state, Outcome.CONVERGED, history)
