@@ -41,9 +41,13 @@ WANTED_FILLET = 0.1
 """Radius of a good fillet, multiple of the module."""
 ROOT_END = 0.98
 """A fillet of our choice leaves that much of half the pitch, and a short root land."""
+SHARPEST = 0.1
+"""Smallest radius of curvature of an edge's path that is followed, of the module."""
 SHORTEST = 4e-6
 """Pieces shorter than that are left out, the chain goes on tangentially [m]."""
-NODES, DENSE, SAMPLES = 41, 161, 33
+OVERLAP = 1e-9
+"""Largest overlap of the pair that is accepted [m]."""
+NODES, EDGE_NODES, DENSE, SAMPLES = 41, 121, 161, 33
 
 
 def conjugate_profile(design: Design, member: str) -> ToothProfile:
@@ -137,7 +141,26 @@ class _Builder:
                 "the conjugate tooth is pointed; accepted: a smaller one",
             )
         pieces[0] = replace(pieces[0], edge=True)  # type: ignore[type-var]
-        return start.profile(top, [*pieces, *below], end)
+        profile = start.profile(top, [*pieces, *below], end)
+        if not self._sound(profile):
+            raise self._split_fault()
+        return profile
+
+    def _sound(self, profile: ToothProfile) -> bool:
+        """Whether the chain is a flank, and the other member overlaps it nowhere.
+
+        Branches of the envelope may end or cross inside a piece where the curvature of
+        the wave generator jumps; such a chain is not handed out.
+        """
+        s = np.linspace(*profile.contact_range, 1500)
+        points, _, _ = profile.evaluate(s)
+        chords = np.hypot(*np.diff(points, axis=0).T) / np.diff(s)
+        if chords.max() > 1.001 or chords.min() < 0.3:  # a corner shortens them
+            return False
+        if (np.diff(profile.side * np.hypot(*points.T)) > 1e-15).any():
+            return False
+        gap, _, _ = profile.signed_distance(self._tips)
+        return bool(gap.min() > -OVERLAP)
 
     # -- the flank ----------------------------------------------------------------
 
@@ -194,17 +217,16 @@ class _Builder:
             following = runs[k + 1] if k + 1 < len(runs) else None
             last = float(values[-1])
             next_first, next_edge = 0.0, False
-            if run.edge:
-                # the path of the edge ends at its summit, well before in inclination
-                last = self._summit(run, first)
-            elif following is not None and following.edge:
-                near = abs(values[-1] - low) < 0.05 * (values[0] - low)
-                if not near:
-                    raise self._split_fault()
+            smooth = following is not None and self._runs_on(run, following, low)
+            if following is None:
+                if run.edge:
+                    # its path ends at the summit, or before, where it turns sharply
+                    last = self._round_part(trace, first, self._summit(run, first))
+            elif smooth:
                 last = low
                 _, _, theta = envelope.trace(run, np.array([low]))
                 next_first = float(theta[0])
-            elif following is not None:
+            else:
                 last, next_first = self._meet(run, following)
                 next_edge = True
             # leave where the flank inclines too much, below its steepest part
@@ -229,6 +251,8 @@ class _Builder:
                 last, leaves = first, True
             if last != first:
                 pieces += self._curves(run, trace, first, last, edge)
+            if leaves and not pieces:
+                return None
             if leaves or following is None:
                 points, normals = trace(np.array([last]))
                 return pieces, ((float(points[0, 0]), float(points[0, 1])), normals[0])
@@ -237,8 +261,21 @@ class _Builder:
 
     def _split_fault(self) -> DesignError:
         return self.start.fault(
-            "profile.kind", "the envelope breaks up under this wave generator"
+            "profile.kind",
+            "the envelope breaks up under this wave generator; accepted: other "
+            "profiles or thickness_coefficient there, or a smoother wave generator",
         )
+
+    def _round_part(
+        self, trace: Callable[[Array], tuple[Array, Array]], first: float, last: float
+    ) -> float:
+        """Where the path of an edge begins to turn too sharply, or its end."""
+        t = np.linspace(first, last, 401)
+        points, normals = trace(t)
+        turn = np.unwrap(np.arctan2(normals[:, 1], normals[:, 0]))
+        walked = np.hypot(*np.diff(points, axis=0).T)
+        sharp = np.abs(np.diff(turn)) * SHARPEST * self.start.module > walked
+        return float(t[np.argmax(sharp)]) if sharp.any() else last
 
     def _summit(self, run: Run, first: float) -> float:
         """Position at which the path of the edge is farthest into the receiver."""
@@ -254,23 +291,45 @@ class _Builder:
         )
         return float(found.x)
 
+    def _runs_on(self, run: Run, following: Run, low: float) -> bool:
+        """Whether a branch goes over into the path of the edge at its own end."""
+        near = abs(run.station[-1] - low) < 0.05 * abs(run.station[0] - low)
+        step = abs(following.theta[0] - run.theta[-1])
+        return (
+            following.edge
+            and not run.edge
+            and bool(near)
+            and following.motion is run.motion
+            and bool(step < 0.03 * run.motion.half_range)
+        )
+
     def _meet(self, one: Run, two: Run) -> tuple[float, float]:
-        """Stations at which two branches cross."""
+        """Parameters (stations, positions of an edge) at which two branches cross."""
         from scipy.optimize import root
 
         first, second = self._trace(one), self._trace(two)
-        scale = self.start.module
+        module = self.start.module
+        scale = np.array([0.01 if run.edge else module for run in (one, two)])
 
         def apart(x: Array) -> Array:
-            a, _ = first(x[:1] * scale)
-            b, _ = second(x[1:] * scale)
-            return np.asarray((a - b)[0] / scale)
+            a, _ = first(x[:1] * scale[0])
+            b, _ = second(x[1:] * scale[1])
+            return np.asarray((a - b)[0] / module)
 
-        guess = np.array([one.station[-1], two.station[0]]) / scale
-        found = root(apart, guess, tol=1e-13)
-        if not np.abs(apart(found.x)).max() < 1e-10:
+        ends = (
+            (one.theta if one.edge else one.station)[-1],
+            (two.theta if two.edge else two.station)[0],
+        )
+        found = root(apart, np.array(ends) / scale, tol=1e-13)
+        values = found.x * scale
+        low, high = self.envelope.given.contact_range
+        inside = [
+            run.edge or low <= x <= high
+            for run, x in zip((one, two), values, strict=True)
+        ]
+        if not np.abs(apart(found.x)).max() < 1e-10 or not all(inside):
             raise self._split_fault()
-        return float(found.x[0] * scale), float(found.x[1] * scale)
+        return float(values[0]), float(values[1])
 
     def _curves(
         self,
@@ -303,7 +362,7 @@ class _Builder:
                     a,
                     b,
                     self.start.side,
-                    nodes=NODES,
+                    nodes=EDGE_NODES if run.edge else NODES,
                     dense=DENSE,
                     edge=edge and not pieces,
                 )
@@ -393,10 +452,11 @@ class _Builder:
 
     @cached_property
     def _tips(self) -> Array:
-        """Tip part of the given flank at all positions near the lobe (n, 2) [m]."""
+        """Points of the given flank at all positions near the lobe (n, 2) [m]."""
         envelope = self.envelope
-        low, high = envelope.given.contact_range
-        points, _, _ = envelope.given.evaluate(np.linspace(low, 0.6 * high, 150))
+        points, _, _ = envelope.given.evaluate(
+            np.linspace(*envelope.given.contact_range, 150)
+        )
         parts = []
         for motion in envelope.motions:
             theta = np.linspace(-0.25, 0.25, 201) * motion.half_range

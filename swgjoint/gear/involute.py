@@ -29,6 +29,10 @@ TIP_ROUNDING = 0.25
 """Radius of the cutter tip where the design names none, multiple of the module."""
 LARGEST_ROUNDING = 0.9
 """Of the depth below the pitch circle: the centre of the rounding stays beyond it."""
+SHARPEST = 0.25
+"""Smallest radius of curvature of an involute, of the module; zero is undercut."""
+FILLET_NODES = 257
+"""A small tip radius leaves a fillet whose curvature changes a hundredfold."""
 MARGIN = 0.999
 """Of the largest tip radius that fits, so that nothing degenerates."""
 
@@ -102,7 +106,14 @@ def involute_profile(design: Design, member: str) -> ToothProfile:
         smooth_curve(
             "involute", involute, roll_tip, fillet.flank_end, side, edge=top > 0.0
         ),
-        smooth_curve("fillet", fillet.trace, fillet.first, fillet.last, side),
+        smooth_curve(
+            "fillet",
+            fillet.trace,
+            fillet.first,
+            fillet.last,
+            side,
+            nodes=FILLET_NODES,
+        ),
     ]
     return start.profile(top, [*pieces], fillet.end)
 
@@ -156,13 +167,15 @@ def _rack(start: Blank, spec: Involute) -> _Fillet:
     y_c = depth - rho
     x_c = half_tooth + y_c * tan(alpha) + rho / cos(alpha)
     straight = y_c + rho * sin(alpha)  # depth where the straight flank ends
-    lowest = r * sin(alpha) ** 2
+    # the involute ends where its radius of curvature is still some of the module
+    lowest = sin(alpha) * (r * sin(alpha) - SHARPEST * start.module)
     if straight >= lowest:
         raise start.fault(
             "pressure_angle_deg",
             f"the rack undercuts the tooth: its flank reaches {straight / mm:.4g} mm "
-            f"below the pitch line; accepted there: < {lowest / mm:.4g} mm (a larger "
-            "angle, a smaller dedendum_coefficient or a larger cutter_tip_radius_mm)",
+            f"below the pitch line; accepted: < {max(lowest, 0.0) / mm:.4g} mm (a "
+            "larger angle, a smaller dedendum_coefficient or a larger "
+            "cutter_tip_radius_mm)",
         )
     base = r * cos(alpha)
 

@@ -16,6 +16,8 @@ Array = NDArray[np.float64]
 
 NODES = 33
 """Nodes of a generated curve; involutes and fillets then err below 1e-13 m."""
+CLOSEST = 1e-6
+"""Nodes nearer than that lose their tangent in the rounding of coordinates [m]."""
 DENSE = 1025
 """Points that lay out the nodes."""
 STEPS = 8
@@ -150,7 +152,7 @@ def smooth_curve(
         first: Parameter at the tip end.
         last: Parameter at the root end.
         side: +1 for an external tooth, -1 for an internal one.
-        nodes: Number of nodes, equally spaced along the curve.
+        nodes: Largest number of nodes, equally spaced along the curve.
         dense: Number of points that lay out the nodes.
         edge: Whether the piece starts at an edge.
     """
@@ -160,6 +162,7 @@ def smooth_curve(
     steps = np.linspace(first, last, dense)
     chord = np.hypot(*np.diff(trace(steps)[0], axis=0).T)
     walked = np.concatenate([[0.0], np.cumsum(chord)])
+    nodes = max(9, min(nodes, int(walked[-1] / CLOSEST)))
     share = np.linspace(0.0, walked[-1], nodes)
     points, normals = trace(np.interp(share, walked, steps))
     # arc length: the speed of a quintic spline over the chords, by quadrature

@@ -6,6 +6,9 @@ from functools import cache
 
 import numpy as np
 import pytest
+from hypothesis import given as for_any
+from hypothesis import settings
+from hypothesis import strategies as st
 
 from swgjoint.errors import DesignError
 from swgjoint.gear.design import Design
@@ -34,7 +37,14 @@ GENERATORS = {
         "connector_radius_mm": 50.0,
     },
 }
-CASES = [("qca", generator) for generator in GENERATORS]
+GENERATORS["turned"] = {
+    **GENERATORS["parabolic"],
+    "kind": "asymmetric_parabolic",
+    "rotation_deg": 0.5,
+    "connector_radius_mm": 40.0,
+}
+SYMMETRIC = [name for name in GENERATORS if name != "turned"]
+CASES = [("qca", generator) for generator in SYMMETRIC]
 CASES += [("dca", "elliptical"), ("involute", "elliptical")]
 
 
@@ -125,6 +135,19 @@ def test_every_point_of_the_flank_touches_once(member, kind, generator):
     assert np.abs(other + turned).max() < 1e-6
 
 
+@pytest.mark.parametrize("member", MEMBERS)
+def test_unsymmetric_generator_clears_on_both_flanks(member, profile_laws):
+    """With turned lobes left and right differ; the tooth keeps off both of them."""
+    given, made, motions = pair(member, "qca", "turned")
+    profile_laws(made)
+    assert len(motions) == 2
+    lowest = []
+    for motion in motions:
+        theta = np.linspace(-0.12, 0.12, 401) * motion.half_range
+        lowest.append(gaps(given, made, motion, theta, 301).min())
+    assert -1e-9 < min(lowest) < 1e-9
+
+
 def test_three_lobes_mesh_as_two_do(profile_laws):
     """With three lobes and three teeth more the pair is conjugate as well."""
     given, made, motions = pair("circular_spline", "qca", "cosine", teeth=123)
@@ -191,6 +214,51 @@ def test_impossible_conjugates_are_refused(make_profile, values, message):
     with pytest.raises(DesignError, match=message) as error:
         make_profile("circular_spline", values)
     assert "\n" not in str(error.value)
+
+
+@settings(max_examples=25, deadline=None)
+@for_any(
+    member=st.sampled_from(MEMBERS),
+    kind=st.sampled_from(["dca", "involute", "two_arc"]),
+    generator=st.sampled_from(["elliptical", "simplified", "cosine"]),
+    teeth=st.integers(25, 100),
+    addenda=st.tuples(st.floats(0.3, 0.8), st.floats(0.3, 0.8)),
+    clearance=st.tuples(st.floats(0.0, 0.4), st.floats(0.0, 0.4)),
+    angle=st.floats(10.0, 30.0),
+    thickness=st.floats(0.7, 1.0),
+)
+def test_any_conjugate_is_right_or_refused(
+    profile_laws, member, kind, generator, teeth, addenda, clearance, angle, thickness
+):
+    """Parameters give a flank that obeys the laws and clears, or one line."""
+    other = MEMBERS[1 - MEMBERS.index(member)]
+    section = PROFILES.get(kind) or {"kind": kind}
+    changes = {
+        f"{member}.profile": {"kind": "conjugate"},
+        f"{other}.profile": section,
+        f"{other}.pressure_angle_deg": angle,
+        f"{other}.thickness_coefficient": thickness,
+        "drive.teeth_flexspline": 2 * teeth,
+        "drive.teeth_circular_spline": 2 * teeth + 2,
+    }
+    for k, name in enumerate((member, other)):
+        changes[f"{name}.addendum_coefficient"] = addenda[k]
+        changes[f"{name}.dedendum_coefficient"] = addenda[1 - k] + clearance[k]
+    if GENERATORS[generator]:
+        changes["wave_generator"] = GENERATORS[generator]
+    try:
+        design = Design.load("reference-2d").with_changes(changes)
+        made = tooth_profile(design, member)
+    except DesignError as error:
+        assert "\n" not in str(error)
+        keys = ("_coefficient", "_mm", "_deg", "kind", "wave_generator", "_teeth")
+        assert any(key in str(error) for key in keys)
+        return
+    profile_laws(made)
+    for motion in tooth_motions(design):
+        theta = np.linspace(-0.3, 0.3, 201) * motion.half_range
+        gap = gaps(tooth_profile(design, other), made, motion, theta, 201)
+        assert gap.min() > -1e-7
 
 
 def test_rollers_are_refused():
