@@ -23,7 +23,7 @@ from swgjoint.gear.blank import Blank, blank
 from swgjoint.gear.design import Design
 from swgjoint.gear.design_sections import Conjugate
 from swgjoint.gear.envelope import Envelope, Run
-from swgjoint.gear.profile import ToothProfile, tooth_profile
+from swgjoint.gear.profile import TANGENCY_RAD, ToothProfile, tooth_profile
 from swgjoint.gear.segments import Piece, Point, arc, line
 from swgjoint.gear.smooth_curve import smooth_curve
 from swgjoint.gear.tooth_motion import Receiver, tooth_motions
@@ -152,6 +152,10 @@ class _Builder:
         Branches of the envelope may end or cross inside a piece where the curvature of
         the wave generator jumps; such a chain is not handed out.
         """
+        for junction in profile.junctions():
+            tangent = junction.edge or junction.corner < TANGENCY_RAD
+            if junction.gap > 1e-12 or not tangent:
+                return False
         s = np.linspace(*profile.contact_range, 1500)
         points, _, _ = profile.evaluate(s)
         chords = np.hypot(*np.diff(points, axis=0).T) / np.diff(s)
