@@ -96,7 +96,11 @@ class NewtonSolver:
                 state, settled = _advance(model, state, ring, step, damping, repeats)
                 small = step.largest < self.step_tolerance and damping == 1.0
                 if settled and small and thorough:
-                    return _finished(model, state, Outcome.CONVERGED, history)
+                    # an output that no tooth holds stays where the search left it
+                    free = load.torque is not None and load.teeth
+                    free &= len(state.tooth_force) == 0
+                    outcome = Outcome.SINGULAR if free else Outcome.CONVERGED
+                    return _finished(model, state, outcome, history)
         except ActiveSetError as error:
             singular = "singular" in str(error)
             outcome = Outcome.SINGULAR if singular else Outcome.ACTIVE_SET_CYCLES

@@ -77,7 +77,7 @@ class Linearised:
         s, frames = contacts.sector, self.frames
         count, n = len(s), frames.spin.shape[1]
         carried = contacts.weight @ self.element.flank_from_skeleton
-        j_y = turned(frames.position[s].reshape(count, -1, 2)).reshape(count, n)
+        j_y = turned(frames.position[s].reshape(count, n // 2, 2)).reshape(count, n)
         arm = np.einsum("ki,ki->k", contacts.normal, turned(contacts.point))
         lever = arm - np.einsum("kn,kn->k", carried, j_y)
         return _to_basis(self.turn[s], carried + frames.spin[s] * lever[:, None])
@@ -182,5 +182,5 @@ def linearise(model: RingModel, state: State, torque: float | None) -> Linearise
 
 def _to_basis(turn: Array, rows: Array) -> Array:
     """Row vectors per sector or contact into the bases of the nodes."""
-    shaped = rows.reshape(len(rows), -1, 2)
+    shaped = rows.reshape(len(rows), rows.shape[1] // 2, 2)
     return np.asarray(np.einsum("sni,snia->sna", shaped, turn)).reshape(rows.shape)

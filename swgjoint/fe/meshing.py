@@ -70,8 +70,12 @@ def simulate_meshing(
     setup = [("wave_generator", MemberMaxima.at(ring, state))]
     state = checked(follow.meshed(state), "engagement of the teeth")
     setup.append(("meshed", MemberMaxima.at(ring, state)))
-    if torque != 0.0 or len(state.tooth_force):
-        state = checked(follow.to_torque(state, torque), f"loading to {torque:g} N·m")
+    if torque == 0.0 and len(state.tooth_force) == 0:
+        raise ComputationError(
+            f"{design.drive.name}: no tooth touches without torque: "
+            f"{Outcome.SINGULAR.value}"
+        )
+    state = checked(follow.to_torque(state, torque), f"loading to {torque:g} N·m")
     setup.append(("torque", MemberMaxima.at(ring, state)))
 
     rows = []

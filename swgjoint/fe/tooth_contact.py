@@ -198,7 +198,7 @@ class ToothContact:
             rigid=rigid,
             steps=2,
         )
-        return s, seen.feet.gap.reshape(-1, s.size), sector, side
+        return s, seen.feet.gap.reshape(len(sector), s.size), sector, side
 
     def _feet(
         self,
@@ -290,7 +290,7 @@ class ToothContact:
             gap=seen.feet.gap,
             normal=normal,
             point=point,
-            weight=weight.reshape(n, -1),
+            weight=weight.reshape(n, 4 * size),
             tooth=seen.tooth,
             ring_weight=self._ring_weight(seen.feet, 1 - side),
         )
@@ -305,7 +305,7 @@ class ToothContact:
         normal = feet.normal * _MIRROR[facing]
         spline = self.circular_spline.spline(feet.station)
         weight[np.arange(n), facing] = -spline[:, :, None] * normal[:, None, :]
-        return weight.reshape(n, -1)
+        return weight.reshape(n, dofs)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -8,7 +8,7 @@ from math import pi
 import numpy as np
 import pytest
 
-from swgjoint.errors import DesignError
+from swgjoint.errors import ComputationError, DesignError
 from swgjoint.fe.continuation import Continuation
 from swgjoint.fe.drive2d import ring_model
 from swgjoint.fe.linearise import linearise
@@ -250,3 +250,27 @@ def test_cup_adds_its_torsion_in_series():
     gained = with_cup.series("energy") - without.series("energy")
     assert gained == pytest.approx(0.5 * TORQUE**2 / stiffness, rel=1e-6)
     assert "closed-form" in with_cup.to_json()["label"]["cup"]
+
+
+def test_backlash_is_taken_up_by_torque():
+    """With 5 % thinner teeth both signs of torque move the output by the clearance."""
+    thin = {"flexspline.thickness_coefficient": 0.95}
+    design = Design.load("reference-2d").with_changes(thin)
+    error = [
+        simulate_meshing(design, torque=torque, steps=1, half=True).series(
+            "output_error"
+        )[0]
+        for torque in (-5.0, 5.0)
+    ]
+    assert error[0] == pytest.approx(-error[1], rel=1e-6)
+    # half the clearance of 5 % of half a pitch at the pitch circle, less what the
+    # deflected teeth find before they are in the middle of their spaces
+    assert 0.3e-3 < error[0] < 0.05 * pi / 120 / 2 * 1.2
+
+
+def test_free_output_is_reported():
+    """Backlash without torque: one line that says why and what to do."""
+    thin = {"flexspline.thickness_coefficient": 0.9}
+    design = Design.load("reference-2d").with_changes(thin)
+    with pytest.raises(ComputationError, match="apply a torque"):
+        simulate_meshing(design, torque=0.0, steps=3, turn=0.01, half=True)
