@@ -71,7 +71,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         "checks": [_row(check) for check in checks],
     }
     if args.action == "show":
-        result["files"] = _show(design, folder)
+        result |= _show(design, folder)
     else:
         result |= _export(design, folder)
     return result
@@ -177,12 +177,30 @@ def _checked(reference: str) -> dict[str, Any]:
     }
 
 
-def _show(design: Design, folder: Path) -> list[str]:
+def _show(design: Design, folder: Path) -> dict[str, Any]:
+    """Pictures of the design and of the passage of a rigid tooth, with its numbers."""
+    from swgjoint.gear.tooth_path import tooth_path
+    from swgjoint.units import deg, um
     from swgjoint.view.design_plots import design_picture
+    from swgjoint.view.tooth_path_plots import tooth_path_picture
 
-    picture = design_picture(design)
+    pictures = {"design.png": design_picture(design)}
+    try:
+        path = tooth_path(design)
+    except DesignError as error:  # a rim on rollers has no outline to follow
+        numbers: dict[str, Any] = {"missing": str(error)}
+    else:
+        pictures["tooth-path.png"] = tooth_path_picture(design, path)
+        numbers = {
+            "smallest_clearance_um": path.smallest_clearance / um,
+            "interference_um": path.interference / um,
+            "where": path.where[path.worst],
+            "angle_deg": float(path.theta[path.worst]) / deg,
+            "engaged_deg": path.engaged / deg,
+        }
     folder.mkdir(parents=True, exist_ok=True)
-    return [str(write_whole(folder / "design.png", picture))]
+    files = [str(write_whole(folder / name, data)) for name, data in pictures.items()]
+    return {"tooth_path": numbers, "files": files}
 
 
 def _export(design: Design, folder: Path) -> dict[str, Any]:

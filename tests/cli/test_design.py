@@ -137,7 +137,8 @@ def test_show_writes_a_picture(name, tmp_path, capsys):
 
     status, result, _ = outcome(capsys, "show", name, "--out", str(tmp_path / "new"))
     assert status == 0
-    assert result["files"] == [str(tmp_path / "new" / "design.png")]
+    names = ["design.png"] + ["tooth-path.png"] * (name != "reference-2d-four-roller")
+    assert result["files"] == [str(tmp_path / "new" / each) for each in names]
     image = imread(result["files"][0])
     assert min(image.shape[:2]) > 600
     # steel of both members and of the wave generator: red, blue, green areas
@@ -145,6 +146,25 @@ def test_show_writes_a_picture(name, tmp_path, capsys):
     assert np.count_nonzero((red > green + 0.1) & (red > blue + 0.1)) > 5000
     assert np.count_nonzero(blue > red + 0.1) > 5000
     assert np.count_nonzero((green > red + 0.05) & (green > blue + 0.05)) > 5000
+
+
+def test_show_tells_the_passage_of_a_rigid_tooth(tmp_path, capsys):
+    """Numbers of the tooth path as the function gives them, or why there are none."""
+    from swgjoint.gear.design import Design
+    from swgjoint.gear.tooth_path import tooth_path
+
+    _, result, _ = outcome(capsys, "show", "reference-2d", "--out", str(tmp_path))
+    path = tooth_path(Design.load("reference-2d"))
+    found = result["tooth_path"]
+    assert found["smallest_clearance_um"] == pytest.approx(
+        path.smallest_clearance * 1e6
+    )
+    assert found["interference_um"] == pytest.approx(path.interference * 1e6)
+    assert found["where"] == path.where[path.worst]
+    _, result, _ = outcome(
+        capsys, "show", "reference-2d-four-roller", "--out", str(tmp_path)
+    )
+    assert "four_roller" in result["tooth_path"]["missing"]
 
 
 # -- export: read back with a reader of our own ----------------------------------------
