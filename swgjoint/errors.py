@@ -17,10 +17,6 @@ class DesignError(InputError):
     """A design that is inconsistent or cannot be built; one line per fault."""
 
 
-class RangeError(InputError):
-    """A value outside the range in which a result is valid."""
-
-
 class MapFileError(InputError):
     """A ``.swg`` file that is damaged, hostile or of another schema."""
 

@@ -49,6 +49,16 @@ def check_modelled(design: Design, model: str) -> None:
         raise DesignError("\n".join(f"{drive.name}: {fault}" for fault in faults))
 
 
+def left_out(design: Design) -> str | None:
+    """Parts of the design that the 2D model cannot see, for the validity label."""
+    shapes = design.micro_geometry.model_dump(exclude={"crowning_kind"})
+    parts = {
+        "wave_generator.bearing": design.wave_generator.bearing is not None,
+        "micro_geometry": any(shapes.values()),
+    }
+    return " and ".join(name for name, there in parts.items() if there) or None
+
+
 def ring_model(
     design: Design,
     *,

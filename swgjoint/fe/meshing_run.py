@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.errors import Outcome
+from swgjoint.fe.drive2d import left_out
 from swgjoint.fe.ring import RingModel
 from swgjoint.fe.state import State
 from swgjoint.fe.stress import KINDS, MemberMaxima, StressMaxima
@@ -98,6 +99,7 @@ class MeshingRun:
                 "circular_spline": "elastic, outside fixed" if elastic else "rigid",
                 "half": self.model.half,
                 "cup": cup,
+                "left_out": left_out(self.design),
             },
             "torque_Nm": self.torque,
             "nodes": self.nodes,

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from swgjoint.errors import ComputationError
 from swgjoint.fe.continuation import Continuation
-from swgjoint.fe.drive2d import can_halve, ring_model
+from swgjoint.fe.drive2d import can_halve, left_out, ring_model
 from swgjoint.fe.state import State
 from swgjoint.gear.cup import cup_torsional_stiffness
 from swgjoint.gear.design import Design
@@ -215,6 +215,7 @@ def sample_map(
                 "level": "nonlinear",
                 "circular_spline": "elastic, outside fixed",
                 "cup": None if cup is None else "closed-form torsion in series",
+                "left_out": left_out(design),
             },
             "ratings_source": ratings.source,
             "truncated": truncated,

@@ -10,7 +10,7 @@ import pytest
 
 from swgjoint.errors import ComputationError, DesignError
 from swgjoint.fe.continuation import Continuation
-from swgjoint.fe.drive2d import ring_model
+from swgjoint.fe.drive2d import left_out, ring_model
 from swgjoint.fe.linearise import linearise
 from swgjoint.fe.meshing import simulate_meshing
 from swgjoint.fe.stress import circular_spline_stress, flexspline_stress
@@ -274,3 +274,12 @@ def test_free_output_is_reported():
     design = Design.load("reference-2d").with_changes(thin)
     with pytest.raises(ComputationError, match="apply a torque"):
         simulate_meshing(design, torque=0.0, steps=3, turn=0.01, half=True)
+
+
+def test_label_names_what_a_plane_model_cannot_see():
+    """Bearing and micro-geometry of a design are left out, and the label says so."""
+    assert left_out(Design.load("reference-2d")) is None
+    assert left_out(Design.load("size-25-100")) == (
+        "wave_generator.bearing and micro_geometry"
+    )
+    assert one_pitch().to_json()["label"]["left_out"] is None
