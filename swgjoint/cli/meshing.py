@@ -7,7 +7,7 @@ import math
 from typing import Any
 
 from swgjoint.cli.text import table
-from swgjoint.errors import InputError
+from swgjoint.errors import InputError, Outcome
 from swgjoint.files import output_folder, write_whole
 from swgjoint.json_text import json_text, plain
 
@@ -80,6 +80,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         turn=args.turn,
         nonlinear=args.nonlinear,
         half=args.half,
+        throw=False,
         progress=args.progress,
     )
     result: dict[str, Any] = plain(meshing.to_json())
@@ -106,6 +107,11 @@ def _check(args: argparse.Namespace) -> None:
         faults.append(f"--turn {args.turn:g} turns; accepted: up to 1000, not 0")
     if faults:
         raise InputError("\n".join(faults))
+
+
+def status(result: dict[str, Any]) -> int:
+    """1 where a position could not be solved."""
+    return int(result["outcome"] != "converged")
 
 
 def report(result: dict[str, Any]) -> str:
@@ -143,4 +149,8 @@ def report(result: dict[str, Any]) -> str:
             f"output error, peak to peak: {max(error) - min(error):.4g} arcsec"
         )
     lines.append(f"outcome: {result['outcome']}")
+    failed = sum(name != "converged" for name in steps["outcome"])
+    if failed:
+        advice = Outcome[result["outcome"].upper()].value
+        lines.append(f"{failed} of {len(steps['outcome'])} positions failed: {advice}")
     return "\n".join([*lines, *(f"wrote {name}" for name in result["files"])])

@@ -8,7 +8,7 @@ from math import pi
 from swgjoint.errors import ComputationError, Outcome
 from swgjoint.fe.continuation import Continuation
 from swgjoint.fe.drive2d import check_modelled, ring_model
-from swgjoint.fe.meshing_run import MeshingRun, MeshingStep
+from swgjoint.fe.meshing_run import MeshingRun, MeshingStep, SetupState
 from swgjoint.fe.ring import RingModel
 from swgjoint.fe.state import State
 from swgjoint.fe.stress import MemberMaxima
@@ -28,6 +28,7 @@ def simulate_meshing(
     nonlinear: bool = True,
     half: bool = False,
     elastic_circular_spline: bool = True,
+    throw: bool = True,
     progress: Progress = silent,
 ) -> MeshingRun:
     """Simulate meshing: deflect, engage, load, then turn the wave generator.
@@ -42,11 +43,15 @@ def simulate_meshing(
         half: Half model; needs even tooth counts.
         elastic_circular_spline: Whether the circular spline deforms, held at its
             outer diameter; False makes it rigid.
+        throw: Whether a position that cannot be solved is an error; else it is kept
+            with its outcome and the turn goes on from the last good one.
         progress: Called with the stage, the steps done and their number.
 
     Raises:
         DesignError: If the design cannot be built or holds what is not modelled.
         ComputationError: If a solve fails; the message carries the outcome's advice.
+            Without deflection, engagement and load there is nothing to go on from, so
+            their failure is an error in any case.
     """
     check_modelled(design, model)
     begin = time.perf_counter()
@@ -67,41 +72,26 @@ def simulate_meshing(
         return state
 
     state = checked(follow.deflected(), "deflection by the wave generator")
-    setup = [("wave_generator", MemberMaxima.at(ring, state))]
+    setup = [SetupState.at(ring, "wave_generator", state)]
     state = checked(follow.meshed(state), "engagement of the teeth")
-    setup.append(("meshed", MemberMaxima.at(ring, state)))
+    setup.append(SetupState.at(ring, "meshed", state))
     if torque == 0.0 and len(state.tooth_force) == 0:
         raise ComputationError(
             f"{design.drive.name}: no tooth touches without torque: "
             f"{Outcome.SINGULAR.value}"
         )
     state = checked(follow.to_torque(state, torque), f"loading to {torque:g} N·m")
-    setup.append(("torque", MemberMaxima.at(ring, state)))
+    setup.append(SetupState.at(ring, "torque", state))
 
     rows = []
     for k in range(steps):
         angle = 2.0 * pi * turn * k / steps
-        if k > 0:
-            state = checked(
-                follow.to_angle(state, angle),
-                f"the input position {angle / deg:g} deg",
-            )
-        twist = 0.0 if cup is None else torque / cup
-        rows.append(
-            MeshingStep(
-                input_angle=angle,
-                wave_generator_angle=state.wave_generator_angle,
-                output_error=follow.output_angle(state) - twist - angle / design.ratio,
-                input_torque=follow.input_torque(state),
-                wave_generator_torque=state.wave_generator_torque,
-                tooth_moment=state.tooth_moment,
-                energy=state.energy + (0.0 if cup is None else 0.5 * torque**2 / cup),
-                pairs_in_contact=_pairs(ring, state),
-                contact_nodes=ring.copies * int(state.touching.sum()),
-                stress=MemberMaxima.at(ring, state),
-                iterations=len(state.history),
-            )
-        )
+        found = state if k == 0 else follow.to_angle(state, angle)
+        if throw:
+            checked(found, f"the input position {angle / deg:g} deg")
+        if found.outcome.ok:
+            state = found
+        rows.append(_step(ring, follow, found, angle, torque, cup))
         progress("meshing", k + 1, steps)
     return MeshingRun(
         design=design,
@@ -109,10 +99,36 @@ def simulate_meshing(
         torque=torque,
         steps=tuple(rows),
         setup=tuple(setup),
-        last_state=state,
-        outcome=Outcome.CONVERGED,
         cup_stiffness=cup,
         wall_s=time.perf_counter() - begin,
+    )
+
+
+def _step(
+    ring: RingModel,
+    follow: Continuation,
+    state: State,
+    angle: float,
+    torque: float,
+    cup: float | None,
+) -> MeshingStep:
+    """Results at one position; of a solve that failed, only its outcome."""
+    if not state.outcome.ok:
+        return MeshingStep(input_angle=angle, outcome=state.outcome)
+    twist = 0.0 if cup is None else torque / cup
+    return MeshingStep(
+        input_angle=angle,
+        wave_generator_angle=state.wave_generator_angle,
+        output_error=follow.output_angle(state) - twist - angle / follow.ratio,
+        input_torque=follow.input_torque(state),
+        wave_generator_torque=state.wave_generator_torque,
+        tooth_moment=state.tooth_moment,
+        energy=state.energy + (0.0 if cup is None else 0.5 * torque**2 / cup),
+        pairs_in_contact=_pairs(ring, state),
+        contact_nodes=ring.copies * int(state.touching.sum()),
+        stress=MemberMaxima.at(ring, state),
+        iterations=len(state.history),
+        state=state,
     )
 
 

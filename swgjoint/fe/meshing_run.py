@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import nan
 from typing import Any
 
 import numpy as np
@@ -21,28 +22,46 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class SetupState:
+    """One of the equilibria that lead to the first wave-generator position."""
+
+    name: str
+    """``wave_generator`` (no tooth contact), ``meshed`` or ``torque``."""
+    state: State
+    stress: MemberMaxima
+
+    @classmethod
+    def at(cls, model: RingModel, name: str, state: State) -> SetupState:
+        """Recover the stresses of a state."""
+        return cls(name=name, state=state, stress=MemberMaxima.at(model, state))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class MeshingStep:
-    """Results at one wave-generator position."""
+    """Results at one wave-generator position; NaN and None where the solve failed."""
 
     input_angle: float
     """theta [rad]."""
-    wave_generator_angle: float
+    outcome: Outcome = Outcome.CONVERGED
+    wave_generator_angle: float = nan
     """Against the frame in which the flexspline or circular spline stands [rad]."""
-    output_error: float
+    output_error: float = nan
     """Output angle minus theta/i, from the undeformed position [rad]."""
-    input_torque: float
+    input_torque: float = nan
     """External torque on the input [N·m]."""
-    wave_generator_torque: float
+    wave_generator_torque: float = nan
     """External torque on the wave generator [N·m]."""
-    tooth_moment: float
+    tooth_moment: float = nan
     """Moment of the tooth forces on the flexspline [N·m]."""
-    energy: float
+    energy: float = nan
     """Strain energy [J]."""
-    pairs_in_contact: int
-    contact_nodes: int
+    pairs_in_contact: int | None = None
+    contact_nodes: int | None = None
     """Bore nodes that touch the wave generator, whole drive."""
-    stress: MemberMaxima
-    iterations: int
+    stress: MemberMaxima | None = None
+    iterations: int = 0
+    state: State | None = None
+    """The equilibrium, for fields and pictures."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -53,11 +72,15 @@ class MeshingRun:
     model: RingModel
     torque: float
     steps: tuple[MeshingStep, ...]
-    setup: tuple[tuple[str, MemberMaxima], ...]
-    last_state: State
-    outcome: Outcome
+    setup: tuple[SetupState, ...]
     cup_stiffness: float | None
     wall_s: float
+
+    @property
+    def outcome(self) -> Outcome:
+        """Converged, or what the first position that failed says."""
+        failed = (s.outcome for s in self.steps if not s.outcome.ok)
+        return next(failed, Outcome.CONVERGED)
 
     def _members(self) -> list[tuple[Superelement, int]]:
         ring = self.model.circular_spline.compliance
@@ -88,7 +111,7 @@ class MeshingRun:
     def to_json(self) -> dict[str, Any]:
         """The JSON object of ``swgjoint meshing``; per-step stress: flexspline."""
         elastic = self.model.circular_spline.compliance is not None
-        stress = [step.stress.flexspline.to_json() for step in self.steps]
+        solved = [step.stress for step in self.steps if step.stress is not None]
         cup = None if self.cup_stiffness is None else "closed-form torsion in series"
         return {
             "design": self.design.drive.name,
@@ -107,13 +130,19 @@ class MeshingRun:
             "steps": len(self.steps),
             "wall_s": self.wall_s,
             "outcome": self.outcome.name.lower(),
-            "flexspline": _averages([s.stress.flexspline for s in self.steps]),
-            "circular_spline": _averages(
-                [s.stress.circular_spline for s in self.steps]
-            ),
+            "flexspline": _averages([s.flexspline for s in solved]),
+            "circular_spline": _averages([s.circular_spline for s in solved]),
             "per_step": {
                 "angle_deg": list(self.series("input_angle") / deg),
-                **{f"{kind}_MPa": [row[kind] for row in stress] for kind in KINDS},
+                **{
+                    f"{kind}_MPa": [
+                        None
+                        if step.stress is None
+                        else getattr(step.stress.flexspline, kind) / 1e6
+                        for step in self.steps
+                    ]
+                    for kind in KINDS
+                },
                 "pairs_in_contact": [step.pairs_in_contact for step in self.steps],
                 "output_error_arcsec": list(self.series("output_error") / arcsec),
                 "wave_generator_torque_Nm": list(self.series("wave_generator_torque")),
@@ -121,16 +150,10 @@ class MeshingRun:
                 "tooth_moment_Nm": list(self.series("tooth_moment")),
                 "energy_J": list(self.series("energy")),
                 "iterations": [step.iterations for step in self.steps],
+                "outcome": [step.outcome.name.lower() for step in self.steps],
             },
             "setup_MPa": [
-                {
-                    "state": name,
-                    "flexspline": maxima.flexspline.to_json(),
-                    "circular_spline": None
-                    if maxima.circular_spline is None
-                    else maxima.circular_spline.to_json(),
-                }
-                for name, maxima in self.setup
+                {"state": found.name} | found.stress.to_json() for found in self.setup
             ],
         }
 

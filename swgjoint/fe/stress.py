@@ -106,3 +106,11 @@ class MemberMaxima:
             flexspline=StressMaxima.of(flexspline_stress(model, state)),
             circular_spline=None if ring is None else StressMaxima.of(ring),
         )
+
+    def to_json(self) -> dict[str, dict[str, float] | None]:
+        """Values in MPa by member, null for a rigid circular spline."""
+        ring = self.circular_spline
+        return {
+            "flexspline": self.flexspline.to_json(),
+            "circular_spline": None if ring is None else ring.to_json(),
+        }

@@ -114,6 +114,7 @@ def test_rated_torque_is_the_default(monkeypatch):
         "turn": 0.5,
         "nonlinear": False,
         "half": False,
+        "throw": False,
     }
 
 

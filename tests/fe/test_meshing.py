@@ -48,11 +48,11 @@ def meshed():
 def test_deflected_flexspline_meets_an_independent_study(refinement, tolerance):
     """Stress by the wave generator alone against 289/200/282 MPa (CalculiX study)."""
     run = simulate_meshing(reference(refinement), torque=0.0, steps=1, half=True)
-    state, found = run.setup[0]
+    state, found = run.setup[0].name, run.setup[0].stress
     assert state == "wave_generator"
     found = found.flexspline
     values = [found.tensile, found.compressive, found.von_mises]
-    assert run.setup[0][1].circular_spline.von_mises == 0.0
+    assert run.setup[0].stress.circular_spline.von_mises == 0.0
     assert values == pytest.approx([289e6, 200e6, 282e6], rel=tolerance)
 
 
@@ -170,8 +170,8 @@ def test_linear_level_runs_and_differs():
     )
     assert linear.to_json()["label"]["level"] == "linear"
     total = linear.series("tooth_moment") + linear.series("wave_generator_torque")
-    assert linear.setup[0][1].flexspline.tensile != pytest.approx(
-        one_pitch().setup[0][1].flexspline.tensile, rel=0.01
+    assert linear.setup[0].stress.flexspline.tensile != pytest.approx(
+        one_pitch().setup[0].stress.flexspline.tensile, rel=0.01
     )
     assert np.isfinite(total).all()
 
