@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.sparse.linalg import splu
 
+from swgjoint.fe.contact_patch import averaged_spline
 from swgjoint.fe.elasticity import (
     nodal_stress_operator,
     plane_stress_basis,
@@ -49,10 +50,14 @@ class Superelement:
     """M_a [Pa/m]. Shape (n_nodes, 3, 2 n_a)."""
     stress_from_flank: Array
     """M_F [Pa/N]. Shape (n_nodes, 3, 2 n_b)."""
+    displacement_from_skeleton: Array
+    """Of all nodes, like the stress [-]. Shape (n_nodes, 2, 2 n_a)."""
+    displacement_from_flank: Array
+    """[m/N]. Shape (n_nodes, 2, 2 n_b)."""
     mesh: SectorMesh
     profile: ToothProfile
     spline: CubicSpline
-    """Weights of the flank nodes at an arc length, C2 between the nodes."""
+    """Weights of the flank nodes in the displacement of a patch at an arc length."""
 
     @property
     def flank_size(self) -> int:
@@ -117,10 +122,15 @@ def condense(
     stiffness = reduced[:n, :n] + reduced[:n, n:] @ flank_from_skeleton
     stiffness = 0.5 * (stiffness + stiffness.T)
 
-    operator = nodal_stress_operator(basis, youngs_modulus, poisson_ratio).tocsc()
-    from_kept = operator[:, kept].toarray() + operator[:, inner] @ inner_from_kept
-    from_a = from_kept[:, :n] + from_kept[:, n:] @ flank_from_skeleton
-    from_flank = from_kept[:, n:] @ compliance
+    # all degrees of freedom from the kept ones, then from skeleton and flank forces
+    recovery = np.zeros((basis.N, kept.size))
+    recovery[kept, np.arange(kept.size)] = 1.0
+    recovery[inner] = inner_from_kept
+    all_from_a = recovery[:, :n] + recovery[:, n:] @ flank_from_skeleton
+    all_from_flank = recovery[:, n:] @ compliance
+    operator = nodal_stress_operator(basis, youngs_modulus, poisson_ratio)
+    from_a, from_flank = operator @ all_from_a, operator @ all_from_flank
+    at_nodes = basis.nodal_dofs.T.ravel()
     # sectors travel a thousand times farther than they strain: make rigid translation
     # free of force and stress to the last digit, not only to the solver's
     move = np.tile(np.eye(2), (len(skeleton), 1)) / np.sqrt(len(skeleton))
@@ -141,7 +151,9 @@ def condense(
         flank_compliance=compliance,
         stress_from_skeleton=from_a.reshape(nodes, 3, -1),
         stress_from_flank=from_flank.reshape(nodes, 3, -1),
+        displacement_from_skeleton=all_from_a[at_nodes].reshape(nodes, 2, -1),
+        displacement_from_flank=all_from_flank[at_nodes].reshape(nodes, 2, -1),
         mesh=mesh,
         profile=profile,
-        spline=CubicSpline(stations, np.eye(stations.size)),
+        spline=averaged_spline(stations),
     )

@@ -1,8 +1,8 @@
 """Closest points between the deformed flexspline flanks and the circular spline.
 
 Both flanks are smooth: analytic profiles that carry displacements interpolated by cubic
-splines through the flank nodes. Facets would leak their chord error, about a
-micrometre, into a kinematic error that is itself a matter of micrometres.
+splines and averaged over the patch of a contact. Facets would leak their chord error,
+about a micrometre, into a kinematic error that is itself a matter of micrometres.
 """
 
 from __future__ import annotations
