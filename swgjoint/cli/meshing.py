@@ -55,7 +55,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--half", action="store_true", help="half model: perfect geometry, even teeth"
     )
     parser.add_argument(
-        "--out", metavar="DIR", help="write meshing.json and meshing.png there"
+        "--out", metavar="DIR", help="write meshing.json and pictures there"
     )
 
 
@@ -86,13 +86,16 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     result: dict[str, Any] = plain(meshing.to_json())
     result["files"] = []
     if folder is not None:
+        from swgjoint.view.field_plots import field_pictures
         from swgjoint.view.meshing_plots import meshing_picture
 
-        picture = meshing_picture(result)
+        pictures = {"meshing": meshing_picture(result)} | field_pictures(meshing)
         folder.mkdir(parents=True, exist_ok=True)
-        result["files"] = [str(folder / f"meshing.{end}") for end in ("json", "png")]
+        names = ["meshing.json", *(f"{name}.png" for name in pictures)]
+        result["files"] = [str(folder / name) for name in names]
         write_whole(folder / "meshing.json", json_text(result) + "\n")
-        write_whole(folder / "meshing.png", picture)
+        for name, picture in pictures.items():
+            write_whole(folder / f"{name}.png", picture)
     return result
 
 

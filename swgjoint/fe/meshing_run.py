@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from swgjoint.errors import Outcome
 from swgjoint.fe.drive2d import left_out
+from swgjoint.fe.fields import root_stress, tooth_forces, wave_generator_contact
 from swgjoint.fe.ring import RingModel
 from swgjoint.fe.state import State
 from swgjoint.fe.stress import KINDS, MemberMaxima, StressMaxima
@@ -104,6 +105,11 @@ class MeshingRun:
         """Elements before condensation, of the deformable members."""
         return sum(int(e.mesh.mesh.t.shape[1]) * n for e, n in self._members())
 
+    @property
+    def states(self) -> tuple[State, ...]:
+        """Equilibria of the positions that were solved."""
+        return tuple(step.state for step in self.steps if step.state is not None)
+
     def series(self, name: str) -> Array:
         """One quantity of :class:`MeshingStep` over the steps."""
         return np.array([getattr(step, name) for step in self.steps], dtype=float)
@@ -149,12 +155,42 @@ class MeshingRun:
                 "input_torque_Nm": list(self.series("input_torque")),
                 "tooth_moment_Nm": list(self.series("tooth_moment")),
                 "energy_J": list(self.series("energy")),
+                "contact_arc_deg": [self._arcs(step.state) for step in self.steps],
                 "iterations": [step.iterations for step in self.steps],
                 "outcome": [step.outcome.name.lower() for step in self.steps],
             },
+            "contact_forces_N": self._tooth_forces(),
+            "root_stress": self._root_stress(),
             "setup_MPa": [
                 {"state": found.name} | found.stress.to_json() for found in self.setup
             ],
+        }
+
+    def _arcs(self, state: State | None) -> list[list[list[float]]] | None:
+        """Contact arcs of the wave generator from each lobe [deg], as they are."""
+        if state is None:
+            return None
+        found = wave_generator_contact(self.model, state, self.design.lobes)
+        return [[[low / deg, high / deg] for low, high in arcs] for arcs in found.arcs]
+
+    def _tooth_forces(self) -> dict[str, list[float]] | None:
+        """Forces on all flexspline teeth at the last position that was solved."""
+        if not self.states:
+            return None
+        force = tooth_forces(self.model, self.states[-1])
+        return {"right": list(force[:, 0]), "left": list(force[:, 1])}
+
+    def _root_stress(self) -> dict[str, Any] | None:
+        """Stress at one tooth root as the lobe passes."""
+        if not self.states:
+            return None
+        found = root_stress(self.model, self.states, self.design.lobes)
+        return {
+            "tooth": found.tooth,
+            "lobe_deg": list(found.lobe_position[:, found.tooth] / deg),
+        } | {
+            f"{kind}_MPa": list(getattr(found, kind)[:, found.tooth] / 1e6)
+            for kind in KINDS
         }
 
 

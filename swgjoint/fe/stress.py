@@ -49,13 +49,13 @@ def _nodal_stress(
     # angle of each sector's frame seen from the one before it
     step = (np.roll(angle, -1) - angle)[:, None]
     after = np.roll(stress[:, first], -1, axis=0)
-    mean = 0.5 * (stress[:, last] + _turned(after, step))
+    mean = 0.5 * (stress[:, last] + turned_stress(after, step))
     stress[:, last] = mean
-    stress[:, first] = np.roll(_turned(mean, -step), 1, axis=0)
+    stress[:, first] = np.roll(turned_stress(mean, -step), 1, axis=0)
     return stress
 
 
-def _turned(stress: Array, angle: Array) -> Array:
+def turned_stress(stress: Array, angle: Array) -> Array:
     """Components in a frame from which the given one is turned by ``angle``."""
     xx, yy, xy = stress[..., 0], stress[..., 1], stress[..., 2]
     middle, half = 0.5 * (xx + yy), 0.5 * (xx - yy)

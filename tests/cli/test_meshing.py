@@ -71,11 +71,14 @@ def test_balance_reaches_the_output(run):
 
 
 def test_files(run):
-    """--out holds the same object and a picture; progress stayed off stdout."""
+    """--out holds the same object and pictures; progress stayed off stdout."""
     result, folder, others = run
-    assert sorted(p.name for p in folder.iterdir()) == ["meshing.json", "meshing.png"]
+    pictures = {"meshing", "contours", "tooth_forces", "root_stress", "contact_arcs"}
+    names = {"meshing.json", *(f"{name}.png" for name in pictures)}
+    assert {p.name for p in folder.iterdir()} == names
     assert json.loads((folder / "meshing.json").read_text()) == result
-    assert (folder / "meshing.png").read_bytes().startswith(b"\x89PNG")
+    for path in folder.glob("*.png"):
+        assert path.read_bytes().startswith(b"\x89PNG")
     assert any("meshing: 4/4" in line for line in others)
 
 
