@@ -31,6 +31,7 @@ COMMANDS = {
     "map": "build the map of a drive and save it",
     "spec": "catalogue-style sheet of a design, a map or a catalogue drive",
     "run": "simulate an arm with its drives",
+    "study": "our values beside those of a source",
     "view": "open a recording",
     "doctor": "versions, engine plugin, cache, optional parts",
 }

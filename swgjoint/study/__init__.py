@@ -1,0 +1,1 @@
+"""Comparisons with sources: one function a study, plugged into ``swgjoint study``."""

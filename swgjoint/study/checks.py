@@ -1,0 +1,182 @@
+"""Rank orders and trends: what a source states that no single number holds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import combinations, groupby
+from typing import TYPE_CHECKING, Any
+
+from swgjoint.study.cases import Kind
+
+if TYPE_CHECKING:
+    from swgjoint.study.thesis import CaseRecords
+
+RANK_GAP = 0.05
+"""Two printed values that differ by less have no rank (the mesh study of the thesis
+spreads one design over 15 %)."""
+TIE = 0.02
+"""A stress that exceeds the lowest by less counts as lowest."""
+FLAT = 0.05
+"""Spread over a sweep that counts as no influence."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class RankCheck:
+    """Whether the von Mises stresses of a table come in the printed order."""
+
+    part: str
+    tenth: bool
+    pairs: int
+    """Pairs whose printed values differ by more than 5 %."""
+    swapped: tuple[tuple[str, str], ...]
+    """(printed lower, printed higher) that come out the other way round."""
+    missing: tuple[str, ...]
+    """Cases without a value."""
+
+    @property
+    def agrees(self) -> bool:
+        """Whether every pair was found in the printed order."""
+        return not self.swapped and not self.missing
+
+    @property
+    def text(self) -> str:
+        """One line."""
+        load = "T/10" if self.tenth else "T"
+        if self.agrees:
+            return f"{self.part} at {load}: rank order in von Mises stress as printed"
+        swapped = [f"{low} above {high}" for low, high in self.swapped]
+        return f"{self.part} at {load}: rank order differs: " + ", ".join(
+            [*swapped, *(f"{name} missing" for name in self.missing)]
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """All fields and whether it agrees."""
+        return {**vars(self), "agrees": self.agrees, "text": self.text}
+
+
+@dataclass(frozen=True, kw_only=True)
+class TrendCheck:
+    """Whether a stress is lowest, highest or constant where the source says so."""
+
+    part: str
+    kind: Kind
+    tenth: bool
+    claim: str
+    """``lowest``, ``highest`` or ``flat``."""
+    stated: float | None
+    """Parameter that the source names."""
+    ours: float | None
+    """Parameter that we find; for ``flat`` the spread, largest/smallest - 1."""
+    agrees: bool
+
+    def to_json(self) -> dict[str, Any]:
+        """All fields."""
+        return dict(vars(self))
+
+
+def _groups(results: Sequence[CaseRecords]) -> Iterator[list[CaseRecords]]:
+    for _, found in groupby(results, key=lambda result: result.case.group.id):
+        yield list(found)
+
+
+def rank_checks(results: Sequence[CaseRecords]) -> list[RankCheck]:
+    """Rank orders of the tables that ask for it, at T/10 and at T."""
+    checks = []
+    for cases in _groups(results):
+        group = cases[0].case.group
+        if not group.rank:
+            continue
+        for tenth in (True, False):
+            values = [
+                (
+                    group.name_of(c.case.entry),
+                    c.case.entry.von_mises_MPa,
+                    c.value("von_mises", tenth=tenth),
+                )
+                for c in cases
+            ]
+            known = [(n, p, v) for n, p, v in values if p is not None]
+            pairs, swapped = 0, []
+            for a, b in combinations(sorted(known, key=lambda item: item[1]), 2):
+                if b[1] < (1.0 + RANK_GAP) * a[1]:
+                    continue
+                pairs += 1
+                if a[2] is not None and b[2] is not None and a[2] >= b[2]:
+                    swapped.append((a[0], b[0]))
+            missing = tuple(name for name, _, value in known if value is None)
+            checks.append(
+                RankCheck(
+                    part=group.id,
+                    tenth=tenth,
+                    pairs=pairs,
+                    swapped=tuple(swapped),
+                    missing=missing,
+                )
+            )
+    return checks
+
+
+def trend_checks(results: Sequence[CaseRecords]) -> list[TrendCheck]:
+    """Stated extremes and constancies of the sweeps, at T/10 and at T."""
+    checks = []
+    for cases in _groups(results):
+        group = cases[0].case.group
+        for tenth in (True, False):
+            for claim in ("lowest", "highest"):
+                checks += [
+                    _extreme(cases, kind, tenth, claim, stated)
+                    for kind, stated in getattr(group, claim).items()
+                ]
+            checks += [_flat(cases, kind, tenth) for kind in group.flat]
+    return checks
+
+
+def _values(
+    cases: Sequence[CaseRecords], kind: Kind, tenth: bool
+) -> list[tuple[float, float]]:
+    """(parameter, stress) where both are known."""
+    return [
+        (case.case.entry.value, value)
+        for case in cases
+        if (value := case.value(kind, tenth=tenth)) is not None
+        and case.case.entry.value is not None
+    ]
+
+
+def _extreme(
+    cases: Sequence[CaseRecords], kind: Kind, tenth: bool, claim: str, stated: float
+) -> TrendCheck:
+    sign = 1.0 if claim == "lowest" else -1.0
+    values = _values(cases, kind, tenth)
+    ours = min(values, key=lambda item: sign * item[1]) if values else None
+    there = next((stress for value, stress in values if value == stated), None)
+    agrees = (
+        ours is not None
+        and there is not None
+        and len(values) > 1
+        and sign * (there / ours[1] - 1.0) <= TIE
+    )
+    return TrendCheck(
+        part=cases[0].case.group.id,
+        kind=kind,
+        tenth=tenth,
+        claim=claim,
+        stated=stated,
+        ours=None if ours is None else ours[0],
+        agrees=agrees,
+    )
+
+
+def _flat(cases: Sequence[CaseRecords], kind: Kind, tenth: bool) -> TrendCheck:
+    stresses = [stress for _, stress in _values(cases, kind, tenth)]
+    spread = max(stresses) / min(stresses) - 1.0 if len(stresses) > 1 else None
+    return TrendCheck(
+        part=cases[0].case.group.id,
+        kind=kind,
+        tenth=tenth,
+        claim="flat",
+        stated=None,
+        ours=spread,
+        agrees=spread is not None and spread <= FLAT,
+    )

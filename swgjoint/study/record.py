@@ -1,0 +1,187 @@
+"""One simulation of meshing as the small record that a study keeps."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import logging
+import time
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from swgjoint.errors import ComputationError, DesignError, InputError
+from swgjoint.files import write_whole
+from swgjoint.gear.design import Design
+from swgjoint.json_text import json_text
+from swgjoint.maps.cache import cache_folder, key_of
+from swgjoint.study.cases import KINDS
+from swgjoint.units import MPa
+
+_log = logging.getLogger(__name__)
+
+NUMBER = float | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunSpec:
+    """What a simulation of meshing depends on."""
+
+    design: Design
+    torque: float
+    """T [N·m]."""
+    positions: int
+    turn: float
+    """Turns of the input that the positions divide."""
+
+    @property
+    def key(self) -> str:
+        """Hash of the design, the load and the code."""
+        return key_of(
+            {
+                "study": _own_version(),
+                "design": self.design.content_hash(),
+                "torque": self.torque,
+                "positions": self.positions,
+                "turn": self.turn,
+            }
+        )
+
+    @property
+    def size(self) -> float:
+        """Rough work, to start long runs first: positions times nodes."""
+        return self.positions * float(self.design.mesh.refinement) ** 2
+
+
+@lru_cache
+def _own_version() -> str:
+    """Hash of the files of this part that decide a record."""
+    here = Path(__file__).parent
+    names = ("record.py", "stress_places.py")
+    return hashlib.sha256(b"".join((here / n).read_bytes() for n in names)).hexdigest()
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunRecord:
+    """Stresses of the flexspline in MPa by kind; None where there is none."""
+
+    outcome: str
+    """``converged``, the outcome of the first position that failed, ``failed`` where
+    not even the set-up was solved, or ``refused`` for a design that is no drive."""
+    message: str | None = None
+    failed_positions: int = 0
+    wall_s: float = 0.0
+    average: Mapping[str, NUMBER] = field(default_factory=dict)
+    """Mean over the positions of the largest nodal stress."""
+    away: Mapping[str, NUMBER] = field(default_factory=dict)
+    """The same without the nodes beside loaded tooth contacts."""
+    last: Mapping[str, NUMBER] = field(default_factory=dict)
+    """Largest nodal stress at the last position."""
+    places: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
+    """How often the largest stress sat where."""
+    setup: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    """By state of the set-up."""
+    per_position: Mapping[str, list[NUMBER]] = field(default_factory=dict)
+    angle_deg: list[float] = field(default_factory=list)
+    pairs_in_contact: list[int | None] = field(default_factory=list)
+
+    @property
+    def ok(self) -> bool:
+        """Whether every position was solved."""
+        return self.outcome == "converged"
+
+
+def recorded(spec: RunSpec) -> RunRecord:
+    """The record of a run, from the cache or computed and then kept.
+
+    An entry appears whole, under a name that only its content decides, so that a study
+    that was interrupted goes on where it stopped; a damaged entry is computed again.
+    """
+    folder = cache_folder()
+    path = None if folder is None else folder / "studies" / f"{spec.key}.json"
+    found = None if path is None else _kept(path)
+    if found is not None:
+        return found
+    record = compute(spec)
+    if path is not None:
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            write_whole(path, json_text(asdict(record)))
+        except (OSError, InputError) as error:
+            _log.warning("record not kept in the cache: %s", error)
+    return record
+
+
+def _kept(path: Path) -> RunRecord | None:
+    names = {item.name for item in fields(RunRecord)}
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+        if set(data) == names:
+            return RunRecord(**data)
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError, TypeError):
+        pass
+    _log.warning("cache entry ignored and computed again: %s", path)
+    return None
+
+
+def compute(spec: RunSpec) -> RunRecord:
+    """Simulate meshing; what fails is part of the record, not an error."""
+    from swgjoint.fe.drive2d import can_halve
+    from swgjoint.fe.meshing import simulate_meshing
+
+    begin = time.perf_counter()
+    try:
+        run = simulate_meshing(
+            spec.design,
+            torque=spec.torque,
+            steps=spec.positions,
+            turn=spec.turn,
+            half=can_halve(spec.design),
+            throw=False,
+        )
+    except (ComputationError, DesignError) as error:
+        outcome = "refused" if isinstance(error, DesignError) else "failed"
+        wall = time.perf_counter() - begin
+        return RunRecord(outcome=outcome, message=str(error), wall_s=wall)
+    return _record(run, begin)
+
+
+def _record(run: Any, begin: float) -> RunRecord:
+    from swgjoint.study.stress_places import StressPlaces
+
+    places = StressPlaces(model=run.model)
+    rows: list[tuple[dict[str, float], dict[str, float], dict[str, str]] | None] = [
+        None if step.state is None else places.largest(step.state) for step in run.steps
+    ]
+    solved = [row for row in rows if row is not None]
+
+    def mean(which: int, kind: str) -> NUMBER:
+        values: list[float] = [row[which][kind] for row in solved]  # type: ignore[misc]
+        return float(np.mean(values)) / MPa if values else None
+
+    bad = [step for step in run.steps if not step.outcome.ok]
+    last = rows[-1]
+    return RunRecord(
+        outcome=run.outcome.name.lower(),
+        message=bad[0].outcome.value if bad else None,
+        failed_positions=len(bad),
+        average={kind: mean(0, kind) for kind in KINDS},
+        away={kind: mean(1, kind) for kind in KINDS},
+        last={kind: None if last is None else last[0][kind] / MPa for kind in KINDS},
+        places={kind: dict(Counter(row[2][kind] for row in solved)) for kind in KINDS},
+        setup={state.name: state.stress.flexspline.to_json() for state in run.setup},
+        per_position={
+            kind: [None if row is None else row[0][kind] / MPa for row in rows]
+            for kind in KINDS
+        },
+        angle_deg=[float(np.rad2deg(step.input_angle)) for step in run.steps],
+        pairs_in_contact=[step.pairs_in_contact for step in run.steps],
+        wall_s=time.perf_counter() - begin,
+    )

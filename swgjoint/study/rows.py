@@ -1,0 +1,60 @@
+"""What every study returns: rows that set our values beside those of a source."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from swgjoint.progress import Progress, silent
+
+
+@dataclass(frozen=True, kw_only=True)
+class StudyOptions:
+    """Options of ``swgjoint study``; a study refuses those that it has no use for."""
+
+    only: tuple[str, ...] = ()
+    """Parts to run; all without."""
+    model: str | None = None
+    """Fidelity, ``2d`` or ``3d``; None for the study's own."""
+    jobs: int = 1
+    """Processes."""
+    folder: Path | None = None
+    """Where tables, report and plots go; None writes nothing."""
+    progress: Progress = silent
+
+
+@dataclass(frozen=True, kw_only=True)
+class Row:
+    """One quantity of one case: the source's value and ours."""
+
+    case: str
+    quantity: str
+    unit: str
+    source_value: float | None
+    """None where the source holds it back or prints no number."""
+    ours: float | None
+    """None where the computation failed; ``reason`` then says why."""
+    converged: float | None = None
+    """Mesh-converged value; None where it was not computed."""
+    reason: str | None = None
+    """Why ours differs or is missing."""
+    more: dict[str, Any] = field(default_factory=dict)
+    """Further columns of this study."""
+
+    def to_json(self) -> dict[str, Any]:
+        """All columns side by side."""
+        named = {k: getattr(self, k) for k in self.__dataclass_fields__ if k != "more"}
+        return named | self.more
+
+
+@dataclass(frozen=True, kw_only=True)
+class StudyResult:
+    """Rows of a study, what they add up to, and the files written."""
+
+    rows: tuple[Row, ...]
+    summary: tuple[str, ...] = ()
+    """Lines for the terminal."""
+    more: dict[str, Any] = field(default_factory=dict)
+    """Further keys of the JSON object."""
+    files: tuple[str, ...] = ()
