@@ -65,8 +65,12 @@ def run_thesis(options: StudyOptions) -> StudyResult:
         raise InputError(
             f"--model {options.model}: chapters 4 to 6 are two-dimensional"
         )
+    return run_cases(StudyFile.load("thesis"), options)
+
+
+def run_cases(study: StudyFile, options: StudyOptions) -> StudyResult:
+    """Simulate the cases of a study file and compare them with its printed values."""
     begin = time.perf_counter()
-    study = StudyFile.load("thesis")
     cases = [
         case_of(study, group, entry)
         for group in study.chosen(options.only)

@@ -1,0 +1,88 @@
+"""Thin rings pulled apart by two opposite forces: closed form and elastica."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.integrate import solve_bvp
+from scipy.interpolate import CubicSpline
+
+from swgjoint.errors import ComputationError
+
+Array = NDArray[np.float64]
+
+
+def small_deflection(angle: ArrayLike) -> Array:
+    r"""Outward deflection over that under the force, small, inextensional.
+
+    .. math:: w = \frac{F R^3}{4 E I}
+        \left(\sin\varphi' ... \right)
+
+    Args:
+        angle: From the axis of the forces, 0 to pi/2 [rad].
+
+    Source:
+        Timoshenko, Strength of Materials II, thin ring under two opposite forces.
+    """
+    across = 0.5 * np.pi - np.asarray(angle, dtype=float)
+    shape = np.cos(across) + across * np.sin(across) - 4.0 / np.pi
+    return np.asarray(shape / (0.5 * np.pi - 4.0 / np.pi))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Elastica:
+    """Inextensional ring with large rotations, one quarter."""
+
+    deflection: Array
+    """Outward, in the directions asked for, fixed in space [m]."""
+    force: float
+    """F R^2/(E I) [-]."""
+    curvature: float
+    """Under the force, times R; 1 in the undeformed ring."""
+
+
+def elastica(radius: float, crown: float, angle: ArrayLike) -> Elastica:
+    r"""Large deflection of a thin ring whose crowns move outwards.
+
+    .. math:: \theta' = \kappa, \quad \kappa' = \frac{F}{2EI}\cos\theta, \quad
+        x' = \cos\theta, \quad y' = \sin\theta
+
+    along the quarter from the crown (s = 0) to the side; by symmetry no force acts
+    along x.
+
+    Args:
+        radius: R [m].
+        crown: Outward displacement of each crown [m].
+        angle: Directions from the axis of the forces [rad].
+
+    Raises:
+        ComputationError: If the boundary value problem is not solved.
+    """
+    rise = 1.0 + crown / radius
+
+    def slope(s: Array, state: Array, force: Array) -> Array:
+        _, _, theta, bend = state
+        return np.stack(
+            [np.cos(theta), np.sin(theta), bend, 0.5 * force[0] * np.cos(theta)]
+        )
+
+    def ends(first: Array, last: Array, force: Array) -> Array:
+        del force
+        return np.array(
+            [first[0], first[1] - rise, first[2], last[1], last[2] + 0.5 * np.pi]
+        )
+
+    s = np.linspace(0.0, 0.5 * np.pi, 201)
+    start = np.stack([np.sin(s), np.cos(s), -s, np.full_like(s, -1.0)])
+    found = solve_bvp(slope, ends, s, start, p=[0.0], tol=1e-10, max_nodes=20000)
+    if not found.success:
+        raise ComputationError(f"elastica at {crown:g} m: {found.message}")
+    x, y = found.sol(np.linspace(0.0, 0.5 * np.pi, 801))[:2]
+    shape = CubicSpline(np.arctan2(x, y), np.hypot(x, y))
+    return Elastica(
+        deflection=radius * (shape(np.asarray(angle, dtype=float)) - 1.0),
+        force=float(found.p[0]),
+        curvature=-float(found.y[3, 0]),
+    )

@@ -1,0 +1,170 @@
+"""The runner on tiny studies: rows, failures, files, resumption."""
+
+from __future__ import annotations
+
+import csv
+
+import pytest
+
+from swgjoint.errors import InputError
+from swgjoint.faults import validated
+from swgjoint.study import record, thesis
+from swgjoint.study.cases import KINDS, StudyFile
+from swgjoint.study.rows import StudyOptions
+from swgjoint.study.thesis import run_cases, run_thesis
+
+BACKLASH = {"circular_spline.thickness_coefficient": 0.8}
+TINY = {
+    "source": "a source",
+    "torque_Nm": 20.0,
+    "positions": 2,
+    "group": [
+        {
+            "id": "sweep",
+            "title": "Rim",
+            "source": "a figure",
+            "base": "reference-2d",
+            "keys": ["flexspline.rim_mm"],
+            "symbol": "t_r",
+            "unit": "mm",
+            "lowest": {"von_mises": 0.9},
+            "cases": [{"value": 0.9}, {"value": 1.0, "tensile_MPa": 300.0}],
+        },
+        {
+            "id": "states",
+            "title": "States",
+            "source": "another",
+            "base": "reference-2d",
+            "cases": [
+                {"name": "free", "torque_Nm": 0.0, "changes": BACKLASH},
+                {"name": "no drive", "changes": {"flexspline.rim_mm": -1.0}},
+                {"name": "engaged", "state": "meshed", "tensile_MPa": 290.0},
+                {"name": "turned", "angle_deg": 3.0},
+            ],
+        },
+    ],
+}
+
+
+@pytest.fixture(scope="module")
+def folders(tmp_path_factory):
+    return tmp_path_factory.mktemp("cache"), tmp_path_factory.mktemp("out") / "a" / "b"
+
+
+@pytest.fixture(scope="module")
+def study():
+    return validated(StudyFile, TINY, where="tiny")
+
+
+@pytest.fixture(scope="module")
+def result(study, folders):
+    """The tiny study, run with two processes and written."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("SWGJOINT_CACHE", str(folders[0]))
+        return run_cases(study, StudyOptions(jobs=2, folder=folders[1]))
+
+
+def rows_of(result, case):
+    return {row.more["kind"]: row for row in result.rows if row.case == case}
+
+
+def test_rows_of_the_contract(result):
+    """Three rows a case in the order of the file, printed values or none."""
+    cases = list(dict.fromkeys(row.case for row in result.rows))
+    assert cases == [
+        *("sweep t_r = 0.9 mm", "sweep t_r = 1 mm"),
+        *("states free", "states no drive", "states engaged", "states turned"),
+    ]
+    assert len(result.rows) == 3 * len(cases)
+    row = rows_of(result, "sweep t_r = 1 mm")["tensile"].to_json()
+    assert row["source_value"] == 300.0
+    assert row["unit"] == "MPa" and row["quantity"] == "tensile stress"
+    assert row["converged"] is None
+    assert row["deviation_percent"] == pytest.approx(100 * (row["ours"] / 300 - 1))
+    assert rows_of(result, "sweep t_r = 0.9 mm")["tensile"].source_value is None
+
+
+def test_torque_and_tenth_differ(result):
+    """More torque, more tensile stress: T and T/10 are two simulations."""
+    row = rows_of(result, "sweep t_r = 1 mm")["tensile"]
+    assert row.ours > row.more["ours_tenth"] > 200.0
+
+
+def test_single_states(result):
+    """A set-up state is the same at both torques; a position is read there."""
+    engaged = rows_of(result, "states engaged")["tensile"]
+    assert engaged.ours == engaged.more["ours_tenth"]
+    turned = rows_of(result, "states turned")["von_mises"]
+    first = rows_of(result, "sweep t_r = 1 mm")["von_mises"]
+    assert turned.ours != first.ours
+    assert turned.ours == pytest.approx(first.ours, rel=0.1)
+
+
+def test_failures_stay_in_the_table(result):
+    """What cannot be solved or built has a row with the reason, and is counted."""
+    free = rows_of(result, "states free")["tensile"]
+    assert free.ours is None and "free to move" in free.reason
+    refused = rows_of(result, "states no drive")["tensile"]
+    assert refused.more["outcome"] == "refused"
+    assert "flexspline.rim_mm = -1 mm" in refused.reason
+    assert result.more["failed_cases"] == ["states free", "states no drive"]
+
+
+def test_shares_and_trends(result):
+    """Printed values within 15 % are counted; stated trends are checked."""
+    assert result.more["shares"]["tenth"] == {"printed": 2, "computed": 2, "within": 2}
+    assert result.more["shares"]["converged_tenth"]["computed"] == 0
+    assert [t["claim"] for t in result.more["trends"]] == ["lowest", "lowest"]
+    assert any("2 of 2 printed values within 15 %" in line for line in result.summary)
+
+
+def test_files(result, folders):
+    """Tables, report and one plot a part; the CSV has every row and column."""
+    assert sorted(path.name for path in folders[1].iterdir()) == [
+        *("states.png", "sweep.png"),
+        *("thesis.csv", "thesis.json", "thesis.md"),
+    ]
+    assert len(result.files) == 5
+    with (folders[1] / "thesis.csv").open(encoding="utf-8") as file:
+        table = list(csv.DictReader(file))
+    assert len(table) == len(result.rows)
+    assert list(table[0]) == list(result.rows[0].to_json())
+    assert float(table[3]["ours"]) == result.rows[3].ours
+    text = (folders[1] / "thesis.md").read_text(encoding="utf-8")
+    assert "## sweep: Rim" in text and "free to move" in text
+    for part in ("sweep", "states"):
+        assert (folders[1] / f"{part}.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_study_resumes(result, study, folders, monkeypatch):
+    """Run again, a study takes every record from the cache and finds the same rows."""
+    monkeypatch.setenv("SWGJOINT_CACHE", str(folders[0]))
+
+    def computed(spec):
+        raise AssertionError("computed again")
+
+    monkeypatch.setattr(record, "compute", computed)
+    assert run_cases(study, StudyOptions()).rows == result.rows
+
+
+def test_finer_meshes(study, monkeypatch):
+    """A group that converges has the value of the finest mesh and its last change."""
+    monkeypatch.setattr(thesis, "REFINEMENTS", (1, 2))
+    monkeypatch.setattr(thesis, "FINE_POSITIONS", 1)
+    monkeypatch.setenv("SWGJOINT_CACHE", "")
+    group = {**TINY["group"][0], "converge": True, "cases": [{"value": 1.0}]}
+    group["lowest"] = {}
+    tiny = validated(StudyFile, {**TINY, "group": [group]}, where="tiny")
+    found = {row.more["kind"]: row for row in run_cases(tiny, StudyOptions()).rows}
+    assert set(found) == set(KINDS)
+    row = found["tensile"]
+    # 261 and 287 MPa in the deflected state on refinements 1 and 2
+    assert 1.05 < row.converged / row.ours < 1.2
+    change = 100 * (row.more["converged_tenth"] / row.more["ours_tenth"] - 1)
+    assert row.more["last_refinement_percent"] == pytest.approx(change)
+
+
+def test_two_dimensions_only():
+    """The thesis study has no other fidelity."""
+    with pytest.raises(InputError, match="--model 3d: chapters 4 to 6"):
+        run_thesis(StudyOptions(model="3d"))
