@@ -25,6 +25,10 @@ Index = NDArray[np.int64]
 
 NEGLIGIBLE = 1e-9
 """Blocks below this part of the largest one are left out."""
+CORNER = 0.05
+"""Part of the flank within which a corner is a candidate for contact."""
+BEYOND = 1e-9
+"""Part of the flank by which a foot must miss its end to be a corner."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -132,13 +136,19 @@ class CircularSpline:
         flanks: FlankSplines | None,
         index: Index,
         *,
+        facing: Array | None = None,
         start: Array | None = None,
         steps: int = 3,
     ) -> Feet:
         """Closest points of a right flank, exact for the deformed curve.
 
+        A point whose foot would lie beyond an end of the flank faces the corner there:
+        its gap is the distance of the corner along the normal of the surface on which
+        the point lies. Without that normal, and for a rigid flank, it has none (inf).
+
         Args:
             points: In the frame of a ring tooth, mirrored to its right flank (n, 2).
+            facing: Normals of the flexspline at the points, in that frame (n, 2).
             flanks: Displacements of flanks in that frame; None for rigid ones.
             index: Which of the flanks each point faces (n,).
             start: Stations near the feet (n,); those of the rigid flank if None [m].
@@ -149,12 +159,18 @@ class CircularSpline:
         if flanks is None or start is None:
             gap, normal, curvature = self.profile.signed_distance(points)
             if flanks is None:
-                return Feet(gap=gap, normal=normal, curvature=curvature)
+                return Feet(
+                    gap=gap,
+                    normal=normal,
+                    curvature=curvature,
+                    corner=outside,
+                    rest=np.zeros_like(points),
+                )
             outside = ~np.isfinite(gap)
-            start = self._station(
-                points - np.where(outside, 0.0, gap)[:, None] * normal
-            )
-        s, low, high = start, flanks.breaks[0], flanks.breaks[-1]
+            inside = np.where(outside, 0.0, gap)
+            start = self._station(points - inside[:, None] * normal)
+        low, high = float(flanks.breaks[0]), float(flanks.breaks[-1])
+        s, wanted = start, start
         side = -1.0 if self.profile.internal else 1.0
         for _ in range(steps):
             base, outward, curvature = self.profile.evaluate(s)
@@ -166,9 +182,30 @@ class CircularSpline:
             normal = side * np.stack([-unit[:, 1], unit[:, 0]], axis=-1)
             gap = rest[:, 0] * normal[:, 0] + rest[:, 1] * normal[:, 1]
             along = (rest[:, 0] * unit[:, 0] + rest[:, 1] * unit[:, 1]) / size
-            s = np.clip(s + along / (1.0 + curvature * gap), low, high)
-        gap = np.where(outside, np.inf, gap)
-        return Feet(gap=gap, normal=normal, curvature=curvature, station=s)
+            wanted = s + along / np.maximum(1.0 + curvature * gap, 0.1)
+            s = np.clip(wanted, low, high)
+        corner = np.abs(wanted - s) > BEYOND * (high - low)
+        rest = np.zeros_like(points)
+        gap = np.where(outside & ~corner, np.inf, gap)
+        if corner.any():
+            at = np.flatnonzero(corner)
+            end = self.profile.evaluate(s[at])[0] + flanks.at(index[at], s[at])[0]
+            rest[at] = points[at] - end
+            gap[at] = np.inf
+            if facing is not None:
+                normal = normal.copy()
+                normal[at] = -facing[at]
+                depth = np.einsum("ki,ki->k", rest[at], normal[at])
+                near = np.hypot(rest[at, 0], rest[at, 1]) < CORNER * (high - low)
+                gap[at] = np.where(near, depth, np.inf)
+        return Feet(
+            gap=gap,
+            normal=normal,
+            curvature=curvature,
+            corner=corner,
+            rest=rest,
+            station=s,
+        )
 
     @cached_property
     def _stations_by_radius(self) -> tuple[Array, Array]:
@@ -218,5 +255,9 @@ class Feet:
     gap: Array
     normal: Array
     curvature: Array
+    corner: NDArray[np.bool_]
+    """Whether the foot is an end of the flank, not a point where it is normal."""
+    rest: Array
+    """From that end to the point, zero where there is none (n, 2) [m]."""
     station: Array | None = None
     """Arc length on the profile, of an elastic one [m]."""

@@ -185,7 +185,7 @@ class ToothContact:
         """
         element = self.element
         s = np.linspace(*element.flank_range, per_node * element.flank_size)
-        base, _, _ = element.profile.evaluate(s)
+        base, outward, _ = element.profile.evaluate(s)
         points = base + element.spline(s) @ sides
         # a flank can touch only where it reaches beyond the ring's tip circle
         farthest = np.hypot(points[..., 0], points[..., 1]).max(axis=-1)
@@ -193,6 +193,7 @@ class ToothContact:
         sector, side = sector[deep], side[deep]
         seen = self._feet(
             points[deep].reshape(-1, 2),
+            np.tile(outward, (len(sector), 1)),
             np.repeat(sector, s.size),
             np.repeat(side, s.size),
             rigid=rigid,
@@ -203,6 +204,7 @@ class ToothContact:
     def _feet(
         self,
         points: Array,
+        outward: Array,
         sector: Index,
         side: Index,
         *,
@@ -210,7 +212,17 @@ class ToothContact:
         start: Array | None = None,
         steps: int = 3,
     ) -> _Seen:
-        """Feet on the circular spline of points in the mirrored sector frames."""
+        """Feet on the circular spline of points in the mirrored sector frames.
+
+        Args:
+            points: On the displaced flanks (n, 2) [m].
+            outward: Normals of the flexspline there (n, 2).
+            sector: Sector of each point (n,).
+            side: Side of each point (n,).
+            rigid: Whether to leave the circular spline's own micrometres out.
+            start: Stations near the feet (n,) [m].
+            steps: Newton steps to the foot.
+        """
         ring = self.circular_spline
         teeth = ring.profile.teeth
         pitch = 2.0 * pi / teeth
@@ -220,13 +232,35 @@ class ToothContact:
         space = np.round(sign * self.bearing[sector] / pitch)
         turn = sign * self.angle[sector] - (space - 0.5) * pitch
         seen = rotate(points, turn) * _MIRROR[1]
+        facing = rotate(outward, turn) * _MIRROR[1]
         # ring tooth j stands half a pitch counter-clockwise from space j
         tooth = np.where(side == 0, space - 1, -space).astype(np.int64)
         tooth %= len(self.ring_flank)
         flanks = None if rigid else self._ring_flanks
-        feet = ring.feet(seen, flanks, 2 * tooth + 1 - side, start=start, steps=steps)
-        normal = rotate(feet.normal * _MIRROR[1], -turn)
-        return _Seen(feet=feet, normal=normal, tooth=tooth)
+        feet = ring.feet(
+            seen,
+            flanks,
+            2 * tooth + 1 - side,
+            facing=facing,
+            start=start,
+            steps=steps,
+        )
+        return _Seen(
+            feet=feet,
+            normal=rotate(feet.normal * _MIRROR[1], -turn),
+            rest=rotate(feet.rest * _MIRROR[1], -turn),
+            tooth=tooth,
+        )
+
+    def _displaced(self, s: Array, mirrored: Array) -> tuple[Array, Array, Array]:
+        """Points of displaced flanks, their tangents from tip to root, curvatures."""
+        element = self.element
+        base, outward, curvature = element.profile.evaluate(s)
+        point = base + np.einsum("ks,ksi->ki", element.spline(s), mirrored)
+        # tangent of the profile from tip to root: the outward normal turned back
+        tangent = np.stack([outward[:, 1], -outward[:, 0]], axis=-1)
+        slope = np.einsum("ks,ksi->ki", element.spline(s, 1), mirrored)
+        return point, tangent + slope, curvature
 
     def _refine(
         self,
@@ -241,20 +275,25 @@ class ToothContact:
         low, high = element.flank_range
         low_s = np.maximum(station - spacing, low)
         high_s = np.minimum(station + spacing, high)
-        d_spline = element.spline.derivative()
         s, foot = station, None
         for _ in range(REFINEMENTS):
-            point, outward, curvature = element.profile.evaluate(s)
-            point = point + np.einsum("ks,ksi->ki", element.spline(s), mirrored)
-            # tangent of the profile from tip to root: the outward normal turned back
-            tangent = np.stack([outward[:, 1], -outward[:, 0]], axis=-1)
-            tangent = tangent + np.einsum("ks,ksi->ki", d_spline(s), mirrored)
+            point, tangent, curvature = self._displaced(s, mirrored)
             seen = self._feet(
-                point, sector, side, start=foot, steps=3 if foot is None else 2
+                point,
+                _outward(tangent),
+                sector,
+                side,
+                start=foot,
+                steps=3 if foot is None else 2,
             )
-            foot = seen.feet.station
+            foot, corner = seen.feet.station, seen.feet.corner
             slope = np.einsum("ki,ki->k", seen.normal, tangent)
             relative = curvature + seen.feet.curvature
+            if corner.any():
+                # the point of the flank that is closest to the corner
+                beside = np.einsum("ki,ki->k", seen.rest, tangent)
+                slope = np.where(corner, beside, slope)
+                relative = np.where(corner, 1.0 + curvature * seen.feet.gap, relative)
             # the bracket holds the minimum: shrink it, and stay inside
             high_s = np.where(slope > 0.0, s, high_s)
             low_s = np.where(slope <= 0.0, s, low_s)
@@ -276,10 +315,10 @@ class ToothContact:
         n = len(sector)
         shaped = flank.reshape(-1, 2, size, 2)[sector, side]
         spline = element.spline(station) if n else np.zeros((0, size))
-        base, _, _ = element.profile.evaluate(station)
         mirror = _MIRROR[side]
-        point = base * mirror + np.einsum("ks,ksi->ki", spline, shaped)
-        seen = self._feet(point * mirror, sector, side)
+        mirrored, tangent, _ = self._displaced(station, shaped * mirror[:, None, :])
+        point = mirrored * mirror
+        seen = self._feet(mirrored, _outward(tangent), sector, side)
         normal = seen.normal * mirror
         weight = np.zeros((n, 2, size, 2))
         weight[np.arange(n), side] = spline[:, :, None] * normal[:, None, :]
@@ -314,4 +353,12 @@ class _Seen:
 
     feet: Feet
     normal: Array
+    rest: Array
+    """From a corner to the point (n, 2) [m]."""
     tooth: Index
+
+
+def _outward(tangent: Array) -> Array:
+    """Unit normals out of the flexspline, tangents from tip to root."""
+    size = np.hypot(tangent[:, 0], tangent[:, 1])
+    return np.asarray(np.stack([-tangent[:, 1], tangent[:, 0]], -1) / size[:, None])

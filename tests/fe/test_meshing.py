@@ -283,3 +283,25 @@ def test_label_names_what_a_plane_model_cannot_see():
         "wave_generator.bearing and micro_geometry"
     )
     assert one_pitch().to_json()["label"]["left_out"] is None
+
+
+@pytest.mark.parametrize(
+    ("pressure_angle", "member"), [(19.8, "flexspline"), (20.4, "circular_spline")]
+)
+def test_sharp_teeth_touch_with_their_corners(pressure_angle, member):
+    """Involute flanks that are not parallel touch at tips (thesis section 6.3.1)."""
+    design = Design.preset("reference-2d-involute").with_changes(
+        {"flexspline.pressure_angle_deg": pressure_angle}
+    )
+    run = simulate_meshing(design, torque=20.0, steps=2, turn=0.02, half=True)
+    inner = run.model.circular_spline.profile.addendum_radius
+    for step in run.steps:
+        contacts, force = step.state.contacts, step.state.tooth_force
+        assert step.tooth_moment + step.wave_generator_torque == pytest.approx(20.0)
+        assert (np.abs(contacts.gap) < 1e-9).all()
+        radius = np.hypot(contacts.point[:, 0], contacts.point[:, 1])
+        at_tip = {
+            "flexspline": contacts.station == run.model.element.flank_range[0],
+            "circular_spline": np.abs(radius - inner) < 2e-5,
+        }
+        assert force[at_tip[member]].sum() > 0.5 * force.sum()
