@@ -16,6 +16,10 @@ STUDIES = {
         "swgjoint.study.thesis:run_thesis",
         "stresses of the thesis, chapters 4 to 6, with the 2D model",
     ),
+    "ring": (
+        "swgjoint.study.ring:run_ring",
+        "deflection of a plain ring between two rollers, thesis appendix A",
+    ),
 }
 """Name -> function that takes a StudyOptions and returns a StudyResult, and what it
 compares; imported only when chosen."""

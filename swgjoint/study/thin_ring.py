@@ -18,7 +18,8 @@ def small_deflection(angle: ArrayLike) -> Array:
     r"""Outward deflection over that under the force, small, inextensional.
 
     .. math:: w = \frac{F R^3}{4 E I}
-        \left(\sin\varphi' ... \right)
+        \left(\cos\psi + \psi\sin\psi - \frac4\pi\right), \quad
+        \psi = \frac\pi2 - \varphi
 
     Args:
         angle: From the axis of the forces, 0 to pi/2 [rad].

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 KINDS = ("tensile", "|compressive|", "von Mises")
-SHOWN_TEETH = 4.5  # to either side of an axis
+SHOWN_TEETH = 6.0  # to either side of an axis
 LEVELS = 12
 PALE = (0.9, 0.92, 0.97, 1.0)
 SNAPSHOTS = 4
