@@ -68,6 +68,10 @@ class GroupEntry(Section):
     highest: Mapping[Kind, float] = {}
     flat: Annotated[tuple[Kind, ...], Listed] = ()
     """Stresses that do not depend on the parameter, as the source states it."""
+    flat_range: Annotated[tuple[float, float], Listed] | None = None
+    """Values of the parameter between which that holds; all without."""
+    over: str | None = None
+    """Group of the same parameter whose von Mises stress this one is compared with."""
     statement: str = ""
     note: str = ""
     converge: bool = False
@@ -121,11 +125,19 @@ class StudyFile(Section):
     group: Annotated[tuple[GroupEntry, ...], Field(strict=False, min_length=1)]
 
     @model_validator(mode="after")
-    def _ids_differ(self) -> StudyFile:
+    def _groups_fit(self) -> StudyFile:
         ids = [group.id for group in self.group]
         twice = sorted({i for i in ids if ids.count(i) > 1})
         if twice:
             raise Fault(("group", f"id {', '.join(twice)} more than once"))
+        keys = {group.id: group.keys for group in self.group}
+        faults = [
+            (f"group[{k}].over", f"{g.over!r}; accepted: a group of the same keys")
+            for k, g in enumerate(self.group)
+            if g.over is not None and (keys.get(g.over) != g.keys or not g.keys)
+        ]
+        if faults:
+            raise Fault(*faults)
         return self
 
     @classmethod

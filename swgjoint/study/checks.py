@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations, groupby
+from math import inf
 from typing import TYPE_CHECKING, Any
 
 from swgjoint.study.cases import Kind
 
 if TYPE_CHECKING:
-    from swgjoint.study.thesis import CaseRecords
+    from swgjoint.study.thesis_rows import CaseRecords
 
 RANK_GAP = 0.05
 """Two printed values that differ by less have no rank (the mesh study of the thesis
@@ -169,7 +170,8 @@ def _extreme(
 
 
 def _flat(cases: Sequence[CaseRecords], kind: Kind, tenth: bool) -> TrendCheck:
-    stresses = [stress for _, stress in _values(cases, kind, tenth)]
+    low, high = cases[0].case.group.flat_range or (-inf, inf)
+    stresses = [s for p, s in _values(cases, kind, tenth) if low <= p <= high]
     spread = max(stresses) / min(stresses) - 1.0 if len(stresses) > 1 else None
     return TrendCheck(
         part=cases[0].case.group.id,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from swgjoint.study.cases import KINDS
 
 if TYPE_CHECKING:
-    from swgjoint.study.thesis import CaseRecords
+    from swgjoint.study.thesis_rows import CaseRecords
 
 _TITLES = {
     "tensile": "tensile",

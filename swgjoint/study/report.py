@@ -16,7 +16,7 @@ from swgjoint.study.plots import group_picture
 from swgjoint.study.rows import Row
 
 if TYPE_CHECKING:
-    from swgjoint.study.thesis import CaseRecords
+    from swgjoint.study.thesis_rows import CaseRecords
 
 _COLUMNS = {
     "case": "case",

@@ -12,47 +12,27 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 from swgjoint.errors import InputError
 from swgjoint.gear.design import Design
-from swgjoint.study.cases import KINDS, Case, Kind, StudyFile, case_of
+from swgjoint.study.cases import Case, StudyFile, case_of
 from swgjoint.study.checks import RankCheck, TrendCheck, rank_checks, trend_checks
 from swgjoint.study.pool import run_all
-from swgjoint.study.reasons import WITHIN, Facts, percent, reason_for
+from swgjoint.study.reasons import WITHIN
 from swgjoint.study.record import RunRecord, RunSpec, recorded
 from swgjoint.study.rows import Row, StudyOptions, StudyResult
+from swgjoint.study.thesis_rows import (
+    REFINEMENTS,
+    CaseRecords,
+    increase_rows,
+    stress_rows,
+)
 
 TENTH = 0.1
-REFINEMENTS = (2, 3)
-"""Meshes beyond the one of the thesis for the rows of its tables."""
 FINE_POSITIONS = 12
 """Positions on the finer meshes, over one pitch of the fixed member. Without tolerances
 the pattern repeats with that pitch, and 35 positions over half a turn (61 pitches) are
 35 equidistant phases of it: the mean over 12 phases agrees to 0.1 %."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class CaseRecords:
-    """All runs of a case: nominal and tenth torque, by refinement."""
-
-    case: Case
-    nominal: Mapping[int, RunRecord]
-    tenth: Mapping[int, RunRecord]
-
-    def value(
-        self, kind: Kind, *, tenth: bool, refinement: int = 1, away: bool = False
-    ) -> float | None:
-        """Stress [MPa]; None where the run failed or was not made."""
-        record = (self.tenth if tenth else self.nominal).get(refinement)
-        entry = self.case.entry
-        if record is None:
-            return None
-        if entry.state != "turn":
-            return record.setup.get(entry.state, {}).get(kind)
-        if entry.angle_deg is not None:
-            return record.last.get(kind)
-        return (record.away if away else record.average).get(kind)
 
 
 def run_thesis(options: StudyOptions) -> StudyResult:
@@ -137,64 +117,6 @@ def _collect(
     return CaseRecords(case=case, nominal=nominal, tenth=tenth)
 
 
-def _row(result: CaseRecords, kind: Kind) -> Row:
-    case, finest = result.case, REFINEMENTS[-1]
-    printed = case.entry.printed[kind]
-
-    def ours(tenth: bool, refinement: int = 1, away: bool = False) -> float | None:
-        return result.value(kind, tenth=tenth, refinement=refinement, away=away)
-
-    facts = Facts(
-        printed=printed,
-        nominal=ours(False),
-        tenth=ours(True),
-        away=ours(True, away=True),
-        fine=ours(True, finest),
-        places=result.tenth[1].places.get(kind, {}),
-        failures=tuple(
-            dict.fromkeys(
-                f"{name}: {record.message}"
-                for name, record in (
-                    ("T", result.nominal[1]),
-                    ("T/10", result.tenth[1]),
-                )
-                if not record.ok
-            )
-        ),
-        note=case.note,
-    )
-    return Row(
-        case=case.name,
-        quantity=kind.replace("_", " ").replace("mises", "Mises") + " stress",
-        unit="MPa",
-        source_value=printed,
-        ours=facts.nominal,
-        converged=ours(False, finest),
-        reason=reason_for(facts),
-        more={
-            "part": case.group.id,
-            "kind": kind,
-            "source": case.group.source,
-            "parameter": case.entry.value,
-            "torque_Nm": case.torque,
-            "ours_tenth": facts.tenth,
-            "converged_tenth": facts.fine,
-            "deviation_percent": percent(facts.nominal, printed),
-            "deviation_tenth_percent": percent(facts.tenth, printed),
-            "deviation_converged_tenth_percent": percent(facts.fine, printed),
-            "last_refinement_percent": percent(facts.fine, ours(True, REFINEMENTS[-2])),
-            "away_from_contacts": ours(False, away=True),
-            "away_from_contacts_tenth": facts.away,
-            "places": dict(result.nominal[1].places.get(kind, {})),
-            "places_tenth": dict(facts.places),
-            "outcome": result.nominal[1].outcome,
-            "outcome_tenth": result.tenth[1].outcome,
-            "run_s": result.nominal[1].wall_s,
-            "run_tenth_s": result.tenth[1].wall_s,
-        },
-    )
-
-
 def _result(
     study: StudyFile,
     results: Sequence[CaseRecords],
@@ -202,7 +124,11 @@ def _result(
     begin: float,
     runs: int,
 ) -> StudyResult:
-    rows = tuple(_row(result, kind) for result in results for kind in KINDS)
+    order = list(dict.fromkeys(result.case.group.id for result in results))
+    rows = sorted(
+        [*stress_rows(results), *increase_rows(results)],
+        key=lambda row: order.index(row.more["part"]),
+    )
     ranks, trends = rank_checks(results), trend_checks(results)
     shares = {
         key: _share(rows, column)
@@ -212,13 +138,11 @@ def _result(
             ("converged_tenth", "deviation_converged_tenth_percent"),
         )
     }
-    failed = sorted(
-        {
-            row.case
-            for row in rows
-            if {row.more["outcome"], row.more["outcome_tenth"]} != {"converged"}
-        }
-    )
+    failed = [
+        result.case.name
+        for result in results
+        if not (result.nominal[1].ok and result.tenth[1].ok)
+    ]
     more = {
         "source": study.source,
         "within_percent": WITHIN,
@@ -237,7 +161,7 @@ def _result(
         files = write_report(
             options.folder, study, results, rows, (*summary, f"{seconds:.0f} s")
         )
-    return StudyResult(rows=rows, summary=summary, more=more, files=files)
+    return StudyResult(rows=tuple(rows), summary=summary, more=more, files=files)
 
 
 def _share(rows: Sequence[Row], column: str) -> dict[str, int]:

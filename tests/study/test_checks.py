@@ -8,7 +8,7 @@ from swgjoint.study.cases import StudyFile, case_of
 from swgjoint.study.checks import rank_checks, trend_checks
 from swgjoint.study.reasons import Facts, reason_for
 from swgjoint.study.record import RunRecord
-from swgjoint.study.thesis import CaseRecords
+from swgjoint.study.thesis_rows import CaseRecords
 
 STUDY = StudyFile.load("thesis")
 
@@ -68,6 +68,17 @@ def test_trends():
     flat = trend_checks(results("6.4.5", [100, 101, 104, 102], [100, 101, 106, 102]))
     assert [c.agrees for c in flat] == [False, True]
     assert [c.ours for c in flat] == pytest.approx([0.06, 0.04])
+
+
+def test_flat_over_a_range():
+    """5.2: stresses are alike for C from 0.91 to 0.94, not beyond."""
+    tenth = [342.0, 342, 342, 343, 329, 276, 224, 266]
+    nominal = [540.0, 486, 435, 383, 333, 317, 310, 303]
+    checks = trend_checks(results("5.2", nominal, tenth))
+    flat = {(c.kind, c.tenth): c for c in checks if c.claim == "flat"}
+    assert flat["von_mises", True].agrees
+    assert not flat["von_mises", False].agrees
+    assert flat["von_mises", False].ours == pytest.approx(540 / 383 - 1)
 
 
 def test_highest():

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 
+from swgjoint.errors import ComputationError, Outcome
+from swgjoint.fe import meshing
 from swgjoint.fe.meshing import simulate_meshing
+from swgjoint.fe.meshing_run import MeshingStep
 from swgjoint.gear.design import Design
 from swgjoint.study import record
 from swgjoint.study.cases import KINDS
@@ -17,13 +21,6 @@ from swgjoint.study.stress_places import StressPlaces
 SHORT = RunSpec(
     design=Design.preset("reference-2d"), torque=20.0, positions=2, turn=0.01
 )
-FREE = RunSpec(
-    design=SHORT.design.with_changes({"circular_spline.thickness_coefficient": 0.8}),
-    torque=0.0,
-    positions=2,
-    turn=0.01,
-)
-"""No torque and backlash: nothing holds the output."""
 
 
 @cache
@@ -110,11 +107,12 @@ def test_resumes_from_the_cache(cache_here, monkeypatch):
 
 def test_key_depends_on_everything():
     """Design, torque, positions and turn each change the key; the name does not."""
+    finer = SHORT.design.with_changes({"mesh.refinement": 2})
     others = [
         RunSpec(design=SHORT.design, torque=2.0, positions=2, turn=0.01),
         RunSpec(design=SHORT.design, torque=20.0, positions=3, turn=0.01),
         RunSpec(design=SHORT.design, torque=20.0, positions=2, turn=0.02),
-        FREE,
+        RunSpec(design=finer, torque=20.0, positions=2, turn=0.01),
     ]
     assert len({spec.key for spec in (SHORT, *others)}) == 5
     renamed = SHORT.design.with_changes({"drive.name": "other"})
@@ -122,12 +120,36 @@ def test_key_depends_on_everything():
     assert again.key == SHORT.key
 
 
-def test_a_failure_is_recorded():
-    """A drive whose output is free is a record with the advice, not an exception."""
-    found = compute(FREE)
+def test_a_failure_is_recorded(monkeypatch):
+    """A set-up that cannot be solved is a record with the advice, not an exception."""
+
+    def stuck(*_, **__):
+        raise ComputationError(f"loading failed: {Outcome.DIVERGED.value}")
+
+    monkeypatch.setattr(meshing, "simulate_meshing", stuck)
+    found = compute(SHORT)
     assert found.outcome == "failed" and not found.ok
-    assert "the output is free to move" in found.message
+    assert "lower the torque" in found.message
     assert found.average == {}
+
+
+def test_positions_that_fail_are_counted(monkeypatch):
+    """Averages are over the positions that were solved; the others are counted."""
+
+    def last_fails(*args, **options):
+        run = simulate_meshing(*args, **options)
+        bad = MeshingStep(input_angle=1.0, outcome=Outcome.MAX_ITERATIONS)
+        return replace(run, steps=(run.steps[0], bad))
+
+    monkeypatch.setattr(meshing, "simulate_meshing", last_fails)
+    found = compute(SHORT)
+    assert found.outcome == "max_iterations" and found.failed_positions == 1
+    assert "use smaller load steps" in found.message
+    for kind in KINDS:
+        first = short().per_position[kind][0]
+        assert found.per_position[kind] == [first, None]
+        assert found.average[kind] == first
+        assert found.last[kind] is None
 
 
 def test_a_design_that_is_not_modelled_is_recorded():

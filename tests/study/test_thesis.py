@@ -8,12 +8,12 @@ import pytest
 
 from swgjoint.errors import InputError
 from swgjoint.faults import validated
-from swgjoint.study import record, thesis
+from swgjoint.study import record, thesis, thesis_rows
 from swgjoint.study.cases import KINDS, StudyFile
+from swgjoint.study.record import RunRecord
 from swgjoint.study.rows import StudyOptions
 from swgjoint.study.thesis import run_cases, run_thesis
 
-BACKLASH = {"circular_spline.thickness_coefficient": 0.8}
 TINY = {
     "source": "a source",
     "torque_Nm": 20.0,
@@ -36,7 +36,7 @@ TINY = {
             "source": "another",
             "base": "reference-2d",
             "cases": [
-                {"name": "free", "torque_Nm": 0.0, "changes": BACKLASH},
+                {"name": "stuck", "torque_Nm": 5.0},
                 {"name": "no drive", "changes": {"flexspline.rim_mm": -1.0}},
                 {"name": "engaged", "state": "meshed", "tensile_MPa": 290.0},
                 {"name": "turned", "angle_deg": 3.0},
@@ -58,10 +58,18 @@ def study():
 
 @pytest.fixture(scope="module")
 def result(study, folders):
-    """The tiny study, run with two processes and written."""
+    """The tiny study, run and written; at 5 and 0.5 N·m nothing can be solved."""
+    compute = record.compute
+
+    def partly(spec):
+        if spec.torque in (5.0, 0.5):
+            return RunRecord(outcome="failed", message="the solve is stuck")
+        return compute(spec)
+
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("SWGJOINT_CACHE", str(folders[0]))
-        return run_cases(study, StudyOptions(jobs=2, folder=folders[1]))
+        patch.setattr(record, "compute", partly)
+        return run_cases(study, StudyOptions(folder=folders[1]))
 
 
 def rows_of(result, case):
@@ -73,7 +81,7 @@ def test_rows_of_the_contract(result):
     cases = list(dict.fromkeys(row.case for row in result.rows))
     assert cases == [
         *("sweep t_r = 0.9 mm", "sweep t_r = 1 mm"),
-        *("states free", "states no drive", "states engaged", "states turned"),
+        *("states stuck", "states no drive", "states engaged", "states turned"),
     ]
     assert len(result.rows) == 3 * len(cases)
     row = rows_of(result, "sweep t_r = 1 mm")["tensile"].to_json()
@@ -102,12 +110,13 @@ def test_single_states(result):
 
 def test_failures_stay_in_the_table(result):
     """What cannot be solved or built has a row with the reason, and is counted."""
-    free = rows_of(result, "states free")["tensile"]
-    assert free.ours is None and "free to move" in free.reason
+    stuck = rows_of(result, "states stuck")["tensile"]
+    assert stuck.ours is None
+    assert stuck.reason == "T, T/10: the solve is stuck"
     refused = rows_of(result, "states no drive")["tensile"]
     assert refused.more["outcome"] == "refused"
     assert "flexspline.rim_mm = -1 mm" in refused.reason
-    assert result.more["failed_cases"] == ["states free", "states no drive"]
+    assert result.more["failed_cases"] == ["states stuck", "states no drive"]
 
 
 def test_shares_and_trends(result):
@@ -116,6 +125,25 @@ def test_shares_and_trends(result):
     assert result.more["shares"]["converged_tenth"]["computed"] == 0
     assert [t["claim"] for t in result.more["trends"]] == ["lowest", "lowest"]
     assert any("2 of 2 printed values within 15 %" in line for line in result.summary)
+
+
+def test_increase_with_torque(study, folders, monkeypatch):
+    """A group over another one has the increase of its von Mises stress in percent."""
+    monkeypatch.setenv("SWGJOINT_CACHE", str(folders[0]))
+    low = {**TINY["group"][0], "cases": [{"value": 1.0}], "lowest": {}}
+    high = {**low, "id": "high", "torque_Nm": 200.0, "over": "sweep"}
+    tiny = validated(StudyFile, {**TINY, "group": [low, high]}, where="tiny")
+    rows = run_cases(tiny, StudyOptions()).rows
+    assert [row.more["part"] for row in rows] == ["sweep"] * 3 + ["high"] * 4
+    before, after, increase = rows[2], rows[5], rows[6]
+    assert increase.quantity == "von Mises stress over that at 20 N·m"
+    assert increase.unit == "%" and increase.ours > 20.0
+    assert increase.ours == pytest.approx(100 * (after.ours / before.ours - 1))
+    # ten times the torque of a tenth is the torque
+    assert after.more["ours_tenth"] == pytest.approx(before.ours, rel=1e-12)
+    high["over"] = "nothing"
+    with pytest.raises(InputError, match=r"group\[1\].over: 'nothing'; accepted"):
+        validated(StudyFile, {**TINY, "group": [low, high]}, where="tiny")
 
 
 def test_files(result, folders):
@@ -131,7 +159,7 @@ def test_files(result, folders):
     assert list(table[0]) == list(result.rows[0].to_json())
     assert float(table[3]["ours"]) == result.rows[3].ours
     text = (folders[1] / "thesis.md").read_text(encoding="utf-8")
-    assert "## sweep: Rim" in text and "free to move" in text
+    assert "## sweep: Rim" in text and "the solve is stuck" in text
     for part in ("sweep", "states"):
         assert (folders[1] / f"{part}.png").read_bytes().startswith(b"\x89PNG")
 
@@ -145,11 +173,14 @@ def test_a_study_resumes(result, study, folders, monkeypatch):
 
     monkeypatch.setattr(record, "compute", computed)
     assert run_cases(study, StudyOptions()).rows == result.rows
+    # processes of their own find the same records
+    assert run_cases(study, StudyOptions(jobs=2)).rows == result.rows
 
 
 def test_finer_meshes(study, monkeypatch):
     """A group that converges has the value of the finest mesh and its last change."""
-    monkeypatch.setattr(thesis, "REFINEMENTS", (1, 2))
+    for module in (thesis, thesis_rows):
+        monkeypatch.setattr(module, "REFINEMENTS", (1, 2))
     monkeypatch.setattr(thesis, "FINE_POSITIONS", 1)
     monkeypatch.setenv("SWGJOINT_CACHE", "")
     group = {**TINY["group"][0], "converge": True, "cases": [{"value": 1.0}]}
