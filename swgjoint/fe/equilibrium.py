@@ -81,7 +81,7 @@ class NewtonSolver:
             for iteration in range(self.max_iterations):
                 ring = linearise(model, state, load.on_flexspline)
                 # after the first steps only close candidates matter
-                reach = 2e-5 if iteration > 2 else 1e-4
+                reach = (0.02 if iteration > 2 else 0.1) * model.lobe_height
                 thorough = bool(history) and history[-1] < self.thorough_below
                 step = _solve_linear(model, state, ring, load, reach, thorough)
                 history.append(step.largest)
