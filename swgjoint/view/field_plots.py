@@ -57,7 +57,7 @@ def contour_picture(run: MeshingRun, state: State) -> bytes:
 
     One scale per row; the wave generator in grey, tooth forces as arrows.
     """
-    figure = _figure(14.0, 7.6)
+    figure = _figure(14.0, 6.9)
     axes = figure.subplots(3, 2)
     model = run.model
     members = [flexspline_field(model, state)]
