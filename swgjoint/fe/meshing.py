@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from math import pi
 
-from swgjoint.errors import ComputationError, Outcome
+from swgjoint.errors import ComputationError
 from swgjoint.fe.continuation import Continuation
 from swgjoint.fe.drive2d import check_modelled, ring_model
 from swgjoint.fe.meshing_run import MeshingRun, MeshingStep, SetupState
@@ -14,6 +14,7 @@ from swgjoint.fe.state import State
 from swgjoint.fe.stress import MemberMaxima
 from swgjoint.gear.cup import cup_torsional_stiffness
 from swgjoint.gear.design import Design
+from swgjoint.maps.catalogue import ratings_of
 from swgjoint.progress import Progress, silent
 from swgjoint.units import deg
 
@@ -75,18 +76,25 @@ def simulate_meshing(
     setup = [SetupState.at(ring, "wave_generator", state)]
     state = checked(follow.meshed(state), "engagement of the teeth")
     setup.append(SetupState.at(ring, "meshed", state))
-    if torque == 0.0 and len(state.tooth_force) == 0:
-        raise ComputationError(
-            f"{design.drive.name}: no tooth touches without torque: "
-            f"{Outcome.SINGULAR.value}"
-        )
-    state = checked(follow.to_torque(state, torque), f"loading to {torque:g} N·m")
+    if torque == 0.0:
+        small = 0.01 * ratings_of(design).rated_torque
+        unloaded = follow.unloaded(state, small)
+        state = unloaded.state
+    else:
+        state = follow.to_torque(state, torque)
+    checked(state, f"loading to {torque:g} N·m")
     setup.append(SetupState.at(ring, "torque", state))
 
     rows = []
     for k in range(steps):
         angle = 2.0 * pi * turn * k / steps
-        found = state if k == 0 else follow.to_angle(state, angle)
+        if k == 0:
+            found = state
+        elif torque == 0.0:
+            unloaded = follow.unloaded_to(unloaded, angle)
+            found = unloaded.state
+        else:
+            found = follow.to_angle(state, angle)
         if throw:
             checked(found, f"the input position {angle / deg:g} deg")
         if found.outcome.ok:
