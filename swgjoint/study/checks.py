@@ -34,6 +34,8 @@ class RankCheck:
     """(printed lower, printed higher) that come out the other way round."""
     missing: tuple[str, ...]
     """Cases without a value."""
+    added: dict[str, float]
+    """What the torque adds from T/10 to T, by case [MPa]: the cause of a swap at T."""
 
     @property
     def agrees(self) -> bool:
@@ -46,10 +48,18 @@ class RankCheck:
         load = "T/10" if self.tenth else "T"
         if self.agrees:
             return f"{self.part} at {load}: rank order in von Mises stress as printed"
-        swapped = [f"{low} above {high}" for low, high in self.swapped]
+        swapped = [
+            f"{low} above {high} (from T/10 to T {self._added(low)} and"
+            f" {self._added(high)} MPa)"
+            for low, high in self.swapped
+        ]
         return f"{self.part} at {load}: rank order differs: " + ", ".join(
             [*swapped, *(f"{name} missing" for name in self.missing)]
         )
+
+    def _added(self, name: str) -> str:
+        value = self.added.get(name)
+        return "-" if value is None else f"{value:+.0f}"
 
     def to_json(self) -> dict[str, Any]:
         """All fields and whether it agrees."""
@@ -71,9 +81,23 @@ class TrendCheck:
     """Parameter that we find; for ``flat`` the spread, largest/smallest - 1."""
     agrees: bool
 
+    @property
+    def text(self) -> str:
+        """One line."""
+        load = "T/10" if self.tenth else "T"
+        kind = self.kind.replace("_m", " M")
+        if self.ours is None:
+            return f"{load}: {kind} stress {self.claim}: not computed"
+        end = "as stated" if self.agrees else "not as stated"
+        if self.claim == "flat":
+            return f"{load}: {kind} stress within {100 * self.ours:.1f} %, {end} (flat)"
+        place = f"{self.claim} at {self.ours:g}"
+        stated = "" if self.ours == self.stated else f" ({self.stated:g})"
+        return f"{load}: {kind} stress {place}, {end}{stated}"
+
     def to_json(self) -> dict[str, Any]:
-        """All fields."""
-        return dict(vars(self))
+        """All fields and one line."""
+        return {**vars(self), "text": self.text}
 
 
 def _groups(results: Sequence[CaseRecords]) -> Iterator[list[CaseRecords]]:
@@ -88,6 +112,12 @@ def rank_checks(results: Sequence[CaseRecords]) -> list[RankCheck]:
         group = cases[0].case.group
         if not group.rank:
             continue
+        added = {
+            group.name_of(c.case.entry): high - low
+            for c in cases
+            if (high := c.value("von_mises", tenth=False)) is not None
+            and (low := c.value("von_mises", tenth=True)) is not None
+        }
         for tenth in (True, False):
             values = [
                 (
@@ -113,6 +143,7 @@ def rank_checks(results: Sequence[CaseRecords]) -> list[RankCheck]:
                     pairs=pairs,
                     swapped=tuple(swapped),
                     missing=missing,
+                    added=added,
                 )
             )
     return checks

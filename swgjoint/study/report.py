@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from swgjoint.files import write_whole
 from swgjoint.json_text import json_text
 from swgjoint.study.cases import StudyFile
+from swgjoint.study.checks import TrendCheck
 from swgjoint.study.plots import group_picture
 from swgjoint.study.rows import Row
 
@@ -49,6 +50,7 @@ def write_report(
     study: StudyFile,
     results: Sequence[CaseRecords],
     rows: Sequence[Row],
+    trends: Sequence[TrendCheck],
     summary: Sequence[str],
 ) -> tuple[str, ...]:
     """Write ``thesis.csv``, ``thesis.md``, ``thesis.json`` and one plot a part.
@@ -60,7 +62,9 @@ def write_report(
     plain_rows = [row.to_json() for row in rows]
     files = [
         write_whole(folder / "thesis.csv", _csv(plain_rows)),
-        write_whole(folder / "thesis.md", _markdown(study, results, rows, summary)),
+        write_whole(
+            folder / "thesis.md", _markdown(study, results, rows, trends, summary)
+        ),
         write_whole(folder / "thesis.json", json_text(plain_rows) + "\n"),
     ]
     for part, found in groupby(results, key=lambda result: result.case.group.id):
@@ -89,6 +93,7 @@ def _markdown(
     study: StudyFile,
     results: Sequence[CaseRecords],
     rows: Sequence[Row],
+    trends: Sequence[TrendCheck],
     summary: Sequence[str],
 ) -> str:
     head = _HEAD.format(
@@ -103,7 +108,9 @@ def _markdown(
         lines = [f"## {part}: {group.title}", "", group.source]
         if group.statement:
             lines[-1] += f": {group.statement}"
-        parts.append("\n".join([*lines, "", *_table(list(found))]))
+        stated = [f"- {check.text}" for check in trends if check.part == part]
+        stated += [""] if stated else []
+        parts.append("\n".join([*lines, "", *stated, *_table(list(found))]))
     return "\n\n".join(parts) + "\n"
 
 

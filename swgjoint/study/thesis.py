@@ -159,7 +159,7 @@ def _result(
 
         seconds = time.perf_counter() - begin
         files = write_report(
-            options.folder, study, results, rows, (*summary, f"{seconds:.0f} s")
+            options.folder, study, results, rows, trends, (*summary, f"{seconds:.0f} s")
         )
     return StudyResult(rows=tuple(rows), summary=summary, more=more, files=files)
 
@@ -197,4 +197,5 @@ def _summary(
         if here:
             agree = sum(check.agrees for check in here)
             lines.append(f"at {name}: {agree} of {len(here)} stated trends found")
+            lines += [f"{c.part} at {c.text}" for c in here if not c.agrees]
     return tuple(lines)
