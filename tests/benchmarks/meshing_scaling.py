@@ -148,7 +148,8 @@ def picture(result: dict[str, Any]) -> bytes:
         "refinement": "mesh refinement",
         "torque": "torque [N·m]",
     }
-    for ax, (sweep, label) in zip(figure.subplots(1, 3), labels.items(), strict=True):
+    axes = figure.subplots(1, 3, sharey=True)
+    for ax, (sweep, label) in zip(axes, labels.items(), strict=True):
         rows = [r for r in result["rows"] if r["sweep"] == sweep and r["value"] > 0.0]
         rows = [r for r in rows if "cpu_s_per_position" in r]
         x = np.array([r["value"] for r in rows])
@@ -160,11 +161,11 @@ def picture(result: dict[str, Any]) -> bytes:
                 x, fit[1] * x ** fit[0], "k--", lw=0.8, label=f"power {fit[0]:.2f}"
             )
         ax.set_xticks(x, [f"{v:g}" for v in x])
-        ax.minorticks_off()
+        ax.xaxis.minorticks_off()
         ax.set_xlabel(label)
         ax.grid(alpha=0.3)
         ax.legend(fontsize="small")
-    figure.axes[0].set_ylabel("one position [s]")
+    axes[0].set_ylabel("one position [s]")
     size = "half model" if result["half"] else "all teeth"
     figure.suptitle(
         f"2D simulation of meshing, {size}, {result['steps']} positions;"
