@@ -1,0 +1,87 @@
+"""Our states that CalculiX looks at."""
+
+from __future__ import annotations
+
+from functools import cache
+from math import pi
+
+from swgjoint.fe.continuation import Continuation
+from swgjoint.fe.drive2d import ring_model
+from swgjoint.fe.ring import RingModel
+from swgjoint.fe.state import State
+from swgjoint.gear.design import Design
+
+DESIGNS = {
+    "elliptical": "reference-2d",
+    "simplified": "reference-2d-simplified",
+    "parabolic": "reference-2d-parabolic",
+}
+TORQUE = 20.0
+POSITIONS = (0.0, 0.3)
+"""Wave-generator angles of the meshed positions in pitches of the circular spline."""
+
+
+def design_of(kind: str, refinement: int) -> Design:
+    """Reference design with a wave generator."""
+    return Design.load(DESIGNS[kind]).with_changes({"mesh.refinement": refinement})
+
+
+@cache
+def model_of(kind: str, refinement: int, elastic: bool = True) -> RingModel:
+    """Half of its drive."""
+    design = design_of(kind, refinement)
+    return ring_model(design, half=True, elastic_circular_spline=elastic)
+
+
+def _follow(kind: str, refinement: int, elastic: bool) -> Continuation:
+    design = design_of(kind, refinement)
+    model = model_of(kind, refinement, elastic)
+    return Continuation(model=model, ratio=design.ratio)
+
+
+@cache
+def deflected(kind: str, refinement: int, elastic: bool = False) -> State:
+    """The wave generator alone."""
+    return _checked(_follow(kind, refinement, elastic).deflected())
+
+
+@cache
+def loaded(kind: str, refinement: int, elastic: bool = True) -> State:
+    """At the torque, the wave generator not turned."""
+    follow = _follow(kind, refinement, elastic)
+    meshed = _checked(follow.meshed(deflected(kind, refinement, elastic)))
+    return _checked(follow.to_torque(meshed, TORQUE))
+
+
+def turned_to(kind: str, refinement: int, pitches: float) -> State:
+    """At the torque, the wave generator turned by pitches of the circular spline."""
+    state = loaded(kind, refinement)
+    if not pitches:
+        return state
+    teeth = model_of(kind, refinement).circular_spline.profile.teeth
+    follow = _follow(kind, refinement, True)
+    return _checked(follow.to_angle(state, pitches * 2.0 * pi / teeth))
+
+
+def _checked(state: State) -> State:
+    assert state.outcome.ok, state.outcome
+    return state
+
+
+def within_sector(model: RingModel, state: State) -> float:
+    r"""Deflection that our sectors lack under hoop tension: too soft by this [m].
+
+    Sectors turn as wholes: the tension N stiffens the ring by the rotations of the
+    sectors, and what the rim turns within a sector is left out. For the two-lobe shape
+    :math:`w = a \cos 2\varphi` of an inextensional ring the rotation is
+    :math:`\psi = \tfrac32 (a/r) \sin 2\varphi`, the stiffness against a by tension
+    :math:`K_N = \tfrac94 \pi N / r`, by bending :math:`K_b \approx 2 U/a^2`, and of
+    K_N the share :math:`(2 h)^2/12` is lost, h the angle of a sector.
+    """
+    a, angle = model.lobe_height, 2.0 * pi / model.element.sectors
+    radius = model.element.profile.dedendum_radius
+    tension = model.copies * float(state.pressure.sum()) / (2.0 * pi)
+    by_tension = 2.25 * pi * tension / radius
+    by_bending = 2.0 * state.energy / a**2
+    lost = (2.0 * angle) ** 2 / 12.0
+    return a * lost * by_tension / (by_tension + by_bending)

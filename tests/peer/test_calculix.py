@@ -1,0 +1,158 @@
+"""CalculiX, an independent code, under our contact forces and with its own contact."""
+
+from __future__ import annotations
+
+import os
+from types import SimpleNamespace
+
+import calculix
+import numpy as np
+import pytest
+from own_contact import own_contact
+from quadratic_ring import MIRROR, quadratic_ring
+from replay import Forces, flexspline_deck, replay, um
+from states import (
+    DESIGNS,
+    POSITIONS,
+    TORQUE,
+    deflected,
+    design_of,
+    loaded,
+    model_of,
+    turned_to,
+    within_sector,
+)
+
+from swgjoint.fe.corotation import rotate, turned
+from swgjoint.units import mm
+
+OURS = 8
+SHAPE = 0.2 * um
+STRESS = 0.03
+
+needs_calculix = pytest.mark.skipif(
+    not (calculix.available() or os.environ.get("SWGJOINT_REQUIRE_CCX")),
+    reason="no ccx on the path: apt-get install calculix-ccx",
+)
+
+
+def largest(part):
+    return float(np.abs(part).max())
+
+
+def test_forces_keep_their_resultants_on_another_mesh():
+    """Sum and moment of all forces are the same on a coarser mesh with curved sides."""
+    model, state = model_of("elliptical", 2), loaded("elliptical", 2)
+    forces, profile = Forces.of(model, state), model.element.profile
+    rim = design_of("elliptical", 2).flexspline.rim_mm * mm
+    ring = quadratic_ring(profile, rim, 1, sectors=model.sectors)
+    nodal = forces.on(ring)
+    every = np.concatenate([forces.bore.reshape(-1, 2), forces.flank.reshape(-1, 2)])
+    assert nodal.sum(axis=0) == pytest.approx(every.sum(axis=0), rel=1e-12)
+    right, _, _ = profile.evaluate(forces.station)
+    flanks = rotate(np.stack([right, right * MIRROR]), model.place[:, None, None])
+    place = np.concatenate(
+        [
+            model.reference[:, model.bore_nodes].reshape(-1, 2),
+            flanks.reshape(-1, 2),
+        ]
+    )
+    moment = np.einsum("ni,ni->", turned(place), every)
+    ours = np.einsum("ni,ni->", turned(ring.points), nodal)
+    assert ours == pytest.approx(moment, abs=1e-6 * TORQUE)
+    assert abs(moment) > 1e-3 * TORQUE  # they balance in the deformed shape only
+
+
+def test_forces_balance_in_the_deformed_shape():
+    """Wave generator, load and teeth have no moment about the axis together."""
+    model, state = model_of("elliptical", 2), loaded("elliptical", 2)
+    nodes = model.skeleton(state)[:, model.bore_nodes]
+    bore = np.einsum("sni,sni->", turned(nodes), Forces.of(model, state).bore)
+    balance = model.copies * bore + state.tooth_moment
+    assert abs(balance) < 1e-9 * TORQUE
+    assert abs(state.tooth_moment) > 0.9 * TORQUE
+
+
+@needs_calculix
+def test_substituted_constants_are_plane_stress(tmp_path):
+    """One element pulled by 100 MPa: strain s/E along and -nu s/E across."""
+    design = design_of("elliptical", 1)
+    steel = design.material_of("flexspline")
+    corners = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    middles = 0.5 * (corners + np.roll(corners, -1, axis=0))
+    element = SimpleNamespace(
+        points=np.concatenate([corners, middles]) * mm, elements=np.arange(8)[None]
+    )
+    force = np.zeros((8, 2))
+    force[[1, 5, 2], 0] = np.array([1, 4, 1]) / 6 * 100.0 * design.drive.face_width_mm
+    deck = flexspline_deck(design, element, "CPE8")
+    deck += "*BOUNDARY\n1, 1, 2\n4, 1\n8, 1\n*STEP\n*STATIC\n"
+    deck += calculix.load_block(force) + calculix.OUTPUT + "*END STEP\n"
+    found = calculix.run(deck, tmp_path, 8)
+    strain = 100e6 / steel.youngs_modulus
+    assert found.displacement[2] == pytest.approx(
+        [strain, -steel.poisson_ratio * strain], rel=1e-5
+    )
+    assert found.stress == pytest.approx(np.tile([100.0, 0.0, 0.0], (8, 1)), abs=0.02)
+
+
+@needs_calculix
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", DESIGNS)
+def test_wave_generator_state_holds_in_calculix(kind, tmp_path):
+    """Our contact forces give the same shape and root stress in CalculiX."""
+    design, model = design_of(kind, OURS), model_of(kind, OURS, False)
+    state = deflected(kind, OURS)
+
+    def found(element):
+        return replay(
+            design, model, state, tmp_path, element=element, refinement=1, quarter=True
+        )
+
+    radial, tangential = found("CPE8R").shape
+    # what tension stiffens within a sector is not in our model
+    allowed = SHAPE + within_sector(model, state)
+    assert max(largest(radial), largest(tangential)) < allowed
+    ours, theirs = found("CPE8").root_stress
+    assert ours == pytest.approx(theirs, rel=STRESS)
+
+
+@needs_calculix
+@pytest.mark.slow
+@pytest.mark.parametrize("pitches", POSITIONS)
+def test_meshed_position_holds_in_calculix(pitches, tmp_path):
+    """The same at 20 N·m, where the moments of all forces balance besides."""
+    design, model = design_of("elliptical", OURS), model_of("elliptical", OURS)
+    state = turned_to("elliptical", OURS, pitches)
+
+    def found(element):
+        return replay(
+            design, model, state, tmp_path, element=element, refinement=1, quarter=False
+        )
+
+    shape = found("CPE8R")
+    allowed = SHAPE + within_sector(model, state)
+    assert max(largest(part) for part in shape.shape) < allowed
+    assert abs(model.copies * shape.moment) < 1e-4 * TORQUE
+    ours, theirs = found("CPE8").root_stress
+    assert ours == pytest.approx(theirs, rel=STRESS)
+
+
+@needs_calculix
+@pytest.mark.slow
+def test_own_contact_finds_our_shape(tmp_path):
+    """CalculiX's contact with the wave generator, no force of ours in it."""
+    design, model = design_of("elliptical", 4), model_of("elliptical", 4, False)
+    state = deflected("elliptical", 4)
+    found = own_contact(
+        design,
+        model,
+        state,
+        tmp_path,
+        element="CPE8R",
+        refinement=1,
+        penalty=1e15,
+        quarter=True,
+    )
+    # 5 MPa of contact pressure at 1 GPa per micrometre, and chords of the outline
+    assert max(largest(part) for part in found.shape) < 0.05 * um
