@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from swgjoint.errors import DesignError
 from swgjoint.fe.circular_spline import CircularSpline, ring_compliance
+from swgjoint.fe.friction import STICK_STIFFNESS, Friction
 from swgjoint.fe.ring import RingModel
 from swgjoint.fe.sector_mesh import sector_mesh
 from swgjoint.fe.superelement import Superelement, condense
@@ -35,11 +36,6 @@ def check_modelled(design: Design, model: str) -> None:
     faults = []
     if model != "2d":
         faults.append(f"model {model!r} is not available yet; available: '2d'")
-    if design.friction.tooth_coefficient > 0.0:
-        faults.append(
-            f"friction.tooth_coefficient = {design.friction.tooth_coefficient:g} is "
-            "not modelled yet; accepted: 0"
-        )
     faults += [
         f"tolerances.{key} = {value:g} is not modelled yet; accepted: 0"
         for key, value in tolerances.model_dump().items()
@@ -65,6 +61,7 @@ def ring_model(
     half: bool = False,
     nonlinear: bool = True,
     elastic_circular_spline: bool = True,
+    friction: bool = True,
 ) -> RingModel:
     """2D model of a design.
 
@@ -74,6 +71,8 @@ def ring_model(
         nonlinear: Large rotations of the sectors.
         elastic_circular_spline: Whether the circular spline deforms; its outer
             diameter is fixed.
+        friction: Whether the flanks rub, with the coefficient of the design; False for
+            the conservative part alone.
 
     Raises:
         DesignError: If the design cannot be built or the half model does not apply.
@@ -90,7 +89,21 @@ def ring_model(
     if elastic_circular_spline:
         element = _sector(design, "circular_spline")
         ring = replace(ring, compliance=ring_compliance(element))
+    coefficient = design.friction.tooth_coefficient if friction else 0.0
+    law = None
+    if coefficient > 0.0:
+        if ring.compliance is None:
+            raise DesignError(
+                f"{design.drive.name}: friction.tooth_coefficient = {coefficient:g} "
+                "needs an elastic circular spline; accepted with a rigid one: 0"
+            )
+        modulus = design.material_of("flexspline").youngs_modulus
+        width = design.drive.face_width_mm * mm
+        law = Friction(
+            coefficient=coefficient, stiffness=STICK_STIFFNESS * modulus * width
+        )
     return RingModel(
+        friction=law,
         element=_sector(design, "flexspline"),
         wave_generator=wave_generator(design),
         circular_spline=ring,

@@ -16,6 +16,7 @@ from swgjoint.errors import Outcome
 from swgjoint.fe.complementarity import ActiveSetError, solve_mixed
 from swgjoint.fe.corotation import elastic_energy, turned
 from swgjoint.fe.cyclic import CyclicFactor, SingularRingError
+from swgjoint.fe.friction import Sliding, SlipHistory, dissipated, spring_energy
 from swgjoint.fe.linearise import Linearised, linearise
 from swgjoint.fe.ring import RingModel
 from swgjoint.fe.state import State
@@ -115,10 +116,14 @@ class NewtonSolver:
 class _Step:
     """Solution of one linearised problem."""
 
+    lines: Contacts
+    """Normals of the candidates, then, with friction, their tangents."""
+    line_force: Array
+    """Forces along them [N]."""
     contacts: Contacts
-    """Points that carry force."""
-    force: Array
-    """Their forces [N]."""
+    """The candidates."""
+    active: NDArray[np.int64]
+    """Those that carry force."""
     torque: float
     holding_torque: float
     compliance: float
@@ -152,17 +157,22 @@ def _solve_linear(
     and the gradient of the output rotation.
     """
     element = model.element
-    contacts, rows = ring.no_contacts, np.zeros((0, ring.gradient.shape[1]))
+    contacts = ring.no_contacts
     if load.teeth:
         contacts = ring.search.search(
             ring.flank, reach, state.contacts, thorough=thorough
         )
-        rows = ring.gap_gradient(contacts)
-    m = len(contacts)
-    levers = np.zeros((*ring.gradient.shape, m + 2))
-    levers[contacts.sector, :, np.arange(m)] = rows
-    levers[:, :, m] = ring.anchor
-    levers[:, :, m + 1] = ring.rotation_gradient
+    # lines of force: the normals and, with friction, the tangents of the contacts
+    m, lines, sliding = len(contacts), contacts, None
+    if model.friction is not None and m:
+        last = state.candidates or state.slip
+        sliding = Sliding.of(model.friction, contacts, state.slip, last)
+        lines = sliding.lines
+    n, rows = len(lines), ring.gap_gradient(lines)
+    levers = np.zeros((*ring.gradient.shape, n + 2))
+    levers[lines.sector, :, np.arange(n)] = rows
+    levers[:, :, n] = ring.anchor
+    levers[:, :, n + 1] = ring.rotation_gradient
 
     rhs = -ring.gradient - np.einsum("sij,sj->si", ring.hessian, ring.value)
     columns = np.concatenate([rhs[:, :, None], levers], axis=2)
@@ -170,72 +180,90 @@ def _solve_linear(
     solved = CyclicFactor(ring.anchored(), 2 * element.face_size).solve(columns)
     base, response = solved[:, :, 0] + ring.value, solved[:, :, 1:]
 
-    # unknowns: contact forces, displacement of the anchor, rotation of the circular
-    # spline, multiplier of the flexspline's rotation
-    matrix, offset = np.zeros((m + 3, m + 3)), np.zeros(m + 3)
-    own = np.r_[0 : m + 1, m + 2]
-    matrix[np.ix_(np.arange(m), own)] = np.einsum(
-        "kn,knl->kl", rows, response[contacts.sector]
+    # forces on the lines, displacement of the anchor, rotation of the circular spline,
+    # multiplier of the flexspline's rotation
+    matrix, offset = np.zeros((n + 3, n + 3)), np.zeros(n + 3)
+    own = np.r_[0 : n + 1, n + 2]
+    matrix[np.ix_(np.arange(n), own)] = np.einsum(
+        "kn,knl->kl", rows, response[lines.sector]
     )
-    local = contacts.weight @ element.flank_compliance
-    same = contacts.sector[:, None] == contacts.sector[None, :]
-    matrix[:m, :m] += np.where(same, local @ contacts.weight.T, 0.0)
+    local = lines.weight @ element.flank_compliance
+    same = lines.sector[:, None] == lines.sector[None, :]
+    matrix[:n, :n] += np.where(same, local @ lines.weight.T, 0.0)
     ring_compliance = model.circular_spline.compliance
     if ring_compliance is not None:
-        matrix[:m, :m] += ring_compliance.between(
-            contacts.tooth, contacts.ring_weight, model.ring_teeth
+        matrix[:n, :n] += ring_compliance.between(
+            lines.tooth, lines.ring_weight, model.ring_teeth
         )
-    last_two = np.array([m, m + 2])
-    matrix[np.ix_(last_two, own)] = np.einsum("snf,snl->fl", levers[:, :, m:], response)
-    matrix[:m, last_two] = matrix[last_two, :m].T
-    matrix[m, m] -= 1.0 / ring.anchor_stiffness
+    last_two = np.array([n, n + 2])
+    matrix[np.ix_(last_two, own)] = np.einsum("snf,snl->fl", levers[:, :, n:], response)
+    matrix[:n, last_two] = matrix[last_two, :n].T
+    matrix[n, n] -= 1.0 / ring.anchor_stiffness
     # turning the circular spline towards the teeth closes the gap by the lever arm
-    arm = np.einsum("ki,ki->k", turned(contacts.point), contacts.normal)
-    matrix[:m, m + 1] = matrix[m + 1, :m] = -arm
-    offset[m + 1] = -(load.on_ring or 0.0) / model.copies
+    arm = np.einsum("ki,ki->k", turned(lines.point), lines.normal)
+    matrix[:n, n + 1] = matrix[n + 1, :n] = -arm
+    offset[n + 1] = -(load.on_ring or 0.0) / model.copies
     # gaps as if the old tooth forces were gone; the new ones bring their own share
-    old = np.einsum("kb,kb->k", local, state.flank_force[contacts.sector])
-    old += np.einsum(
-        "kb,kb->k", contacts.ring_weight, ring.search.ring_flank[contacts.tooth]
-    )
-    moved = np.einsum("kn,kn->k", rows, base[contacts.sector])
-    offset[:m] = contacts.gap - old + moved
-    offset[last_two] = np.einsum("snf,sn->f", levers[:, :, m:], base)
-    offset[m + 2] += ring.rotation - (load.rotation or 0.0)
+    old = np.einsum("kb,kb->k", local, state.flank_force[lines.sector])
+    old += np.einsum("kb,kb->k", lines.ring_weight, ring.search.ring_flank[lines.tooth])
+    moved = np.einsum("kn,kn->k", rows, base[lines.sector])
+    offset[:n] = lines.gap - old + moved
+    offset[last_two] = np.einsum("snf,sn->f", levers[:, :, n:], base)
+    offset[n + 2] += ring.rotation - (load.rotation or 0.0)
 
-    used = np.arange(m + 1)
+    k = m if sliding is None else m + len(sliding.stick)
+    used = np.arange(k + 1)
     if load.on_ring is not None:
-        used = np.append(used, m + 1)
+        used = np.append(used, k + 1)
     if load.rotation is not None:
-        used = np.append(used, m + 2)
+        used = np.append(used, k + 2)
     guess = offset[:m] < 0.0
     if state.contacts is not None and len(state.contacts):
         guess = contacts.on_flanks_of(state.contacts)
-    found, active = solve_mixed(
-        matrix[np.ix_(used, used)],
-        offset[used],
-        m,
-        int(load.rotation is not None),
-        guess,
-    )
-    z = np.zeros(m + 3)
+
+    def solved_for(matrix: Array, offset: Array) -> tuple[Array, Mask]:
+        return solve_mixed(
+            matrix[np.ix_(used, used)],
+            offset[used],
+            m,
+            int(load.rotation is not None),
+            guess,
+        )
+
+    if sliding is None:
+        found, active = solved_for(matrix, offset)
+    else:
+        full = matrix, offset
+        try:
+            matrix, offset = sliding.reduced(*full)
+            found, active = solved_for(matrix, offset)
+        except ActiveSetError:
+            # without friction in proportion to the normal forces it is symmetric
+            sliding = sliding.lagged()
+            matrix, offset = sliding.reduced(*full)
+            found, active = solved_for(matrix, offset)
+    z = np.zeros(k + 3)
     z[used] = found
     held = np.concatenate([np.flatnonzero(active), used[m:]])
-    compliance = _output_compliance(matrix, held, m, load)
+    compliance = _output_compliance(matrix, held, k, load)
+    force = z[:k] if sliding is None else sliding.forces(z[:k])
+    anchor, ring_turn, multiplier = z[k:]
 
-    increment = base + response @ z[own]
+    solution = np.concatenate([force, [anchor, multiplier]])
+    increment = base + response @ solution
     residual = ring.gradient + np.einsum("sij,sj->si", ring.hessian, increment)
-    np.subtract.at(residual, contacts.sector, z[:m, None] * rows)
-    residual -= z[m + 2] * ring.rotation_gradient
-    holding = model.copies * float(z[m + 2])
-    held = np.flatnonzero(active)
+    np.subtract.at(residual, lines.sector, force[:, None] * rows)
+    residual -= multiplier * ring.rotation_gradient
+    holding = model.copies * float(multiplier)
     return _Step(
-        contacts=contacts.chosen(held),
-        force=z[held],
+        lines=lines,
+        line_force=force,
+        contacts=contacts,
+        active=np.flatnonzero(active),
         torque=-holding if load.torque is None else load.torque,
         holding_torque=holding if load.on_flexspline is None else -load.on_flexspline,
         compliance=compliance / model.copies,
-        ring_turn=float(z[m + 1]),
+        ring_turn=float(ring_turn),
         increment=increment,
         shift=ring.in_global_frame(increment),
         pressure=np.where(state.touching, ring.normal_rows(residual), 0.0),
@@ -243,17 +271,24 @@ def _solve_linear(
 
 
 def _output_compliance(
-    matrix: Array, held: NDArray[np.int64], m: int, load: Load
+    matrix: Array, held: NDArray[np.int64], k: int, load: Load
 ) -> float:
-    """Rotation of the output against its load, per torque of the model."""
+    """Rotation of the output against its load, per torque of the model.
+
+    Args:
+        matrix: Of k force unknowns, then anchor, ring and multiplier.
+        held: Unknowns that are not zero.
+        k: Force unknowns.
+        load: What is prescribed.
+    """
     system = matrix[np.ix_(held, held)]
     if load.on_ring is not None:
-        unit = (held == m + 1).astype(float)
-        return -float(np.linalg.solve(system, unit)[held == m + 1][0])
-    held = held[held <= m]
-    reach = matrix[held, m + 2]
+        unit = (held == k + 1).astype(float)
+        return -float(np.linalg.solve(system, unit)[held == k + 1][0])
+    held = held[held <= k]
+    reach, turn = matrix[held, k + 2], matrix[k + 2, held]
     system = matrix[np.ix_(held, held)]
-    return float(matrix[m + 2, m + 2] - reach @ np.linalg.solve(system, reach))
+    return float(matrix[k + 2, k + 2] - turn @ np.linalg.solve(system, reach))
 
 
 def _advance(
@@ -270,18 +305,12 @@ def _advance(
     bad = wrong > 1e-15
     if one_at_a_time and bad.any():
         bad = wrong == wrong.max()
+    lines, force, m = step.lines, step.line_force[:, None], len(step.contacts)
     flank_force = np.zeros_like(state.flank_force)
-    np.add.at(
-        flank_force,
-        step.contacts.sector,
-        step.force[:, None] * step.contacts.weight,
-    )
+    np.add.at(flank_force, lines.sector, force * lines.weight)
     ring_force = np.zeros_like(state.ring_force)
-    np.add.at(
-        ring_force,
-        step.contacts.tooth,
-        step.force[:, None] * step.contacts.ring_weight,
-    )
+    np.add.at(ring_force, lines.tooth, force * lines.ring_weight)
+    friction = step.line_force[m:] if len(lines) > m else np.zeros(m)
     # faces and bores of each sector; a shared face appears once
     size, inside = model.element.face_size, model.element.bore_size
     moved = model.skeleton(state) + damping * step.shift
@@ -293,8 +322,12 @@ def _advance(
         touching=state.touching ^ bad,
         flank_force=flank_force,
         ring_force=ring_force,
-        contacts=step.contacts,
-        tooth_force=step.force,
+        contacts=step.contacts.chosen(step.active),
+        tooth_force=step.line_force[step.active],
+        friction_force=friction[step.active],
+        candidates=SlipHistory(
+            contacts=step.contacts, normal=step.line_force[:m], force=friction
+        ),
         rotation=ring.rotation,
         ring_rotation=state.ring_rotation + damping * step.ring_turn,
         compliance=step.compliance,
@@ -318,9 +351,15 @@ def _finished(
         c = state.contacts
         moment = float(
             state.tooth_force @ np.einsum("ki,ki->k", turned(c.point), c.normal)
+            + state.friction_force @ np.einsum("ki,ki->k", turned(c.point), c.tangent)
         )
     energy = float(elastic_energy(model.element, frames, state.flank_force).sum())
     energy += 0.5 * float(np.sum(state.ring_force * model.ring_displacement(state)))
+    work, law = 0.0, model.friction
+    if law is not None and state.candidates is not None:
+        energy += spring_energy(law, state.candidates)
+        work = dissipated(law, state.slip, state.candidates)
+        state = replace(state, slip=state.candidates)
     return replace(
         state,
         outcome=outcome,
@@ -329,4 +368,6 @@ def _finished(
         wave_generator_torque=model.copies * float(np.sum(state.pressure * arm)),
         tooth_moment=model.copies * moment,
         energy=model.copies * energy,
+        friction_work=state.friction_work + model.copies * work,
+        candidates=None,
     )

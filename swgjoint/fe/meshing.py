@@ -132,6 +132,7 @@ def _step(
         wave_generator_torque=state.wave_generator_torque,
         tooth_moment=state.tooth_moment,
         energy=state.energy + (0.0 if cup is None else 0.5 * torque**2 / cup),
+        friction_work=state.friction_work,
         pairs_in_contact=_pairs(ring, state),
         contact_nodes=ring.copies * int(state.touching.sum()),
         stress=MemberMaxima.at(ring, state),

@@ -56,6 +56,8 @@ class MeshingStep:
     """Moment of the tooth forces on the flexspline [N·m]."""
     energy: float = nan
     """Strain energy [J]."""
+    friction_work: float = nan
+    """Work of tooth friction since the deflection [J]."""
     pairs_in_contact: int | None = None
     contact_nodes: int | None = None
     """Bore nodes that touch the wave generator, whole drive."""
@@ -128,6 +130,7 @@ class MeshingRun:
                 "circular_spline": "elastic, outside fixed" if elastic else "rigid",
                 "half": self.model.half,
                 "cup": cup,
+                "tooth_friction": self.design.friction.tooth_coefficient or None,
                 "left_out": left_out(self.design),
             },
             "torque_Nm": self.torque,
@@ -155,6 +158,7 @@ class MeshingRun:
                 "input_torque_Nm": list(self.series("input_torque")),
                 "tooth_moment_Nm": list(self.series("tooth_moment")),
                 "energy_J": list(self.series("energy")),
+                "friction_work_J": list(self.series("friction_work")),
                 "contact_arc_deg": [self._arcs(step.state) for step in self.steps],
                 "iterations": [step.iterations for step in self.steps],
                 "outcome": [step.outcome.name.lower() for step in self.steps],

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from swgjoint.fe.circular_spline import CircularSpline
 from swgjoint.fe.corotation import Frames, rotate, sector_frames, turned
+from swgjoint.fe.friction import Friction
 from swgjoint.fe.state import State
 from swgjoint.fe.superelement import Superelement
 from swgjoint.gear.wave_generator import WaveGenerator
@@ -33,6 +34,8 @@ class RingModel:
     half: bool = False
     """Half of the ring, closed by a rotation of 180 deg."""
     nonlinear: bool = True
+    friction: Friction | None = None
+    """Between the flanks; None without."""
 
     @property
     def sectors(self) -> int:

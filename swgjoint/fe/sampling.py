@@ -122,7 +122,7 @@ def sample_map(
         drive.layout, drive.teeth_flexspline, drive.teeth_circular_spline
     )
     follow = Continuation(
-        model=ring_model(design, half=can_halve(design)),
+        model=ring_model(design, half=can_halve(design), friction=False),
         ratio=design.ratio,
         layout=drive.layout,
     )
@@ -215,6 +215,9 @@ def sample_map(
                 "level": "nonlinear",
                 "circular_spline": "elastic, outside fixed",
                 "cup": None if cup is None else "closed-form torsion in series",
+                "friction": "left out of the potential"
+                if design.friction.tooth_coefficient
+                else None,
                 "left_out": left_out(design),
             },
             "ratings_source": ratings.source,

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.errors import Outcome
+from swgjoint.fe.friction import SlipHistory
 from swgjoint.fe.tooth_contact import Contacts
 
 Array = NDArray[np.float64]
@@ -34,6 +35,14 @@ class State:
     """Points that carry force."""
     tooth_force: Array = field(default_factory=lambda: np.zeros(0))
     """Normal force of every contact [N]. Shape (n_contacts,)."""
+    friction_force: Array = field(default_factory=lambda: np.zeros(0))
+    """Friction on the flexspline at every contact, tip to root [N]. (n_contacts,)."""
+    slip: SlipHistory | None = None
+    """Candidates and friction forces at the end of the step; None without friction."""
+    candidates: SlipHistory | None = None
+    """The same of the running iteration; None at its end."""
+    friction_work: float = 0.0
+    """Work of friction since the deflection, whole drive [J]."""
     wave_generator_angle: float = 0.0
     rotation: float = 0.0
     """Best-fit rotation of the bore [rad]."""

@@ -7,7 +7,7 @@ about a micrometre, into a kinematic error that is itself a matter of micrometre
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import pi
 
@@ -49,6 +49,16 @@ class Contacts:
     ring_weight: Array
     """Derivative of the gap by that tooth's flank displacements; no columns if it is
     rigid. Shape (n, 2 n_c)."""
+    tangent: Array
+    """Along the flank from tip to root, in the sector frame. Shape (n, 2)."""
+    sliding: Array
+    """Derivative of the motion along the tangent by the flank displacements, as
+    ``weight``. Shape (n, 2 n_b)."""
+    ring_sliding: Array
+    """The same by the flank displacements of the circular spline. Shape (n, 2 n_c)."""
+    slip: Array
+    """Sum of the arc lengths of the two material points, tips to roots; NaN on a rigid
+    circular spline [m]. Shape (n,)."""
 
     def __len__(self) -> int:
         return len(self.sector)
@@ -67,7 +77,47 @@ class Contacts:
             weight=np.zeros((0, flank_dofs)),
             tooth=index,
             ring_weight=np.zeros((0, ring_dofs)),
+            tangent=np.zeros((0, 2)),
+            sliding=np.zeros((0, flank_dofs)),
+            ring_sliding=np.zeros((0, ring_dofs)),
+            slip=empty,
         )
+
+    @classmethod
+    def joined(cls, first: Contacts, second: Contacts) -> Contacts:
+        """The points of both, one after the other."""
+        return cls(
+            **{
+                key: np.concatenate([getattr(first, key), getattr(second, key)])
+                for key in cls.__dataclass_fields__
+            }
+        )
+
+    def along_flanks(self, gap: Array) -> Contacts:
+        """The same points with the tangent in place of the normal."""
+        return replace(
+            self,
+            gap=gap,
+            normal=self.tangent,
+            weight=self.sliding,
+            ring_weight=self.ring_sliding,
+        )
+
+    def nearest_in(self, others: Contacts) -> Index:
+        """The nearest of others on the same pair of flanks, -1 without one (n,)."""
+        result = np.full(len(self), -1, dtype=np.int64)
+        if len(others) and len(self):
+            same = (
+                (self.sector[:, None] == others.sector)
+                & (self.side[:, None] == others.side)
+                & (self.tooth[:, None] == others.tooth)
+            )
+            apart = np.abs(self.station[:, None] - others.station)
+            apart = np.where(same, apart, np.inf)
+            near = apart.argmin(axis=1)
+            found = np.isfinite(apart[np.arange(len(self)), near])
+            result[found] = near[found]
+        return result
 
     def on_flanks_of(self, others: Contacts) -> NDArray[np.bool_]:
         """Which points lie on a flank on which others lie. Shape (n,)."""
@@ -320,8 +370,17 @@ class ToothContact:
         point = mirrored * mirror
         seen = self._feet(mirrored, _outward(tangent), sector, side)
         normal = seen.normal * mirror
-        weight = np.zeros((n, 2, size, 2))
-        weight[np.arange(n), side] = spline[:, :, None] * normal[:, None, :]
+        # in the mirrored frame the flexspline's normal is -n: its tangent is J n
+        tangent = np.stack([-seen.normal[:, 1], seen.normal[:, 0]], axis=-1) * mirror
+        # the mirror between a flank and the one that it faces turns tangents over
+        facing, out = _MIRROR[1 - side], seen.feet.normal
+        ring_normal = out * facing
+        ring_tangent = np.stack([out[:, 1], -out[:, 0]], axis=-1) * facing
+        ring_spline = np.zeros((n, 0))
+        slip = np.full(n, np.nan)
+        if seen.feet.station is not None:
+            ring_spline = self.circular_spline.spline(seen.feet.station)
+            slip = station + seen.feet.station
         found = Contacts(
             sector=sector,
             side=side,
@@ -329,22 +388,15 @@ class ToothContact:
             gap=seen.feet.gap,
             normal=normal,
             point=point,
-            weight=weight.reshape(n, 4 * size),
+            weight=_on_flank(side, spline, normal),
             tooth=seen.tooth,
-            ring_weight=self._ring_weight(seen.feet, 1 - side),
+            ring_weight=-_on_flank(1 - side, ring_spline, ring_normal),
+            tangent=tangent,
+            sliding=_on_flank(side, spline, tangent),
+            ring_sliding=-_on_flank(1 - side, ring_spline, ring_tangent),
+            slip=slip,
         )
         return found.chosen(np.flatnonzero(found.gap < reach))
-
-    def _ring_weight(self, feet: Feet, facing: Index) -> Array:
-        """The gap closes as the ring's flank moves along its normal."""
-        n, dofs = len(facing), self.circular_spline.flank_dofs
-        if feet.station is None:
-            return np.zeros((n, 0))
-        weight = np.zeros((n, 2, dofs // 4, 2))
-        normal = feet.normal * _MIRROR[facing]
-        spline = self.circular_spline.spline(feet.station)
-        weight[np.arange(n), facing] = -spline[:, :, None] * normal[:, None, :]
-        return weight.reshape(n, dofs)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -362,3 +414,11 @@ def _outward(tangent: Array) -> Array:
     """Unit normals out of the flexspline, tangents from tip to root."""
     size = np.hypot(tangent[:, 0], tangent[:, 1])
     return np.asarray(np.stack([-tangent[:, 1], tangent[:, 0]], -1) / size[:, None])
+
+
+def _on_flank(side: Index, spline: Array, direction: Array) -> Array:
+    """Rows over both flanks of a tooth (n, 4 n_nodes) that act on one of them."""
+    n, nodes = spline.shape
+    rows = np.zeros((n, 2, nodes, 2))
+    rows[np.arange(n), side] = spline[:, :, None] * direction[:, None, :]
+    return rows.reshape(n, 4 * nodes)

@@ -179,7 +179,7 @@ def test_linear_level_runs_and_differs():
 @pytest.mark.parametrize(
     ("changes", "key"),
     [
-        ({"friction.tooth_coefficient": 0.1}, "friction.tooth_coefficient"),
+        ({"tolerances.wave_generator_ovality_um": 3.0}, "wave_generator_ovality_um"),
         ({"tolerances.random_pitch_um": 2.0}, "tolerances.random_pitch_um"),
     ],
 )

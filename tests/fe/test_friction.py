@@ -1,0 +1,119 @@
+"""Coulomb friction of the flanks: passive, balanced, the same in every layout."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from swgjoint.errors import DesignError
+from swgjoint.fe.continuation import Continuation
+from swgjoint.fe.drive2d import ring_model
+from swgjoint.fe.meshing import simulate_meshing
+from swgjoint.gear.design import Design
+
+PITCH = 2.0 * np.pi / 122
+
+
+def rubbing(coefficient: float = 0.1, **changes) -> Design:
+    return Design.preset("reference-2d").with_changes(
+        {"friction.tooth_coefficient": coefficient, **changes}
+    )
+
+
+@cache
+def turned(torque: float, steps: int):
+    """States over two pitches at constant torque."""
+    design = rubbing()
+    follow = Continuation(model=ring_model(design, half=True), ratio=design.ratio)
+    states = [follow.to_torque(follow.meshed(follow.deflected()), torque)]
+    for k in range(1, 2 * steps + 1):
+        states.append(follow.to_angle(states[-1], PITCH * k / steps))
+    assert all(state.outcome.ok for state in states)
+    return states
+
+
+def series(states, name):
+    return np.array([getattr(state, name) for state in states])
+
+
+@pytest.mark.parametrize("torque", [20.0, -20.0])
+def test_work_of_friction_is_never_negative(torque):
+    """It grows at every step, and no contact carries more than mu F."""
+    states = turned(torque, 24)
+    assert (np.diff(series(states, "friction_work")) > 0.0).all()
+    for state in states:
+        limit = 0.1 * state.tooth_force * (1.0 + 1e-9)
+        assert (np.abs(state.friction_force) <= limit + 1e-12).all()
+
+
+def test_work_of_friction_closes_the_balance():
+    """T_wg dtheta - T dpsi - dU over a pitch, ever better with smaller steps."""
+    gaps = []
+    for steps in (24, 96):
+        states = turned(20.0, steps)[steps:]  # the second pitch: a steady cycle
+        theta, psi = (series(states, k) for k in ("wave_generator_angle", "rotation"))
+        torque, energy = (
+            series(states, k) for k in ("wave_generator_torque", "energy")
+        )
+        work = float(np.trapezoid(torque, theta)) - 20.0 * (psi[-1] - psi[0])
+        work -= energy[-1] - energy[0]
+        friction = float(np.ptp(series(states, "friction_work")))
+        gaps.append(abs(work - friction) / friction)
+    assert gaps[1] < 0.5 * gaps[0]
+    assert gaps[1] < 0.01
+
+
+def test_driving_costs_torque_and_overhauling_gives_less():
+    """Friction adds to the input torque T/i, whichever way the power flows."""
+    for torque in (20.0, -20.0):
+        states = turned(torque, 24)[24:]
+        mean = float(np.mean(series(states, "wave_generator_torque")[1:]))
+        drag = float(np.ptp(series(states, "friction_work"))) / PITCH
+        assert drag > 0.0
+        assert mean == pytest.approx(torque / -60.0 + drag, rel=2e-3)
+
+
+def test_loop_at_a_locked_input_encloses_the_work():
+    """Torque up, down and up again: a closed loop whose area is the friction work."""
+    # the ellipse holds the whole rim: its flanks hardly slide under torque
+    design = Design.preset("reference-2d-simplified").with_changes(
+        {"friction.tooth_coefficient": 0.1}
+    )
+    follow = Continuation(model=ring_model(design, half=True), ratio=design.ratio)
+    state = follow.meshed(follow.deflected())
+    legs = [np.linspace(a, b, 41)[1:] for a, b in ((0, 20), (20, -20), (-20, 20))]
+    loop = []
+    for k, torque in enumerate(np.concatenate(legs)):
+        state = follow.to_torque(state, float(torque))
+        assert state.outcome.ok
+        if k >= 39:
+            loop.append(state)
+    psi, torque = series(loop, "rotation"), series(loop, "torque")
+    area = -float(np.trapezoid(torque, psi))
+    assert psi[-1] == pytest.approx(psi[0], abs=1e-4 * np.ptp(psi))
+    # 40 steps leave 1.4e-4
+    assert area == pytest.approx(np.ptp(series(loop, "friction_work")), rel=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("layout", "twin"), [("flexspline_fixed", -20.0), ("wave_generator_fixed", 20.0)]
+)
+def test_layouts_rub_alike(layout, twin):
+    """The same relative motion with the same flow of power dissipates the same work."""
+    work = []
+    for name, torque in (("circular_spline_fixed", twin), (layout, 20.0)):
+        design = rubbing(**{"drive.layout": name})
+        run = simulate_meshing(design, torque=torque, steps=4, turn=0.01, half=True)
+        state = run.steps[-1].state
+        relative = state.wave_generator_angle - state.ring_rotation
+        work.append(abs(state.friction_work / relative))
+    # 2 %: positions that differ by a sixtieth, and the torques by 2/120
+    assert work[1] == pytest.approx(work[0], rel=0.02)
+
+
+def test_a_rigid_circular_spline_cannot_rub():
+    """Its flank has no material points to follow: one clear line."""
+    with pytest.raises(DesignError, match="needs an elastic circular spline"):
+        ring_model(rubbing(), elastic_circular_spline=False)
