@@ -1,9 +1,9 @@
-r"""The circular spline: rigid, or elastic on a fixed outer diameter.
+r"""The circular spline: rigid, or elastic with its outer diameter fixed or free.
 
-It does not rotate and strains little, so it is linear: the displacement of the flanks
-of tooth k under forces on the flanks of tooth j is a block :math:`G_{k-j}` of a
-block-circulant compliance, in the frames of the teeth. The outer diameter is held, so
-the blocks decay within a few teeth.
+It strains little, so it is linear: the displacement of the flanks of tooth k under
+forces on the flanks of tooth j is a block :math:`G_{k-j}` of a block-circulant
+compliance, in the frames of the teeth. Where the outer diameter is fixed the blocks
+decay within a few teeth; a free one lets the ring become oval.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from swgjoint.fe.corotation import rotate
+from swgjoint.fe.corotation import rotate, turned
 from swgjoint.fe.cyclic import CyclicFactor
 from swgjoint.fe.superelement import Superelement
 from swgjoint.gear.profile import ToothProfile
@@ -74,11 +74,13 @@ class Compliance:
         return result
 
 
-def ring_compliance(element: Superelement) -> Compliance:
-    """Compliance of a circular spline whose outer diameter is fixed.
+def ring_compliance(element: Superelement, *, free_rim: bool = False) -> Compliance:
+    """Compliance of a circular spline under forces on its flanks.
 
     Args:
         element: Condensed sector of the circular spline.
+        free_rim: Whether the outer diameter can deform: held in the mean over its
+            nodes, which carry the load away in equal shares; else it is fixed.
     """
     n_teeth, size = element.sectors, element.face_size
     n_a = len(element.skeleton)
@@ -90,17 +92,39 @@ def ring_compliance(element: Superelement) -> Compliance:
     for node in range(n_a - size, n_a):
         turn[2 * node : 2 * node + 2, 2 * node : 2 * node + 2] = corner
     matrix = turn.T @ element.stiffness @ turn
-    outside = np.r_[size - 1 : n_a - size, n_a - 1]  # outer diameter and its corners
-    held = np.concatenate([2 * outside, 2 * outside + 1])
-    matrix[held] = 0.0
-    matrix[:, held] = 0.0
-    matrix[held, held] = float(np.mean(np.diag(element.stiffness)))
     load = turn.T @ element.flank_from_skeleton.T
-    load[held] = 0.0
     rhs = np.zeros((n_teeth, *load.shape))
-    rhs[0] = load
-    factor = CyclicFactor(np.broadcast_to(matrix, (n_teeth, *matrix.shape)), 2 * size)
-    skeleton = turn @ factor.solve(rhs)
+    outside = np.r_[size - 1 : n_a - size, n_a - 1]  # outer diameter and its corners
+    scale = float(np.mean(np.diag(element.stiffness)))
+    blocks = np.broadcast_to(matrix, (n_teeth, *matrix.shape))
+    if free_rim:
+        own = outside[:-1]  # the last corner is the next tooth's first
+        rigid = _rigid_modes(element.skeleton, n_teeth)
+        held = rigid[:, own].reshape(n_teeth, -1, 3)
+        weight = np.einsum("tia,tib->ab", held, held)
+        # the rigid motion that the forces on the flanks do work on, shared out
+        resultant = (element.flank_from_skeleton @ rigid[0].reshape(-1, 3)).T
+        share = -held @ np.linalg.solve(weight, resultant)
+        dofs = (2 * own[:, None] + np.arange(2)).ravel()
+        rhs[:, dofs] = share
+        rhs[0] += load
+        # three springs that carry nothing keep the ring in place
+        blocks, first = blocks.copy(), 2 * own[0]
+        for tooth, dof in ((0, first), (0, first + 1), (n_teeth // 2, first)):
+            blocks[tooth, dof, dof] += scale
+    else:
+        fixed = (2 * outside[:, None] + np.arange(2)).ravel()
+        matrix[fixed] = 0.0
+        matrix[:, fixed] = 0.0
+        matrix[fixed, fixed] = scale
+        load[fixed] = 0.0
+        rhs[0] = load
+        blocks = np.broadcast_to(matrix, blocks.shape)
+    skeleton = turn @ CyclicFactor(blocks, 2 * size).solve(rhs)
+    if free_rim:
+        moved = np.einsum("tia,til->al", held, skeleton[:, dofs])
+        drift = np.linalg.solve(weight, moved)
+        skeleton -= rigid.reshape(n_teeth, -1, 3) @ drift
     flank = element.flank_from_skeleton @ skeleton
     flank[0] += element.flank_compliance
     strength = np.abs(flank).max(axis=(1, 2))
@@ -109,6 +133,16 @@ def ring_compliance(element: Superelement) -> Compliance:
     return Compliance(
         element=element, offsets=offsets, flank=flank[kept], skeleton=skeleton[kept]
     )
+
+
+def _rigid_modes(skeleton: Array, teeth: int) -> Array:
+    """Two translations and the rotation, in the frames of the teeth (N, n_a, 2, 3)."""
+    angle = np.asarray(2.0 * np.pi / teeth * np.arange(teeth), dtype=np.float64)
+    shape = (teeth, *skeleton.shape)
+    shifts = [
+        np.broadcast_to(rotate(axis, -angle)[:, None], shape) for axis in np.eye(2)
+    ]
+    return np.stack([*shifts, np.broadcast_to(turned(skeleton), shape)], axis=-1)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -70,7 +70,7 @@ def ring_model(
         half: Half of the drive, closed by its symmetry.
         nonlinear: Large rotations of the sectors.
         elastic_circular_spline: Whether the circular spline deforms; its outer
-            diameter is fixed.
+            diameter is fixed or free as the design says.
         friction: Whether the flanks rub, with the coefficient of the design; False for
             the conservative part alone.
 
@@ -88,7 +88,8 @@ def ring_model(
     ring = CircularSpline(profile=tooth_profile(design, "circular_spline"))
     if elastic_circular_spline:
         element = _sector(design, "circular_spline")
-        ring = replace(ring, compliance=ring_compliance(element))
+        free = design.circular_spline.outer_rim == "free"
+        ring = replace(ring, compliance=ring_compliance(element, free_rim=free))
     coefficient = design.friction.tooth_coefficient if friction else 0.0
     law = None
     if coefficient > 0.0:

@@ -42,8 +42,8 @@ def simulate_meshing(
         turn: Turns of the input.
         nonlinear: Large rotations of the sectors; False is the cheap linear level.
         half: Half model; needs even tooth counts.
-        elastic_circular_spline: Whether the circular spline deforms, held at its
-            outer diameter; False makes it rigid.
+        elastic_circular_spline: Whether the circular spline deforms; False makes it
+            rigid.
         throw: Whether a position that cannot be solved is an error; else it is kept
             with its outcome and the turn goes on from the last good one.
         progress: Called with the stage, the steps done and their number.

@@ -121,13 +121,14 @@ class MeshingRun:
         elastic = self.model.circular_spline.compliance is not None
         solved = [step.stress for step in self.steps if step.stress is not None]
         cup = None if self.cup_stiffness is None else "closed-form torsion in series"
+        ring = f"elastic, outside {self.design.circular_spline.outer_rim}"
         return {
             "design": self.design.drive.name,
             "label": {
                 "model": "2d",
                 "layout": self.design.drive.layout,
                 "level": "nonlinear" if self.model.nonlinear else "linear",
-                "circular_spline": "elastic, outside fixed" if elastic else "rigid",
+                "circular_spline": ring if elastic else "rigid",
                 "half": self.model.half,
                 "cup": cup,
                 "tooth_friction": self.design.friction.tooth_coefficient or None,

@@ -213,7 +213,8 @@ def sample_map(
             "label": {
                 "model": "2d",
                 "level": "nonlinear",
-                "circular_spline": "elastic, outside fixed",
+                "circular_spline": "elastic, outside "
+                + design.circular_spline.outer_rim,
                 "cup": None if cup is None else "closed-form torsion in series",
                 "friction": "left out of the potential"
                 if design.friction.tooth_coefficient

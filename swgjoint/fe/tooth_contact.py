@@ -343,7 +343,8 @@ class ToothContact:
                 # the point of the flank that is closest to the corner
                 beside = np.einsum("ki,ki->k", seen.rest, tangent)
                 slope = np.where(corner, beside, slope)
-                relative = np.where(corner, 1.0 + curvature * seen.feet.gap, relative)
+                depth = np.einsum("ki,ki->k", seen.rest, seen.normal)
+                relative = np.where(corner, 1.0 + curvature * depth, relative)
             # the bracket holds the minimum: shrink it, and stay inside
             high_s = np.where(slope > 0.0, s, high_s)
             low_s = np.where(slope <= 0.0, s, low_s)

@@ -15,6 +15,7 @@ from swgjoint.errors import DesignError, InputError
 from swgjoint.faults import Fault, Section, parse_toml, read_toml, validated
 from swgjoint.gear import kinematics
 from swgjoint.gear.design_sections import (
+    CircularSplineMember,
     Cup,
     Drive,
     Friction,
@@ -46,7 +47,7 @@ class Design(Section):
     drive: Drive
     material: MaterialSection = MaterialSection()
     flexspline: Member
-    circular_spline: Member
+    circular_spline: CircularSplineMember
     wave_generator: WaveGenerator
     cup: Cup | None = None
     micro_geometry: MicroGeometry = MicroGeometry()

@@ -168,6 +168,12 @@ class Member(Section):
     profile: Profile
 
 
+class CircularSplineMember(Member):
+    """The member whose outer diameter sits in a housing."""
+
+    outer_rim: Literal["fixed", "free"] = "fixed"
+
+
 class Bearing(Section):
     """Thin-race ball bearing between wave generator and flexspline."""
 

@@ -9,6 +9,7 @@ import pytest
 from scipy.sparse.linalg import spsolve
 
 from swgjoint.fe.circular_spline import FlankSplines
+from swgjoint.fe.continuation import Continuation
 from swgjoint.fe.drive2d import ring_model
 from swgjoint.fe.elasticity import plane_stress_basis, stiffness_matrix
 from swgjoint.gear.design import Design
@@ -91,3 +92,65 @@ def test_feet_on_a_deformed_flank():
     h = 1e-8
     steps = [flanks.at(index, feet.station + k * h)[0] for k in (-1, 1)]
     assert slope == pytest.approx((steps[1] - steps[0]) / (2 * h), abs=1e-6)
+
+
+def free_rim(rim_mm):
+    return Design.preset("reference-2d").with_changes(
+        {"circular_spline.outer_rim": "free", "circular_spline.rim_mm": rim_mm}
+    )
+
+
+def test_free_rim_becomes_oval_like_a_thin_ring():
+    """Two opposite radial forces against the closed form; teeth make it stiffer."""
+    spline = ring_model(free_rim(5.0)).circular_spline
+    compliance, teeth = spline.compliance, spline.profile.teeth
+    force = np.zeros((teeth, spline.flank_dofs))
+    nodes = spline.flank_dofs // 4
+    # the radial components at both corners of the tips, along +y of their teeth
+    for tooth in (0, teeth // 2 + teeth % 2):
+        force[tooth, [1, 2 * nodes + 1]] = 0.5
+    outer = compliance.element.face_size - 1
+    moved = compliance.skeleton_displacement(force)[:, 2 * outer + 1]
+    radius = np.hypot(*compliance.element.skeleton.T).max() - 2.5e-3
+    second_moment = 10e-3 * (5e-3) ** 3 / 12.0
+    # Timoshenko, Strength of Materials II, thin ring under two forces P: the radius
+    # grows by 0.0744 P R^3/(E I) at the forces and shrinks by 0.0683 across
+    scale = radius**3 / (210e9 * second_moment)
+    assert 0.6 < moved[0] / (0.0744 * scale) < 1.0
+    assert moved[30] / moved[0] == pytest.approx(-0.0683 / 0.0744, rel=0.03)
+    # the ring is held in the mean
+    assert abs(moved.mean()) < 0.05 * moved[0]
+
+
+def test_free_rim_answers_reciprocally():
+    """G of tooth k by tooth j is the transpose of G of tooth j by tooth k."""
+    compliance = ring_model(free_rim(5.0)).circular_spline.compliance
+    at = {int(offset): k for k, offset in enumerate(compliance.offsets)}
+    largest = np.abs(compliance.flank).max()
+    for offset in (0, 1, 17, 60):
+        there, back = compliance.flank[at[offset]], compliance.flank[at[-offset]]
+        assert np.abs(there - back.T).max() < 1e-9 * largest
+
+
+def test_free_rim_keeps_the_energy_balance():
+    """T_wg is the derivative of U + T psi also where the whole ring deforms."""
+    design = free_rim(10.0)
+    follow = Continuation(model=ring_model(design, half=True), ratio=design.ratio)
+    state = follow.to_torque(follow.meshed(follow.deflected()), 20.0)
+    potential, step = [], 1e-4
+    for angle in (0.01 - step, 0.01, 0.01 + step):
+        state = follow.to_angle(state, angle)
+        assert state.outcome.ok
+        potential.append(state.energy + 20.0 * state.rotation)
+        if angle == 0.01:
+            torque = state.wave_generator_torque
+    slope = (potential[2] - potential[0]) / (2.0 * step)
+    assert torque == pytest.approx(slope, rel=1e-6)
+
+
+def test_a_free_rim_that_is_too_soft_is_an_outcome():
+    """A 2 mm ring under 20 N·m leaves the range of its linear model."""
+    design = free_rim(2.0)
+    follow = Continuation(model=ring_model(design, half=True), ratio=design.ratio)
+    state = follow.to_torque(follow.meshed(follow.deflected()), 20.0)
+    assert not state.outcome.ok
