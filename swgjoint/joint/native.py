@@ -4,15 +4,14 @@ The mean curve becomes the polynomial stiffness of a tendon,
 :math:`T(x) = a x + c x^3` with x = theta/i - psi; hysteresis becomes parallel tendons
 with ``springyield`` (Jenkin elements), friction the ``frictionloss`` of the rotor.
 
-The last two exist only where the map's ``info`` has them: ``hysteresis``, a list of
-``{"stiffness_Nm_rad": k, "yield_torque_Nm": f}``, and ``friction``,
-``{"input_Nm": f}``. Kinematic error and the angle harmonics of the torque have no
-native form.
+The last two exist only where the map has them: ``hysteresis``, and in its ``info``
+``friction``, ``{"input_Nm": f}``. Kinematic error and the angle harmonics of the torque
+have no native form.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -21,18 +20,9 @@ from numpy.typing import NDArray
 
 from swgjoint.errors import InputError
 from swgjoint.maps.drive_map import DriveMap
+from swgjoint.maps.hysteresis import Jenkin
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Jenkin:
-    """A spring in series with a slider: hysteresis that dissipates."""
-
-    stiffness: float
-    """While it sticks [N·m/rad]."""
-    yield_torque: float
-    """At which it slips [N·m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -66,7 +56,7 @@ def fit_native(drive: DriveMap) -> NativeSpring:
     of the mean stiffness stays. ``note`` says so.
 
     Raises:
-        InputError: If the map's ``info`` has unusable hysteresis or friction.
+        InputError: If the map's ``info`` has an unusable friction.
     """
     low, high = drive.torque_range
     peak = min(drive.ratings.repeated_peak, -low, high)
@@ -95,7 +85,7 @@ def fit_native(drive: DriveMap) -> NativeSpring:
         residual=float(np.sqrt(np.mean(rest**2))),
         fitted_to=float(peak),
         note=note,
-        hysteresis=_hysteresis(drive),
+        hysteresis=drive.hysteresis,
         friction=_friction(drive),
     )
 
@@ -120,49 +110,18 @@ def native_map(drive: DriveMap, spring: NativeSpring) -> DriveMap:
     )
 
 
-def play_hysteresis(elements: Sequence[Jenkin], torsion: Array) -> Array:
-    """Torque of the elements along a history of torsion [N·m]. Shapes (n,).
-
-    The sliders start at zero torsion, as the engine resets them.
-    """
-    total = np.zeros_like(torsion)
-    for element in elements:
-        force, last = 0.0, 0.0
-        for k, x in enumerate(torsion):
-            force += element.stiffness * (float(x) - last)
-            force = min(max(force, -element.yield_torque), element.yield_torque)
-            total[k] += force
-            last = float(x)
-    return total
-
-
-def _hysteresis(drive: DriveMap) -> tuple[Jenkin, ...]:
-    given = drive.info.get("hysteresis")
-    if given is None:
-        return ()
-    if not isinstance(given, Sequence) or isinstance(given, str):
-        raise InputError(f"info.hysteresis of {drive.name!r}; accepted: a list")
-    return tuple(
-        Jenkin(
-            stiffness=_number(drive, item, "hysteresis", "stiffness_Nm_rad"),
-            yield_torque=_number(drive, item, "hysteresis", "yield_torque_Nm"),
-        )
-        for item in given
-    )
-
-
 def _friction(drive: DriveMap) -> float:
     given = drive.info.get("friction")
-    return 0.0 if given is None else _number(drive, given, "friction", "input_Nm")
+    return 0.0 if given is None else _number(drive, given)
 
 
-def _number(drive: DriveMap, item: Any, where: str, key: str) -> float:
-    value = item.get(key) if isinstance(item, Mapping) else None
+def _number(drive: DriveMap, item: Any) -> float:
+    value = item.get("input_Nm") if isinstance(item, Mapping) else None
     if isinstance(value, bool) or not isinstance(value, int | float):
         value = None
     if value is None or not (np.isfinite(value) and value > 0.0):
         raise InputError(
-            f"info.{where}.{key} of map {drive.name!r} is {value}; accepted: a finite"
-            " number > 0"
+            f"info.friction.input_Nm of map {drive.name!r} is {value}; accepted: a"
+            " finite number > 0"
         )
     return float(value)

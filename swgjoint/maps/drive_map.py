@@ -8,6 +8,9 @@ r"""The reduced drive: a potential of torsion and of the two gear angles.
 with :math:`\Delta = \theta/i + e_0(\alpha, \beta) - \psi`. The coefficients are
 piecewise polynomials of degree four, so torque is piecewise cubic. Outside the
 sampled torsion every coefficient continues as a parabola, the torque linearly.
+
+Beside the potential a map may have hysteresis: Jenkin elements along the torsion, see
+:mod:`swgjoint.maps.hysteresis`. Everything below but ``hysteresis`` is conservative.
 """
 
 from __future__ import annotations
@@ -21,7 +24,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swgjoint.arrays import frozen_array
+from swgjoint.errors import InputError
 from swgjoint.gear.kinematics import LAYOUTS, angle_coefficients, ratio
+from swgjoint.maps.hysteresis import MAX_ELEMENTS, Jenkin
 
 Array = NDArray[np.float64]
 
@@ -40,7 +45,7 @@ class Ratings:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DriveMap:
-    """Conservative map of one drive; immutable."""
+    """Potential and hysteresis of one drive; immutable."""
 
     name: str
     level: str
@@ -66,6 +71,8 @@ class DriveMap:
     """Cosine and sine amplitude of e0 for every harmonic [rad]. (n_harmonics, 2)."""
     ratings: Ratings
     damping_ratio: float = 0.02
+    hysteresis: tuple[Jenkin, ...] = ()
+    """Parallel elements that add to the torque along the torsion; none by default."""
     info: Mapping[str, Any] = field(default_factory=dict)
     """Provenance and residuals, JSON values only."""
 
@@ -89,6 +96,15 @@ class DriveMap:
         ):
             array = frozen_array(getattr(self, key), f"{key} [{unit}]", shape=shape)
             object.__setattr__(self, key, array)
+        elements = tuple(self.hysteresis)
+        if len(elements) > MAX_ELEMENTS or not all(
+            isinstance(element, Jenkin) for element in elements
+        ):
+            raise InputError(
+                f"hysteresis of {self.name!r}; accepted: up to {MAX_ELEMENTS} Jenkin"
+                " elements"
+            )
+        object.__setattr__(self, "hysteresis", elements)
 
     # -- constructors ---------------------------------------------------------
 

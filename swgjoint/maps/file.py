@@ -21,6 +21,7 @@ from typing import Any, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from swgjoint import __version__
 from swgjoint.errors import InputError, MapFileError
@@ -29,8 +30,11 @@ from swgjoint.files import write_whole
 from swgjoint.json_text import json_text
 from swgjoint.maps.checks import check_map
 from swgjoint.maps.drive_map import DriveMap, Ratings
+from swgjoint.maps.hysteresis import Jenkin
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
+"""2 added ``hysteresis``; a map of version 1 is read as one without."""
+_READABLE = (1, SCHEMA_VERSION)
 MAX_BYTES = 64_000_000
 """A map with a thousand harmonics and a hundred knots is below 10 MB."""
 
@@ -62,6 +66,13 @@ class RatingsHeader(Section):
     source: str
 
 
+class JenkinHeader(Section):
+    """One element of the hysteresis."""
+
+    stiffness_Nm_rad: float
+    yield_torque_Nm: float
+
+
 class Header(Section):
     """The JSON header of a ``.swg`` file."""
 
@@ -76,6 +87,7 @@ class Header(Section):
     teeth_circular_spline: int
     damping_ratio: float
     ratings: RatingsHeader
+    hysteresis: list[JenkinHeader] = Field(default_factory=list)
     info: dict[str, Any]
 
 
@@ -101,6 +113,13 @@ def map_bytes(drive: DriveMap) -> bytes:
             key: value if key == "source" else float(value)
             for key, value in asdict(drive.ratings).items()
         },
+        "hysteresis": [
+            {
+                "stiffness_Nm_rad": float(element.stiffness),
+                "yield_torque_Nm": float(element.yield_torque),
+            }
+            for element in drive.hysteresis
+        ],
         "info": dict(drive.info),
     }
     text = json_text(header, indent=None).encode()
@@ -167,6 +186,13 @@ def map_from_bytes(data: bytes, cls: type[Map]) -> Map:
         teeth_circular_spline=header.teeth_circular_spline,
         damping_ratio=header.damping_ratio,
         ratings=Ratings(**header.ratings.model_dump()),
+        hysteresis=tuple(
+            Jenkin(
+                stiffness=element.stiffness_Nm_rad,
+                yield_torque=element.yield_torque_Nm,
+            )
+            for element in header.hysteresis
+        ),
         info=header.info,
         **arrays,
     )
@@ -248,10 +274,11 @@ def _header(data: bytes) -> Header:
     if not isinstance(content, dict):
         raise MapFileError("header is not a JSON object")
     version = content.get("schema_version")
-    if version != SCHEMA_VERSION:
+    if version not in _READABLE:
         raise MapFileError(
-            f"schema version {str(version)[:20]}; accepted: {SCHEMA_VERSION};"
-            " build the map again with 'swgjoint map'"
+            f"schema version {str(version)[:20]}; accepted:"
+            f" {' and '.join(map(str, _READABLE))}; build the map again with 'swgjoint"
+            " map'"
         )
     return validated(Header, content, where="header", error=MapFileError)
 

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.joint.drive import JointDrive, JointSignals
-from swgjoint.joint.native import play_hysteresis
 from swgjoint.maps.drive_map import DriveMap
+from swgjoint.maps.hysteresis import play_hysteresis
 
 Array = NDArray[np.float64]
 

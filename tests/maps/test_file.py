@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 from swgjoint.errors import InputError, MapFileError
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.file import MAX_BYTES, map_bytes
+from swgjoint.maps.hysteresis import Jenkin
 
 ARRAYS = ("torsion_knots", "orders", "potential", "end_stiffness", "kinematic_error")
 
@@ -77,7 +78,12 @@ def refusal(tmp_path: Path, data: bytes) -> str:
 
 def test_round_trip_is_bitwise(synthetic_map, tmp_path):
     """A saved map is loaded with every bit of its arrays and all its fields."""
-    drive = replace(synthetic_map, info={"residual": {"torque_Nm": 1e-3}, "angles": 24})
+    elements = (
+        Jenkin(stiffness=1e3 / 3, yield_torque=0.1),
+        Jenkin(stiffness=2e4, yield_torque=1 / 7),
+    )
+    info = {"residual": {"torque_Nm": 1e-3}, "angles": 24}
+    drive = replace(synthetic_map, hysteresis=elements, info=info)
     drive.save(tmp_path / "a.swg")
     assert same(DriveMap.load(tmp_path / "a.swg"), drive)
     assert os.listdir(tmp_path) == ["a.swg"]
@@ -95,7 +101,7 @@ def test_numpy_reads_the_file_without_pickle(synthetic_map, tmp_path):
         assert np.array_equal(arrays["potential"], synthetic_map.potential)
         header = json.loads(arrays["header"].tobytes())
     assert header["units"]["torsion_knots"] == "rad"
-    assert header["schema_version"] == 1
+    assert header["schema_version"] == 2
 
 
 def test_info_that_is_no_number_becomes_null(synthetic_map, tmp_path):
@@ -237,7 +243,8 @@ def test_wrong_headers(synthetic_map, tmp_path):
     header = header_of(data)
     ratings = header["ratings"]
     cases = {
-        "schema version 2": {**header, "schema_version": 2},
+        "schema version 3": {**header, "schema_version": 3},
+        "schema version 0": {**header, "schema_version": 0},
         "header: layout": {k: v for k, v in header.items() if k != "layout"},
         "unknown key": {**header, "code": "x"},
         "teeth_flexspline": {**header, "teeth_flexspline": 120.5},
@@ -255,6 +262,35 @@ def test_wrong_headers(synthetic_map, tmp_path):
     for word, changed in cases.items():
         message = refusal(tmp_path, repacked(data, header=header_npy(changed)))
         assert word.lower() in message.lower(), message
+
+
+def test_a_file_of_version_1_has_no_hysteresis(synthetic_map, tmp_path):
+    """A map that was written before there was hysteresis is read without it."""
+    data = map_bytes(synthetic_map)
+    header = {k: v for k, v in header_of(data).items() if k != "hysteresis"}
+    path = tmp_path / "old.swg"
+    old = header_npy({**header, "schema_version": 1})
+    path.write_bytes(repacked(data, header=old))
+    assert same(DriveMap.load(path), synthetic_map)
+
+
+@pytest.mark.parametrize(
+    ("elements", "says"),
+    [
+        ([{"stiffness_Nm_rad": -1.0, "yield_torque_Nm": 1.0}], "stiffness -1.0"),
+        ([{"stiffness_Nm_rad": 1.0, "yield_torque_Nm": 0.0}], "yield_torque 0.0"),
+        ([{"stiffness_Nm_rad": 1e99, "yield_torque_Nm": 1.0}], "stiffness 1e+99"),
+        ([{"stiffness_Nm_rad": 1.0}], "hysteresis[0].yield_torque_Nm"),
+        ([{"stiffness_Nm_rad": 1.0, "yield_torque_Nm": "1"}], "yield_torque_Nm"),
+        ([{"stiffness_Nm_rad": 1.0, "yield_torque_Nm": 1.0}] * 65, "up to 64"),
+        ("much", "hysteresis"),
+    ],
+)
+def test_hostile_hysteresis(synthetic_map, tmp_path, elements, says):
+    """Elements that cannot be, or too many of them, are refused in one line."""
+    data = map_bytes(synthetic_map)
+    header = header_npy({**header_of(data), "hysteresis": elements})
+    assert says in refusal(tmp_path, repacked(data, header=header))
 
 
 def test_what_is_not_a_file(tmp_path):

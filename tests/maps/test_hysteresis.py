@@ -1,0 +1,102 @@
+"""Maxwell-slip hysteresis: the law, its losses, and elements for a wanted loop."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from swgjoint.errors import InputError
+from swgjoint.maps.hysteresis import Jenkin, Sliders, play_hysteresis
+
+ELEMENTS = (
+    Jenkin(stiffness=4e3, yield_torque=2.0),
+    Jenkin(stiffness=9e3, yield_torque=0.7),
+)
+
+
+def return_mapping(element, torsion):
+    """The law in increments: q = clip(q + k dx, ± f), from rest at zero torsion."""
+    q, last, torque = 0.0, 0.0, []
+    for x in torsion:
+        q = np.clip(
+            q + element.stiffness * (x - last),
+            -element.yield_torque,
+            element.yield_torque,
+        )
+        torque.append(q)
+        last = x
+    return np.array(torque)
+
+
+def test_play_is_the_return_mapping():
+    """The play of the rest positions is the same law as increments of the torque."""
+    x = 1e-3 * np.random.default_rng(1).standard_normal(500)
+    want = sum(return_mapping(e, x) for e in ELEMENTS)
+    np.testing.assert_allclose(play_hysteresis(ELEMENTS, x), want, atol=1e-12)
+    sliders = Sliders.relaxed(ELEMENTS)
+    for k, value in enumerate(x):
+        sliders = sliders.moved(value)
+        assert float(sliders.torque(value)) == pytest.approx(want[k], abs=1e-12)
+
+
+def test_cycle_loses_four_f_times_the_slip():
+    """Loop area of one element by quadrature: 4 f (X - f/k), zero below yield."""
+    k, f = 4e3, 2.0
+    turn = np.linspace(0.0, 4.0 * np.pi, 40_001)
+    for amplitude, loss in ((2e-3, 4 * f * (2e-3 - f / k)), (0.9 * f / k, 0.0)):
+        x = amplitude * np.sin(turn)
+        q = play_hysteresis([Jenkin(stiffness=k, yield_torque=f)], x)
+        last = slice(20_000, None)
+        assert float(np.trapezoid(q[last], x[last])) == pytest.approx(loss, abs=1e-9)
+
+
+@settings(max_examples=200, deadline=None, derandomize=True)
+@given(
+    turns=st.lists(st.floats(-3e-3, 3e-3), min_size=1, max_size=12),
+    values=st.lists(
+        st.tuples(st.floats(1e2, 1e5), st.floats(1e-2, 1e2)), min_size=1, max_size=4
+    ),
+)
+def test_work_is_stored_or_slipped(turns, values):
+    """Over any path work = change of energy + sum of f |slip|, and no cycle gains."""
+    elements = [Jenkin(stiffness=k, yield_torque=f) for k, f in values]
+    force = np.array([e.yield_torque for e in elements])
+    start = Sliders.relaxed(elements)
+    sliders, here, work, slip = start, 0.0, 0.0, 0.0
+    for end in [*turns, 0.0]:
+        # exact by trapezoid: every element bends at most once on a leg
+        bends = np.concatenate(
+            [sliders.rest - sliders.reach, sliders.rest + sliders.reach]
+        )
+        low, high = min(here, end), max(here, end)
+        points = np.unique([low, *bends[(bends > low) & (bends < high)], high])
+        leg = float(np.trapezoid(sliders.torque(points), points))
+        work += leg if end >= here else -leg
+        after = sliders.moved(end)
+        slip += float(force @ np.abs(after.rest - sliders.rest))
+        sliders, here = after, end
+    stored = float(sliders.energy(here))
+    scale = 1e-9 * (1.0 + abs(work) + slip)
+    assert work == pytest.approx(stored + slip, abs=scale)
+    # back at the start of the cycle nothing has been gained
+    assert work >= -scale
+    assert (work > scale) or slip <= scale
+
+
+def test_tangent_is_the_slope_of_the_torque():
+    """The stiffness of the sticking elements against differences."""
+    sliders = Sliders.relaxed(ELEMENTS, 1e-4).moved(8e-4).moved(3e-4)
+    x = np.linspace(-1.01e-3, 1e-3, 41)  # off the corners
+    slope = (sliders.torque(x + 1e-9) - sliders.torque(x - 1e-9)) / 2e-9
+    np.testing.assert_allclose(sliders.tangent(x), slope, atol=1e-2)
+
+
+@pytest.mark.parametrize("value", [0.0, -1.0, np.nan, np.inf, True, "1"])
+def test_values_that_cannot_be(value):
+    """Stiffness and yield torque are finite and positive, whoever gives them."""
+    with pytest.raises(InputError, match=r"hysteresis stiffness .* accepted"):
+        Jenkin(stiffness=value, yield_torque=1.0)
+    with pytest.raises(InputError, match=r"hysteresis yield_torque .* accepted"):
+        Jenkin(stiffness=1.0, yield_torque=value)
