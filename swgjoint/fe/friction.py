@@ -158,11 +158,12 @@ class Sliding:
             np.add.at(before, heir[left], last.force[left])
         pairs = Pairs.of(contacts, normal)
         member = pairs.share > 0.0
-        slip, force, _ = _since(history, pairs)
+        slip, force, known = _since(history, pairs)
         trial = force + friction.stiffness * slip
         limit = friction.coefficient * (member @ normal)
         turned_over = trial * (member @ before) < 0.0
-        sticks = ((np.abs(trial) < limit) | turned_over) & (limit > 0.0)
+        sticks = (np.abs(trial) < limit) | turned_over
+        sticks &= (limit > 0.0) & (known >= 0)  # no past, no friction yet
         condition = (-slip - force / friction.stiffness)[pairs.pair]
         return cls(
             lines=Contacts.joined(contacts, contacts.along_flanks(condition)),

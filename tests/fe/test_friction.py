@@ -48,6 +48,7 @@ def test_work_of_friction_is_never_negative(torque):
         assert (np.abs(state.friction_force) <= limit + 1e-12).all()
 
 
+@pytest.mark.slow
 def test_work_of_friction_closes_the_balance():
     """T_wg dtheta - T dpsi - dU over a pitch, ever better with smaller steps."""
     gaps = []
@@ -75,6 +76,7 @@ def test_driving_costs_torque_and_overhauling_gives_less():
         assert mean == pytest.approx(torque / -60.0 + drag, rel=2e-3)
 
 
+@pytest.mark.slow
 def test_loop_at_a_locked_input_encloses_the_work():
     """Torque up, down and up again: a closed loop whose area is the friction work."""
     # the ellipse holds the whole rim: its flanks hardly slide under torque

@@ -1,0 +1,70 @@
+"""Extreme designs and loads end with a balanced result or a clear outcome."""
+
+from __future__ import annotations
+
+import pytest
+
+from swgjoint.errors import ComputationError, Outcome
+from swgjoint.fe.meshing import simulate_meshing
+from swgjoint.gear.design import Design
+
+
+def teeth(flexspline: int, rim: float = 1.0) -> dict:
+    return {
+        "drive.teeth_flexspline": flexspline,
+        "drive.teeth_circular_spline": flexspline + 2,
+        "flexspline.rim_mm": rim,
+    }
+
+
+RUBBING = {"friction.tooth_coefficient": 0.1}
+SLACK = {"circular_spline.thickness_coefficient": 0.8}
+CASES = {
+    "thin rim": ("reference-2d", {"flexspline.rim_mm": 0.2}, 20.0),
+    "thick rim": ("reference-2d", {"flexspline.rim_mm": 3.0}, 20.0),
+    "40 teeth": ("reference-2d", teeth(40), 5.0),
+    "400 teeth": ("reference-2d", teeth(400), 100.0),
+    "hundred times the rated torque": ("reference-2d", {}, 2000.0),
+    "against it": ("reference-2d", {}, -2000.0),
+    "a fifth of backlash": ("reference-2d", SLACK, 20.0),
+    "a fifth of backlash, no torque": ("reference-2d", SLACK, 0.0),
+    "rollers 20 deg apart": (
+        "reference-2d-four-roller",
+        {"wave_generator.aperture_deg": 20.0},
+        20.0,
+    ),
+    "minor axis far away": (
+        "reference-2d-simplified",
+        {"wave_generator.minor_axis_coefficient": 0.8},
+        20.0,
+    ),
+    "rollers and friction": ("reference-2d-four-roller", RUBBING, 20.0),
+    "friction and backlash": ("reference-2d", RUBBING | SLACK, 20.0),
+}
+
+
+@pytest.mark.fe
+@pytest.mark.parametrize("case", CASES)
+def test_extreme_designs_run_and_balance(case):
+    """Moments balance; nothing penetrates, nothing pulls."""
+    name, changes, torque = CASES[case]
+    design = Design.preset(name).with_changes(changes)
+    run = simulate_meshing(design, torque=torque, steps=2, turn=0.01, half=True)
+    for step in run.steps:
+        state = step.state
+        # the middle of a clearance is held by a torque of the size of round-off
+        total = step.tooth_moment + step.wave_generator_torque
+        assert total == pytest.approx(torque, abs=1e-6 * max(1.0, abs(torque)))
+        assert (state.tooth_force >= 0.0).all()
+        assert (state.pressure >= -1e-9).all()
+        assert len(state.contacts) == 0 or state.contacts.gap.min() > -1e-10
+
+
+@pytest.mark.fe
+def test_a_load_out_of_reach_ends_with_advice():
+    """A thousand times the rated torque: what failed, and what to try."""
+    design = Design.preset("reference-2d")
+    with pytest.raises(ComputationError, match="loading to 20000 N·m failed") as found:
+        simulate_meshing(design, torque=20_000.0, steps=1, half=True)
+    advice = str(found.value).split("failed: ")[1]
+    assert advice in {outcome.value for outcome in Outcome if not outcome.ok}
