@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import csv
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import log
 
@@ -31,11 +31,12 @@ class CatalogueRow:
     ratcheting_torque: float
     T1: float
     T2: float
+    series: str = "CSG"
 
     @property
     def name(self) -> str:
         """Name as catalogues write it."""
-        return f"CSG-{self.size}-{self.ratio}"
+        return f"{self.series}-{self.size}-{self.ratio}"
 
     @property
     def pitch_diameter(self) -> float:
@@ -87,6 +88,23 @@ def catalogue_rows() -> tuple[CatalogueRow, ...]:
             )
         )
     return tuple(rows)
+
+
+def named_rows() -> tuple[CatalogueRow, ...]:
+    """Every drive that has a name: the component sets, then other series.
+
+    Another series has a drive where ``accuracy.csv`` states its accuracy at that size;
+    it takes the ratings of the component set of its size and ratio, for the tables hold
+    none of its own.
+    """
+    rows = catalogue_rows()
+    others = dict.fromkeys((row["series"], row["size"]) for row in table("accuracy"))
+    return rows + tuple(
+        replace(row, series=str(series))
+        for series, size in others
+        for row in rows
+        if series != row.series and size == row.size
+    )
 
 
 def nearest_row(pitch_diameter: float, ratio: float) -> CatalogueRow:

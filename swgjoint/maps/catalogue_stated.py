@@ -6,7 +6,7 @@ from statistics import median
 from typing import Any
 
 from swgjoint.errors import InputError
-from swgjoint.maps.catalogue import CatalogueRow, catalogue_rows, table
+from swgjoint.maps.catalogue import CatalogueRow, catalogue_rows, named_rows, table
 
 SIMILAR = 1.6
 """Torsion at T1 varies by less than this factor about the median of its ratio class:
@@ -45,13 +45,18 @@ def stiffness_of(size: int, ratio: int) -> dict[str, float]:
 def stated_figures(row: CatalogueRow) -> dict[str, float | None]:
     """What the tables state of one drive beside stiffness and ratings; None if not.
 
-    A ratio class holds from its own ratio up to the next class of the series.
+    A ratio class holds from its own ratio up to the next class of the series. The
+    torques of ratcheting and buckling and the inertia are those of CSG.
     """
-    accuracy = _of_class("accuracy", row.size, row.ratio, series="CSG") or {}
+    accuracy = _of_class("accuracy", row.size, row.ratio, series=row.series) or {}
     figures: dict[str, float | None] = {}
     for key in _STATED:
         value = accuracy.get(key)
         figures[key] = value if isinstance(value, float) else None
+    if row.series != "CSG":
+        return figures | dict.fromkeys(
+            ("ratcheting_torque_Nm", "buckling_torque_Nm", "input_inertia_kgm2")
+        )
     ratings = next(
         r for r in table("ratings") if (r["size"], r["ratio"]) == (row.size, row.ratio)
     )
@@ -81,7 +86,7 @@ def catalogue_faults() -> list[str]:
 def catalogue_gaps() -> list[dict[str, Any]]:
     """Rows with values that the tables do not hold: ``row`` and ``missing``."""
     gaps = []
-    for row in catalogue_rows():
+    for row in named_rows():
         absent = [key for key, value in stated_figures(row).items() if value is None]
         if absent:
             gaps.append({"row": row.name, "missing": absent})

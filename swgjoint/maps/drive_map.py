@@ -149,8 +149,9 @@ class DriveMap:
     def from_catalogue(cls, name: str) -> Self:
         """The map of a catalogue drive such as ``CSG-25-100``: series, size, ratio.
 
-        Stiffness K1, K2, K3 and ratings of the shipped tables; no kinematic error and
-        no hysteresis, of which a catalogue gives bounds only (``info["stated"]``).
+        Stiffness K1, K2, K3 and ratings of the shipped tables, and the hysteresis loss
+        where a row states one (CHA), at the upper bound that it is; no kinematic error,
+        of which a catalogue gives a bound only (``info["stated"]``).
 
         Raises:
             InputError: With the nearest names, if there is no such row.

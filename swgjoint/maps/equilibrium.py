@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from swgjoint.errors import ComputationError
 from swgjoint.maps.drive_map import DriveMap
+from swgjoint.maps.hysteresis import Sliders
 
 Array = NDArray[np.float64]
 
@@ -16,7 +17,12 @@ _NEWTON = 12
 _BISECTIONS = 400
 
 
-def output_angle(drive: DriveMap, theta: ArrayLike, torque: ArrayLike) -> Array:
+def output_angle(
+    drive: DriveMap,
+    theta: ArrayLike,
+    torque: ArrayLike,
+    sliders: Sliders | None = None,
+) -> Array:
     """Output angle psi [rad] at which the drive exerts a torque on the output.
 
     Newton steps from the mean curve; what they do not settle is bisected. Where
@@ -26,6 +32,8 @@ def output_angle(drive: DriveMap, theta: ArrayLike, torque: ArrayLike) -> Array:
         drive: The map.
         theta: Input angles [rad].
         torque: T on the output [N·m], broadcast with the angles.
+        sliders: Hysteresis, each point reached on a path of one direction from there;
+            none: the conservative part alone.
 
     Raises:
         ComputationError: If a torque is not reached by the map.
@@ -40,14 +48,20 @@ def output_angle(drive: DriveMap, theta: ArrayLike, torque: ArrayLike) -> Array:
     curve = drive.coefficients(x, 1)[:, 0, 0], x
     size = max(1, CHUNK // len(drive.orders))
     parts = [
-        _solve(drive, curve, flat_theta[k : k + size], flat_torque[k : k + size])
+        _solve(
+            drive, curve, flat_theta[k : k + size], flat_torque[k : k + size], sliders
+        )
         for k in range(0, flat_theta.size, size)
     ]
     return np.concatenate(parts).reshape(theta.shape)
 
 
 def _solve(
-    drive: DriveMap, curve: tuple[Array, Array], theta: Array, torque: Array
+    drive: DriveMap,
+    curve: tuple[Array, Array],
+    theta: Array,
+    torque: Array,
+    sliders: Sliders | None,
 ) -> Array:
     ideal = theta / drive.ratio
     e0, _, _ = drive.error_at(drive.phases(theta, ideal))
@@ -59,7 +73,7 @@ def _solve(
     open_ = np.arange(theta.size)
     for _ in range(_NEWTON):
         here = psi[open_]
-        f, slope = _torque(drive, theta[open_], here)
+        f, slope = _torque(drive, theta[open_], here, sliders)
         f = f - torque[open_]
         step = np.where(
             f == 0.0, 0.0, f / np.where(slope > 0.0, slope, np.nan)
@@ -70,11 +84,15 @@ def _solve(
         if not open_.size:
             return psi
     start = (ideal + e0 - twist)[open_]
-    psi[open_] = _bisect(drive, theta[open_], torque[open_], start, 0.01 * span)
+    psi[open_] = _bisect(
+        drive, theta[open_], torque[open_], start, 0.01 * span, sliders
+    )
     return psi
 
 
-def _torque(drive: DriveMap, theta: Array, psi: Array) -> tuple[Array, Array]:
+def _torque(
+    drive: DriveMap, theta: Array, psi: Array, sliders: Sliders | None
+) -> tuple[Array, Array]:
     """T on the output, -dV/dpsi, and the stiffness at fixed angles."""
     phases = drive.phases(theta, psi)
     cos, sin = np.cos(phases), np.sin(phases)
@@ -83,6 +101,9 @@ def _torque(drive: DriveMap, theta: Array, psi: Array) -> tuple[Array, Array]:
     first, second = drive.coefficients(x, 1), drive.coefficients(x, 2)
     torque = np.sum(first[..., 0] * cos + first[..., 1] * sin, axis=-1)
     stiffness = np.sum(second[..., 0] * cos + second[..., 1] * sin, axis=-1)
+    if sliders is not None:
+        torque = torque + sliders.torque(x)
+        stiffness = stiffness + sliders.tangent(x)
     total = torque * (1.0 - e_psi)
     n_psi = drive.angle_orders[:, 1]
     if n_psi.any():
@@ -92,12 +113,17 @@ def _torque(drive: DriveMap, theta: Array, psi: Array) -> tuple[Array, Array]:
 
 
 def _bisect(
-    drive: DriveMap, theta: Array, torque: Array, start: Array, width: float
+    drive: DriveMap,
+    theta: Array,
+    torque: Array,
+    start: Array,
+    width: float,
+    sliders: Sliders | None,
 ) -> Array:
     """The same to round-off where stiffness vanishes or jumps."""
 
     def excess(psi: Array) -> Array:
-        return _torque(drive, theta, psi)[0] - torque
+        return _torque(drive, theta, psi, sliders)[0] - torque
 
     ends = []
     for sign in (-1.0, 1.0):

@@ -3,30 +3,41 @@
 Torque against torsion has the slopes K1, K2, K3 on 0..T1, T1..T2 and above. The two
 corners are rounded by parabolas that end on the catalogue's lines (:data:`CORNER`), so
 torque and stiffness are continuous. What a catalogue states as an upper bound only,
-above all the kinematic error, is not in the map; its record says so.
+above all the kinematic error, is not in the map; its record says so. The exception is
+the hysteresis loss: where a row states it the map has it, at the bound, and the label
+says that a drive may have less.
 """
 
 from __future__ import annotations
 
 import re
+from dataclasses import replace
+from itertools import pairwise
 from math import log
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
 from swgjoint.errors import InputError
-from swgjoint.maps.catalogue import CatalogueRow, catalogue_rows
+from swgjoint.maps.catalogue import CatalogueRow, named_rows
 from swgjoint.maps.catalogue_stated import stated_figures, stiffness_of
 from swgjoint.maps.drive_map import DriveMap, Ratings
+from swgjoint.maps.hysteresis import Jenkin
+from swgjoint.maps.loop import largest_torque, torque_loop
 from swgjoint.maps.torsion_law import potential_of_stiffness
+from swgjoint.units import arcmin
 
 SHARED_SERIES = ("CSF", "CSG", "SHG", "HFUC", "HFUS", "CHA")
-"""Series with the stiffness of ``stiffness.csv``; only CSG has ratings there."""
+"""Series with the stiffness of ``stiffness.csv``; only CSG has ratings of its own."""
 CORNER = 0.04
 """Half width of a rounded corner, as part of the shorter line beside it. The chord
 over a line of slope K beside one of slope K' changes by CORNER |K'/K - 1|/4: less
 than 1 % for every shipped row."""
 LOBES = 2
+SLOPES = ("K1", "K2", "K3")
+CLOSE = 1e-4
+"""Part by which slopes and hysteresis loss of the loop may miss the row."""
+ROUNDS = 50
 
 _NAME = re.compile(r"([A-Z]+)-(\d{1,4})-(\d{1,4})")
 _NO_ERROR = (
@@ -39,7 +50,7 @@ Map = TypeVar("Map", bound=DriveMap)
 
 def catalogue_names() -> list[str]:
     """Every name that :func:`map_from_catalogue` accepts."""
-    return [row.name for row in catalogue_rows()]
+    return [row.name for row in named_rows()]
 
 
 def is_catalogue_name(text: str) -> bool:
@@ -55,15 +66,15 @@ def find_row(name: str) -> CatalogueRow:
     Raises:
         InputError: With the nearest names, if no row with ratings has that name.
     """
-    rows = {row.name: row for row in catalogue_rows()}
+    rows = {row.name: row for row in named_rows()}
     wanted = name.strip().upper()
     if wanted in rows:
         return rows[wanted]
     parts = _NAME.fullmatch(wanted)
     if parts is None:
         why = "is no catalogue name; accepted: SERIES-SIZE-RATIO"
-    elif parts[1] in SHARED_SERIES and parts[1] != "CSG":
-        why = f"has no ratings in models/catalogue (series {parts[1]}); has: CSG"
+    elif parts[1] not in (has := sorted({row.series for row in rows.values()})):
+        why = f"has no ratings in models/catalogue; series that have: {', '.join(has)}"
     else:
         why = "is not in models/catalogue/ratings.csv"
     # nearest by factor in size, then in ratio; 100 where the name says none
@@ -72,7 +83,8 @@ def find_row(name: str) -> CatalogueRow:
     near = sorted(
         rows,
         key=lambda key: (
-            abs(log(rows[key].size / size)) + abs(log(rows[key].ratio / ratio))
+            abs(log(rows[key].size / size)) + abs(log(rows[key].ratio / ratio)),
+            not wanted.startswith(rows[key].series),
         ),
     )[:3]
     raise InputError(f"catalogue drive {name[:60]!r} {why}; nearest: {', '.join(near)}")
@@ -88,23 +100,17 @@ def map_from_catalogue(name: str, cls: type[Map]) -> Map:
     """
     row = find_row(name)
     s = stiffness_of(row.size, row.ratio)
-    top = max(row.momentary_peak, 1.5 * s["T2"])
-    knots, stiffness = three_lines(
-        s["T1"], s["T2"], s["K1"], s["K2"], s["K3"], largest=top
-    )
-    potential, ends = potential_of_stiffness(knots, stiffness)
     stated = stated_figures(row)
+    own = "" if row.series == "CSG" else f", the tables hold none of {row.series}"
     teeth = LOBES * row.ratio
-    return cls(
+    drive = cls(
         name=row.name,
         level="catalogue",
         layout="circular_spline_fixed",
         teeth_flexspline=teeth,
         teeth_circular_spline=teeth + LOBES,
-        torsion_knots=knots,
         orders=np.zeros((1, 2), dtype=np.int64),
-        potential=potential,
-        end_stiffness=ends,
+        **_spring(row, s),
         kinematic_error=np.zeros((1, 2)),
         ratings=Ratings(
             rated_torque=row.rated_torque,
@@ -112,16 +118,62 @@ def map_from_catalogue(name: str, cls: type[Map]) -> Map:
             momentary_peak=row.momentary_peak,
             T1=s["T1"],
             T2=s["T2"],
-            source=f"catalogue {row.name}",
+            source=f"catalogue CSG-{row.size}-{row.ratio}{own}",
         ),
         info={
             "source": f"catalogue {row.name}: models/catalogue/*.csv",
             "stated": stated
-            | {f"{k}_Nm_rad": s[k] for k in ("K1", "K2", "K3")}
+            | {f"{k}_Nm_rad": s[k] for k in SLOPES}
             | {f"{k}_Nm": s[k] for k in ("T1", "T2")},
             "corner": CORNER,
             "missing": _missing(stated),
         },
+    )
+    loss = stated["hysteresis_loss_arcmin"]
+    return drive if loss is None else _with_hysteresis(drive, row, s, loss * arcmin)
+
+
+def _spring(row: CatalogueRow, s: dict[str, float]) -> dict[str, Any]:
+    """Knots, potential and end stiffness of three lines."""
+    top = max(row.momentary_peak, 1.5 * s["T2"])
+    knots, stiffness = three_lines(
+        s["T1"], s["T2"], s["K1"], s["K2"], s["K3"], largest=top
+    )
+    potential, ends = potential_of_stiffness(knots, stiffness)
+    return {"torsion_knots": knots, "potential": potential, "end_stiffness": ends}
+
+
+def _with_hysteresis(
+    drive: Map, row: CatalogueRow, s: dict[str, float], loss: float
+) -> Map:
+    """The map whose loop shows the slopes of the row and a hysteresis loss [rad].
+
+    The mid-line of a loop is not its spring: it mixes the slopes beside T1 and T2, and
+    at the tip, where both branches meet, the elements carry load too. So the slopes of
+    the spring are set such that those measured on the loop are the catalogue's.
+    """
+    r = drive.ratings
+    limits = (0.0, r.T1, r.T2, largest_torque(r))
+    wanted = np.array([*(s[k] for k in SLOPES), loss])
+    # yield torque of one element in parallel with K1
+    given = wanted * [1.0, 1.0, 1.0, 0.5 * s["K1"]]
+    for _ in range(ROUNDS):
+        slopes = dict(zip(SLOPES, map(float, given), strict=False))
+        element = Jenkin(stiffness=s["K1"], yield_torque=float(given[3]))
+        drive = replace(drive, **_spring(row, s | slopes), hysteresis=(element,))
+        loop = torque_loop(drive)
+        found = [loop.stiffness(a, b) for a, b in pairwise(limits)]
+        change = wanted / np.array([*found, loop.hysteresis_loss()])
+        if np.abs(change - 1.0).max() < CLOSE:
+            label = (
+                f"catalogue {row.name}: {loss / arcmin:g} arcmin, an upper bound; a"
+                " drive may have less"
+            )
+            return replace(drive, info={**drive.info, "hysteresis": label})
+        given = given * change
+    raise InputError(
+        f"catalogue drive {row.name}: no map has its stiffness and a hysteresis loss of"
+        f" {loss / arcmin:g} arcmin"
     )
 
 
@@ -174,6 +226,6 @@ def _missing(stated: dict[str, float | None]) -> dict[str, str]:
         "ripple_pp_percent": _NO_ERROR,
         "hysteresis_loss_arcmin": "the map is conservative, without friction or"
         f" hysteresis; {says('hysteresis_loss_arcmin')}",
-        "repeatability_arcmin": "the map is conservative, without friction or"
-        f" hysteresis; {says('repeatability_arcmin')}",
+        "repeatability_arcmin": "the map has no random part;"
+        f" {says('repeatability_arcmin')}",
     }

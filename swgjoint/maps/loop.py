@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from swgjoint.arrays import frozen_array
 from swgjoint.maps.drive_map import DriveMap, Ratings
 from swgjoint.maps.equilibrium import output_angle
+from swgjoint.maps.hysteresis import Sliders
 
 Array = NDArray[np.float64]
 
@@ -131,23 +132,32 @@ def torque_loop(drive: DriveMap, *, theta: float = 0.0) -> TorqueLoop:
     """The standard loop 0 -> Tmax -> 0 -> -Tmax -> 0 with the input locked.
 
     T1, T2 and the torques of the lost motion are among the points. Torsion is counted
-    from the unloaded position (e0), as an angle sensor at the output sees it.
+    from the unloaded position (e0), as an angle sensor at the output sees it. With
+    hysteresis the loop is played twice and the second time counts: it is closed, and a
+    first loading from rest is no branch of it.
 
     Args:
-        drive: The map; conservative, so that the path needs no history.
+        drive: The map.
         theta: Where the input is locked [rad].
     """
     r = drive.ratings
     top = largest_torque(r)
     named = [r.T1, r.T2, LOST_MOTION_TORQUE * r.rated_torque]
     up = np.unique(np.concatenate([np.linspace(0.0, top, POINTS), named]))
-    down = up[::-1]
-    torque = np.concatenate([up, down[1:], -up[1:], -down[1:]])
     # at rest on the side from which the load left; the start is the middle
-    load = torque.copy()
-    load[2 * up.size - 2] = _REST * r.rated_torque
-    load[-1] = -_REST * r.rated_torque
-    values, place = np.unique(load, return_inverse=True)
-    psi = output_angle(drive, theta, values)
-    free = float(output_angle(drive, theta, 0.0))
-    return TorqueLoop(torque=torque, torsion=free - psi[place])
+    side = _REST * r.rated_torque
+    legs = [
+        up,
+        np.concatenate([up[-2:0:-1], [side], -up[1:]]),
+        np.append(-up[-2:0:-1], -side),
+    ]
+    free = output_angle(drive, theta, 0.0)
+    sliders = Sliders.relaxed(drive.hysteresis, float(drive.torsion(theta, free)))
+    parts: list[Array] = []
+    for leg in legs * (2 if drive.hysteresis else 1):
+        psi = output_angle(drive, theta, leg, sliders)
+        sliders = sliders.moved(float(drive.torsion(theta, psi[-1])))
+        parts.append(float(free) - psi)
+    torque = np.concatenate(legs)
+    torque[np.abs(torque) == side] = 0.0
+    return TorqueLoop(torque=torque, torsion=np.concatenate(parts[-3:]))

@@ -82,12 +82,14 @@ def map_from_measurement(
         "missing": {},
     }
     width = fit.report["hysteresis_loss_arcmin"]
-    measured = (
-        "" if width is None else f"; the measured loop is {width:.4g} arcmin wide"
-    )
-    info["missing"]["hysteresis_loss_arcmin"] = (
-        f"the map is the mid-line of the loop, conservative{measured}"
-    )
+    if fit.hysteresis:
+        info["hysteresis"] = f"measured loop {Path(path).name}, {width:.4g} arcmin wide"
+    else:
+        info["missing"]["hysteresis_loss_arcmin"] = (
+            "the record has one direction of the torque only"
+            if width is None
+            else f"the measured loop is {width:.4g} arcmin wide, no more than its noise"
+        )
     harmonics = np.zeros((1, 2), dtype=np.int64)
     amplitudes = np.zeros((1, 2))
     if kinematic_error is not None:
@@ -132,6 +134,7 @@ def map_from_measurement(
         kinematic_error=amplitudes,
         ratings=_ratings(ratings, float(np.abs(loop.torque).max())),
         damping_ratio=damping_ratio,
+        hysteresis=fit.hysteresis,
         info=info,
     )
 

@@ -40,7 +40,8 @@ TURN_KEYS = (
 )
 """From one output turn."""
 ABSENT_KEYS = {
-    "repeatability_arcmin": "the map is conservative: it returns to the same position",
+    "repeatability_arcmin": "the map has no random part: a repeated approach ends"
+    " at the same position",
     "fatigue_safety_factor": "needs the stresses of the finite elements; a map holds"
     " torque and torsion only",
     "radial_stiffness_N_mm": "needs the finite elements of the flexspline; a map holds"
@@ -139,7 +140,7 @@ def measure_spec(
     if drive is not None:
         if set(keys) & set(LOOP_KEYS):
             loop = torque_loop(drive)
-            _loop_figures(loop, ratings, values, missing)
+            _loop_figures(drive, loop, ratings, values, missing)
         if set(keys) & set(TURN_KEYS):
             turns = _turns(drive, keys)
             _turn_figures(drive, turns, values, missing)
@@ -156,7 +157,11 @@ def measure_spec(
 
 
 def _loop_figures(
-    loop: TorqueLoop, r: Ratings, values: dict[str, Any], missing: dict[str, str]
+    drive: DriveMap,
+    loop: TorqueLoop,
+    r: Ratings,
+    values: dict[str, Any],
+    missing: dict[str, str],
 ) -> None:
     T3 = largest_torque(r)
     for k, (low, high) in enumerate(((0.0, r.T1), (r.T1, r.T2), (r.T2, T3)), 1):
@@ -170,6 +175,8 @@ def _loop_figures(
     else:
         missing["hysteresis_loss_arcmin"] = (
             "the map is conservative, without friction or hysteresis"
+            if not drive.hysteresis
+            else "the hysteresis of the map does not slip within this loop"
         )
     values["lost_motion_arcmin"] = loop.lost_motion(r.rated_torque) / arcmin
 
@@ -247,8 +254,14 @@ def spec_sheet(drive: DriveMap, only: Collection[str] = ()) -> dict[str, Any]:
 
 
 def validity(drive: DriveMap) -> dict[str, Any]:
-    """Level of the source, its range of torque and whether the loop leaves it."""
+    """Level of the source, its range of torque, whether the loop leaves it.
+
+    ``hysteresis`` tells where the elements come from; one output turn (accuracy,
+    ripple) is taken without them.
+    """
     low, high = drive.torque_range
+    slipping = sum(element.yield_torque for element in drive.hysteresis)
+    low, high = low - slipping, high + slipping
     top = largest_torque(drive.ratings)
     reach = 1.0 + 1e-6
     return {
@@ -257,4 +270,7 @@ def validity(drive: DriveMap) -> dict[str, Any]:
         "loop_to_Nm": top,
         "beyond_range": bool(top > reach * high or -top < reach * low),
         "ratings": drive.ratings.source,
+        "hysteresis": str(drive.info.get("hysteresis", "given"))
+        if drive.hysteresis
+        else "none",
     }

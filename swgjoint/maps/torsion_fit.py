@@ -1,4 +1,4 @@
-"""A monotone torsion curve through the mid-line of a measured loop."""
+"""A monotone torsion curve and hysteresis from a measured loop."""
 
 from __future__ import annotations
 
@@ -8,94 +8,147 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from swgjoint.maps.hysteresis import Jenkin, stretches
 from swgjoint.maps.loop import TorqueLoop
 from swgjoint.maps.torsion_law import torque_at_knots
 from swgjoint.units import arcmin
 
 Array = NDArray[np.float64]
 
-INTERVALS = 16
+INTERVALS = 48
 SOFTEST = 0.02
 """Smallest stiffness of the fit, of the mean one: the curve stays monotone."""
+REACHES = 0.25 * 2.0 ** -np.arange(0.0, 5.5, 0.5)
+"""Yield torsions of the elements that are tried, parts of the travel: from a quarter,
+above which an element sticks too long to be told from the spring, to 0.8 %."""
+FAINT = 1e-3
+"""Hysteresis below this part of the largest torque is none."""
 
 _SMOOTH = 1e-4  # weight of the bend of the stiffness: decides only where data is absent
+_SIGNIFICANT = 20.0  # of an F test: far beyond what noise does
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TorsionFit:
-    """Monotone mid-line of a measured loop."""
+    """Monotone spring and hysteresis of a measured loop."""
 
     knots: Array
     """Torsion from the position of zero torque [rad]."""
     stiffness: Array
     """At the knots, positive [N·m/rad]."""
+    hysteresis: tuple[Jenkin, ...]
     report: dict[str, Any]
 
 
-def fit_torsion(loop: TorqueLoop, *, intervals: int = INTERVALS) -> TorsionFit:
-    """Mid-line of a loop with piecewise linear, positive stiffness.
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Solution:
+    values: Array
+    """Torque at the first knot, stiffness at the knots, yield torques."""
+    error: Array
+    """Torque of the model minus that of the samples [N·m]."""
+    bounded: Array
+    """-1 where a value is at its lower bound."""
 
-    Bounded linear least squares on the torque of the mid-line at every sampled torque
-    that both branches reach.
+    @property
+    def rms(self) -> float:
+        return float(np.sqrt(np.mean(self.error**2)))
+
+
+def fit_torsion(loop: TorqueLoop, *, intervals: int = INTERVALS) -> TorsionFit:
+    """Spring with piecewise linear, positive stiffness, and Jenkin elements.
+
+    Bounded linear least squares on the torque of the samples: with its yield torsion
+    given, the torque of an element along the record is its yield torque times a known
+    signal. Samples count once the torsion has moved twice the largest yield torsion,
+    when no element remembers how the record began. Elements are kept where they take
+    away more of the residual than noise could; a record of one direction has none.
+    A loop of another kind, such as one whose width in torque is smallest in the middle,
+    leaves a residual; the report has it.
 
     Args:
         loop: Both signs of the torque.
         intervals: Equal pieces of the torsion, fewer for few samples.
     """
-    from scipy.optimize import lsq_linear
-
-    torque = np.unique(loop.torque)
-    branches = [loop.branch(torque, rising=r) for r in (True, False)]
-    known = ~np.isnan(branches)
-    both = known.all(axis=0)
-    # a curve of one direction has no other branch
-    use = both if both.sum() >= 8 else known.any(axis=0)
-    torque, x = torque[use], loop.mid_line(torque[use])
-
-    count = max(1, min(intervals, torque.size // 3))
+    travel = np.maximum.accumulate(loop.torsion) - np.minimum.accumulate(loop.torsion)
+    reaches = REACHES * travel[-1]
+    width = loop.hysteresis_loss()
+    known = travel >= 2.0 * reaches[0]
+    if np.isnan(width):
+        known[:] = True
+    torque, x = loop.torque[known], loop.torsion[known]
+    count = max(1, min(intervals, np.unique(torque).size // 3))
     knots = np.linspace(x.min(), x.max(), count + 1)
-    h, secant = float(knots[1] - knots[0]), float(np.ptp(torque) / np.ptp(x))
-    # unknowns: torque at the first knot over h secant, stiffness over the secant
-    basis = np.column_stack([np.ones_like(x), _integrals(x, knots) / h])
-    bend = np.zeros((max(0, count - 1), count + 2))
-    for row in range(len(bend)):
-        bend[row, row + 1 : row + 4] = (1.0, -2.0, 1.0)
-    weight = _SMOOTH * np.sqrt(torque.size)
-    solution = lsq_linear(
-        np.vstack([basis, weight * bend]),
-        np.concatenate([torque / (h * secant), np.zeros(len(bend))]),
-        bounds=(np.r_[-np.inf, np.full(count + 1, SOFTEST)], np.inf),
-        method="bvls",
+    signals = np.column_stack([stretches(loop.torsion, d)[known] / d for d in reaches])
+
+    plain = _solve(x, torque, knots, signals[:, :0])
+    found = plain
+    if width > 0.0 and torque.size > 2 * (count + 2 + reaches.size):
+        slipping = _solve(x, torque, knots, signals)
+        better = plain.rms**2 > slipping.rms**2 * (
+            1.0 + _SIGNIFICANT * reaches.size / torque.size
+        )
+        yields = slipping.values[count + 2 :]
+        if better and yields.sum() > FAINT * np.abs(torque).max():
+            found = slipping
+    stiffness, yields = found.values[1 : count + 2], found.values[count + 2 :]
+    elements = tuple(
+        Jenkin(stiffness=float(f / d), yield_torque=float(f))
+        for f, d in zip(yields, reaches, strict=False)
+        if f > FAINT * yields.sum()
     )
-    stiffness = secant * solution.x[1:]
-    at_knots = h * secant * solution.x[0] + np.concatenate(
-        [[0.0], np.cumsum(0.5 * h * (stiffness[1:] + stiffness[:-1]))]
-    )
+    steps = 0.5 * np.diff(knots) * (stiffness[1:] + stiffness[:-1])
+    at_knots = found.values[0] + np.concatenate([[0.0], np.cumsum(steps)])
     zero = _inverse(0.0, knots, stiffness, at_knots)
     shifted = knots - zero
-    error = basis @ solution.x * (h * secant) - torque
-    local = np.interp(x, knots, stiffness)
-    width = loop.hysteresis_loss()
+    turned = np.abs(found.error / np.interp(x, knots, stiffness)) / arcmin
     return TorsionFit(
         knots=shifted,
         stiffness=stiffness,
+        hysteresis=elements,
         report={
             "samples": int(loop.torque.size),
-            "mid_line_points": int(torque.size),
-            "branches": "both" if use is both else "one",
+            "samples_used": int(torque.size),
+            "branches": "one" if np.isnan(width) else "both",
             "intervals": count,
-            "residual_rms_Nm": float(np.sqrt(np.mean(error**2))),
-            "residual_max_Nm": float(np.abs(error).max()),
-            "residual_rms_arcmin": float(np.sqrt(np.mean((error / local) ** 2)))
-            / arcmin,
-            "residual_max_arcmin": float(np.abs(error / local).max()) / arcmin,
+            "elements": len(elements),
+            "yield_torque_Nm": float(sum(e.yield_torque for e in elements)),
+            "residual_rms_Nm": found.rms,
+            "residual_max_Nm": float(np.abs(found.error).max()),
+            "residual_rms_arcmin": float(np.sqrt(np.mean(turned**2))),
+            "residual_max_arcmin": float(turned.max()),
+            "residual_rms_without_hysteresis_Nm": plain.rms,
             "torsion_at_zero_torque_arcmin": zero / arcmin,
             "hysteresis_loss_arcmin": None if np.isnan(width) else width / arcmin,
             "torque_range_Nm": [
                 float(v) for v in torque_at_knots(shifted, stiffness)[[0, -1]]
             ],
-            "at_softest": int((solution.active_mask[1:] != 0).sum()),
+            "at_softest": int((found.bounded[1 : count + 2] != 0).sum()),
         },
+    )
+
+
+def _solve(x: Array, torque: Array, knots: Array, signals: Array) -> _Solution:
+    """Torque at the first knot, stiffness at the knots and yield torques."""
+    from scipy.optimize import lsq_linear
+
+    count, elements = knots.size - 1, signals.shape[1]
+    h, secant = float(knots[1] - knots[0]), float(np.ptp(torque) / np.ptp(x))
+    # unknowns: torques over h secant, stiffness over the secant
+    basis = np.column_stack([np.ones_like(x), _integrals(x, knots) / h, signals])
+    bend = np.zeros((max(0, count - 1), basis.shape[1]))
+    for row in range(len(bend)):
+        bend[row, row + 1 : row + 4] = (1.0, -2.0, 1.0)
+    matrix = np.vstack([basis, _SMOOTH * np.sqrt(torque.size) * bend])
+    wanted = np.concatenate([torque / (h * secant), np.zeros(len(bend))])
+    # the triangle has the same least squares and as many rows as unknowns
+    q, r = np.linalg.qr(matrix)
+    lowest = np.r_[-np.inf, np.full(count + 1, SOFTEST), np.zeros(elements)]
+    solution = lsq_linear(r, q.T @ wanted, bounds=(lowest, np.inf), method="bvls")
+    unit = np.r_[h * secant, np.full(count + 1, secant), np.full(elements, h * secant)]
+    return _Solution(
+        values=solution.x * unit,
+        error=(basis @ solution.x) * (h * secant) - torque,
+        bounded=solution.active_mask,
     )
 
 

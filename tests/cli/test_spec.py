@@ -101,7 +101,7 @@ def test_report(capsys, tmp_path, synthetic_map):
     ("arguments", "message"),
     [
         (["CSG-26-100"], "nearest: CSG-25-100"),
-        (["CHA-25-100"], "no ratings"),
+        (["SHG-25-100"], "no ratings"),
         (["none.swg"], "none.swg"),
         (["refrence-2d"], "did you mean reference-2d"),
         (["CSG25100.toml"], "neither a file"),

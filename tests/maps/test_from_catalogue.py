@@ -26,7 +26,7 @@ from swgjoint.maps.torsion_law import potential_of_stiffness, torque_at_knots
 
 @pytest.mark.parametrize("name", catalogue_names())
 def test_the_loop_returns_the_stiffness_of_the_row(name):
-    """K1, K2, K3 measured on the loop are those of the table within 2 %."""
+    """K1 to K3 and hysteresis loss measured on the loop are the tables' within 2 %."""
     drive = DriveMap.from_catalogue(name)
     sheet = drive.spec_sheet(["K1_Nm_rad", "K2_Nm_rad", "K3_Nm_rad", "T1_Nm", "T2_Nm"])
     _, size, ratio = name.split("-")
@@ -40,6 +40,12 @@ def test_the_loop_returns_the_stiffness_of_the_row(name):
         stated = 1e4 * row[f"{k}_1e4Nm_rad"]
         assert sheet[f"{k}_Nm_rad"] == pytest.approx(stated, rel=0.02)
     assert (sheet["T1_Nm"], sheet["T2_Nm"]) == (row["T1_Nm"], row["T2_Nm"])
+    loss = drive.info["stated"]["hysteresis_loss_arcmin"]
+    assert bool(drive.hysteresis) == (loss is not None) == name.startswith("CHA")
+    if loss:
+        sheet = drive.spec_sheet(["hysteresis_loss_arcmin"])
+        assert sheet["hysteresis_loss_arcmin"] == pytest.approx(loss, rel=0.02)
+        assert "upper bound" in sheet["validity"]["hysteresis"]
     assert drive.ratio == -int(ratio)
 
 
@@ -125,7 +131,8 @@ def test_gaps_are_listed():
     [
         ("CSG-26-100", ["ratings.csv", "CSG-25-100"]),
         ("CSG-25-70", ["CSG-25-80"]),
-        ("CHA-25-100", ["no ratings", "series CHA", "CSG-25-100"]),
+        ("SHG-25-100", ["no ratings", "CHA, CSG", "CSG-25-100"]),
+        ("CHA-26-100", ["ratings.csv", "CHA-25-100"]),
         ("csg25", ["SERIES-SIZE-RATIO", "CSG-25-100"]),
         ("", ["SERIES-SIZE-RATIO"]),
     ],

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from swgjoint.errors import InputError
+from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.hysteresis import Jenkin, Sliders, play_hysteresis
+from swgjoint.maps.hysteresis_fit import hysteresis_from
+from swgjoint.maps.loop import torque_loop
+from swgjoint.units import arcmin
 
 ELEMENTS = (
     Jenkin(stiffness=4e3, yield_torque=2.0),
@@ -100,3 +106,67 @@ def test_values_that_cannot_be(value):
         Jenkin(stiffness=value, yield_torque=1.0)
     with pytest.raises(InputError, match=r"hysteresis yield_torque .* accepted"):
         Jenkin(stiffness=1.0, yield_torque=value)
+
+
+def test_width_of_one_element_in_closed_form():
+    """In parallel with a spring K the loop is 2 f/K wide at zero torque."""
+    K = 1e4
+    for k, f in ((1e4, 2.0), (3e5, 7.0)):
+        element = Jenkin(stiffness=k, yield_torque=f)
+        loop = torque_loop(replace(DriveMap.linear(K), hysteresis=(element,)))
+        assert loop.hysteresis_loss() == pytest.approx(2 * f / K, rel=1e-6)
+        # closed: both branches meet at the tip, where element and spring carry T
+        tip = (loop.torque.max() - f) / K
+        assert loop.torsion.max() == pytest.approx(tip, rel=1e-9)
+        assert loop.torsion.min() == pytest.approx(-tip, rel=1e-9)
+
+
+def test_area_of_the_loop_is_the_slip_work(synthetic_map):
+    """The area of the standard loop of a map equals 4 f (X - f/k) of its elements."""
+    drive = replace(synthetic_map, hysteresis=ELEMENTS)
+    loop = torque_loop(drive)
+    T, x = loop.torque, loop.torsion
+    area = float(np.trapezoid(T, x))
+    # the harmonics shift the unloaded position; the amplitude is what counts
+    X = 0.5 * np.ptp(x)
+    want = sum(4 * e.yield_torque * (X - e.yield_torsion) for e in ELEMENTS)
+    # chords of the legs between 80 torques cut the corners where elements slip
+    assert area == pytest.approx(want, rel=5e-3)
+
+
+@pytest.mark.parametrize("stiffness", [None, 2e5])
+def test_wanted_loss_is_measured(synthetic_map, stiffness):
+    """The spec procedure returns the hysteresis loss that was wanted."""
+    for drive in (synthetic_map, DriveMap.from_catalogue("CSG-20-80")):
+        [element] = hysteresis_from(drive, loss=0.8 * arcmin, stiffness=stiffness)
+        sheet = replace(drive, hysteresis=(element,)).spec_sheet()
+        assert sheet["hysteresis_loss_arcmin"] == pytest.approx(0.8, rel=1e-4)
+        assert "hysteresis_loss_arcmin" not in sheet["missing"]
+        assert sheet["validity"]["hysteresis"] == "given"
+        if stiffness:
+            assert element.stiffness == stiffness
+
+
+def test_lost_motion_takes_a_second_element():
+    """Loss and lost motion at once; a lost motion that cannot be had is refused."""
+    drive = DriveMap.linear(1e4, rated_torque=50.0)
+    lost = 0.99 * 4.0 / 1e4  # the line alone has 8 % of rated over K
+    elements = hysteresis_from(drive, loss=1e-4, lost_motion=lost)
+    assert len(elements) == 2
+    sheet = replace(drive, hysteresis=elements).spec_sheet()
+    assert sheet["hysteresis_loss_arcmin"] == pytest.approx(1e-4 / arcmin, rel=1e-3)
+    assert sheet["lost_motion_arcmin"] == pytest.approx(lost / arcmin, rel=1e-3)
+    with pytest.raises(
+        InputError, match=r"lost motion .* accepted: .* to 1\.375 arcmin"
+    ):
+        hysteresis_from(drive, loss=1e-4, lost_motion=1.1 * 4.0 / 1e4)
+
+
+def test_loss_that_no_element_gives():
+    """Wider than sticking allows, narrower than clearance, no number: refused."""
+    drive = DriveMap.linear(1e4)
+    with pytest.raises(InputError, match=r"accepted: up to .* arcmin"):
+        hysteresis_from(drive, loss=0.03)
+    for loss in (0.0, -1.0, np.nan):
+        with pytest.raises(InputError, match="accepted: > 0 rad"):
+            hysteresis_from(drive, loss=loss)
