@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+from numpy.typing import NDArray
+
 from swgjoint.errors import DesignError
 from swgjoint.fe.circular_spline import CircularSpline, ring_compliance
 from swgjoint.fe.friction import STICK_STIFFNESS, Friction
@@ -12,17 +15,25 @@ from swgjoint.fe.sector_mesh import sector_mesh
 from swgjoint.fe.superelement import Superelement, condense
 from swgjoint.gear.design import Design, MemberName
 from swgjoint.gear.profile import tooth_profile
+from swgjoint.gear.tolerances import has_errors, tooth_errors, wave_generator_offset
 from swgjoint.gear.wave_generator import lobe_height, wave_generator
 from swgjoint.units import mm
 
+Array = NDArray[np.float64]
+
+
+NOT_MODELLED = ("wave_generator_ovality_um", "misalignment_arcmin")
+"""Tolerances that the 2D model refuses."""
+
 
 def can_halve(design: Design) -> bool:
-    """Whether half a turn maps the drive onto itself: equal lobes, even teeth."""
+    """Whether half a turn maps the drive onto itself: lobes, even teeth, no errors."""
     drive = design.drive
     return (
         drive.teeth_flexspline % 2 == 0
         and drive.teeth_circular_spline % 2 == 0
         and wave_generator(design).folds % 2 == 0
+        and not has_errors(design)
     )
 
 
@@ -39,7 +50,7 @@ def check_modelled(design: Design, model: str) -> None:
     faults += [
         f"tolerances.{key} = {value:g} is not modelled yet; accepted: 0"
         for key, value in tolerances.model_dump().items()
-        if key != "seed" and value
+        if key in NOT_MODELLED and value
     ]
     if faults:
         raise DesignError("\n".join(f"{drive.name}: {fault}" for fault in faults))
@@ -81,7 +92,7 @@ def ring_model(
         drive = design.drive
         raise DesignError(
             f"{drive.name}: a half model needs even tooth counts and a wave generator "
-            "that half a turn maps onto itself, not "
+            "that half a turn maps onto itself, without tolerances, not "
             f"{drive.teeth_flexspline}/{drive.teeth_circular_spline} teeth and "
             f"{design.wave_generator.kind}"
         )
@@ -103,7 +114,19 @@ def ring_model(
         law = Friction(
             coefficient=coefficient, stiffness=STICK_STIFFNESS * modulus * width
         )
+    shifts: dict[str, Array] = {}
+    if has_errors(design):
+        if ring.compliance is None:
+            raise DesignError(
+                f"{design.drive.name}: tolerances need an elastic circular spline"
+            )
+        shifts = {
+            "tooth_shift": tooth_errors(design, "flexspline").shift,
+            "ring_tooth_shift": tooth_errors(design, "circular_spline").shift,
+            "wave_generator_offset": wave_generator_offset(design),
+        }
     return RingModel(
+        **shifts,
         friction=law,
         element=_sector(design, "flexspline"),
         wave_generator=wave_generator(design),

@@ -209,7 +209,7 @@ def _solve_linear(
     offset[n + 1] = -(load.on_ring or 0.0) / model.copies
     # gaps as if the old tooth forces were gone; the new ones bring their own share
     old = np.einsum("kb,kb->k", local, state.flank_force[lines.sector])
-    old += np.einsum("kb,kb->k", lines.ring_weight, ring.search.ring_flank[lines.tooth])
+    old += np.einsum("kb,kb->k", lines.ring_weight, ring.ring_elastic[lines.tooth])
     moved = np.einsum("kn,kn->k", rows, base[lines.sector])
     offset[:n] = lines.gap - old + moved
     offset[last_two] = np.einsum("snf,sn->f", levers[:, :, n:], base)

@@ -53,7 +53,10 @@ class Linearised:
     anchor_stiffness: float
     """[N/m]."""
     flank: Array
-    """Displacement of the flank nodes in the sector frames (N, 2 n_b) [m]."""
+    """Displacement of the flank nodes in the sector frames, manufacturing errors
+    included (N, 2 n_b) [m]."""
+    ring_elastic: Array
+    """Elastic displacement of the circular spline's flanks (N_c, 2 n_c) [m]."""
     search: ToothContact
 
     @property
@@ -153,6 +156,9 @@ def linearise(model: RingModel, state: State, torque: float | None) -> Linearise
     anchor[0, :2] = turned(x[0, 0]) / np.hypot(*x[0, 0])
     centre = frames.position.reshape(model.sectors, n_a, 2).mean(axis=1)
     seen = frames.angle - state.ring_rotation
+    ring_elastic = model.ring_displacement(state)
+    flank = frames.displacement @ element.flank_from_skeleton.T
+    flank += state.flank_force @ element.flank_compliance
     return Linearised(
         element=element,
         frames=frames,
@@ -168,12 +174,12 @@ def linearise(model: RingModel, state: State, torque: float | None) -> Linearise
         rotation_gradient=rotation_gradient,
         anchor=anchor,
         anchor_stiffness=float(np.mean(np.diag(element.stiffness))),
-        flank=frames.displacement @ element.flank_from_skeleton.T
-        + state.flank_force @ element.flank_compliance,
+        flank=model.placed(flank, model.tooth_shift),
+        ring_elastic=ring_elastic,
         search=ToothContact(
             element=element,
             circular_spline=model.circular_spline,
-            ring_flank=model.ring_displacement(state),
+            ring_flank=model.placed(ring_elastic, model.ring_tooth_shift),
             angle=seen,
             bearing=seen - np.arctan2(centre[:, 0], centre[:, 1]),
         ),

@@ -36,6 +36,12 @@ class RingModel:
     nonlinear: bool = True
     friction: Friction | None = None
     """Between the flanks; None without."""
+    tooth_shift: Array | None = None
+    """Manufacturing errors of the flexspline's teeth in their frames (N, 2) [m]."""
+    ring_tooth_shift: Array | None = None
+    """The same of the circular spline, which must be elastic (N_c, 2) [m]."""
+    wave_generator_offset: Array | None = None
+    """Centre of the outline in the frame of the wave generator (2,) [m]."""
 
     @property
     def sectors(self) -> int:
@@ -135,6 +141,8 @@ class RingModel:
             alpha: Wave-generator angle [rad].
         """
         flat = rotate(nodes.reshape(-1, 2), -alpha)
+        if self.wave_generator_offset is not None:
+            flat = flat - self.wave_generator_offset
         gap, normal, curvature = self.wave_generator.signed_distance(flat)
         return (
             gap.reshape(nodes.shape[:-1]),
@@ -188,6 +196,12 @@ class RingModel:
             rotation=rotation,
             ring_rotation=ring_rotation,
         )
+
+    def placed(self, flank: Array, shift: Array | None) -> Array:
+        """Displacements of flank nodes (N, 2 n) [m] with the errors of their teeth."""
+        if shift is None:
+            return flank
+        return flank + np.tile(shift, flank.shape[1] // 2)
 
     def ring_displacement(self, state: State) -> Array:
         """Flank displacement of the circular spline (N_c, 2 n_c) [m]."""

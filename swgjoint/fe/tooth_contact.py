@@ -141,8 +141,9 @@ class ToothContact:
     element: Superelement
     circular_spline: CircularSpline
     ring_flank: Array
-    """Displacement of the circular spline's flank nodes in the frames of its teeth, one
-    row per tooth of the model; no columns if rigid [m]. Shape (N_c, 2 n_c)."""
+    """Displacement of the circular spline's flank nodes in the frames of its teeth,
+    manufacturing errors included, one row per tooth of the model; no columns if rigid
+    [m]. Shape (N_c, 2 n_c)."""
     angle: Array
     """Angles of the sector frames against the circular spline (N,) [rad]."""
     bearing: Array
