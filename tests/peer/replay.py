@@ -132,6 +132,14 @@ class Replay:
             tangential = tangential - tangential.mean()
         return radial, tangential
 
+    @property
+    def two_lobe(self) -> float:
+        """Radial difference a cos 2 phi from the lobes; a < 0: ours is softer [m]."""
+        x, y = np.moveaxis(self.model.reference[:, self.model.bore_nodes], -1, 0)
+        nodes, _ = self.ring.bore.at(self.forces.bore_angle)
+        phi = np.arctan2(-x, y)[nodes[..., 0] >= 0] - self.state.wave_generator_angle
+        return float(self.shape[0] @ np.cos(2 * phi) / np.sum(np.cos(2 * phi) ** 2))
+
     @cached_property
     def root_stress(self) -> tuple[float, float]:
         """Largest principal stress of the root fillets, ours and CalculiX [Pa]."""
@@ -151,6 +159,14 @@ class Replay:
             nodes = np.unique(side[side >= 0])
             found.append(stress_maxima(self.fields.stress[nodes])[0].max())
         return float(max(found)) * MPa
+
+    @property
+    def rotation(self) -> float:
+        """Best-fit rotation of the bore in CalculiX [rad]."""
+        chain, angle = self.ring.bore, self.forces.bore_angle
+        moved = _seen(self.fields.displacement, chain, angle) * mm
+        start = self.model.reference[:, self.model.bore_nodes]
+        return self.model.best_fit_rotation(start + moved)[0]
 
     @property
     def moment(self) -> float:
