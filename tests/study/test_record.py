@@ -152,9 +152,9 @@ def test_positions_that_fail_are_counted(monkeypatch):
         assert found.last[kind] is None
 
 
-def test_a_design_that_is_not_modelled_is_recorded():
-    """What the model does not contain is refused, in the record."""
-    design = SHORT.design.with_changes({"tolerances.random_pitch_um": 2.0})
+def test_a_tooth_that_cannot_be_built_is_recorded():
+    """A design whose tooth does not close is refused, in the record."""
+    design = SHORT.design.with_changes({"flexspline.profile.root_radius_mm": 1.9})
     found = compute(RunSpec(design=design, torque=20.0, positions=2, turn=0.01))
     assert found.outcome == "refused"
-    assert "random_pitch_um" in found.message
+    assert "flexspline.profile." in found.message
