@@ -17,6 +17,7 @@ from swgjoint.fe.state import State
 from swgjoint.fe.stress import KINDS, MemberMaxima, StressMaxima
 from swgjoint.fe.superelement import Superelement
 from swgjoint.gear.design import Design
+from swgjoint.gear.tolerances import has_errors
 from swgjoint.units import arcsec, deg
 
 Array = NDArray[np.float64]
@@ -132,6 +133,7 @@ class MeshingRun:
                 "half": self.model.half,
                 "cup": cup,
                 "tooth_friction": self.design.friction.tooth_coefficient or None,
+                "tolerances": has_errors(self.design) or None,
                 "left_out": left_out(self.design),
             },
             "torque_Nm": self.torque,

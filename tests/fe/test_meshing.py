@@ -180,7 +180,7 @@ def test_linear_level_runs_and_differs():
     ("changes", "key"),
     [
         ({"tolerances.wave_generator_ovality_um": 3.0}, "wave_generator_ovality_um"),
-        ({"tolerances.random_pitch_um": 2.0}, "tolerances.random_pitch_um"),
+        ({"tolerances.misalignment_arcmin": 0.5}, "tolerances.misalignment_arcmin"),
     ],
 )
 def test_what_is_not_modelled_is_refused(changes, key):
