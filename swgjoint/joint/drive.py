@@ -12,8 +12,12 @@ from swgjoint.errors import InputError
 from swgjoint.joint.native import NativeSpring
 from swgjoint.joint.prescribed import error_of_motor, motor_of_link
 from swgjoint.maps.drive_map import DriveMap
+from swgjoint.maps.hysteresis import Jenkin, Sliders
 
 Array = NDArray[np.float64]
+
+ACCELERATIONS = 2
+"""Numbers in the plugin's state before those of the hysteresis."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,7 +72,12 @@ class JointDrive:
     native: NativeSpring | None = None
     """What ``native`` holds of the map; None at other levels."""
     hysteresis: tuple[str, ...] = ()
-    """Tendons of the Jenkin elements, in the order of ``native.hysteresis``."""
+    """Tendons of the Jenkin elements of ``native``, in the order of the map's."""
+
+    @property
+    def elements(self) -> tuple[Jenkin, ...]:
+        """Hysteresis that the level holds; only ``native`` and ``full`` do."""
+        return self.drive.hysteresis if self.level in ("native", "full") else ()
 
     @property
     def kept_orders(self) -> tuple[float, ...]:
@@ -90,19 +99,21 @@ class JointDrive:
         psi: ArrayLike,
         theta_rate: ArrayLike = 0.0,
         psi_rate: ArrayLike = 0.0,
+        slipping: ArrayLike = 0.0,
     ) -> JointSignals:
         """Torsion, transmission error and torque from recorded joint states.
 
         Taken at the positions and velocities that are passed in, so pass ``qpos`` and
         ``qvel`` of the same instant, as they stand after a step. The discrete scheme
         evaluates its force half a step earlier; what is given here is the law itself
-        at the true positions. Hysteresis of ``native`` has a history and is not in it.
+        at the true positions. Hysteresis has a history: its torque is passed in.
 
         Args:
             theta: Rotor positions [rad].
             psi: Link positions [rad].
             theta_rate: Rotor velocities [rad/s].
             psi_rate: Link velocities [rad/s].
+            slipping: Torque of the elements along the torsion [N·m].
 
         Raises:
             InputError: For ``rigid`` and ``kinematic``, which have no rotor; see
@@ -113,8 +124,11 @@ class JointDrive:
                 f"joint {self.joint!r} is {self.level}: it has no rotor to take "
                 "signals from; use observe(model, data)"
             )
-        theta, psi, theta_rate, psi_rate = np.broadcast_arrays(
-            *(np.asarray(x, float) for x in (theta, psi, theta_rate, psi_rate))
+        theta, psi, theta_rate, psi_rate, slipping = np.broadcast_arrays(
+            *(
+                np.asarray(x, float)
+                for x in (theta, psi, theta_rate, psi_rate, slipping)
+            )
         )
         error = psi - theta / self.ratio
         if self.level in ("linear", "native"):
@@ -124,7 +138,7 @@ class JointDrive:
             return JointSignals(
                 torsion=-error,
                 transmission_error=error,
-                torque=elastic + self.damping * rate,
+                torque=elastic + self.damping * rate + slipping,
             )
         _, e_theta, e_psi = self.drive.error_at(self.drive.phases(theta, psi))
         g_theta, g_psi = 1.0 / self.ratio + e_theta, -1.0 + e_psi
@@ -132,8 +146,15 @@ class JointDrive:
         return JointSignals(
             torsion=self.drive.torsion(theta, psi),
             transmission_error=error,
-            torque=self.drive.forces(theta, psi)[1] - self.damping * rate * g_psi,
+            torque=self.drive.forces(theta, psi)[1]
+            - (self.damping * rate + slipping) * g_psi,
         )
+
+    def output_slope(self, theta: ArrayLike, psi: ArrayLike) -> Array:
+        """Torque on the link per torque along the torsion, -dDelta/dpsi [-]."""
+        if self.level != "full":
+            return np.ones(np.broadcast(theta, psi).shape)
+        return np.asarray(1.0 - self.drive.error_at(self.drive.phases(theta, psi))[2])
 
     def motor_angle(self, psi: ArrayLike) -> Array:
         """Motor angle of a drive without torsion at link angles [rad].
@@ -173,16 +194,27 @@ class JointDrive:
                 torque=np.asarray(torque),
             )
         rotor = model.joint(self.rotor)
-        got = self.signals(
+        state = (
             data.qpos[int(rotor.qposadr[0])],
             data.qpos[q],
             data.qvel[int(rotor.dofadr[0])],
             data.qvel[v],
         )
-        slip = sum(
-            _slipping(model, data, name, float(got.torsion)) for name in self.hysteresis
-        )
-        return replace(got, torque=got.torque + slip) if self.hysteresis else got
+        got = self.signals(*state)
+        if not self.elements:
+            return got
+        torsion = float(got.torsion)
+        if self.plugin is None:
+            slipping = sum(
+                _slipping(model, data, name, torsion) for name in self.hysteresis
+            )
+        else:
+            instance = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_PLUGIN, self.plugin)
+            first = int(model.plugin_stateadr[instance]) + ACCELERATIONS
+            rest = data.plugin_state[first : first + len(self.elements)]
+            sliders = replace(Sliders.relaxed(self.elements), rest=rest.copy())
+            slipping = float(sliders.torque(torsion))
+        return self.signals(*state, slipping=slipping)
 
 
 def _slipping(

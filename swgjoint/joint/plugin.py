@@ -93,7 +93,15 @@ def config(
         "damping": repr(float(damping)),
         "numerical_damping": repr(float(numerical_damping)),
         "passes": str(int(passes)),
-    }
+    } | (
+        {
+            "hysteresis": _text(
+                np.array([(e.stiffness, e.yield_torque) for e in drive.hysteresis])
+            )
+        }
+        if drive.hysteresis
+        else {}
+    )
 
 
 _SELF_TEST = """

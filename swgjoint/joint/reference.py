@@ -18,6 +18,17 @@ its two ends, g the secant of the torsion. The step of the pair is predicted and
 remainder, linear in the velocity step, goes to the engine as the metric
 :math:`M + h^2 p\,g g^T`.
 
+Hysteresis, elements k, f relaxed at r, adds its mean torque over the step to L and the
+slope of that mean to the remainder. The stretch goes from :math:`u_0` to
+:math:`u_1 = \mathrm{clip}(u_0 + \Delta^+ - \Delta, \pm f/k)`; with s the part of the
+way that it sticks,
+
+.. math::
+    \bar q = k\,[\tfrac12 (u_0 + u_1)\,s + u_1 (1 - s)], \qquad
+    \partial\bar q/\partial\Delta^+ = \tfrac12 k s^2.
+
+Its work is the change of :math:`k u^2/2` plus what slipping takes, which is >= 0.
+
 Source:
     Gonzalez (1996), "Time integration and discrete Hamiltonian systems", J. Nonlinear
     Sci. 6, for discrete gradients; the prediction and the metric are our own.
@@ -25,7 +36,7 @@ Source:
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -50,6 +61,8 @@ class Motion:
     rotor_acceleration: float = 0.0
     """What all other forces caused in the last step, plugin state [rad/s²]."""
     link_acceleration: float = 0.0
+    rest: tuple[float, ...] = ()
+    """Torsion at which each element of the hysteresis is relaxed [rad]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -88,6 +101,8 @@ def gradient_force(
     _, e_theta, e_psi = drive.error_at(drive.phases(motion.theta, motion.psi))
     g_theta, g_psi = 1.0 / drive.ratio + float(e_theta), -1.0 + float(e_psi)
     friction = damping * (g_theta * motion.theta_rate + g_psi * motion.psi_rate)
+    torsion = float(drive.torsion(motion.theta, motion.psi))
+    friction += _slip(drive, motion.rest, torsion, 0.0)[0]
     return float(theta) - friction * g_theta, float(psi) - friction * g_psi
 
 
@@ -117,7 +132,18 @@ def scheme_force(
     x = np.array([motion.theta, motion.psi]) - 0.5 * h * v
     dv: Array = np.zeros(2)
     for _ in range(passes):
-        s = _secant(drive, x, h * (v + 0.5 * dv))
+        dx = h * (v + 0.5 * dv)
+        s = _secant(drive, x, dx)
+        torque, slope, sticking = _slip(
+            drive, motion.rest, float(drive.torsion(*x)), float(s.g @ dx)
+        )
+        s = replace(
+            s,
+            torque=s.torque + torque,
+            slope=s.slope + slope,
+            k0=s.k0 + sticking,
+            k1=s.k1 + sticking,
+        )
         k = max(0.0, 0.5 * (s.k0 + s.k1))
         w = float(np.sum(weight * s.g**2))
         ka = h**2 * k * w
@@ -160,6 +186,40 @@ def other_acceleration(
         dm / timestep + motion.rotor_weight * (force.g_theta * along + force.e_theta),
         dl / timestep + motion.link_weight * (force.g_psi * along + force.e_psi),
     )
+
+
+def rest_after(
+    drive: DriveMap, motion: Motion, *, timestep: float
+) -> tuple[float, ...]:
+    """Plugin state after a step of the scheme: where each element is relaxed [rad].
+
+    The end of a step is the beginning of the next; it counts there.
+    """
+    torsion = float(
+        drive.torsion(
+            motion.theta - 0.5 * timestep * motion.theta_rate,
+            motion.psi - 0.5 * timestep * motion.psi_rate,
+        )
+    )
+    reach = np.array([e.yield_torsion for e in drive.hysteresis])
+    rest = np.array(motion.rest)
+    return tuple(np.clip(rest, torsion - reach, torsion + reach).tolist())
+
+
+def _slip(
+    drive: DriveMap, rest: tuple[float, ...], torsion: float, change: float
+) -> tuple[float, float, float]:
+    """Mean torque of the elements over a change, its slope, stiffness that sticks."""
+    torque = slope = sticking = 0.0
+    for element, r in zip(drive.hysteresis, rest, strict=True):
+        k, d = element.stiffness, element.yield_torsion
+        begin = float(np.clip(torsion - r, -d, d))
+        end = float(np.clip(begin + change, -d, d))
+        part = 1.0 if end == begin + change else (end - begin) / change
+        torque += k * (0.5 * (begin + end) * part + end * (1.0 - part))
+        slope += 0.5 * k * part**2
+        sticking += k * part
+    return torque, slope, sticking
 
 
 def _secant(drive: DriveMap, x: Array, dx: Array) -> _Secant:

@@ -12,7 +12,9 @@ namespace {
 constexpr char kName[] = "swgjoint.drive";
 constexpr const char* kAttributes[] = {
     "ratio",           "orders",  "knots",             "potential", "end_stiffness",
-    "kinematic_error", "damping", "numerical_damping", "passes"};
+    "kinematic_error", "damping", "numerical_damping", "passes", "hysteresis"};
+constexpr int kAccelerations = 2;  // states before those of the hysteresis
+constexpr size_t kMaxElements = 64;
 
 Drive* Get(const mjData* d, int instance) {
   return reinterpret_cast<Drive*>(d->plugin_data[instance]);
@@ -31,6 +33,25 @@ bool Scalar(const mjModel* m, int instance, const char* key, mjtNum low, mjtNum 
   if (list.size() != 1 || list[0] < low || list[0] > high) return false;
   *out = list[0];
   return true;
+}
+
+// Stiffness and yield torque of every Jenkin element; an absent attribute has none.
+bool Elements(const mjModel* m, int instance, std::vector<double>* list) {
+  const char* text = mj_getPluginConfig(m, instance, "hysteresis");
+  list->clear();
+  if (!text || !*text) return true;
+  if (!ParseNumbers(text, list) || list->size() % 2 ||
+      list->size() > 2 * kMaxElements) {
+    return false;
+  }
+  return std::all_of(list->begin(), list->end(), [](double x) { return x > 0; });
+}
+
+int CountStates(const mjModel* m, int instance) {
+  std::vector<double> list;
+  // a bad attribute is refused when the instance is made
+  if (!Elements(m, instance, &list)) return kAccelerations;
+  return kAccelerations + static_cast<int>(list.size() / 2);
 }
 
 }  // namespace
@@ -58,6 +79,16 @@ std::unique_ptr<Drive> Drive::Create(const mjModel* m, int instance) {
     return Refuse(m, instance, "attribute 'passes' is not an integer in 1..20");
   }
   drive->passes_ = static_cast<int>(passes);
+  std::vector<double> elements;
+  if (!Elements(m, instance, &elements)) {
+    return Refuse(m, instance,
+                  "attribute 'hysteresis' is not up to 64 pairs of numbers > 0");
+  }
+  for (size_t j = 0; j < elements.size(); j += 2) {
+    drive->stiffness_.push_back(elements[j]);
+    drive->reach_.push_back(elements[j + 1] / elements[j]);
+  }
+  drive->stretch_.assign(drive->reach_.size(), 0.0);
 
   // config strings get no prefix when a model is attached, names do: the tendon
   // has the name of the instance
@@ -101,7 +132,7 @@ std::unique_ptr<Drive> Drive::Create(const mjModel* m, int instance) {
 }
 
 void Drive::Compute(const mjModel* m, mjData* d, int instance) {
-  step_.scheme = false;
+  step_.scheme = step_.gradient = false;
   // without springs the engine leaves the tendon out of its metric, too
   if (m->opt.disableflags & mjDSBL_SPRING) return;
 
@@ -116,13 +147,38 @@ void Drive::Compute(const mjModel* m, mjData* d, int instance) {
   if (m->opt.integrator == mjINT_DISCRETE && m->opt.solver != mjSOL_PGS) {
     AddScheme(m, d, instance);
   } else {
-    AddGradient(m, d);
+    AddGradient(m, d, instance);
   }
 }
 
-void Drive::AddGradient(const mjModel* m, mjData* d) {
+// Stretch of every element at the torsion where the map begins: it slips to reach it.
+void Drive::Place(const mjtNum* rest) {
+  for (size_t j = 0; j < reach_.size(); ++j) {
+    stretch_[j] = std::clamp(map_.torsion() - rest[j], -reach_[j], reach_[j]);
+  }
+}
+
+// Adds the elements over a change of the torsion: the mean of their torque along it,
+// so that their work is exact, and how that mean grows with the change. An element
+// sticks for the part f of the way.
+void Drive::Slip(mjtNum change, DriveValue* value) const {
+  for (size_t j = 0; j < reach_.size(); ++j) {
+    const mjtNum k = stiffness_[j], begin = stretch_[j], free = begin + change;
+    const mjtNum end = std::clamp(free, -reach_[j], reach_[j]);
+    const mjtNum f = end == free ? 1 : (end - begin) / change;
+    value->torque += k * (0.5 * (begin + end) * f + end * (1 - f));
+    value->slope += 0.5 * k * f * f;
+    value->stiffness_begin += k * f;
+    value->stiffness_end += k * f;
+  }
+}
+
+void Drive::AddGradient(const mjModel* m, mjData* d, int instance) {
   DriveValue value;
   map_.Gradient(d->qpos[q_rotor_], d->qpos[q_link_], &value);
+  Place(d->plugin_state + m->plugin_stateadr[instance] + kAccelerations);
+  Slip(0, &value);
+  step_.gradient = true;
   const mjtNum damping = m->opt.disableflags & mjDSBL_DAMPER ? 0 : damping_;
   const mjtNum rate = value.g_theta * d->qvel[v_rotor_] + value.g_psi * d->qvel[v_link_];
   const mjtNum force = value.torque + damping * rate;
@@ -143,10 +199,13 @@ void Drive::AddScheme(const mjModel* m, mjData* d, int instance) {
 
   // the scheme is a midpoint rule in positions half a step back
   map_.Begin(d->qpos[q_rotor_] - 0.5 * h * vm, d->qpos[q_link_] - 0.5 * h * vl);
+  Place(state + kAccelerations);
   DriveValue& g = step_.value;
   mjtNum dm = 0, dl = 0, force = 0, p = 0;
   for (int pass = 0; pass < passes_; ++pass) {
-    map_.Secant(h * (vm + 0.5 * dm), h * (vl + 0.5 * dl), &g);
+    const mjtNum xm = h * (vm + 0.5 * dm), xl = h * (vl + 0.5 * dl);
+    map_.Secant(xm, xl, &g);
+    Slip(g.g_theta * xm + g.g_psi * xl, &g);
     const mjtNum k = std::max(0.0, 0.5 * (g.stiffness_begin + g.stiffness_end));
     const mjtNum w = g.g_theta * g.g_theta * wm + g.g_psi * g.g_psi * wl;
     const mjtNum ka = h * h * k * w;
@@ -185,11 +244,26 @@ void Drive::AddScheme(const mjModel* m, mjData* d, int instance) {
   step_.w_link = wl;
   step_.force = force;
   step_.metric = p;
+  step_.torsion = map_.torsion();
 }
 
-void Drive::Advance(const mjModel* m, mjData* d, int instance) const {
+void Drive::Advance(const mjModel* m, mjData* d, int instance) {
   mjtNum* state = d->plugin_state + m->plugin_stateadr[instance];
   state[0] = state[1] = 0;
+  // one path from the last torsion: its end decides where an element is relaxed. The
+  // end of a step of the scheme is the beginning of the next and counts then; stages
+  // of other integrators do not count at all.
+  if (!reach_.empty() && (step_.scheme || step_.gradient)) {
+    if (step_.gradient) {
+      map_.Begin(d->qpos[q_rotor_], d->qpos[q_link_]);
+      step_.torsion = map_.torsion();
+    }
+    mjtNum* rest = state + kAccelerations;
+    for (size_t j = 0; j < reach_.size(); ++j) {
+      rest[j] =
+          std::clamp(rest[j], step_.torsion - reach_[j], step_.torsion + reach_[j]);
+    }
+  }
   if (!step_.scheme) return;
   const mjtNum h = m->opt.timestep;
   const DriveValue& g = step_.value;
@@ -207,7 +281,7 @@ void Drive::RegisterPlugin() {
   plugin.capabilityflags |= mjPLUGIN_PASSIVE;
   plugin.nattribute = sizeof(kAttributes) / sizeof(kAttributes[0]);
   plugin.attributes = kAttributes;
-  plugin.nstate = +[](const mjModel*, int) { return 2; };
+  plugin.nstate = +[](const mjModel* m, int instance) { return CountStates(m, instance); };
   plugin.init = +[](const mjModel* m, mjData* d, int instance) {
     auto drive = Drive::Create(m, instance);
     if (!drive) return -1;
@@ -228,8 +302,8 @@ void Drive::RegisterPlugin() {
           reinterpret_cast<uintptr_t>(new Drive(*Get(src, instance)));
     }
   };
-  plugin.reset = +[](const mjModel*, mjtNum* state, void* data, int) {
-    state[0] = state[1] = 0;
+  plugin.reset = +[](const mjModel* m, mjtNum* state, void* data, int instance) {
+    mju_zero(state, m->plugin_statenum[instance]);
     if (data) static_cast<Drive*>(data)->Forget();
   };
   plugin.compute = +[](const mjModel* m, mjData* d, int instance, int) {

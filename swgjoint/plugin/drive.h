@@ -5,6 +5,7 @@
 #include <mujoco/mujoco.h>
 
 #include <memory>
+#include <vector>
 
 #include "drive_map.h"
 
@@ -18,8 +19,9 @@ class Drive {
   // Adds the force and, for the discrete integrator, hands its linearisation over.
   void Compute(const mjModel* m, mjData* d, int instance);
 
-  // After the step: keeps the acceleration that all other forces caused.
-  void Advance(const mjModel* m, mjData* d, int instance) const;
+  // After the step: keeps the acceleration that all other forces caused, and where
+  // the elements of the hysteresis are relaxed.
+  void Advance(const mjModel* m, mjData* d, int instance);
 
   void Forget() { step_ = Step(); }
 
@@ -28,20 +30,25 @@ class Drive {
  private:
   // What Compute found and Advance needs, within one step.
   struct Step {
-    bool scheme = false;
+    bool scheme = false, gradient = false;
     mjtNum v_rotor = 0, v_link = 0, w_rotor = 0, w_link = 0;  // velocity, 1/inertia
     mjtNum force = 0, metric = 0;                             // lam, p
+    mjtNum torsion = 0;                                       // begin of the step
     DriveValue value;
   };
 
-  void AddGradient(const mjModel* m, mjData* d);
+  void AddGradient(const mjModel* m, mjData* d, int instance);
   void AddScheme(const mjModel* m, mjData* d, int instance);
+  void Place(const mjtNum* rest);
+  void Slip(mjtNum change, DriveValue* value) const;
 
   DriveMap map_;
   mjtNum damping_ = 0, numerical_damping_ = 0;
   int passes_ = 0;
   int tendon_ = -1, entry_rotor_ = -1, entry_link_ = -1;  // tendon, entries of ten_J
   int q_rotor_ = -1, q_link_ = -1, v_rotor_ = -1, v_link_ = -1;  // addresses
+  // Jenkin elements: stiffness, torsion from rest to slip, torsion from rest now
+  std::vector<mjtNum> stiffness_, reach_, stretch_;
   Step step_;
 };
 

@@ -43,6 +43,7 @@ class DriveMap {
 
   // Sets the state from which the following Secant calls step.
   void Begin(double theta, double psi);
+  double torsion() const { return torsion_; }  // at that state
 
   // Discrete gradient from the begin state to begin + (dtheta, dpsi):
   // (torque g + e) . (dtheta, dpsi) is the change of V, to round-off.

@@ -79,6 +79,10 @@ def set_start(assembly: Assembly, data: mujoco.MjData) -> None:
             -data.qLDiagInv[rotor] * float(on_input),
             -data.qLDiagInv[link] * float(on_output),
         ]
+        # the balance is that of the spring: hysteresis starts relaxed
+        torsion = float(transmission.law.torsion(theta, psi))
+        elements = len(transmission.attached.elements)
+        data.plugin_state[first + 2 : first + 2 + elements] = torsion
     mujoco.mj_forward(model, data)
 
 

@@ -67,9 +67,16 @@ class Transmission:
         ]
         torsion = np.concatenate([p.torsion for p in pieces])
         torque = np.concatenate([p.torque for p in pieces])
-        native = self.attached.native
-        if native is not None and native.hysteresis:
-            torque = torque + play_hysteresis(native.hysteresis, torsion)
+        elements = self.attached.elements
+        if elements:
+            # as a run starts: native relaxed at zero torsion, full where it stands
+            first = torsion[0] if self.level == "full" else 0.0
+            played = play_hysteresis(elements, torsion - first)
+            slopes = [
+                self.attached.output_slope(theta[k : k + _CHUNK], psi[k : k + _CHUNK])
+                for k in range(0, theta.size, _CHUNK)
+            ]
+            torque = torque + played * np.concatenate(slopes)
         return JointSignals(
             torsion=torsion,
             transmission_error=np.concatenate([p.transmission_error for p in pieces]),

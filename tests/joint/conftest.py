@@ -12,6 +12,7 @@ import pytest
 from swgjoint.joint.attach import attach
 from swgjoint.joint.drive import JointDrive
 from swgjoint.maps.drive_map import DriveMap
+from swgjoint.maps.hysteresis import Sliders
 
 TWO_MASS = """
 <mujoco>
@@ -50,8 +51,17 @@ class Bench:
         v = d.qvel[self.v]
         x = d.qpos[self.q] - 0.5 * midpoint * self.model.opt.timestep * v
         drive = self.drive.drive
-        potential = drive.energy(drive.torsion(*x), *x)
+        torsion = drive.torsion(*x)
+        potential = drive.energy(torsion, *x)
+        if drive.hysteresis and self.drive.plugin:
+            sliders = Sliders.relaxed(drive.hysteresis)
+            potential += replace(sliders, rest=self.rest.copy()).energy(torsion)
         return float(0.5 * np.sum(inertia * v**2) + potential)
+
+    @property
+    def rest(self) -> np.ndarray:
+        """Plugin state of the hysteresis: torsions at which elements are relaxed."""
+        return self.data.plugin_state[2:]
 
 
 def make_bench(
