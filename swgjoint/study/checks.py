@@ -80,11 +80,14 @@ class TrendCheck:
     ours: float | None
     """Parameter that we find; for ``flat`` the spread, largest/smallest - 1."""
     agrees: bool
+    refinement: int
 
     @property
     def text(self) -> str:
         """One line."""
         load = "T/10" if self.tenth else "T"
+        if self.refinement > 1:
+            load += f", refinement {self.refinement}"
         kind = self.kind.replace("_m", " M")
         if self.ours is None:
             return f"{load}: {kind} stress {self.claim}: not computed"
@@ -150,66 +153,84 @@ def rank_checks(results: Sequence[CaseRecords]) -> list[RankCheck]:
 
 
 def trend_checks(results: Sequence[CaseRecords]) -> list[TrendCheck]:
-    """Stated extremes and constancies of the sweeps, at T/10 and at T."""
+    """Stated extremes and constancies of the sweeps, at T/10 and at T.
+
+    Where a sweep was also run on finer meshes, the finest is checked too.
+    """
     checks = []
     for cases in _groups(results):
         group = cases[0].case.group
-        for tenth in (True, False):
-            for claim in ("lowest", "highest"):
-                checks += [
-                    _extreme(cases, kind, tenth, claim, stated)
-                    for kind, stated in getattr(group, claim).items()
-                ]
-            checks += [_flat(cases, kind, tenth) for kind in group.flat]
+        finest = max(cases[0].nominal)
+        for refinement in dict.fromkeys((1, finest)):
+            for tenth in (True, False):
+                sweep = _Sweep(cases=cases, tenth=tenth, refinement=refinement)
+                for claim in ("lowest", "highest"):
+                    checks += [
+                        sweep.extreme(kind, claim, stated)
+                        for kind, stated in getattr(group, claim).items()
+                    ]
+                checks += [sweep.flat(kind) for kind in group.flat]
     return checks
 
 
-def _values(
-    cases: Sequence[CaseRecords], kind: Kind, tenth: bool
-) -> list[tuple[float, float]]:
-    """(parameter, stress) where both are known."""
-    return [
-        (case.case.entry.value, value)
-        for case in cases
-        if (value := case.value(kind, tenth=tenth)) is not None
-        and case.case.entry.value is not None
-    ]
+@dataclass(frozen=True, kw_only=True)
+class _Sweep:
+    """Cases of one group at one torque on one mesh."""
 
+    cases: Sequence[CaseRecords]
+    tenth: bool
+    refinement: int
 
-def _extreme(
-    cases: Sequence[CaseRecords], kind: Kind, tenth: bool, claim: str, stated: float
-) -> TrendCheck:
-    sign = 1.0 if claim == "lowest" else -1.0
-    values = _values(cases, kind, tenth)
-    ours = min(values, key=lambda item: sign * item[1]) if values else None
-    there = next((stress for value, stress in values if value == stated), None)
-    agrees = (
-        ours is not None
-        and there is not None
-        and len(values) > 1
-        and sign * (there / ours[1] - 1.0) <= TIE
-    )
-    return TrendCheck(
-        part=cases[0].case.group.id,
-        kind=kind,
-        tenth=tenth,
-        claim=claim,
-        stated=stated,
-        ours=None if ours is None else ours[0],
-        agrees=agrees,
-    )
+    def values(self, kind: Kind) -> list[tuple[float, float]]:
+        """(parameter, stress) where both are known."""
+        return [
+            (case.case.entry.value, value)
+            for case in self.cases
+            if (value := self._value(case, kind)) is not None
+            and case.case.entry.value is not None
+        ]
 
+    def _value(self, case: CaseRecords, kind: Kind) -> float | None:
+        return case.value(kind, tenth=self.tenth, refinement=self.refinement)
 
-def _flat(cases: Sequence[CaseRecords], kind: Kind, tenth: bool) -> TrendCheck:
-    low, high = cases[0].case.group.flat_range or (-inf, inf)
-    stresses = [s for p, s in _values(cases, kind, tenth) if low <= p <= high]
-    spread = max(stresses) / min(stresses) - 1.0 if len(stresses) > 1 else None
-    return TrendCheck(
-        part=cases[0].case.group.id,
-        kind=kind,
-        tenth=tenth,
-        claim="flat",
-        stated=None,
-        ours=spread,
-        agrees=spread is not None and spread <= FLAT,
-    )
+    def extreme(self, kind: Kind, claim: str, stated: float) -> TrendCheck:
+        """Whether the stress at the stated parameter is the lowest (highest)."""
+        sign = 1.0 if claim == "lowest" else -1.0
+        values = self.values(kind)
+        ours = min(values, key=lambda item: sign * item[1]) if values else None
+        there = next((stress for value, stress in values if value == stated), None)
+        agrees = (
+            ours is not None
+            and there is not None
+            and len(values) > 1
+            and sign * (there / ours[1] - 1.0) <= TIE
+        )
+        found = None if ours is None else ours[0]
+        return self._check(kind, claim, stated, found, agrees)
+
+    def flat(self, kind: Kind) -> TrendCheck:
+        """Whether the stress is the same over the stated range."""
+        low, high = self.cases[0].case.group.flat_range or (-inf, inf)
+        stresses = [s for p, s in self.values(kind) if low <= p <= high]
+        spread = max(stresses) / min(stresses) - 1.0 if len(stresses) > 1 else None
+        agrees = spread is not None and spread <= FLAT
+        return self._check(kind, "flat", None, spread, agrees)
+
+    def _check(
+        self,
+        kind: Kind,
+        claim: str,
+        stated: float | None,
+        ours: float | None,
+        agrees: bool,
+    ) -> TrendCheck:
+        return TrendCheck(
+            part=self.cases[0].case.group.id,
+            kind=kind,
+            tenth=self.tenth,
+            refinement=self.refinement,
+            claim=claim,
+            stated=stated,
+            ours=ours,
+            agrees=agrees,
+        )

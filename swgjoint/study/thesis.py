@@ -193,9 +193,16 @@ def _summary(
             )
     lines += [check.text for check in ranks]
     for tenth, name in ((True, "T/10"), (False, "T")):
-        here = [check for check in trends if check.tenth == tenth]
-        if here:
+        for refinement in sorted({check.refinement for check in trends}):
+            here = [
+                check
+                for check in trends
+                if check.tenth == tenth and check.refinement == refinement
+            ]
             agree = sum(check.agrees for check in here)
-            lines.append(f"at {name}: {agree} of {len(here)} stated trends found")
+            lines.append(
+                f"at {name}, refinement {refinement}: {agree} of {len(here)} stated"
+                " trends found"
+            )
             lines += [f"{c.part} at {c.text}" for c in here if not c.agrees]
     return tuple(lines)
