@@ -15,6 +15,8 @@ Tested on random joints (K 1e2..1e7 N·m/rad, rotor 1e-7..1e-3, link 1e-4..1e2 k
 i 30..160, low orders and tooth order with side bands, ripple 2-5 %, hardening to 26 K,
 steps 0.5-5 ms, no physical damping, 2 s): of 2302 runs inside none diverged and one
 gained more than 5 % of its energy; 34 of the 1155 that ran free lost more than 5 %.
+With one to three elements of hysteresis, 0.1 to 20 K stiff: of 2254 runs inside (1 s)
+none diverged and two gained more than 5 %, the springs of the elements counted.
 Not a proof: the step is one linearised solve with two evaluations.
 `tests/joint/test_random_joints.py` runs a sample.
 """
