@@ -39,9 +39,9 @@ def attach(
     ``<joint>_drive`` with the length theta/i - psi: a native spring and damper, the
     same with a cubic part (and tendons ``<joint>_hysteresis<k>`` and rotor friction
     where the map has them), or the carrier of the engine plugin's instance of the same
-    name, which evaluates ``drive``, hysteresis included. The rotor takes the place of the joint's own
-    armature, which is set to 0. Keyframes grow by the rotor, at the position without
-    torsion.
+    name, which evaluates ``drive``, hysteresis included. The rotor takes the place of
+    the joint's own armature, which is set to 0. Keyframes grow by the rotor, at the
+    position without torsion.
 
     No actuator is added and none is changed. The motor belongs on the rotor::
 
