@@ -197,12 +197,12 @@ class _Sweep:
         """Whether the stress at the stated parameter is the lowest (highest)."""
         sign = 1.0 if claim == "lowest" else -1.0
         values = self.values(kind)
-        ours = min(values, key=lambda item: sign * item[1]) if values else None
+        several = len(values) > 1  # one value alone is no extreme
+        ours = min(values, key=lambda item: sign * item[1]) if several else None
         there = next((stress for value, stress in values if value == stated), None)
         agrees = (
             ours is not None
             and there is not None
-            and len(values) > 1
             and sign * (there / ours[1] - 1.0) <= TIE
         )
         found = None if ours is None else ours[0]

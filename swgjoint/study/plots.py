@@ -48,7 +48,9 @@ def group_picture(results: Sequence[CaseRecords]) -> bytes:
     _turn(axes["turn_tenth"], results, tenth=True)
     handles, labels = axes["turn"].get_legend_handles_labels()
     if handles:
-        axes["turn"].legend(handles, labels, fontsize="x-small", ncols=2)
+        figure.legend(
+            handles, labels, loc="outside lower center", fontsize="x-small", ncols=7
+        )
     figure.suptitle(f"{group.id}: {group.title} ({group.source})", fontsize=11)
     out = io.BytesIO()
     figure.savefig(out, format="png", dpi=100)
@@ -56,11 +58,16 @@ def group_picture(results: Sequence[CaseRecords]) -> bytes:
 
 
 def _sweep(axis: Any, results: Sequence[CaseRecords], kind: Any) -> None:
-    """Stress against the parameter at both torques, printed points as crosses."""
+    """Stress against the parameter at both torques and meshes, printed ones crossed."""
     values = [result.case.entry.value for result in results]
     for tenth, colour, label in ((False, _NOMINAL, "T"), (True, _TENTH, "T/10")):
-        stresses = [_number(r.value(kind, tenth=tenth)) for r in results]
-        axis.plot(values, stresses, "o-", color=colour, label=label, ms=4)
+        for refinement in dict.fromkeys((1, max(results[0].nominal))):
+            stresses = [
+                _number(r.value(kind, tenth=tenth, refinement=refinement))
+                for r in results
+            ]
+            style, end = ("o-", "") if refinement == 1 else (".--", ", fine mesh")
+            axis.plot(values, stresses, style, color=colour, label=label + end, ms=4)
     printed = [_number(result.case.entry.printed[kind]) for result in results]
     axis.plot(values, printed, "x", color=_SOURCE, label="thesis", ms=9, mew=2)
 
