@@ -32,6 +32,7 @@ from states import (
     within_sector,
 )
 
+import swgjoint
 from swgjoint.files import write_whole
 from swgjoint.json_text import json_text
 
@@ -75,7 +76,6 @@ def row(label: str, mesh: tuple[int, int, str], found: Replay, wall: float) -> R
         "tangential_rms_um": np.sqrt(np.mean(tangential**2)),
         "root_ours_MPa": root[0],
         "root_calculix_MPa": root[1],
-        "moment_of_forces_Nm": found.model.copies * found.moment,
         "within_sector_um": within_sector(found.model, found.state) / um,
         "calculix_s": wall,
     }
@@ -113,7 +113,9 @@ def rows(folder: Path, quick: bool) -> Iterator[Row]:
                 quarter=False,
             )
             label = f"elliptical, {TORQUE:g} N·m, {pitches:g} pitch"
-            yield row(label, mesh, found, time.perf_counter() - clock)
+            entry = row(label, mesh, found, time.perf_counter() - clock)
+            entry["moment_of_forces_Nm"] = found.model.copies * found.moment
+            yield entry
     yield from contact_rows(folder, quick)
 
 
@@ -137,7 +139,8 @@ def contact_rows(folder: Path, quick: bool) -> Iterator[Row]:
             refinement=theirs,
             quarter=quarter,
         )
-        yield row(label, CONTACT_MESH, found, time.perf_counter() - clock)
+        entry = row(label, CONTACT_MESH, found, time.perf_counter() - clock)
+        yield entry | {"own_contact_Pa_per_m": None}
         for penalty in PENALTIES[: 1 if quick else 2]:
             clock = time.perf_counter()
             found = own_contact(
@@ -202,12 +205,10 @@ def main() -> int:
 
 def document(found: list[Row]) -> str:
     """The rows with date and versions."""
-    packages = ("swgjoint", "numpy", "scipy", "scikit-fem")
-    versions = {name: version(name) for name in packages}
-    header = {
-        "date": date.today().isoformat(),
-        "versions": {"calculix": calculix.version(), **versions},
-    }
+    versions = {"calculix": calculix.version(), "swgjoint": swgjoint.__version__}
+    for name in ("numpy", "scipy", "scikit-fem"):
+        versions[name] = version(name)
+    header = {"date": date.today().isoformat(), "versions": versions}
     return json_text({**header, "rows": found}) + "\n"
 
 
