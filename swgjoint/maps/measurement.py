@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -13,7 +14,7 @@ from swgjoint.gear.kinematics import LAYOUTS
 from swgjoint.maps.csv_columns import read_columns
 from swgjoint.maps.drive_map import DriveMap, Ratings
 from swgjoint.maps.error_fit import ORDERS, fit_error
-from swgjoint.maps.loop import TorqueLoop
+from swgjoint.maps.loop import TorqueLoop, torque_loop
 from swgjoint.maps.torsion_fit import INTERVALS, fit_torsion
 from swgjoint.maps.torsion_law import potential_of_stiffness
 from swgjoint.units import arcmin, deg
@@ -82,9 +83,7 @@ def map_from_measurement(
         "missing": {},
     }
     width = fit.report["hysteresis_loss_arcmin"]
-    if fit.hysteresis:
-        info["hysteresis"] = f"measured loop {Path(path).name}, {width:.4g} arcmin wide"
-    else:
+    if not fit.hysteresis:
         info["missing"]["hysteresis_loss_arcmin"] = (
             "the record has one direction of the torque only"
             if width is None
@@ -121,7 +120,7 @@ def map_from_measurement(
     potential, ends = potential_of_stiffness(
         fit.knots, fit.stiffness, n_harmonics=len(harmonics)
     )
-    return cls(
+    drive = cls(
         name=name or Path(path).stem,
         level="measurement",
         layout=layout,
@@ -137,6 +136,17 @@ def map_from_measurement(
         hysteresis=fit.hysteresis,
         info=info,
     )
+    if not fit.hysteresis:
+        return drive
+    # a loop that is no Maxwell slip is followed as a whole, not at zero torque
+    played = torque_loop(drive).hysteresis_loss() / arcmin
+    report = {**fit.report, "hysteresis_loss_map_arcmin": played}
+    info["fit"] = {**info["fit"], "torsion": report}
+    info["hysteresis"] = (
+        f"measured loop {Path(path).name}, {width:.4g} arcmin wide; that of the map"
+        f" {played:.4g} arcmin"
+    )
+    return replace(drive, info=info)
 
 
 def _ratings(given: Ratings | float, largest: float) -> Ratings:

@@ -18,9 +18,9 @@ Array = NDArray[np.float64]
 INTERVALS = 48
 SOFTEST = 0.02
 """Smallest stiffness of the fit, of the mean one: the curve stays monotone."""
-REACHES = 0.25 * 2.0 ** -np.arange(0.0, 5.5, 0.5)
+REACHES = 0.25 * 2.0 ** -np.arange(0.0, 8.5, 0.5)
 """Yield torsions of the elements that are tried, parts of the travel: from a quarter,
-above which an element sticks too long to be told from the spring, to 0.8 %."""
+above which an element sticks too long to be told from the spring, to 0.1 %."""
 FAINT = 1e-3
 """Hysteresis below this part of the largest torque is none."""
 
@@ -82,7 +82,7 @@ def fit_torsion(loop: TorqueLoop, *, intervals: int = INTERVALS) -> TorsionFit:
 
     plain = _solve(x, torque, knots, signals[:, :0])
     found = plain
-    if width > 0.0 and torque.size > 2 * (count + 2 + reaches.size):
+    if width > 0.0 and torque.size > count + 2 + reaches.size:
         slipping = _solve(x, torque, knots, signals)
         better = plain.rms**2 > slipping.rms**2 * (
             1.0 + _SIGNIFICANT * reaches.size / torque.size

@@ -180,7 +180,8 @@ void Drive::AddGradient(const mjModel* m, mjData* d, int instance) {
   Slip(0, &value);
   step_.gradient = true;
   const mjtNum damping = m->opt.disableflags & mjDSBL_DAMPER ? 0 : damping_;
-  const mjtNum rate = value.g_theta * d->qvel[v_rotor_] + value.g_psi * d->qvel[v_link_];
+  const mjtNum rate =
+      value.g_theta * d->qvel[v_rotor_] + value.g_psi * d->qvel[v_link_];
   const mjtNum force = value.torque + damping * rate;
   d->qfrc_passive[v_rotor_] -= force * value.g_theta + value.e_theta;
   d->qfrc_passive[v_link_] -= force * value.g_psi + value.e_psi;
@@ -281,7 +282,7 @@ void Drive::RegisterPlugin() {
   plugin.capabilityflags |= mjPLUGIN_PASSIVE;
   plugin.nattribute = sizeof(kAttributes) / sizeof(kAttributes[0]);
   plugin.attributes = kAttributes;
-  plugin.nstate = +[](const mjModel* m, int instance) { return CountStates(m, instance); };
+  plugin.nstate = CountStates;
   plugin.init = +[](const mjModel* m, mjData* d, int instance) {
     auto drive = Drive::Create(m, instance);
     if (!drive) return -1;
