@@ -64,12 +64,14 @@ class Load:
 class NewtonSolver:
     """Settings of the iteration."""
 
-    max_iterations: int = 80
+    max_iterations: int = 120
     step_tolerance: float = 2e-12
     """Displacement increment at which the iteration ends [m]; about 1e-5 of the
     smallest effect of interest, a tenth of a micrometre."""
     thorough_below: float = 1e-8
     """Increment below which contact is searched between the nodes, too [m]."""
+    stride: float = 0.1
+    """Longest move of one iteration, in lobe heights: contact changes on the way."""
     largest_step: float = 0.1
     """Displacement increment beyond which the search has left the drive [m]."""
 
@@ -94,11 +96,18 @@ class NewtonSolver:
                     return replace(
                         state, outcome=Outcome.DIVERGED, history=tuple(history)
                     )
-                damping = min(1.0, model.lobe_height / step.largest)
+                damping = min(1.0, self.stride * model.lobe_height / step.largest)
                 # a set that comes back would come back for ever
                 repeats = state.touching.tobytes() in tried
                 tried.add(state.touching.tobytes())
-                state, settled = _advance(model, state, ring, step, damping, repeats)
+                state, settled = _advance(
+                    model,
+                    state,
+                    ring,
+                    step,
+                    damping,
+                    one_at_a_time=repeats,
+                )
                 small = step.largest < self.step_tolerance and damping == 1.0
                 if settled and small and thorough:
                     # an output that no tooth holds stays where the search left it
@@ -301,13 +310,15 @@ def _advance(
     ring: Linearised,
     step: _Step,
     damping: float,
+    *,
     one_at_a_time: bool,
 ) -> tuple[State, bool]:
     """Move, exchange tooth forces, update the wave generator's active set."""
-    after = ring.wave_generator_gap + step.increment[:, ring.normal_dofs]
+    after = ring.wave_generator_gap + damping * step.increment[:, ring.normal_dofs]
     wrong = np.where(state.touching, -step.pressure / ring.anchor_stiffness, -after)
     bad = wrong > 1e-15
-    if one_at_a_time and bad.any():
+    # without any contact the rim springs back: let go of the worst node only
+    if bad.any() and (one_at_a_time or not (state.touching ^ bad).any()):
         bad = wrong == wrong.max()
     lines, force, m = step.lines, step.line_force[:, None], len(step.contacts)
     flank_force = np.zeros_like(state.flank_force)
