@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from swgjoint.sim.assembly import Assembly
     from swgjoint.sim.transmission import Transmission
 
+_HYSTERETIC = ("native", "full")
 _LEFT_OUT = {
     "rigid": "torsion, kinematic error and torque ripple (level rigid)",
     "kinematic": "torsion and the torque ripple of the stiffness (level kinematic)",
@@ -55,6 +56,9 @@ def _joint(transmission: Transmission) -> dict[str, Any]:
         "orders": list(attached.kept_orders)
         if attached.level in ("kinematic", "full")
         else [],
+        "hysteresis_elements": len(attached.drive.hysteresis)
+        if attached.level in _HYSTERETIC
+        else 0,
         **_native(attached),
     }
 
@@ -86,6 +90,9 @@ def _left_out(transmission: Transmission) -> list[dict[str, str]]:
             else "the scene asks for no more"
         )
         items.append({"part": _LEFT_OUT[attached.level], "reason": reason})
+    if attached.drive.hysteresis and attached.level not in _HYSTERETIC:
+        part = f"hysteresis ({len(attached.drive.hysteresis)} elements)"
+        items.append({"part": part, "reason": "the scene asks for no more"})
     if attached.level == "kinematic" and attached.kept_orders:
         share = 100.0 * ratio_variation(attached.drive)
         items.append(

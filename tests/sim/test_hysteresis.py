@@ -45,3 +45,12 @@ def test_torque_of_a_sweep_has_the_hysteresis(bench, level):
     # without the elements the same torsion would give another torque
     spring = 2e4 * run.torsion[moves, 0]
     assert np.abs(torque - spring).max() == pytest.approx(3.0, rel=1e-3)
+
+
+def test_a_run_says_where_hysteresis_is(bench):
+    """In the label of `full`; among what the simpler levels leave out."""
+    full = bench(LOSSY).contains
+    assert full["joints"]["joint"]["hysteresis_elements"] == 1
+    linear = bench(LOSSY, defaults__level="linear").contains
+    assert linear["joints"]["joint"]["hysteresis_elements"] == 0
+    assert any("hysteresis" in item["part"] for item in linear["left_out"])
