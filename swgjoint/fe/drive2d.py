@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -14,7 +15,7 @@ from swgjoint.fe.ring import RingModel
 from swgjoint.fe.sector_mesh import sector_mesh
 from swgjoint.fe.superelement import Superelement, condense
 from swgjoint.gear.design import Design, MemberName
-from swgjoint.gear.profile import tooth_profile
+from swgjoint.gear.profile import ToothProfile, tooth_profile
 from swgjoint.gear.tolerances import has_errors, tooth_errors, wave_generator_offset
 from swgjoint.gear.wave_generator import lobe_height, wave_generator
 from swgjoint.units import mm
@@ -73,6 +74,7 @@ def ring_model(
     nonlinear: bool = True,
     elastic_circular_spline: bool = True,
     friction: bool = True,
+    profiles: Mapping[MemberName, ToothProfile] | None = None,
 ) -> RingModel:
     """2D model of a design.
 
@@ -84,6 +86,7 @@ def ring_model(
             diameter is fixed or free as the design says.
         friction: Whether the flanks rub, with the coefficient of the design; False for
             the conservative part alone.
+        profiles: Flanks to use instead of those of the design, by member.
 
     Raises:
         DesignError: If the design cannot be built or the half model does not apply.
@@ -96,9 +99,14 @@ def ring_model(
             f"{drive.teeth_flexspline}/{drive.teeth_circular_spline} teeth and "
             f"{design.wave_generator.kind}"
         )
-    ring = CircularSpline(profile=tooth_profile(design, "circular_spline"))
+    flanks: dict[MemberName, ToothProfile] = dict(profiles or {})
+    members: tuple[MemberName, ...] = ("flexspline", "circular_spline")
+    for name in members:
+        if name not in flanks:
+            flanks[name] = tooth_profile(design, name)
+    ring = CircularSpline(profile=flanks["circular_spline"])
     if elastic_circular_spline:
-        element = _sector(design, "circular_spline")
+        element = _sector(design, "circular_spline", ring.profile)
         free = design.circular_spline.outer_rim == "free"
         ring = replace(ring, compliance=ring_compliance(element, free_rim=free))
     coefficient = design.friction.tooth_coefficient if friction else 0.0
@@ -128,7 +136,7 @@ def ring_model(
     return RingModel(
         **shifts,
         friction=law,
-        element=_sector(design, "flexspline"),
+        element=_sector(design, "flexspline", flanks["flexspline"]),
         wave_generator=wave_generator(design),
         circular_spline=ring,
         lobe_height=lobe_height(design),
@@ -137,8 +145,8 @@ def ring_model(
     )
 
 
-def _sector(design: Design, member: MemberName) -> Superelement:
-    profile, material = tooth_profile(design, member), design.material_of(member)
+def _sector(design: Design, member: MemberName, profile: ToothProfile) -> Superelement:
+    material = design.material_of(member)
     rim = getattr(design, member).rim_mm * mm
     return condense(
         sector_mesh(profile, rim, design.mesh.refinement),

@@ -26,7 +26,7 @@ from swgjoint.gear.envelope import Envelope, Run
 from swgjoint.gear.profile import TANGENCY_RAD, ToothProfile, tooth_profile
 from swgjoint.gear.segments import Piece, Point, arc, line
 from swgjoint.gear.smooth_curve import smooth_curve
-from swgjoint.gear.tooth_motion import Receiver, tooth_motions
+from swgjoint.gear.tooth_motion import Receiver, ToothMotion, tooth_motions
 from swgjoint.units import deg, mm
 
 Array = NDArray[np.float64]
@@ -50,11 +50,18 @@ OVERLAP = 1e-9
 NODES, EDGE_NODES, DENSE, SAMPLES = 41, 121, 161, 33
 
 
-def conjugate_profile(design: Design, member: str) -> ToothProfile:
+def conjugate_profile(
+    design: Design, member: str, *, motions: tuple[ToothMotion, ...] | None = None
+) -> ToothProfile:
     """Profile of ``member`` conjugate to the other one under the wave generator.
 
     Without backlash at c_P = 1 of this member; a smaller thickness coefficient turns
     the flank back by (1 - c_P) alpha_T / 2 as for other profiles (6.3).
+
+    Args:
+        design: The drive; the profile key of ``member`` counts for its root only.
+        member: ``flexspline`` or ``circular_spline``.
+        motions: Of the teeth; by default those of the neutral line.
 
     Raises:
         DesignError: If there is no such tooth, in one line that names the key.
@@ -64,7 +71,10 @@ def conjugate_profile(design: Design, member: str) -> ToothProfile:
     other = "flexspline" if start.internal else "circular_spline"
     given = tooth_profile(design, other)
     envelope = Envelope(
-        given=given, receiver=receiver, motions=tooth_motions(design), tip=start.tip
+        given=given,
+        receiver=receiver,
+        motions=motions or tooth_motions(design),
+        tip=start.tip,
     )
     return _Builder(start, envelope).build()
 

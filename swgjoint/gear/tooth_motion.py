@@ -8,16 +8,19 @@ the tooth stands in the middle of its tooth space, whatever the layout.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from swgjoint.gear.design import Design
-from swgjoint.gear.neutral_line import NeutralLine, neutral_line
+from swgjoint.gear.neutral_line import Pose, neutral_line
 
 Array = NDArray[np.float64]
 Receiver = Literal["flexspline", "circular_spline"]
+
+SAME = 1e-9
+"""Motions closer than that, relative to the radius, are one."""
 
 _MIRROR = np.array([-1.0, 1.0])
 
@@ -63,11 +66,26 @@ def _rotation(angle: Array) -> tuple[Array, Array]:
     return turn, np.stack([np.stack([-d, -c], -1), np.stack([c, -d], -1)], axis=-2)
 
 
+class TeethOnRim(Protocol):
+    """Where teeth of the deflected rim go: the neutral line, or finite elements."""
+
+    @property
+    def lobes(self) -> int:
+        """Lobes of the wave generator."""
+
+    @property
+    def radius(self) -> float:
+        """Radius of the point of the tooth that is followed [m]."""
+
+    def pose(self, theta: ArrayLike) -> Pose:
+        """Pose of a tooth at an angle of the undeflected rim from a lobe [rad]."""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ToothMotion:
     """Relative motion of the teeth at one lobe of the wave generator."""
 
-    line: NeutralLine
+    line: TeethOnRim
     teeth_flexspline: int
     teeth_circular_spline: int
     lobe: int = 0
@@ -154,13 +172,19 @@ def _facing(teeth: int) -> Array:
     return np.array([[-c, d], [d, c]])
 
 
-def tooth_motions(design: Design) -> tuple[ToothMotion, ...]:
+def tooth_motions(
+    design: Design, line: TeethOnRim | None = None
+) -> tuple[ToothMotion, ...]:
     """Motions that differ: every lobe, and both flanks where these are not alike.
+
+    Args:
+        design: The drive.
+        line: Where the teeth go; by default the neutral line of the design.
 
     Raises:
         DesignError: If the wave generator cannot be built.
     """
-    line = neutral_line(design)
+    line = line or neutral_line(design)
     first = ToothMotion(
         line=line,
         teeth_flexspline=design.drive.teeth_flexspline,
@@ -183,6 +207,6 @@ def tooth_motions(design: Design) -> tuple[ToothMotion, ...]:
                 mirrored=mirrored,
             )
             new = path(motion)
-            if all(np.abs(new - old).max() > 1e-11 for _, old in found):
+            if all(np.abs(new - old).max() > SAME for _, old in found):
                 found.append((motion, new))
     return tuple(motion for motion, _ in found)
