@@ -183,7 +183,9 @@ class Sliding:
 
     def forces(self, unknowns: Array) -> Array:
         """Forces of the lines (2 n,) [N]."""
-        return self._carried() @ unknowns + np.append(0.0 * self.fixed, self.fixed)
+        result = self._carried() @ unknowns
+        result[len(self.push) :] += self.fixed
+        return np.asarray(result)
 
     def _carried(self) -> Array:
         """Forces of the lines by the unknowns (normal forces, sticking forces).

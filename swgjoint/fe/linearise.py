@@ -177,6 +177,7 @@ def linearise(model: RingModel, state: State, torque: float | None) -> Linearise
         flank=model.placed(flank, model.tooth_shift),
         ring_elastic=ring_elastic,
         search=ToothContact(
+            rubs=model.friction is not None,
             element=element,
             circular_spline=model.circular_spline,
             ring_flank=model.placed(ring_elastic, model.ring_tooth_shift),

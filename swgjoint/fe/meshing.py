@@ -91,8 +91,10 @@ def simulate_meshing(
         if k == 0:
             found = state
         elif torque == 0.0:
-            unloaded = follow.unloaded_to(unloaded, angle)
-            found = unloaded.state
+            tried = follow.unloaded_to(unloaded, angle)
+            found = tried.state
+            # a failed one may be the last good state under the small torque
+            unloaded = tried if found.outcome.ok else unloaded
         else:
             found = follow.to_angle(state, angle)
         if throw:

@@ -53,7 +53,7 @@ class Contacts:
     """Along the flank from tip to root, in the sector frame. Shape (n, 2)."""
     sliding: Array
     """Derivative of the motion along the tangent by the flank displacements, as
-    ``weight``. Shape (n, 2 n_b)."""
+    ``weight``; no columns without friction. Shape (n, 2 n_b)."""
     ring_sliding: Array
     """The same by the flank displacements of the circular spline. Shape (n, 2 n_c)."""
     slip: Array
@@ -149,6 +149,8 @@ class ToothContact:
     bearing: Array
     """Polar angles of the teeth against the circular spline, which tell the tooth space
     that they enter (N,) [rad]."""
+    rubs: bool = False
+    """Whether the candidates need their rows along the flanks."""
 
     @cached_property
     def _ring_flanks(self) -> FlankSplines | None:
@@ -379,7 +381,7 @@ class ToothContact:
         ring_normal = out * facing
         ring_tangent = np.stack([out[:, 1], -out[:, 0]], axis=-1) * facing
         ring_spline = np.zeros((n, 0))
-        slip = np.full(n, np.nan)
+        slip, none = np.full(n, np.nan), np.zeros((n, 0))
         if seen.feet.station is not None:
             ring_spline = self.circular_spline.spline(seen.feet.station)
             slip = station + seen.feet.station
@@ -394,8 +396,10 @@ class ToothContact:
             tooth=seen.tooth,
             ring_weight=-_on_flank(1 - side, ring_spline, ring_normal),
             tangent=tangent,
-            sliding=_on_flank(side, spline, tangent),
-            ring_sliding=-_on_flank(1 - side, ring_spline, ring_tangent),
+            sliding=_on_flank(side, spline, tangent) if self.rubs else none,
+            ring_sliding=-_on_flank(1 - side, ring_spline, ring_tangent)
+            if self.rubs
+            else none,
             slip=slip,
         )
         return found.chosen(np.flatnonzero(found.gap < reach))

@@ -18,13 +18,14 @@ from scipy.interpolate import CubicSpline
 
 from swgjoint.errors import ComputationError
 from swgjoint.fe.continuation import Continuation
-from swgjoint.fe.corotation import rotate
+from swgjoint.fe.corotation import rotate, turned
 from swgjoint.fe.drive2d import can_halve, ring_model
 from swgjoint.gear.conjugate import conjugate_profile
 from swgjoint.gear.design import Design, MemberName
 from swgjoint.gear.neutral_line import Pose
 from swgjoint.gear.profile import ToothProfile
 from swgjoint.gear.tooth_motion import tooth_motions
+from swgjoint.units import mm
 
 Array = NDArray[np.float64]
 
@@ -59,7 +60,7 @@ class DeflectedRim:
         # +x of the tooth frame points clockwise
         local = np.stack([-value[:, 0], self.radius + value[:, 1]], axis=-1)
         rate = np.stack([-slope[:, 0], slope[:, 1]], axis=-1)
-        rate += np.stack([-local[:, 1], local[:, 0]], axis=-1)
+        rate += turned(local)
         return Pose(
             point=rotate(local, theta),
             angle=theta + value[:, 2],
@@ -93,9 +94,9 @@ def deflected_rim(design: Design) -> DeflectedRim:
     # rigid motion of the flanks of each tooth, seen in its sector frame
     centre, middle = still.mean(axis=0), nodes.mean(axis=1)
     about, seen = still - centre, nodes - middle[:, None]
-    cross = np.einsum("ni,sni->s", np.stack([-about[:, 1], about[:, 0]], -1), seen)
+    cross = np.einsum("ni,sni->s", turned(about), seen)
     turn = np.arctan2(cross, np.einsum("ni,sni->s", about, seen))
-    radius = design.flexspline_inner_radius + 0.5 * design.flexspline.rim_mm * 1e-3
+    radius = design.flexspline_inner_radius + 0.5 * design.flexspline.rim_mm * mm
     foot = middle + rotate(
         np.broadcast_to(np.array([0.0, radius]) - centre, middle.shape), turn
     )
