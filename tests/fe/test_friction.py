@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 from swgjoint.errors import DesignError
 from swgjoint.fe.continuation import Continuation
 from swgjoint.fe.drive2d import ring_model
+from swgjoint.fe.linearise import linearise
 from swgjoint.fe.meshing import simulate_meshing
 from swgjoint.gear.design import Design
 
@@ -36,6 +38,31 @@ def turned(torque: float, steps: int):
 
 def series(states, name):
     return np.array([getattr(state, name) for state in states])
+
+
+def test_slip_is_differentiated_right():
+    """Change of s_f + s_c by the motion of either flank, against differences."""
+    model = ring_model(rubbing(), half=True)
+    follow = Continuation(model=model, ratio=-60.0)
+    state = follow.to_torque(follow.meshed(follow.deflected()), 20.0)
+    ring, c = linearise(model, state, 20.0), state.contacts
+    rng, step = np.random.default_rng(1), 1e-8
+
+    def slip(flank, ring_flank):
+        search = replace(ring.search, ring_flank=ring_flank)
+        found = search.search(flank, 2e-5, c)
+        return found.slip[c.nearest_in(found)]
+
+    here, there = ring.flank, ring.search.ring_flank
+    still = slip(here, there)
+    # smooth along the flank: rigid motions of the teeth
+    for own, shift in ((True, here), (False, there)):
+        push = np.tile(rng.standard_normal((len(shift), 2)), shift.shape[1] // 2)
+        moved = (here + step * push, there) if own else (here, there + step * push)
+        rows = c.sliding if own else c.ring_sliding
+        at = c.sector if own else c.tooth
+        expected = -np.einsum("kb,kb->k", rows, push[at])
+        assert (slip(*moved) - still) / step == pytest.approx(expected, abs=2e-3)
 
 
 @pytest.mark.parametrize("torque", [20.0, -20.0])

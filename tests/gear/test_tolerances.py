@@ -37,6 +37,10 @@ def test_eccentricity_is_a_translation_and_ovality_a_second_harmonic():
     y = found.radial * np.cos(angle) - found.tangential * np.sin(angle)
     assert np.ptp(x) < 1e-18 and np.ptp(y) < 1e-18
     assert np.hypot(x[0], y[0]) == pytest.approx(5e-6)
+    # the shift in the frames of the teeth is the same vector, turned to each of them
+    sine, cosine = np.sin(angle), np.cos(angle)
+    assert found.shift[:, 0] == pytest.approx(cosine * x + sine * y, abs=1e-18)
+    assert found.shift[:, 1] == pytest.approx(cosine * y - sine * x, abs=1e-18)
     oval = spectrum(errors(circular_spline_ovality_um=6.0).radial)
     assert oval[2] == pytest.approx(3e-6) and np.delete(oval, 2).max() < 1e-18
 
