@@ -76,6 +76,7 @@ def report(result: dict[str, Any]) -> str:
         f" {contains['tendons']} tendons, {contains['plugin_instances']} plugin"
         f" instances, {contains['integrator']} at {1e3 * contains['step_s']:g} ms,"
         f" {result['steps_per_s']:.3g} steps/s",
+        sub_step_line(contains),
         *[
             f"left out in {item['joint']}: {item['part']}: {item['reason']}"
             for item in contains["left_out"]
@@ -83,6 +84,19 @@ def report(result: dict[str, Any]) -> str:
         *[f"wrote {path}" for path in result["files"]],
     ]
     return "\n".join(line for line in lines if line)
+
+
+def sub_step_line(contains: dict[str, Any]) -> str:
+    """Why the steps were cut, and into how many parts; empty if they were not."""
+    if contains["sub_steps"] == 1:
+        return ""
+    why = ", ".join(
+        f"{name}: {what}" for name, what in contains["sub_stepped_for"].items()
+    )
+    return (
+        f"every step in {contains['sub_steps']} sub-steps, because its own length is"
+        f" outside the region of the integrator ({why})"
+    )
 
 
 def joint_table(joints: dict[str, Any]) -> str:

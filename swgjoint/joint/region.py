@@ -24,12 +24,16 @@ Not a proof: the step is one linearised solve with two evaluations.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import floor, inf, log10, sqrt
+from math import ceil, floor, inf, log10, sqrt
 
 import numpy as np
 
 from swgjoint.errors import ComputationError
 from swgjoint.joint.drive import JointDrive, input_orders
+
+MAX_SUB_STEPS = 64
+"""Parts of a step beyond which a run is refused instead of sub-stepped: an arm at 1 ms
+still runs in real time with that many, and who needs more should choose the step."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,12 +78,34 @@ class Region:
         return floor(step / digit) * digit
 
     @property
+    def sub_steps(self) -> int | None:
+        """Equal parts of the step that meet every bound, 1 if it does itself.
+
+        None if no step does. In a loop of one's own, with the largest of all joints::
+
+            n = check_region(drive, timestep=h, max_input_speed=speed).sub_steps
+            model.opt.timestep = h / n  # attach keeps the harmonics that h carries
+            mujoco.mj_step(model, data, nstep=n)  # one step of h
+        """
+        steps = [bound.timestep for bound in self.bounds if not bound.ok]
+        if None in steps:
+            return None
+        longest = min([self.timestep, *(s for s in steps if s is not None)])
+        return ceil(self.timestep / longest * (1.0 - 1e-9))
+
+    @property
+    def exceeded(self) -> str:
+        """What is exceeded, with value and limit; empty inside."""
+        return "; ".join(
+            f"{b.what} = {b.value:.3g} > {b.limit:.3g}" for b in self.bounds if not b.ok
+        )
+
+    @property
     def message(self) -> str:
         """One line: ``ok``, or what is exceeded and the step that would do."""
-        broken = [b for b in self.bounds if not b.ok]
-        if not broken:
+        what = self.exceeded
+        if not what:
             return "ok"
-        what = "; ".join(f"{b.what} = {b.value:.3g} > {b.limit:.3g}" for b in broken)
         step = self.suggested_timestep
         way_out = (
             "no step helps: use a drive with less kinematic error, or level linear"
@@ -91,14 +117,22 @@ class Region:
             f"outside the integrator's region: {what}; {way_out}"
         )
 
-    def require(self) -> None:
-        """Raise unless inside.
+    def require(self, max_sub_steps: int = 1) -> int:
+        """Sub-steps with which the integration holds, 1 inside the region.
+
+        Args:
+            max_sub_steps: Largest number that is accepted; 1 refuses what is outside.
 
         Raises:
-            ComputationError: With :attr:`message`.
+            ComputationError: With :attr:`message` if it takes more.
         """
-        if not self.ok:
-            raise ComputationError(self.message)
+        parts = self.sub_steps
+        if parts is not None and parts <= max_sub_steps:
+            return parts
+        tail = ""
+        if parts is not None and max_sub_steps > 1:
+            tail = f" ({parts} sub-steps; accepted: at most {max_sub_steps})"
+        raise ComputationError(self.message + tail)
 
 
 def check_region(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
@@ -19,7 +19,7 @@ from swgjoint.progress import Progress, silent
 from swgjoint.sim.control import add_actuators, control_gains, feedforward
 from swgjoint.sim.drives import check_joint_names, drive_of
 from swgjoint.sim.rigid_arm import RigidArm, compile_spec
-from swgjoint.sim.scene import Scene
+from swgjoint.sim.scene import MAX_STEPS, Scene
 from swgjoint.sim.scene_sections import JointSection
 from swgjoint.sim.trajectory import Trajectory, constant_speed, sweep
 from swgjoint.sim.transmission import Transmission
@@ -30,9 +30,14 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Assembly:
-    """A scene ready to run. Axes of joints follow ``joints``."""
+    """A scene ready to run. Axes of joints follow ``joints``, n are the samples."""
 
     scene: Scene
+    sub_steps: int
+    """Steps of the engine per step of the scene."""
+    outside: dict[str, str]
+    """Joints that the scene's own step would leave outside the region of their
+    integration, and what they exceed there."""
     arm: RigidArm
     model: mujoco.MjModel
     joints: tuple[str, ...]
@@ -59,6 +64,23 @@ class Assembly:
     motor_position: NDArray[np.intp]
     """Addresses of the motor angles in qpos, -1 without a rotor. (n_joints,)."""
     motor_velocity: NDArray[np.intp]
+
+    @property
+    def step(self) -> float:
+        """Step of the engine [s]."""
+        return float(self.model.opt.timestep)
+
+    def recorded(self) -> Assembly:
+        """The same with the samples that a run records, one per step of the scene."""
+        n = self.sub_steps
+        return replace(
+            self,
+            trajectory=self.trajectory.every(n),
+            link_torque=self.link_torque[::n],
+            feedforward=self.feedforward[::n],
+            prescribed=self.prescribed[::n],
+            prescribed_rate=self.prescribed_rate[::n],
+        )
 
     @property
     def ratio(self) -> Array:
@@ -88,7 +110,8 @@ def assemble(
     Raises:
         InputError: If a joint or drive does not exist or does not fit.
         ComputationError: If a joint lies outside the region in which its integration
-            holds; the message names the bound and the step that would do.
+            holds even with the sub-steps that the scene accepts; the message names the
+            bound and the step that would do.
     """
     arm = RigidArm(scene.arm, tool_site=scene.tool_site)
     check_joint_names(
@@ -110,7 +133,7 @@ def assemble(
         mujoco.mjtIntegrator, f"mjINT_{scene.simulation.integrator.upper()}"
     )
 
-    transmissions = []
+    transmissions, sub_steps, outside = [], 1, {}
     for name, section, speed in zip(
         arm.joints, sections, trajectory.top_speed, strict=True
     ):
@@ -125,14 +148,23 @@ def assemble(
             # a joint at rest carries every order
             max_input_speed=float(abs(drive.ratio) * speed) or None,
         )
-        check_region(
+        region = check_region(
             attached,
             timestep=scene.simulation.step_s,
             max_input_speed=float(abs(drive.ratio) * speed),
             integrator=scene.simulation.integrator,
-        ).require()
+        )
+        sub_steps = max(sub_steps, region.require(scene.simulation.max_sub_steps))
+        if not region.ok:
+            outside[name] = region.exceeded
         transmissions.append(transmission_of(attached, drive))
 
+    # attach kept the harmonics that the scene's own step carries: what a run contains
+    # follows from the step that its user chose, not from what the integrator needs
+    if sub_steps > 1:
+        _check_length(scene, sub_steps)
+        spec.option.timestep = scene.simulation.step_s / sub_steps
+        trajectory = trajectory_of(scene, arm.joints, sub_steps=sub_steps)
     load = np.array(
         [
             _load_torque(scene, name, t.drive)
@@ -146,12 +178,25 @@ def assemble(
     )
     add_actuators(spec, transmissions, stiffness, damping, load)
     model = compile_spec(spec, where=f"scene {scene.name!r}")
-    link_torque = load + arm.torques(
-        trajectory.position, trajectory.velocity, trajectory.acceleration
+    # torques of the rigid arm change little within a step
+    coarse = trajectory.every(sub_steps)
+    link_torque, weight = (
+        load + _between(torque, sub_steps)
+        for torque in (
+            arm.torques(coarse.position, coarse.velocity, coarse.acceleration),
+            arm.gravity(coarse.position),
+        )
     )
-    prescribed, prescribed_rate = _prescribed(scene, trajectory.position, transmissions)
+    prescribed, prescribed_rate = _prescribed(
+        trajectory.position,
+        transmissions,
+        step=float(model.opt.timestep),
+        discrete=scene.simulation.integrator == "discrete",
+    )
     return Assembly(
         scene=scene,
+        sub_steps=sub_steps,
+        outside=outside,
         arm=arm,
         model=model,
         joints=arm.joints,
@@ -163,7 +208,7 @@ def assemble(
         link_torque=link_torque,
         feedforward=feedforward(
             scene.controller.feedforward,
-            weight=load + arm.gravity(trajectory.position),
+            weight=weight,
             link_torque=link_torque,
             acceleration=trajectory.acceleration,
             ratio=ratio,
@@ -175,8 +220,10 @@ def assemble(
     )
 
 
-def trajectory_of(scene: Scene, joints: tuple[str, ...]) -> Trajectory:
-    """The commanded motion of all joints of an arm."""
+def trajectory_of(
+    scene: Scene, joints: tuple[str, ...], *, sub_steps: int = 1
+) -> Trajectory:
+    """The commanded motion of all joints of an arm, at every step or part of one."""
     section, timing = scene.trajectory, scene.simulation
     start = np.array([section.start_deg.get(name, 0.0) for name in joints]) * deg
     if section.kind == "constant_speed":
@@ -187,6 +234,7 @@ def trajectory_of(scene: Scene, joints: tuple[str, ...]) -> Trajectory:
             duration=timing.duration_s,
             step=timing.step_s,
             settle=section.settle_s,
+            sub_steps=sub_steps,
         )
     end = [
         section.end_deg.get(name, section.start_deg.get(name, 0.0)) for name in joints
@@ -199,6 +247,7 @@ def trajectory_of(scene: Scene, joints: tuple[str, ...]) -> Trajectory:
         hold=section.hold_s,
         ramp=section.ramp_s,
         settle=section.settle_s,
+        sub_steps=sub_steps,
     )
 
 
@@ -221,11 +270,29 @@ def transmission_of(attached: JointDrive, drive: DriveMap) -> Transmission:
     return Transmission(attached=attached, drive=drive, law=law)
 
 
+def _check_length(scene: Scene, sub_steps: int) -> None:
+    steps = scene.simulation.duration_s / scene.simulation.step_s * sub_steps
+    if steps > MAX_STEPS:
+        raise InputError(
+            f"{scene.where}: simulation.duration_s: {scene.simulation.duration_s:g} s"
+            f" with {sub_steps} sub-steps a step makes {steps:.3g} steps; accepted: at"
+            f" most {MAX_STEPS} steps in a run"
+        )
+
+
+def _between(values: Array, n: int) -> Array:
+    """Values at n samples per sample, on straight lines. Shape (n (m - 1) + 1, ...)."""
+    if n == 1:
+        return values
+    part = (np.arange(n) / n)[None, :, None]
+    lines = values[:-1, None] * (1.0 - part) + values[1:, None] * part
+    return np.vstack([lines.reshape(-1, values.shape[1]), values[-1:]])
+
+
 def _prescribed(
-    scene: Scene, position: Array, transmissions: list[Transmission]
+    position: Array, transmissions: list[Transmission], *, step: float, discrete: bool
 ) -> tuple[Array, Array]:
     """Error and rate that level ``kinematic`` prescribes on the motion."""
-    step = scene.simulation.step_s
     # one more sample in front for the rate of the first, as if the motion went on
     path = np.vstack([2.0 * position[:1] - position[1:2], position])
     error = np.column_stack(
@@ -236,7 +303,7 @@ def _prescribed(
     )
     # positions of the discrete integrator change by the velocity after the step
     rate = np.diff(error, axis=0) / step
-    if scene.simulation.integrator != "discrete":
+    if not discrete:
         rate = np.gradient(error, step, axis=0)[1:]
     return error[1:], rate
 

@@ -30,6 +30,8 @@ def contents(assembly: Assembly) -> dict[str, Any]:
         "actuators": int(model.nu),
         "integrator": assembly.scene.simulation.integrator,
         "step_s": assembly.scene.simulation.step_s,
+        "sub_steps": assembly.sub_steps,
+        "sub_stepped_for": dict(assembly.outside),
         "joints": {t.joint: _joint(t) for t in assembly.transmissions},
         "left_out": [
             {"joint": t.joint, **item}

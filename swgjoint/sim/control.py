@@ -118,10 +118,9 @@ def control_inputs(assembly: Assembly) -> Array:
         + assembly.damping * ratio * (path.velocity + assembly.prescribed_rate)
         + assembly.feedforward
     )
-    simulation = assembly.scene.simulation
-    at_end = simulation.integrator == "discrete"
+    at_end = assembly.scene.simulation.integrator == "discrete"
     steps = inputs[1:] if at_end else inputs[:-1]
-    acceleration = np.diff(assembly.prescribed_rate, axis=0) / simulation.step_s
+    acceleration = np.diff(assembly.prescribed_rate, axis=0) / assembly.step
     steps = steps + assembly.rotor_inertia * ratio * acceleration
     load = assembly.load[assembly.load != 0.0]
     return np.hstack([steps, np.broadcast_to(load, (len(steps), load.size))])

@@ -33,7 +33,7 @@ def start_state(assembly: Assembly) -> tuple[Array, Array]:
     Returns:
         qpos and qvel of the compiled model.
     """
-    path, h = assembly.trajectory, assembly.scene.simulation.step_s
+    path, h = assembly.trajectory, assembly.step
     theta, psi = _balance(assembly, 0.0)
     link_rate = path.velocity[0].copy()
     if link_rate.any():

@@ -40,6 +40,7 @@ def run_metrics(run: Run) -> dict[str, Any]:
         "tool": tool_metrics(run),
         "window_s": [float(t) for t in run.time[run.steady][[0, -1]]],
         "ripple_of": RIPPLE_OF,
+        "sub_steps": run.assembly.sub_steps,
         "steps_per_s": run.steps_per_second,
     }
 

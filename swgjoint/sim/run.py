@@ -25,7 +25,7 @@ from swgjoint.sim.scene import Scene
 
 Array = NDArray[np.float64]
 
-_CHUNK = 1000  # steps between two signs of life
+_CHUNK = 1000  # steps of the engine between two signs of life
 _STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
 
 
@@ -70,7 +70,7 @@ class Run:
 
     @property
     def steps_per_second(self) -> float:
-        """Simulation steps per second of wall time."""
+        """Recorded steps, each with its sub-steps, per second of wall time."""
         return (self.time.size - 1) / self.wall
 
     @property
@@ -114,6 +114,9 @@ def run_scene(
 ) -> Run:
     """Simulate a scene from an equilibrium to its end.
 
+    A step that lies outside the region in which a joint's integration holds is cut into
+    ``run.assembly.sub_steps`` equal parts; the run records the scene's steps.
+
     Args:
         scene: A scene, the path of a scene file, or the name of a bundled one.
         overrides: Dotted keys of the scene with other values, as a mapping or as
@@ -144,24 +147,29 @@ def simulate(assembly: Assembly, *, name: str, progress: Progress = silent) -> R
     mujoco.mj_getState(model, data, state, _STATE)
 
     # the engine's own rollout: no Python between two steps, every state recorded
-    states = np.empty((path.time.size, state.size))
+    steps, parts = len(inputs), assembly.sub_steps
+    states = np.empty((steps // parts + 1, state.size))
     states[0] = state
-    steps = len(inputs)
+    speeds = 1 + model.nq + assembly.link_velocity
+    rates = np.empty((path.time.size, speeds.size))
+    rates[0] = state[speeds]
+    chunk = parts * max(1, _CHUNK // parts)
     begin = time.perf_counter()
     with Rollout(nthread=0) as rollout:
-        for first in range(0, steps, _CHUNK):
-            last = min(first + _CHUNK, steps)
+        for first in range(0, steps, chunk):
+            last = min(first + chunk, steps)
             got, _ = rollout.rollout(
                 model,
                 data,
-                states[first][None],
+                states[first // parts][None],
                 inputs[None, first:last],
                 initial_warmstart=data.qacc_warmstart[None],
             )
-            states[first + 1 : last + 1] = got[0]
-            _check_finite(assembly, data, states[first + 1 : last + 1])
+            states[first // parts + 1 : last // parts + 1] = got[0, parts - 1 :: parts]
+            rates[first + 1 : last + 1] = got[0][:, speeds]
+            _check_finite(assembly, data, got[0])
             progress(f"run {name}", last, steps)
-    return _recorded(assembly, name, states, time.perf_counter() - begin)
+    return _recorded(assembly, name, states, rates, time.perf_counter() - begin)
 
 
 def _check_finite(assembly: Assembly, data: mujoco.MjData, states: Array) -> None:
@@ -177,7 +185,7 @@ def _check_finite(assembly: Assembly, data: mujoco.MjData, states: Array) -> Non
     )
     speed = np.abs(states[:, 1 + nq : 1 + nq + nv])
     if bad or not np.isfinite(states).all() or speed.max() > 1e6:
-        step = assembly.scene.simulation.step_s
+        step = assembly.step
         raise ComputationError(
             f"scene {assembly.scene.name!r}: the motion diverged before"
             f" t = {states[-1, 0]:.3f} s with a step of {step:g} s and integrator"
@@ -186,9 +194,20 @@ def _check_finite(assembly: Assembly, data: mujoco.MjData, states: Array) -> Non
         )
 
 
-def _recorded(assembly: Assembly, name: str, states: Array, wall: float) -> Run:
-    """Signals of all joints from the recorded states."""
-    model, path, ratio = assembly.model, assembly.trajectory, assembly.ratio
+def _recorded(
+    whole: Assembly, name: str, states: Array, rates: Array, wall: float
+) -> Run:
+    """Signals of all joints from the recorded states.
+
+    Args:
+        whole: The scene as it was run.
+        name: Of the run.
+        states: One per step of the scene. Shape (n, n_state).
+        rates: Link speeds at every step of the engine [rad/s].
+        wall: Time that the steps took [s].
+    """
+    assembly, ratio = whole.recorded(), whole.ratio
+    model, path = assembly.model, assembly.trajectory
     q = states[:, 1 : 1 + model.nq]
     v = states[:, 1 + model.nq : 1 + model.nq + model.nv]
     position, velocity = q[:, assembly.link_position], v[:, assembly.link_velocity]
@@ -201,9 +220,9 @@ def _recorded(assembly: Assembly, name: str, states: Array, wall: float) -> Run:
     motor = motor_torque(assembly, theta, theta_rate)
     # no rotor: what the motor gives less what its rotor takes; the integrator's own
     # acceleration is the velocity difference of the step that led to the state
-    step = assembly.scene.simulation.step_s
-    rotor_rate = np.diff(theta_rate, axis=0, prepend=theta_rate[:1]) / step
-    output = ratio * (motor - assembly.rotor_inertia * rotor_rate)
+    ideal = ratio * (rates - whole.prescribed_rate)
+    slowing = np.diff(ideal, axis=0, prepend=ideal[:1])[:: whole.sub_steps] / whole.step
+    output = ratio * (motor - assembly.rotor_inertia * slowing)
     torsion, error = np.zeros_like(position), assembly.prescribed.copy()
     for j in np.flatnonzero(flexible):
         got = assembly.transmissions[j].signals(

@@ -24,6 +24,9 @@ from swgjoint.sim.scene_sections import (
     TrajectorySection,
 )
 
+MAX_STEPS = 2_000_000
+"""Steps of the engine in a run."""
+
 
 class Scene(Section):
     """One scene: attributes mirror the tables and keys of the file, units included."""
@@ -64,12 +67,12 @@ class Scene(Section):
                     " ramps and settling of the trajectory take",
                 )
             )
-        if duration / step > 2_000_000:
+        if duration / step > MAX_STEPS:
             faults.append(
                 (
                     "simulation.step_s",
                     f"{step:g} s makes {duration / step:.3g} steps; accepted: at most"
-                    " 2000000 steps in a run",
+                    f" {MAX_STEPS} steps in a run",
                 )
             )
         if faults:

@@ -7,6 +7,7 @@ from typing import Annotated, Literal, Self, get_args
 from pydantic import Field, model_validator
 
 from swgjoint.faults import Fault, Section
+from swgjoint.joint.region import MAX_SUB_STEPS
 
 Level = Literal["rigid", "kinematic", "linear", "native", "full"]
 LEVELS: tuple[str, ...] = get_args(Level)
@@ -162,6 +163,10 @@ class Simulation(Section):
     duration_s: Annotated[float, Field(gt=0, le=10_000)]
     step_s: Annotated[float, Field(ge=1e-6, le=0.02)] = 0.001
     integrator: Integrator = "discrete"
+    max_sub_steps: Annotated[int, Field(ge=1, le=1_000)] = MAX_SUB_STEPS
+    """Equal parts that a step may be cut into where the integration of a joint asks for
+    it; 1 refuses such a scene. What is recorded and which harmonics are kept follows
+    from ``step_s`` alone."""
 
 
 class Recording(Section):

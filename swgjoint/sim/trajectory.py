@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,17 @@ class Trajectory:
     """Samples of the constant-speed part that the metrics use."""
     steady_velocity: Array
     """Speed of that part [rad/s]. Shape (n_joints,)."""
+
+    def every(self, n: int) -> Trajectory:
+        """The same motion at every n-th sample, the first included."""
+        return replace(
+            self,
+            time=self.time[::n],
+            position=self.position[::n],
+            velocity=self.velocity[::n],
+            acceleration=self.acceleration[::n],
+            steady=slice(-(-self.steady.start // n), (self.steady.stop - 1) // n + 1),
+        )
 
     @property
     def top_speed(self) -> Array:
@@ -55,6 +66,7 @@ def sweep(
     hold: float,
     ramp: float,
     settle: float = 0.0,
+    sub_steps: int = 1,
 ) -> Trajectory:
     """Rest, smooth ramp to constant speed, smooth ramp to rest; all joints together.
 
@@ -66,8 +78,9 @@ def sweep(
         hold: Rest before and after [s].
         ramp: Time of either ramp [s].
         settle: Time after the first ramp that the metrics leave out [s].
+        sub_steps: Samples per step.
     """
-    time = time_grid(duration, step)
+    time = time_grid(duration, step, sub_steps)
     top = duration - hold - ramp  # the second ramp starts here
     speed = (end - start) / (top - hold)
     up = np.clip((time - hold) / ramp, 0.0, 1.0)
@@ -87,10 +100,16 @@ def sweep(
 
 
 def constant_speed(
-    *, start: Array, speed: Array, duration: float, step: float, settle: float = 0.0
+    *,
+    start: Array,
+    speed: Array,
+    duration: float,
+    step: float,
+    settle: float = 0.0,
+    sub_steps: int = 1,
 ) -> Trajectory:
     """Constant speed from the first instant; arguments as for :func:`sweep`."""
-    time = time_grid(duration, step)
+    time = time_grid(duration, step, sub_steps)
     return Trajectory(
         time=time,
         position=start + time[:, None] * speed,
@@ -101,9 +120,10 @@ def constant_speed(
     )
 
 
-def time_grid(duration: float, step: float) -> Array:
+def time_grid(duration: float, step: float, sub_steps: int = 1) -> Array:
     """Times of all states of a run, first and last included [s]."""
-    return np.asarray(np.arange(round(duration / step) + 1) * step)
+    count = round(duration / step) * sub_steps
+    return np.asarray(np.arange(count + 1) * (step / sub_steps))
 
 
 def _window(time: Array, first: float, last: float) -> slice:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import mujoco
 import numpy as np
 import pytest
@@ -141,6 +143,48 @@ def test_region_names_bound_and_step(bench, synthetic_map):
     inside.require()
     more = check_region(drive, timestep=1.2 * step, max_input_speed=10.0)
     assert not more.ok  # the step is not needlessly small
+
+
+def test_sub_steps_are_the_fewest_that_lie_inside(bench, synthetic_map):
+    """With n parts of the step the region holds, with n - 1 it does not."""
+    drive = bench(synthetic_map, rotor_inertia=1e-7, link=1e-4).drive
+    seen = set()
+    for step in (1e-5, 3e-4, 1e-3, 7e-3, 2e-2):
+        for speed in (0.0, 3.0, 40.0):
+            parts = check_region(drive, timestep=step, max_input_speed=speed).sub_steps
+            assert parts is not None
+            seen.add(parts)
+            for n, inside in ((parts, True), (parts - 1, False)):
+                if n:
+                    h = step / n
+                    region = check_region(drive, timestep=h, max_input_speed=speed)
+                    assert region.ok is inside
+    assert 1 in seen and len(seen) > 3
+
+
+def test_no_sub_step_helps_against_a_steep_kinematic_error(bench, synthetic_map):
+    """A bound that no step meets is refused however many sub-steps are accepted."""
+    steep = replace(
+        synthetic_map, kinematic_error=100.0 * synthetic_map.kinematic_error
+    )
+    region = check_region(bench(steep).drive, timestep=1e-3)
+    assert region.sub_steps is None
+    with pytest.raises(ComputationError, match="slope of the kinematic error"):
+        region.require(1000)
+
+
+def test_more_sub_steps_than_accepted_are_refused_with_their_number(
+    bench, synthetic_map
+):
+    """The message has the number of parts; accepting that many gives it back."""
+    region = check_region(
+        bench(synthetic_map).drive, timestep=2e-3, max_input_speed=100.0
+    )
+    parts = region.sub_steps
+    assert parts is not None and parts > 2
+    with pytest.raises(ComputationError, match=rf"\({parts} sub-steps; accepted: at m"):
+        region.require(parts - 1)
+    assert region.require(parts) == parts
 
 
 def test_region_without_a_step(bench, synthetic_map):

@@ -185,13 +185,6 @@ def test_a_run_that_diverges_is_a_failure_with_advice(
         )
 
 
-def test_a_step_outside_the_region_is_refused_before_it_runs(bench):
-    """The joint's own bound is named with the step that would do."""
-    stiff = DriveMap.linear(1e7, teeth_flexspline=120, teeth_circular_spline=122)
-    with pytest.raises(ComputationError, match=r"joint 'joint' .* would do"):
-        bench(stiff, simulation={"integrator": "RK4", "step_s": 0.005, "duration_s": 1})
-
-
 def test_contents_name_what_is_in_the_model(bench, synthetic_map):
     """Rigid adds nothing; linear a rotor and a tendon; full a plugin instance too."""
     found = {
