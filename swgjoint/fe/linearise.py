@@ -7,7 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from swgjoint.fe.corotation import Frames, projected, rotate, tangent, turned
+from swgjoint.fe.corotation import (
+    Frames,
+    elastic_force,
+    projected,
+    rotate,
+    tangent,
+    turned,
+)
 from swgjoint.fe.ring import RingModel
 from swgjoint.fe.state import State
 from swgjoint.fe.superelement import Superelement
@@ -123,7 +130,7 @@ def linearise(model: RingModel, state: State, torque: float | None) -> Linearise
     )
 
     # elastic forces and tangent in the sector frames, then in the bases
-    elastic = frames.deformation @ element.stiffness
+    elastic = elastic_force(element, frames)
     total = elastic - state.flank_force @ element.flank_from_skeleton
     gradient = _to_basis(turn, projected(frames, elastic))
     hessian = np.einsum(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,6 +69,33 @@ class Superelement:
     def bore_size(self) -> int:
         """Bore nodes inside the sector, faces excluded."""
         return len(self.skeleton) - 2 * self.face_size
+
+    @cached_property
+    def rim_slopes(self) -> Array:
+        r"""Rows B of the rotations of the rim against the frame, at the bore.
+
+        One row per interval between bore nodes, times the root of its length:
+        :math:`\int \omega^2 ds = d^T B^T B d` [m^(-1/2)]. Shape (n_bore + 1, 2 n_a).
+        """
+        size, count = self.face_size, len(self.skeleton)
+        along = np.r_[size - 1 : size + self.bore_size, count - 1]
+        chord = np.diff(self.skeleton[along], axis=0)
+        length = np.hypot(chord[:, 0], chord[:, 1])
+        # rotation of a chord: its ends apart along its normal, over its length
+        row = np.stack([-chord[:, 1], chord[:, 0]], axis=-1) / length[:, None] ** 1.5
+        rows, interval = np.zeros((len(chord), count, 2)), np.arange(len(chord))
+        rows[interval, along[1:]] = row
+        rows[interval, along[:-1]] = -row
+        return rows.reshape(len(chord), -1)
+
+    @cached_property
+    def elongation(self) -> Array:
+        """Uniform elongation of the sector by a unit of its bore's length (2 n_a,)."""
+        size = self.face_size
+        x = self.skeleton[:, 0]
+        moved = np.zeros_like(self.skeleton)
+        moved[:, 0] = (x - x.mean()) / abs(x[size - 1] - x[-1])
+        return moved.ravel()
 
     @property
     def flank_range(self) -> tuple[float, float]:

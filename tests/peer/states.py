@@ -66,22 +66,3 @@ def turned_to(kind: str, refinement: int, pitches: float) -> State:
 def _checked(state: State) -> State:
     assert state.outcome.ok, state.outcome
     return state
-
-
-def within_sector(model: RingModel, state: State) -> float:
-    r"""Deflection that our sectors lack under hoop tension: too soft by this [m].
-
-    Sectors turn as wholes: the tension N stiffens the ring by the rotations of the
-    sectors, and what the rim turns within a sector is left out. For the two-lobe shape
-    :math:`w = a \cos 2\varphi` of an inextensional ring the rotation is
-    :math:`\psi = \tfrac32 (a/r) \sin 2\varphi`, the stiffness against a by tension
-    :math:`K_N = \tfrac94 \pi N / r`, by bending :math:`K_b \approx 2 U/a^2`, and of
-    K_N the share :math:`(2 h)^2/12` is lost, h the angle of a sector.
-    """
-    a, angle = model.lobe_height, 2.0 * pi / model.element.sectors
-    radius = model.element.profile.dedendum_radius
-    tension = model.copies * float(state.pressure.sum()) / (2.0 * pi)
-    by_tension = 2.25 * pi * tension / radius
-    by_bending = 2.0 * state.energy / a**2
-    lost = (2.0 * angle) ** 2 / 12.0
-    return a * lost * by_tension / (by_tension + by_bending)

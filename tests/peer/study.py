@@ -29,7 +29,6 @@ from states import (
     loaded,
     model_of,
     turned_to,
-    within_sector,
 )
 
 import swgjoint
@@ -76,7 +75,6 @@ def row(label: str, mesh: tuple[int, int, str], found: Replay, wall: float) -> R
         "tangential_rms_um": np.sqrt(np.mean(tangential**2)),
         "root_ours_MPa": root[0],
         "root_calculix_MPa": root[1],
-        "within_sector_um": within_sector(found.model, found.state) / um,
         "calculix_s": wall,
     }
 
