@@ -5,6 +5,7 @@ import pytest
 
 from swgjoint.errors import InputError
 from swgjoint.sim.rigid_arm import RigidArm
+from swgjoint.sim.run import run_scene
 
 UR5E = RigidArm("ur5e")
 
@@ -76,3 +77,104 @@ def test_the_iiwa_has_the_mass_and_height_of_its_source():
     np.testing.assert_allclose(tool, [0.0, 0.0, height], atol=1e-5)
     # upright it carries no weight but what lies beside the axes
     assert np.abs(arm.gravity(np.zeros((1, 7)))).max() < 9.81 * 22 * 0.06
+
+
+PI = np.pi
+MAKERS = {
+    # name: mass of the fixed base and of the arm in the maker's data sheet [kg], and
+    # Denavit-Hartenberg rows (a, alpha, d, offset), turning before or after the shift
+    "iiwa14": (
+        5.0,
+        29.9,
+        "after",
+        [
+            (0, -PI / 2, 0.36, 0),
+            (0, PI / 2, 0, 0),
+            (0, PI / 2, 0.42, 0),
+            (0, -PI / 2, 0, 0),
+            (0, -PI / 2, 0.4, 0),
+            (0, PI / 2, 0, 0),
+            (0, 0, 0.126, 0),
+        ],
+    ),
+    "kinova": (
+        1.697,
+        8.2,
+        "after",
+        [
+            (0, PI / 2, -(0.1564 + 0.1284), 0),
+            (0, PI / 2, -(0.0054 + 0.0064), PI),
+            (0, PI / 2, -(0.2104 + 0.2104), PI),
+            (0, PI / 2, -(0.0064 + 0.0064), PI),
+            (0, PI / 2, -(0.2084 + 0.1059), PI),
+            (0, PI / 2, 0, PI),
+            (0, PI, -(0.1059 + 0.0615), PI),
+        ],
+    ),
+    "panda": (
+        0.63,
+        18.0,
+        "before",
+        [
+            (0, 0, 0.333, 0),
+            (0, -PI / 2, 0, 0),
+            (0, PI / 2, 0.316, 0),
+            (0.0825, PI / 2, 0, 0),
+            (-0.0825, -PI / 2, 0.384, 0),
+            (0, PI / 2, 0, 0),
+            (0.088, PI / 2, 0.107, 0),
+        ],
+    ),
+}
+
+
+def denavit_hartenberg(rows, order, q):
+    """Place of the flange [m]."""
+    pose = np.diag([1.0, -1.0, -1.0, 1.0]) if rows[0][2] < 0 else np.eye(4)
+    for (a, alpha, d, offset), angle in zip(rows, q, strict=True):
+        ca, sa = np.cos(alpha), np.sin(alpha)
+        c, s = np.cos(angle + offset), np.sin(angle + offset)
+        x = np.array([[1, 0, 0, a], [0, ca, -sa, 0], [0, sa, ca, 0], [0, 0, 0, 1]])
+        z = np.array([[c, -s, 0, 0], [s, c, 0, 0], [0, 0, 1, d], [0, 0, 0, 1]])
+        pose = pose @ (x @ z if order == "before" else z @ x)
+    return pose[:3, 3]
+
+
+@pytest.mark.parametrize("name", MAKERS)
+def test_an_arm_moves_as_its_makers_table_says(name):
+    """In random poses the tool lies where the Denavit-Hartenberg table puts it."""
+    _, _, order, rows = MAKERS[name]
+    poses = np.random.default_rng(3).uniform(-2.0, 2.0, (5, 7))
+    tool = RigidArm(name).tool_positions(poses)
+    expected = [denavit_hartenberg(rows, order, q) for q in poses]
+    # the table of the Gen3 is rounded to 0.1 mm
+    np.testing.assert_allclose(tool, expected, atol=3e-4 if name == "kinova" else 1e-6)
+
+
+@pytest.mark.parametrize("name", MAKERS)
+def test_an_arm_weighs_what_its_maker_says(name):
+    """Base and links within 8 % of the data sheet; every inertia is that of a body."""
+    base, stated, _, _ = MAKERS[name]
+    model = RigidArm(name).model
+    assert len(model.jnt_type) == 7
+    assert base + model.body_mass.sum() == pytest.approx(stated, rel=0.08)
+    inertia = np.sort(model.body_inertia[2:], axis=1)
+    assert (inertia[:, 0] > 0.0).all()
+    assert (inertia[:, 0] + inertia[:, 1] >= inertia[:, 2]).all()
+
+
+@pytest.mark.parametrize(
+    "name", ["ur5e-catalogue", "iiwa14-sweep", "kinova-sweep", "panda-sweep"]
+)
+def test_an_arm_with_catalogue_drives_carries_its_weight(name):
+    """Every drive transmits what the rigid arm needs, within its ratings, uncut."""
+    run = run_scene(name, overrides={"simulation.duration_s": 2.0})
+    assert run.assembly.sub_steps == 1
+    needed = run.assembly.link_torque[run.steady]
+    rated = [t.drive.ratings.rated_torque for t in run.assembly.transmissions]
+    # vibration after the ramp is what differs
+    assert (
+        np.abs(run.output_torque[run.steady] - needed) < 0.02 * np.array(rated)
+    ).all()
+    for joint in run.metrics()["joints"].values():
+        assert joint["ratings"]["within"]
