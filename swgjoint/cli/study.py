@@ -20,6 +20,10 @@ STUDIES = {
         "swgjoint.study.ring:run_ring",
         "deflection of a plain ring between two rollers, thesis appendix A",
     ),
+    "response": (
+        "swgjoint.study.response:run_response",
+        "two-mass frequency response of a joint beside its closed form",
+    ),
 }
 """Name -> function that takes a StudyOptions and returns a StudyResult, and what it
 compares; imported only when chosen."""
@@ -32,7 +36,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
     listing = "; ".join(f"{name}: {text}" for name, (_, text) in STUDIES.items())
     parser.add_argument("name", metavar="NAME", choices=STUDIES, help=listing)
     parser.add_argument(
-        "--only", metavar="PART,...", help="run these sections or tables of the source"
+        "--only",
+        metavar="PART,...",
+        help="run these sections or tables of the source; response: these drives",
     )
     parser.add_argument(
         "--model", choices=("2d", "3d"), help="fidelity; default: that of the study"

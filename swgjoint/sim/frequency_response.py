@@ -1,0 +1,223 @@
+r"""Two-mass frequency response of one joint, from a periodic chirp of motor torque.
+
+Rotor J_m (at the input) and link J_l on a torsional stiffness K at the output resonate
+at :math:`\sqrt{K (1/J_l + 1/(i^2 J_m))}`; at :math:`\sqrt{K/J_l}` the rotor stands
+still (anti-resonance). The chirp repeats: once the transient of the first periods is
+gone, the ratio of two Fourier transforms over whole periods has no leakage.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import pi, sqrt
+
+import mujoco
+import mujoco.rollout
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.errors import ComputationError, InputError
+from swgjoint.joint.attach import attach
+from swgjoint.maps.drive_map import DriveMap
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+JOINT = "joint"
+
+
+@dataclass(frozen=True, kw_only=True)
+class TwoMass:
+    """Inertias on both sides of a drive."""
+
+    rotor_inertia: float
+    """Rotor and wave generator about the input axis [kg·m²]."""
+    link_inertia: float
+    """Load about the output axis [kg·m²]."""
+
+    def resonance(self, stiffness: float, ratio: float) -> float:
+        """Closed form of the undamped resonance [Hz]."""
+        reflected = ratio**2 * self.rotor_inertia
+        compliance = 1.0 / self.link_inertia + 1.0 / reflected
+        return sqrt(stiffness * compliance) / (2.0 * pi)
+
+    def antiresonance(self, stiffness: float) -> float:
+        """Closed form of the undamped anti-resonance of the rotor [Hz]."""
+        return sqrt(stiffness / self.link_inertia) / (2.0 * pi)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Chirp:
+    """A sine whose frequency grows exponentially from low to high, repeated."""
+
+    low: float
+    """[Hz]."""
+    high: float
+    """[Hz]."""
+    period: float = 16.0
+    """One sweep [s]; lines of the spectrum are 1/period apart."""
+    settling: int = 1
+    """Periods before the one that is evaluated."""
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.low < self.high or self.period * self.low < 1.0:
+            raise InputError(
+                f"chirp from {self.low:g} to {self.high:g} Hz in {self.period:g} s;"
+                " accepted: 0 < low < high, at least one cycle of the lowest in it"
+            )
+
+    def samples(self, step: float) -> Array:
+        """One period with an amplitude of one, without mean. Shape (n,)."""
+        n = round(self.period / step)
+        rate = np.log(self.high / self.low) / n
+        phase = 2.0 * pi * self.low * step * np.expm1(rate * np.arange(n)) / rate
+        wave = np.sin(phase)
+        return np.asarray(wave - wave.mean())
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FrequencyResponse:
+    """Speeds per motor torque, complex, over the band of the chirp."""
+
+    frequency: Array
+    """[Hz]. Shape (n,)."""
+    rotor: Complex
+    """Rotor speed per motor torque [rad/s per N·m]. Complex, shape (n,)."""
+    link: Complex
+    """Link speed per motor torque [rad/s per N·m]. Complex, shape (n,)."""
+    largest_torque: float
+    """Largest elastic torque of the drive on the way [N·m]."""
+
+    @property
+    def resonance(self) -> float:
+        """Where the link moves most against the free body [Hz]."""
+        return self._extreme(np.abs(self.link) * self.frequency)
+
+    @property
+    def antiresonance(self) -> float:
+        """Where the rotor moves least against the free body [Hz]."""
+        return self._extreme(1.0 / (np.abs(self.rotor) * self.frequency))
+
+    @property
+    def peak(self) -> float:
+        """Link speed per motor torque at the resonance [rad/s per N·m]."""
+        return float(np.abs(self.link).max())
+
+    def _extreme(self, height: Array) -> float:
+        """Vertex of the parabola through the logarithms at the largest line."""
+        k = int(height.argmax())
+        if not 0 < k < len(height) - 1:
+            raise ComputationError(
+                "no extreme of the frequency response between"
+                f" {self.frequency[0]:.3g} and {self.frequency[-1]:.3g} Hz; try a"
+                " wider chirp"
+            )
+        a, b, c = np.log(height[k - 1 : k + 2])
+        offset = 0.5 * (a - c) / (a - 2.0 * b + c)
+        line = self.frequency[1] - self.frequency[0]
+        return float(self.frequency[k] + offset * line)
+
+
+def frequency_response(
+    drive: DriveMap,
+    masses: TwoMass,
+    chirp: Chirp,
+    *,
+    level: str = "full",
+    amplitude: float,
+    bias: float = 0.0,
+    step: float = 1e-4,
+    integrator: str = "RK4",
+    damping_ratio: float | None = None,
+) -> FrequencyResponse:
+    """Excite the rotor of a joint that is free at both ends and look at both speeds.
+
+    Args:
+        drive: Map of the drive.
+        masses: Rotor and link.
+        chirp: Excitation.
+        level: Of the joint: ``linear``, ``native`` or ``full``.
+        amplitude: Of the motor torque, seen at the output [N·m].
+        bias: Constant torque on the drive beside it, seen at the output [N·m]: the
+            motor drives, the load resists.
+        step: Of the simulation [s].
+        integrator: RK4 has no numerical damping at these steps; ``discrete`` is what
+            scenes use.
+        damping_ratio: As in :func:`swgjoint.joint.attach.attach`.
+
+    Raises:
+        InputError: For a level without a rotor or a chirp that the step cannot carry.
+        ComputationError: If the simulation leaves finite numbers.
+    """
+    if level not in ("linear", "native", "full"):
+        raise InputError(f"level {level!r}; accepted: linear, native, full")
+    if chirp.high * step > 0.1:
+        raise InputError(
+            f"chirp up to {chirp.high:g} Hz at a step of {1e3 * step:g} ms; accepted:"
+            f" up to {0.1 / step:g} Hz"
+        )
+    spec = _bench(masses, step, integrator)
+    got = attach(
+        spec,
+        joint=JOINT,
+        drive=drive,
+        level=level,
+        rotor_inertia=masses.rotor_inertia,
+        damping_ratio=damping_ratio,
+    )
+    assert got.rotor is not None
+    for name in (got.rotor, JOINT):
+        motor = spec.add_actuator(name=name, target=name)
+        motor.trntype = mujoco.mjtTrn.mjTRN_JOINT
+        motor.gear[0] = 1.0
+    model = spec.compile()
+    wave = chirp.samples(step)
+    torque = (amplitude * wave + bias) / got.ratio
+    # the load holds the bias: the joint speeds up under the chirp alone
+    control = np.stack([torque, np.full_like(torque, -bias)], axis=-1)
+    x, speed = _last_period(model, got.rotor, control, chirp.settling + 1)
+    bins = np.asarray(np.fft.rfftfreq(len(wave), step), dtype=np.float64)
+    band = (bins >= chirp.low) & (bins <= chirp.high)
+    spectrum = np.fft.rfft(speed, axis=0)[band] / np.fft.rfft(torque)[band, None]
+    torsion = drive.torsion(x[:, 0], x[:, 1])
+    transmitted = drive.coefficients(torsion, 1)[:, 0, 0]
+    return FrequencyResponse(
+        frequency=bins[band],
+        rotor=spectrum[:, 0],
+        link=spectrum[:, 1],
+        largest_torque=float(np.abs(transmitted).max()),
+    )
+
+
+def _bench(masses: TwoMass, step: float, integrator: str) -> mujoco.MjSpec:
+    """A link on a hinge, without gravity."""
+    spec = mujoco.MjSpec()
+    spec.option.timestep = step
+    spec.option.gravity = [0.0, 0.0, 0.0]
+    spec.option.integrator = getattr(
+        mujoco.mjtIntegrator, f"mjINT_{integrator.upper()}"
+    )
+    link = spec.worldbody.add_body(name="link")
+    link.add_joint(name=JOINT, type=mujoco.mjtJoint.mjJNT_HINGE, axis=[0, 0, 1])
+    link.mass, link.inertia = 1.0, [masses.link_inertia] * 3
+    link.explicitinertial = True
+    return spec
+
+
+def _last_period(
+    model: mujoco.MjModel, rotor: str, control: Array, periods: int
+) -> tuple[Array, Array]:
+    """Angles and speeds of rotor and link under a repeated control (n, 2) each."""
+    data = mujoco.MjData(model)
+    full = mujoco.mjtState.mjSTATE_FULLPHYSICS
+    state = np.empty(mujoco.mj_stateSize(model, full))
+    mujoco.mj_getState(model, data, state, full)
+    joints = [model.joint(name) for name in (rotor, JOINT)]
+    q = [1 + int(joint.qposadr[0]) for joint in joints]  # after the time
+    v = [1 + model.nq + int(joint.dofadr[0]) for joint in joints]
+    for _ in range(periods):
+        found, _ = mujoco.rollout.rollout(model, data, state[None], control[None])
+        state = found[0, -1]
+    if not np.isfinite(found).all():
+        raise ComputationError("the response left finite numbers; try a smaller step")
+    return found[0][:, q], found[0][:, v]
