@@ -142,9 +142,7 @@ def _rows(name: str, measured: Measured) -> list[Row]:
                 case=f"{name}, {measured.case}",
                 quantity=quantity,
                 unit="Hz",
-                source_value=None
-                if measured.expected is None
-                else measured.expected[k],
+                source_value=None if closed is None else closed[k],
                 ours=getattr(measured.response, quantity),
                 converged=None if finer is None else getattr(finer, quantity),
                 reason=measured.reason,
