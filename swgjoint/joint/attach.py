@@ -39,9 +39,10 @@ def attach(
     ``<joint>_drive`` with the length theta/i - psi: a native spring and damper, the
     same with a cubic part (and tendons ``<joint>_hysteresis<k>`` and rotor friction
     where the map has them), or the carrier of the engine plugin's instance of the same
-    name, which evaluates ``drive``, hysteresis included. The rotor takes the place of
-    the joint's own armature, which is set to 0. Keyframes grow by the rotor, at the
-    position without torsion.
+    name, which evaluates ``drive``, hysteresis included; where the map has friction a
+    tendon ``<joint>_friction`` carries its part of the integrator's metric. The rotor
+    takes the place of the joint's own armature, which is set to 0. Keyframes grow by
+    the rotor, at the position without torsion.
 
     No actuator is added and none is changed. The motor belongs on the rotor::
 
@@ -149,6 +150,17 @@ def attach(
             body.plugin.name = tendon
             body.plugin.plugin_name = plugin.NAME
             body.plugin.active = True
+            if drive.friction is not None:
+                add_tendon(
+                    spec,
+                    f"{joint}_friction",
+                    rotor,
+                    joint,
+                    ratio,
+                    plugin.FRICTION_STIFFNESS,
+                    0.0,
+                    coefficients=drive.friction_direction,
+                )
         if spec.option.integrator == mujoco.mjtIntegrator.mjINT_EULER:
             spec.option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
     return JointDrive(

@@ -12,6 +12,7 @@ from swgjoint.errors import InputError
 from swgjoint.joint.native import NativeSpring
 from swgjoint.joint.prescribed import error_of_motor, motor_of_link
 from swgjoint.maps.drive_map import DriveMap
+from swgjoint.maps.friction import Friction
 from swgjoint.maps.hysteresis import Jenkin, Sliders
 
 Array = NDArray[np.float64]
@@ -80,6 +81,11 @@ class JointDrive:
         return self.drive.hysteresis if self.level in ("native", "full") else ()
 
     @property
+    def friction(self) -> Friction | None:
+        """Friction against the flexspline; ``native`` has it against the housing."""
+        return self.drive.friction if self.level == "full" else None
+
+    @property
     def kept_orders(self) -> tuple[float, ...]:
         """Orders per input turn that the map as simulated holds, increasing."""
         return tuple(sorted({float(n) for n in input_orders(self.drive)[1:]}))
@@ -100,13 +106,15 @@ class JointDrive:
         theta_rate: ArrayLike = 0.0,
         psi_rate: ArrayLike = 0.0,
         slipping: ArrayLike = 0.0,
+        friction: ArrayLike = 0.0,
     ) -> JointSignals:
         """Torsion, transmission error and torque from recorded joint states.
 
         Taken at the positions and velocities that are passed in, so pass ``qpos`` and
         ``qvel`` of the same instant, as they stand after a step. The discrete scheme
         evaluates its force half a step earlier; what is given here is the law itself
-        at the true positions. Hysteresis has a history: its torque is passed in.
+        at the true positions. Hysteresis and friction have a history: their torques
+        are passed in.
 
         Args:
             theta: Rotor positions [rad].
@@ -114,6 +122,7 @@ class JointDrive:
             theta_rate: Rotor velocities [rad/s].
             psi_rate: Link velocities [rad/s].
             slipping: Torque of the elements along the torsion [N·m].
+            friction: Torque of the wave generator against the flexspline [N·m].
 
         Raises:
             InputError: For ``rigid`` and ``kinematic``, which have no rotor; see
@@ -124,10 +133,10 @@ class JointDrive:
                 f"joint {self.joint!r} is {self.level}: it has no rotor to take "
                 "signals from; use observe(model, data)"
             )
-        theta, psi, theta_rate, psi_rate, slipping = np.broadcast_arrays(
+        theta, psi, theta_rate, psi_rate, slipping, friction = np.broadcast_arrays(
             *(
                 np.asarray(x, float)
-                for x in (theta, psi, theta_rate, psi_rate, slipping)
+                for x in (theta, psi, theta_rate, psi_rate, slipping, friction)
             )
         )
         error = psi - theta / self.ratio
@@ -147,7 +156,8 @@ class JointDrive:
             torsion=self.drive.torsion(theta, psi),
             transmission_error=error,
             torque=self.drive.forces(theta, psi)[1]
-            - (self.damping * rate + slipping) * g_psi,
+            - (self.damping * rate + slipping) * g_psi
+            - self.drive.friction_direction[1] * friction,
         )
 
     def output_slope(self, theta: ArrayLike, psi: ArrayLike) -> Array:
@@ -200,9 +210,7 @@ class JointDrive:
             data.qvel[int(rotor.dofadr[0])],
             data.qvel[v],
         )
-        got = self.signals(*state)
-        if not self.elements:
-            return got
+        got, friction = self.signals(*state), 0.0
         torsion = float(got.torsion)
         if self.plugin is None:
             slipping = sum(
@@ -214,7 +222,16 @@ class JointDrive:
             rest = data.plugin_state[first : first + len(self.elements)]
             sliders = replace(Sliders.relaxed(self.elements), rest=rest.copy())
             slipping = float(sliders.torque(torsion))
-        return self.signals(*state, slipping=slipping)
+            if self.friction is not None:
+                relaxed, known = data.plugin_state[first + len(self.elements) :][:2]
+                b = self.drive.friction_direction
+                beta = float(np.dot(b, state[:2]))
+                friction = self.friction.torque(
+                    beta - float(relaxed) if known else 0.0,
+                    float(np.dot(b, state[2:])),
+                    (float(got.torque) + slipping) / self.ratio,
+                )
+        return self.signals(*state, slipping=slipping, friction=friction)
 
 
 def _slipping(

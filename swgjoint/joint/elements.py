@@ -51,8 +51,12 @@ def add_tendon(
     stiffness: tuple[float, float, float],
     damping: float,
     springyield: float = 0.0,
+    coefficients: tuple[float, float] | None = None,
 ) -> None:
-    """Fixed tendon of length theta/i - psi, nothing inherited from defaults."""
+    """Fixed tendon of length theta/i - psi, nothing inherited from defaults.
+
+    With ``coefficients`` its length is that sum of theta and psi instead.
+    """
     tendon = spec.add_tendon(name=name)
     tendon.stiffness = np.array(stiffness)
     tendon.damping = np.array([damping, 0.0, 0.0])
@@ -62,8 +66,10 @@ def add_tendon(
     tendon.frictionloss = 0.0
     tendon.limited = mujoco.mjtLimited.mjLIMITED_FALSE
     tendon.actfrclimited = mujoco.mjtLimited.mjLIMITED_FALSE
-    tendon.wrap_joint(rotor, 1.0 / ratio)
-    tendon.wrap_joint(link, -1.0)
+    by_theta, by_psi = coefficients or (1.0 / ratio, -1.0)
+    tendon.wrap_joint(rotor, by_theta)
+    if by_psi:
+        tendon.wrap_joint(link, by_psi)
 
 
 def add_native(
@@ -85,6 +91,8 @@ def add_native(
     )
     if spring.friction:
         spec.joint(rotor).frictionloss = spring.friction
+    if spring.viscous:
+        spec.joint(rotor).damping[0] = spring.viscous
     names = tuple(f"{link}_hysteresis{k}" for k in range(len(spring.hysteresis)))
     for one, element in zip(names, spring.hysteresis, strict=True):
         add_tendon(

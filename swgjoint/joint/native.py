@@ -2,23 +2,22 @@ r"""Level ``native``: what MuJoCo's own elements can hold of a drive, no plugin.
 
 The mean curve becomes the polynomial stiffness of a tendon,
 :math:`T(x) = a x + c x^3` with x = theta/i - psi; hysteresis becomes parallel tendons
-with ``springyield`` (Jenkin elements), friction the ``frictionloss`` of the rotor.
+with ``springyield`` (Jenkin elements), friction ``frictionloss`` and ``damping`` of the
+rotor: Coulomb, bending and viscous part, against the housing. That is an approximation:
+friction that grows with the load or falls with the speed has no constant, and the
+engine's friction loss is a soft constraint, which creeps.
 
-The last two exist only where the map has them: ``hysteresis``, and in its ``info``
-``friction``, ``{"input_Nm": f}``. Kinematic error and the angle harmonics of the torque
-have no native form.
+The last two exist only where the map has them. Kinematic error and the angle harmonics
+of the torque have no native form.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from swgjoint.errors import InputError
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.hysteresis import Jenkin
 
@@ -42,6 +41,8 @@ class NativeSpring:
     hysteresis: tuple[Jenkin, ...] = ()
     friction: float = 0.0
     """Constant friction torque at the input [N·m]."""
+    viscous: float = 0.0
+    """Friction per speed of the input [N·m·s/rad]."""
 
     def torque(self, torsion: Array) -> Array:
         """Elastic torque, without hysteresis [N·m]."""
@@ -53,10 +54,7 @@ def fit_native(drive: DriveMap) -> NativeSpring:
 
     Where the curve softens (c < 0) the spring is linear with the map's mean
     stiffness; where it has no stiffness about zero (a <= 0: clearance) a thousandth
-    of the mean stiffness stays. ``note`` says so.
-
-    Raises:
-        InputError: If the map's ``info`` has an unusable friction.
+    of the mean stiffness stays. ``note`` says so, and what friction loses.
     """
     low, high = drive.torque_range
     peak = min(drive.ratings.repeated_peak, -low, high)
@@ -79,6 +77,10 @@ def fit_native(drive: DriveMap) -> NativeSpring:
         c = max(float(u**3 @ (torque - a * x)) / float(u**3 @ u**3) / unit**3, 0.0)
         note = "the mean curve has no stiffness about zero: cubic"
     rest = torque - x * (a + c * x**2)
+    law = drive.friction
+    if law is not None and (law.load or law.static > law.coulomb):
+        more = "friction without its dependence on load and speed, against the housing"
+        note = f"{note}; {more}" if note else more
     return NativeSpring(
         linear=float(a),
         cubic=float(c),
@@ -86,7 +88,8 @@ def fit_native(drive: DriveMap) -> NativeSpring:
         fitted_to=float(peak),
         note=note,
         hysteresis=drive.hysteresis,
-        friction=_friction(drive),
+        friction=law.coulomb + law.bending if law else 0.0,
+        viscous=law.viscous if law else 0.0,
     )
 
 
@@ -108,20 +111,3 @@ def native_map(drive: DriveMap, spring: NativeSpring) -> DriveMap:
         end_stiffness=np.array([[[stiffness, stiffness], [0.0, 0.0]]]),
         kinematic_error=np.zeros((1, 2)),
     )
-
-
-def _friction(drive: DriveMap) -> float:
-    given = drive.info.get("friction")
-    return 0.0 if given is None else _number(drive, given)
-
-
-def _number(drive: DriveMap, item: Any) -> float:
-    value = item.get("input_Nm") if isinstance(item, Mapping) else None
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        value = None
-    if value is None or not (np.isfinite(value) and value > 0.0):
-        raise InputError(
-            f"info.friction.input_Nm of map {drive.name!r} is {value}; accepted: a"
-            " finite number > 0"
-        )
-    return float(value)

@@ -29,6 +29,9 @@ PASSES = 2
 """Evaluations of the map in a step: one prediction of the pair, then the force."""
 TENDON_STIFFNESS = (1e-9, 0.0, 1.0)
 """Polynomial of the carrier tendon; its cubic turns a length into a tangent."""
+FRICTION_STIFFNESS = (1e-9, 0.0, 1e-30)
+"""The same for the tendon of the friction, whose length is a rotation of many turns:
+with so small a cubic its own spring pulls with nothing. The plugin knows it by that."""
 
 
 def library() -> Path:
@@ -83,24 +86,46 @@ def config(
         numerical_damping: See :data:`NUMERICAL_DAMPING` [-].
         passes: See :data:`PASSES`.
     """
-    return {
-        "ratio": repr(drive.ratio),
-        "orders": " ".join(str(int(n)) for n in np.ravel(drive.angle_orders)),
-        "knots": _text(drive.torsion_knots),
-        "potential": _text(drive.potential),
-        "end_stiffness": _text(drive.end_stiffness),
-        "kinematic_error": _text(drive.kinematic_error),
-        "damping": repr(float(damping)),
-        "numerical_damping": repr(float(numerical_damping)),
-        "passes": str(int(passes)),
-    } | (
+    return (
         {
-            "hysteresis": _text(
-                np.array([(e.stiffness, e.yield_torque) for e in drive.hysteresis])
-            )
+            "ratio": repr(drive.ratio),
+            "orders": " ".join(str(int(n)) for n in np.ravel(drive.angle_orders)),
+            "knots": _text(drive.torsion_knots),
+            "potential": _text(drive.potential),
+            "end_stiffness": _text(drive.end_stiffness),
+            "kinematic_error": _text(drive.kinematic_error),
+            "damping": repr(float(damping)),
+            "numerical_damping": repr(float(numerical_damping)),
+            "passes": str(int(passes)),
         }
-        if drive.hysteresis
-        else {}
+        | (
+            {
+                "hysteresis": _text(
+                    np.array([(e.stiffness, e.yield_torque) for e in drive.hysteresis])
+                )
+            }
+            if drive.hysteresis
+            else {}
+        )
+        | ({"friction": _text(friction_numbers(drive))} if drive.friction else {})
+    )
+
+
+def friction_numbers(drive: DriveMap) -> np.ndarray:
+    """Attribute ``friction``: direction, then the law with the bending in it. (9,)."""
+    f = drive.friction
+    assert f is not None
+    return np.array(
+        [
+            *drive.friction_direction,
+            f.stiffness,
+            f.damping,
+            f.coulomb + f.bending,
+            f.static + f.bending,
+            f.stribeck_speed,
+            f.viscous,
+            f.load / abs(drive.ratio),
+        ]
     )
 
 

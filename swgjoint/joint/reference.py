@@ -29,6 +29,10 @@ way that it sticks,
 
 Its work is the change of :math:`k u^2/2` plus what slipping takes, which is >= 0.
 
+Friction acts along beta, the rotation of the wave generator relative to the flexspline,
+with a metric of its own, :math:`h^2 p_b\,b b^T`; see
+:mod:`swgjoint.joint.friction_step`.
+
 Source:
     Gonzalez (1996), "Time integration and discrete Hamiltonian systems", J. Nonlinear
     Sci. 6, for discrete gradients; the prediction and the metric are our own.
@@ -42,6 +46,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from swgjoint.joint.friction_step import FrictionStep, friction_step, stretch_after
 from swgjoint.maps.drive_map import DriveMap
 
 Array = NDArray[np.float64]
@@ -63,6 +68,8 @@ class Motion:
     link_acceleration: float = 0.0
     rest: tuple[float, ...] = ()
     """Torsion at which each element of the hysteresis is relaxed [rad]."""
+    relaxed: float | None = None
+    """beta at which the bristle of the friction is relaxed [rad]; None: here."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,6 +88,9 @@ class SchemeForce:
     e_theta: float
     """Secant of V by theta at fixed torsion [N·m]."""
     e_psi: float
+    friction: FrictionStep | None = None
+    """Along beta; its force is in ``theta`` and ``psi``, its metric is not in
+    ``metric``."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -102,8 +112,18 @@ def gradient_force(
     g_theta, g_psi = 1.0 / drive.ratio + float(e_theta), -1.0 + float(e_psi)
     friction = damping * (g_theta * motion.theta_rate + g_psi * motion.psi_rate)
     torsion = float(drive.torsion(motion.theta, motion.psi))
-    friction += _slip(drive, motion.rest, torsion, 0.0)[0]
-    return float(theta) - friction * g_theta, float(psi) - friction * g_psi
+    slipping = _slip(drive, motion.rest, torsion, 0.0)[0]
+    friction += slipping
+    on_theta, on_psi = float(theta) - friction * g_theta, float(psi) - friction * g_psi
+    if drive.friction is not None:
+        law, b = drive.friction, np.array(drive.friction_direction, float)
+        elastic = float(drive.torque(torsion, motion.theta, motion.psi)) + slipping
+        speed = float(b @ [motion.theta_rate, motion.psi_rate])
+        beta = float(b @ [motion.theta, motion.psi])
+        turned = 0.0 if motion.relaxed is None else beta - motion.relaxed
+        rubs = law.torque(turned, speed, elastic / drive.ratio)
+        on_theta, on_psi = on_theta - b[0] * rubs, on_psi - b[1] * rubs
+    return on_theta, on_psi
 
 
 def scheme_force(
@@ -130,6 +150,9 @@ def scheme_force(
     weight = np.array([motion.rotor_weight, motion.link_weight])
     other = np.array([motion.rotor_acceleration, motion.link_acceleration])
     x = np.array([motion.theta, motion.psi]) - 0.5 * h * v
+    b = np.array(drive.friction_direction, float)
+    beta, speed = float(b @ x), float(b @ v)
+    rubs: FrictionStep | None = None
     dv: Array = np.zeros(2)
     for _ in range(passes):
         dx = h * (v + 0.5 * dv)
@@ -154,9 +177,26 @@ def scheme_force(
         # (M + h² p g g') dv = h (M other - lam g - e), M diagonal
         free = h * (other - weight * (lam * s.g + s.e))
         metric = np.eye(2) + h**2 * p * np.outer(weight * s.g, s.g)
+        middle = speed + 0.5 * float(b @ dv)
         dv = np.asarray(np.linalg.solve(metric, free), float)
+        if drive.friction is not None:
+            answer = h * np.linalg.solve(metric, weight * b)
+            rubs = friction_step(
+                drive.friction,
+                stretch=0.0 if motion.relaxed is None else beta - motion.relaxed,
+                yield_torque=float(
+                    drive.friction.yield_torque(middle, s.torque / drive.ratio)
+                ),
+                speed=speed,
+                free=float(b @ dv),
+                response=float(b @ answer),
+                timestep=h,
+            )
+            dv = dv - answer * rubs.predicted
     p = max(p, 1e-9)
     force = -lam * s.g - s.e
+    if rubs is not None:
+        force = force - rubs.force * b
     return SchemeForce(
         theta=float(force[0]),
         psi=float(force[1]),
@@ -166,10 +206,22 @@ def scheme_force(
         metric=p,
         e_theta=float(s.e[0]),
         e_psi=float(s.e[1]),
+        friction=rubs,
     )
 
 
+def metric_of(drive: DriveMap, force: SchemeForce, *, timestep: float) -> Array:
+    """What the step adds to the inertia of the pair, h² (p g g' + p_b b b'). (2, 2)."""
+    g = np.array([force.g_theta, force.g_psi])
+    metric = force.metric * np.outer(g, g)
+    if force.friction is not None:
+        b = np.array(drive.friction_direction, float)
+        metric = metric + force.friction.metric * np.outer(b, b)
+    return np.asarray(timestep**2 * metric)
+
+
 def other_acceleration(
+    drive: DriveMap,
     motion: Motion,
     force: SchemeForce,
     *,
@@ -182,9 +234,16 @@ def other_acceleration(
     along = force.along + timestep * force.metric * (
         force.g_theta * dm + force.g_psi * dl
     )
+    on_theta = force.g_theta * along + force.e_theta
+    on_psi = force.g_psi * along + force.e_psi
+    if force.friction is not None:
+        b = drive.friction_direction
+        step = force.friction
+        rubs = step.force + timestep * step.metric * (b[0] * dm + b[1] * dl)
+        on_theta, on_psi = on_theta + b[0] * rubs, on_psi + b[1] * rubs
     return (
-        dm / timestep + motion.rotor_weight * (force.g_theta * along + force.e_theta),
-        dl / timestep + motion.link_weight * (force.g_psi * along + force.e_psi),
+        dm / timestep + motion.rotor_weight * on_theta,
+        dl / timestep + motion.link_weight * on_psi,
     )
 
 
@@ -204,6 +263,25 @@ def rest_after(
     reach = np.array([e.yield_torsion for e in drive.hysteresis])
     rest = np.array(motion.rest)
     return tuple(np.clip(rest, torsion - reach, torsion + reach).tolist())
+
+
+def relaxed_after(
+    drive: DriveMap,
+    motion: Motion,
+    force: SchemeForce,
+    *,
+    timestep: float,
+    theta_rate: float,
+    psi_rate: float,
+) -> float:
+    """Plugin state after a step of the scheme: beta where the bristle is relaxed."""
+    assert drive.friction is not None and force.friction is not None
+    b = np.array(drive.friction_direction, float)
+    v = np.array([motion.theta_rate, motion.psi_rate])
+    turned = 0.5 * timestep * float(b @ (v + np.array([theta_rate, psi_rate])))
+    beta = float(b @ [motion.theta, motion.psi]) - 0.5 * timestep * float(b @ v)
+    end = stretch_after(drive.friction, force.friction, turned)
+    return beta + turned - end
 
 
 def _slip(

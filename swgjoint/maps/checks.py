@@ -28,6 +28,9 @@ def check_map(drive: DriveMap) -> None:
     torques = np.array([r.rated_torque, r.repeated_peak, r.momentary_peak, r.T1, r.T2])
     if not (np.isfinite(torques).all() and (torques > 0).all()):
         raise ValueError(f"ratings {torques.tolist()} N·m; accepted: > 0 N·m")
+    skips = r.ratcheting_torque
+    if skips is not None and not (np.isfinite(skips) and skips > 0):
+        raise ValueError(f"ratcheting torque {skips} N·m; accepted: > 0 N·m or none")
     if not 0 <= drive.damping_ratio <= 10:
         raise ValueError(f"damping ratio {drive.damping_ratio}; accepted: 0 to 10")
     if len(drive.orders) > 100_000 or not (abs(drive.orders.astype(float)) < 1e6).all():

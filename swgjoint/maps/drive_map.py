@@ -9,8 +9,9 @@ with :math:`\Delta = \theta/i + e_0(\alpha, \beta) - \psi`. The coefficients are
 piecewise polynomials of degree four, so torque is piecewise cubic. Outside the
 sampled torsion every coefficient continues as a parabola, the torque linearly.
 
-Beside the potential a map may have hysteresis: Jenkin elements along the torsion, see
-:mod:`swgjoint.maps.hysteresis`. Everything below but ``hysteresis`` is conservative.
+Beside the potential a map may have hysteresis, Jenkin elements along the torsion (see
+:mod:`swgjoint.maps.hysteresis`), and friction of the wave generator at speed (see
+:mod:`swgjoint.maps.friction`). Everything below but these two is conservative.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from numpy.typing import ArrayLike, NDArray
 from swgjoint.arrays import frozen_array
 from swgjoint.errors import InputError
 from swgjoint.gear.kinematics import LAYOUTS, angle_coefficients, ratio
+from swgjoint.maps.friction import Friction
 from swgjoint.maps.hysteresis import MAX_ELEMENTS, Jenkin
 
 Array = NDArray[np.float64]
@@ -41,11 +43,13 @@ class Ratings:
     T1: float
     T2: float
     source: str = "given"
+    ratcheting_torque: float | None = None
+    """At which teeth skip; None where it is not known."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DriveMap:
-    """Potential and hysteresis of one drive; immutable."""
+    """Potential, hysteresis and friction of one drive; immutable."""
 
     name: str
     level: str
@@ -73,6 +77,8 @@ class DriveMap:
     damping_ratio: float = 0.02
     hysteresis: tuple[Jenkin, ...] = ()
     """Parallel elements that add to the torque along the torsion; none by default."""
+    friction: Friction | None = None
+    """Of the wave generator against the flexspline; None by default."""
     info: Mapping[str, Any] = field(default_factory=dict)
     """Provenance and residuals, JSON values only."""
 
@@ -105,6 +111,11 @@ class DriveMap:
                 " elements"
             )
         object.__setattr__(self, "hysteresis", elements)
+        if not isinstance(self.friction, Friction | None):
+            raise InputError(
+                f"friction of {self.name!r}: {self.friction!s:.40}; accepted: Friction"
+                " or None"
+            )
 
     # -- constructors ---------------------------------------------------------
 
@@ -237,6 +248,11 @@ class DriveMap:
         """(d phi/d theta, d phi/d psi) of every harmonic. Shape (n_harmonics, 2)."""
         alpha, beta = angle_coefficients(self.layout)
         return np.asarray(self.orders @ np.array([alpha, beta], dtype=np.int64))
+
+    @property
+    def friction_direction(self) -> tuple[int, int]:
+        """(d beta/d theta, d beta/d psi), the rotation against which friction acts."""
+        return angle_coefficients(self.layout)[1]
 
     def phases(self, theta: ArrayLike, psi: ArrayLike) -> Array:
         """Phases of the harmonics [rad], appended as the last axis."""

@@ -16,6 +16,7 @@ import stat
 import struct
 import zipfile
 from dataclasses import asdict
+from numbers import Real
 from pathlib import Path
 from typing import Any, Literal, TypeVar
 
@@ -30,11 +31,13 @@ from swgjoint.files import write_whole
 from swgjoint.json_text import json_text
 from swgjoint.maps.checks import check_map
 from swgjoint.maps.drive_map import DriveMap, Ratings
+from swgjoint.maps.friction import Friction
 from swgjoint.maps.hysteresis import Jenkin
 
-SCHEMA_VERSION = 2
-"""2 added ``hysteresis``; a map of version 1 is read as one without."""
-_READABLE = (1, SCHEMA_VERSION)
+SCHEMA_VERSION = 3
+"""2 added ``hysteresis``, 3 ``friction`` and the ratcheting torque; an older map is
+read as one without."""
+_READABLE = (1, 2, SCHEMA_VERSION)
 MAX_BYTES = 64_000_000
 """A map with a thousand harmonics and a hundred knots is below 10 MB."""
 
@@ -64,6 +67,7 @@ class RatingsHeader(Section):
     T1: float
     T2: float
     source: str
+    ratcheting_torque: float | None = None
 
 
 class JenkinHeader(Section):
@@ -71,6 +75,34 @@ class JenkinHeader(Section):
 
     stiffness_Nm_rad: float
     yield_torque_Nm: float
+
+
+class FrictionHeader(Section):
+    """Friction at the input."""
+
+    stiffness_Nm_rad: float
+    coulomb_Nm: float
+    static_Nm: float
+    stribeck_speed_rad_s: float
+    viscous_Nms_rad: float
+    load: float
+    bending_Nm: float
+    damping_Nms_rad: float
+    source: str
+
+
+_FRICTION = {
+    "stiffness_Nm_rad": "stiffness",
+    "coulomb_Nm": "coulomb",
+    "static_Nm": "static",
+    "stribeck_speed_rad_s": "stribeck_speed",
+    "viscous_Nms_rad": "viscous",
+    "load": "load",
+    "bending_Nm": "bending",
+    "damping_Nms_rad": "damping",
+    "source": "source",
+}
+"""Keys of the file and fields of the friction."""
 
 
 class Header(Section):
@@ -88,6 +120,7 @@ class Header(Section):
     damping_ratio: float
     ratings: RatingsHeader
     hysteresis: list[JenkinHeader] = Field(default_factory=list)
+    friction: FrictionHeader | None = None
     info: dict[str, Any]
 
 
@@ -109,10 +142,7 @@ def map_bytes(drive: DriveMap) -> bytes:
         "teeth_flexspline": drive.teeth_flexspline,
         "teeth_circular_spline": drive.teeth_circular_spline,
         "damping_ratio": float(drive.damping_ratio),
-        "ratings": {
-            key: value if key == "source" else float(value)
-            for key, value in asdict(drive.ratings).items()
-        },
+        "ratings": {key: _plain(value) for key, value in asdict(drive.ratings).items()},
         "hysteresis": [
             {
                 "stiffness_Nm_rad": float(element.stiffness),
@@ -120,6 +150,11 @@ def map_bytes(drive: DriveMap) -> bytes:
             }
             for element in drive.hysteresis
         ],
+        "friction": drive.friction
+        and {
+            key: _plain(getattr(drive.friction, name))
+            for key, name in _FRICTION.items()
+        },
         "info": dict(drive.info),
     }
     text = json_text(header, indent=None).encode()
@@ -136,6 +171,10 @@ def map_bytes(drive: DriveMap) -> bytes:
             # ZipInfo's own date, 1980, keeps the bytes independent of the clock
             archive.writestr(zipfile.ZipInfo(f"{key}.npy"), member.getvalue())
     return out.getvalue()
+
+
+def _plain(value: object) -> object:
+    return float(value) if isinstance(value, Real) else value
 
 
 def write_map(drive: DriveMap, path: str | Path) -> None:
@@ -193,11 +232,18 @@ def map_from_bytes(data: bytes, cls: type[Map]) -> Map:
             )
             for element in header.hysteresis
         ),
+        friction=_friction(header.friction),
         info=header.info,
         **arrays,
     )
     check_map(drive)
     return drive
+
+
+def _friction(header: FrictionHeader | None) -> Friction | None:
+    if header is None:
+        return None
+    return Friction(**{_FRICTION[key]: v for key, v in header.model_dump().items()})
 
 
 def _content(path: Path) -> bytes:
@@ -277,7 +323,7 @@ def _header(data: bytes) -> Header:
     if version not in _READABLE:
         raise MapFileError(
             f"schema version {str(version)[:20]}; accepted:"
-            f" {' and '.join(map(str, _READABLE))}; build the map again with 'swgjoint"
+            f" {', '.join(map(str, _READABLE))}; build the map again with 'swgjoint"
             " map'"
         )
     return validated(Header, content, where="header", error=MapFileError)

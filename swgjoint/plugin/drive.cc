@@ -12,9 +12,14 @@ namespace {
 constexpr char kName[] = "swgjoint.drive";
 constexpr const char* kAttributes[] = {
     "ratio",           "orders",  "knots",             "potential", "end_stiffness",
-    "kinematic_error", "damping", "numerical_damping", "passes", "hysteresis"};
+    "kinematic_error", "damping", "numerical_damping", "passes", "hysteresis",
+    "friction"};
 constexpr int kAccelerations = 2;  // states before those of the hysteresis
+constexpr int kBristle = 2;        // where it is relaxed, whether that is known
 constexpr size_t kMaxElements = 64;
+// Cubic coefficient that marks the tendon of the friction: so small that the spring
+// pulls with nothing, for its length, unlike a torsion, is a rotation of many turns.
+constexpr mjtNum kFrictionCubic = 1e-30;
 
 Drive* Get(const mjData* d, int instance) {
   return reinterpret_cast<Drive*>(d->plugin_data[instance]);
@@ -51,7 +56,26 @@ int CountStates(const mjModel* m, int instance) {
   std::vector<double> list;
   // a bad attribute is refused when the instance is made
   if (!Elements(m, instance, &list)) return kAccelerations;
-  return kAccelerations + static_cast<int>(list.size() / 2);
+  const char* friction = mj_getPluginConfig(m, instance, "friction");
+  return kAccelerations + static_cast<int>(list.size() / 2) +
+         (friction && *friction ? kBristle : 0);
+}
+
+// Tangent stiffness of a tendon's cubic spring at the length that this sets; 0 would
+// leave the engine's metric. Returns the stiffness that it has after rounding.
+mjtNum SetTangent(const mjModel* m, mjData* d, int tendon, mjtNum p) {
+  const mjtNum a = m->tendon_stiffness[tendon];
+  const mjtNum c = m->tendon_stiffnesspoly[mjNPOLY * tendon + 1];
+  const mjtNum length = std::max(1e-12, std::sqrt(std::max(0.0, (p - a) / (3 * c))));
+  d->ten_length[tendon] = length;
+  return a + 3 * c * length * length;
+}
+
+// Force of a tendon's cubic spring, as the engine applied it.
+mjtNum NativeForce(const mjModel* m, const mjData* d, int tendon) {
+  const mjtNum x = d->ten_length[tendon];
+  return x * (m->tendon_stiffness[tendon] +
+              x * x * m->tendon_stiffnesspoly[mjNPOLY * tendon + 1]);
 }
 
 }  // namespace
@@ -128,7 +152,44 @@ std::unique_ptr<Drive> Drive::Create(const mjModel* m, int instance) {
   if (drive->entry_rotor_ < 0 || drive->entry_link_ < 0) {
     return Refuse(m, instance, "its joints are missing in the tendon's Jacobian");
   }
+  const char* friction = text("friction");
+  if (friction && *friction && !drive->FindFriction(m, friction, rotor, link)) {
+    return Refuse(m, instance,
+                  "attribute 'friction' is not nine numbers 'b_theta b_psi stiffness "
+                  "damping coulomb static stribeck_speed viscous load', or no tendon "
+                  "with these b and stiffness 'a 0 1e-30' carries it");
+  }
   return drive;
+}
+
+// The tendon that carries the friction's metric has the same joints, with b as
+// coefficients, and the mark; found by that, for attaching may change its name.
+bool Drive::FindFriction(const mjModel* m, const char* text, int rotor, int link) {
+  std::vector<double> list;
+  Friction friction;
+  if (!ParseNumbers(text, &list) || !friction.Parse(list)) return false;
+  const int size = friction.b_psi() == 0 ? 1 : 2;
+  for (int t = 0; t < m->ntendon; ++t) {
+    const int wrap = m->tendon_adr[t];
+    if (m->tendon_num[t] != size || m->wrap_type[wrap] != mjWRAP_JOINT ||
+        m->wrap_objid[wrap] != rotor || m->wrap_prm[wrap] != friction.b_theta() ||
+        m->tendon_stiffness[t] <= 0 || m->tendon_damping[t] != 0 ||
+        m->tendon_stiffnesspoly[mjNPOLY * t + 1] != kFrictionCubic) {
+      continue;
+    }
+    if (size == 2 && (m->wrap_objid[wrap + 1] != link ||
+                      m->wrap_prm[wrap + 1] != friction.b_psi())) {
+      continue;
+    }
+    friction_ = friction;
+    friction_tendon_ = t;
+  }
+  return friction_.has_value();
+}
+
+// Of the wave generator relative to the flexspline, from positions or velocities.
+mjtNum Drive::Rotation(const mjtNum* q) const {
+  return friction_->b_theta() * q[0] + friction_->b_psi() * q[1];
 }
 
 void Drive::Compute(const mjModel* m, mjData* d, int instance) {
@@ -137,11 +198,14 @@ void Drive::Compute(const mjModel* m, mjData* d, int instance) {
   if (m->opt.disableflags & mjDSBL_SPRING) return;
 
   // take the native spring of the tendon out again, as the engine applied it
-  const mjtNum x = d->ten_length[tendon_];
-  const mjtNum native = x * (m->tendon_stiffness[tendon_] +
-                             x * x * m->tendon_stiffnesspoly[mjNPOLY * tendon_ + 1]);
+  const mjtNum native = NativeForce(m, d, tendon_);
   d->qfrc_passive[v_rotor_] += native * d->ten_J[entry_rotor_];
   d->qfrc_passive[v_link_] += native * d->ten_J[entry_link_];
+  if (friction_) {
+    const mjtNum rubbed = NativeForce(m, d, friction_tendon_);
+    d->qfrc_passive[v_rotor_] += rubbed * friction_->b_theta();
+    d->qfrc_passive[v_link_] += rubbed * friction_->b_psi();
+  }
 
   // PGS solves without the tendon part of the metric
   if (m->opt.integrator == mjINT_DISCRETE && m->opt.solver != mjSOL_PGS) {
@@ -178,6 +242,18 @@ void Drive::AddGradient(const mjModel* m, mjData* d, int instance) {
   map_.Gradient(d->qpos[q_rotor_], d->qpos[q_link_], &value);
   Place(d->plugin_state + m->plugin_stateadr[instance] + kAccelerations);
   Slip(0, &value);
+  if (friction_) {
+    const mjtNum* state = d->plugin_state + m->plugin_stateadr[instance] +
+                          kAccelerations + reach_.size();
+    const mjtNum q[2] = {d->qpos[q_rotor_], d->qpos[q_link_]};
+    const mjtNum v[2] = {d->qvel[v_rotor_], d->qvel[v_link_]};
+    const mjtNum speed = Rotation(v);
+    const mjtNum x = state[1] != 0 ? Rotation(q) - state[0] : 0;
+    const mjtNum rubs =
+        friction_->Torque(x, friction_->Reach(speed, value.torque), speed);
+    d->qfrc_passive[v_rotor_] -= rubs * friction_->b_theta();
+    d->qfrc_passive[v_link_] -= rubs * friction_->b_psi();
+  }
   step_.gradient = true;
   const mjtNum damping = m->opt.disableflags & mjDSBL_DAMPER ? 0 : damping_;
   const mjtNum rate =
@@ -202,7 +278,17 @@ void Drive::AddScheme(const mjModel* m, mjData* d, int instance) {
   map_.Begin(d->qpos[q_rotor_] - 0.5 * h * vm, d->qpos[q_link_] - 0.5 * h * vl);
   Place(state + kAccelerations);
   DriveValue& g = step_.value;
-  mjtNum dm = 0, dl = 0, force = 0, p = 0;
+  FrictionStep& rub = step_.friction;
+  mjtNum dm = 0, dl = 0, force = 0, p = 0, speed = 0, turned = 0;
+  if (friction_) {
+    const mjtNum* rest = state + kAccelerations + reach_.size();
+    const mjtNum x[2] = {d->qpos[q_rotor_] - 0.5 * h * vm,
+                         d->qpos[q_link_] - 0.5 * h * vl};
+    const mjtNum v[2] = {vm, vl};
+    speed = Rotation(v);
+    step_.rotation = Rotation(x);
+    turned = rest[1] != 0 ? step_.rotation - rest[0] : 0;
+  }
   for (int pass = 0; pass < passes_; ++pass) {
     const mjtNum xm = h * (vm + 0.5 * dm), xl = h * (vl + 0.5 * dl);
     map_.Secant(xm, xl, &g);
@@ -215,28 +301,47 @@ void Drive::AddScheme(const mjModel* m, mjData* d, int instance) {
     const mjtNum predicted = g.g_theta * dm + g.g_psi * dl;
     force = g.torque - 0.5 * h * g.slope * predicted + (nu * k * h + damping) * rate;
     p = 0.5 * g.slope + 0.75 * nu * k + 0.5 * damping / h;
-    if (pass + 1 == passes_) break;
+    if (pass + 1 == passes_ && !friction_) break;
+    if (friction_) {
+      const mjtNum dv[2] = {dm, dl};
+      rub.reach = friction_->Reach(speed + 0.5 * Rotation(dv), g.torque);
+      rub.stretch = std::clamp(turned, -rub.reach, rub.reach);
+    }
     const mjtNum am = state[0] - wm * g.e_theta, al = state[1] - wl * g.e_psi;
     const mjtNum change = h * (g.g_theta * am + g.g_psi * al - w * force) /
                           (1 + h * h * w * p);
     const mjtNum f = force + h * p * change;
     dm = h * (am - wm * g.g_theta * f);
     dl = h * (al - wl * g.g_psi * f);
+    if (friction_) {
+      // (M + h^2 p g g')^-1 b: how the pair answers to friction
+      const mjtNum bm = friction_->b_theta(), bl = friction_->b_psi();
+      const mjtNum along = h * h * p * (wm * bm * g.g_theta + wl * bl * g.g_psi) /
+                           (1 + h * h * w * p);
+      const mjtNum rm = wm * (bm - along * g.g_theta);
+      const mjtNum rl = wl * (bl - along * g.g_psi);
+      const mjtNum dv[2] = {dm, dl}, response[2] = {h * rm, h * rl};
+      const mjtNum rubs =
+          friction_->Solve(h, speed, Rotation(dv), Rotation(response), &rub);
+      dm -= h * rm * rubs;
+      dl -= h * rl * rubs;
+    }
   }
 
-  // length at which the cubic spring has the tangent p; 0 would leave the metric
-  const mjtNum a = m->tendon_stiffness[tendon_];
-  const mjtNum c = m->tendon_stiffnesspoly[mjNPOLY * tendon_ + 1];
-  const mjtNum length = std::max(1e-12, std::sqrt(std::max(0.0, (p - a) / (3 * c))));
-  p = a + 3 * c * length * length;
-
+  p = SetTangent(m, d, tendon_, p);
   // the engine will add -h p times the tendon's velocity along g: cancel it
   const mjtNum shift = h * p * d->ten_velocity[tendon_];
-  d->ten_length[tendon_] = length;
   d->ten_J[entry_rotor_] = g.g_theta;
   d->ten_J[entry_link_] = g.g_psi;
   d->qfrc_passive[v_rotor_] -= (force - shift) * g.g_theta + g.e_theta;
   d->qfrc_passive[v_link_] -= (force - shift) * g.g_psi + g.e_psi;
+  if (friction_) {
+    // the same along b, a second term of the metric
+    rub.metric = SetTangent(m, d, friction_tendon_, rub.metric);
+    const mjtNum rubs = rub.force - h * rub.metric * d->ten_velocity[friction_tendon_];
+    d->qfrc_passive[v_rotor_] -= rubs * friction_->b_theta();
+    d->qfrc_passive[v_link_] -= rubs * friction_->b_psi();
+  }
 
   step_.scheme = true;
   step_.v_rotor = vm;
@@ -265,14 +370,39 @@ void Drive::Advance(const mjModel* m, mjData* d, int instance) {
           std::clamp(rest[j], step_.torsion - reach_[j], step_.torsion + reach_[j]);
     }
   }
+  mjtNum* bristle = state + kAccelerations + reach_.size();
+  if (friction_ && step_.gradient) {
+    const mjtNum q[2] = {d->qpos[q_rotor_], d->qpos[q_link_]};
+    const mjtNum v[2] = {d->qvel[v_rotor_], d->qvel[v_link_]};
+    const mjtNum x = Rotation(q);
+    DriveValue value;
+    map_.Gradient(q[0], q[1], &value);
+    Place(state + kAccelerations);
+    Slip(0, &value);
+    const mjtNum reach = friction_->Reach(Rotation(v), value.torque);
+    bristle[0] = bristle[1] != 0 ? std::clamp(bristle[0], x - reach, x + reach) : x;
+    bristle[1] = 1;
+  }
   if (!step_.scheme) return;
   const mjtNum h = m->opt.timestep;
   const DriveValue& g = step_.value;
   const mjtNum dm = d->qvel[v_rotor_] - step_.v_rotor;
   const mjtNum dl = d->qvel[v_link_] - step_.v_link;
   const mjtNum f = step_.force + h * step_.metric * (g.g_theta * dm + g.g_psi * dl);
-  state[0] = dm / h + step_.w_rotor * (g.g_theta * f + g.e_theta);
-  state[1] = dl / h + step_.w_link * (g.g_psi * f + g.e_psi);
+  mjtNum on_rotor = g.g_theta * f + g.e_theta, on_link = g.g_psi * f + g.e_psi;
+  if (friction_) {
+    const FrictionStep& rub = step_.friction;
+    const mjtNum v[2] = {step_.v_rotor, step_.v_link}, dv[2] = {dm, dl};
+    const mjtNum change = Rotation(dv);
+    const mjtNum rubs = rub.force + h * rub.metric * change;
+    on_rotor += friction_->b_theta() * rubs;
+    on_link += friction_->b_psi() * rubs;
+    const mjtNum dx = h * (Rotation(v) + 0.5 * change);
+    bristle[0] = step_.rotation + dx - friction_->After(rub, dx);
+    bristle[1] = 1;
+  }
+  state[0] = dm / h + step_.w_rotor * on_rotor;
+  state[1] = dl / h + step_.w_link * on_link;
 }
 
 void Drive::RegisterPlugin() {

@@ -5,9 +5,11 @@
 #include <mujoco/mujoco.h>
 
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "drive_map.h"
+#include "friction.h"
 
 namespace swgjoint {
 
@@ -20,7 +22,7 @@ class Drive {
   void Compute(const mjModel* m, mjData* d, int instance);
 
   // After the step: keeps the acceleration that all other forces caused, and where
-  // the elements of the hysteresis are relaxed.
+  // the elements of the hysteresis and the bristle of the friction are relaxed.
   void Advance(const mjModel* m, mjData* d, int instance);
 
   void Forget() { step_ = Step(); }
@@ -33,14 +35,17 @@ class Drive {
     bool scheme = false, gradient = false;
     mjtNum v_rotor = 0, v_link = 0, w_rotor = 0, w_link = 0;  // velocity, 1/inertia
     mjtNum force = 0, metric = 0;                             // lam, p
-    mjtNum torsion = 0;                                       // begin of the step
+    mjtNum torsion = 0, rotation = 0;                         // begin of the step
     DriveValue value;
+    FrictionStep friction;
   };
 
   void AddGradient(const mjModel* m, mjData* d, int instance);
   void AddScheme(const mjModel* m, mjData* d, int instance);
   void Place(const mjtNum* rest);
   void Slip(mjtNum change, DriveValue* value) const;
+  bool FindFriction(const mjModel* m, const char* text, int rotor, int link);
+  mjtNum Rotation(const mjtNum* q) const;
 
   DriveMap map_;
   mjtNum damping_ = 0, numerical_damping_ = 0;
@@ -49,6 +54,8 @@ class Drive {
   int q_rotor_ = -1, q_link_ = -1, v_rotor_ = -1, v_link_ = -1;  // addresses
   // Jenkin elements: stiffness, torsion from rest to slip, torsion from rest now
   std::vector<mjtNum> stiffness_, reach_, stretch_;
+  std::optional<Friction> friction_;
+  int friction_tendon_ = -1;  // carries its part of the metric
   Step step_;
 };
 

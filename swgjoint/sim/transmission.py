@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from swgjoint.joint.drive import JointDrive, JointSignals
 from swgjoint.maps.drive_map import DriveMap
+from swgjoint.maps.friction import play_friction
 from swgjoint.maps.hysteresis import play_hysteresis
 
 Array = NDArray[np.float64]
@@ -53,8 +54,8 @@ class Transmission:
     ) -> JointSignals:
         """Torsion, transmission error and output torque of recorded states. (n,).
 
-        The law at the true positions and velocities of each state; hysteresis is played
-        over the whole record. Not for the levels without a rotor.
+        The law at the true positions and velocities of each state; hysteresis and
+        friction are played over the whole record. Not for the levels without a rotor.
         """
         pieces = [
             self.attached.signals(
@@ -77,6 +78,16 @@ class Transmission:
                 for k in range(0, theta.size, _CHUNK)
             ]
             torque = torque + played * np.concatenate(slopes)
+        friction = self.attached.friction
+        if friction is not None:
+            by_theta, by_psi = self.drive.friction_direction
+            rubs = play_friction(
+                friction,
+                by_theta * theta + by_psi * psi,
+                by_theta * theta_rate + by_psi * psi_rate,
+                torque / self.ratio,
+            )
+            torque = torque - by_psi * rubs
         return JointSignals(
             torsion=torsion,
             transmission_error=np.concatenate([p.transmission_error for p in pieces]),

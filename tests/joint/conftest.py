@@ -56,12 +56,20 @@ class Bench:
         if drive.hysteresis and self.drive.plugin:
             sliders = Sliders.relaxed(drive.hysteresis)
             potential += replace(sliders, rest=self.rest.copy()).energy(torsion)
+        if drive.friction and self.drive.plugin and self.bristle[1]:
+            stretch = float(np.dot(drive.friction_direction, x)) - self.bristle[0]
+            potential += 0.5 * drive.friction.stiffness * stretch**2
         return float(0.5 * np.sum(inertia * v**2) + potential)
 
     @property
     def rest(self) -> np.ndarray:
         """Plugin state of the hysteresis: torsions at which elements are relaxed."""
-        return self.data.plugin_state[2:]
+        return self.data.plugin_state[2 : 2 + len(self.drive.drive.hysteresis)]
+
+    @property
+    def bristle(self) -> np.ndarray:
+        """Plugin state of the friction: where it is relaxed, whether that is known."""
+        return self.data.plugin_state[2 + len(self.drive.drive.hysteresis) :]
 
 
 def make_bench(

@@ -116,7 +116,7 @@ def test_trajectory_equals_twin(bench, lossy):
         v = v + np.linalg.solve(metric, h * total)
         q = q + h * v
         state = other_acceleration(
-            motion, f, timestep=h, theta_rate=v[0], psi_rate=v[1]
+            lossy, motion, f, timestep=h, theta_rate=v[0], psi_rate=v[1]
         )
         rest = rest_after(lossy, motion, timestep=h)
     mujoco.mj_step(b.model, b.data, 300)

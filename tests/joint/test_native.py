@@ -8,10 +8,10 @@ import mujoco
 import numpy as np
 import pytest
 
-from swgjoint.errors import InputError
 from swgjoint.joint.native import fit_native, native_map
 from swgjoint.joint.region import check_region
 from swgjoint.maps.drive_map import DriveMap
+from swgjoint.maps.friction import Friction
 from swgjoint.maps.hysteresis import Jenkin, play_hysteresis
 
 
@@ -118,7 +118,7 @@ def test_what_a_map_does_not_have_is_absent(bench, synthetic_map):
             Jenkin(stiffness=3e3, yield_torque=1.0),
             Jenkin(stiffness=2e3, yield_torque=2.0),
         ),
-        info={"friction": {"input_Nm": 0.05}},
+        friction=Friction(stiffness=50.0, coulomb=0.05, static=0.05),
     )
     b = bench(lossy, level="native")
     assert (b.model.ntendon, b.model.nplastic) == (3, 4)  # low and high end each
@@ -159,19 +159,6 @@ def test_hysteresis_loop_loses_four_f_times_the_slip(bench):
     played = 2e4 * x + play_hysteresis([Jenkin(stiffness=k, yield_torque=f)], x)
     loss = float(np.trapezoid(played[last], x[last]))
     assert loss == pytest.approx(4.0 * f * (amplitude - f / k), rel=1e-3)
-
-
-@pytest.mark.parametrize(
-    ("info", "says"),
-    [
-        ({"friction": {"input_Nm": -1}}, "info.friction.input_Nm .* is -1"),
-        ({"friction": 3.0}, "info.friction.input_Nm .* is None"),
-    ],
-)
-def test_bad_loss_data_is_refused(bench, synthetic_map, info, says):
-    """Loss data that cannot be used are named."""
-    with pytest.raises(InputError, match=says):
-        bench(replace(synthetic_map, info=info), level="native")
 
 
 def test_region_of_native_under_rk4_counts_the_hardening(bench, synthetic_map):

@@ -11,6 +11,7 @@ from numpy.polynomial import Polynomial
 
 from swgjoint.joint.region import check_region
 from swgjoint.maps.drive_map import DriveMap, Ratings
+from swgjoint.maps.friction import Friction
 from swgjoint.maps.hysteresis import Jenkin
 from swgjoint.units import arcmin
 
@@ -72,11 +73,30 @@ def with_elements(drive, rng):
     return replace(drive, hysteresis=elements)
 
 
-def run(bench, rng, *, step, loaded, tooth_order, hardening, seconds, slips=False):
+def with_friction(drive, rng):
+    """Friction of 0.1 to 30 % of the peak torque at the input, of every kind."""
+    at_input = drive.ratings.repeated_peak / abs(drive.ratio)
+    static = at_input * 10 ** rng.uniform(-3, -0.5)
+    stiffness = static / 10 ** rng.uniform(-4, -2)
+    friction = Friction(
+        stiffness=float(stiffness),
+        static=float(static),
+        coulomb=float(static * rng.uniform(0.3, 1.0)),
+        stribeck_speed=float(10 ** rng.uniform(-1, 1)),
+        viscous=float(static / 10 ** rng.uniform(1, 3)),
+        load=float(rng.uniform(0.0, 0.3)),
+        damping=float(stiffness * 10 ** rng.uniform(-4, -2.5)),
+    )
+    return replace(drive, friction=friction)
+
+
+def run(bench, rng, *, step, loaded, tooth_order, hardening, seconds, losses="none"):
     """Energies along one run over its scale, or None outside the region."""
     drive = random_map(rng, tooth_order=tooth_order, hardening=hardening)
-    if slips:
+    if losses == "hysteresis":
         drive = with_elements(drive, rng)
+    if losses == "friction":
+        drive = with_friction(drive, rng)
     rotor, link = 10 ** rng.uniform(-7, -3), 10 ** rng.uniform(-4, 2)
     order = float(np.abs(drive.orders[1, 0]))
     speed = rng.uniform(0, 0.5 if loaded else 0.2) / step / order * rng.choice([-1, 1])
@@ -100,13 +120,13 @@ def run(bench, rng, *, step, loaded, tooth_order, hardening, seconds, slips=Fals
     return np.array(energies) / scale
 
 
-@pytest.mark.parametrize("slips", [False, True])
+@pytest.mark.parametrize("losses", ["none", "hysteresis", "friction"])
 @pytest.mark.parametrize("tooth_order", [False, True])
 @pytest.mark.parametrize("loaded", [False, True])
-def test_random_joints_gain_no_energy(bench, loaded, tooth_order, slips):
+def test_random_joints_gain_no_energy(bench, loaded, tooth_order, losses):
     """Of 60 random joints at 0.5 to 5 ms those inside the region gain under 5 %.
 
-    The springs of the hysteresis count in the energy.
+    The springs of hysteresis and friction count in the energy.
     """
     rng = np.random.default_rng(11)
     inside = 0
@@ -119,7 +139,7 @@ def test_random_joints_gain_no_energy(bench, loaded, tooth_order, slips):
             tooth_order=tooth_order,
             hardening=float(rng.choice([3.0, 10.0, 25.0])),
             seconds=1.0,
-            slips=slips,
+            losses=losses,
         )
         if energies is not None:
             inside += 1

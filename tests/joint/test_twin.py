@@ -124,7 +124,7 @@ def test_trajectory_equals_twin(bench, any_layout, torque):
         v = v + np.linalg.solve(metric, h * total)
         q = q + h * v
         state = other_acceleration(
-            motion, f, timestep=h, theta_rate=v[0], psi_rate=v[1]
+            any_layout, motion, f, timestep=h, theta_rate=v[0], psi_rate=v[1]
         )
     mujoco.mj_step(b.model, b.data, 300)
     ratio = abs(any_layout.ratio)

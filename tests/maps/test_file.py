@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 from swgjoint.errors import InputError, MapFileError
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.file import MAX_BYTES, map_bytes
+from swgjoint.maps.friction import Friction
 from swgjoint.maps.hysteresis import Jenkin
 
 ARRAYS = ("torsion_knots", "orders", "potential", "end_stiffness", "kinematic_error")
@@ -82,8 +83,16 @@ def test_round_trip_is_bitwise(synthetic_map, tmp_path):
         Jenkin(stiffness=1e3 / 3, yield_torque=0.1),
         Jenkin(stiffness=2e4, yield_torque=1 / 7),
     )
+    friction = Friction(stiffness=1e2 / 3, coulomb=0.1, static=1 / 7, source="a guess")
     info = {"residual": {"torque_Nm": 1e-3}, "angles": 24}
-    drive = replace(synthetic_map, hysteresis=elements, info=info)
+    ratings = replace(synthetic_map.ratings, ratcheting_torque=700 / 3)
+    drive = replace(
+        synthetic_map,
+        hysteresis=elements,
+        friction=friction,
+        ratings=ratings,
+        info=info,
+    )
     drive.save(tmp_path / "a.swg")
     assert same(DriveMap.load(tmp_path / "a.swg"), drive)
     assert os.listdir(tmp_path) == ["a.swg"]
@@ -101,7 +110,7 @@ def test_numpy_reads_the_file_without_pickle(synthetic_map, tmp_path):
         assert np.array_equal(arrays["potential"], synthetic_map.potential)
         header = json.loads(arrays["header"].tobytes())
     assert header["units"]["torsion_knots"] == "rad"
-    assert header["schema_version"] == 2
+    assert header["schema_version"] == 3
 
 
 def test_info_that_is_no_number_becomes_null(synthetic_map, tmp_path):
@@ -243,7 +252,7 @@ def test_wrong_headers(synthetic_map, tmp_path):
     header = header_of(data)
     ratings = header["ratings"]
     cases = {
-        "schema version 3": {**header, "schema_version": 3},
+        "schema version 4": {**header, "schema_version": 4},
         "schema version 0": {**header, "schema_version": 0},
         "header: layout": {k: v for k, v in header.items() if k != "layout"},
         "unknown key": {**header, "code": "x"},
@@ -264,12 +273,18 @@ def test_wrong_headers(synthetic_map, tmp_path):
         assert word.lower() in message.lower(), message
 
 
-def test_a_file_of_version_1_has_no_hysteresis(synthetic_map, tmp_path):
-    """A map that was written before there was hysteresis is read without it."""
+@pytest.mark.parametrize(
+    ("version", "new"), [(1, {"hysteresis", "friction"}), (2, {"friction"})]
+)
+def test_an_older_file_is_read_without_what_is_new(
+    synthetic_map, tmp_path, version, new
+):
+    """A map from before hysteresis, or friction and ratcheting, is read without."""
     data = map_bytes(synthetic_map)
-    header = {k: v for k, v in header_of(data).items() if k != "hysteresis"}
+    header = {k: v for k, v in header_of(data).items() if k not in new}
+    del header["ratings"]["ratcheting_torque"]
     path = tmp_path / "old.swg"
-    old = header_npy({**header, "schema_version": 1})
+    old = header_npy({**header, "schema_version": version})
     path.write_bytes(repacked(data, header=old))
     assert same(DriveMap.load(path), synthetic_map)
 
@@ -291,6 +306,49 @@ def test_hostile_hysteresis(synthetic_map, tmp_path, elements, says):
     data = map_bytes(synthetic_map)
     header = header_npy({**header_of(data), "hysteresis": elements})
     assert says in refusal(tmp_path, repacked(data, header=header))
+
+
+_RUBS = {
+    "stiffness_Nm_rad": 50.0,
+    "coulomb_Nm": 0.05,
+    "static_Nm": 0.07,
+    "stribeck_speed_rad_s": 1.0,
+    "viscous_Nms_rad": 1e-3,
+    "load": 0.1,
+    "bending_Nm": 0.0,
+    "damping_Nms_rad": 0.0,
+    "source": "given",
+}
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"stiffness_Nm_rad": 0.0}, "friction stiffness 0.0"),
+        ({"coulomb_Nm": -0.1}, "friction coulomb -0.1"),
+        ({"static_Nm": 0.01}, "at least coulomb"),
+        ({"viscous_Nms_rad": 1e99}, "friction viscous 1e+99"),
+        ({"load": "much"}, "friction.load"),
+        ({"source": 1.0}, "friction.source"),
+        ({"more": 1.0}, "unknown key"),
+        ({"bending_Nm": None}, "friction.bending_Nm"),
+    ],
+)
+def test_hostile_friction(synthetic_map, tmp_path, change, says):
+    """Friction that cannot be, or of other keys, is refused in one line."""
+    data = map_bytes(synthetic_map)
+    friction = {k: v for k, v in {**_RUBS, **change}.items() if v is not None}
+    header = header_npy({**header_of(data), "friction": friction})
+    assert says in refusal(tmp_path, repacked(data, header=header))
+
+
+def test_hostile_ratcheting(synthetic_map, tmp_path):
+    """A ratcheting torque that is none is refused in one line."""
+    data = map_bytes(synthetic_map)
+    header = header_of(data)
+    header["ratings"]["ratcheting_torque"] = -3.0
+    message = refusal(tmp_path, repacked(data, header=header_npy(header)))
+    assert "ratcheting torque -3.0" in message
 
 
 def test_what_is_not_a_file(tmp_path):

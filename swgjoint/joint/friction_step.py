@@ -1,0 +1,110 @@
+r"""Friction in one step of the discrete scheme; the twin of ``plugin/friction.cc``.
+
+The bristle goes from the stretch :math:`z_0` over a relative rotation dx. It sticks up
+to its reach R, over the way a, and slips from there. With :math:`f = \sigma R`, motion
+forward, its mean torque over the step is
+
+.. math::
+    \bar q = \begin{cases} \sigma (z_0 + dx/2) + \sigma_1 dx/h & dx \le a\\
+        f - \sigma a^2/(2\,dx) + \sigma_1 a/h & dx > a = R - z_0, \end{cases}
+
+continuous and increasing, and its work :math:`\bar q\,dx` is exact. The predicted
+pair answers to a torque F with :math:`dx = d - \tfrac12 h c F`, so that :math:`F =
+\bar q(dx) + \eta\,dx/h` is a linear or a quadratic equation: no iteration.
+
+What the engine gets is linear in the true dx: offset + rate dx. With rate >= sigma/2
+and offset :math:`\sigma z_0` (it sticks), or \|offset\| at most :math:`\sigma |z_0|`,
+or offset 0, its work is never below :math:`-\sigma z_0^2/2`, whatever the other forces
+do to the step; and the bristle ends with no more than it had plus that work. So the
+friction of a step takes energy or gives back its own, also where the prediction is
+wrong.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import copysign, sqrt
+
+from swgjoint.maps.friction import Friction
+
+
+@dataclass(frozen=True, kw_only=True)
+class FrictionStep:
+    """What friction does in one step, linear in the change of the relative speed."""
+
+    stretch: float
+    """z at the beginning [rad]."""
+    reach: float
+    """R, the largest stretch in this step [rad]."""
+    force: float
+    """Torque without a change of the speed [N·m]."""
+    metric: float
+    """Torque per change of the speed, over h [N·m/rad]."""
+    offset: float
+    """Of the bristle alone, without a rotation [N·m]."""
+    rate: float
+    """Of the bristle alone, per rotation [N·m/rad]."""
+    predicted: float
+    """Torque on the predicted step [N·m]."""
+
+
+def friction_step(
+    friction: Friction,
+    *,
+    stretch: float,
+    yield_torque: float,
+    speed: float,
+    free: float,
+    response: float,
+    timestep: float,
+) -> FrictionStep:
+    """Solve friction on the predicted step of a pair.
+
+    Args:
+        friction: The parameters.
+        stretch: z before the step, cut to the reach of the step [rad].
+        yield_torque: f in this step [N·m].
+        speed: nu at its beginning [rad/s].
+        free: Change of nu without friction [rad/s].
+        response: Change of nu that a torque takes off [rad/s per N·m], > 0.
+        timestep: h [s].
+    """
+    h, sigma = timestep, friction.stiffness
+    reach = yield_torque / sigma
+    z = min(max(stretch, -reach), reach)
+    d, k = h * (speed + 0.5 * free), 0.5 * h * response
+    m = 1.0 + 0.5 * response * friction.viscous
+    offset, rate = sigma * z, 0.5 * sigma + friction.damping / h
+    dx = (d - k * offset) / (m + k * rate)
+    if abs(z + dx) > reach:
+        sign = copysign(1.0, dx)
+        a = reach - sign * z
+        creep = friction.damping * a / h
+        # m dx² - b dx - k sigma a²/2 = 0 for dx > 0
+        b = sign * d - k * (yield_torque + creep)
+        root = sqrt(b * b + 2.0 * m * k * sigma * a * a)
+        way = 0.5 * (b + root) / m if b > 0.0 else k * sigma * a * a / (root - b)
+        mean = sign * (yield_torque - 0.5 * sigma * a * a / way + creep)
+        dx = sign * way
+        rate = 0.5 * sigma
+        offset = mean - rate * dx
+        if abs(offset) > sigma * abs(z):
+            offset, rate = 0.0, mean / dx
+    slope = rate + friction.viscous / h
+    return FrictionStep(
+        stretch=z,
+        reach=reach,
+        force=offset + slope * h * speed,
+        metric=0.5 * slope,
+        offset=offset,
+        rate=rate,
+        predicted=offset + slope * dx,
+    )
+
+
+def stretch_after(friction: Friction, step: FrictionStep, rotation: float) -> float:
+    """Z after the rotation that the step came to [rad]."""
+    end = min(max(step.stretch + rotation, -step.reach), step.reach)
+    work = (step.offset + step.rate * rotation) * rotation
+    most = sqrt(max(0.0, step.stretch**2 + 2.0 * work / friction.stiffness))
+    return min(max(end, -most), most)

@@ -1,0 +1,163 @@
+r"""Friction of a drive at speed: bearing, seals and bending between two members.
+
+It acts on the rotation of the wave generator relative to the flexspline, beta (theta -
+psi with the circular spline fixed, theta with the flexspline fixed): there the bearing
+runs and the rim is bent. An elasto-plastic element, a bristle of stiffness sigma and
+damping sigma_1 in series with a slider, and a viscous part, with nu the relative speed:
+
+.. math::
+    F = \sigma z + \sigma_1 \dot z + \eta\,\nu, \quad |z| \le f/\sigma, \quad
+    f = f_b + f_c + (f_s - f_c)\,e^{-(\nu/\nu_s)^2} + c\,|T/i|
+
+f_b bending, f_c Coulomb, f_s static, c the part that grows with the output torque. The
+bristle moves with beta where that keeps it within its reach, else it slips.
+
+Why not LuGre: its bristle yields a little at any stretch, so it drifts under a load
+that swings below f_s, and it is passive only for :math:`\eta \ge \sigma_1 (f_s -
+f_c)/f_c` (Barabanov and Ortega 2000), at constant load. Here the power
+:math:`F\nu` is the change of :math:`\sigma z^2/2` plus :math:`\sigma z (\nu - \dot z)
++ \sigma_1 \dot z \nu + \eta\nu^2`, and no term is negative whatever f >= 0 does: a
+slider moves, and a reach shrinks, only against the bristle's pull (sigma_1 acts where
+the bristle is stretched on, not where its reach shrinks). Passive without any
+condition, and at rest below f it is a spring, without creep.
+
+Source:
+    Dupont, Hayward, Armstrong, Altpeter (2002), "Single state elastoplastic friction
+    models", IEEE Trans. Autom. Control 47, 787-792, for the class; Canudas de Wit et
+    al. (1995), IEEE Trans. Autom. Control 40, 419-425, for the Stribeck curve;
+    Barabanov, Ortega (2000), "Necessary and sufficient conditions for passivity of the
+    LuGre friction model", IEEE Trans. Autom. Control 45, 830-832.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isfinite
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from swgjoint.errors import InputError
+
+Array = NDArray[np.float64]
+
+_UNITS = {
+    "coulomb": "N·m",
+    "static": "N·m",
+    "bending": "N·m",
+    "viscous": "N·m·s/rad",
+    "load": "",
+    "stribeck_speed": "rad/s",
+    "stiffness": "N·m/rad",
+    "damping": "N·m·s/rad",
+}
+_POSITIVE = ("stribeck_speed", "stiffness")
+_ROUND_OFF = 1e-9
+_LARGEST = 1e30  # far beyond any drive, far below overflow of products
+
+
+@dataclass(frozen=True, kw_only=True)
+class Friction:
+    """Friction of the wave generator against the flexspline, at the input."""
+
+    stiffness: float
+    """sigma of the bristle, before it slips [N·m/rad], > 0."""
+    coulomb: float = 0.0
+    """f_c, slipping, without load [N·m]."""
+    static: float = 0.0
+    """f_s, at rest, without load [N·m]; not below f_c."""
+    stribeck_speed: float = 1.0
+    """nu_s, relative speed over which f_s gives way to f_c [rad/s]."""
+    viscous: float = 0.0
+    """eta [N·m·s/rad]."""
+    load: float = 0.0
+    """c, friction per |T/i|; from about 1 on the output cannot drive the input [-]."""
+    bending: float = 0.0
+    """f_b, loss of the turning elastic rim over one radian [N·m]."""
+    damping: float = 0.0
+    """sigma_1 of the bristle [N·m·s/rad]."""
+    source: str = "given"
+    """Where the figures come from, and which of them are assumed."""
+
+    def __post_init__(self) -> None:
+        for key, unit in _UNITS.items():
+            value = getattr(self, key)
+            number = isinstance(value, int | float) and not isinstance(value, bool)
+            low = 1e-30 if key in _POSITIVE else 0.0
+            if not (number and isfinite(value) and low <= value <= _LARGEST):
+                accepted = "> 0" if key in _POSITIVE else ">= 0"
+                raise InputError(
+                    f"friction {key} {value!s:.40} {unit}; accepted: a finite number"
+                    f" {accepted}"
+                )
+        if self.static < self.coulomb:
+            raise InputError(
+                f"friction static {self.static:g} N·m; accepted: at least coulomb"
+                f" {self.coulomb:g} N·m"
+            )
+
+    def yield_torque(self, speed: ArrayLike, input_torque: ArrayLike) -> Array:
+        """f, at which the bristle slips [N·m].
+
+        Args:
+            speed: nu [rad/s].
+            input_torque: T/i, the elastic torque on the input [N·m].
+        """
+        x = np.asarray(speed, float) / self.stribeck_speed
+        more = (self.static - self.coulomb) * np.exp(-(x**2))
+        return np.asarray(
+            self.bending + self.coulomb + more + self.load * np.abs(input_torque)
+        )
+
+    def torque(self, rotation: float, speed: float, input_torque: float) -> float:
+        """F where the bristle was relaxed a rotation ago, on a way of one direction.
+
+        Args:
+            rotation: beta since then [rad].
+            speed: nu [rad/s].
+            input_torque: T/i [N·m].
+        """
+        reach = float(self.yield_torque(speed, input_torque)) / self.stiffness
+        stretch = min(max(rotation, -reach), reach)
+        # at its reach it slips onward, also where round-off leaves it just inside
+        slips = abs(rotation) >= (1.0 - _ROUND_OFF) * reach and rotation * speed > 0.0
+        creep = 0.0 if slips else self.damping * speed
+        return self.stiffness * stretch + creep + self.viscous * speed
+
+    def steady(self, speed: float, input_torque: float) -> float:
+        """F at constant speed nu, never zero [N·m]."""
+        slip = float(self.yield_torque(speed, input_torque))
+        return float(np.copysign(slip, speed)) + self.viscous * speed
+
+
+def play_friction(
+    friction: Friction, rotation: Array, speed: Array, input_torque: Array
+) -> Array:
+    """F along a history of the relative rotation, from a relaxed bristle [N·m].
+
+    Args:
+        friction: The parameters.
+        rotation: beta [rad]. Shape (n,).
+        speed: nu [rad/s]. Shape (n,).
+        input_torque: T/i [N·m]. Shape (n,).
+    """
+    reach = friction.yield_torque(speed, input_torque) / friction.stiffness
+    stretch, slips = play_bristle(rotation, reach)
+    creep = np.where(slips, 0.0, friction.damping * np.asarray(speed))
+    return np.asarray(friction.stiffness * stretch + creep + friction.viscous * speed)
+
+
+def play_bristle(rotation: Array, reach: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Stretch z along a history [rad], and whether it slips there. Shapes (n,).
+
+    Args:
+        rotation: beta, relaxed at the first [rad]. Shape (n,).
+        reach: Largest stretch at each sample [rad]. Shape (n,).
+    """
+    stretch, slips = np.empty(len(rotation)), np.zeros(len(rotation), dtype=bool)
+    rest = float(rotation[0]) if len(rotation) else 0.0
+    for k, (x, r) in enumerate(zip(rotation.tolist(), reach.tolist(), strict=True)):
+        slips[k] = abs(x - rest) > r
+        rest = min(max(rest, x - r), x + r)
+        stretch[k] = x - rest
+    return stretch, slips

@@ -1,0 +1,435 @@
+"""Level full with friction: twin, passivity whatever happens, closed forms, state."""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import replace
+from functools import partial
+
+import mujoco
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from swgjoint.errors import InputError
+from swgjoint.joint import plugin
+from swgjoint.joint.attach import attach
+from swgjoint.joint.friction_step import friction_step, stretch_after
+from swgjoint.joint.reference import (
+    Motion,
+    gradient_force,
+    metric_of,
+    other_acceleration,
+    relaxed_after,
+    rest_after,
+    scheme_force,
+)
+from swgjoint.maps.drive_map import DriveMap
+from swgjoint.maps.friction import Friction
+from swgjoint.maps.hysteresis import Jenkin
+
+FRICTION = Friction(
+    stiffness=70.0,
+    coulomb=0.04,
+    static=0.07,
+    stribeck_speed=3.0,
+    viscous=6e-4,
+    load=0.1,
+    bending=0.005,
+    damping=0.05,
+)
+COULOMB = Friction(stiffness=100.0, coulomb=0.1, static=0.1)
+
+
+@pytest.fixture
+def rubbing(any_layout: DriveMap) -> DriveMap:
+    """The synthetic map in each layout, with friction and one element."""
+    element = Jenkin(stiffness=2e4, yield_torque=2.0)
+    return replace(any_layout, friction=FRICTION, hysteresis=(element,))
+
+
+def random_motion(b, rng) -> Motion:
+    """A state that sticks, slips, or slips before the step is through."""
+    drive = b.drive.drive
+    theta = rng.uniform(-8, 8)
+    psi = theta / drive.ratio - rng.uniform(-1, 1) ** 5 * drive.torsion_knots[-1]
+    rates = rng.normal(0, 1) * 10 ** rng.uniform(-2, 1.5), rng.normal(0, 0.1)
+    rest = drive.torsion(theta, psi) + 1e-4 * rng.standard_normal(1)
+    relaxed = float(np.dot(drive.friction_direction, (theta, psi)))
+    relaxed += 2e-3 * rng.standard_normal()
+    b.place(theta, psi, *rates)
+    b.data.plugin_state[:] = rng.normal(0, 30), rng.normal(0, 0.5), *rest, relaxed, 1.0
+    mujoco.mj_forward(b.model, b.data)
+    weight, other = b.data.qLDiagInv[b.v], b.data.plugin_state[:2]
+    return Motion(
+        theta=theta,
+        psi=psi,
+        theta_rate=rates[0],
+        psi_rate=rates[1],
+        rotor_weight=weight[0],
+        link_weight=weight[1],
+        rotor_acceleration=other[0],
+        link_acceleration=other[1],
+        rest=tuple(rest),
+        relaxed=relaxed,
+    )
+
+
+@pytest.mark.parametrize("integrator", ["RK4", "discrete"])
+def test_force_equals_twin(bench, rubbing, integrator):
+    """Forces, and under discrete both metrics, are the twin's to round-off."""
+    b = bench(rubbing, damping_ratio=0.05, integrator=integrator)
+    rng = np.random.default_rng(2)
+    model, h = b.model, b.model.opt.timestep
+    t, f_t = (model.tendon(name).id for name in ("j_drive", "j_friction"))
+    top = max(abs(x) for x in rubbing.torque_range)
+    slips = 0
+    for _ in range(300):
+        motion = random_motion(b, rng)
+        shift = np.zeros(2)
+        if integrator == "discrete":
+            f = scheme_force(rubbing, motion, timestep=h, damping=b.drive.damping)
+            metric = 1e-9 + 3 * b.data.ten_length[t] ** 2
+            assert metric == pytest.approx(f.metric, rel=1e-8)
+            rubs = 1e-9 + 3e-30 * b.data.ten_length[f_t] ** 2
+            assert rubs == pytest.approx(f.friction.metric, rel=1e-8)
+            slips += f.friction.offset != 70.0 * f.friction.stretch
+            direction = np.array(rubbing.friction_direction)
+            shift = (
+                h * f.metric * b.data.ten_velocity[t] * np.array([f.g_theta, f.g_psi])
+                + h * rubs * b.data.ten_velocity[f_t] * direction
+            )
+            want = np.array([f.theta, f.psi]) + shift
+        else:
+            want = np.array(gradient_force(rubbing, motion, damping=b.drive.damping))
+        np.testing.assert_allclose(
+            b.data.qfrc_passive[b.v],
+            want,
+            rtol=0,
+            atol=1e-11 * top + 1e-11 * np.abs(shift).max(),
+        )
+    assert integrator == "RK4" or 10 < slips < 290
+
+
+def test_trajectory_equals_twin(bench, rubbing):
+    """300 loaded steps through rest and back equal the scheme in numpy, state too."""
+    rotor = 0.144 / rubbing.ratio**2
+    b = bench(rubbing, damping_ratio=0.02, rotor_inertia=rotor)
+    h = b.model.opt.timestep
+    rate = 2.0 * abs(rubbing.ratio) / 60
+    b.place(0.2, 0.2 / rubbing.ratio, rate, rate / rubbing.ratio)
+    b.data.qfrc_applied[b.v] = -8.0 / rubbing.ratio, 3.0
+    inertia = np.array([rotor, b.drive.link_inertia])
+    q, v = b.data.qpos[b.q].copy(), b.data.qvel[b.v].copy()
+    state, rest, relaxed, stuck = (0.0, 0.0), (0.0,), None, 0
+    for _ in range(300):
+        motion = Motion(
+            theta=q[0],
+            psi=q[1],
+            theta_rate=v[0],
+            psi_rate=v[1],
+            rotor_weight=1 / inertia[0],
+            link_weight=1 / inertia[1],
+            rotor_acceleration=state[0],
+            link_acceleration=state[1],
+            rest=rest,
+            relaxed=relaxed,
+        )
+        f = scheme_force(rubbing, motion, timestep=h, damping=b.drive.damping)
+        total = np.array([f.theta, f.psi]) + b.data.qfrc_applied[b.v]
+        metric = np.diag(inertia) + metric_of(rubbing, f, timestep=h)
+        stuck += f.friction.offset == 70.0 * f.friction.stretch
+        v = v + np.linalg.solve(metric, h * total)
+        q = q + h * v
+        rates = {"timestep": h, "theta_rate": v[0], "psi_rate": v[1]}
+        state = other_acceleration(rubbing, motion, f, **rates)
+        rest = rest_after(rubbing, motion, timestep=h)
+        relaxed = relaxed_after(rubbing, motion, f, **rates)
+    mujoco.mj_step(b.model, b.data, 300)
+    ratio = abs(rubbing.ratio)
+    np.testing.assert_allclose(
+        b.data.qpos[b.q] / [ratio, 1], q / [ratio, 1], rtol=0, atol=1e-9
+    )
+    np.testing.assert_allclose(b.bristle, [relaxed, 1.0], rtol=0, atol=1e-8 * ratio)
+    assert stuck < 300
+
+
+positive = st.floats(1e-3, 1e3)
+signed = st.floats(-1e3, 1e3)
+
+
+@settings(max_examples=500, deadline=None, derandomize=True)
+@given(
+    reach=st.floats(0, 1e-1),
+    stiffness=positive,
+    damping=st.floats(0, 10),
+    viscous=st.floats(0, 1),
+    stretch=st.floats(-0.2, 0.2),
+    speed=signed,
+    free=signed,
+    response=st.floats(1e-6, 1e4),
+    step=st.floats(1e-5, 5e-3),
+    off=st.floats(-10, 10),
+)
+def test_one_step_never_gives_more_than_the_bristle_had(
+    reach, stiffness, damping, viscous, stretch, speed, free, response, step, off
+):
+    """Also where the true step is another than the predicted: work >= energy gained.
+
+    And where it is the predicted one, the torque is that of the law: inside the reach
+    the spring and dashpot, beyond it the work of sticking and of slipping.
+    """
+    law = Friction(stiffness=stiffness, damping=damping, viscous=viscous)
+    got = friction_step(
+        law,
+        stretch=stretch,
+        yield_torque=reach * stiffness,
+        speed=speed,
+        free=free,
+        response=response,
+        timestep=step,
+    )
+    dx = step * (speed + 0.5 * (free - response * got.predicted))
+    for true in (dx, dx + off * max(reach, 1e-6), -dx, 0.0):
+        # what the engine applies over the step is linear in the change of the speed
+        change = 2.0 * (true / step - speed)
+        work = (got.force + step * got.metric * change) * true
+        end = stretch_after(law, got, true)
+        gained = 0.5 * stiffness * (end**2 - got.stretch**2)
+        scale = abs(work) + stiffness * got.stretch**2
+        scale += abs(got.force * true) + step * got.metric * abs(change * true)
+        assert gained <= work + 1e-12 * scale + 1e-90  # squares that underflow
+        assert abs(end) <= reach * (1 + 1e-12)
+    # the law by quadrature along the predicted way, at constant speed
+    way = np.linspace(0.0, dx, 20_001)
+    z = np.clip(got.stretch + way, -reach, reach)
+    mean = stiffness * np.trapezoid(z, dx=1.0 / 20_000)
+    mean += damping * (z[-1] - z[0]) / step + viscous * dx / step
+    size = stiffness * reach + (damping + viscous * step) * abs(dx) / step
+    slack = 1e-6 * (size + stiffness * abs(dx)) + 1e-9 * abs(got.predicted) + 1e-90
+    # what the prediction takes off the speed must be the torque that is found
+    assert abs(got.predicted - mean) <= slack + 1e-9 * (abs(speed) + abs(free)) * (
+        stiffness * step + damping + viscous
+    )
+
+
+@settings(
+    max_examples=60,
+    deadline=None,
+    derandomize=True,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    step=st.sampled_from([2e-4, 1e-3, 5e-3]),
+    stiffness=st.floats(1e0, 1e4),
+    rotor=st.floats(-6.5, -3.5),
+)
+def test_random_pushes_never_give_energy(bench, seed, step, stiffness, rotor):
+    """Random torques that jump: the energy gained is at most their work.
+
+    On a linear spring the step is exact, so this holds from step to step to round-off,
+    whatever the friction; its bristle counts in the energy. What is lost is seen, too.
+    """
+    law = Friction(
+        stiffness=stiffness,
+        coulomb=0.05,
+        static=0.08,
+        stribeck_speed=2.0,
+        viscous=1e-4,
+        load=0.1,
+        damping=1e-3 * stiffness,
+    )
+    drive = replace(DriveMap.linear(2e4), friction=law)
+    with pytest.MonkeyPatch.context() as patch:
+        # the damping of unresolved torsion is no friction and not quite passive
+        exact = partial(plugin.config, numerical_damping=0.0)
+        patch.setattr(plugin, "config", exact)
+        b = bench(drive, step=step, rotor_inertia=10**rotor)
+    rng = np.random.default_rng(seed)
+    before, lost, scale = b.energy(midpoint=True), 0.0, 1e-3
+    for _ in range(60):
+        push = rng.normal(0, 0.3), rng.normal(0, 10.0)
+        push = np.array(push) * (rng.random(2) < 0.5)
+        b.data.qfrc_applied[b.v] = push
+        x = b.data.qpos[b.q] - 0.5 * step * b.data.qvel[b.v]
+        mujoco.mj_step(b.model, b.data)
+        moved = b.data.qpos[b.q] - 0.5 * step * b.data.qvel[b.v] - x
+        after, work = b.energy(midpoint=True), float(push @ moved)
+        scale = max(scale, after, abs(work))
+        assert after - before - work <= 1e-9 * scale
+        lost += before + work - after
+        before = after
+    assert lost > 0.0
+
+
+@pytest.mark.parametrize("step", [2e-4, 1e-3, 5e-3])
+def test_coasting_stops_as_the_closed_form_says(bench, step):
+    """Coulomb friction and the stretching of the bristle take f t + sigma_1 R.
+
+    The rotor stops after that momentum is gone, and stays.
+    """
+    law = replace(COULOMB, damping=0.02)
+    drive = replace(DriveMap.linear(2e4), friction=law, layout="flexspline_fixed")
+    b = bench(drive, step=step, rotor_inertia=4e-5, link=1e-3)
+    inertia = np.array([4e-5, 1e-3 / drive.ratio])
+    total = 4e-5 + 1e-3 / drive.ratio**2
+    b.place(0.0, 0.0, 100.0, 100.0 / drive.ratio)
+    stretching = 0.02 * law.static / law.stiffness
+    stop = (100.0 * total - stretching) / 0.1
+    mujoco.mj_step(b.model, b.data, round(0.5 * stop / step))
+    momentum = inertia @ b.data.qvel[b.v]
+    # half a stretch, while the spring loads, and 100 rad/s
+    slack = 0.5 * 0.1 * 1e-3 / 100.0 + 1e-3 * 100.0 * total
+    assert momentum == pytest.approx(0.1 * (stop - b.data.time), abs=slack)
+    mujoco.mj_step(b.model, b.data, round(20 * stop / step))
+    stays = b.data.qpos[b.q[0]]
+    assert abs(b.data.qvel[b.v[0]]) < 1e-3
+    mujoco.mj_step(b.model, b.data, 100)
+    assert b.data.qpos[b.q[0]] == pytest.approx(stays, abs=1e-4)
+
+
+def test_true_stiction(bench):
+    """Below the static torque nothing creeps in ten seconds, above it turns."""
+    drive = replace(
+        DriveMap.linear(2e4), friction=replace(COULOMB, damping=0.1), damping_ratio=0.0
+    )
+    for part, moves in ((0.98, False), (1.02, True)):
+        b = bench(drive, joint='damping="100"', damping_ratio=0.1)
+        # virtual work: friction on theta - psi = theta (1 - 1/i)
+        torque = part * 0.1 * (1.0 - 1.0 / drive.ratio)
+        for k in range(1000):
+            b.data.qfrc_applied[b.v[0]] = torque * (k + 1) / 1000
+            mujoco.mj_step(b.model, b.data)
+        mujoco.mj_step(b.model, b.data, 2000)
+        first = b.data.qpos[b.q[0]]
+        mujoco.mj_step(b.model, b.data, 10_000)
+        change = b.data.qpos[b.q[0]] - first
+        if moves:
+            assert change > 1.0
+        else:
+            # the bristle's own stretch, and no more of it
+            assert first == pytest.approx(part * 0.1 / 100.0, rel=0.02)
+            assert abs(change) < 1e-8
+
+
+def test_full_equals_rk4(bench, rubbing):
+    """With a short step the scheme goes the same way as RK4."""
+    rotor = 0.144 / rubbing.ratio**2
+    # explicit integrators leave out the creep of a reach that grows
+    rubbing = replace(rubbing, friction=replace(FRICTION, damping=0.0))
+    ends = []
+    for integrator in ("discrete", "RK4"):
+        b = bench(rubbing, integrator=integrator, step=1e-5, rotor_inertia=rotor)
+        b.data.qfrc_applied[b.v] = 30.0 / rubbing.ratio, 5.0
+        mujoco.mj_step(b.model, b.data, 10_000)
+        ends.append(b.data.qpos[b.q] / [rubbing.ratio, 1])
+    assert np.abs(ends[1]).max() > 0.1
+    assert np.abs(ends[0] - ends[1]).max() < 1e-3 * np.abs(ends[1]).max()
+
+
+def full_state(b, data, kind=mujoco.mjtState.mjSTATE_INTEGRATION):
+    state = np.empty(mujoco.mj_stateSize(b.model, kind))
+    mujoco.mj_getState(b.model, data, state, kind)
+    return state
+
+
+@pytest.mark.parametrize("integrator", ["RK4", "discrete"])
+def test_copies_continue_bitwise(bench, synthetic_map, integrator):
+    """A copy and a set state go on with the same bits; a reset forgets the bristle."""
+    b = bench(
+        replace(synthetic_map, friction=FRICTION), integrator=integrator, step=1e-4
+    )
+    b.place(0.1, -3e-3, 3.0, 0.05)
+    mujoco.mj_step(b.model, b.data, 50)
+    assert b.bristle[1] == 1.0
+    twin, fresh = copy.copy(b.data), mujoco.MjData(b.model)
+    kind = mujoco.mjtState.mjSTATE_INTEGRATION
+    mujoco.mj_setState(b.model, fresh, full_state(b, b.data), kind)
+    for data in (b.data, twin, fresh):
+        mujoco.mj_step(b.model, data, 200)
+        np.testing.assert_array_equal(full_state(b, data), full_state(b, b.data))
+    mujoco.mj_resetData(b.model, b.data)
+    assert not b.data.plugin_state.any()
+
+
+def test_absent_unless_the_map_has_it(bench, synthetic_map):
+    """No tendon, no state, no attribute without friction; one, two and one with it."""
+    b = bench(synthetic_map)
+    assert (b.model.ntendon, b.model.npluginstate) == (1, 2)
+    assert "friction" not in plugin.config(synthetic_map, damping=0.0)
+    b = bench(replace(synthetic_map, friction=FRICTION))
+    assert (b.model.ntendon, b.model.npluginstate) == (2, 4)
+    for level, tendons in (("linear", 1), ("native", 1)):
+        b = bench(replace(synthetic_map, friction=FRICTION), level=level)
+        assert b.model.ntendon == tendons
+
+
+def test_native_has_friction_without_load(bench, synthetic_map):
+    """Frictionloss of the rotor is Coulomb and bending, damping the viscous part."""
+    b = bench(replace(synthetic_map, friction=FRICTION), level="native")
+    np.testing.assert_allclose(b.model.dof_frictionloss[b.v], [0.045, 0.0])
+    np.testing.assert_allclose(b.model.dof_damping[b.v], [6e-4, 0.0])
+    assert b.drive.native.friction == pytest.approx(0.045)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "1 2",
+        "1 -1 0 0 1 1 1 0 0",
+        "2 -1 1 0 1 1 1 0 0",
+        "1 -1 1 0 2 1 1 0 0",
+        "1 -1 1 0 1 1 0 0 0",
+        "1 -1 1 -1 1 1 1 0 0",
+        "1 -1 1 nan 1 1 1 0 0",
+        "1 0 1 0 1 1 1 0 0",
+        "x",
+    ],
+)
+def test_bad_attribute_is_rejected(text):
+    """Numbers that are no friction, or a tendon that is not there, give an error."""
+    spec = mujoco.MjSpec.from_string(
+        '<mujoco><worldbody><body><joint name="j"/><geom size=".1"/></body>'
+        "</worldbody></mujoco>"
+    )
+    drive = replace(DriveMap.linear(1e4), friction=COULOMB)
+    attach(spec, joint="j", drive=drive, rotor_inertia=4e-5)
+    [instance] = spec.plugins
+    instance.config = {**plugin.config(drive, damping=1.0), "friction": text}
+    with pytest.raises(ValueError, match="attribute 'friction' is not nine numbers"):
+        spec.compile()
+
+
+def test_a_prefix_and_suffix_leave_the_friction_in_place(synthetic_map):
+    """A model attached to another finds its friction tendon under any name."""
+    arm = mujoco.MjSpec.from_string(
+        '<mujoco><worldbody><body name="b"><joint name="j"/><geom size=".1"/></body>'
+        "</worldbody></mujoco>"
+    )
+    drive = replace(synthetic_map, friction=FRICTION)
+    attach(arm, joint="j", drive=drive, rotor_inertia=4e-5)
+    parent = mujoco.MjSpec()
+    parent.option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
+    parent.attach(arm, prefix="a_", suffix="_z", frame=parent.worldbody.add_frame())
+    model = parent.compile()
+    assert model.npluginstate == 4
+    mujoco.mj_step(model, mujoco.MjData(model), 10)
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"stiffness": 0.0}, "friction stiffness 0.0 N·m/rad; accepted"),
+        ({"viscous": -1.0}, "friction viscous -1.0"),
+        ({"load": float("nan")}, "friction load nan"),
+        ({"static": 0.01}, "friction static 0.01 N·m; accepted: at least coulomb"),
+        ({"stribeck_speed": 0.0}, "friction stribeck_speed"),
+        ({"coulomb": True}, "friction coulomb True"),
+    ],
+)
+def test_bad_friction_is_refused(change, says):
+    """Parameters that no friction has are named with what is accepted."""
+    with pytest.raises(InputError, match=says):
+        replace(FRICTION, **change)
