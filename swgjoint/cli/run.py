@@ -147,6 +147,13 @@ def notes(joints: dict[str, Any]) -> list[str]:
                 f"{name}: torque up to {ratings['peak_Nm']:.3g} N·m leaves the map"
                 f" ({low:.3g} to {high:.3g} N·m), which continues linearly there"
             )
+        if ratings["ratcheting"]:
+            lines.append(
+                f"{name}: teeth would skip at {ratings['ratcheting']['time_s']:.4g} s"
+                f" with {ratings['ratcheting']['torque_Nm']:.4g} N·m, above the"
+                f" ratcheting torque {ratings['ratcheting_Nm']:.4g} N·m; the run goes"
+                " on elastic"
+            )
         if not ratings["within"]:
             lines.append(
                 f"{name}: above its ratings: cubed mean"

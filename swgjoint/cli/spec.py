@@ -115,6 +115,7 @@ def _write(folder: Any, result: dict[str, Any], sheet: SpecSheet, start: float) 
 
 def report(result: dict[str, Any]) -> str:
     """Figures with units, the strongest orders, what is missing and why."""
+    from swgjoint.maps.catalogue_stated import LOSS_KEYS
     from swgjoint.maps.spec_sheet import KEYS
 
     keys = [key for key in KEYS if key in result and key != "orders"]
@@ -143,6 +144,14 @@ def report(result: dict[str, Any]) -> str:
                 ],
                 header=("", "no load [arcmin]", "rated load [arcmin]", "ripple [%]"),
             )
+        )
+    friction = result["validity"].get("friction", "none")
+    if friction != "none" and any(key in result for key in LOSS_KEYS):
+        speed = result["validity"]["running_speed_rpm"]
+        lines.append(
+            "losses at the input, back driving at the output; running torque and"
+            f" efficiency at {speed:g} rpm, efficiency at rated torque; friction from"
+            f" {friction}"
         )
     reasons: dict[str, list[str]] = {}
     for key, reason in result["missing"].items():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import mujoco
 import numpy as np
 
@@ -25,6 +27,7 @@ def attach(
     level: str = "full",
     rotor_inertia: float,
     damping_ratio: float | None = None,
+    friction: bool = False,
     max_input_speed: float | None = None,
     max_phase_step: float = 0.5,
 ) -> JointDrive:
@@ -37,12 +40,15 @@ def attach(
     ``linear``, ``native`` and ``full`` add a rotor (body ``<joint>_rotor`` with a hinge
     of the same name, beside the link under the same parent) and a tendon
     ``<joint>_drive`` with the length theta/i - psi: a native spring and damper, the
-    same with a cubic part (and tendons ``<joint>_hysteresis<k>`` and rotor friction
-    where the map has them), or the carrier of the engine plugin's instance of the same
-    name, which evaluates ``drive``, hysteresis included; where the map has friction a
-    tendon ``<joint>_friction`` carries its part of the integrator's metric. The rotor
-    takes the place of the joint's own armature, which is set to 0. Keyframes grow by
-    the rotor, at the position without torsion.
+    same with a cubic part (and tendons ``<joint>_hysteresis<k>`` where the map has
+    hysteresis), or the carrier of the engine plugin's instance of the same name, which
+    evaluates ``drive``, hysteresis included. The rotor takes the place of the joint's
+    own armature, which is set to 0. Keyframes grow by the rotor, at the position
+    without torsion.
+
+    With ``friction`` the friction of the map is in the model, too: friction loss and
+    damping of the rotor at ``native``; at ``full`` the whole law, with a tendon
+    ``<joint>_friction`` that carries its part of the integrator's metric.
 
     No actuator is added and none is changed. The motor belongs on the rotor::
 
@@ -64,6 +70,7 @@ def attach(
         rotor_inertia: Rotor and wave generator about their axis [kg·m²].
         damping_ratio: Share of critical damping of rotor against link with the link
             inertia at qpos0, the other joints held; that of the map if None [-].
+        friction: Whether the model has the friction of the map, where it has any.
         max_input_speed: Largest speed of the rotor [rad/s]; harmonics that the step
             cannot carry at it are left out. None keeps all.
         max_phase_step: Largest phase step h n |theta rate| that is kept [rad].
@@ -91,6 +98,8 @@ def attach(
         check_option(spec, level)
     place = find_place(spec, joint, rotor_inertia)
 
+    if not friction:
+        drive = replace(drive, friction=None)
     ratio = drive.ratio
     stiffness = drive.mean_stiffness
     reflected = ratio**2 * rotor_inertia

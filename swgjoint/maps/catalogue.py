@@ -123,8 +123,9 @@ def ratings_of(design: Design) -> Ratings:
 
     The row is scaled to the rated torque that the design states, else with the cube
     of the pitch diameter. Where no row fits, T1 and T2 are 0.2 and 0.6 of the rated
-    torque. ``source`` says which rule was used. A default never breaks the order of
-    the torques: it gives way to the design's own values.
+    torque, and no torque of ratcheting is told. ``source`` says which rule was used. A
+    default never breaks the order of the torques: it gives way to the design's own
+    values.
     """
     given = design.ratings
     ratio = design.drive.teeth_flexspline / design.tooth_difference
@@ -150,6 +151,7 @@ def ratings_of(design: Design) -> Ratings:
         rated = min(rated, repeated)
     repeated = max(repeated, rated)
     momentary = max(momentary, repeated)
+    skips = max(row.ratcheting_torque * scale, momentary) if fits else None
     low, high = (row.T1 * scale, row.T2 * scale) if fits else (0.2 * rated, 0.6 * rated)
     spread = high / low
     if given.T1_Nm is not None:
@@ -160,6 +162,8 @@ def ratings_of(design: Design) -> Ratings:
 
     keys = type(given).model_fields
     absent = [key for key in keys if getattr(given, key) is None]
+    if skips is not None:
+        absent.append("ratcheting_torque_Nm")
     source = "given"
     if absent:
         source = f"default ({', '.join(absent)}): catalogue {row.name} {rule}"
@@ -176,4 +180,5 @@ def ratings_of(design: Design) -> Ratings:
         T1=low,
         T2=high,
         source=source,
+        ratcheting_torque=skips,
     )

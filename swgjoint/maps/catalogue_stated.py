@@ -7,6 +7,7 @@ from typing import Any
 
 from swgjoint.errors import InputError
 from swgjoint.maps.catalogue import CatalogueRow, catalogue_rows, named_rows, table
+from swgjoint.maps.friction_fit import StatedLosses
 
 SIMILAR = 1.6
 """Torsion at T1 varies by less than this factor about the median of its ratio class:
@@ -19,6 +20,38 @@ _STATED = (
     "lost_motion_arcmin",
     "repeatability_arcmin",
 )
+
+
+LOSS_KEYS = (
+    "no_load_running_torque_Nm",
+    "starting_torque_Nm",
+    "back_driving_torque_Nm",
+    "efficiency_percent",
+)
+"""Losses at speed, as ``swgjoint spec`` names them."""
+_LOSS_RATIO = 100
+"""Ratio of every row of ``losses.csv``."""
+_MILLI = 1e-3
+
+
+def stated_losses(row: CatalogueRow) -> StatedLosses | None:
+    """Row of ``losses.csv`` for a component set of the same ratio and rated torque.
+
+    The table is another maker's (RT1-H-CS), with the sizes and rated torques of CSG at
+    a ratio of 100, and second-hand.
+    """
+    if row.series != "CSG" or row.ratio != _LOSS_RATIO:
+        return None
+    for found in table("losses"):
+        if (found["size"], found["rated_Nm"]) == (row.size, row.rated_torque):
+            return StatedLosses(
+                rated_torque=_number(found, "rated_Nm"),
+                efficiency=0.01 * _number(found, "efficiency_percent"),
+                no_load_running=_MILLI * _number(found, "no_load_running_mNm"),
+                starting=_MILLI * _number(found, "starting_mNm"),
+                back_driving=_number(found, "back_driving_Nm"),
+            )
+    return None
 
 
 def stiffness_of(size: int, ratio: int) -> dict[str, float]:
@@ -46,10 +79,11 @@ def stated_figures(row: CatalogueRow) -> dict[str, float | None]:
     """What the tables state of one drive beside stiffness and ratings; None if not.
 
     A ratio class holds from its own ratio up to the next class of the series. The
-    torques of ratcheting and buckling and the inertia are those of CSG.
+    torques of ratcheting and buckling and the inertia are those of CSG, the losses
+    those of :func:`stated_losses`.
     """
     accuracy = _of_class("accuracy", row.size, row.ratio, series=row.series) or {}
-    figures: dict[str, float | None] = {}
+    figures: dict[str, float | None] = dict.fromkeys(LOSS_KEYS)
     for key in _STATED:
         value = accuracy.get(key)
         figures[key] = value if isinstance(value, float) else None
@@ -61,6 +95,14 @@ def stated_figures(row: CatalogueRow) -> dict[str, float | None]:
         r for r in table("ratings") if (r["size"], r["ratio"]) == (row.size, row.ratio)
     )
     inertia = ratings["input_inertia_1e-4kgm2"]
+    losses = stated_losses(row)
+    if losses is not None:
+        figures |= {
+            "no_load_running_torque_Nm": losses.no_load_running,
+            "starting_torque_Nm": losses.starting,
+            "back_driving_torque_Nm": losses.back_driving,
+            "efficiency_percent": 100.0 * losses.efficiency,
+        }
     return figures | {
         "ratcheting_torque_Nm": row.ratcheting_torque,
         "buckling_torque_Nm": _number(ratings, "buckling_Nm"),

@@ -5,7 +5,7 @@ corners are rounded by parabolas that end on the catalogue's lines (:data:`CORNE
 torque and stiffness are continuous. What a catalogue states as an upper bound only,
 above all the kinematic error, is not in the map; its record says so. The exception is
 the hysteresis loss: where a row states it the map has it, at the bound, and the label
-says that a drive may have less.
+says that a drive may have less. Where losses at speed are stated the map has friction.
 """
 
 from __future__ import annotations
@@ -20,8 +20,14 @@ import numpy as np
 
 from swgjoint.errors import InputError
 from swgjoint.maps.catalogue import CatalogueRow, named_rows
-from swgjoint.maps.catalogue_stated import stated_figures, stiffness_of
+from swgjoint.maps.catalogue_stated import (
+    LOSS_KEYS,
+    stated_figures,
+    stated_losses,
+    stiffness_of,
+)
 from swgjoint.maps.drive_map import DriveMap, Ratings
+from swgjoint.maps.friction_fit import friction_of_losses
 from swgjoint.maps.hysteresis import Jenkin
 from swgjoint.maps.loop import largest_torque, torque_loop
 from swgjoint.maps.torsion_law import potential_of_stiffness
@@ -119,6 +125,7 @@ def map_from_catalogue(name: str, cls: type[Map]) -> Map:
             T1=s["T1"],
             T2=s["T2"],
             source=f"catalogue CSG-{row.size}-{row.ratio}{own}",
+            ratcheting_torque=row.ratcheting_torque,
         ),
         info={
             "source": f"catalogue {row.name}: models/catalogue/*.csv",
@@ -129,6 +136,15 @@ def map_from_catalogue(name: str, cls: type[Map]) -> Map:
             "missing": _missing(stated),
         },
     )
+    losses = stated_losses(row)
+    if losses is not None:
+        label = (
+            f"models/catalogue/losses.csv, size {row.size}: starting torque, no-load"
+            " running torque at 2000 rpm and efficiency of an RT1-H-CS of the same"
+            " rated torque, second-hand; the back-driving torque is a prediction"
+        )
+        friction = friction_of_losses(losses, drive.ratio, source=label)
+        drive = replace(drive, friction=friction)
     loss = stated["hysteresis_loss_arcmin"]
     return drive if loss is None else _with_hysteresis(drive, row, s, loss * arcmin)
 
@@ -217,6 +233,10 @@ def _missing(stated: dict[str, float | None]) -> dict[str, str]:
             else f"the catalogue states {value:g} arcmin"
         )
 
+    no_losses = (
+        "the map has no friction: the catalogue tables state losses for component sets"
+        " of ratio 100, sizes 14 to 25"
+    )
     bound = f"{_NO_ERROR}; {says('transmission_accuracy_arcmin')}"
     return {
         "transmission_accuracy_arcmin": bound,
@@ -224,8 +244,9 @@ def _missing(stated: dict[str, float | None]) -> dict[str, str]:
         "orders": _NO_ERROR,
         "ripple_rms_percent": _NO_ERROR,
         "ripple_pp_percent": _NO_ERROR,
-        "hysteresis_loss_arcmin": "the map is conservative, without friction or"
+        "hysteresis_loss_arcmin": "the torque loop is conservative: the map has no"
         f" hysteresis; {says('hysteresis_loss_arcmin')}",
         "repeatability_arcmin": "the map has no random part;"
         f" {says('repeatability_arcmin')}",
+        **dict.fromkeys(LOSS_KEYS, no_losses),
     }

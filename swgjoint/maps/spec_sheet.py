@@ -9,11 +9,24 @@ from difflib import get_close_matches
 from math import isnan
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from swgjoint.errors import InputError
+from swgjoint.maps.catalogue_stated import LOSS_KEYS
 from swgjoint.maps.drive_map import DriveMap, Ratings
+from swgjoint.maps.friction_running import (
+    RUNNING_SPEED,
+    back_driving_torque,
+    efficiency,
+    no_load_running_torque,
+    starting_torque,
+)
 from swgjoint.maps.loop import TorqueLoop, largest_torque, torque_loop
 from swgjoint.maps.turn import Turn, error_turn, ripple_turn, strongest_orders
-from swgjoint.units import arcmin
+from swgjoint.units import arcmin, rpm
+
+Array = NDArray[np.float64]
 
 RATING_KEYS = (
     "T1_Nm",
@@ -39,6 +52,7 @@ TURN_KEYS = (
     "orders",
 )
 """From one output turn."""
+_NO_FRICTION = "the map has no friction of bearing, seals and teeth at speed"
 ABSENT_KEYS = {
     "repeatability_arcmin": "the map has no random part: a repeated approach ends"
     " at the same position",
@@ -48,10 +62,22 @@ ABSENT_KEYS = {
     " torque and torsion only",
 }
 """What no map tells, with the reason."""
-KEYS = (*RATING_KEYS, *LOOP_KEYS, *TURN_KEYS, *ABSENT_KEYS)
+KEYS = (*RATING_KEYS, *LOOP_KEYS, *TURN_KEYS, *LOSS_KEYS, *ABSENT_KEYS)
 
+_CURVE = 64
+"""Samples of the period for a point of the efficiency curve."""
 _WIDTH = 1e-7
 """A loop narrower than this part of its travel has no hysteresis [-]."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LossCurve:
+    """Efficiency over the load at constant speeds."""
+
+    load: Array
+    """Output torque [N·m]. Shape (n,)."""
+    efficiency: dict[float, Array]
+    """By speed of the input [rad/s]: work out over work in [-]. Shapes (n,)."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -65,6 +91,8 @@ class SpecSheet:
     loop: TorqueLoop | None = None
     turns: dict[str, Turn] = field(default_factory=dict)
     """``no_load`` and ``rated``: transmission error [rad]; ``ripple``: torque [N·m]."""
+    losses: LossCurve | None = None
+    """Efficiency over the load; None without friction, or where it is not asked for."""
 
     def as_dict(self) -> dict[str, Any]:
         """Figures, then ``missing``."""
@@ -111,7 +139,9 @@ def measure_spec(
     (at least 1.5 T2), input locked at zero. Transmission accuracy: peak to peak of the
     transmission error over one output turn, one direction, without load and at rated
     torque. Ripple: output held on its ideal motion at rated torque, percent of rated.
-    Orders per input turn, amplitudes zero to peak.
+    Orders per input turn, amplitudes zero to peak. Losses: see
+    :mod:`swgjoint.maps.friction_running`; running torque and efficiency at 2000 rpm of
+    the input, efficiency at rated torque.
 
     Args:
         drive: The map; None where :func:`needs_map` says so.
@@ -135,8 +165,8 @@ def measure_spec(
         "repeated_peak_Nm": float(ratings.repeated_peak),
         "momentary_peak_Nm": float(ratings.momentary_peak),
     }
-    missing = dict(ABSENT_KEYS)
-    loop, turns = None, {}
+    missing = ABSENT_KEYS | dict.fromkeys(LOSS_KEYS, _NO_FRICTION)
+    loop, turns, losses = None, {}, None
     if drive is not None:
         if set(keys) & set(LOOP_KEYS):
             loop = torque_loop(drive)
@@ -144,6 +174,10 @@ def measure_spec(
         if set(keys) & set(TURN_KEYS):
             turns = _turns(drive, keys)
             _turn_figures(drive, turns, values, missing)
+        if drive.friction is not None and set(keys) & set(LOSS_KEYS):
+            _loss_figures(drive, keys, values, missing)
+            if "efficiency_percent" in keys:
+                losses = _loss_curve(drive)
         # the source knows best why it cannot tell
         own = drive.info.get("missing")
         if isinstance(own, dict):
@@ -153,6 +187,7 @@ def measure_spec(
         missing={k: missing[k] for k in keys if values.get(k) is None},
         loop=loop,
         turns=turns,
+        losses=losses,
     )
 
 
@@ -174,7 +209,7 @@ def _loop_figures(
         values["hysteresis_loss_arcmin"] = width / arcmin
     else:
         missing["hysteresis_loss_arcmin"] = (
-            "the map is conservative, without friction or hysteresis"
+            "the torque loop is conservative: the map has no hysteresis"
             if not drive.hysteresis
             else "the hysteresis of the map does not slip within this loop"
         )
@@ -236,6 +271,39 @@ def _turn_figures(
         )
 
 
+def _loss_figures(
+    drive: DriveMap,
+    keys: Collection[str],
+    values: dict[str, Any],
+    missing: dict[str, str],
+) -> None:
+    if "no_load_running_torque_Nm" in keys:
+        values["no_load_running_torque_Nm"] = no_load_running_torque(drive)
+    if "starting_torque_Nm" in keys:
+        values["starting_torque_Nm"] = starting_torque(drive)
+    if "back_driving_torque_Nm" in keys:
+        values["back_driving_torque_Nm"] = back_driving_torque(drive)
+        missing["back_driving_torque_Nm"] = (
+            "no torque up to the momentary peak turns the input"
+        )
+    if "efficiency_percent" in keys:
+        rated = drive.ratings.rated_torque
+        values["efficiency_percent"] = 100.0 * efficiency(drive, rated)
+
+
+def _loss_curve(drive: DriveMap) -> LossCurve:
+    load = np.linspace(0.0, drive.ratings.repeated_peak, 25)
+    return LossCurve(
+        load=load[1:],
+        efficiency={
+            speed: np.array(
+                [efficiency(drive, float(T), speed, at_most=_CURVE) for T in load[1:]]
+            )
+            for speed in (0.25 * RUNNING_SPEED, RUNNING_SPEED)
+        },
+    )
+
+
 def spec_sheet(drive: DriveMap, only: Collection[str] = ()) -> dict[str, Any]:
     """Figures, ``missing``, ``validity`` and ``wall_s``: plain values.
 
@@ -256,8 +324,8 @@ def spec_sheet(drive: DriveMap, only: Collection[str] = ()) -> dict[str, Any]:
 def validity(drive: DriveMap) -> dict[str, Any]:
     """Level of the source, its range of torque, whether the loop leaves it.
 
-    ``hysteresis`` tells where the elements come from; one output turn (accuracy,
-    ripple) is taken without them.
+    ``hysteresis`` and ``friction`` tell where they come from; one output turn
+    (accuracy, ripple) is taken without both, the loop without friction.
     """
     low, high = drive.torque_range
     slipping = sum(element.yield_torque for element in drive.hysteresis)
@@ -273,4 +341,6 @@ def validity(drive: DriveMap) -> dict[str, Any]:
         "hysteresis": str(drive.info.get("hysteresis", "given"))
         if drive.hysteresis
         else "none",
+        "friction": drive.friction.source if drive.friction else "none",
+        "running_speed_rpm": RUNNING_SPEED / rpm if drive.friction else None,
     }

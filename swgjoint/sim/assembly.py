@@ -145,6 +145,7 @@ def assemble(
             level=section.level or "full",
             rotor_inertia=section.rotor_inertia_kgm2 or 0.0,
             damping_ratio=section.damping_ratio,
+            friction=bool(section.friction),
             # a joint at rest carries every order
             max_input_speed=float(abs(drive.ratio) * speed) or None,
         )

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from swgjoint.sim.assembly import Assembly
     from swgjoint.sim.transmission import Transmission
 
-_HYSTERETIC = ("native", "full")
+_LOSSY = ("native", "full")
 _LEFT_OUT = {
     "rigid": "torsion, kinematic error and torque ripple (level rigid)",
     "kinematic": "torsion and the torque ripple of the stiffness (level kinematic)",
@@ -59,8 +59,11 @@ def _joint(transmission: Transmission) -> dict[str, Any]:
         if attached.level in ("kinematic", "full")
         else [],
         "hysteresis_elements": len(attached.drive.hysteresis)
-        if attached.level in _HYSTERETIC
+        if attached.level in _LOSSY
         else 0,
+        "friction": attached.drive.friction.source
+        if attached.drive.friction and attached.level in _LOSSY
+        else None,
         **_native(attached),
     }
 
@@ -78,6 +81,7 @@ def _native(attached: JointDrive) -> dict[str, Any]:
             "fitted_to_Nm": spring.fitted_to,
             "hysteresis": list(attached.hysteresis),
             "friction_Nm": spring.friction,
+            "viscous_Nms_rad": spring.viscous,
         }
     }
 
@@ -92,9 +96,13 @@ def _left_out(transmission: Transmission) -> list[dict[str, str]]:
             else "the scene asks for no more"
         )
         items.append({"part": _LEFT_OUT[attached.level], "reason": reason})
-    if attached.drive.hysteresis and attached.level not in _HYSTERETIC:
+    if attached.drive.hysteresis and attached.level not in _LOSSY:
         part = f"hysteresis ({len(attached.drive.hysteresis)} elements)"
         items.append({"part": part, "reason": "the scene asks for no more"})
+    friction = transmission.drive.friction
+    if friction and not (attached.drive.friction and attached.level in _LOSSY):
+        reason = "the scene asks for no more"
+        items.append({"part": "friction of the drive", "reason": reason})
     if attached.level == "kinematic" and attached.kept_orders:
         share = 100.0 * ratio_variation(attached.drive)
         items.append(

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from swgjoint.errors import InputError
+from swgjoint.maps.catalogue_stated import LOSS_KEYS
 from swgjoint.maps.drive_map import DriveMap
+from swgjoint.maps.friction_bending import without_friction
 from swgjoint.maps.from_catalogue import catalogue_names, is_catalogue_name
 from swgjoint.models_path import bundled_names
 from swgjoint.progress import Progress, silent
@@ -26,6 +29,8 @@ def drive_of(
 ) -> DriveMap:
     """The map of a joint's drive; what was built is kept in ``known``.
 
+    Hysteresis that the section switches off is not in it.
+
     Args:
         section: Settings of the joint with a drive.
         known: Maps by reference; extended.
@@ -41,7 +46,8 @@ def drive_of(
         raise ValueError("a joint without a drive has no map")
     if reference not in known:
         known[reference] = load_drive(reference, progress=progress)
-    return known[reference]
+    drive = known[reference]
+    return replace(drive, hysteresis=()) if section.hysteresis is False else drive
 
 
 def linear_map(section: LinearDrive) -> DriveMap:
@@ -84,8 +90,11 @@ def load_drive(
     from swgjoint.fe.build_map import build_map
 
     if angles is None:
-        return build_map(source, model=model, progress=progress)
-    return build_map(source, model=model, angles=angles, progress=progress)
+        drive = build_map(source, model=model, progress=progress)
+    else:
+        drive = build_map(source, model=model, angles=angles, progress=progress)
+    missing = dict.fromkeys(LOSS_KEYS, without_friction(source))
+    return replace(drive, info={**drive.info, "missing": missing})
 
 
 def find_drive(reference: str) -> DriveMap | Design:

@@ -165,10 +165,12 @@ def use_of_ratings(run: Run, j: int) -> dict[str, Any]:
     cubed = cubed_mean(torque, speed if moving else np.ones_like(speed))
     peak = float(torque.max())
     low, high = transmission.drive.torque_range
+    skips = ratings.ratcheting_torque
     return {
         "rated_Nm": ratings.rated_torque,
         "repeated_peak_Nm": ratings.repeated_peak,
         "momentary_peak_Nm": ratings.momentary_peak,
+        "ratcheting_Nm": skips,
         "source": ratings.source,
         "peak_Nm": peak,
         "cubed_mean_Nm": cubed,
@@ -177,11 +179,36 @@ def use_of_ratings(run: Run, j: int) -> dict[str, Any]:
             cubed <= SLACK * ratings.rated_torque
             and peak <= SLACK * ratings.repeated_peak
         ),
+        "ratcheting_margin": None if skips is None else skips / max(peak, 1e-300),
+        "ratcheting": first_ratcheting(run.time, run.output_torque[:, j], skips),
         "map_range_Nm": [low, high],
         "within_map": bool(
             low <= run.output_torque[:, j].min()
             and run.output_torque[:, j].max() <= high
         ),
+    }
+
+
+def first_ratcheting(
+    time: Array, torque: Array, limit: float | None
+) -> dict[str, Any] | None:
+    """The first instant at which teeth would skip; None where they do not.
+
+    The simulation goes on with the elastic law: what follows is no skipped tooth.
+
+    Args:
+        time: [s]. Shape (n,).
+        torque: At the output [N·m]. Shape (n,).
+        limit: Ratcheting torque [N·m], None where it is not known.
+    """
+    above = np.flatnonzero(np.abs(torque) > (np.inf if limit is None else limit))
+    if not above.size:
+        return None
+    first = int(above[0])
+    return {
+        "time_s": float(time[first]),
+        "torque_Nm": float(torque[first]),
+        "after_it": "elastic, without the skipped tooth",
     }
 
 

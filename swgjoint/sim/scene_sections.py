@@ -39,6 +39,10 @@ class JointSection(Section):
     """Rotor with wave generator about the motor axis."""
     damping_ratio: Annotated[float, Field(ge=0, le=1)] | None = None
     """Of the torsional vibration; None takes that of the drive."""
+    hysteresis: bool | None = None
+    """False leaves the hysteresis of the drive out."""
+    friction: bool | None = None
+    """True takes the friction of the drive in, at the levels native and full."""
 
     @model_validator(mode="after")
     def _one_drive(self) -> Self:

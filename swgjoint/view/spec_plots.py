@@ -1,4 +1,4 @@
-"""Picture of a spec sheet: loop, error over a turn, order spectrum."""
+"""Picture of a spec sheet: loop, error over a turn, order spectrum, losses."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from swgjoint.units import arcmin
+from swgjoint.units import arcmin, rpm
 
 if TYPE_CHECKING:
     from swgjoint.maps.spec_sheet import SpecSheet
@@ -27,11 +27,10 @@ def spec_picture(name: str, sheet: SpecSheet) -> bytes:
     """
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(13, 4.2), layout="constrained")
-    loop, turn, orders = figure.subplots(1, 3)
-    _loop(loop, sheet)
-    _turn(turn, sheet)
-    _orders(orders, sheet)
+    panels = [_loop, _turn, _orders] + ([_losses] if sheet.losses else [])
+    figure = Figure(figsize=(1 + 4 * len(panels), 4.2), layout="constrained")
+    for ax, draw in zip(figure.subplots(1, len(panels)), panels, strict=True):
+        draw(ax, sheet)
     figure.suptitle(f"{name}: spec sheet")
     out = io.BytesIO()
     figure.savefig(out, format="png", dpi=130)
@@ -115,6 +114,23 @@ def _orders(ax: Any, sheet: SpecSheet) -> None:
         ax.set_yscale("log")
         ax.set_ylim(1e-4 * largest, 2.0 * largest)
     ax.legend(fontsize="small")
+    ax.grid(alpha=0.3)
+
+
+def _losses(ax: Any, sheet: SpecSheet) -> None:
+    ax.set_title("efficiency against the load")
+    ax.set_xlabel("output torque [N·m]")
+    ax.set_ylabel("efficiency [%]")
+    assert sheet.losses is not None
+    for speed, values in sheet.losses.efficiency.items():
+        label = f"{speed / rpm:.0f} rpm at the input"
+        ax.plot(sheet.losses.load, 100.0 * values, label=label)
+    rated = sheet.figures.get("rated_torque_Nm")
+    if rated:
+        ax.axvline(rated, color="0.6", lw=1.0, ls="--", label="rated torque")
+    ax.set_xlim(left=0.0)
+    ax.set_ylim(0.0, 100.0)
+    ax.legend(fontsize="small", loc="lower right")
     ax.grid(alpha=0.3)
 
 

@@ -83,7 +83,7 @@ def make_bench(
 ) -> Bench:
     text = TWO_MASS.format(step=step, integrator=integrator, link=link, joint=joint)
     spec = mujoco.MjSpec.from_string(text)
-    keys = {"rotor_inertia": 4e-5, "damping_ratio": 0.0, **keys}
+    keys = {"rotor_inertia": 4e-5, "damping_ratio": 0.0, "friction": True, **keys}
     got = attach(spec, joint="j", drive=drive, **keys)  # type: ignore[arg-type]
     model = spec.compile()
     joints = [model.joint(name) for name in (got.rotor, "j")]

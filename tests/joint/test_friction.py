@@ -242,6 +242,7 @@ def test_random_pushes_never_give_energy(bench, seed, step, stiffness, rotor):
         damping=1e-3 * stiffness,
     )
     drive = replace(DriveMap.linear(2e4), friction=law)
+    plugin.require_metric()
     with pytest.MonkeyPatch.context() as patch:
         # the damping of unresolved torsion is no friction and not quite passive
         exact = partial(plugin.config, numerical_damping=0.0)
@@ -354,13 +355,17 @@ def test_copies_continue_bitwise(bench, synthetic_map, integrator):
     assert not b.data.plugin_state.any()
 
 
-def test_absent_unless_the_map_has_it(bench, synthetic_map):
-    """No tendon, no state, no attribute without friction; one, two and one with it."""
+def test_absent_unless_asked_for(bench, synthetic_map):
+    """No tendon, no state, no attribute unless the map has it and it is asked for."""
     b = bench(synthetic_map)
     assert (b.model.ntendon, b.model.npluginstate) == (1, 2)
     assert "friction" not in plugin.config(synthetic_map, damping=0.0)
     b = bench(replace(synthetic_map, friction=FRICTION))
     assert (b.model.ntendon, b.model.npluginstate) == (2, 4)
+    b = bench(replace(synthetic_map, friction=FRICTION), friction=False)
+    assert (b.model.ntendon, b.model.npluginstate) == (1, 2)
+    b = bench(replace(synthetic_map, friction=FRICTION), friction=False, level="native")
+    assert not b.model.dof_frictionloss.any() and not b.model.dof_damping.any()
     for level, tendons in (("linear", 1), ("native", 1)):
         b = bench(replace(synthetic_map, friction=FRICTION), level=level)
         assert b.model.ntendon == tendons
@@ -395,7 +400,7 @@ def test_bad_attribute_is_rejected(text):
         "</worldbody></mujoco>"
     )
     drive = replace(DriveMap.linear(1e4), friction=COULOMB)
-    attach(spec, joint="j", drive=drive, rotor_inertia=4e-5)
+    attach(spec, joint="j", drive=drive, rotor_inertia=4e-5, friction=True)
     [instance] = spec.plugins
     instance.config = {**plugin.config(drive, damping=1.0), "friction": text}
     with pytest.raises(ValueError, match="attribute 'friction' is not nine numbers"):
@@ -409,7 +414,7 @@ def test_a_prefix_and_suffix_leave_the_friction_in_place(synthetic_map):
         "</worldbody></mujoco>"
     )
     drive = replace(synthetic_map, friction=FRICTION)
-    attach(arm, joint="j", drive=drive, rotor_inertia=4e-5)
+    attach(arm, joint="j", drive=drive, rotor_inertia=4e-5, friction=True)
     parent = mujoco.MjSpec()
     parent.option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
     parent.attach(arm, prefix="a_", suffix="_z", frame=parent.worldbody.add_frame())
@@ -433,3 +438,39 @@ def test_bad_friction_is_refused(change, says):
     """Parameters that no friction has are named with what is accepted."""
     with pytest.raises(InputError, match=says):
         replace(FRICTION, **change)
+
+
+def test_the_joint_runs_as_its_spec_sheet_says(bench):
+    """CSG-25-100 in MuJoCo: starting, running, back-driving torque and efficiency.
+
+    Two per cent below the starting and the back-driving torque it stands, two above it
+    turns; under the no-load running torque, and under rated load with what the
+    efficiency asks for, it keeps 2000 rpm.
+    """
+    drive = DriveMap.from_catalogue("CSG-25-100")
+    sheet = drive.spec_sheet()
+    speed, i = 2000 * np.pi / 30, drive.ratio
+
+    def turned(torque, load, rate=0.0):
+        b = bench(drive, damping_ratio=0.1, step=1e-3)
+        start = load if rate else 0.0
+        b.place(0.0, -drive.mean_torsion(start), rate, rate / i)
+        for k in range(1000):
+            part = 1.0 if rate else min(1.0, (k + 1) / 500)
+            b.data.qfrc_applied[b.v] = part * torque, -part * load
+            mujoco.mj_step(b.model, b.data)
+        return b.data.qpos[b.q[0]], b.data.qvel[b.v[0]]
+
+    for part, moves in ((0.98, False), (1.02, True)):
+        angle, _ = turned(part * sheet["starting_torque_Nm"], 0.0)
+        assert (abs(angle) > 0.1) == moves
+        # a load against the sense of the ratio drives an input that turns forward
+        load = np.sign(i) * -part * sheet["back_driving_torque_Nm"]
+        angle, _ = turned(0.0, load)
+        # the torsion under the load lets the input turn by less than a degree
+        assert (angle > 0.1) == moves
+    _, rate = turned(sheet["no_load_running_torque_Nm"], 0.0, rate=speed)
+    assert rate == pytest.approx(speed, rel=2e-3)
+    needed = 87.0 / abs(i) / (0.01 * sheet["efficiency_percent"])
+    _, rate = turned(needed, np.sign(i) * 87.0, rate=speed)
+    assert rate == pytest.approx(speed, rel=1e-2)

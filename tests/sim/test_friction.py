@@ -1,0 +1,87 @@
+"""Runs with friction: asked for per joint, in the torque of the motor, in the label."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from swgjoint.cli.run import notes
+from swgjoint.maps.drive_map import DriveMap
+from swgjoint.maps.friction import Friction
+from swgjoint.maps.hysteresis import Jenkin
+from swgjoint.sim.drives import drive_of
+from swgjoint.sim.metrics import first_ratcheting
+from swgjoint.sim.scene_sections import JointSection
+
+LINEAR = DriveMap.linear(2e4, teeth_flexspline=120, teeth_circular_spline=122)
+LAW = Friction(stiffness=50.0, coulomb=0.05, static=0.05, load=0.1, damping=0.05)
+RUBBING = replace(LINEAR, friction=LAW)
+
+
+@pytest.mark.parametrize("level", ["full", "native"])
+def test_a_scene_asks_for_friction(bench, level):
+    """With the key the motor works against it, without it nothing is in the model."""
+    off = bench(RUBBING, defaults__level=level)
+    on = bench(RUBBING, defaults__level=level, defaults__friction=True)
+    torque = [run.motor_torque[run.steady, 0].mean() for run in (off, on)]
+    # 20 N·m over i = -60; at level native no part of the load rubs
+    rubs = 0.05 + (0.1 * 20.0 / 60.0 if level == "full" else 0.0)
+    rubs *= 1.0 + 1.0 / 60.0 if level == "full" else 1.0
+    assert abs(torque[0]) == pytest.approx(20.0 / 60.0, rel=1e-6)
+    extra = abs(torque[1] - torque[0])
+    assert extra == pytest.approx(rubs, rel=2e-3 if level == "full" else 0.02)
+    label = [run.contains["joints"]["joint"]["friction"] for run in (off, on)]
+    assert label == [None, "given"]
+    left = [item["part"] for item in off.contains["left_out"]]
+    assert "friction of the drive" in left
+    assert "friction of the drive" not in [
+        item["part"] for item in on.contains["left_out"]
+    ]
+
+
+def test_the_link_feels_the_friction_of_the_flexspline(bench):
+    """Recorded output torque is the load: elastic part and friction on the link."""
+    run = bench(RUBBING, defaults__friction=True, simulation__duration_s=3.0)
+    late = slice(-200, None)  # the motor's loop has taken up the friction
+    np.testing.assert_allclose(run.output_torque[late, 0], 20.0, rtol=1e-4)
+    elastic = 2e4 * run.torsion[late, 0]
+    rubs = 0.05 + 0.1 * 20.0 / 60.0
+    assert np.abs(elastic - 20.0) == pytest.approx(rubs, rel=0.03)
+
+
+def test_hysteresis_can_be_switched_off():
+    """A joint may leave the hysteresis of its drive out."""
+    element = Jenkin(stiffness=2e4, yield_torque=3.0)
+    known = {"x": replace(LINEAR, hysteresis=(element,))}
+    assert drive_of(JointSection(drive="x"), known=known).hysteresis == (element,)
+    section = JointSection(drive="x", hysteresis=False)
+    assert drive_of(section, known=known).hysteresis == ()
+
+
+def test_ratcheting_is_reported(bench):
+    """Above the ratcheting torque a run says when and at which torque, and goes on."""
+    ratings = replace(LINEAR.ratings, ratcheting_torque=19.0)
+    run = bench(replace(LINEAR, ratings=ratings))
+    joints = run.metrics()["joints"]
+    use = joints["joint"]["ratings"]
+    assert use["ratcheting"]["time_s"] == 0.0
+    assert use["ratcheting"]["torque_Nm"] == pytest.approx(20.0)
+    assert use["ratcheting_margin"] == pytest.approx(0.95)
+    (line,) = [line for line in notes(joints) if "skip" in line]
+    assert "joint: teeth would skip at 0 s with 20 N·m" in line
+    for limit, margin in ((21.0, 1.05), (None, None)):
+        ratings = replace(LINEAR.ratings, ratcheting_torque=limit)
+        use = bench(replace(LINEAR, ratings=ratings)).metrics()
+        use = use["joints"]["joint"]["ratings"]
+        assert use["ratcheting"] is None
+        assert use["ratcheting_margin"] == (margin and pytest.approx(margin))
+
+
+def test_the_first_of_several_events():
+    """Either sign of the torque counts; the first instant above the limit is told."""
+    time, torque = np.arange(5.0), np.array([1.0, -3.0, 2.0, 5.0, 0.0])
+    event = first_ratcheting(time, torque, 2.5)
+    assert (event["time_s"], event["torque_Nm"]) == (1.0, -3.0)
+    assert first_ratcheting(time, torque, 5.0) is None
