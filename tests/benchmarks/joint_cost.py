@@ -4,7 +4,8 @@ Against the rigid arm: a 7-joint arm (iiwa 7) turns slowly under gravity with a 
 loop on every motor (``--bare``: no actuators and no gravity), slowly enough for the
 step to carry all harmonics, as `attach` sees to. One thread, `mj_step` in C, CPU time
 of the process; per level the median over interleaved pairs rigid, level of the ratio of
-their steps per second. Not a test: nothing is asserted.
+their steps per second. ``full+friction`` is level full with friction that slips. Not a
+test: nothing is asserted.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from mujoco.batch import Batch
 
 from swgjoint.joint.attach import LEVELS, attach
 from swgjoint.maps.drive_map import DriveMap, Ratings
+from swgjoint.maps.friction import Friction
 from swgjoint.sim.rigid_arm import RigidArm
 
 STIFFNESS = (4e4, 4e4, 3e4, 3e4, 1.5e4, 8e3, 8e3)
@@ -30,6 +32,15 @@ SPEED = 0.6
 """Of the motors [rad/s]: order 404 moves by 0.24 rad in 1 ms."""
 GAIN = 5.0
 """Of the speed loops [N·m·s/rad]."""
+FRICTION = Friction(
+    stiffness=70.0,
+    coulomb=0.05,
+    static=0.07,
+    stribeck_speed=2.0,
+    viscous=6e-4,
+    load=0.08,
+    damping=0.07,
+)
 START = (0.2, 0.5, -0.2, -1.2, 0.3, 0.8, 0.1)
 
 
@@ -61,6 +72,7 @@ def drive(stiffness: float, orders: tuple[int, ...]) -> DriveMap:
         potential=potential,
         end_stiffness=ends,
         kinematic_error=error,
+        friction=FRICTION,
         ratings=Ratings(
             rated_torque=40.0, repeated_peak=100.0, momentary_peak=200.0, T1=10, T2=30
         ),
@@ -82,9 +94,10 @@ def build(
             spec,
             joint=name,
             drive=drive(stiffness, orders),
-            level=level,
+            level=level.removesuffix("+friction"),
             rotor_inertia=rotor,
             damping_ratio=0.02,
+            friction=level.endswith("+friction"),
         )
         for name, stiffness, rotor in zip(names, STIFFNESS, ROTOR, strict=True)
     ]
@@ -171,7 +184,8 @@ def batch(args: argparse.Namespace) -> dict[str, float]:
 def main() -> None:
     """Print the table, or JSON."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    parser.add_argument("--levels", nargs="+", choices=LEVELS, default=LEVELS)
+    levels = (*LEVELS, "full+friction")
+    parser.add_argument("--levels", nargs="+", choices=levels, default=levels)
     parser.add_argument("--pairs", type=int, default=9)
     parser.add_argument("--steps", type=int, default=4_000)
     parser.add_argument("--step", type=float, default=1e-3, help="timestep [s]")
