@@ -6,6 +6,7 @@ import io
 import json
 import os
 import struct
+import time
 import zipfile
 from dataclasses import replace
 from pathlib import Path
@@ -17,7 +18,7 @@ from hypothesis import strategies as st
 
 from swgjoint.errors import InputError, MapFileError
 from swgjoint.maps.drive_map import DriveMap
-from swgjoint.maps.file import MAX_BYTES, map_bytes
+from swgjoint.maps.file import MAX_BYTES, map_bytes, map_from_bytes
 from swgjoint.maps.friction import Friction
 from swgjoint.maps.hysteresis import Jenkin
 
@@ -244,6 +245,73 @@ def test_huge_claims(synthetic_map, tmp_path):
         file.truncate(MAX_BYTES + 1)
     with pytest.raises(MapFileError, match="at most"):
         DriveMap.load(tmp_path / "long.swg")
+
+
+KINDS = ("truncated", "shape", "not a number", "huge", "pickle", "bomb", "header")
+
+
+def hostile(data: bytes, kind: str, rng: np.random.Generator) -> bytes:
+    """A file of one kind, another one at every call."""
+    drive = map_from_bytes(data, DriveMap)
+    key = str(rng.choice(ARRAYS))
+    array = getattr(drive, key)
+    if kind == "truncated":
+        return data[: int(rng.integers(0, len(data)))]
+    if kind == "shape":
+        size = int(rng.integers(1, 40))
+        wrong = [array[:-1], array[None], np.zeros((size,) * 2, array.dtype)]
+        return repacked(data, **{key: npy(wrong[int(rng.integers(3))])})
+    if kind == "not a number":
+        floats = [k for k in ARRAYS if k != "orders"]
+        key = str(rng.choice(floats))
+        array = getattr(drive, key).copy()
+        array.flat[int(rng.integers(array.size))] = rng.choice(
+            [np.nan, np.inf, -np.inf]
+        )
+        return repacked(data, **{key: npy(array)})
+    if kind == "huge":
+        shape = tuple(int(n) for n in 10 ** rng.integers(4, 9, array.ndim))
+        text = f"{{'descr': '{array.dtype.str}', 'fortran_order': False, "
+        text += f"'shape': {shape}, }}"
+        claim = b"\x93NUMPY\x01\x00" + struct.pack("<H", 118)
+        claim += text.encode().ljust(117) + b"\n"
+        return repacked(data, **{key: claim + bytes(int(rng.integers(8, 800)))})
+    if kind == "pickle":
+        values = [{"a": 1}, print, b"x", [1, (2,)], None]
+        one = np.array([values[int(rng.integers(5))]], dtype=object)
+        return repacked(data, **{key: npy(one, allow_pickle=True)})
+    if kind == "bomb":
+        zeros = npy(np.zeros(int(rng.integers(1e5, 1e6))))
+        name = str(rng.choice(["extra", *ARRAYS]))
+        return repacked(data, zipfile.ZIP_DEFLATED, **{name: zeros})
+    header = header_of(data)
+    name = str(rng.choice(sorted(header)))
+    values = [float("1e400"), [], {"x": 1}, -7, "\x00" * 50, [[[]]] * 9, None, True]
+    wrong = values[int(rng.integers(len(values)))]
+    if wrong is None and name == "friction":
+        wrong = 3
+    if name in ("name", "level") and isinstance(wrong, str):
+        wrong = 3  # any text is a name
+    if name in ("units", "versions", "info") and isinstance(wrong, dict):
+        wrong = 3
+    if name == "hysteresis" and wrong == []:
+        wrong = 3
+    return repacked(data, header=header_npy({**header, name: wrong}))
+
+
+def test_two_hundred_hostile_files(synthetic_map, tmp_path):
+    """30 of each kind, no two alike: every one refused in one line, quickly."""
+    data = map_bytes(synthetic_map)
+    rng = np.random.default_rng(3)
+    seen = set()
+    for kind in KINDS:
+        for _ in range(30):
+            file = hostile(data, kind, rng)
+            seen.add(file)
+            begin = time.perf_counter()
+            refusal(tmp_path, file)
+            assert time.perf_counter() - begin < 5.0
+    assert len(seen) > 150
 
 
 def test_wrong_headers(synthetic_map, tmp_path):
