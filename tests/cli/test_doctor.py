@@ -5,12 +5,15 @@ from __future__ import annotations
 import json
 import sys
 
+import mujoco
 import pytest
 
 from swgjoint.cli import doctor
 from swgjoint.cli.main import main
 from swgjoint.errors import ComputationError
 from swgjoint.joint import plugin
+from swgjoint.joint.attach import attach
+from swgjoint.maps.drive_map import DriveMap
 
 
 def run(capsys) -> tuple[int, dict]:
@@ -52,6 +55,29 @@ def test_plugin_that_does_not_load(capsys, monkeypatch):
     assert status == 1
     assert not result["ok"]
     assert "pip install mujoco==4.0.0" in by_name(result)["engine plugin"]["detail"]
+
+
+def test_another_mujoco(capsys, monkeypatch):
+    """With another version doctor and a scene's joint say which is needed, and how."""
+    plugin.load.cache_clear()
+    with monkeypatch.context() as patch:
+        patch.setattr(mujoco, "__version__", "4.1.0")
+        status, result = run(capsys)
+        assert status == 1
+        detail = by_name(result)["engine plugin"]["detail"]
+        assert "mujoco 4.1.0 is installed" in detail
+        assert detail.endswith("needs 4.0.0: pip install mujoco==4.0.0")
+        spec = mujoco.MjSpec.from_string(
+            '<mujoco><worldbody><body><joint name="j"/><geom size=".1"/></body>'
+            "</worldbody></mujoco>"
+        )
+        drive = DriveMap.linear(1e4)
+        with pytest.raises(ComputationError, match=r"pip install mujoco==4\.0\.0"):
+            attach(spec, joint="j", drive=drive, rotor_inertia=1e-4)
+        # what needs no plugin still works
+        attach(spec, joint="j", drive=drive, level="linear", rotor_inertia=1e-4)
+    _, result = run(capsys)
+    assert by_name(result)["engine plugin"]["ok"]
 
 
 def test_mujoco_that_is_missing(capsys, monkeypatch):
