@@ -14,6 +14,7 @@ import numpy as np
 
 from swgjoint.errors import ComputationError
 from swgjoint.maps.drive_map import DriveMap
+from swgjoint.maps.friction import Friction
 
 NAME = "swgjoint.drive"
 MUJOCO_VERSION = "4.0.0"
@@ -142,18 +143,21 @@ _SELF_TEST = """
       <joint name="l" axis="0 0 1"/></body>
   </worldbody>
   <tendon><fixed name="d" stiffness="1e-9 0 1" springlength="0">
-    <joint joint="m" coef="{coef!r}"/><joint joint="l" coef="-1"/></fixed></tendon>
+    <joint joint="m" coef="{coef!r}"/><joint joint="l" coef="-1"/></fixed>
+    <fixed name="f" stiffness="1e-9 0 1e-30" springlength="0">
+    <joint joint="m" coef="1"/><joint joint="l" coef="-1"/></fixed></tendon>
 </mujoco>
 """
 
 
 def metric_error() -> float:
-    """Difference of one step from (M + h² p g g')⁻¹ h f, relative to the step.
+    """Difference of one step from (M + h² (p g g' + p_b b b'))⁻¹ h f, of the step.
 
-    The scheme hands direction g and stiffness p to the engine through ``ten_J`` and
-    ``ten_length``, which no document promises; this asks the installed engine.
+    The scheme hands direction g and stiffness p, and the stiffness p_b of friction, to
+    the engine through ``ten_J`` and ``ten_length``, which no document promises; this
+    asks the installed engine.
     """
-    from swgjoint.joint.reference import Motion, scheme_force
+    from swgjoint.joint.reference import Motion, metric_of, scheme_force
 
     load()
     drive = DriveMap.linear(2e4)
@@ -163,6 +167,7 @@ def metric_error() -> float:
         potential=np.concatenate([drive.potential, 0.0 * drive.potential]),
         end_stiffness=np.concatenate([drive.end_stiffness, 0.0 * drive.end_stiffness]),
         kinematic_error=np.array([[0.0, 0.0], [3e-4, 2e-4]]),
+        friction=Friction(stiffness=70.0, coulomb=0.05, static=0.05, viscous=1e-3),
     )
     damping, h = 3.0, 0.002
     keys = config(drive, damping=damping)
@@ -187,8 +192,7 @@ def metric_error() -> float:
         timestep=h,
         damping=damping,
     )
-    g = np.array([force.g_theta, force.g_psi])
-    metric = np.diag(inertia) + h * h * force.metric * np.outer(g, g)
+    metric = np.diag(inertia) + metric_of(drive, force, timestep=h)
     expected = np.linalg.solve(metric, h * np.array([force.theta, force.psi]))
     mujoco.mj_step(model, data)
     return float(np.linalg.norm(data.qvel - v - expected) / np.linalg.norm(expected))
