@@ -19,6 +19,15 @@ Array = NDArray[np.float64]
 HARMONICS = (1, 2, 3, 4)
 """Of the cumulative pitch error, with amplitudes 1/k."""
 
+TEETH = (
+    "flexspline_cumulative_pitch_um",
+    "circular_spline_cumulative_pitch_um",
+    "random_pitch_um",
+    "circular_spline_eccentricity_um",
+    "circular_spline_ovality_um",
+)
+"""Keys of errors that shift teeth."""
+
 # streams of the random parts
 _PITCH = {"flexspline": 1, "circular_spline": 2}
 _RANDOM = {"flexspline": 3, "circular_spline": 4}
@@ -87,6 +96,11 @@ def wave_generator_offset(design: Design) -> Array:
     turn = _stream(design.tolerances.seed, _WAVE_GENERATOR).uniform(0.0, 2.0 * np.pi)
     size = design.tolerances.wave_generator_eccentricity_um * um
     return size * np.array([-np.sin(turn), np.cos(turn)])
+
+
+def with_perfect_teeth(design: Design) -> Design:
+    """The same drive without errors of its teeth; those of the wave generator stay."""
+    return design.with_changes({f"tolerances.{key}": 0.0 for key in TEETH})
 
 
 def has_errors(design: Design) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -15,8 +15,76 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class FullSolves:
+    """Single equilibria that judge a map and take no part in its fit. Shapes (n,)."""
+
+    input_angle: Array
+    """theta [rad]."""
+    torque: Array
+    """T [N·m]."""
+    output_error: Array
+    """psi - theta/i [rad]."""
+    input_torque: Array
+    """External torque on the input [N·m]."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ToleranceSamples:
+    """Equilibria of a drive with errors of its teeth over a whole cycle of them.
+
+    The cycle has so many pitches that the teeth that mesh return; after each of them
+    the perfect drive would be the same. Quantities of a table, its first axis: output
+    error psi - theta/i [rad], strain energy [J], compliance [rad/(N·m)].
+    """
+
+    pitches: int
+    """Of the cycle."""
+    phases: int
+    """Positions in a pitch."""
+    torque: Array
+    """T, increasing, zero included [N·m]. Shape (n_torques,)."""
+    table: Array
+    """At equal steps of theta over the cycle, its end excluded. Shape (3, n_torques,
+    pitches * phases)."""
+    perfect: Array
+    """The same without the errors, by the same means. Shape (3, n_torques, phases)."""
+    free: int = 0
+    """Positions at which the unloaded output is free; it stands in the middle."""
+    solved: FullSolves | None = None
+    """Solves of the same drive without linearisation, errors as in the table."""
+
+    def __post_init__(self) -> None:
+        torque = frozen_array(self.torque, "torque [N·m]", ndim=1)
+        if (np.diff(torque) <= 0).any() or not (torque == 0.0).any():
+            raise ValueError("torque [N·m] must increase and contain zero")
+        object.__setattr__(self, "torque", torque)
+        for key, count in (
+            ("table", self.pitches * self.phases),
+            ("perfect", self.phases),
+        ):
+            shape = (3, torque.size, count)
+            table = frozen_array(getattr(self, key), key, shape=shape)
+            object.__setattr__(self, key, table)
+
+    def in_series(self, stiffness: float) -> ToleranceSamples:
+        """The same drive behind a spring at its output [N·m/rad]."""
+        t = self.torque[:, None]
+        spring = np.stack([-t, 0.5 * t**2, np.ones_like(t)]) / stiffness
+        solved = self.solved
+        if solved is not None:
+            twisted = solved.output_error - solved.torque / stiffness
+            solved = replace(solved, output_error=twisted)
+        return replace(
+            self,
+            table=self.table + spring,
+            perfect=self.perfect + spring,
+            solved=solved,
+        )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class MapSamples:
-    """Equilibria of a perfect drive over one period of its pattern.
+    """Equilibria of a drive with perfect teeth over one period of its pattern.
 
     Tables have the shape (n_torques, n_angles).
     """
@@ -42,6 +110,8 @@ class MapSamples:
     """Tangent d(torsion)/dT at fixed input [rad/(N·m)]."""
     input_torque: Array
     """External torque on the input; not used by the fit, only to judge it [N·m]."""
+    tolerances: ToleranceSamples | None = None
+    """The drive with errors of its teeth; None without."""
     info: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

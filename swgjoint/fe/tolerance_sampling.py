@@ -1,0 +1,256 @@
+"""Equilibria of a drive with manufacturing errors over the whole cycle of its teeth.
+
+Errors of the circular spline repeat with alpha, those of the flexspline with beta; both
+together after as many pitches as the least common multiple of the tooth counts, a turn
+of the output or a part of it. Full solves would take hours: the drive is linearised at
+a few positions within one pitch, and the errors of all pitches are superposed there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from math import lcm, pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.errors import ComputationError
+from swgjoint.fe.continuation import Continuation
+from swgjoint.fe.drive2d import ring_model
+from swgjoint.fe.state import State
+from swgjoint.fe.tolerance_influence import Influence, Response, influence
+from swgjoint.gear.design import Design, MemberName
+from swgjoint.gear.kinematics import periodicity
+from swgjoint.gear.tolerances import ToothErrors, tooth_errors, with_perfect_teeth
+from swgjoint.maps.samples import FullSolves, ToleranceSamples
+from swgjoint.progress import Progress, silent
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+PHASES = 4
+"""Positions within a pitch: what the errors add varies slowly within one."""
+POSITIONS = 40_000
+"""Positions of the cycle, if that leaves two in a pitch: what two minutes allow."""
+LEVELS = (0.15, 0.45, 1.0)
+"""Sampled torques, of both signs, as parts of the repeated peak torque."""
+SMALL = 0.01
+"""Part of the rated torque of either sign between whose positions an output without
+torque stands where clearance leaves it free."""
+CHECKS = 12
+"""Positions that are solved without linearisation, too, to judge the map."""
+MEMBERS: tuple[MemberName, MemberName] = ("flexspline", "circular_spline")
+FREE = 100.0
+"""Compliance, in that of the perfect drive, from which the output counts as free."""
+
+
+def pitches_of(design: Design) -> int:
+    """Pitches after which the errors of the teeth repeat; 0 without such errors."""
+    shifts = [tooth_errors(design, member).shift for member in MEMBERS]
+    counts = [len(shift) for shift in shifts if shift.any()]
+    return lcm(*counts) if counts else 0
+
+
+def pitch_of(design: Design) -> float:
+    """Input angle after which the teeth stand alike [rad]."""
+    drive = design.drive
+    cycles = periodicity(
+        drive.layout, drive.teeth_flexspline, drive.teeth_circular_spline
+    )
+    return 2.0 * pi / cycles
+
+
+def shifted(errors: ToothErrors, pitches: Index, layout: str) -> Array:
+    """Shifts of the teeth that stand where those of the first pitch stood.
+
+    Args:
+        errors: Of one member.
+        pitches: Whole pitches that the input has moved on (n,).
+        layout: Which member is fixed.
+
+    Returns:
+        In the frames of the teeth (n, n_teeth, 2) [m].
+    """
+    count = len(errors.shift)
+    # the lobes move on to the next teeth; a wave generator that stands still sees the
+    # teeth come from behind
+    onwards = -pitches if layout == "wave_generator_fixed" else pitches
+    return np.asarray(errors.shift[(np.arange(count) + onwards[:, None]) % count])
+
+
+def influences(
+    design: Design, *, phases: int = PHASES
+) -> tuple[Continuation, list[tuple[State, Influence]]]:
+    """The drive with perfect teeth, unloaded and linearised at positions in a pitch.
+
+    Args:
+        design: The drive; errors of its wave generator are kept.
+        phases: Positions, equally spaced.
+
+    Raises:
+        ComputationError: If the unloaded drive cannot be solved.
+    """
+    perfect, drive = with_perfect_teeth(design), design.drive
+    follow = Continuation(
+        model=ring_model(perfect, friction=False),
+        ratio=design.ratio,
+        layout=drive.layout,
+    )
+    period = pitch_of(design)
+    state = follow.meshed(follow.deflected())
+    if state.outcome.ok:
+        state = follow.to_torque(state, 0.0)
+    found = []
+    for k in range(phases):
+        if k:
+            state = follow.to_angle(state, period * k / phases)
+        if not state.outcome.ok:
+            raise ComputationError(
+                f"{drive.name}: no equilibrium without torque and errors:"
+                f" {state.outcome.value}"
+            )
+        linear = influence(follow.model, state, ring_is_output=follow.ring_is_output)
+        found.append((state, linear))
+    return follow, found
+
+
+def sample_tolerances(
+    design: Design,
+    *,
+    repeated_peak: float,
+    rated_torque: float,
+    phases: int | None = None,
+    progress: Progress = silent,
+) -> ToleranceSamples:
+    """Superposed equilibria over the cycle of the teeth.
+
+    Args:
+        design: A drive with errors of its teeth.
+        repeated_peak: Largest torque [N·m].
+        rated_torque: [N·m].
+        phases: Positions within a pitch; fewer than usual for many pitches if None.
+        progress: Called with the stage, the positions done and their number.
+
+    Raises:
+        ComputationError: If the drive without errors or without torque, or a torque
+            with errors cannot be solved.
+    """
+    drive = design.drive
+    if phases is None:
+        phases = int(np.clip(POSITIONS // pitches_of(design), 2, PHASES))
+    follow, linear = influences(design, phases=phases)
+    pitches = np.arange(pitches_of(design), dtype=np.int64)
+    errors = [
+        shifted(tooth_errors(design, member), pitches, drive.layout)
+        for member in MEMBERS
+    ]
+    levels = np.array([part * repeated_peak for part in LEVELS])
+    tables, free = [], 0
+    for k, (state, at) in enumerate(linear):
+        # the last row is the drive without errors
+        gaps = at.gap_change(*errors)
+        gaps = np.concatenate([gaps, np.zeros((1, gaps.shape[1]))])
+        found, count = _over_torque(at, gaps, levels, SMALL * rated_torque)
+        if not np.isfinite(found).all():
+            lost = np.isnan(found).any(axis=(0, 1)).sum()
+            raise ComputationError(
+                f"{drive.name}: no equilibrium with the errors of the teeth at {lost}"
+                f" of {gaps.shape[0]} positions; try smaller tolerances"
+            )
+        found[0] -= pitch_of(design) * k / phases / design.ratio
+        found[1] += state.energy
+        tables.append(found)
+        free += count
+        progress(f"{drive.name}: tolerances", k + 1, phases)
+    # (3, n_torques, n_pitches, n_phases)
+    table = np.stack(tables, axis=-1)
+    # spread over the cycle and the phases of a pitch
+    count = pitches.size * phases
+    chosen = np.arange(CHECKS) * (count // CHECKS) + np.arange(CHECKS) % phases
+    states = [state for state, _ in linear]
+    solved = full_solves(design, follow, states, chosen % count, (0.0, rated_torque))
+    return ToleranceSamples(
+        pitches=pitches.size,
+        phases=phases,
+        torque=np.concatenate([-levels[::-1], [0.0], levels]),
+        table=table[:, :, :-1].reshape(*table.shape[:2], -1),
+        perfect=table[:, :, -1],
+        free=free,
+        solved=solved,
+    )
+
+
+def full_solves(
+    design: Design,
+    follow: Continuation,
+    states: list[State],
+    positions: Index,
+    torques: Sequence[float],
+) -> FullSolves:
+    """Equilibria with errors at some positions of the cycle, without linearisation.
+
+    Args:
+        design: A drive with errors of its teeth.
+        follow: The same without them.
+        states: Its unloaded states at positions in a pitch.
+        positions: Numbers of positions in the cycle, ``len(states)`` a pitch.
+        torques: T at each of them [N·m].
+    """
+    rows = []
+    step = pitch_of(design) / len(states)
+    pitch, phase = np.divmod(positions, len(states))
+    shifts = [
+        shifted(tooth_errors(design, member), pitch, design.drive.layout)
+        for member in MEMBERS
+    ]
+    for k, (own, other) in enumerate(zip(*shifts, strict=True)):
+        model = replace(follow.model, tooth_shift=own, ring_tooth_shift=other)
+        flawed, state = replace(follow, model=model), states[phase[k]]
+        for torque in torques:
+            state = flawed.to_torque(state, torque)
+            angle = flawed.output_angle(state) if state.outcome.ok else np.nan
+            error = angle - step * phase[k] / follow.ratio
+            rows.append(
+                (step * positions[k], torque, error, follow.input_torque(state))
+            )
+    table = np.array(rows).T
+    table = table[:, np.isfinite(table[2])]
+    return FullSolves(
+        input_angle=table[0],
+        torque=table[1],
+        output_error=table[2],
+        input_torque=table[3],
+    )
+
+
+def _over_torque(
+    at: Influence, gaps: Array, levels: Array, small: float
+) -> tuple[Array, int]:
+    """Output angle, strain energy, compliance at all torques (3, n_torques, n_sets).
+
+    And the number of sets whose unloaded output is free.
+    """
+
+    def row(torque: float, response: Response) -> Array:
+        energy = response.potential - torque * response.output_angle
+        return np.stack([response.output_angle, energy, response.compliance])
+
+    rest = at.respond(gaps, 0.0)
+    unloaded = row(0.0, rest)
+    free = ~(rest.compliance < FREE * rest.compliance[-1])
+    if free.any():
+        ends = [row(t, at.respond(gaps[free], t)) for t in (small, -small)]
+        middle = 0.5 * (ends[0] + ends[1])
+        middle[2] = 0.5 * (ends[1][0] - ends[0][0]) / small
+        unloaded[:, free] = middle
+    sides = []
+    for sign in (-1.0, 1.0):
+        active, rows = rest.active, []
+        for level in levels:
+            response = at.respond(gaps, sign * level, active)
+            active = response.active
+            rows.append(row(sign * level, response))
+        sides.append(rows)
+    table = [*sides[0][::-1], unloaded, *sides[1]]
+    return np.stack(table, axis=1), int(free.sum())

@@ -1,0 +1,144 @@
+"""Errors of the teeth superposed on the linearised drive, against full solves."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from swgjoint.fe.continuation import Continuation
+from swgjoint.fe.drive2d import ring_model
+from swgjoint.fe.tolerance_sampling import (
+    MEMBERS,
+    full_solves,
+    influences,
+    pitch_of,
+    pitches_of,
+    shifted,
+)
+from swgjoint.gear.design import Design
+from swgjoint.gear.tolerances import tooth_errors
+
+pytestmark = pytest.mark.fe
+
+ERRORS = {
+    "flexspline_cumulative_pitch_um": 10.0,
+    "circular_spline_cumulative_pitch_um": 10.0,
+    "random_pitch_um": 2.0,
+    "circular_spline_ovality_um": 5.0,
+    "circular_spline_eccentricity_um": 5.0,
+}
+
+
+def flawed(name="reference-2d", **values) -> Design:
+    changes = {f"tolerances.{key}": value for key, value in values.items()}
+    return Design.preset(name).with_changes(changes)
+
+
+def gaps_at(design, at, pitches):
+    """Gap changes of all contacts at whole pitches (n, n_contacts)."""
+    layout = design.drive.layout
+    shifts = [shifted(tooth_errors(design, m), pitches, layout) for m in MEMBERS]
+    return at.gap_change(*shifts)
+
+
+@pytest.fixture(scope="module")
+def reference():
+    """The perfect drive without load at one position, and its influences."""
+    follow, found = influences(Design.preset("reference-2d"), phases=1)
+    return follow, *found[0]
+
+
+def test_without_errors_the_perfect_drive_comes_back(reference):
+    """Angle, compliance and energy over torque are those of full solves."""
+    follow, state, at = reference
+    none = np.zeros((1, len(at.sector)))
+    rest = at.respond(none, 0.0)
+    assert rest.output_angle[0] == pytest.approx(state.rotation, abs=1e-15)
+    assert rest.compliance[0] == pytest.approx(state.compliance, rel=1e-9)
+    assert rest.potential[0] == 0.0 and not rest.active.any()
+    loaded = follow.to_torque(state, 20.0)
+    found = at.respond(none, 20.0)
+    # linear geometry against nonlinear
+    assert found.output_angle[0] == pytest.approx(loaded.rotation, rel=3e-3)
+    assert found.compliance[0] == pytest.approx(loaded.compliance, rel=3e-3)
+    gain = loaded.energy + 20.0 * loaded.rotation - state.energy
+    assert found.potential[0] == pytest.approx(gain, rel=3e-3)
+
+
+def test_potential_is_the_integral_of_the_angle(reference):
+    """Pi has psi as its slope in T, where errors have changed the contacts, too."""
+    _, _, at = reference
+    design = flawed(**ERRORS)
+    gaps = gaps_at(design, at, np.arange(0, 7320, 600))
+    step = 1e-4
+    torques = (15.0 - step, 15.0, 15.0 + step)
+    low, middle, high = (at.respond(gaps, t) for t in torques)
+    assert (middle.active.sum(axis=1) > 20).all()
+    slope = (high.potential - low.potential) / (2.0 * step)
+    assert slope == pytest.approx(middle.output_angle, rel=1e-6, abs=1e-12)
+    bend = -(high.output_angle - low.output_angle) / (2.0 * step)
+    assert bend == pytest.approx(middle.compliance, rel=1e-4)
+
+
+def test_superposition_is_within_five_percent_of_full_solves(reference):
+    """Output error and energy at no load and at rated torque, two seeds."""
+    follow, state, at = reference
+    none = np.zeros((1, len(at.sector)))
+    for seed in (1, 2):
+        design = flawed(**ERRORS, seed=seed)
+        positions = np.random.default_rng(seed).choice(pitches_of(design), 3)
+        solved = full_solves(design, follow, [state], positions, (0.0, 20.0))
+        assert solved.torque.size == 6
+        for torque in (0.0, 20.0):
+            every = gaps_at(design, at, np.arange(0, 7320, 20))
+            spread = np.ptp(at.respond(every, torque).output_angle)
+            assert spread > 5e-5
+            gaps = gaps_at(design, at, positions)
+            found = at.respond(gaps, torque).output_angle
+            found -= at.respond(none, torque).output_angle
+            perfect = follow.to_torque(state, torque).rotation
+            wanted = solved.output_error[solved.torque == torque] - perfect
+            assert np.abs(found - wanted).max() < 0.05 * spread
+            # what the gaps do to first order misses by far: contacts change
+            first = gaps @ at.angle_by_gap
+            assert np.abs(first - wanted).max() > 0.05 * spread
+
+
+@pytest.mark.parametrize(
+    "name", ["reference-2d", "reference-2d-flexspline-fixed", "wave_generator_fixed"]
+)
+def test_a_pitch_on_the_next_teeth_stand_alike(name):
+    """Turning the input by whole pitches equals moving the errors on to other teeth."""
+    fixed = name == "wave_generator_fixed"
+    design = flawed("reference-2d" if fixed else name, **ERRORS)
+    if fixed:
+        design = design.with_changes({"drive.layout": name})
+    follow, found = influences(design, phases=1)
+    state, pitches = found[0][0], 5
+    moved = full_solves(design, follow, [state], np.array([pitches]), (20.0,))
+    model = ring_model(design, friction=False)
+    turned = Continuation(model=model, ratio=design.ratio, layout=design.drive.layout)
+    there = turned.to_torque(turned.meshed(turned.deflected()), 20.0)
+    here = turned.output_angle(there)
+    angle = pitches * pitch_of(design)
+    there = turned.to_angle(there, angle)
+    assert there.outcome.ok
+    error = turned.output_angle(there) - angle / design.ratio
+    assert error == pytest.approx(moved.output_error[0], abs=1e-9)
+    # it is not the error of the first position
+    assert abs(here - error) > 1e-6
+    assert turned.input_torque(there) == pytest.approx(moved.input_torque[0], abs=1e-6)
+
+
+def test_flawed_or_half_models_are_refused(reference):
+    """The linearised drive has perfect teeth and all sectors."""
+    from swgjoint.fe.tolerance_influence import influence
+
+    follow, state, _ = reference
+    shifts = np.full((120, 2), 1e-6)
+    for change in ({"tooth_shift": shifts}, {"half": True}):
+        model = replace(follow.model, **change)
+        with pytest.raises(ValueError, match="without friction and errors"):
+            influence(model, state, ring_is_output=False)
