@@ -43,6 +43,8 @@ class NativeSpring:
     """Constant friction torque at the input [N·m]."""
     viscous: float = 0.0
     """Friction per speed of the input [N·m·s/rad]."""
+    friction_note: str = ""
+    """What of the friction has no constant."""
 
     def torque(self, torsion: Array) -> Array:
         """Elastic torque, without hysteresis [N·m]."""
@@ -54,7 +56,7 @@ def fit_native(drive: DriveMap) -> NativeSpring:
 
     Where the curve softens (c < 0) the spring is linear with the map's mean
     stiffness; where it has no stiffness about zero (a <= 0: clearance) a thousandth
-    of the mean stiffness stays. ``note`` says so, and what friction loses.
+    of the mean stiffness stays. ``note`` says so.
     """
     low, high = drive.torque_range
     peak = min(drive.ratings.repeated_peak, -low, high)
@@ -78,9 +80,7 @@ def fit_native(drive: DriveMap) -> NativeSpring:
         note = "the mean curve has no stiffness about zero: cubic"
     rest = torque - x * (a + c * x**2)
     law = drive.friction
-    if law is not None and (law.load or law.static > law.coulomb):
-        more = "friction without its dependence on load and speed, against the housing"
-        note = f"{note}; {more}" if note else more
+    changes = law is not None and (law.load > 0.0 or law.static > law.coulomb)
     return NativeSpring(
         linear=float(a),
         cubic=float(c),
@@ -90,6 +90,7 @@ def fit_native(drive: DriveMap) -> NativeSpring:
         hysteresis=drive.hysteresis,
         friction=law.coulomb + law.bending if law else 0.0,
         viscous=law.viscous if law else 0.0,
+        friction_note="its change with load and speed" if changes else "",
     )
 
 

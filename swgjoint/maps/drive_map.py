@@ -161,8 +161,9 @@ class DriveMap:
         """The map of a catalogue drive such as ``CSG-25-100``: series, size, ratio.
 
         Stiffness K1, K2, K3 and ratings of the shipped tables, and the hysteresis loss
-        where a row states one (CHA), at the upper bound that it is; no kinematic error,
-        of which a catalogue gives a bound only (``info["stated"]``).
+        where a row states one (CHA), at the upper bound that it is; friction where
+        losses are stated (CSG, ratio 100, sizes 14 to 25); no kinematic error, of which
+        a catalogue gives a bound only (``info["stated"]``).
 
         Raises:
             InputError: With the nearest names, if there is no such row.

@@ -113,6 +113,9 @@ def _left_out(transmission: Transmission) -> list[dict[str, str]]:
         )
     if attached.native is not None and attached.native.note:
         items.append({"part": "the stiffness curve", "reason": attached.native.note})
+    if attached.native is not None and attached.native.friction_note:
+        part = f"of the friction {attached.native.friction_note}"
+        items.append({"part": part, "reason": "no native form"})
     if attached.unresolved:
         left = [f"{u.order:.4g}" for u in attached.unresolved]
         orders = f"orders {left[0]} to {left[-1]}" if left[1:] else f"order {left[0]}"

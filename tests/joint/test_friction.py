@@ -377,6 +377,10 @@ def test_native_has_friction_without_load(bench, synthetic_map):
     np.testing.assert_allclose(b.model.dof_frictionloss[b.v], [0.045, 0.0])
     np.testing.assert_allclose(b.model.dof_damping[b.v], [6e-4, 0.0])
     assert b.drive.native.friction == pytest.approx(0.045)
+    assert "load" in b.drive.native.friction_note
+    constant = replace(FRICTION, load=0.0, static=0.04)
+    b = bench(replace(synthetic_map, friction=constant), level="native")
+    assert not b.drive.native.friction_note
 
 
 @pytest.mark.parametrize(
