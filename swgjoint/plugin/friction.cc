@@ -27,9 +27,11 @@ bool Friction::Parse(const std::vector<double>& list) {
 }
 
 double Friction::Reach(double speed, double torque) const {
-  const double x = speed / stribeck_;
-  const double slip = coulomb_ + (static_ - coulomb_) * std::exp(-x * x) +
-                      load_ * std::fabs(torque);
+  double slip = coulomb_ + load_ * std::fabs(torque);
+  if (static_ > coulomb_) {
+    const double x = speed / stribeck_;
+    slip += (static_ - coulomb_) * std::exp(-x * x);
+  }
   return slip / stiffness_;
 }
 

@@ -14,7 +14,8 @@ from swgjoint.sim.drives import load_drive
 CONTRACT = (
     "K1_Nm_rad K2_Nm_rad K3_Nm_rad T1_Nm T2_Nm hysteresis_loss_arcmin"
     " lost_motion_arcmin transmission_accuracy_arcmin orders ripple_rms_percent"
-    " fatigue_safety_factor radial_stiffness_N_mm wall_s"
+    " no_load_running_torque_Nm starting_torque_Nm back_driving_torque_Nm"
+    " efficiency_percent fatigue_safety_factor radial_stiffness_N_mm wall_s"
 ).split()
 
 
@@ -46,6 +47,9 @@ def test_catalogue_drive(capsys, tmp_path, monkeypatch):
     empty = {k for k in CONTRACT if result[k] is None}
     assert empty <= set(result["missing"])
     assert result["stated"]["transmission_accuracy_arcmin"] == 1.0
+    assert result["efficiency_percent"] == pytest.approx(77.0)
+    assert result["stated"]["back_driving_torque_Nm"] == 7.26
+    assert result["validity"]["running_speed_rpm"] == pytest.approx(2000.0)
     assert result["files"] == ["out/spec.json", "out/spec.png"]
     written = json.loads((tmp_path / "out/spec.json").read_text())
     skip = {"wall_s"}
@@ -95,6 +99,28 @@ def test_report(capsys, tmp_path, synthetic_map):
     assert main(["spec", "CSG-25-100", "--only", "K1_Nm_rad"]) == 0
     (row,) = (r for r in capsys.readouterr().out.splitlines() if r.startswith("K1"))
     assert row.split() == ["K1", "3.115e+04", "3.1e+04", "N·m/rad"]
+
+
+def test_report_of_losses(capsys):
+    """Losses stand with their conditions and source, or with the reason."""
+    keys = "starting_torque_Nm,back_driving_torque_Nm"
+    assert main(["spec", "CSG-25-100", "--only", keys]) == 0
+    out = capsys.readouterr().out
+    (row,) = (r for r in out.splitlines() if r.startswith("starting"))
+    assert row.split() == ["starting", "torque", "0.069", "0.069", "N·m"]
+    assert "at 2000 rpm" in out and "prediction" in out
+    assert main(["spec", "CSG-25-50", "--only", keys]) == 0
+    assert "the map has no friction" in capsys.readouterr().out
+
+
+def test_a_built_map_names_what_bending_alone_takes(built, capsys):
+    """Finite elements have no friction; the reason has the loss of the bent rim."""
+    keys = "starting_torque_Nm,K1_Nm_rad"
+    result = spec(capsys, "reference-2d", "--only", keys)
+    assert result["starting_torque_Nm"] is None
+    assert "takes about 0.049 mN·m" in result["missing"]["starting_torque_Nm"]
+    assert spec(capsys, "reference-2d", "--only", "starting_torque_Nm")["missing"]
+    assert len(built) == 1
 
 
 @pytest.mark.parametrize(
