@@ -32,6 +32,7 @@ COMMANDS = {
     "spec": "catalogue-style sheet of a design, a map or a catalogue drive",
     "run": "simulate an arm with its drives",
     "study": "our values beside those of a source",
+    "stability": "stiff and extreme joints: run, cut into sub-steps, or refused",
     "view": "open a recording",
     "doctor": "versions, engine plugin, cache, optional parts",
 }

@@ -140,6 +140,8 @@ def check_region(
     *,
     timestep: float,
     max_input_speed: float = 0.0,
+    max_torque: float | None = None,
+    contacts: bool = False,
     integrator: str = "discrete",
 ) -> Region:
     """Whether a joint's integration holds at a step; see the module for the bounds.
@@ -148,6 +150,9 @@ def check_region(
         drive: What :func:`swgjoint.joint.attach.attach` returned.
         timestep: Step h [s].
         max_input_speed: Largest speed of the rotor [rad/s].
+        max_torque: Largest torque at the output [N·m]; the repeated peak torque if None
+            or smaller.
+        contacts: Whether contacts or limits may act on the link.
         integrator: ``discrete``; for ``RK4`` and the others, which take the drive as an
             explicit force, the bound is on h times the fastest torsion frequency.
     """
@@ -155,7 +160,11 @@ def check_region(
     if drive.rotor is None or (native and integrator == "discrete"):
         bounds: tuple[Bound, ...] = ()
     elif integrator == "discrete":
+        torque = max(max_torque or 0.0, drive.drive.ratings.repeated_peak)
         bounds = _discrete_bounds(drive, timestep, abs(max_input_speed))
+        bounds += (_acceleration_bound(drive, torque),)
+        if contacts:
+            bounds += (_contact_bound(drive, timestep),)
     else:
         bounds = _explicit_bounds(drive, timestep, integrator)
     return Region(joint=drive.joint, timestep=timestep, bounds=bounds)
@@ -206,6 +215,26 @@ def _discrete_bounds(drive: JointDrive, h: float, speed: float) -> tuple[Bound, 
             limit=30.0,
             timestep=None,
         ),
+    )
+
+
+def _acceleration_bound(drive: JointDrive, torque: float) -> Bound:
+    rotor = abs(drive.ratio) * drive.rotor_inertia
+    return Bound(
+        what="acceleration of rotor or link by the largest torque [rad/s²]",
+        value=torque / min(rotor, drive.link_inertia),
+        limit=1e10,  # mjMAXVAL: the engine takes more for a divergence
+        timestep=None,
+    )
+
+
+def _contact_bound(drive: JointDrive, h: float) -> Bound:
+    frequency = sqrt(drive.stiffness / drive.link_inertia)
+    return Bound(
+        what="h times the frequency of the link on its held rotor, with contacts",
+        value=h * frequency,
+        limit=2.5,
+        timestep=2.5 / frequency,
     )
 
 

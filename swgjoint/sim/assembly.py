@@ -134,8 +134,12 @@ def assemble(
     )
 
     transmissions, sub_steps, outside = [], 1, {}
-    for name, section, speed in zip(
-        arm.joints, sections, trajectory.top_speed, strict=True
+    for name, section, speed, touches in zip(
+        arm.joints,
+        sections,
+        trajectory.top_speed,
+        _touching(arm, trajectory),
+        strict=True,
     ):
         drive = drive_of(section, known=known, progress=progress)
         attached = attach(
@@ -153,6 +157,7 @@ def assemble(
             attached,
             timestep=scene.simulation.step_s,
             max_input_speed=float(abs(drive.ratio) * speed),
+            contacts=bool(touches),
             integrator=scene.simulation.integrator,
         )
         sub_steps = max(sub_steps, region.require(scene.simulation.max_sub_steps))
@@ -219,6 +224,15 @@ def assemble(
         prescribed_rate=prescribed_rate,
         **_addresses(model, arm.joints, transmissions),
     )
+
+
+def _touching(arm: RigidArm, trajectory: Trajectory) -> NDArray[np.bool_]:
+    """Joints on which contacts or limits may act. Shape (n_joints,)."""
+    model = arm.model
+    collides = bool(model.geom_contype.any() and model.geom_conaffinity.any())
+    low, high = model.jnt_range.T
+    beyond = (trajectory.position <= low) | (trajectory.position >= high)
+    return np.asarray(collides | (model.jnt_limited.astype(bool) & beyond.any(axis=0)))
 
 
 def trajectory_of(

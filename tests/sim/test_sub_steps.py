@@ -10,6 +10,7 @@ import pytest
 
 from swgjoint.errors import ComputationError, InputError
 from swgjoint.maps.drive_map import DriveMap
+from swgjoint.sim.assembly import assemble
 from swgjoint.sim.run import run_scene
 from swgjoint.sim.scene import Scene
 from swgjoint.sim.trajectory import sweep
@@ -128,6 +129,19 @@ def test_a_run_says_into_how_many_parts_its_steps_are_cut(bench):
     assert inside.contains["sub_stepped_for"] == {}
     result = {"scene": "s", **inside.metrics(), "contains": inside.contains}
     assert "sub-step" not in report(result | {"files": []})
+
+
+def test_contacts_and_limits_cut_the_steps_of_a_light_link():
+    """The bare flange of the UR5e is cut where its motion runs into a joint limit."""
+    keys = {"simulation.step_s": 2e-3, "simulation.duration_s": 2.0}
+    free = assemble(Scene.load_file("ur5e-catalogue", keys))
+    assert free.sub_steps == 1
+    keys["trajectory.start_deg.wrist_3_joint"] = 300.0
+    keys["trajectory.end_deg.wrist_3_joint"] = 361.0
+    stopped = assemble(Scene.load_file("ur5e-catalogue", keys))
+    assert stopped.sub_steps > 1
+    assert list(stopped.outside) == ["wrist_3_joint"]
+    assert "with contacts" in stopped.outside["wrist_3_joint"]
 
 
 def test_a_scene_may_refuse_sub_steps(bench):

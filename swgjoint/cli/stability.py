@@ -1,0 +1,63 @@
+"""``swgjoint stability``: the joint on stiff and extreme cases."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from swgjoint.cli.text import table
+from swgjoint.errors import InputError
+from swgjoint.files import output_folder
+
+MAX_JOBS = 256
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Size of the grid, processes, output folder."""
+    parser.add_argument(
+        "--full",
+        action="store_true",
+        help="the whole grid of stiffness, inertias and steps instead of a part",
+    )
+    parser.add_argument(
+        "--jobs", type=int, default=2, metavar="N", help="processes; default 2"
+    )
+    parser.add_argument(
+        "--out", metavar="DIR", help="write the table and the picture there"
+    )
+
+
+def run(args: argparse.Namespace) -> dict[str, Any]:
+    """Run the study.
+
+    Returns:
+        See :func:`swgjoint.study.stability.run_stability`.
+    """
+    if not 1 <= args.jobs <= MAX_JOBS:
+        raise InputError(f"--jobs {args.jobs}; accepted: 1 to {MAX_JOBS}")
+    folder = output_folder(args.out) if args.out else None
+    from swgjoint.study.stability import run_stability
+
+    return run_stability(
+        full=args.full, jobs=args.jobs, folder=folder, progress=args.progress
+    )
+
+
+def report(result: dict[str, Any]) -> str:
+    """Outcomes by situation and scheme, then what they add up to."""
+    from swgjoint.study.stability import summary
+    from swgjoint.study.stability_rows import OUTCOMES
+
+    rows = [
+        [name, *(count.get(outcome, 0) for outcome in OUTCOMES)]
+        for name, count in result["counts"].items()
+    ]
+    lines = [table(rows, header=("situation: scheme", *OUTCOMES)), ""]
+    lines += summary(result)
+    lines += [f"wrote {name}" for name in result["files"]]
+    return "\n".join([*lines, f"{result['wall_s']:.0f} s"])
+
+
+def status(result: dict[str, Any]) -> int:
+    """1 if a run went wrong without saying so."""
+    return int(bool(result["unexplained"]))
