@@ -86,3 +86,15 @@ def test_the_first_of_several_events():
     event = first_ratcheting(time, torque, 2.5)
     assert (event["time_s"], event["torque_Nm"]) == (1.0, -3.0)
     assert first_ratcheting(time, torque, 5.0) is None
+
+
+def test_one_joint_switches_off_what_the_scene_asks_for(bench):
+    """A joint's own ``friction = false`` goes before that of the defaults."""
+    run = bench(
+        RUBBING,
+        defaults__friction=True,
+        joints={"joint": {"friction": False}},
+        simulation__duration_s=0.6,
+    )
+    assert run.assembly.model.ntendon == 1
+    assert run.contains["joints"]["joint"]["friction"] is None
