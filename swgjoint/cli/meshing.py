@@ -86,10 +86,18 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     result: dict[str, Any] = plain(meshing.to_json())
     result["files"] = []
     if folder is not None:
-        from swgjoint.view.field_plots import field_pictures
+        from swgjoint.fe.meshing_run import MeshingRun
         from swgjoint.view.meshing_plots import meshing_picture
 
-        pictures = {"meshing": meshing_picture(result)} | field_pictures(meshing)
+        pictures = {"meshing": meshing_picture(result)}
+        if isinstance(meshing, MeshingRun):
+            from swgjoint.view.field_plots import field_pictures
+
+            pictures |= field_pictures(meshing)
+        else:
+            from swgjoint.view.solid_plots import solid_pictures
+
+            pictures |= solid_pictures(meshing)
         folder.mkdir(parents=True, exist_ok=True)
         names = ["meshing.json", *(f"{name}.png" for name in pictures)]
         result["files"] = [str(folder / name) for name in names]

@@ -151,16 +151,22 @@ class CircularSpline:
 
     profile: ToothProfile
     compliance: Compliance | None = None
-    """None for a rigid circular spline."""
+    """None for a rigid circular spline, and for a plane of one in space."""
+    weights: CubicSpline | None = None
+    """Weights of the flank nodes in such a plane."""
 
     @property
     def flank_dofs(self) -> int:
         """Degrees of freedom of the flanks of one tooth, 0 if rigid."""
-        return 0 if self.compliance is None else self.compliance.flank.shape[1]
+        if self.compliance is None and self.weights is None:
+            return 0
+        return 4 * int(self.spline.c.shape[-1])
 
     @property
     def spline(self) -> CubicSpline:
         """Weights of the flank nodes at an arc length (elastic only)."""
+        if self.weights is not None:
+            return self.weights
         assert self.compliance is not None
         return self.compliance.element.spline
 

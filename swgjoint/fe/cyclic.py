@@ -44,9 +44,8 @@ class CyclicFactor:
             raise SingularRingError from error
         self._coupling = blocks[:, inner][:, :, outer]
         self._reach = self._inverse @ self._coupling
-        schur = blocks[:, outer][:, :, outer] - np.einsum(
-            "sio,sip->sop", self._coupling, self._reach
-        )
+        schur = blocks[:, outer][:, :, outer]
+        schur = schur - self._coupling.transpose(0, 2, 1) @ self._reach
         order = np.empty(n_sectors, dtype=np.int64)
         order[0::2] = np.arange((n_sectors + 1) // 2)
         order[1::2] = n_sectors - 1 - np.arange(n_sectors // 2)
@@ -85,7 +84,7 @@ class CyclicFactor:
         """
         face, n = self._face, rhs.shape[1]
         inside = rhs[:, self._inner]
-        outer = rhs[:, self._outer] - np.einsum("sio,sik->sok", self._reach, inside)
+        outer = rhs[:, self._outer] - self._reach.transpose(0, 2, 1) @ inside
         faces = outer[:, :face] + np.roll(outer[:, face:], 1, axis=0)
         folded = faces[self._order].reshape(self._sectors * face, -1)
         solved, info = dgbtrs(self._lu, self._band, self._band, folded, self._pivots)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from math import pi
+from typing import TYPE_CHECKING
 
 from swgjoint.errors import ComputationError
 from swgjoint.fe.continuation import Continuation
@@ -18,6 +19,9 @@ from swgjoint.maps.catalogue import ratings_of
 from swgjoint.progress import Progress, silent
 from swgjoint.units import deg
 
+if TYPE_CHECKING:
+    from swgjoint.fe.solid.meshing import SolidRun
+
 
 def simulate_meshing(
     design: Design,
@@ -31,12 +35,12 @@ def simulate_meshing(
     elastic_circular_spline: bool = True,
     throw: bool = True,
     progress: Progress = silent,
-) -> MeshingRun:
+) -> MeshingRun | SolidRun:
     """Simulate meshing: deflect, engage, load, then turn the wave generator.
 
     Args:
         design: The drive.
-        model: Fidelity, ``2d``.
+        model: Fidelity, ``2d`` or, for a design with a cup, ``3d``.
         torque: T that the drive exerts on the output [N·m], constant over the turn.
         steps: Wave-generator positions k turn/steps, k = 0 to steps - 1.
         turn: Turns of the input.
@@ -54,6 +58,20 @@ def simulate_meshing(
             Without deflection, engagement and load there is nothing to go on from, so
             their failure is an error in any case.
     """
+    if model == "3d":
+        from swgjoint.fe.solid.meshing import simulate_solid_meshing
+
+        return simulate_solid_meshing(
+            design,
+            torque=torque,
+            steps=steps,
+            turn=turn,
+            nonlinear=nonlinear,
+            half=half,
+            elastic_circular_spline=elastic_circular_spline,
+            throw=throw,
+            progress=progress,
+        )
     check_modelled(design, model)
     begin = time.perf_counter()
     ring = ring_model(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import nan
 from typing import Any
@@ -142,8 +143,8 @@ class MeshingRun:
             "steps": len(self.steps),
             "wall_s": self.wall_s,
             "outcome": self.outcome.name.lower(),
-            "flexspline": _averages([s.flexspline for s in solved]),
-            "circular_spline": _averages([s.circular_spline for s in solved]),
+            "flexspline": averages([s.flexspline for s in solved]),
+            "circular_spline": averages([s.circular_spline for s in solved]),
             "per_step": {
                 "angle_deg": list(self.series("input_angle") / deg),
                 **{
@@ -201,7 +202,7 @@ class MeshingRun:
         }
 
 
-def _averages(maxima: list[StressMaxima | None]) -> dict[str, Any]:
+def averages(maxima: Sequence[StressMaxima | None]) -> dict[str, Any]:
     """Means of the per-step maxima, null for a rigid member."""
     rows = [m.to_json() for m in maxima if m is not None]
     return {

@@ -178,17 +178,17 @@ class RingModel:
         # displacements in sector frames repeat after half a turn
         still = self.element.skeleton[: size + inside]
         x = rotate(
-            still + _travelled(local - still, shift),
+            still + travelled(local - still, shift),
             (self.place + rotation)[:, None],
         )
         return replace(
             state,
             faces=x[:, :size],
             bores=x[:, size:],
-            pressure=_travelled(state.pressure, shift),
+            pressure=travelled(state.pressure, shift),
             touching=np.roll(state.touching, round(shift), axis=0),
-            flank_force=_travelled(state.flank_force, shift),
-            ring_force=_travelled(
+            flank_force=travelled(state.flank_force, shift),
+            ring_force=travelled(
                 state.ring_force,
                 (d_alpha - (ring_rotation - state.ring_rotation)) / ring_pitch,
             ),
@@ -211,7 +211,7 @@ class RingModel:
         return compliance.displacement(state.ring_force)
 
 
-def _travelled(values: Array, shift: float) -> Array:
+def travelled(values: Array, shift: float) -> Array:
     """Rows moved on by a fraction of the ring, cubic between four neighbours."""
     whole = int(np.floor(shift))
     t = shift - whole

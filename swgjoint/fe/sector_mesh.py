@@ -48,7 +48,13 @@ class SectorMesh:
     """Arc length of the flank nodes on the profile [m]."""
 
 
-def sector_mesh(profile: ToothProfile, rim: float, refinement: int) -> SectorMesh:
+def sector_mesh(
+    profile: ToothProfile,
+    rim: float,
+    refinement: int,
+    *,
+    lower_rim: float | None = None,
+) -> SectorMesh:
     """Mesh a tooth sector with the topology of the thesis.
 
     Each half tooth is one block of 21 elements along the flank (end of the top land to
@@ -59,6 +65,8 @@ def sector_mesh(profile: ToothProfile, rim: float, refinement: int) -> SectorMes
         profile: Flank of the member.
         rim: Thickness between root circle and inner (outer) diameter [m].
         refinement: Multiplies the elements per direction.
+        lower_rim: Thickness of the lower rim, to which a cup connects; that of the
+            thesis for a plane model if None [m].
 
     Returns:
         The sector; both halves are mirror images.
@@ -66,8 +74,10 @@ def sector_mesh(profile: ToothProfile, rim: float, refinement: int) -> SectorMes
     n, layers = FLANK * refinement, LAYERS * refinement
     bore, lower = BORE * refinement, LOWER_RIM * refinement
     side = -1.0 if profile.internal else 1.0
-    middle = profile.dedendum_radius - side * 0.5 * POSITIONING_FACTOR * rim
     inner = profile.dedendum_radius - side * rim
+    if lower_rim is None:
+        lower_rim = (1.0 - 0.5 * POSITIONING_FACTOR) * rim
+    middle = inner + side * lower_rim
     names = [part.name for part in profile.segments]
     stations = profile.stations
     start = float(stations[1]) if names[0] == "top_land" else 0.0

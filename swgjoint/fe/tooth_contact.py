@@ -10,13 +10,15 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import pi
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 
 from swgjoint.fe.circular_spline import CircularSpline, Feet, FlankSplines
 from swgjoint.fe.corotation import rotate
-from swgjoint.fe.superelement import Superelement
+from swgjoint.gear.profile import ToothProfile
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -134,11 +136,31 @@ class Contacts:
 _MIRROR = np.array([[1.0, 1.0], [-1.0, 1.0]])  # by side, into the right flank's frame
 
 
+class Flanks(Protocol):
+    """Both flanks of the flexspline's teeth in one plane."""
+
+    @property
+    def profile(self) -> ToothProfile:
+        """The right flank."""
+
+    @property
+    def spline(self) -> CubicSpline:
+        """Weights of the flank nodes in the displacement at an arc length."""
+
+    @property
+    def flank_size(self) -> int:
+        """Nodes of one flank."""
+
+    @property
+    def flank_range(self) -> tuple[float, float]:
+        """Arc length over which a flank can touch [m]."""
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ToothContact:
     """Search for contact candidates at one state."""
 
-    element: Superelement
+    element: Flanks
     circular_spline: CircularSpline
     ring_flank: Array
     """Displacement of the circular spline's flank nodes in the frames of its teeth,

@@ -1,0 +1,1 @@
+"""The drive in three dimensions: face width, cup, micro-geometry."""

@@ -1,0 +1,158 @@
+r"""Corotational segments in space: large rotations, small strains within a segment.
+
+Each segment of each sector has a frame R, the best-fit rotation of its masters (polar
+decomposition of :math:`\sum x_i X_i^T`). With :math:`d = R^T x - X` the energy is
+:math:`\tfrac12 d^T \hat K d`. To first order a motion :math:`\delta y` seen in the
+frame turns it by :math:`\omega = G\,\delta y` and deforms the segment by
+:math:`P = I - S G`, :math:`S\omega = \omega\times y`.
+
+The gradient is exact. The tangent leaves out the moment of the forces about the frame,
+which is of second order in d: Newton's method converges linearly by a factor of the
+strain, about 1e-3.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.fe.solid.segment import Segment
+
+Array = NDArray[np.float64]
+
+# v x w = LEVI[i, j, k] v_j w_k
+LEVI = np.zeros((3, 3, 3))
+LEVI[0, 1, 2] = LEVI[1, 2, 0] = LEVI[2, 0, 1] = 1.0
+LEVI[0, 2, 1] = LEVI[2, 1, 0] = LEVI[1, 0, 2] = -1.0
+
+
+def spin(vectors: Array) -> Array:
+    """Matrices of v x (..., 3, 3)."""
+    return np.asarray(np.einsum("ijk,...j->...ik", LEVI, vectors))
+
+
+def about_z(angle: Array) -> Array:
+    """Rotations about the axis of the drive (..., 3, 3)."""
+    cos, sin = np.cos(angle), np.sin(angle)
+    matrix = np.zeros((*np.shape(angle), 3, 3))
+    matrix[..., 0, 0] = matrix[..., 1, 1] = cos
+    matrix[..., 0, 1], matrix[..., 1, 0] = -sin, sin
+    matrix[..., 2, 2] = 1.0
+    return matrix
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Frames:
+    """Kinematics of one segment in all sectors; m masters."""
+
+    turn: Array
+    """From the frame to the global frame (N, 3, 3)."""
+    position: Array
+    """y, masters in the frames, from their mean (N, m, 3) [m]."""
+    centre: Array
+    """That mean against the mean of X, in the frames (N, 3) [m]."""
+    deformation: Array
+    """d without its mean (N, 3 m) [m]."""
+    gradient: Array
+    """G, derivative of the rotation by the masters in the frame (N, 3, 3 m) [1/m]."""
+
+    @property
+    def displacement(self) -> Array:
+        """d, travel included (N, 3 m) [m]."""
+        n, m = self.position.shape[:2]
+        return self.deformation + np.tile(self.centre, (1, m)).reshape(n, 3 * m)
+
+
+def segment_frames(
+    segment: Segment, x: Array, place: Array, *, fitted: bool = True
+) -> Frames:
+    """Best-fit frames.
+
+    Args:
+        segment: The condensed segment.
+        x: Its masters in the global frame (N, m, 3) [m].
+        place: Rotations of the sectors in the undeformed ring (N, 3, 3).
+        fitted: False keeps the frames at their places (linear level).
+    """
+    reference = segment.position - segment.position.mean(axis=0)
+    mean = x.mean(axis=1)
+    seen = np.einsum("sji,saj->sai", place, x - mean[:, None])
+    crossed = spin(reference).transpose(1, 0, 2).reshape(3, -1)
+    gradient = np.zeros((len(x), *crossed.shape))
+    turn, y = place, seen
+    if fitted:
+        left, _, right = np.linalg.svd(np.einsum("sai,aj->sij", seen, reference))
+        left[:, :, 2] *= np.linalg.det(left @ right)[:, None]
+        fit = left @ right
+        turn, y = place @ fit, seen @ fit
+        arm = np.einsum("ai,sai->s", reference, y)
+        inertia = arm[:, None, None] * np.eye(3)
+        inertia -= np.einsum("sai,aj->sij", y, reference)
+        gradient += np.linalg.solve(inertia, np.broadcast_to(crossed, gradient.shape))
+    return Frames(
+        turn=turn,
+        position=y,
+        centre=np.einsum("sji,sj->si", turn, mean) - segment.position.mean(axis=0),
+        deformation=(y - reference).reshape(len(x), -1),
+        gradient=gradient,
+    )
+
+
+def energies(segment: Segment, frames: Frames) -> Array:
+    """Strain energy of the masters' part in each sector (N,) [J]."""
+    d = frames.deformation
+    return np.asarray(0.5 * np.einsum("si,ij,sj->s", d, segment.stiffness, d))
+
+
+def projected(frames: Frames, force: Array) -> Array:
+    """P^T f: gradient by the masters seen in the frame (N, 3 m) [N]."""
+    n, m = frames.position.shape[:2]
+    moment = np.cross(frames.position, force.reshape(n, m, 3)).sum(axis=1)
+    return np.asarray(force - np.einsum("sw,swi->si", moment, frames.gradient))
+
+
+def tangent(segment: Segment, frames: Frames, force: Array) -> Array:
+    r"""Second derivative by the masters seen in the frames, to first order in d.
+
+    .. math:: T = P^T \hat K P + H G + (H G)^T - G^T \mathrm{sym}(H^T S) G, \quad
+        H\omega = \omega \times f
+
+    Args:
+        segment: The condensed segment.
+        frames: From :func:`segment_frames`.
+        force: f, forces on the masters in the frames, those of loads included (N, 3 m).
+
+    Returns:
+        Symmetric matrices (N, 3 m, 3 m) [N/m].
+    """
+    n, m = frames.position.shape[:2]
+    g = frames.gradient
+    # S and H map a rotation to motions and to changes of force
+    s = -spin(frames.position).reshape(n, 3 * m, 3)
+    h = -spin(force.reshape(n, m, 3)).reshape(n, 3 * m, 3)
+    ks = np.einsum("ij,sjw->siw", segment.stiffness, s)
+    middle = np.einsum("siw,siv->swv", s, ks)
+    geometric = np.einsum("siw,siv->swv", h, s)
+    middle -= 0.5 * (geometric + geometric.transpose(0, 2, 1))
+    # everything but K has G on one side: T = K + U G + (U G)^T
+    u = h - ks + 0.5 * np.einsum("swi,swv->siv", g, middle)
+    outer = u @ g
+    return np.asarray(segment.stiffness + outer + outer.transpose(0, 2, 1))
+
+
+def in_global(frames: Frames, rows: Array) -> Array:
+    """Vectors per master from the frames to the global frame (N, 3 m)."""
+    n, m = frames.position.shape[:2]
+    turned = np.einsum("sij,saj->sai", frames.turn, rows.reshape(n, m, 3))
+    return np.asarray(turned.reshape(n, 3 * m))
+
+
+def matrices_in_global(frames: Frames, matrix: Array) -> Array:
+    """Matrices over masters from the frames to the global frame (N, 3 m, 3 m)."""
+    n, m = frames.position.shape[:2]
+    blocks = matrix.reshape(n, m, 3, m, 3)
+    half = np.einsum("sij,sajbk->saibk", frames.turn, blocks)
+    full = np.einsum("slk,saibk->saibl", frames.turn, half)
+    return np.asarray(full.reshape(n, 3 * m, 3 * m))

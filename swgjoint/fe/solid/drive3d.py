@@ -1,0 +1,98 @@
+"""The 3D model of a design."""
+
+from __future__ import annotations
+
+from swgjoint.errors import DesignError
+from swgjoint.fe.circular_spline import CircularSpline
+from swgjoint.fe.contact_patch import averaged_spline
+from swgjoint.fe.drive2d import can_halve
+from swgjoint.fe.solid.masters import Orders
+from swgjoint.fe.solid.ring import SolidRing
+from swgjoint.fe.solid.ring_gear import ring_gear
+from swgjoint.fe.solid.strip import flexspline
+from swgjoint.fe.solid.teeth import FlankCrowning, Teeth
+from swgjoint.fe.solid.wave_generator import WaveGeneratorSurface
+from swgjoint.gear.design import Design
+from swgjoint.gear.profile import tooth_profile
+from swgjoint.gear.tolerances import has_errors
+from swgjoint.gear.wave_generator import lobe_height
+from swgjoint.units import mm, um
+
+
+def solid_ring(
+    design: Design,
+    *,
+    half: bool = False,
+    nonlinear: bool = True,
+    elastic_circular_spline: bool = True,
+    orders: Orders | None = None,
+) -> SolidRing:
+    """3D model of a design.
+
+    Args:
+        design: The drive; it needs a ``[cup]``.
+        half: Half of the drive, closed by its symmetry.
+        nonlinear: Large rotations of the segments.
+        elastic_circular_spline: Whether the circular spline deforms.
+        orders: Degrees of the displacements of faces and sections.
+
+    Raises:
+        DesignError: If the design cannot be built or the half model does not apply.
+    """
+    name = design.drive.name
+    check_modelled(design)
+    if half and not can_halve(design):
+        raise DesignError(f"{name}: the half model does not apply; leave --half out")
+    profile = tooth_profile(design, "flexspline")
+    facing = tooth_profile(design, "circular_spline")
+    strip = flexspline(design, profile, orders=orders)
+    gear, surface = None, CircularSpline(profile=facing)
+    if elastic_circular_spline:
+        gear = ring_gear(design, facing)
+        stations = gear.mesh.teeth.plane.flank_stations[:-1]
+        surface = CircularSpline(profile=facing, weights=averaged_spline(stations))
+    shape = design.micro_geometry
+    return SolidRing(
+        strip=strip,
+        wave_generator=WaveGeneratorSurface.of(design),
+        teeth=Teeth(
+            strip=strip,
+            circular_spline=surface,
+            ring_gear=gear,
+            ring_teeth=design.drive.teeth_circular_spline // (2 if half else 1),
+            crowning=FlankCrowning(
+                height=shape.flexspline_crowning_um * um,
+                width=design.drive.face_width_mm * mm,
+                circular=shape.crowning_kind == "circular",
+            ),
+        ),
+        lobe_height=lobe_height(design),
+        half=half,
+        nonlinear=nonlinear,
+    )
+
+
+def check_modelled(design: Design) -> None:
+    """Refuse what the 3D model does not contain yet.
+
+    Raises:
+        DesignError: One line per key.
+    """
+    drive = design.drive
+    faults = []
+    if design.cup is None:
+        faults.append("the 3d model needs a [cup]; accepted without one: --model 2d")
+    if drive.layout != "circular_spline_fixed":
+        faults.append(
+            f"drive.layout = {drive.layout!r} is not modelled in 3d yet; accepted:"
+            " 'circular_spline_fixed'"
+        )
+    if design.friction.tooth_coefficient:
+        faults.append(
+            f"friction.tooth_coefficient = {design.friction.tooth_coefficient:g} is not"
+            " modelled in 3d yet; accepted: 0"
+        )
+    if has_errors(design) or design.tolerances.misalignment_arcmin:
+        faults.append("[tolerances] are not modelled in 3d yet; accepted: none")
+    if faults:
+        raise DesignError("\n".join(f"{drive.name}: {fault}" for fault in faults))

@@ -1,0 +1,340 @@
+"""Equilibrium of the cup between wave generator and circular spline, in space.
+
+Newton's method on the corotational strips. The wave generator's contact is a
+primal-dual active set, condensed in every sector; tooth contact and the rotation of the
+output are a small complementarity problem on the frozen tangent, as in the plane model.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.errors import Outcome
+from swgjoint.fe.complementarity import ActiveSetError, solve_mixed
+from swgjoint.fe.cyclic import SingularRingError
+from swgjoint.fe.solid.corotation import about_z, energies
+from swgjoint.fe.solid.linearise import Linearised, linearise
+from swgjoint.fe.solid.ring import SolidRing
+from swgjoint.fe.solid.ring_factor import RingFactor
+from swgjoint.fe.solid.state import SolidState
+from swgjoint.fe.solid.teeth import ToothRows
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SolidLoad:
+    """What is prescribed at the bore of the diaphragm: a torque or the rotation."""
+
+    torque: float | None = None
+    """T that the output exerts on its load, whole drive [N·m]."""
+    rotation: float | None = None
+    """[rad]."""
+    teeth: bool = True
+    """Whether the teeth touch."""
+
+    def __post_init__(self) -> None:
+        if (self.torque is None) == (self.rotation is None):
+            raise ValueError("give a torque or a rotation")
+
+
+@dataclass(frozen=True, kw_only=True)
+class SolidSolver:
+    """Settings of the iteration."""
+
+    max_iterations: int = 80
+    step_tolerance: float = 1e-10
+    """Displacement increment at which the iteration ends [m]; a thousandth of the
+    smallest effect of interest, a tenth of a micrometre."""
+    thorough_below: float = 1e-7
+    """Increment below which contact is searched between the nodes, too [m]."""
+    stride: float = 0.2
+    """Longest move of one iteration, in lobe heights: contact changes on the way."""
+    largest_step: float = 0.1
+    """Displacement increment beyond which the search has left the drive [m]."""
+
+    def __call__(
+        self, ring: SolidRing, start: SolidState, load: SolidLoad
+    ) -> SolidState:
+        """Equilibrium at the wave-generator angle of ``start``.
+
+        Returns:
+            The state with its outcome; states that did not converge come back too.
+        """
+        state, history = start, list[float]()
+        tried: set[bytes] = set()
+        settled = False
+        try:
+            for iteration in range(self.max_iterations):
+                linear = linearise(ring, state)
+                reach = (0.02 if iteration > 2 else 0.1) * ring.lobe_height
+                thorough = bool(history) and history[-1] < self.thorough_below
+                step = _solve_linear(ring, state, linear, load, reach, thorough)
+                history.append(step.largest)
+                if not step.largest < self.largest_step:
+                    return replace(
+                        state, outcome=Outcome.DIVERGED, history=tuple(history)
+                    )
+                damping = min(1.0, self.stride * ring.lobe_height / step.largest)
+                # a set that comes back would come back for ever
+                repeats = state.touching.tobytes() in tried
+                tried.add(state.touching.tobytes())
+                state, settled = _advance(
+                    ring, state, linear, step, damping, one_at_a_time=repeats
+                )
+                small = step.largest < self.step_tolerance and damping == 1.0
+                if settled and small and (thorough or not load.teeth):
+                    free = load.torque is not None and load.teeth
+                    free &= len(state.tooth_force) == 0
+                    outcome = Outcome.SINGULAR if free else Outcome.CONVERGED
+                    return _finished(ring, state, outcome, history)
+        except ActiveSetError as error:
+            singular = "singular" in str(error)
+            outcome = Outcome.SINGULAR if singular else Outcome.ACTIVE_SET_CYCLES
+            return replace(start, outcome=outcome, history=tuple(history))
+        except SingularRingError:
+            return replace(start, outcome=Outcome.SINGULAR, history=tuple(history))
+        outcome = Outcome.MAX_ITERATIONS if settled else Outcome.ACTIVE_SET_CYCLES
+        return _finished(ring, state, outcome, history)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Step:
+    """Solution of one linearised problem."""
+
+    found: ToothRows | None
+    force: Array
+    """Of the candidates (n,) [N]."""
+    active: NDArray[np.int64]
+    increment: Array
+    """Of the masters in the global frame (N, n) [m]."""
+    turn: float
+    """Of the bore of the diaphragm [rad]."""
+    pressure: Array
+    """Of the wave generator (N, p) [N]."""
+    after: Array
+    """Gaps to it after the step (N, p) [m]."""
+    torque: float
+    """[N·m]."""
+
+    @property
+    def largest(self) -> float:
+        """Largest displacement increment [m]."""
+        return float(np.abs(self.increment).max())
+
+
+def _solve_linear(
+    ring: SolidRing,
+    state: SolidState,
+    linear: Linearised,
+    load: SolidLoad,
+    reach: float,
+    thorough: bool,
+) -> _Step:
+    """Condense the ring to tooth forces and output rotation, solve, go back."""
+    masters, bore, strip = ring.strip.masters, linear.bore, ring.strip
+    teeth_dofs = (3 * strip.teeth.masters[:, None] + np.arange(3)).ravel()
+    held = (3 * masters.held[:, None] + np.arange(3)).ravel()
+    n_sectors, size = linear.gradient.shape
+    found, n = None, 0
+    if load.teeth:
+        found = ring.teeth.find(
+            linear.frames[0],
+            ring.loads(state),
+            state.ring_force,
+            reach,
+            state.held,
+            thorough=thorough,
+        )
+        n = len(found)
+    # known motions of the bore of the diaphragm: to its place, and turning
+    rotation = state.rotation if load.rotation is None else load.rotation
+    target = np.einsum("ij,saj->sai", about_z(np.array(rotation)), ring.reference)
+    value = np.zeros((n_sectors, size, 2))
+    still = (target - ring.masters(state)).reshape(n_sectors, -1)
+    value[:, held, 0] = still[:, held]
+    around = np.stack([-target[..., 1], target[..., 0], 0.0 * target[..., 2]], axis=-1)
+    value[:, held, 1] = around.reshape(n_sectors, -1)[:, held]
+
+    # rows of the candidates with the wave generator's contact condensed
+    rows, local, gap = np.zeros((n, size)), np.zeros((n, n)), np.zeros(n)
+    coupling = np.zeros((n, bore.gap.shape[1]))
+    if found is not None and n:
+        sector = found.contacts.sector
+        loads = ring.loads(state)
+        flank = strip.flank_dofs
+        through = found.weight @ strip.teeth.compliance[:flank]
+        p = bore.gap.shape[1]
+        at_bore = through[:, flank:].reshape(n, p, 3)
+        coupling = np.einsum("kpi,kpi->kp", at_bore, bore.normal[sector])
+        eased = np.einsum("kp,kpq->kq", coupling, bore.inverse[sector])
+        rows[:, teeth_dofs] = found.rows - np.einsum(
+            "kp,kpm->km", eased, bore.rows[sector]
+        )
+        same = sector[:, None] == sector[None, :]
+        local = ring.teeth.compliance(found)
+        local -= np.where(same, np.einsum("kp,lp->kl", eased, coupling), 0.0)
+        old = np.einsum("kb,kb->k", through, loads[sector])
+        if ring.teeth.ring_gear is not None:
+            moved = ring.teeth.ring_gear.displacement(state.ring_force)
+            old += np.einsum("kb,kb->k", found.ring_weight, moved[found.contacts.tooth])
+        gap = found.contacts.gap - old
+        gap -= np.einsum("kp,kp->k", eased, bore.free_gap[sector])
+
+    out_of = linear.gradient + linear.pushed
+    columns = np.zeros((n_sectors, size, n + 2))
+    columns[:, :, 0] = -out_of
+    columns[:, :, [0, n + 1]] -= linear.hessian @ value
+    if found is not None and n:
+        columns[found.contacts.sector, :, 1 + np.arange(n)] = rows
+    matrix = linear.hessian.copy()
+    scale = float(np.mean(np.einsum("sii->si", matrix)))
+    matrix[:, held] = 0.0
+    matrix[:, :, held] = 0.0
+    matrix[:, held, held] = scale
+    columns[:, held] = 0.0
+    solved = _solve_ring(ring, matrix, columns)
+    base, response = solved[:, :, 0] + value[:, :, 0], solved[:, :, 1:]
+    response[:, :, n] += value[:, :, 1]
+
+    # gaps and the torque on the bore of the diaphragm
+    system, offset = np.zeros((n + 1, n + 1)), np.zeros(n + 1)
+    lever = value[:, held, 1]
+    into = np.einsum("sh,shi->si", lever, linear.hessian[:, held])
+    system[n] = np.einsum("si,sik->k", into, response)
+    offset[n] = np.sum(lever * out_of[:, held]) + np.sum(into * base)
+    if found is not None and n:
+        seen = np.einsum("ki,kil->kl", rows, response[found.contacts.sector])
+        system[:n] = seen
+        system[:n, :n] += local
+        offset[:n] = gap + np.einsum("ki,ki->k", rows, base[found.contacts.sector])
+    stiffness, moment = system[n].copy(), offset[n]
+    if load.torque is not None:
+        # -(dU/dpsi + T) = 0: with the sign of the gaps the system is symmetric
+        system[n], offset[n] = -system[n], -moment - load.torque / ring.copies
+        used = np.arange(n + 1)
+    else:
+        used = np.arange(n)
+    force, turn = np.zeros(n), 0.0
+    active = np.zeros(n, dtype=bool)
+    if len(used):
+        guess = offset[:n] < 0.0
+        if state.held is not None and found is not None and len(state.held):
+            guess = found.contacts.on_flanks_of(state.held.contacts)
+        z, active = solve_mixed(system[np.ix_(used, used)], offset[used], n, 0, guess)
+        force = z[:n]
+        turn = float(z[n]) if load.torque is not None else 0.0
+    unknown = np.append(force, turn)
+    increment = base + response @ unknown
+    dudpsi = moment + float(stiffness @ unknown)
+    change = np.einsum("spm,sm->sp", bore.rows, increment[:, teeth_dofs])
+    by_teeth = np.zeros_like(change)
+    if found is not None:
+        np.add.at(by_teeth, found.contacts.sector, force[:, None] * coupling)
+    free = bore.free_gap + change + by_teeth
+    pressure = -np.einsum("spq,sq->sp", bore.inverse, free)
+    after = free + np.einsum("spq,sq->sp", bore.compliance, pressure)
+    return _Step(
+        found=found,
+        force=force,
+        active=np.flatnonzero(active),
+        increment=increment,
+        turn=rotation + turn - state.rotation,
+        pressure=pressure,
+        after=after,
+        torque=-ring.copies * dudpsi,
+    )
+
+
+def _solve_ring(ring: SolidRing, matrix: Array, columns: Array) -> Array:
+    """Solve, the last face of a half model written in the frame of the first one."""
+    size = ring.strip.masters.face_size
+    sign = np.tile(ring.closure, size)
+    matrix[-1, -3 * size :] *= sign[:, None]
+    matrix[-1, :, -3 * size :] *= sign
+    columns[-1, -3 * size :] *= sign[:, None]
+    solved = RingFactor(matrix, 3 * size).solve(columns)
+    solved[-1, -3 * size :] *= sign[:, None]
+    return solved
+
+
+def _advance(
+    ring: SolidRing,
+    state: SolidState,
+    linear: Linearised,
+    step: _Step,
+    damping: float,
+    *,
+    one_at_a_time: bool,
+) -> tuple[SolidState, bool]:
+    """Move, exchange the contact forces, update which bore nodes touch."""
+    bore, masters = linear.bore, ring.strip.masters
+    local = np.einsum("spp->sp", bore.compliance)
+    wrong = np.where(bore.active, -step.pressure * local, -step.after)
+    bad = wrong > 1e-15
+    if bad.any() and one_at_a_time:
+        bad = wrong == wrong.max()
+    size, last = masters.face_size, masters.size - masters.face_size
+    moved = damping * step.increment
+    x = ring.masters(state) + moved.reshape(len(moved), -1, 3)
+    force = step.pressure[:, :, None] * bore.normal
+    flank_force = np.zeros_like(state.flank_force)
+    ring_force = np.zeros_like(state.ring_force)
+    kept = None
+    if step.found is not None:
+        contacts, f = step.found.contacts, step.force[:, None]
+        np.add.at(flank_force, contacts.sector, f * step.found.weight)
+        np.add.at(ring_force, contacts.tooth, f * step.found.ring_weight)
+        kept = step.found.chosen(step.active)
+    new = replace(
+        state,
+        faces=x[:, :size],
+        inside=x[:, size:last],
+        pressure=step.pressure,
+        bore_force=force.reshape(len(force), -1),
+        touching=state.touching ^ bad,
+        flank_force=flank_force,
+        ring_force=ring_force,
+        held=kept,
+        tooth_force=step.force[step.active],
+        rotation=state.rotation + damping * step.turn,
+        torque=step.torque,
+    )
+    return new, not bool(bad.any())
+
+
+def _finished(
+    ring: SolidRing, state: SolidState, outcome: Outcome, history: list[float]
+) -> SolidState:
+    """Energy and moments of the whole drive at the last positions."""
+    frames = ring.frames(state)
+    energy = sum(
+        float(energies(segment, frame).sum())
+        for segment, frame in zip(ring.strip.segments, frames, strict=True)
+    )
+    loads = ring.loads(state)
+    energy += 0.5 * float(np.sum(loads * (loads @ ring.strip.teeth.compliance)))
+    if ring.teeth.ring_gear is not None:
+        moved = ring.teeth.ring_gear.displacement(state.ring_force)
+        energy += 0.5 * float(np.sum(state.ring_force * moved))
+    points = np.einsum(
+        "sij,spj->spi", frames[0].turn, ring.bore_positions(frames[0], state)
+    )
+    _, normal, _ = ring.wave_generator.gap(
+        points.reshape(-1, 3), state.wave_generator_angle
+    )
+    arm = (points[..., 0].ravel() * normal[:, 1]) - points[..., 1].ravel() * normal[
+        :, 0
+    ]
+    teeth = 0.0 if state.held is None else float(state.tooth_force @ state.held.arm)
+    return replace(
+        state,
+        outcome=outcome,
+        history=tuple(history),
+        energy=ring.copies * energy,
+        wave_generator_torque=ring.copies * float(state.pressure.ravel() @ arm),
+        tooth_moment=ring.copies * teeth,
+    )

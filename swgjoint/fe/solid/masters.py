@@ -1,0 +1,222 @@
+r"""Master nodes: few points whose displacements carry those of faces and sections.
+
+The displacement of a cut face is a polynomial along the meridian of each segment and
+linear through the wall; that of a section between segments is a polynomial around the
+sector. Both contain every linear field and add up to one, so that master nodes turn
+like points of a body: the corotational model needs no more than their positions.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numpy.polynomial import Legendre
+from numpy.typing import NDArray
+
+from swgjoint.fe.solid.strip_mesh import SegmentMesh, StripMesh
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Orders:
+    """Degrees of the polynomials."""
+
+    teeth: int = 6
+    """Along the face width."""
+    cup: int = 3
+    """Along each segment of the cup."""
+    at_teeth: int = 4
+    """Around the sector where the cup meets the teeth: the rim bends between teeth."""
+    around: int = 2
+    """Around the sector at the other sections."""
+
+
+@cache
+def lobatto(order: int) -> Array:
+    """Points from 0 to 1, ends included, between which polynomials stay tame."""
+    inner = np.asarray(Legendre.basis(order).deriv().roots(), dtype=np.float64)
+    return np.concatenate([[0.0], 0.5 * (1.0 + np.sort(inner)), [1.0]])
+
+
+def lagrange(points: Array, x: Array) -> Array:
+    """Values of the Lagrange polynomials of the points (n_x, n_points)."""
+    weights = np.empty((len(x), len(points)))
+    for k, point in enumerate(points):
+        others = np.delete(points, k)
+        weights[:, k] = np.prod((x[:, None] - others) / (point - others), axis=1)
+    return weights
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SegmentMasters:
+    """How the boundary of one segment follows the masters of the strip."""
+
+    boundary: Index
+    """Node numbers of faces and sections (n_boundary,)."""
+    masters: Index
+    """Of the strip, those that this segment hangs on (n_m,)."""
+    weight: Array
+    """Displacement of the boundary by that of these masters (n_boundary, n_m)."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Masters:
+    """Master nodes of a strip: first face, sections, last face."""
+
+    position: Array
+    """In the frame of the tooth (n, 3) [m]."""
+    face_size: int
+    segments: tuple[SegmentMasters, ...]
+    held: Index
+    """Masters of the strip at the bore of the diaphragm; all of its end section."""
+
+    @property
+    def size(self) -> int:
+        """How many."""
+        return len(self.position)
+
+
+def strip_masters(strip: StripMesh, orders: Orders | None = None) -> Masters:
+    """Masters of a strip and how its segments follow them."""
+    orders = orders or Orders()
+    segments = strip.segments
+    degree = [orders.teeth] + [orders.cup] * (len(segments) - 1)
+    around = [orders.at_teeth] + [orders.around] * (len(segments) - 1)
+    # two masters a station on a face, outside and bore side
+    stations = 1 + sum(degree)
+    face_size, count = 2 * stations, 2 * stations
+    inside = []  # first master inside the end section of every segment
+    for segment, order in zip(segments, around, strict=True):
+        inside.append(count)
+        count += 2 * (order - 1) if segment.end is not None else 0
+    size = count + face_size
+    position = np.full((size, 3), np.nan)
+
+    found, station = [], 0
+    for k, segment in enumerate(segments):
+        follow = _Follow(
+            size=size,
+            face_size=face_size,
+            stations=station + np.arange(degree[k] + 1),
+            begin=(around[k - 1], inside[k - 1]) if k else None,
+            end=(around[k], inside[k]),
+            narrow=strip.narrow if k == 1 else 0.0,
+        )
+        masters = follow.of(segment)
+        _place(segment, masters, position)
+        found.append(masters)
+        station += degree[k]
+    ends = np.array([face_size - 2, face_size - 1])
+    held = np.concatenate([ends, np.arange(inside[-1], count), size - face_size + ends])
+    return Masters(
+        position=position, face_size=face_size, segments=tuple(found), held=held
+    )
+
+
+def _place(segment: SegmentMesh, follow: SegmentMasters, position: Array) -> None:
+    """Where new masters lie: the boundary follows them at rest, too.
+
+    The faces first: their masters must stay in them, where the next sector meets.
+    """
+    points = np.asarray(segment.mesh.p).T[follow.boundary]
+    faces = np.isin(follow.boundary, np.concatenate([segment.first, segment.last]))
+    for part in (faces, ~faces):
+        weight = follow.weight[part]
+        known = np.isfinite(position[follow.masters, 0])
+        new = ~known & (np.abs(weight).max(axis=0, initial=0.0) > 0.0)
+        rest = points[part] - weight[:, known] @ position[follow.masters[known]]
+        found = np.linalg.lstsq(weight[:, new], rest, rcond=None)[0]
+        position[follow.masters[new]] = found
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Follow:
+    """Numbers of the masters around one segment."""
+
+    size: int
+    face_size: int
+    stations: Index
+    """Of the segment on a face (degree + 1,)."""
+    begin: tuple[int, int] | None
+    """Degree around the section towards the teeth, first master inside it."""
+    end: tuple[int, int]
+    narrow: float
+    """How deep below the outside of the teeth the segment's own outside begins."""
+
+    def of(self, segment: SegmentMesh) -> SegmentMasters:
+        """Weights of the masters in the displacements of faces and sections."""
+        rows: dict[int, Array] = {}
+        for nodes, offset in ((segment.first, 0), (segment.last, self.last)):
+            for node, row in zip(nodes, self._face(segment, offset), strict=True):
+                rows[int(node)] = row
+        for section, place in ((segment.begin, self.begin), (segment.end, self.end)):
+            if section is not None and place is not None:
+                self._section(section, *place, rows)
+        boundary = np.array(sorted(rows), dtype=np.int64)
+        weight = np.array([rows[node] for node in boundary])
+        used = np.flatnonzero(np.abs(weight).max(axis=0) > 0.0)
+        weight = np.ascontiguousarray(weight[:, used])
+        return SegmentMasters(boundary=boundary, masters=used, weight=weight)
+
+    @property
+    def last(self) -> int:
+        """First master of the last face."""
+        return self.size - self.face_size
+
+    def _face(self, segment: SegmentMesh, offset: int) -> Array:
+        """Rows of face nodes: polynomials along, linear through (n, size)."""
+        along = lagrange(lobatto(len(self.stations) - 1), segment.position)
+        through = np.stack([1.0 - segment.depth, segment.depth], axis=-1)
+        both = along[:, :, None] * through[:, None, :]
+        # at the teeth the outside of the wall lies between the masters
+        outside = both[:, 0, 0].copy()
+        both[:, 0, 0] -= self.narrow * outside
+        both[:, 0, 1] += self.narrow * outside
+        rows = np.zeros((len(along), self.size))
+        first = offset + 2 * self.stations[0]
+        rows[:, first : first + both[0].size] = both.reshape(len(along), -1)
+        return rows
+
+    def _section(
+        self, section: Index, order: int, start: int, rows: dict[int, Array]
+    ) -> None:
+        """Rows of the nodes between the faces: polynomials around, linear through."""
+        n_phi, n_wall = section.shape
+        around = lagrange(lobatto(order), np.linspace(0.0, 1.0, n_phi))
+        for t, depth in enumerate(np.linspace(0.0, 1.0, n_wall)):
+            through = np.array([1.0 - depth, depth])
+            ends = rows[int(section[0, t])], rows[int(section[-1, t])]
+            for k in range(1, n_phi - 1):
+                row = around[k, 0] * ends[0] + around[k, -1] * ends[1]
+                inner = around[k, 1:-1, None] * through
+                row[start : start + inner.size] += inner.ravel()
+                rows[int(section[k, t])] = row
+
+
+def face_lines(strip: StripMesh, masters: Masters, x: Array) -> Array:
+    """Outside and bore side of the first face, from the open end to the bore.
+
+    Args:
+        strip: The mesh.
+        masters: Its masters.
+        x: Positions of all masters (n, 3) [m].
+
+    Returns:
+        Shape (2, n_points, 3) [m].
+    """
+    sides: list[list[Array]] = [[], []]
+    for segment, follow in zip(strip.segments, masters.segments, strict=True):
+        place = np.searchsorted(follow.boundary, segment.first)
+        points = follow.weight[place] @ x[follow.masters]
+        for side in (0, 1):
+            stations = np.unique(np.round(segment.position, 9))
+            for station in stations[0 if not sides[side] else 1 :]:
+                here = np.flatnonzero(np.abs(segment.position - station) < 1e-8)
+                depth = segment.depth[here]
+                k = here[depth.argmin() if side == 0 else depth.argmax()]
+                sides[side].append(points[k])
+    return np.array(sides)

@@ -1,0 +1,267 @@
+"""Simulation of meshing in space: deflect, engage, load, turn (thesis chapter 7)."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from math import nan, pi
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.errors import ComputationError, Outcome
+from swgjoint.fe.meshing_run import averages
+from swgjoint.fe.solid.continuation import SolidContinuation
+from swgjoint.fe.solid.drive3d import solid_ring
+from swgjoint.fe.solid.ring import SolidRing
+from swgjoint.fe.solid.state import SolidState
+from swgjoint.fe.solid.stress import Place, SolidMaxima
+from swgjoint.fe.stress import KINDS
+from swgjoint.gear.design import Design
+from swgjoint.progress import Progress, silent
+from swgjoint.units import arcsec, deg
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SolidSetup:
+    """One of the equilibria that lead to the first wave-generator position."""
+
+    name: str
+    """``wave_generator`` (no tooth contact), ``meshed`` or ``torque``."""
+    state: SolidState
+    stress: SolidMaxima
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SolidStep:
+    """Results at one wave-generator position; NaN and None where the solve failed."""
+
+    input_angle: float
+    """theta [rad]."""
+    outcome: Outcome = Outcome.CONVERGED
+    output_error: float = nan
+    """Output angle minus theta/i, from the undeformed position [rad]."""
+    wave_generator_torque: float = nan
+    """External torque on the wave generator [N·m]."""
+    tooth_moment: float = nan
+    """Moment of the tooth forces on the flexspline [N·m]."""
+    energy: float = nan
+    """Strain energy [J]."""
+    pairs_in_contact: int | None = None
+    stress: SolidMaxima | None = None
+    iterations: int = 0
+    state: SolidState | None = None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SolidRun:
+    """A simulation of meshing in space."""
+
+    design: Design
+    model: SolidRing
+    torque: float
+    steps: tuple[SolidStep, ...]
+    setup: tuple[SolidSetup, ...]
+    wall_s: float
+
+    @property
+    def outcome(self) -> Outcome:
+        """Converged, or what the first position that failed says."""
+        failed = (s.outcome for s in self.steps if not s.outcome.ok)
+        return next(failed, Outcome.CONVERGED)
+
+    @property
+    def nodes(self) -> int:
+        """Nodes before condensation, of the deformable members."""
+        total = _nodes(self.model)
+        gear = self.model.teeth.ring_gear
+        if gear is not None:
+            face = len(gear.mesh.teeth.segment.first)
+            total += (gear.mesh.nodes - face) * self.model.teeth.ring_teeth
+        return total
+
+    @property
+    def elements(self) -> int:
+        """Elements before condensation, of the deformable members."""
+        total = self.model.strip.mesh.elements * self.model.sectors
+        gear = self.model.teeth.ring_gear
+        if gear is not None:
+            total += gear.mesh.elements * self.model.teeth.ring_teeth
+        return total
+
+    @property
+    def states(self) -> tuple[SolidState, ...]:
+        """Equilibria of the positions that were solved."""
+        return tuple(step.state for step in self.steps if step.state is not None)
+
+    def series(self, name: str) -> Array:
+        """One quantity of :class:`SolidStep` over the steps."""
+        return np.array([getattr(step, name) for step in self.steps], dtype=float)
+
+    def to_json(self) -> dict[str, Any]:
+        """The JSON object of ``swgjoint meshing``; per-step stress: flexspline."""
+        solved = [step.stress for step in self.steps if step.stress is not None]
+        elastic = self.model.teeth.ring_gear is not None
+        gear = f"elastic, outside {self.design.circular_spline.outer_rim}"
+        shapes = self.design.micro_geometry.model_dump(exclude={"crowning_kind"})
+        bearing = self.design.wave_generator.bearing is not None
+        return {
+            "design": self.design.drive.name,
+            "label": {
+                "model": "3d",
+                "layout": self.design.drive.layout,
+                "level": "nonlinear" if self.model.nonlinear else "linear",
+                "circular_spline": gear if elastic else "rigid",
+                "half": self.model.half,
+                "micro_geometry": any(shapes.values()),
+                "stress": "largest nodal value; edges and the step from rim to cup"
+                " do not converge with the mesh",
+                "left_out": "wave_generator.bearing" if bearing else None,
+            },
+            "torque_Nm": self.torque,
+            "nodes": self.nodes,
+            "elements": self.elements,
+            "steps": len(self.steps),
+            "wall_s": self.wall_s,
+            "outcome": self.outcome.name.lower(),
+            "flexspline": averages([s.flexspline for s in solved]),
+            "circular_spline": averages([s.circular_spline for s in solved]),
+            "per_step": {
+                "angle_deg": list(self.series("input_angle") / deg),
+                **{
+                    f"{kind}_MPa": [
+                        None
+                        if step.stress is None
+                        else getattr(step.stress.flexspline, kind) / 1e6
+                        for step in self.steps
+                    ]
+                    for kind in KINDS
+                },
+                "von_mises_at": [
+                    None if step.stress is None else _place(step.stress.place)
+                    for step in self.steps
+                ],
+                "pairs_in_contact": [step.pairs_in_contact for step in self.steps],
+                "output_error_arcsec": list(self.series("output_error") / arcsec),
+                "wave_generator_torque_Nm": list(self.series("wave_generator_torque")),
+                "tooth_moment_Nm": list(self.series("tooth_moment")),
+                "energy_J": list(self.series("energy")),
+                "iterations": [step.iterations for step in self.steps],
+                "outcome": [step.outcome.name.lower() for step in self.steps],
+            },
+            "parts_MPa": _parts(solved),
+            "setup_MPa": [
+                {"state": found.name} | found.stress.to_json() for found in self.setup
+            ],
+        }
+
+
+def simulate_solid_meshing(
+    design: Design,
+    *,
+    torque: float,
+    steps: int = 36,
+    turn: float = 0.5,
+    nonlinear: bool = True,
+    half: bool = False,
+    elastic_circular_spline: bool = True,
+    throw: bool = True,
+    progress: Progress = silent,
+) -> SolidRun:
+    """What :func:`swgjoint.fe.meshing.simulate_meshing` does for ``model="3d"``."""
+    begin = time.perf_counter()
+    ring = solid_ring(
+        design,
+        half=half,
+        nonlinear=nonlinear,
+        elastic_circular_spline=elastic_circular_spline,
+    )
+    follow = SolidContinuation(ring=ring, ratio=design.ratio)
+
+    def checked(state: SolidState, what: str) -> SolidState:
+        if not state.outcome.ok:
+            raise ComputationError(
+                f"{design.drive.name}: {what} failed: {state.outcome.value}"
+            )
+        return state
+
+    setup = []
+
+    def reached(name: str, state: SolidState) -> None:
+        stress = SolidMaxima.at(ring, state)
+        setup.append(SolidSetup(name=name, state=state, stress=stress))
+        progress("setting up", len(setup), 3)
+
+    state = checked(follow.deflected(), "deflection by the wave generator")
+    reached("wave_generator", state)
+    state = checked(follow.meshed(state), "engagement of the teeth")
+    reached("meshed", state)
+    state = checked(follow.to_torque(state, torque), f"loading to {torque:g} N·m")
+    reached("torque", state)
+
+    rows = []
+    for k in range(steps):
+        angle = 2.0 * pi * turn * k / steps
+        found = state if k == 0 else follow.to_angle(state, angle)
+        if throw:
+            checked(found, f"the input position {angle / deg:g} deg")
+        if found.outcome.ok:
+            state = found
+        rows.append(_step(ring, found, angle, design.ratio))
+        progress("meshing", k + 1, steps)
+    return SolidRun(
+        design=design,
+        model=ring,
+        torque=torque,
+        steps=tuple(rows),
+        setup=tuple(setup),
+        wall_s=time.perf_counter() - begin,
+    )
+
+
+def _step(ring: SolidRing, state: SolidState, angle: float, ratio: float) -> SolidStep:
+    if not state.outcome.ok:
+        return SolidStep(input_angle=angle, outcome=state.outcome)
+    pairs = set() if state.held is None else set(state.held.contacts.sector.tolist())
+    return SolidStep(
+        input_angle=angle,
+        output_error=state.rotation - angle / ratio,
+        wave_generator_torque=state.wave_generator_torque,
+        tooth_moment=state.tooth_moment,
+        energy=state.energy,
+        pairs_in_contact=ring.copies * len(pairs),
+        stress=SolidMaxima.at(ring, state),
+        iterations=len(state.history),
+        state=state,
+    )
+
+
+def _nodes(ring: SolidRing) -> int:
+    """Of the flexspline; nodes on a face belong to one sector."""
+    face = sum(len(segment.mesh.first) for segment in ring.strip.segments)
+    rows = [s.begin.shape[1] for s in ring.strip.mesh.cup if s.begin is not None]
+    return int((ring.strip.mesh.nodes - face + sum(rows)) * ring.sectors)
+
+
+def _place(place: Place) -> dict[str, Any]:
+    return {
+        "part": place.part,
+        "sector": place.sector,
+        "position_mm": [1e3 * x for x in place.position],
+    }
+
+
+def _parts(solved: list[SolidMaxima]) -> dict[str, dict[str, float]]:
+    """Means of the per-step maxima of the flexspline by segment [MPa]."""
+    if not solved:
+        return {}
+    return {
+        name: {
+            kind: float(np.mean([getattr(s.by_part[name], kind) for s in solved])) / 1e6
+            for kind in KINDS
+        }
+        for name in solved[0].by_part
+    }

@@ -1,0 +1,133 @@
+"""The ring of strips on its wave generator: geometry, frames, contact points."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.fe.solid.corotation import Frames, about_z, segment_frames
+from swgjoint.fe.solid.state import SolidState
+from swgjoint.fe.solid.strip import Strip
+from swgjoint.fe.solid.teeth import Teeth
+from swgjoint.fe.solid.wave_generator import WaveGeneratorSurface
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SolidRing:
+    """Flexspline strips around the wave generator."""
+
+    strip: Strip
+    wave_generator: WaveGeneratorSurface
+    teeth: Teeth
+    lobe_height: float
+    """Radial deflection at the lobes [m]."""
+    half: bool = False
+    """Half of the ring, closed by a rotation of 180 deg."""
+    nonlinear: bool = True
+    """Large rotations of the segments; else they turn with the output alone."""
+
+    @property
+    def copies(self) -> int:
+        """How many times the model repeats in the drive."""
+        return 2 if self.half else 1
+
+    @property
+    def sectors(self) -> int:
+        """Sectors in the model."""
+        return self.strip.sectors // self.copies
+
+    @cached_property
+    def closure(self) -> Array:
+        """Factors of x, y, z that close the ring."""
+        sign = -1.0 if self.half else 1.0
+        return np.array([sign, sign, 1.0])
+
+    @cached_property
+    def place(self) -> Array:
+        """Rotations of the sectors in the undeformed ring (N, 3, 3)."""
+        return about_z(
+            2.0 * pi / self.strip.sectors * np.arange(self.sectors, dtype=float)
+        )
+
+    @cached_property
+    def reference(self) -> Array:
+        """Undeformed masters in the global frame (N, n, 3) [m]."""
+        position = self.strip.masters.position
+        return np.asarray(np.einsum("sij,aj->sai", self.place, position))
+
+    def masters(self, state: SolidState) -> Array:
+        """Positions of all masters per sector (N, n, 3) [m]."""
+        last = np.roll(state.faces, -1, axis=0)
+        last[-1] *= self.closure
+        return np.concatenate([state.faces, state.inside, last], axis=1)
+
+    def loads(self, state: SolidState) -> Array:
+        """Forces at the loaded degrees of freedom of the teeth (N, n_b) [N]."""
+        return np.concatenate([state.flank_force, state.bore_force], axis=1)
+
+    def frames(self, state: SolidState) -> tuple[Frames, ...]:
+        """Frames of all segments."""
+        x, place = self.masters(state), self.place
+        if not self.nonlinear:
+            place = about_z(np.array(state.rotation)) @ place
+        return tuple(
+            segment_frames(segment, x[:, segment.masters], place, fitted=self.nonlinear)
+            for segment in self.strip.segments
+        )
+
+    def bore_positions(self, frames: Frames, state: SolidState) -> Array:
+        """Bore nodes in the frames of the teeth (N, n_bore, 3) [m]."""
+        teeth, first = self.strip.teeth, self.strip.flank_dofs
+        moved = frames.displacement @ teeth.loaded_from_masters[first:].T
+        moved += self.loads(state) @ teeth.compliance[:, first:]
+        return self.strip.bore + moved.reshape(len(moved), -1, 3)
+
+    def at_rest(self, alpha: float = 0.0, rotation: float = 0.0) -> SolidState:
+        """Start of a search: a cup whose wall stays straight and does not stretch.
+
+        Radial w0 s cos 2 phi with s falling from the teeth to the closed end,
+        tangential -w0 s/2 sin 2 phi; no shear in the wall gives the axial motion.
+        """
+        x = self.reference
+        strip, w0 = self.strip, self.lobe_height
+        bore = float(np.hypot(strip.bore[:, 0], strip.bore[:, 1]).min())
+        closed = float(strip.masters.position[:, 2].max())
+        held = strip.masters.position[strip.masters.held]
+        boss = float(np.hypot(held[:, 0], held[:, 1]).mean())
+        radius = np.hypot(x[..., 0], x[..., 1])
+        phi = np.arctan2(-x[..., 0], x[..., 1]) - (alpha - rotation)
+        has_cup = len(strip.segments) > 1
+        s, ds, disc = np.ones_like(phi), 0.0, np.ones_like(phi)
+        if has_cup:
+            ds = -1.0 / closed
+            s = np.clip(1.0 - x[..., 2] / closed, 0.0, None)
+            disc = np.clip((radius - boss) / (bore - boss), 0.0, 1.0)
+        off = radius - bore
+        turn = 1.5 * w0 * s * np.sin(2.0 * phi) / bore
+        radial = w0 * s * np.cos(2.0 * phi)
+        around = -0.5 * w0 * s * np.sin(2.0 * phi) + off * turn
+        axial = -(0.25 * bore * disc + off * (disc == 1.0)) * w0 * ds * np.cos(2 * phi)
+        out = np.stack([x[..., 0], x[..., 1], 0.0 * radius], -1) / radius[..., None]
+        side = np.stack([-out[..., 1], out[..., 0], 0.0 * radius], axis=-1)
+        moved = x + (radial * disc)[..., None] * out + (around * disc)[..., None] * side
+        moved[..., 2] += axial
+        moved = np.einsum("ij,saj->sai", about_z(np.array(rotation)), moved)
+        size, n_bore = strip.masters.face_size, len(strip.bore)
+        last = strip.masters.size - size
+        return SolidState(
+            faces=moved[:, :size],
+            inside=moved[:, size:last],
+            pressure=np.zeros((self.sectors, n_bore)),
+            touching=np.zeros((self.sectors, n_bore), dtype=bool),
+            bore_force=np.zeros((self.sectors, 3 * n_bore)),
+            flank_force=np.zeros((self.sectors, strip.flank_dofs)),
+            ring_force=np.zeros((self.teeth.ring_teeth, self.teeth.ring_dofs)),
+            wave_generator_angle=alpha,
+            rotation=rotation,
+        )

@@ -1,0 +1,132 @@
+"""The elastic circular spline in space: linear, its outside fixed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse.linalg import splu
+
+from swgjoint.errors import DesignError
+from swgjoint.fe.solid.corotation import about_z
+from swgjoint.fe.solid.elasticity import Solid, solid
+from swgjoint.fe.solid.ring_factor import RingFactor
+from swgjoint.fe.solid.strip_mesh import StripMesh, circular_spline_strip
+from swgjoint.gear.design import Design
+from swgjoint.gear.profile import ToothProfile
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+REACH = 4
+"""Teeth on either side of a loaded one that feel it: beyond, a fixed outside leaves
+less than a thousandth."""
+WINDOW = 12
+"""Teeth of the ring in which the response to one of them is computed."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RingGear:
+    """Response of the flanks to forces on them, by the offset of the teeth.
+
+    Forces and displacements in x and y in the frames of the teeth, plane after plane,
+    right then left flank.
+    """
+
+    mesh: StripMesh
+    body: Solid
+    offsets: Index
+    flank: Array
+    """G [m/N]. Shape (n_offsets, n_b, n_b)."""
+    nodal: Array
+    """Displacement of all nodes of a tooth [m/N]. (n_offsets, 3 n_nodes, n_b)."""
+
+    def displacement(self, force: Array) -> Array:
+        """Flank displacement (N_c, n_b) [m] under flank forces (N_c, n_b) [N]."""
+        return self._respond(self.flank, force)
+
+    def nodal_displacement(self, force: Array) -> Array:
+        """Displacement of all nodes (N_c, n_nodes, 3) [m]."""
+        return self._respond(self.nodal, force).reshape(len(force), -1, 3)
+
+    def _respond(self, blocks: Array, force: Array) -> Array:
+        result = np.zeros((len(force), blocks.shape[1]))
+        loaded = np.flatnonzero(force.any(axis=1))
+        for offset, block in zip(self.offsets, blocks, strict=True):
+            result[(loaded + offset) % len(force)] += force[loaded] @ block.T
+        return result
+
+    def between(self, tooth: Index, weight: Array, teeth: int) -> Array:
+        """Compliance between contact points (n, n) [m/N]; see the plane model."""
+        apart = (tooth[:, None] - tooth[None, :]) % teeth
+        result = np.zeros((len(tooth), len(tooth)))
+        for offset, block in zip(self.offsets, self.flank, strict=True):
+            here = apart == offset % teeth
+            if here.any():
+                result += np.where(here, weight @ block @ weight.T, 0.0)
+        return result
+
+
+def ring_gear(design: Design, profile: ToothProfile) -> RingGear:
+    """Condense the circular spline of a design.
+
+    Raises:
+        DesignError: If its outside is free.
+    """
+    if design.circular_spline.outer_rim == "free":
+        raise DesignError(
+            f"{design.drive.name}: circular_spline.outer_rim = 'free' is not modelled"
+            " in 3d; accepted: 'fixed'"
+        )
+    mesh = circular_spline_strip(design, profile)
+    material = design.material_of("circular_spline")
+    segment, teeth = mesh.teeth.segment, mesh.teeth
+    body = solid(segment.mesh, material.youngs_modulus, material.poisson_ratio)
+    matrix, size = body.stiffness.tocsc(), body.stiffness.shape[0]
+
+    def dofs(nodes: Index) -> Index:
+        return np.asarray((3 * nodes[:, None] + np.arange(3)).ravel(), dtype=np.int64)
+
+    outside = teeth.nodes[:, teeth.plane.bore].ravel()
+    inside = ~np.isin(segment.first, outside)
+    first, last = dofs(segment.first[inside]), dofs(segment.last[inside])
+    fixed = dofs(outside)
+    boundary = np.concatenate([first, last])
+    free = np.setdiff1d(np.arange(size), np.concatenate([boundary, fixed]))
+    flank = (3 * teeth.flank.ravel()[:, None] + np.arange(2)).ravel()
+    factor = splu(
+        matrix[free][:, free].tocsc(),
+        permc_spec="MMD_AT_PLUS_A",
+        options={"SymmetricMode": True},
+    )
+    units = np.zeros((len(free), len(flank)))
+    units[np.searchsorted(free, flank), np.arange(len(flank))] = 1.0
+    pull = matrix[free][:, boundary].toarray()
+    solved = factor.solve(np.concatenate([-pull, units], axis=1))
+    n = len(boundary)
+    stiffness = matrix[boundary][:, boundary].toarray() + pull.T @ solved[:, :n]
+    # a last face is the next tooth's first face, in that tooth's frame
+    pitch = about_z(np.array(2.0 * pi / profile.teeth))
+    turn = np.eye(n)
+    turn[n // 2 :, n // 2 :] = np.kron(np.eye(n // 6), pitch)
+    stiffness = turn.T @ stiffness @ turn
+    load = turn.T @ (-pull.T @ solved[:, n:])
+    rhs = np.zeros((WINDOW, n, len(flank)))
+    rhs[0] = load
+    blocks = np.broadcast_to(0.5 * (stiffness + stiffness.T), (WINDOW, n, n))
+    faces = turn @ RingFactor(blocks, n // 2).solve(rhs)
+    offsets = np.arange(-REACH, REACH + 1)
+    nodal = np.zeros((len(offsets), size, len(flank)))
+    for k, offset in enumerate(offsets):
+        nodal[k][boundary] = faces[offset % WINDOW]
+        nodal[k][free] = solved[:, :n] @ faces[offset % WINDOW]
+    nodal[REACH][free] += solved[:, n:]
+    return RingGear(
+        mesh=mesh,
+        body=body,
+        offsets=offsets,
+        flank=nodal[:, flank],
+        nodal=nodal,
+    )

@@ -1,0 +1,52 @@
+"""One equilibrium of the drive in space."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.errors import Outcome
+from swgjoint.fe.solid.teeth import ToothRows
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SolidState:
+    """One equilibrium, or the start of the search for one. Global frame, SI."""
+
+    faces: Array
+    """Masters on the first face of each sector (N, n_face, 3) [m]."""
+    inside: Array
+    """Masters inside the sectors (N, n_inside, 3) [m]."""
+    pressure: Array
+    """Force of the wave generator per gradient of its gap (N, n_bore) [N]."""
+    touching: Mask
+    """Which bore nodes touch it (N, n_bore)."""
+    bore_force: Array
+    """The same forces in the frames of the teeth (N, 3 n_bore) [N]."""
+    flank_force: Array
+    """Tooth forces as nodal forces in those frames (N, n_flank) [N]."""
+    ring_force: Array
+    """The same on the circular spline, in the frames of its teeth (N_c, n_c) [N]."""
+    held: ToothRows | None = None
+    """Tooth contacts that carry force."""
+    tooth_force: Array = field(default_factory=lambda: np.zeros(0))
+    """Their normal forces (n_contacts,) [N]."""
+    wave_generator_angle: float = 0.0
+    rotation: float = 0.0
+    """Of the bore of the diaphragm [rad]."""
+    torque: float = 0.0
+    """That the output exerts on its load, whole drive [N·m]."""
+    wave_generator_torque: float = 0.0
+    """External torque on the wave generator, whole drive [N·m]."""
+    tooth_moment: float = 0.0
+    """Moment of the tooth forces on the flexspline, whole drive [N·m]."""
+    energy: float = 0.0
+    """Strain energy, whole drive [J]."""
+    outcome: Outcome = Outcome.CONVERGED
+    history: tuple[float, ...] = ()
+    """Largest displacement increment of every iteration [m]."""

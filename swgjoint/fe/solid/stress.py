@@ -1,0 +1,151 @@
+"""Stress recovery at the nodes of all sectors, in space."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.fe.solid.corotation import about_z
+from swgjoint.fe.solid.elasticity import COLUMNS, ROWS, stress_maxima
+from swgjoint.fe.solid.ring import SolidRing
+from swgjoint.fe.solid.state import SolidState
+from swgjoint.fe.stress import StressMaxima
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+
+def flexspline_stresses(ring: SolidRing, state: SolidState) -> dict[str, Array]:
+    """Stress xx, yy, zz, xy, yz, zx at the nodes by segment [Pa]. (N, n_nodes, 6).
+
+    In the frames of the segments; nodes on the faces get the mean of their two sectors.
+    """
+    found = {}
+    loads = ring.loads(state)
+    frames = ring.frames(state)
+    for number, (segment, frame) in enumerate(
+        zip(ring.strip.segments, frames, strict=True)
+    ):
+        u = segment.displacement(frame.deformation, None if number else loads)
+        stress = segment.stresses(u)
+        _average(stress, frame.turn, segment.mesh.first, segment.mesh.last)
+        found[segment.name] = stress
+    return found
+
+
+def circular_spline_stresses(ring: SolidRing, state: SolidState) -> Array | None:
+    """The same in the frames of the circular spline's teeth; None if it is rigid."""
+    gear = ring.teeth.ring_gear
+    if gear is None:
+        return None
+    u = gear.nodal_displacement(state.ring_force)
+    stress = np.asarray((gear.body.stress @ u.reshape(len(u), -1).T).T)
+    stress = np.ascontiguousarray(stress.reshape(len(u), -1, 6))
+    teeth = ring.teeth.circular_spline.profile.teeth
+    turn = about_z(2.0 * np.pi / teeth * np.arange(ring.teeth.ring_teeth, dtype=float))
+    segment = gear.mesh.teeth.segment
+    _average(stress, turn, segment.first, segment.last)
+    return stress
+
+
+def _average(stress: Array, turn: Array, first: Index, last: Index) -> None:
+    """Average a face over the sectors that share it, in place."""
+    step = np.einsum("sji,sjk->sik", turn, np.roll(turn, -1, axis=0))
+    # the half model closes with a turn that the stress of the next sector shares
+    step[-1] = step[0]
+    mean = 0.5 * (
+        stress[:, last] + turned_stress(np.roll(stress[:, first], -1, axis=0), step)
+    )
+    stress[:, last] = mean
+    back = turned_stress(mean, step.transpose(0, 2, 1))
+    stress[:, first] = np.roll(back, 1, axis=0)
+
+
+def turned_stress(stress: Array, turn: Array) -> Array:
+    """Components in a frame in which the given one is turned by R (N, 3, 3)."""
+    tensor = np.empty((*stress.shape[:-1], 3, 3))
+    for k, (i, j) in enumerate(zip(ROWS, COLUMNS, strict=True)):
+        tensor[..., i, j] = tensor[..., j, i] = stress[..., k]
+    tensor = turn[:, None] @ tensor @ turn.transpose(0, 2, 1)[:, None]
+    return np.stack([tensor[..., i, j] for i, j in zip(ROWS, COLUMNS, strict=True)], -1)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Place:
+    """Where the largest von Mises stress of the flexspline lies, in its sector."""
+
+    part: str
+    """Segment; of the teeth: ``tooth``, ``root``, ``bore`` or ``back edge``."""
+    sector: int
+    position: tuple[float, float, float]
+    """In the frame of the tooth [m]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class SolidMaxima:
+    """Largest stresses of both members at one state."""
+
+    flexspline: StressMaxima
+    circular_spline: StressMaxima | None
+    by_part: dict[str, StressMaxima]
+    """Of the flexspline by segment."""
+    place: Place
+
+    @classmethod
+    def at(cls, ring: SolidRing, state: SolidState) -> SolidMaxima:
+        """Recover the stresses of a state."""
+        by_part, places = {}, {}
+        for name, stress in flexspline_stresses(ring, state).items():
+            maxima = stress_maxima(stress)
+            by_part[name] = _largest(maxima)
+            worst = np.unravel_index(int(maxima[2].argmax()), maxima[2].shape)
+            places[name] = int(worst[0]), int(worst[1])
+        worst_part = max(by_part, key=lambda name: by_part[name].von_mises)
+        circular = circular_spline_stresses(ring, state)
+        return cls(
+            flexspline=StressMaxima(
+                tensile=max(part.tensile for part in by_part.values()),
+                compressive=max(part.compressive for part in by_part.values()),
+                von_mises=max(part.von_mises for part in by_part.values()),
+            ),
+            circular_spline=None
+            if circular is None
+            else _largest(stress_maxima(circular)),
+            by_part=by_part,
+            place=_place(ring, worst_part, *places[worst_part]),
+        )
+
+    def to_json(self) -> dict[str, dict[str, float] | None]:
+        """Values in MPa by member, null for a rigid circular spline."""
+        circular = self.circular_spline
+        return {
+            "flexspline": self.flexspline.to_json(),
+            "circular_spline": None if circular is None else circular.to_json(),
+        }
+
+
+def _largest(maxima: tuple[Array, Array, Array]) -> StressMaxima:
+    tensile, compressive, von_mises = (float(part.max()) for part in maxima)
+    return StressMaxima(tensile=tensile, compressive=compressive, von_mises=von_mises)
+
+
+def _place(ring: SolidRing, part: str, sector: int, node: int) -> Place:
+    """Name the place of a node."""
+    strip = ring.strip
+    number = [segment.name for segment in strip.segments].index(part)
+    mesh = strip.mesh.segments[number].mesh
+    x, y, z = (float(value) for value in np.asarray(mesh.p)[:, node])
+    name = part
+    if number == 0:
+        radius, back = float(np.hypot(x, y)), strip.mesh.teeth.z[-1]
+        bore = float(np.hypot(strip.bore[:, 0], strip.bore[:, 1]).min())
+        root = strip.profile.dedendum_radius
+        if z > back - 1e-9:
+            name = "back edge"
+        elif radius < bore + 1e-6:
+            name = "bore"
+        else:
+            name = "tooth" if radius > root + 0.3 * (root - bore) else "root"
+    return Place(part=name, sector=sector, position=(x, y, z))

@@ -1,0 +1,208 @@
+"""Tooth contact over the face width: the search of the plane model, plane by plane.
+
+The teeth of the circular spline are straight, so that a point of a flank meets them in
+its own plane. Crowning thins the flexspline's teeth towards both ends.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.fe.circular_spline import CircularSpline
+from swgjoint.fe.corotation import rotate
+from swgjoint.fe.solid.corotation import Frames, spin
+from swgjoint.fe.solid.ring_gear import RingGear
+from swgjoint.fe.solid.strip import Strip
+from swgjoint.fe.solid.wave_generator import crown
+from swgjoint.fe.tooth_contact import Contacts, ToothContact
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FlankCrowning:
+    """Material taken off the flanks at the edges of the face width."""
+
+    height: float = 0.0
+    """[m]."""
+    width: float = 1.0
+    """Face width [m]."""
+    circular: bool = False
+
+    def displacement(self, strip: Strip) -> Array:
+        """Inward motion of the flank nodes in their planes (n_planes, 2 n_b, 2) [m]."""
+        stations = strip.mesh.teeth.plane.flank_stations[:-1]
+        _, outward, _ = strip.profile.evaluate(stations)
+        both = np.concatenate([outward, outward * np.array([-1.0, 1.0])])
+        depth, _ = crown(
+            strip.mesh.teeth.z, self.height, self.width, circular=self.circular
+        )
+        return np.asarray(-depth[:, None, None] * both)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ToothRows:
+    """Candidates in all planes, seen by the flexspline in space; n of them."""
+
+    contacts: Contacts
+    """In the planes' own frames; ``tooth`` counts the teeth of one plane."""
+    plane: Index
+    """(n,)."""
+    weight: Array
+    """Derivative of the gap by the flank nodes, frames of the teeth (n, n_flank)."""
+    ring_weight: Array
+    """The same by the flanks of the circular spline (n, n_ring_flank)."""
+    rows: Array
+    """Derivative by the masters of the teeth, global frame (n, 3 m)."""
+    arm: Array
+    """Derivative by a rotation of the flexspline as a whole (n,) [m]."""
+
+    def __len__(self) -> int:
+        return len(self.plane)
+
+    def chosen(self, index: Index) -> ToothRows:
+        """The candidates with the given indices."""
+        picked = {
+            key: getattr(self, key)[index]
+            for key in self.__dataclass_fields__
+            if key != "contacts"
+        }
+        return ToothRows(contacts=self.contacts.chosen(index), **picked)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Teeth:
+    """Both members' flanks."""
+
+    strip: Strip
+    circular_spline: CircularSpline
+    """Profile and weights of its flank nodes in a plane."""
+    ring_gear: RingGear | None
+    """Elastic circular spline; None while it is rigid."""
+    ring_teeth: int
+    """Teeth of the circular spline in the model."""
+    crowning: FlankCrowning
+
+    @property
+    def ring_dofs(self) -> int:
+        """Degrees of freedom of the flanks of one of its teeth, 0 if rigid."""
+        return 0 if self.ring_gear is None else self.ring_gear.flank.shape[1]
+
+    def find(
+        self,
+        frame: Frames,
+        force: Array,
+        ring_force: Array,
+        reach: float,
+        held: ToothRows | None,
+        *,
+        thorough: bool,
+    ) -> ToothRows:
+        """Candidates at a state.
+
+        Args:
+            frame: Frames of the toothed segments.
+            force: At their loaded degrees of freedom (N, n_b) [N].
+            ring_force: On the flanks of the circular spline (N_c, n_ring_flank) [N].
+            reach: Candidates with a larger gap are left out [m].
+            held: Points of the last iteration that carry force.
+            thorough: As in :meth:`ToothContact.search`.
+        """
+        strip = self.strip
+        n, planes, size = len(frame.turn), strip.planes, 2 * strip.flank_size
+        teeth, flank = strip.teeth, strip.flank_dofs
+        moved = frame.displacement @ teeth.loaded_from_masters[:flank].T
+        moved += force @ teeth.compliance[:, :flank]
+        local = strip.flank + moved.reshape(n, planes, size, 3)
+        nodes = np.einsum("sij,spbj->spbi", frame.turn, local)
+        turn = frame.turn
+        angle = np.arctan2(turn[:, 1, 0] - turn[:, 0, 1], turn[:, 0, 0] + turn[:, 1, 1])
+        flat = rotate(nodes[..., :2], -angle[:, None, None])
+        plane_flank = flat - strip.flank[..., :2] + self.crowning.displacement(strip)
+        centre = flat.mean(axis=2)
+        ring = np.zeros((self.ring_teeth, planes, 0))
+        if self.ring_gear is not None:
+            ring = self.ring_gear.displacement(ring_force)
+            ring = ring.reshape(self.ring_teeth, planes, -1)
+        parts, numbers = [], []
+        for p in range(planes):
+            search = ToothContact(
+                element=strip,
+                circular_spline=self.circular_spline,
+                ring_flank=ring[:, p],
+                angle=angle,
+                bearing=angle - np.arctan2(centre[:, p, 0], centre[:, p, 1]),
+            )
+            old = None
+            if held is not None and len(held):
+                old = held.contacts.chosen(np.flatnonzero(held.plane == p))
+            found = search.search(
+                plane_flank[:, p].reshape(n, -1), reach, old, thorough=thorough
+            )
+            parts.append(found)
+            numbers.append(np.full(len(found), p))
+        contacts = parts[0]
+        for part in parts[1:]:
+            contacts = Contacts.joined(contacts, part)
+        return self._rows(contacts, np.concatenate(numbers), frame, nodes, angle)
+
+    def _rows(
+        self,
+        contacts: Contacts,
+        plane: Index,
+        frame: Frames,
+        nodes: Array,
+        angle: Array,
+    ) -> ToothRows:
+        strip = self.strip
+        sector, side, n = contacts.sector, contacts.side, len(plane)
+        size, teeth = strip.flank_size, strip.teeth
+        turn = frame.turn[sector]
+        normal = np.zeros((n, 3))
+        normal[:, :2] = rotate(contacts.normal, angle[sector])
+        point = np.zeros((n, 3))
+        point[:, :2] = rotate(contacts.point, angle[sector])
+        spline = strip.spline(contacts.station) if n else np.zeros((0, size))
+        on_side = nodes[sector, plane].reshape(n, 2, size, 3)[np.arange(n), side]
+        point[:, 2] = np.einsum("kb,kb->k", spline, on_side[..., 2])
+        arm = normal[:, 1] * point[:, 0] - normal[:, 0] * point[:, 1]
+        seen = np.einsum("kji,kj->ki", turn, normal)
+        at = np.einsum("kji,kj->ki", turn, point)
+        on_nodes = np.zeros((n, strip.planes, 2, size, 3))
+        on_nodes[np.arange(n), plane, side] = spline[:, :, None] * seen[:, None, :]
+        weight = on_nodes.reshape(n, -1)
+        carried = weight @ teeth.loaded_from_masters[: strip.flank_dofs]
+        m = frame.position.shape[1]
+        middle = at - frame.centre[sector] - teeth.position.mean(axis=0)
+        s = -spin(frame.position[sector]).reshape(n, 3 * m, 3)
+        turning = np.cross(middle, seen) - np.einsum("km,kmw->kw", carried, s)
+        rows = carried + np.einsum("kw,kwm->km", turning, frame.gradient[sector])
+        rows = np.einsum("kij,kaj->kai", turn, rows.reshape(n, m, 3))
+        ring = contacts.ring_weight.shape[1]
+        ring_weight = np.zeros((n, strip.planes, ring))
+        ring_weight[np.arange(n), plane] = contacts.ring_weight
+        return ToothRows(
+            contacts=contacts,
+            plane=plane,
+            weight=weight,
+            ring_weight=ring_weight.reshape(n, -1),
+            rows=rows.reshape(n, 3 * m),
+            arm=arm,
+        )
+
+    def compliance(self, found: ToothRows) -> Array:
+        """Compliance between candidates through both members' teeth (n, n) [m/N]."""
+        flank = self.strip.flank_dofs
+        own = self.strip.teeth.compliance[:flank, :flank]
+        sector = found.contacts.sector
+        same = sector[:, None] == sector[None, :]
+        matrix = np.where(same, found.weight @ own @ found.weight.T, 0.0)
+        if self.ring_gear is not None:
+            matrix += self.ring_gear.between(
+                found.contacts.tooth, found.ring_weight, self.ring_teeth
+            )
+        return matrix
