@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from swgjoint.errors import DesignError
 from swgjoint.fe.drive2d import check_modelled
 from swgjoint.fe.sampling import ANGLES, sample_map
 from swgjoint.gear.design import Design
-from swgjoint.gear.tolerances import has_errors
 from swgjoint.maps.cache import cached
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.fit import fit_map
@@ -36,11 +34,6 @@ def build_map(
     """
     model = model or ("3d" if design.cup is not None else "2d")
     check_modelled(design, model)
-    if has_errors(design):
-        raise DesignError(
-            f"{design.drive.name}: tolerances are not in maps yet; the simulation of "
-            "meshing has them; accepted here: all zero"
-        )
 
     def build() -> DriveMap:
         return fit_map(sample_map(design, angles=angles, progress=progress))

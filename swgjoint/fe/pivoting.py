@@ -16,7 +16,7 @@ TOLERANCE = 1e-9
 """Part of the largest offset of a problem that counts as zero."""
 TRIES = 3
 """Exchanges of whole blocks without progress before single ones."""
-EXCHANGES = 400
+EXCHANGES = 5000
 BATCH = 32
 """Problems with active sets of similar size that are solved at once."""
 

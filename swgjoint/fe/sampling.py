@@ -15,9 +15,11 @@ from swgjoint.errors import ComputationError
 from swgjoint.fe.continuation import Continuation
 from swgjoint.fe.drive2d import can_halve, left_out, ring_model
 from swgjoint.fe.state import State
+from swgjoint.fe.tolerance_sampling import pitches_of, sample_tolerances
 from swgjoint.gear.cup import cup_torsional_stiffness
 from swgjoint.gear.design import Design
 from swgjoint.gear.kinematics import angle_coefficients, periodicity
+from swgjoint.gear.tolerances import has_errors, with_perfect_teeth
 from swgjoint.maps.catalogue import ratings_of
 from swgjoint.maps.samples import MapSamples
 from swgjoint.progress import Progress, silent
@@ -103,10 +105,11 @@ def sample_map(
 ) -> MapSamples:
     """Equilibria over one pitch and both signs of torque, by the nonlinear 2D model.
 
-    One pitch suffices without tolerances, and with a symmetric wave generator the
+    One pitch suffices with perfect teeth, and with a symmetric wave generator the
     negative torques are the mirror image of the positive ones; both claims are checked
     at rated torque and recorded. Torques at which a solve fails, and those beyond, are
-    left out, and the record says so.
+    left out, and the record says so. Errors of the teeth are superposed, see
+    :mod:`swgjoint.fe.tolerance_sampling`.
 
     Args:
         design: The drive.
@@ -121,12 +124,13 @@ def sample_map(
     cycles = periodicity(
         drive.layout, drive.teeth_flexspline, drive.teeth_circular_spline
     )
+    perfect = with_perfect_teeth(design)
     follow = Continuation(
-        model=ring_model(design, half=can_halve(design), friction=False),
+        model=ring_model(perfect, half=can_halve(perfect), friction=False),
         ratio=design.ratio,
         layout=drive.layout,
     )
-    symmetric = design.wave_generator.kind in SYMMETRIC
+    symmetric = design.wave_generator.kind in SYMMETRIC and not has_errors(perfect)
     parts = [part * ratings.repeated_peak for part in LEVELS]
     torques = parts if symmetric else [-t for t in parts[::-1]] + parts
     period = 2.0 * pi / cycles
@@ -189,6 +193,16 @@ def sample_map(
         error = error - (used / cup)[:, None]
         energy = energy + (0.5 * used**2 / cup)[:, None]
         compliance = compliance + 1.0 / cup
+    tolerances = None
+    if pitches_of(design):
+        tolerances = sample_tolerances(
+            design,
+            repeated_peak=float(used[-1]),
+            rated_torque=ratings.rated_torque,
+            progress=progress,
+        )
+        if cup is not None:
+            tolerances = tolerances.in_series(cup)
     # the pattern follows the gear angle that depends on the input alone, written so
     # that its phase grows with theta
     alpha, beta = angle_coefficients(drive.layout)
@@ -207,6 +221,7 @@ def sample_map(
         energy=energy,
         compliance=compliance,
         input_torque=input_torque,
+        tolerances=tolerances,
         info=info
         | {
             "design_hash": design.content_hash(),
@@ -219,6 +234,7 @@ def sample_map(
                 "friction": "left out of the potential"
                 if design.friction.tooth_coefficient
                 else None,
+                "tolerances": _named(design),
                 "left_out": left_out(design),
             },
             "ratings_source": ratings.source,
@@ -227,6 +243,12 @@ def sample_map(
             "sampling_wall_s": time.perf_counter() - begin,
         },
     )
+
+
+def _named(design: Design) -> dict[str, float] | None:
+    """Errors of the drive, for the validity label."""
+    values = design.tolerances.model_dump()
+    return {k: v for k, v in values.items() if v} if has_errors(design) else None
 
 
 def _unloaded(follow: Continuation) -> State:

@@ -20,10 +20,13 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import BPoly
+from scipy.interpolate import PchipInterpolator
 
 from swgjoint.maps.drive_map import DriveMap
-from swgjoint.maps.samples import MapSamples
+from swgjoint.maps.equilibrium import output_angle
+from swgjoint.maps.samples import FullSolves, MapSamples
+from swgjoint.maps.tolerance_modes import combined
+from swgjoint.maps.torsion_table import on_knots
 
 Array = NDArray[np.float64]
 
@@ -85,23 +88,22 @@ def fit_map(samples: MapSamples, *, keep: float = KEEP) -> DriveMap:
         keep: Threshold for harmonics, see :data:`KEEP`; 0 keeps all.
     """
     zero = int(np.flatnonzero(samples.torque == 0.0)[0])
-    n_angles = samples.input_angle.size
     unloaded = samples.output_error[zero]
     e0 = unloaded - unloaded.mean()
     torsion = unloaded - samples.output_error  # (n_torques, n_angles)
     energy = samples.energy - samples.energy[zero].mean()
 
-    # common knots: the mean torsions, ends inside the sampled range of every angle
-    knots = torsion.mean(axis=1)
-    knots[zero] = 0.0
-    knots[0], knots[-1] = torsion[0].max(), torsion[-1].min()
-    table = np.empty((3, n_angles, knots.size))
-    for k in range(n_angles):
-        data = np.stack([energy[:, k], samples.torque, 1.0 / samples.compliance[:, k]])
-        curve = BPoly.from_derivatives(torsion[:, k], data.T)
-        table[:, k] = [curve(knots, nu) for nu in range(3)]
-    modes = _modes(np.moveaxis(table, 1, 0))  # (n_modes, 2, 3, n_knots)
-    error_modes = _modes(e0)
+    knots = _knots(samples, torsion)
+    torque = np.broadcast_to(samples.torque[:, None], torsion.shape)
+    curve = np.stack([energy, torque, 1.0 / samples.compliance])
+    modes = _modes(on_knots(torsion, curve, knots))  # (n_modes, 2, 3, n_knots)
+    error_modes = np.concatenate([np.zeros((1, 2)), _modes(e0)[1:]])
+    orders = np.arange(len(modes))[:, None] * np.array([samples.order])
+    toleranced = None
+    if samples.tolerances is not None:
+        toleranced = combined(samples, knots, modes, error_modes, keep=keep)
+        orders, modes = toleranced.orders, toleranced.potential
+        error_modes = toleranced.error
     count = len(modes)
     chains = [
         [quartic_chain(knots, modes[k, c]) for c in range(2)] for k in range(count)
@@ -111,7 +113,6 @@ def fit_map(samples: MapSamples, *, keep: float = KEEP) -> DriveMap:
     ends = modes[:, :, 2][:, :, [0, -1]]
     _clip_ends(ends, knots, modes[0, 0, 1])
 
-    p, q = samples.order
     full = DriveMap(
         name=samples.name,
         level=samples.level,
@@ -119,28 +120,65 @@ def fit_map(samples: MapSamples, *, keep: float = KEEP) -> DriveMap:
         teeth_flexspline=samples.teeth_flexspline,
         teeth_circular_spline=samples.teeth_circular_spline,
         torsion_knots=breaks,
-        orders=np.arange(count)[:, None] * np.array([[p, q]]),
+        orders=orders,
         potential=potential,
         end_stiffness=ends,
-        kinematic_error=np.concatenate([np.zeros((1, 2)), error_modes[1:]]),
+        kinematic_error=error_modes,
         ratings=samples.ratings,
         damping_ratio=samples.damping_ratio,
     )
-    strength = harmonic_strength(full)
-    kept = np.ones(count, dtype=bool)
-    largest = strength[1:].max(axis=0, initial=0.0)
-    kept[1:] = (strength[1:] > keep * np.maximum(largest, 1e-300)).any(axis=1)
-    fitted = full.with_harmonics(kept)
     info = dict(samples.info)
+    if toleranced is not None:
+        perfect = fit_map(replace(samples, tolerances=None), keep=keep).info
+        strength = harmonic_strength(full)
+        checks: dict[str, dict[str, float]] = {}
+        if samples.tolerances is not None and samples.tolerances.solved is not None:
+            checks = against_solves(full, samples, samples.tolerances.solved)
+        info |= checks | {
+            "harmonics": _describe(full, strength, np.ones(count, dtype=bool)),
+            "tolerances": toleranced.record,
+            "perfect_teeth": {
+                key: perfect[key] for key in ("residual", "energy_check")
+            },
+        }
+        fitted = full
+    else:
+        strength = harmonic_strength(full)
+        kept = np.ones(count, dtype=bool)
+        largest = strength[1:].max(axis=0, initial=0.0)
+        kept[1:] = (strength[1:] > keep * np.maximum(largest, 1e-300)).any(axis=1)
+        fitted = full.with_harmonics(kept)
+        info |= {
+            "harmonics": _describe(full, strength, kept),
+            "residual": residual(fitted, samples) | {"threshold": keep},
+            "energy_check": energy_check(fitted, samples)
+            | {"relative_all_harmonics": energy_check(full, samples)["relative"]},
+        }
     info |= {
-        "harmonics": _describe(full, strength, kept),
-        "residual": residual(fitted, samples) | {"threshold": keep},
-        "energy_check": energy_check(fitted, samples)
-        | {"relative_all_harmonics": energy_check(full, samples)["relative"]},
         "stiffness_range_Nm_rad": stiffness_range(fitted),
         "torque_range_Nm": [float(v) for v in fitted.torque_range],
     }
     return replace(fitted, info=info)
+
+
+def _knots(samples: MapSamples, torsion: Array) -> Array:
+    """Torsions at which the curves of all angles are compared [rad]."""
+    zero = int(np.flatnonzero(samples.torque == 0.0)[0])
+    found = samples.tolerances
+    if found is None:
+        # the mean torsions, ends inside the sampled range of every angle
+        knots = torsion.mean(axis=1)
+        knots[0], knots[-1] = torsion[0].max(), torsion[-1].min()
+    else:
+        # with errors of the teeth stiffness varies so much that stiff places would end
+        # the range far below the largest torque: there the curves are continued
+        error = found.table[0]
+        rest = error[int(np.flatnonzero(found.torque == 0.0)[0])]
+        mean = PchipInterpolator(found.torque, (rest - error).mean(axis=1))
+        ends = found.torque[[0, -1]]
+        knots = mean(np.clip(samples.torque, *ends))
+    knots[zero] = 0.0
+    return np.asarray(knots)
 
 
 def _modes(values: Array) -> Array:
@@ -199,6 +237,44 @@ def residual(drive: DriveMap, samples: MapSamples) -> dict[str, float]:
     return {
         "kinematic_error_rad": float(np.abs(e0[zero] - error).max()),
         "torque_Nm": float(np.abs(torque - wanted)[inside].max()),
+    }
+
+
+def against_solves(
+    drive: DriveMap, samples: MapSamples, solved: FullSolves
+) -> dict[str, dict[str, float]]:
+    """The map of a toleranced drive against equilibria that it has not seen.
+
+    Returns:
+        ``residual``: largest deviation of the output error [rad] and its part of the
+        peak to peak of the superposition over the cycle; ``energy_check``: as
+        :func:`energy_check`, at the torques that were solved.
+    """
+    theta = solved.input_angle
+    zero = solved.torque == 0.0
+    error = output_angle(drive, theta, solved.torque) - theta / drive.ratio
+    wrong = solved.output_error - error
+    # the map has its zero at the mean of the unloaded error
+    wrong -= wrong[zero].mean()
+    found = samples.tolerances
+    assert found is not None
+    turn = float(np.ptp(found.table[0, np.flatnonzero(found.torque == 0.0)[0]]))
+    psi = theta / drive.ratio + error
+    on_input, on_output = drive.forces(theta, psi)
+    simulated = solved.input_torque - solved.torque / drive.ratio
+    ripple = -on_input - on_output / drive.ratio
+    missed = float(np.abs(ripple - simulated).max())
+    spread = float(np.ptp(simulated))
+    return {
+        "residual": {
+            "output_error_rad": float(np.abs(wrong).max()),
+            "relative_to_turn": float(np.abs(wrong).max() / turn),
+        },
+        "energy_check": {
+            "input_torque_pp_Nm": spread,
+            "input_torque_error_Nm": missed,
+            "relative": missed / spread,
+        },
     }
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
 from math import ceil, gcd, pi
@@ -12,19 +13,22 @@ from numpy.typing import NDArray
 from swgjoint.arrays import frozen_array
 from swgjoint.errors import ComputationError
 from swgjoint.maps.drive_map import DriveMap
-from swgjoint.maps.equilibrium import CHUNK, output_angle
+from swgjoint.maps.ideal_motion import IdealMotion
 
 Array = NDArray[np.float64]
 
 PER_WAVE = 16
 """Samples of the shortest strong wave; with the parabola through each extreme the
 peak-to-peak value is within 0.1 %."""
+STRONG = 0.1
+"""A wave is strong from this part of the largest one; a weaker one needs fewer samples,
+by the square root of its size, for the same error of the peak to peak."""
 AT_LEAST_PER_WAVE = 4
 """Samples of the shortest wave of all, so that none is aliased."""
-STRONG = 0.02
-"""A wave is strong from this part of the largest one."""
 AT_LEAST = 64
 """Samples of one period."""
+CHUNK = 4096
+"""Positions that are evaluated at once."""
 MAX_SAMPLES = 10_000_000
 LINES = 12
 """Orders that a sheet lists."""
@@ -97,8 +101,10 @@ def period_of(drive: DriveMap) -> tuple[Fraction, int]:
         period = Fraction(abs(ratio.numerator))
     orders = np.abs(n_theta + n_psi / drive.ratio)
     size = _strengths(drive)
-    strong = orders[size > STRONG * size.max(initial=0.0)].max(initial=0.0)
-    waves = max(PER_WAVE * strong, AT_LEAST_PER_WAVE * orders.max())
+    strong = STRONG * max(float(size.max(initial=0.0)), 1e-300)
+    share = np.sqrt(np.minimum(size / strong, 1.0))
+    per_wave = np.maximum(PER_WAVE * share, AT_LEAST_PER_WAVE)
+    waves = float((per_wave * orders).max())
     samples = ceil(max(AT_LEAST, float(waves * period)))
     if samples > MAX_SAMPLES:
         raise ComputationError(
@@ -132,7 +138,8 @@ def error_turn(drive: DriveMap, torque: float = 0.0) -> Turn:
     that the cogging of the unloaded drive gives.
     """
     period, theta = _input_angles(drive)
-    error = output_angle(drive, theta, torque) - theta / drive.ratio
+    error = _along(drive, theta, lambda at: at.output_angle(torque))
+    error -= theta / drive.ratio
     return Turn(period_turns=period, turns=abs(drive.ratio), signal=error)
 
 
@@ -143,15 +150,20 @@ def ripple_turn(drive: DriveMap, torque: float) -> Turn:
     ratio exactly, as if a stiff load turned at constant speed.
     """
     period, theta = _input_angles(drive)
-    psi = theta / drive.ratio - drive.mean_torsion(torque)
-    size = max(1, CHUNK // len(drive.orders))
-    parts = [
-        drive.forces(theta[k : k + size], psi[k : k + size])[1]
-        for k in range(0, theta.size, size)
-    ]
-    return Turn(
-        period_turns=period, turns=abs(drive.ratio), signal=np.concatenate(parts)
+    back = -drive.mean_torsion(torque)
+    signal = _along(
+        drive, theta, lambda at: at.torque(np.full(at.theta.shape, back))[0]
     )
+    return Turn(period_turns=period, turns=abs(drive.ratio), signal=signal)
+
+
+def _along(drive: DriveMap, theta: Array, of: Callable[[IdealMotion], Array]) -> Array:
+    """A quantity at many input angles, some at a time."""
+    parts = [
+        of(IdealMotion.of(drive, theta[k : k + CHUNK]))
+        for k in range(0, theta.size, CHUNK)
+    ]
+    return np.concatenate(parts)
 
 
 def strongest_orders(turns: dict[str, Turn]) -> list[dict[str, float]]:

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from swgjoint.errors import DesignError
-from swgjoint.fe.build_map import build_map
 from swgjoint.fe.continuation import Continuation
 from swgjoint.fe.drive2d import can_halve, ring_model
 from swgjoint.gear.design import Design
@@ -102,11 +101,9 @@ def test_errors_keep_the_energy_balance():
     assert torque == pytest.approx(slope, rel=1e-5)
 
 
-def test_errors_need_all_sectors_and_have_no_map_yet():
-    """No half model; building a map says what is missing."""
+def test_errors_need_all_sectors():
+    """No half model."""
     design = flawed(random_pitch_um=2.0)
     assert not can_halve(design)
     with pytest.raises(DesignError, match="without tolerances"):
         ring_model(design, half=True)
-    with pytest.raises(DesignError, match="not in maps yet"):
-        build_map(design, cache=False)

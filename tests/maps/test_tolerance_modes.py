@@ -1,0 +1,174 @@
+"""Harmonics of errors of the teeth: a known potential of both angles comes back."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from swgjoint.gear.kinematics import LAYOUTS, angle_coefficients, periodicity, ratio
+from swgjoint.maps.drive_map import Ratings
+from swgjoint.maps.fit import fit_map
+from swgjoint.maps.samples import MapSamples, ToleranceSamples
+from swgjoint.maps.tolerance_modes import orders_of
+
+RATINGS = Ratings(rated_torque=20, repeated_peak=50, momentary_peak=90, T1=5, T2=15)
+FLEXSPLINE, CIRCULAR_SPLINE, CYCLE = 30, 32, 480
+K = 2e4
+ERRORS = {(2, 0): 3e-5, (0, 2): 2e-5, (1, -1): 4e-6, (5, 3): 3e-6}
+SWINGS = {(2, 0): 0.1, (0, 4): 0.05}
+COGGING = {(4, 0): 2e-6, (0, 2): 1e-6}
+
+
+def waves(terms, alpha, beta):
+    """Sum of cosines of p alpha + q beta."""
+    return sum(a * np.cos(p * alpha + q * beta) for (p, q), a in terms.items())
+
+
+def known(layout: str, phases: int = 4, part: float = 1.0) -> MapSamples:
+    """Equilibria of V = K x^2/2 (1 + swings) + cogging with the errors e0."""
+    i = ratio(layout, FLEXSPLINE, CIRCULAR_SPLINE)
+    cycles = periodicity(layout, FLEXSPLINE, CIRCULAR_SPLINE)
+    angles = np.array(angle_coefficients(layout))
+    order = (cycles, 0) if angles[0].tolist() == [1, 0] else (0, cycles * angles[1, 0])
+    levels = np.linspace(-50.0, 50.0, 7)
+
+    def table(theta, part):
+        alpha, beta = angles @ np.stack([theta, theta / i])
+        stiffness = K * (1.0 + part * waves(SWINGS, alpha, beta))
+        tooth = np.cos(cycles * theta)
+        e0 = 1e-6 * tooth + part * waves(ERRORS, alpha, beta)
+        x = levels[:, None] / stiffness
+        energy = 0.5 * stiffness * x**2 + part * waves(COGGING, alpha, beta)
+        energy = energy + 1e-7 * tooth
+        return np.stack([e0 - x, energy, np.broadcast_to(1.0 / stiffness, x.shape)])
+
+    period = 2.0 * np.pi / cycles
+    every = period * np.arange(CYCLE * phases) / phases
+    theta = period * np.arange(12) / 12
+    error, energy, compliance = table(theta, 0.0)
+    return MapSamples(
+        name="known",
+        level="2d",
+        layout=layout,
+        teeth_flexspline=FLEXSPLINE,
+        teeth_circular_spline=CIRCULAR_SPLINE,
+        ratings=RATINGS,
+        damping_ratio=0.02,
+        order=order,
+        input_angle=theta,
+        torque=levels,
+        output_error=error,
+        energy=energy,
+        compliance=compliance,
+        input_torque=levels[:, None] / i
+        - cycles * (1e-6 * levels[:, None] + 1e-7) * np.sin(cycles * theta),
+        tolerances=ToleranceSamples(
+            pitches=CYCLE,
+            phases=phases,
+            torque=levels,
+            table=table(every, part),
+            perfect=table(every[:phases], 0.0),
+        ),
+    )
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_known_potential_of_both_angles_comes_back(layout):
+    """Error and energy at unseen angles, orders named by the member that has them."""
+    samples = known(layout)
+    drive = fit_map(samples, keep=1e-6)
+    found = {(p, q) for p, q in drive.orders.tolist()}
+    for p, q in {*ERRORS, *SWINGS, *COGGING}:
+        assert (p, q) in found or (-p, -q) in found
+    theta = np.random.default_rng(1).uniform(0, 200, 300)
+    ideal = theta / drive.ratio
+    alpha, beta = np.array(angle_coefficients(layout)) @ np.stack([theta, ideal])
+    e0, _, _ = drive.error_at(drive.phases(theta, ideal))
+    cycles = periodicity(layout, FLEXSPLINE, CIRCULAR_SPLINE)
+    wanted = waves(ERRORS, alpha, beta) + 1e-6 * np.cos(cycles * theta)
+    assert np.abs(e0 - wanted).max() < 1e-9
+    # to two thirds of the largest torque: beyond, stiff angles are continued
+    for x in (-1.5e-3, 0.0, 1.6e-3):
+        wanted = 0.5 * K * x**2 * (1 + waves(SWINGS, alpha, beta))
+        wanted = wanted + waves(COGGING, alpha, beta) + 1e-7 * np.cos(cycles * theta)
+        energy = drive.energy(x, theta, ideal)
+        assert np.abs(energy - wanted).max() < 1e-4 * np.ptp(wanted) + 1e-10
+        torque = K * x * (1 + waves(SWINGS, alpha, beta))
+        assert np.abs(drive.torque(x, theta, ideal) - torque).max() < 1e-3 * K * 2e-3
+
+
+def test_forces_are_the_gradient_of_the_potential():
+    """A map of both angles is conservative: forces are differences of its energy."""
+    drive = fit_map(known("circular_spline_fixed"))
+    theta, psi, step = 1.234, 1.234 / drive.ratio - 4e-4, 1e-6
+
+    def energy(t, p):
+        return float(drive.energy(drive.torsion(t, p), t, p))
+
+    on_input, on_output = drive.forces(theta, psi)
+    by_theta = (energy(theta + step, psi) - energy(theta - step, psi)) / (2 * step)
+    by_psi = (energy(theta, psi + step) - energy(theta, psi - step)) / (2 * step)
+    assert -by_theta == pytest.approx(float(on_input), rel=1e-5)
+    assert -by_psi == pytest.approx(float(on_output), rel=1e-5)
+
+
+def test_perfect_teeth_add_nothing():
+    """Without errors the map of the perfect drive comes back, tooth order alone."""
+    samples = known("circular_spline_fixed", part=0.0)
+    flawless = fit_map(replace(samples, tolerances=None))
+    drive = fit_map(samples)
+    assert np.array_equal(drive.orders[:2], [(0, 0), (CIRCULAR_SPLINE, 0)])
+    assert not np.any(drive.orders % [CIRCULAR_SPLINE, 1])
+    theta = np.linspace(0.0, 3.0, 50)
+    psi = theta / drive.ratio - 1e-3
+    for mine, other in zip(
+        drive.forces(theta, psi), flawless.forces(theta, psi), strict=True
+    ):
+        assert mine == pytest.approx(other, rel=1e-9)
+
+
+def test_threshold_drops_harmonics_and_the_record_says_how_much():
+    """Fewer harmonics, their share of the rms in the record."""
+    samples = known("circular_spline_fixed")
+    full, sparse = fit_map(samples, keep=0.0), fit_map(samples, keep=0.5)
+    record = sparse.info["tolerances"]
+    assert record["kept"] == len(sparse.orders) < len(full.orders)
+    assert full.info["tolerances"]["dropped"] == 0
+    errors = ERRORS | {(CIRCULAR_SPLINE, 0): 1e-6}
+    kept = sum(a**2 for pq, a in errors.items() if list(pq) in sparse.orders.tolist())
+    total = sum(a**2 for a in errors.values())
+    wanted = np.sqrt(1.0 - kept / total)
+    assert record["dropped_kinematic_error_rms"] == pytest.approx(wanted, rel=1e-3)
+    middle = next(r for r in record["transmission_error"] if r["torque_Nm"] == 0.0)
+    zero = samples.tolerances.table[0, 3]
+    assert middle["peak_to_peak_rad"] == pytest.approx(np.ptp(zero))
+
+
+def test_errors_of_one_member_have_orders_of_its_angle_alone():
+    """One turn of the circular spline: p alpha; of the flexspline: q beta."""
+    samples = known("circular_spline_fixed")
+    waves_in = np.array([0, 2, 5, CIRCULAR_SPLINE + 2])
+    assert samples.tolerances is not None
+    one = replace(
+        samples,
+        tolerances=replace(
+            samples.tolerances,
+            pitches=CIRCULAR_SPLINE,
+            table=samples.tolerances.table[:, :, : 4 * CIRCULAR_SPLINE],
+        ),
+    )
+    expected = [(0, 0), (2, 0), (5, 0), (CIRCULAR_SPLINE + 2, 0)]
+    assert orders_of(waves_in, one).tolist() == [list(pq) for pq in expected]
+    other = replace(
+        samples,
+        tolerances=replace(
+            samples.tolerances,
+            pitches=FLEXSPLINE,
+            table=samples.tolerances.table[:, :, : 4 * FLEXSPLINE],
+        ),
+    )
+    waves_in[-1] = FLEXSPLINE + 2
+    expected = [(0, 0), (0, 2), (0, 5), (CIRCULAR_SPLINE, 2)]
+    assert orders_of(waves_in, other).tolist() == [list(pq) for pq in expected]
