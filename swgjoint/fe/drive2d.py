@@ -16,15 +16,16 @@ from swgjoint.fe.sector_mesh import sector_mesh
 from swgjoint.fe.superelement import Superelement, condense
 from swgjoint.gear.design import Design, MemberName
 from swgjoint.gear.profile import ToothProfile, tooth_profile
-from swgjoint.gear.tolerances import has_errors, tooth_errors, wave_generator_offset
+from swgjoint.gear.tolerances import (
+    flawed_wave_generator,
+    has_errors,
+    tooth_errors,
+    wave_generator_offset,
+)
 from swgjoint.gear.wave_generator import lobe_height, wave_generator
 from swgjoint.units import mm
 
 Array = NDArray[np.float64]
-
-
-NOT_MODELLED = ("wave_generator_ovality_um", "misalignment_arcmin")
-"""Tolerances that the 2D model refuses."""
 
 
 def can_halve(design: Design) -> bool:
@@ -48,11 +49,11 @@ def check_modelled(design: Design, model: str) -> None:
     faults = []
     if model != "2d":
         faults.append(f"model {model!r} is not available yet; available: '2d'")
-    faults += [
-        f"tolerances.{key} = {value:g} is not modelled yet; accepted: 0"
-        for key, value in tolerances.model_dump().items()
-        if key in NOT_MODELLED and value
-    ]
+    if tolerances.misalignment_arcmin:
+        faults.append(
+            f"tolerances.misalignment_arcmin = {tolerances.misalignment_arcmin:g}: the"
+            " 2d model is a plane section, without an axis to tilt; accepted: 0"
+        )
     if faults:
         raise DesignError("\n".join(f"{drive.name}: {fault}" for fault in faults))
 
@@ -137,7 +138,7 @@ def ring_model(
         **shifts,
         friction=law,
         element=_sector(design, "flexspline", flanks["flexspline"]),
-        wave_generator=wave_generator(design),
+        wave_generator=flawed_wave_generator(design),
         circular_spline=ring,
         lobe_height=lobe_height(design),
         half=half,

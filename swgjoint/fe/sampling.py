@@ -15,11 +15,11 @@ from swgjoint.errors import ComputationError
 from swgjoint.fe.continuation import Continuation
 from swgjoint.fe.drive2d import can_halve, left_out, ring_model
 from swgjoint.fe.state import State
-from swgjoint.fe.tolerance_sampling import pitches_of, sample_tolerances
+from swgjoint.fe.tolerance_sampling import sample_tolerances
 from swgjoint.gear.cup import cup_torsional_stiffness
 from swgjoint.gear.design import Design
 from swgjoint.gear.kinematics import angle_coefficients, periodicity
-from swgjoint.gear.tolerances import has_errors, with_perfect_teeth
+from swgjoint.gear.tolerances import has_errors, without_errors
 from swgjoint.maps.catalogue import ratings_of
 from swgjoint.maps.samples import MapSamples
 from swgjoint.progress import Progress, silent
@@ -108,7 +108,7 @@ def sample_map(
     One pitch suffices with perfect teeth, and with a symmetric wave generator the
     negative torques are the mirror image of the positive ones; both claims are checked
     at rated torque and recorded. Torques at which a solve fails, and those beyond, are
-    left out, and the record says so. Errors of the teeth are superposed, see
+    left out, and the record says so. Manufacturing errors are superposed, see
     :mod:`swgjoint.fe.tolerance_sampling`.
 
     Args:
@@ -124,13 +124,13 @@ def sample_map(
     cycles = periodicity(
         drive.layout, drive.teeth_flexspline, drive.teeth_circular_spline
     )
-    perfect = with_perfect_teeth(design)
+    perfect = without_errors(design)
     follow = Continuation(
         model=ring_model(perfect, half=can_halve(perfect), friction=False),
         ratio=design.ratio,
         layout=drive.layout,
     )
-    symmetric = design.wave_generator.kind in SYMMETRIC and not has_errors(perfect)
+    symmetric = design.wave_generator.kind in SYMMETRIC
     parts = [part * ratings.repeated_peak for part in LEVELS]
     torques = parts if symmetric else [-t for t in parts[::-1]] + parts
     period = 2.0 * pi / cycles
@@ -194,7 +194,7 @@ def sample_map(
         energy = energy + (0.5 * used**2 / cup)[:, None]
         compliance = compliance + 1.0 / cup
     tolerances = None
-    if pitches_of(design):
+    if has_errors(design):
         tolerances = sample_tolerances(
             design,
             repeated_peak=float(used[-1]),

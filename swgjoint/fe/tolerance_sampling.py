@@ -22,7 +22,13 @@ from swgjoint.fe.state import State
 from swgjoint.fe.tolerance_influence import Influence, Response, influence
 from swgjoint.gear.design import Design, MemberName
 from swgjoint.gear.kinematics import periodicity
-from swgjoint.gear.tolerances import ToothErrors, tooth_errors, with_perfect_teeth
+from swgjoint.gear.tolerances import (
+    ToothErrors,
+    has_errors,
+    tooth_errors,
+    with_perfect_teeth,
+    without_errors,
+)
 from swgjoint.maps.samples import FullSolves, ToleranceSamples
 from swgjoint.progress import Progress, silent
 
@@ -31,6 +37,8 @@ Index = NDArray[np.int64]
 
 PHASES = 4
 """Positions within a pitch: what the errors add varies slowly within one."""
+ALONE = 24
+"""The same without errors of the teeth, where one pitch is all there is."""
 POSITIONS = 40_000
 """Positions of the cycle, if that leaves two in a pitch: what two minutes allow."""
 LEVELS = (0.15, 0.45, 1.0)
@@ -42,14 +50,14 @@ CHECKS = 12
 """Positions that are solved without linearisation, too, to judge the map."""
 MEMBERS: tuple[MemberName, MemberName] = ("flexspline", "circular_spline")
 FREE = 100.0
-"""Compliance, in that of the perfect drive, from which the output counts as free."""
+"""Compliance, in the median of all positions, from which the output counts as free."""
 
 
 def pitches_of(design: Design) -> int:
-    """Pitches after which the errors of the teeth repeat; 0 without such errors."""
+    """Pitches after which the errors of the teeth repeat; 1 without such errors."""
     shifts = [tooth_errors(design, member).shift for member in MEMBERS]
     counts = [len(shift) for shift in shifts if shift.any()]
-    return lcm(*counts) if counts else 0
+    return lcm(*counts)
 
 
 def pitch_of(design: Design) -> float:
@@ -83,6 +91,8 @@ def influences(
     design: Design, *, phases: int = PHASES
 ) -> tuple[Continuation, list[tuple[State, Influence]]]:
     """The drive with perfect teeth, unloaded and linearised at positions in a pitch.
+
+    Errors of its wave generator turn with it, so that all pitches are alike.
 
     Args:
         design: The drive; errors of its wave generator are kept.
@@ -138,29 +148,37 @@ def sample_tolerances(
     """
     drive = design.drive
     if phases is None:
-        phases = int(np.clip(POSITIONS // pitches_of(design), 2, PHASES))
+        most = PHASES if pitches_of(design) > 1 else ALONE
+        phases = int(np.clip(POSITIONS // pitches_of(design), 2, most))
     follow, linear = influences(design, phases=phases)
+    reference = linear
+    if has_errors(with_perfect_teeth(design)):
+        reference = influences(without_errors(design), phases=phases)[1]
     pitches = np.arange(pitches_of(design), dtype=np.int64)
     errors = [
         shifted(tooth_errors(design, member), pitches, drive.layout)
         for member in MEMBERS
     ]
     levels = np.array([part * repeated_peak for part in LEVELS])
-    tables, free = [], 0
-    for k, (state, at) in enumerate(linear):
-        # the last row is the drive without errors
-        gaps = at.gap_change(*errors)
-        gaps = np.concatenate([gaps, np.zeros((1, gaps.shape[1]))])
+    tables, perfect, free = [], [], 0
+    for k, ((state, at), (still, flawless)) in enumerate(
+        zip(linear, reference, strict=True)
+    ):
+        gaps, none = at.gap_change(*errors), np.zeros((1, len(flawless.sector)))
         found, count = _over_torque(at, gaps, levels, SMALL * rated_torque)
         if not np.isfinite(found).all():
             lost = np.isnan(found).any(axis=(0, 1)).sum()
             raise ComputationError(
                 f"{drive.name}: no equilibrium with the errors of the teeth at {lost}"
-                f" of {gaps.shape[0]} positions; try smaller tolerances"
+                f" of {pitches.size} pitches; try smaller tolerances"
             )
-        found[0] -= pitch_of(design) * k / phases / design.ratio
-        found[1] += state.energy
+        alone, _ = _over_torque(flawless, none, levels, SMALL * rated_torque)
+        ideal = pitch_of(design) * k / phases / design.ratio
+        for rows, energy in ((found, state.energy), (alone, still.energy)):
+            rows[0] -= ideal
+            rows[1] += energy
         tables.append(found)
+        perfect.append(alone[:, :, 0])
         free += count
         progress(f"{drive.name}: tolerances", k + 1, phases)
     # (3, n_torques, n_pitches, n_phases)
@@ -174,8 +192,8 @@ def sample_tolerances(
         pitches=pitches.size,
         phases=phases,
         torque=np.concatenate([-levels[::-1], [0.0], levels]),
-        table=table[:, :, :-1].reshape(*table.shape[:2], -1),
-        perfect=table[:, :, -1],
+        table=table.reshape(*table.shape[:2], -1),
+        perfect=np.stack(perfect, axis=-1),
         free=free,
         solved=solved,
     )
@@ -238,7 +256,8 @@ def _over_torque(
 
     rest = at.respond(gaps, 0.0)
     unloaded = row(0.0, rest)
-    free = ~(rest.compliance < FREE * rest.compliance[-1])
+    # a few free positions leave the median as it is
+    free = ~(rest.compliance < FREE * np.nanmedian(rest.compliance))
     if free.any():
         ends = [row(t, at.respond(gaps[free], t)) for t in (small, -small)]
         middle = 0.5 * (ends[0] + ends[1])

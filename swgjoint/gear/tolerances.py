@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.gear.design import Design, MemberName
+from swgjoint.gear.wave_generator import WaveGenerator, wave_generator
+from swgjoint.gear.wave_generators.oval import Oval
 from swgjoint.units import um
 
 Array = NDArray[np.float64]
@@ -31,7 +33,7 @@ TEETH = (
 # streams of the random parts
 _PITCH = {"flexspline": 1, "circular_spline": 2}
 _RANDOM = {"flexspline": 3, "circular_spline": 4}
-_OVALITY, _ECCENTRICITY, _WAVE_GENERATOR = 5, 6, 7
+_OVALITY, _ECCENTRICITY, _WAVE_GENERATOR, _OUTLINE = 5, 6, 7, 8
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -98,9 +100,29 @@ def wave_generator_offset(design: Design) -> Array:
     return size * np.array([-np.sin(turn), np.cos(turn)])
 
 
+def flawed_wave_generator(design: Design) -> WaveGenerator:
+    """Outline of the wave generator with its ovality, about its centre.
+
+    The key is the largest minus the smallest deviation along the normal; the seed turns
+    it against the major axis.
+    """
+    outline = wave_generator(design)
+    ovality = design.tolerances.wave_generator_ovality_um * um
+    if ovality == 0.0:
+        return outline
+    angle = _stream(design.tolerances.seed, _OUTLINE).uniform(0.0, np.pi)
+    return Oval(nominal=outline, ovality=ovality, angle=float(angle))
+
+
 def with_perfect_teeth(design: Design) -> Design:
     """The same drive without errors of its teeth; those of the wave generator stay."""
     return design.with_changes({f"tolerances.{key}": 0.0 for key in TEETH})
+
+
+def without_errors(design: Design) -> Design:
+    """The same drive as drawn."""
+    keys = set(type(design.tolerances).model_fields) - {"seed"}
+    return design.with_changes({f"tolerances.{key}": 0.0 for key in keys})
 
 
 def has_errors(design: Design) -> bool:

@@ -44,8 +44,10 @@ def test_opposite_lobes_cancel_odd_pitch_errors():
 
 @pytest.mark.fe
 def test_unequal_lobes_show_odd_pitch_errors():
-    """1 per turn needs eccentricity of the wave generator and pitch errors together."""
-    alone = orders(wave_generator_eccentricity_um=5.0)
+    """1 per turn needs an eccentric wave generator and pitch errors together."""
+    alone = orders(
+        positions=8, wave_generator_eccentricity_um=5.0, wave_generator_ovality_um=5.0
+    )
     assert alone[1:].max() < 1e-9
     both = orders(
         wave_generator_eccentricity_um=5.0, circular_spline_cumulative_pitch_um=10.0
@@ -82,9 +84,10 @@ def test_teeth_shifted_alike_turn_the_member():
 
 @pytest.mark.fe
 def test_errors_keep_the_energy_balance():
-    """T_wg is the slope of U + T psi with an eccentric outline and flawed teeth."""
+    """T_wg is the slope of U + T psi, outline eccentric and oval, teeth flawed."""
     design = flawed(
         wave_generator_eccentricity_um=5.0,
+        wave_generator_ovality_um=5.0,
         random_pitch_um=2.0,
         circular_spline_ovality_um=5.0,
     )

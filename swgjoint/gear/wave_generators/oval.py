@@ -1,0 +1,87 @@
+"""An outline with an error of roundness."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import gcd
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from swgjoint.gear.wave_generators.curve import Array, ClosedCurve
+
+
+@dataclass(frozen=True, kw_only=True)
+class Oval(ClosedCurve):
+    r"""An outline moved along its normal by :math:`\delta = \frac o2\cos 2(\varphi-a)`.
+
+    phi is the polar angle of the nominal outline, counter-clockwise from +y; delta is
+    micrometres, its square is left out.
+    """
+
+    nominal: ClosedCurve
+    ovality: float
+    """o, largest minus smallest deviation [m]."""
+    angle: float
+    """a [rad]."""
+
+    @property
+    def major(self) -> float:  # type: ignore[override]
+        """Radius on the +y axis [m]."""
+        return self.nominal.major + 0.5 * self.ovality * float(np.cos(2 * self.angle))
+
+    @property
+    def perimeter(self) -> float:
+        """Of the nominal outline, by which the arc length is counted [m]."""
+        return self.nominal.perimeter
+
+    @property
+    def folds(self) -> int:
+        """Two turns at most."""
+        return gcd(self.nominal.folds, 2)
+
+    def evaluate(self, s: ArrayLike) -> tuple[Array, Array, Array]:
+        """Outline at an arc length of the nominal one."""
+        points, normals, curvature = self.nominal.evaluate(s)
+        delta, slope, bend = self._deviation(points, normals)
+        tilted, curvature = _moved(normals, curvature, delta, slope, bend)
+        return points + delta[:, None] * normals, tilted, curvature
+
+    def outlines(self, count: int) -> list[Array]:
+        """Those of the nominal wave generator: micrometres do not show."""
+        return self.nominal.outlines(count)
+
+    def signed_distance(self, points: Array) -> tuple[Array, Array, Array]:
+        """Distance to the nominal outline less the deviation at its foot.
+
+        The normal is the gradient of that distance: forces along it do the work that
+        the distance says.
+        """
+        distance, normals, curvature = self.nominal.signed_distance(points)
+        foot = points - distance[:, None] * normals
+        delta, slope, bend = self._deviation(foot, normals)
+        reach = 1.0 + curvature * distance
+        tilted, curvature = _moved(normals, curvature, delta, slope / reach, bend)
+        return distance - delta, tilted, curvature
+
+    def _deviation(self, foot: Array, normals: Array) -> tuple[Array, Array, Array]:
+        """Deviation and its first and second derivative by the arc length."""
+        square = np.einsum("ni,ni->n", foot, foot)
+        phase = 2.0 * (np.arctan2(-foot[:, 0], foot[:, 1]) - self.angle)
+        # d phi/ds: the tangent, J n, across the radius
+        per_length = np.einsum("ni,ni->n", foot, normals) / square
+        half = 0.5 * self.ovality
+        return (
+            half * np.cos(phase),
+            -2.0 * half * np.sin(phase) * per_length,
+            -4.0 * half * np.cos(phase) * per_length**2,
+        )
+
+
+def _moved(
+    normals: Array, curvature: Array, delta: Array, slope: Array, bend: Array
+) -> tuple[Array, Array]:
+    tangents = np.stack([-normals[:, 1], normals[:, 0]], axis=-1)
+    tilted = normals - slope[:, None] * tangents
+    tilted /= np.hypot(tilted[:, 0], tilted[:, 1])[:, None]
+    return tilted, curvature - curvature**2 * delta - bend
