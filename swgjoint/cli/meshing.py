@@ -55,7 +55,14 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--half", action="store_true", help="half model: perfect geometry, even teeth"
     )
     parser.add_argument(
-        "--out", metavar="DIR", help="write meshing.json and pictures there"
+        "--out",
+        metavar="DIR",
+        help="write meshing.json and pictures there; of a 3d run also the states",
+    )
+    parser.add_argument(
+        "--resume",
+        action="store_true",
+        help="go on with an interrupted 3d run whose states lie in --out DIR",
     )
 
 
@@ -72,6 +79,8 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
     torque = ratings_of(design).rated_torque if args.torque is None else args.torque
     model = args.model or ("3d" if design.cup is not None else "2d")
+    if args.resume and (folder is None or model != "3d"):
+        raise InputError("--resume needs a 3d model and --out DIR of the run")
     meshing = simulate_meshing(
         design,
         model=model,
@@ -82,6 +91,8 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         half=args.half,
         throw=False,
         progress=args.progress,
+        keep=folder / "states" if folder is not None and model == "3d" else None,
+        resume=args.resume,
     )
     result: dict[str, Any] = plain(meshing.to_json())
     result["files"] = []

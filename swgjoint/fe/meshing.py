@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from math import pi
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from swgjoint.errors import ComputationError
@@ -35,6 +36,8 @@ def simulate_meshing(
     elastic_circular_spline: bool = True,
     throw: bool = True,
     progress: Progress = silent,
+    keep: Path | None = None,
+    resume: bool = False,
 ) -> MeshingRun | SolidRun:
     """Simulate meshing: deflect, engage, load, then turn the wave generator.
 
@@ -51,6 +54,8 @@ def simulate_meshing(
         throw: Whether a position that cannot be solved is an error; else it is kept
             with its outcome and the turn goes on from the last good one.
         progress: Called with the stage, the steps done and their number.
+        keep: Folder for the state of every position of a 3D run; None keeps none.
+        resume: Whether to go on with the interrupted run in that folder.
 
     Raises:
         DesignError: If the design cannot be built or holds what is not modelled.
@@ -71,6 +76,8 @@ def simulate_meshing(
             elastic_circular_spline=elastic_circular_spline,
             throw=throw,
             progress=progress,
+            keep=keep,
+            resume=resume,
         )
     check_modelled(design, model)
     begin = time.perf_counter()

@@ -1,4 +1,4 @@
-"""Pictures of a simulation of meshing in space: contact patterns, sections, stresses."""
+"""Pictures of a simulation of meshing in space: contact patterns and sections."""
 
 from __future__ import annotations
 
@@ -61,8 +61,7 @@ def contact_forces(ring: SolidRing, state: SolidState) -> tuple[Array, Array, Ar
     """Forces over the face width, tooth by tooth.
 
     Returns:
-        Angle of every tooth of the model from the nearest lobe, in (-90, 90] deg for two
-        lobes [rad] (N,); forces of the circular spline (N, n_planes) and of the wave
+        Angle of every tooth of the model from the nearer of two lobes [rad] (N,); forces of the circular spline (N, n_planes) and of the wave
         generator (N, n_planes) [N].
     """
     sectors, planes = ring.sectors, ring.strip.planes

@@ -7,9 +7,11 @@ from swgjoint.fe.circular_spline import CircularSpline
 from swgjoint.fe.contact_patch import averaged_spline
 from swgjoint.fe.drive2d import can_halve
 from swgjoint.fe.solid.masters import Orders
+from swgjoint.fe.solid.memory import require_memory, required_memory
 from swgjoint.fe.solid.ring import SolidRing
 from swgjoint.fe.solid.ring_gear import ring_gear
 from swgjoint.fe.solid.strip import flexspline
+from swgjoint.fe.solid.strip_mesh import circular_spline_strip, flexspline_strip
 from swgjoint.fe.solid.teeth import FlankCrowning, Teeth
 from swgjoint.fe.solid.wave_generator import WaveGeneratorSurface
 from swgjoint.gear.design import Design
@@ -38,6 +40,7 @@ def solid_ring(
 
     Raises:
         DesignError: If the design cannot be built or the half model does not apply.
+        ComputationError: If the memory of the machine will not do.
     """
     name = design.drive.name
     check_modelled(design)
@@ -45,10 +48,15 @@ def solid_ring(
         raise DesignError(f"{name}: the half model does not apply; leave --half out")
     profile = tooth_profile(design, "flexspline")
     facing = tooth_profile(design, "circular_spline")
-    strip = flexspline(design, profile, orders=orders)
+    orders = orders or Orders()
+    mesh = flexspline_strip(design, profile)
+    ring = circular_spline_strip(design, facing) if elastic_circular_spline else None
+    sectors = design.drive.teeth_flexspline // (2 if half else 1)
+    require_memory(name, required_memory(mesh, ring, sectors, orders))
+    strip = flexspline(design, profile, mesh, orders=orders)
     gear, surface = None, CircularSpline(profile=facing)
-    if elastic_circular_spline:
-        gear = ring_gear(design, facing)
+    if ring is not None:
+        gear = ring_gear(design, facing, ring)
         stations = gear.mesh.teeth.plane.flank_stations[:-1]
         surface = CircularSpline(profile=facing, weights=averaged_spline(stations))
     shape = design.micro_geometry

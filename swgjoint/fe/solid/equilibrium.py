@@ -330,8 +330,11 @@ def _finished(
         :, 0
     ]
     teeth = 0.0 if state.held is None else float(state.tooth_force @ state.held.arm)
+    # in one order in memory, so that a state read from a file goes on bit for bit
     return replace(
         state,
+        faces=np.ascontiguousarray(state.faces),
+        inside=np.ascontiguousarray(state.inside),
         outcome=outcome,
         history=tuple(history),
         energy=ring.copies * energy,

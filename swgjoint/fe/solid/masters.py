@@ -23,7 +23,7 @@ Index = NDArray[np.int64]
 
 @dataclass(frozen=True, kw_only=True)
 class Orders:
-    """Degrees of the polynomials."""
+    """Degrees of the polynomials; no higher than the nodes of a mesh can tell apart."""
 
     teeth: int = 6
     """Along the face width."""
@@ -84,8 +84,16 @@ def strip_masters(strip: StripMesh, orders: Orders | None = None) -> Masters:
     """Masters of a strip and how its segments follow them."""
     orders = orders or Orders()
     segments = strip.segments
-    degree = [orders.teeth] + [orders.cup] * (len(segments) - 1)
-    around = [orders.at_teeth] + [orders.around] * (len(segments) - 1)
+    wanted = [orders.teeth] + [orders.cup] * (len(segments) - 1)
+    degree = [
+        min(order, len(np.unique(np.round(segment.position, 9))) - 1)
+        for order, segment in zip(wanted, segments, strict=True)
+    ]
+    wanted = [orders.at_teeth] + [orders.around] * (len(segments) - 1)
+    around = [
+        order if segment.end is None else min(order, len(segment.end) - 1)
+        for order, segment in zip(wanted, segments, strict=True)
+    ]
     # two masters a station on a face, outside and bore side
     stations = 1 + sum(degree)
     face_size, count = 2 * stations, 2 * stations

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from math import nan, pi
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,8 +15,9 @@ from numpy.typing import NDArray
 
 from swgjoint.errors import ComputationError, Outcome
 from swgjoint.fe.meshing_run import averages
+from swgjoint.fe.solid.checkpoint import Checkpoint
 from swgjoint.fe.solid.continuation import SolidContinuation
-from swgjoint.fe.solid.drive3d import solid_ring
+from swgjoint.fe.solid.drive3d import check_modelled, solid_ring
 from swgjoint.fe.solid.ring import SolidRing
 from swgjoint.fe.solid.state import SolidState
 from swgjoint.fe.solid.stress import Place, SolidMaxima
@@ -170,9 +174,44 @@ def simulate_solid_meshing(
     elastic_circular_spline: bool = True,
     throw: bool = True,
     progress: Progress = silent,
+    keep: Path | None = None,
+    resume: bool = False,
 ) -> SolidRun:
-    """What :func:`swgjoint.fe.meshing.simulate_meshing` does for ``model="3d"``."""
+    """What :func:`swgjoint.fe.meshing.simulate_meshing` does for ``model="3d"``.
+
+    Args:
+        design: The drive, with a cup.
+        torque: T that the drive exerts on the output [N·m].
+        steps: Wave-generator positions k turn/steps, k = 0 to steps - 1.
+        turn: Turns of the input.
+        nonlinear: Large rotations of the segments.
+        half: Half model; needs even tooth counts.
+        elastic_circular_spline: Whether the circular spline deforms.
+        throw: Whether a position that cannot be solved is an error.
+        progress: Called with the stage, the steps done and their number.
+        keep: Folder for the state of every position; None keeps none.
+        resume: Whether to go on with the run in that folder; the result is the same,
+            bit for bit.
+
+    Raises:
+        DesignError: If the design cannot be built or holds what is not modelled.
+        ComputationError: If a solve fails or memory will not do.
+        InputError: If there is no such run to go on with.
+    """
     begin = time.perf_counter()
+    check_modelled(design)
+    kept = None
+    if keep is not None:
+        settings = {
+            "design": design.content_hash(),
+            "torque": torque,
+            "steps": steps,
+            "turn": turn,
+            "nonlinear": nonlinear,
+            "half": half,
+            "elastic_circular_spline": elastic_circular_spline,
+        }
+        kept = Checkpoint.open(keep, settings, resume=resume)
     ring = solid_ring(
         design,
         half=half,
@@ -190,22 +229,37 @@ def simulate_solid_meshing(
 
     setup = []
 
-    def reached(name: str, state: SolidState) -> None:
+    def reached(name: str, solve: Callable[[], SolidState]) -> SolidState:
+        state = kept.read(name) if kept is not None and resume else None
+        if state is None:
+            state = solve()
+            if kept is not None and state.outcome.ok:
+                kept.write(name, state)
+        return state
+
+    def set_up(name: str, what: str, solve: Callable[[], SolidState]) -> SolidState:
+        state = checked(reached(name, solve), what)
         stress = SolidMaxima.at(ring, state)
         setup.append(SolidSetup(name=name, state=state, stress=stress))
         progress("setting up", len(setup), 3)
+        return state
 
-    state = checked(follow.deflected(), "deflection by the wave generator")
-    reached("wave_generator", state)
-    state = checked(follow.meshed(state), "engagement of the teeth")
-    reached("meshed", state)
-    state = checked(follow.to_torque(state, torque), f"loading to {torque:g} N·m")
-    reached("torque", state)
+    alone = set_up(
+        "wave_generator", "deflection by the wave generator", follow.deflected
+    )
+    meshed = set_up("meshed", "engagement of the teeth", lambda: follow.meshed(alone))
+    state = set_up(
+        "torque",
+        f"loading to {torque:g} N·m",
+        lambda: follow.to_torque(meshed, torque),
+    )
 
     rows = []
     for k in range(steps):
         angle = 2.0 * pi * turn * k / steps
-        found = state if k == 0 else follow.to_angle(state, angle)
+        found = state
+        if k:
+            found = reached(f"position-{k:04d}", partial(follow.to_angle, state, angle))
         if throw:
             checked(found, f"the input position {angle / deg:g} deg")
         if found.outcome.ok:

@@ -13,7 +13,7 @@ from swgjoint.errors import DesignError
 from swgjoint.fe.solid.corotation import about_z
 from swgjoint.fe.solid.elasticity import Solid, solid
 from swgjoint.fe.solid.ring_factor import RingFactor
-from swgjoint.fe.solid.strip_mesh import StripMesh, circular_spline_strip
+from swgjoint.fe.solid.strip_mesh import StripMesh
 from swgjoint.gear.design import Design
 from swgjoint.gear.profile import ToothProfile
 
@@ -69,8 +69,13 @@ class RingGear:
         return result
 
 
-def ring_gear(design: Design, profile: ToothProfile) -> RingGear:
+def ring_gear(design: Design, profile: ToothProfile, mesh: StripMesh) -> RingGear:
     """Condense the circular spline of a design.
+
+    Args:
+        design: The drive.
+        profile: Flank of the circular spline.
+        mesh: From :func:`swgjoint.fe.solid.strip_mesh.circular_spline_strip`.
 
     Raises:
         DesignError: If its outside is free.
@@ -80,7 +85,6 @@ def ring_gear(design: Design, profile: ToothProfile) -> RingGear:
             f"{design.drive.name}: circular_spline.outer_rim = 'free' is not modelled"
             " in 3d; accepted: 'fixed'"
         )
-    mesh = circular_spline_strip(design, profile)
     material = design.material_of("circular_spline")
     segment, teeth = mesh.teeth.segment, mesh.teeth
     body = solid(segment.mesh, material.youngs_modulus, material.poisson_ratio)

@@ -12,7 +12,7 @@ from scipy.interpolate import CubicSpline
 from swgjoint.fe.contact_patch import averaged_spline
 from swgjoint.fe.solid.masters import Masters, Orders, strip_masters
 from swgjoint.fe.solid.segment import Segment, condense_segment
-from swgjoint.fe.solid.strip_mesh import StripMesh, flexspline_strip
+from swgjoint.fe.solid.strip_mesh import StripMesh
 from swgjoint.gear.design import Design
 from swgjoint.gear.profile import ToothProfile
 
@@ -79,19 +79,20 @@ class Strip:
 
 
 def flexspline(
-    design: Design, profile: ToothProfile, *, orders: Orders | None = None
+    design: Design,
+    profile: ToothProfile,
+    mesh: StripMesh,
+    *,
+    orders: Orders | None = None,
 ) -> Strip:
-    """Mesh and condense a strip of the flexspline.
+    """Condense a strip of the flexspline.
 
     Args:
         design: The drive.
         profile: Flank of the flexspline.
+        mesh: From :func:`swgjoint.fe.solid.strip_mesh.flexspline_strip`.
         orders: Degrees of the displacements of faces and sections.
-
-    Raises:
-        DesignError: If the cup cannot be meshed.
     """
-    mesh = flexspline_strip(design, profile)
     masters = strip_masters(mesh, orders)
     material = design.material_of("flexspline")
     flank, bore = mesh.teeth.flank.ravel(), mesh.teeth.bore.ravel()
