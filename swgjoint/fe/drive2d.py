@@ -48,7 +48,7 @@ def check_modelled(design: Design, model: str) -> None:
     drive, tolerances = design.drive, design.tolerances
     faults = []
     if model != "2d":
-        faults.append(f"model {model!r} is not available yet; available: '2d'")
+        faults.append(f"model {model!r} gives no map yet; available: '2d'")
     if tolerances.misalignment_arcmin:
         faults.append(
             f"tolerances.misalignment_arcmin = {tolerances.misalignment_arcmin:g}: the"

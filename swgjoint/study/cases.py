@@ -59,6 +59,10 @@ class GroupEntry(Section):
     base: Text
     changes: Mapping[str, Any] = {}
     torque_Nm: Torque | None = None
+    positions: Annotated[int, Field(ge=1, le=1000)] | None = None
+    """Of the wave generator over the turn; those of the file without."""
+    turn_deg: Annotated[float, Field(gt=0, le=360)] | None = None
+    """Of the input; that of the file without."""
     keys: Annotated[tuple[str, ...], Listed] = ()
     """Dotted keys of the design that take the value of a case: the parameter."""
     symbol: str = ""
@@ -120,8 +124,11 @@ class StudyFile(Section):
 
     source: Text
     torque_Nm: Torque
+    model: Literal["2d", "3d"] = "2d"
     positions: Annotated[int, Field(ge=1, le=1000)]
-    """Of the wave generator over half a turn."""
+    """Of the wave generator over the turn."""
+    turn_deg: Annotated[float, Field(gt=0, le=360)] = 180.0
+    """Of the input."""
     group: Annotated[tuple[GroupEntry, ...], Field(strict=False, min_length=1)]
 
     @model_validator(mode="after")

@@ -69,7 +69,8 @@ def _deviation(facts: Facts, tenth: float) -> list[str]:
     total = sum(facts.places.values())
     if total:
         place, count = max(facts.places.items(), key=lambda item: item[1])
-        parts.append(f"largest {_PLACES[place]} at {count} of {total} positions")
+        where = _PLACES.get(place, f"at the {place}")
+        parts.append(f"largest {where} at {count} of {total} positions")
         away = percent(facts.away, facts.printed)
         if place == "contact" and away is not None:
             parts.append(f"{away:+.0f} % away from the contacts")

@@ -38,6 +38,7 @@ class RunSpec:
     positions: int
     turn: float
     """Turns of the input that the positions divide."""
+    model: str = "2d"
 
     @property
     def key(self) -> str:
@@ -49,13 +50,16 @@ class RunSpec:
                 "torque": self.torque,
                 "positions": self.positions,
                 "turn": self.turn,
+                "model": self.model,
             }
         )
 
     @property
     def size(self) -> float:
         """Rough work, to start long runs first: positions times nodes."""
-        return self.positions * float(self.design.mesh.refinement) ** 2
+        fine = float(self.design.mesh.refinement)
+        work = fine**2 if self.model == "2d" else 30.0 * fine**3
+        return self.positions * work
 
 
 @lru_cache
@@ -140,6 +144,7 @@ def compute(spec: RunSpec) -> RunRecord:
     try:
         run = simulate_meshing(
             spec.design,
+            model=spec.model,
             torque=spec.torque,
             steps=spec.positions,
             turn=spec.turn,
@@ -150,20 +155,45 @@ def compute(spec: RunSpec) -> RunRecord:
         outcome = "refused" if isinstance(error, DesignError) else "failed"
         wall = time.perf_counter() - begin
         return RunRecord(outcome=outcome, message=str(error), wall_s=wall)
-    return _record(run, begin)
+    return _record(run, spec.model, begin)
 
 
-def _record(run: Any, begin: float) -> RunRecord:
+_Largest = tuple[dict[str, float], dict[str, float], dict[str, str]]
+"""By kind: stress over all nodes, the same away from tooth contacts [Pa], the place."""
+
+
+def _plane(run: Any) -> list[_Largest | None]:
     from swgjoint.study.stress_places import StressPlaces
 
     places = StressPlaces(model=run.model)
-    rows: list[tuple[dict[str, float], dict[str, float], dict[str, str]] | None] = [
+    return [
         None if step.state is None else places.largest(step.state) for step in run.steps
     ]
+
+
+def _solid(run: Any) -> list[_Largest | None]:
+    """The same in space, where nodes beside contacts are not told from others."""
+    rows: list[_Largest | None] = []
+    for step in run.steps:
+        if step.stress is None:
+            rows.append(None)
+            continue
+        largest = step.stress.flexspline
+        values: dict[str, float] = {kind: getattr(largest, kind) for kind in KINDS}
+        rows.append((values, {}, {"von_mises": step.stress.place.part}))
+    return rows
+
+
+def _record(run: Any, model: str, begin: float) -> RunRecord:
+    rows = _plane(run) if model == "2d" else _solid(run)
     solved = [row for row in rows if row is not None]
 
     def mean(which: int, kind: str) -> NUMBER:
-        values: list[float] = [row[which][kind] for row in solved]  # type: ignore[misc]
+        values: list[float] = [
+            row[which][kind]  # type: ignore[misc]
+            for row in solved
+            if kind in row[which]
+        ]
         return float(np.mean(values)) / MPa if values else None
 
     bad = [step for step in run.steps if not step.outcome.ok]
@@ -175,7 +205,10 @@ def _record(run: Any, begin: float) -> RunRecord:
         average={kind: mean(0, kind) for kind in KINDS},
         away={kind: mean(1, kind) for kind in KINDS},
         last={kind: None if last is None else last[0][kind] / MPa for kind in KINDS},
-        places={kind: dict(Counter(row[2][kind] for row in solved)) for kind in KINDS},
+        places={
+            kind: dict(Counter(row[2][kind] for row in solved if kind in row[2]))
+            for kind in KINDS
+        },
         setup={state.name: state.stress.flexspline.to_json() for state in run.setup},
         per_position={
             kind: [None if row is None else row[0][kind] / MPa for row in rows]

@@ -1,4 +1,6 @@
-"""``swgjoint study thesis``: the two-dimensional studies of the thesis, run again.
+"""``swgjoint study thesis``: the studies of the thesis, run again.
+
+Chapters 4 to 6 by default, with the 2D model; chapter 7 with ``--model 3d``.
 
 Every case is simulated at the nominal torque T and at T/10: the stress increments with
 torque that the thesis prints are about ten times too small for its stated torque and
@@ -13,7 +15,6 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 
-from swgjoint.errors import InputError
 from swgjoint.gear.design import Design
 from swgjoint.study.cases import Case, StudyFile, case_of
 from swgjoint.study.checks import RankCheck, TrendCheck, rank_checks, trend_checks
@@ -39,13 +40,10 @@ def run_thesis(options: StudyOptions) -> StudyResult:
     """Run the chosen parts, or all of them.
 
     Raises:
-        InputError: If a part is unknown or a fidelity other than 2d is asked for.
+        InputError: If a part is unknown.
     """
-    if options.model not in (None, "2d"):
-        raise InputError(
-            f"--model {options.model}: chapters 4 to 6 are two-dimensional"
-        )
-    return run_cases(StudyFile.load("thesis"), options)
+    name = "thesis-3d" if options.model == "3d" else "thesis"
+    return run_cases(StudyFile.load(name), options)
 
 
 def run_cases(study: StudyFile, options: StudyOptions) -> StudyResult:
@@ -78,12 +76,14 @@ def _specs(study: StudyFile, case: Case) -> dict[tuple[bool, int], RunSpec]:
     specs = {}
     for tenth in (False, True):
         torque = case.torque * (TENTH if tenth else 1.0)
-        angle = case.entry.angle_deg
+        angle, group = case.entry.angle_deg, case.group
+        turn = (group.turn_deg or study.turn_deg) / 360.0
         specs[tenth, 1] = RunSpec(
             design=case.design,
             torque=torque,
-            positions=study.positions if angle is None else 2,
-            turn=0.5 if angle is None else 2.0 * angle / 360.0,
+            positions=group.positions or study.positions if angle is None else 2,
+            turn=turn if angle is None else 2.0 * angle / 360.0,
+            model=study.model,
         )
         for refinement in REFINEMENTS if case.group.converge else ():
             specs[tenth, refinement] = RunSpec(
@@ -91,6 +91,7 @@ def _specs(study: StudyFile, case: Case) -> dict[tuple[bool, int], RunSpec]:
                 torque=torque,
                 positions=FINE_POSITIONS,
                 turn=1.0 / _fixed_teeth(case.design),
+                model=study.model,
             )
     return specs
 

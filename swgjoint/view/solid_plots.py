@@ -61,8 +61,8 @@ def contact_forces(ring: SolidRing, state: SolidState) -> tuple[Array, Array, Ar
     """Forces over the face width, tooth by tooth.
 
     Returns:
-        Angle of every tooth of the model from the nearer of two lobes [rad] (N,); forces of the circular spline (N, n_planes) and of the wave
-        generator (N, n_planes) [N].
+        Angle of every tooth of the model from the nearer of two lobes [rad] (N,);
+        forces of the circular spline and of the wave generator (N, n_planes) [N].
     """
     sectors, planes = ring.sectors, ring.strip.planes
     x = ring.masters(state).mean(axis=1)

@@ -118,13 +118,27 @@ def test_rated_torque_is_the_default(monkeypatch):
         "nonlinear": False,
         "half": False,
         "throw": False,
+        "keep": None,
+        "resume": False,
     }
 
 
-def test_three_dimensional_model_is_refused(capsys):
-    """A fidelity that is not there yet is bad input in one line."""
+def test_three_dimensional_model_needs_a_cup(capsys):
+    """A ring without a cup is bad input in one line that names the other fidelity."""
     assert main(["meshing", "reference-2d", "--model", "3d"]) == 2
     out, err = capsys.readouterr()
     assert out == ""
     assert err.count("\n") == 1
-    assert "3d" in err
+    assert "[cup]" in err and "--model 2d" in err
+
+
+def test_resume_needs_a_run(tmp_path, capsys):
+    """Going on needs a 3D run and the folder of its states."""
+    assert main(["meshing", "reference-2d", "--resume"]) == 2
+    assert "--resume needs a 3d model and --out" in capsys.readouterr().err
+    folder = str(tmp_path / "none")
+    command = ["meshing", "reference-3d", "--half", "--out", folder, "--resume"]
+    assert main(command) == 2
+    err = capsys.readouterr().err
+    assert err.count("\n") == 1 and "no interrupted run" in err
+    assert not (tmp_path / "none").exists()

@@ -62,7 +62,7 @@ def test_report(instant, capsys):
     [
         (["thesis", "--only", "9.9"], "part 9.9; accepted: 4.4"),
         (["thesis", "--jobs", "0"], "--jobs 0; accepted: 1 to 256"),
-        (["thesis", "--model", "3d"], "--model 3d: chapters 4 to 6"),
+        (["thesis", "--model", "3d", "--only", "4.4"], "part 4.4; accepted: 7.9"),
         (["thesis", "--out", "file/below"], "is a file"),
     ],
 )

@@ -31,6 +31,20 @@ def test_every_section_and_table_is_there():
     assert {name: sizes[name] for name in TABLES} == TABLES
 
 
+def test_chapter_seven_has_its_printed_values():
+    """Table 7.4 of the 3D study is whole, and every design of the file is a drive."""
+    study = StudyFile.load("thesis-3d")
+    assert study.model == "3d"
+    (table,) = study.chosen(("table-7.4",))
+    assert all(None not in case.printed.values() for case in table.cases)
+    for group in study.group:
+        for entry in group.cases:
+            case = case_of(study, group, entry)
+            assert case.design is not None and case.design.cup is not None
+            failed = [c.name for c in design_checks(case.design) if not c.ok]
+            assert not failed, (case.name, failed)
+
+
 def test_tables_are_complete():
     """The four tables have all three stresses of every case and ask for convergence."""
     for name in TABLES:

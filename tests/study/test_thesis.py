@@ -195,7 +195,7 @@ def test_finer_meshes(study, monkeypatch):
     assert row.more["last_refinement_percent"] == pytest.approx(change)
 
 
-def test_two_dimensions_only():
-    """The thesis study has no other fidelity."""
-    with pytest.raises(InputError, match="--model 3d: chapters 4 to 6"):
-        run_thesis(StudyOptions(model="3d"))
+def test_chapter_seven_is_three_dimensional():
+    """With the 3D model the study has the parts of chapter 7 and no others."""
+    with pytest.raises(InputError, match=r"part 4\.4; accepted: 7\.9"):
+        run_thesis(StudyOptions(model="3d", only=("4.4",)))
