@@ -20,6 +20,8 @@ JOINT_HEADER = (
     "strongest orders (%)",
     "unresolved",
 )
+FAST = 1.5
+"""Phase of an order in a step, over what a step carries, at which a run says so."""
 JOINT_UNITS = ("", "", "arcmin", "arcmin", "arcmin", "arcmin", "%", "%", "", "")
 
 
@@ -134,12 +136,20 @@ def fixed(value: float, digits: int = 3) -> str:
 
 def notes(joints: dict[str, Any]) -> list[str]:
     """What marks in the table mean, and warnings about the validity of figures."""
+    from swgjoint.sim.metrics import PHASE_STEP
+
     lines = []
     if any(not line["drive_order"] for j in joints.values() for line in j["orders"]):
         lines.append(
             "* no order of this joint's drive: vibration, modulation or another joint"
         )
     for name, joint in joints.items():
+        if joint["phase_step_rad"] > FAST * PHASE_STEP:
+            lines.append(
+                f"{name}: its rotor turned faster than commanded, the highest order of"
+                f" its drive by {joint['phase_step_rad']:.2g} rad a step; up to"
+                f" {PHASE_STEP:g} rad is carried: use a smaller simulation.step_s"
+            )
         ratings = joint["ratings"]
         if not ratings["within_map"]:
             low, high = ratings["map_range_Nm"]

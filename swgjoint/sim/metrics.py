@@ -84,6 +84,7 @@ def joint_metrics(run: Run, j: int) -> dict[str, Any]:
             for left in transmission.attached.unresolved
         ],
         "highest_resolved_order": highest,
+        "phase_step_rad": phase_step(run, j),
         "transmission_error_arcmin": spread(error),
         "torsion_arcmin": spread(run.torsion[window, j] / arcmin),
         "input_turns": float(abs(angle[-1] - angle[0]) / (2.0 * np.pi)),
@@ -110,6 +111,16 @@ def highest_resolved_order(run: Run, j: int) -> float | None:
     if speed == 0.0:
         return None
     return float(PHASE_STEP / (run.assembly.scene.simulation.step_s * speed))
+
+
+def phase_step(run: Run, j: int) -> float:
+    """Largest phase of the highest kept order in one step of the engine [rad].
+
+    Harmonics are kept by the commanded speed; a rotor may turn faster than that.
+    """
+    order = max(run.assembly.transmissions[j].attached.kept_orders, default=0.0)
+    speed = float(np.abs(run.motor_velocity[:, j]).max())
+    return run.assembly.step * order * speed
 
 
 def drive_order(run: Run, j: int, order: float) -> float | None:

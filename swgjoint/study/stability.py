@@ -48,7 +48,7 @@ Task = ArmTask | CatalogueDrive | GridJoint
 ARM_GROUPS = ("fall", "sweep")
 REFERENCE = (
     "free, loaded: two-mass equations by DOP853 (rtol 1e-10) over 100 rad of torsional"
-    " vibration, at most 0.1 s; sweep: the same arm by RK4 at 0.05 ms"
+    " vibration, at most 0.1 s; sweep: the same arm by RK4 at 0.1 ms"
 )
 SCHEME = (
     "discrete gradient of the potential, predicted per joint and solved with the arm by"

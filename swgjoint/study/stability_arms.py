@@ -36,7 +36,7 @@ FALL = 2.0
 FALL_SPEED = 100.0
 """Of the rotors that the region is asked for in a fall [rad/s]; they reach 2000."""
 SAMPLES = 200
-EXACT_STEP = 5e-5
+EXACT_STEP = 1e-4
 """Of the reference RK4 [s]."""
 
 

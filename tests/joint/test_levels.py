@@ -145,8 +145,8 @@ def test_region_names_bound_and_step(bench, synthetic_map):
     assert not more.ok  # the step is not needlessly small
 
 
-def test_sub_steps_are_the_fewest_that_lie_inside(bench, synthetic_map):
-    """With n parts of the step the region holds, with n - 1 it does not."""
+def test_sub_steps_lie_well_inside_and_are_no_more_than_that(bench, synthetic_map):
+    """A step of 1.4 h/n is inside, one of 1.4 h/(n - 1) is not; inside n is 1."""
     drive = bench(synthetic_map, rotor_inertia=1e-7, link=1e-4).drive
     seen = set()
     for step in (1e-5, 3e-4, 1e-3, 7e-3, 2e-2):
@@ -155,10 +155,12 @@ def test_sub_steps_are_the_fewest_that_lie_inside(bench, synthetic_map):
             assert parts is not None
             seen.add(parts)
             for n, inside in ((parts, True), (parts - 1, False)):
-                if n:
-                    h = step / n
+                if n and parts > 1:
+                    h = 1.4 * step / n
                     region = check_region(drive, timestep=h, max_input_speed=speed)
                     assert region.ok is inside
+            region = check_region(drive, timestep=step, max_input_speed=speed)
+            assert region.ok is (parts == 1)
     assert 1 in seen and len(seen) > 3
 
 

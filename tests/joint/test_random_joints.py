@@ -1,4 +1,4 @@
-"""Random joints inside the stated region: none gains energy, none diverges."""
+"""Random joints inside the stated region, or cut to lie inside: none gains energy."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ def with_friction(drive, rng):
 
 
 def run(bench, rng, *, step, loaded, tooth_order, hardening, seconds, losses="none"):
-    """Energies along one run over its scale, or None outside the region."""
+    """Energies along one run over its scale, or None far outside the region."""
     drive = random_map(rng, tooth_order=tooth_order, hardening=hardening)
     if losses == "hysteresis":
         drive = with_elements(drive, rng)
@@ -102,8 +102,10 @@ def run(bench, rng, *, step, loaded, tooth_order, hardening, seconds, losses="no
     speed = rng.uniform(0, 0.5 if loaded else 0.2) / step / order * rng.choice([-1, 1])
     b = bench(drive, step=step, rotor_inertia=rotor, link=link)
     region = check_region(b.drive, timestep=step, max_input_speed=abs(speed))
-    if not region.ok:
+    if region.sub_steps is None or region.sub_steps > 8:
         return None
+    step /= region.sub_steps
+    b.model.opt.timestep = step
     e0, slope, _ = drive.error_at(drive.phases(0.0, 0.0))
     psi = float(e0) - (0.9 * drive.torsion_knots[-1] if loaded else 0.0)
     link_speed = speed * (1 / drive.ratio + float(slope))
@@ -124,7 +126,7 @@ def run(bench, rng, *, step, loaded, tooth_order, hardening, seconds, losses="no
 @pytest.mark.parametrize("tooth_order", [False, True])
 @pytest.mark.parametrize("loaded", [False, True])
 def test_random_joints_gain_no_energy(bench, loaded, tooth_order, losses):
-    """Of 60 random joints at 0.5 to 5 ms those inside the region gain under 5 %.
+    """Of 60 random joints at 0.5 to 5 ms none gains 5 %, cut into up to 8 sub-steps.
 
     The springs of hysteresis and friction count in the energy.
     """
@@ -144,4 +146,4 @@ def test_random_joints_gain_no_energy(bench, loaded, tooth_order, losses):
         if energies is not None:
             inside += 1
             assert energies.max() < energies[0] + 0.05
-    assert inside >= 10  # the region is not empty
+    assert inside >= 20  # of 60
