@@ -40,6 +40,8 @@ wander along flanks that conform."""
 SUPPORTS = 2
 """Nodes a sector that may touch the wave generator, beside those that do: with all of
 them psi changes by 0.5 % of its peak to peak."""
+SOFTEST = 3e-6
+"""Least stiffness of a motion that opens contacts, in that of a single one."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -214,8 +216,10 @@ def influence(model: RingModel, state: State, *, ring_is_output: bool) -> Influe
     inside = np.concatenate([np.flatnonzero(closed), free])
     pivoted, forward = _pivot(system, inside)
     start = forward @ offset
-    sign = 1.0 if ring_is_output else -1.0  # of T in the row of the output
     closed[n:m] = supports.closed
+    matrix = pivoted[:m, :m]
+    matrix[closed, closed] += _stiffening(matrix[np.ix_(closed, closed)])
+    sign = 1.0 if ring_is_output else -1.0  # of T in the row of the output
     return Influence(
         sector=contacts.sector,
         tooth=contacts.tooth,
@@ -224,7 +228,7 @@ def influence(model: RingModel, state: State, *, ring_is_output: bool) -> Influe
         ),
         closed=closed,
         torque=state.torque,
-        matrix=pivoted[:m, :m],
+        matrix=matrix,
         slack=start[:m],
         by_gap=forward[:m, :n],
         by_torque=sign * pivoted[:m, output],
@@ -233,6 +237,19 @@ def influence(model: RingModel, state: State, *, ring_is_output: bool) -> Influe
         angle_by_gap=forward[output, :n],
         angle_by_torque=sign * float(pivoted[output, output]),
     )
+
+
+def _stiffening(block: Array) -> Array:
+    """What makes the stiffness against openings positive (n,).
+
+    Where all contacts open the flexspline moves freely, and under preload the stiffness
+    of that motion may be negative, by a millionth; no equilibrium is there, but the
+    search for one passes.
+    """
+    size = np.diag(block)
+    scale = np.sqrt(size)
+    lowest = float(np.linalg.eigvalsh(block / scale[:, None] / scale)[0])
+    return np.asarray(max(0.0, SOFTEST - lowest) * size)
 
 
 def _pivot(system: Array, inside: Index) -> tuple[Array, Array]:

@@ -88,9 +88,9 @@ def test_superposition_is_within_five_percent_of_full_solves(reference):
     none = np.zeros((1, len(at.sector)))
     for seed in (1, 2):
         design = flawed(**ERRORS, seed=seed)
-        positions = np.random.default_rng(seed).choice(pitches_of(design), 3)
+        positions = np.random.default_rng(seed).choice(pitches_of(design), 2)
         solved = full_solves(design, follow, [state], positions, (0.0, 20.0))
-        assert solved.torque.size == 6
+        assert solved.torque.size == 4
         for torque in (0.0, 20.0):
             every = gaps_at(design, at, np.arange(0, 7320, 20))
             spread = np.ptp(at.respond(every, torque).output_angle)

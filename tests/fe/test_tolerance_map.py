@@ -26,7 +26,7 @@ def drive() -> DriveMap:
             "tolerances.circular_spline_ovality_um": 5.0,
         }
     )
-    return fit_map(sample_map(design, angles=12))
+    return fit_map(sample_map(design, angles=6))
 
 
 def test_map_has_two_and_four_per_turn_of_the_circular_spline(drive):
