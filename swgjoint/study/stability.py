@@ -79,6 +79,8 @@ def run_stability(
         ``wall_s``.
     """
     begin = time.perf_counter()
+    if folder is not None:
+        folder.mkdir(parents=True, exist_ok=True)  # before minutes of work
     tasks: list[Task] = [ArmTask(scene=scene) for scene in SCENES]
     tasks += [*grid(full=full), *catalogue_drives()]
     found = run_all(run_task, tasks, jobs=jobs, stage="stability", progress=progress)
@@ -128,7 +130,6 @@ def write_files(rows: Sequence[StabilityRow], folder: Path) -> list[str]:
     """Table and picture in a folder; their paths."""
     from swgjoint.study.stability_plots import stability_picture
 
-    folder.mkdir(parents=True, exist_ok=True)
     text = io.StringIO()
     table = [row.to_json() for row in rows]
     writer = csv.DictWriter(text, fieldnames=list(table[0]), lineterminator="\n")
