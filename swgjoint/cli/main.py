@@ -31,6 +31,7 @@ COMMANDS = {
     "map": "build the map of a drive and save it",
     "spec": "catalogue-style sheet of a design, a map or a catalogue drive",
     "run": "simulate an arm with its drives",
+    "compare": "drives or levels side by side in one scene, against a spec",
     "study": "our values beside those of a source",
     "stability": "stiff and extreme joints: run, cut into sub-steps, or refused",
     "view": "open a recording",
