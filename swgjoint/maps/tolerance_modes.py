@@ -160,15 +160,19 @@ def combined(
     ripple = per_turn[:, None] * np.hypot(work[:, 0], work[:, 1])
     size = np.hypot(*error.T)
     kept = size > keep * size.max()
+    middle = int(np.argmin(np.abs(knots)))
     if keep:
-        kept |= (ripple > KEEP_TORQUE * ripple.max(axis=0)).any(axis=1)
+        large = ripple > KEEP_TORQUE * ripple.max(axis=0)
+        # between the torques that were solved, which all positions share at rest
+        # only, interpolation leaves noise in the high orders of the pattern
+        large[:count] = large[:count, middle][:, None]
+        kept |= large.any(axis=1)
     kept[0] = True
 
     def left(power: Array) -> float:
         """Root mean square of what is dropped, in that of everything."""
         return float(np.sqrt(power[~kept].sum() / max(power.sum(), 1e-300)))
 
-    middle = int(np.argmin(np.abs(knots)))
     return Combined(
         orders=orders[kept],
         potential=potential[kept],
