@@ -1,0 +1,135 @@
+"""Condensed segments turning in space: rigid motion, derivatives, direct solution."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.sparse.linalg import spsolve
+from scipy.spatial.transform import Rotation
+
+from swgjoint.fe.solid.corotation import (
+    energies,
+    in_global,
+    matrices_in_global,
+    projected,
+    segment_frames,
+    tangent,
+)
+from swgjoint.fe.solid.elasticity import solid
+
+PLACE = Rotation.from_rotvec([[0, 0, 0.0], [0, 0, 0.4], [0, 0, 2.0]]).as_matrix()
+
+
+@pytest.fixture(scope="module", params=[0, 1, 4])
+def segment(request, small_ring):
+    """Teeth, cylinder and fillet."""
+    return small_ring.strip.segments[request.param]
+
+
+def deformed(segment, scale, seed=3):
+    """Three sectors with random displacements."""
+    rng = np.random.default_rng(seed)
+    x = np.einsum("sij,aj->sai", PLACE, segment.position)
+    return x + scale * rng.normal(size=x.shape)
+
+
+def energy(segment, x):
+    return energies(segment, segment_frames(segment, x, PLACE))
+
+
+def gradient(segment, x):
+    frames = segment_frames(segment, x, PLACE)
+    return in_global(frames, projected(frames, frames.deformation @ segment.stiffness))
+
+
+def test_infinitesimal_rigid_motion_needs_no_force(segment):
+    """Translations exactly; rotations as far as polynomials follow the shape."""
+    size = np.linalg.norm(segment.stiffness, 2)
+    for axis in np.eye(3):
+        moved = np.tile(axis, len(segment.position))
+        assert np.abs(segment.stiffness @ moved).max() < 1e-12 * size
+        turned = np.cross(axis, segment.position - segment.position.mean(axis=0))
+        forces = segment.stiffness @ turned.ravel()
+        # the arc of the fillet is a cubic to 3e-3 of its radius
+        assert np.linalg.norm(forces) < 2e-3 * size * np.linalg.norm(turned)
+
+
+def test_every_node_travels_with_its_masters(segment):
+    """A translation of the masters is that of all nodes to the last digit."""
+    moved = np.tile([1.0, -2.0, 0.5], len(segment.position))
+    nodes = segment.displacement(moved[None])[0]
+    assert np.abs(nodes - [1.0, -2.0, 0.5]).max() < 1e-12
+
+
+def test_large_rotation_leaves_the_energy(segment):
+    """A turn by 1.2 rad about a skew axis and a shift: the same energy and forces."""
+    turn = Rotation.from_rotvec([0.5, -0.4, 1.0]).as_matrix()
+    x = deformed(segment, 1e-6)
+    moved = x @ turn.T + [1e-3, -2e-3, 3e-3]
+    assert energy(segment, moved) == pytest.approx(energy(segment, x), rel=1e-9)
+    before = gradient(segment, x).reshape(x.shape) @ turn.T
+    after = gradient(segment, moved).reshape(x.shape)
+    assert np.abs(after - before).max() < 1e-9 * np.abs(before).max()
+
+
+def test_gradient_is_the_derivative_of_the_energy(segment):
+    """Forces against extrapolated differences, far from the undeformed shape."""
+    x = deformed(segment, 1e-4)
+    way = np.random.default_rng(5).normal(size=x.shape)
+
+    def slope(h):
+        change = energy(segment, x + h * way) - energy(segment, x - h * way)
+        return change / (2 * h)
+
+    ours = np.einsum("sn,sn->s", gradient(segment, x), way.reshape(3, -1))
+    assert (4 * slope(1e-6) - slope(2e-6)) / 3 == pytest.approx(ours, rel=1e-7)
+
+
+def test_tangent_is_the_derivative_of_the_gradient_for_small_strain(segment):
+    """Its error falls with the deformation, as it says: only one of first order."""
+    way = np.random.default_rng(6).normal(size=(3, *segment.position.shape))
+    errors = []
+    for scale in (1e-6, 1e-7):
+        x = deformed(segment, scale)
+        frames = segment_frames(segment, x, PLACE)
+        force = frames.deformation @ segment.stiffness
+        matrix = matrices_in_global(frames, tangent(segment, frames, force))
+        assert (
+            np.abs(matrix - matrix.transpose(0, 2, 1)).max()
+            < 1e-12 * np.abs(matrix).max()
+        )
+        ours = np.einsum("sij,sj->si", matrix, way.reshape(3, -1))
+        h = 1e-8
+        by = gradient(segment, x + h * way) - gradient(segment, x - h * way)
+        errors.append(np.abs(by / (2 * h) - ours).max() / np.abs(ours).max())
+    assert errors[0] < 1e-2
+    assert errors[1] < 0.2 * errors[0]
+
+
+def test_condensed_segment_is_the_direct_solution(small_ring, small_design):
+    """Boundary moved by its masters and a force in the bore: every node, and energy."""
+    strip = small_ring.strip
+    segment, follow = strip.teeth, strip.masters.segments[0]
+    steel = small_design.material_of("flexspline")
+    body = solid(segment.mesh.mesh, steel.youngs_modulus, steel.poisson_ratio)
+    rng = np.random.default_rng(4)
+    d = 1e-6 * rng.normal(size=3 * len(segment.position))
+    load = np.zeros(segment.loaded.size)
+    load[-3 * 40 :: 7] = 2.0
+    n = body.stiffness.shape[0]
+    fixed = (3 * follow.boundary[:, None] + np.arange(3)).ravel()
+    free = np.setdiff1d(np.arange(n), fixed)
+    u, force = np.zeros(n), np.zeros(n)
+    u[fixed] = (follow.weight @ d.reshape(-1, 3)).ravel()
+    force[segment.loaded] = load
+    right = force[free] - body.stiffness[free][:, fixed] @ u[fixed]
+    u[free] = spsolve(body.stiffness[free][:, free].tocsc(), right)
+    found = segment.displacement(d[None], load[None])[0].ravel()
+    assert np.abs(found - u).max() < 1e-8 * np.abs(u).max()
+    stored = 0.5 * d @ segment.stiffness @ d + 0.5 * load @ segment.compliance @ load
+    assert stored == pytest.approx(0.5 * u @ body.stiffness @ u, rel=1e-8)
+    # what the masters must be pushed with
+    on_boundary = (body.stiffness @ u - force)[fixed].reshape(-1, 3)
+    pushed = segment.stiffness @ d - load @ segment.loaded_from_masters
+    by_hand = (follow.weight.T @ on_boundary).ravel()
+    assert np.abs(pushed - by_hand).max() < 1e-8 * np.abs(by_hand).max()

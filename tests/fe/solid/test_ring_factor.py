@@ -1,0 +1,37 @@
+"""Rings of sectors with large faces, against the band solver of the plane model."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from swgjoint.fe.cyclic import CyclicFactor, SingularRingError
+from swgjoint.fe.solid.ring_factor import RingFactor
+
+
+def blocks(sectors, face, inside, seed=1):
+    rng = np.random.default_rng(seed)
+    n = 2 * face + inside
+    half = rng.normal(size=(sectors, n, n))
+    # indefinite, as contact leaves it
+    return half + half.transpose(0, 2, 1) + np.diag(rng.choice([-6.0, 9.0], n))
+
+
+@pytest.mark.parametrize("sectors", [3, 4, 7])
+def test_ring_is_solved_as_by_a_band(sectors):
+    """Symmetric indefinite rings of three sectors and more, many right-hand sides."""
+    matrix = blocks(sectors, 3, 2)
+    rhs = np.random.default_rng(2).normal(size=(sectors, 8, 5))
+    ours = RingFactor(matrix, 3).solve(rhs)
+    assert ours == pytest.approx(CyclicFactor(matrix, 3).solve(rhs), rel=1e-9, abs=1e-9)
+    # and it is a solution: forces of neighbours on a shared face add up
+    force = np.einsum("sij,sjk->sik", matrix, ours) - rhs
+    assert np.abs(force[:, 3:5]).max() < 1e-10
+    assert np.abs(force[:, :3] + np.roll(force[:, 5:], 1, axis=0)).max() < 1e-9
+    assert ours[:, 5:] == pytest.approx(np.roll(ours[:, :3], -1, axis=0))
+
+
+def test_singular_ring_is_reported():
+    """A ring without any stiffness."""
+    with pytest.raises(SingularRingError):
+        RingFactor(np.zeros((4, 5, 5)), 2)
