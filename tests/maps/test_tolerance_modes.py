@@ -22,8 +22,10 @@ COGGING = {(4, 0): 2e-6, (0, 2): 1e-6}
 
 
 def waves(terms, alpha, beta):
-    """Sum of cosines of p alpha + q beta."""
-    return sum(a * np.cos(p * alpha + q * beta) for (p, q), a in terms.items())
+    """Sum of waves of p alpha + q beta, neither even nor odd."""
+    return sum(
+        a * np.cos(p * alpha + q * beta + 0.3 * p - 0.5) for (p, q), a in terms.items()
+    )
 
 
 def known(layout: str, phases: int = 4, part: float = 1.0) -> MapSamples:
