@@ -1,18 +1,29 @@
-"""``swgjoint map``: from a design to a ``.swg`` file."""
+"""``swgjoint map``: from a design or a measured loop to a ``.swg`` file."""
 
 from __future__ import annotations
 
 import argparse
 import time
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from swgjoint.cli.text import table
+from swgjoint.errors import InputError
 from swgjoint.files import check_output_file
+
+if TYPE_CHECKING:
+    from swgjoint.maps.drive_map import DriveMap
+
+_MEASURED = ("measured_teeth", "measured_rated", "measured_error", "measured_layout")
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
-    """Design, output file, model."""
-    parser.add_argument("design", metavar="DESIGN", help="design file or bundled name")
+    """Design or measurement, output file, model."""
+    parser.add_argument(
+        "design",
+        metavar="DESIGN",
+        help="design file or bundled name; or a .csv file of a measured torque-torsion"
+        " loop, with the options that begin with --measured",
+    )
     parser.add_argument(
         "-o", "--output", metavar="FILE", required=True, help="map to write, .swg"
     )
@@ -20,6 +31,23 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--model",
         choices=("ring", "2d", "3d"),
         help="fidelity; default 3d for a design with a cup, else 2d",
+    )
+    measured = parser.add_argument_group("measured drive")
+    measured.add_argument(
+        "--measured-teeth",
+        metavar="FS/CS",
+        help="teeth of flexspline and circular spline, for example 200/202",
+    )
+    measured.add_argument(
+        "--measured-rated", type=float, metavar="NM", help="rated torque"
+    )
+    measured.add_argument(
+        "--measured-error",
+        metavar="FILE",
+        help=".csv file of the kinematic error over one output turn (optional)",
+    )
+    measured.add_argument(
+        "--measured-layout", metavar="LAYOUT", help="default circular_spline_fixed"
     )
 
 
@@ -32,13 +60,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     """
     start = time.perf_counter()
     path = check_output_file(args.output, ".swg")
-    from swgjoint.gear.design import Design
-
-    design = Design.load(args.design)
-    # the finite elements take half a second to import: not before the design is sound
-    from swgjoint.fe.build_map import build_map
-
-    drive = build_map(design, model=args.model, progress=args.progress)
+    drive = _measured(args) if args.design.endswith(".csv") else _built(args)
     drive.save(path)
     info = dict(drive.info)
     return {
@@ -54,6 +76,49 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         "files": [str(path)],
         "wall_s": time.perf_counter() - start,
     }
+
+
+def _built(args: argparse.Namespace) -> DriveMap:
+    """The map of a design."""
+    given = [name for name in _MEASURED if getattr(args, name) is not None]
+    if given:
+        raise InputError(
+            f"--{given[0].replace('_', '-')} with a design; accepted with a .csv file"
+        )
+    from swgjoint.gear.design import Design
+
+    design = Design.load(args.design)
+    # the finite elements take half a second to import: not before the design is sound
+    from swgjoint.fe.build_map import build_map
+
+    return build_map(design, model=args.model, progress=args.progress)
+
+
+def _measured(args: argparse.Namespace) -> DriveMap:
+    """The map of a measured loop."""
+    if args.model is not None:
+        raise InputError(f"--model {args.model} with a measured loop; leave it out")
+    if args.measured_teeth is None or args.measured_rated is None:
+        raise InputError(
+            f"{args.design}: a measured loop needs --measured-teeth FS/CS and"
+            " --measured-rated NM"
+        )
+    teeth = args.measured_teeth.split("/")
+    if len(teeth) != 2 or not all(part.isdecimal() for part in teeth):
+        raise InputError(
+            f"--measured-teeth {args.measured_teeth}; accepted: two numbers, FS/CS"
+        )
+    from swgjoint.maps.drive_map import DriveMap
+
+    options = {} if args.measured_layout is None else {"layout": args.measured_layout}
+    return DriveMap.from_measurement(
+        args.design,
+        teeth_flexspline=int(teeth[0]),
+        teeth_circular_spline=int(teeth[1]),
+        ratings=args.measured_rated,
+        kinematic_error=args.measured_error,
+        **options,
+    )
 
 
 def report(result: dict[str, Any]) -> str:

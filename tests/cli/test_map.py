@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from swgjoint.cli.main import main
@@ -65,3 +66,57 @@ def test_fidelities_that_are_not_there(model, tmp_path, capsys):
     _, err = capsys.readouterr()
     assert err.count("\n") == 1
     assert not path.exists()
+
+
+LOOP = """torque_Nm,torsion_arcmin
+0,0.0
+40,4.2
+80,8.1
+40,4.4
+0,0.3
+-40,-4.0
+-80,-8.0
+-40,-4.3
+0,-0.2
+40,4.1
+80,8.1
+"""
+
+
+def test_measured_loop_becomes_a_map(tmp_path, capsys):
+    """A CSV file with teeth and rated torque gives a map of its mean stiffness."""
+    loop, path = tmp_path / "loop.csv", tmp_path / "a.swg"
+    loop.write_text(LOOP)
+    measured = ["--measured-teeth", "200/202", "--measured-rated", "80"]
+    assert main(["map", str(loop), "-o", str(path), *measured, "--json"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert result["level"] == "measurement"
+    # 160 N·m over 16.1 arcmin
+    secant = 160.0 / (16.1 * np.pi / 10800.0)
+    assert result["stiffness_Nm_rad"] == pytest.approx(secant, rel=0.05)
+    assert result["info"]["fit"]["torsion"]["samples"] == 11
+    assert DriveMap.load(path).ratio == -100
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["loop.csv"], "needs --measured-teeth"),
+        (["loop.csv", "--model", "2d"], "--model 2d with a measured loop"),
+        (
+            ["loop.csv", "--measured-teeth", "200", "--measured-rated", "8"],
+            "--measured-teeth 200; accepted: two numbers",
+        ),
+        (["reference-2d", "--measured-rated", "8"], "--measured-rated with a design"),
+    ],
+)
+def test_measured_loop_needs_its_drive(
+    arguments, message, tmp_path, monkeypatch, capsys
+):
+    """What a loop does not tell is asked for in one line; nothing is written."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "loop.csv").write_text(LOOP)
+    assert main(["map", *arguments, "-o", "a.swg"]) == 2
+    err = capsys.readouterr().err
+    assert err.count("\n") == 1 and message in err
+    assert not (tmp_path / "a.swg").exists()
