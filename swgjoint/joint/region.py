@@ -33,7 +33,8 @@ Dropped on a floor, 9 of 5480 gained 5 % more than the floor of the engine gives
 itself, none of the 582 with h sqrt(K/J_link) from 2 to 2.5; without that bound 12 of
 3090 did, up to three times their energy. Turning freely for 10 s near resonance at
 1 ms, 804 catalogue drives lost 1.5 % at most; without the last bound 83 of 1217 lost
-more than 5 %. ``swgjoint stability`` runs a grid of all this.
+more than 5 %. ``swgjoint stability --full`` runs a grid of all this: of 6300 runs none
+gains energy, 155 are refused.
 Not a proof: the step is one linearised solve with two evaluations.
 `tests/joint/test_random_joints.py` runs a sample.
 """
