@@ -1,0 +1,94 @@
+"""Rows of both contacts against differences, in a loaded state."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from swgjoint.fe.solid.linearise import bore_contact
+
+STEP = 1e-8
+
+
+@pytest.fixture(scope="module")
+def moved(small_ring, loaded):
+    """States with the masters moved along a random smooth way, and the way."""
+    rng = np.random.default_rng(1)
+    faces = rng.normal(size=(*loaded.faces.shape[:1], 1, 3)) * np.ones_like(
+        loaded.faces
+    )
+    faces += 0.3 * rng.normal(size=faces.shape)
+    inside = rng.normal(size=loaded.inside.shape)
+    way = replace(loaded, faces=faces, inside=inside)
+
+    def at(part):
+        return replace(
+            loaded,
+            faces=loaded.faces + part * faces,
+            inside=loaded.inside + part * inside,
+        )
+
+    masters = small_ring.masters(way)[:, small_ring.strip.teeth.masters]
+    return at, masters.reshape(small_ring.sectors, -1)
+
+
+def test_rows_of_the_wave_generator(small_ring, loaded, moved):
+    """Change of the gaps at fixed forces in the frames of the teeth."""
+    at, way = moved
+
+    def gap(part):
+        state = at(part)
+        return bore_contact(small_ring, state, small_ring.frames(state)[0]).gap
+
+    rows = bore_contact(small_ring, loaded, small_ring.frames(loaded)[0]).rows
+    ours = np.einsum("spm,sm->sp", rows, way)
+    by = (gap(STEP) - gap(-STEP)) / (2 * STEP)
+    assert np.abs(ours - by).max() < 1e-6 * np.abs(by).max()
+
+
+def test_rows_of_the_teeth(small_ring, loaded, moved):
+    """The same for the candidates on the flanks, whose feet move along."""
+    at, way = moved
+    ring = small_ring
+
+    def found(part):
+        state = at(part)
+        return ring.teeth.find(
+            ring.frames(state)[0],
+            ring.loads(state),
+            state.ring_force,
+            0.2 * ring.lobe_height,
+            None,
+            thorough=False,
+        )
+
+    def table(rows):
+        c = rows.contacts
+        keys = list(zip(c.sector, c.side, c.tooth, rows.plane, strict=True))
+        return {key: k for k, key in enumerate(keys) if keys.count(key) == 1}
+
+    here, low, high = found(0.0), found(-STEP), found(STEP)
+    ours = np.einsum("km,km->k", here.rows, way[here.contacts.sector])
+    at_low, at_high = table(low), table(high)
+    # feet of the least gap: along the flank it does not change to first order
+    pairs = [
+        (ours[k], high.contacts.gap[at_high[key]] - low.contacts.gap[at_low[key]])
+        for key, k in table(here).items()
+        if key in at_low and key in at_high
+    ]
+    assert len(pairs) > 20
+    slope, by = np.array(pairs).T / [[1.0], [2 * STEP]]
+    assert np.abs(slope - by).max() < 1e-3 * np.abs(by).max()
+
+
+def test_contact_forces_push_and_close_gaps(small_ring, loaded):
+    """Nothing pulls, no bore node enters, every one that is pushed touches."""
+    contact = bore_contact(small_ring, loaded, small_ring.frames(loaded)[0])
+    assert loaded.pressure.min() >= 0.0
+    assert loaded.tooth_force.min() >= 0.0
+    assert contact.gap.min() > -1e-9
+    assert np.abs(contact.gap[loaded.touching]).max() < 1e-9
+    assert not loaded.pressure[~loaded.touching].any()
+    assert (loaded.pressure > 0.0).sum() > 50
