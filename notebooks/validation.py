@@ -100,21 +100,20 @@ for state in states:
     worst = max(shape["radial_max_um"], shape["tangential_max_um"])
     ours, theirs = stress["root_ours_MPa"], stress["root_calculix_MPa"]
     print(
-        f"{state:<28} shape {worst:.3f} um, lost within a sector"
-        f" {shape['within_sector_um']:.3f} um; root {100 * (theirs / ours - 1):+.2f} %,"
+        f"{state:<28} shape {worst:.3f} um; root {100 * (theirs / ours - 1):+.2f} %,"
         f" mesh {100 * change(state, 'ours'):.2f} % ours,"
         f" {100 * change(state, 'calculix'):.2f} % CalculiX"
     )
+    assert worst < 0.2
     assert abs(theirs / ours - 1) < 0.03
     assert max(change(state, code) for code in ("ours", "calculix")) < 0.015
 
 # %% [markdown]
+# Part of the difference is our mesh, part the model. In the limit of fine meshes, where
+# ours is extrapolated with the square of the element size, the model's share remains.
 # Where the wave generator presses all around (the ellipse), the rim is under hoop
-# tension, which stiffens the ring by the rotations of its cross-sections. Our sectors
-# turn as wholes; what the rim turns within one tooth pitch is left out. For the
-# two-lobe shape the loss is a closed form (`within_sector` in `tests/peer/states.py`).
-# It is what remains in the limit of fine meshes, where ours is extrapolated with the
-# square of the element size.
+# tension; without the tension's work on what the rim turns within a sector this limit
+# was 0.3 um.
 
 
 # %%
@@ -130,9 +129,8 @@ kinds = [s for s in states if "," not in s]
 for kind in kinds:
     coarse, fine = two_lobe(kind, 8, 1), two_lobe(kind, 12, 1)
     limit = two_lobe(kind, 12, 2) + (fine - coarse) * 8**2 / (12**2 - 8**2)
-    expected = -finest(kind, "CPE8R")["within_sector_um"]
-    print(f"{kind:<12} limit {limit:+.3f} um, closed form {expected:+.3f} um")
-    assert abs(limit - expected) < 0.1
+    print(f"{kind:<12} limit {limit:+.3f} um")
+    assert abs(limit) < 0.2
 
 # %%
 figure, axes = plt.subplots(figsize=(6, 3.5))
