@@ -80,11 +80,23 @@ class Fields:
     displacement: Array
     """(n, 2) [mm]."""
     stress: Array
-    """xx, yy, xy (n, 3) [MPa]."""
+    """xx, yy, xy (n, 3) [MPa]; in space (n, 3) and xx, yy, zz, xy, yz, zx (n, 6)."""
 
 
 def run(deck: str, folder: Path, nodes: int, name: str = "job") -> Fields:
-    """Run a deck in a folder and read its last results.
+    """Run a plane deck in a folder and read its last results.
+
+    Raises:
+        RuntimeError: If ccx stops before the end of the last step.
+    """
+    found = run_solid(deck, folder, nodes, name)
+    return Fields(
+        displacement=found.displacement[:, :2], stress=found.stress[:, [0, 1, 3]]
+    )
+
+
+def run_solid(deck: str, folder: Path, nodes: int, name: str = "job") -> Fields:
+    """The same with all components of a solid.
 
     Raises:
         RuntimeError: If ccx stops before the end of the last step.
@@ -101,9 +113,7 @@ def run(deck: str, folder: Path, nodes: int, name: str = "job") -> Fields:
     if done.returncode or "Job finished" not in done.stdout:
         raise RuntimeError(f"ccx failed:\n{done.stdout[-2000:]}{done.stderr}")
     blocks = _last_blocks(folder / f"{name}.frd", nodes)
-    return Fields(
-        displacement=blocks["DISP"][:, :2], stress=blocks["STRESS"][:, [0, 1, 3]]
-    )
+    return Fields(displacement=blocks["DISP"], stress=blocks["STRESS"])
 
 
 def _last_blocks(path: Path, nodes: int) -> dict[str, Array]:
