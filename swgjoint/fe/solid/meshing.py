@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import partial
 from math import nan, pi
 from pathlib import Path
@@ -18,6 +18,7 @@ from swgjoint.fe.meshing_run import averages
 from swgjoint.fe.solid.checkpoint import Checkpoint
 from swgjoint.fe.solid.continuation import SolidContinuation
 from swgjoint.fe.solid.drive3d import check_modelled, solid_ring
+from swgjoint.fe.solid.masters import Orders
 from swgjoint.fe.solid.ring import SolidRing
 from swgjoint.fe.solid.state import SolidState
 from swgjoint.fe.solid.stress import Place, SolidMaxima
@@ -210,6 +211,7 @@ def simulate_solid_meshing(
             "nonlinear": nonlinear,
             "half": half,
             "elastic_circular_spline": elastic_circular_spline,
+            "orders": asdict(Orders()),
         }
         kept = Checkpoint.open(keep, settings, resume=resume)
     ring = solid_ring(
