@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from swgjoint.fe.block_circulant import between, respond
 from swgjoint.fe.corotation import rotate, turned
 from swgjoint.fe.cyclic import CyclicFactor
 from swgjoint.fe.superelement import Superelement
@@ -44,18 +45,11 @@ class Compliance:
 
     def displacement(self, force: Array) -> Array:
         """Flank displacement (N, 2 n_b) [m] under flank forces (N, 2 n_b) [N]."""
-        return self._respond(self.flank, force)
+        return respond(self.offsets, self.flank, force)
 
     def skeleton_displacement(self, force: Array) -> Array:
         """Skeleton displacement in the frames of the teeth (N, 2 n_a) [m]."""
-        return self._respond(self.skeleton, force)
-
-    def _respond(self, blocks: Array, force: Array) -> Array:
-        result = np.zeros((len(force), blocks.shape[1]))
-        loaded = np.flatnonzero(force.any(axis=1))
-        for offset, block in zip(self.offsets, blocks, strict=True):
-            result[(loaded + offset) % len(force)] += force[loaded] @ block.T
-        return result
+        return respond(self.offsets, self.skeleton, force)
 
     def between(self, tooth: Index, weight: Array, teeth: int) -> Array:
         """Compliance between contact points (n, n) [m/N].
@@ -65,13 +59,7 @@ class Compliance:
             weight: Derivative of its gap by the flank displacement (n, 2 n_b).
             teeth: Teeth in the model.
         """
-        apart = (tooth[:, None] - tooth[None, :]) % teeth
-        result = np.zeros((len(tooth), len(tooth)))
-        for offset, block in zip(self.offsets, self.flank, strict=True):
-            here = apart == offset % teeth
-            if here.any():
-                result += np.where(here, weight @ block @ weight.T, 0.0)
-        return result
+        return between(self.offsets, self.flank, tooth, weight, teeth)
 
 
 def ring_compliance(element: Superelement, *, free_rim: bool = False) -> Compliance:

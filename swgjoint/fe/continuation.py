@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from math import pi
 
 from swgjoint.errors import Outcome
 from swgjoint.fe.equilibrium import Load, NewtonSolver
+from swgjoint.fe.following import HALVINGS, follow
 from swgjoint.fe.ring import RingModel
 from swgjoint.fe.state import State
 from swgjoint.gear.kinematics import Layout
 
-HALVINGS = 5
 TAKE_UP = 150
 """Hundredths of a pitch over which contact is sought before the output is free."""
-
-_Step = Callable[[State, float, State], State]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -85,16 +82,19 @@ class Continuation:
         """
         angle = self.input_angle(state)
 
-        def step(s: State, part: float, start: State) -> State:
-            load = start.torque + part * (torque - start.torque)
-            return self.solver(self.model, s, self._load(load, angle))
+        def loaded(start: State) -> State:
+            def step(s: State, part: float) -> State:
+                load = start.torque + part * (torque - start.torque)
+                return self.solver(self.model, s, self._load(load, angle))
+
+            return follow(start, step)
 
         if torque == 0.0 or not _is_free(state):
-            found = self._follow(state, step)
+            found = loaded(state)
             if found.outcome.ok or torque == 0.0:
                 return found
         against = self._taken_up(state, torque)
-        return self._follow(against, step) if against.outcome.ok else against
+        return loaded(against) if against.outcome.ok else against
 
     def to_angle(self, state: State, angle: float) -> State:
         """Turn the input at constant torque.
@@ -104,14 +104,14 @@ class Continuation:
         """
         first = self.input_angle(state)
 
-        def step(s: State, part: float, start: State) -> State:
+        def step(s: State, part: float) -> State:
             theta = first + part * (angle - first)
             guess = self._ahead(s, theta)
-            return self.solver(self.model, guess, self._load(start.torque, theta))
+            return self.solver(self.model, guess, self._load(state.torque, theta))
 
         if _is_free(state):
             return self._held(self._ahead(state, angle))
-        found = self._follow(state, step)
+        found = follow(state, step)
         if found.outcome.ok:
             return found
         if state.torque == 0.0 and found.outcome is Outcome.SINGULAR:
@@ -223,20 +223,6 @@ class Continuation:
             state.rotation + rotation,
             state.ring_rotation + ring_rotation,
         )
-
-    def _follow(self, state: State, step: _Step) -> State:
-        """Go from part 0 to 1 of a change; a failed try halves the increment."""
-        current, done, increment = state, 0.0, 1.0
-        while done < 1.0:
-            target = min(1.0, done + increment)
-            tried = step(current, target, state)
-            if tried.outcome.ok:
-                current, done = tried, target
-            elif increment <= 0.5**HALVINGS:
-                return replace(current, outcome=tried.outcome, history=tried.history)
-            else:
-                increment *= 0.5
-        return replace(current, outcome=Outcome.CONVERGED)
 
 
 def _is_free(state: State) -> bool:

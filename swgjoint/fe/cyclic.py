@@ -13,6 +13,44 @@ class SingularRingError(ArithmeticError):
     """The ring of sectors has a zero pivot."""
 
 
+class Insides:
+    """Insides of all sectors, eliminated before the faces that they couple."""
+
+    def __init__(self, blocks: Array, face: int) -> None:
+        """Eliminate; arguments and errors as of :class:`CyclicFactor`."""
+        n = blocks.shape[1]
+        self._face = face
+        self._inner = inner = slice(face, n - face)
+        self._outer = outer = np.r_[0:face, n - face : n]
+        try:
+            self._inverse = np.linalg.inv(blocks[:, inner, inner])
+        except np.linalg.LinAlgError as error:
+            raise SingularRingError from error
+        coupling = blocks[:, inner][:, :, outer]
+        self._reach = self._inverse @ coupling
+        self.schur = blocks[:, outer][:, :, outer]
+        """What is left between both faces of a sector (N, 2 face, 2 face)."""
+        self.schur = self.schur - coupling.transpose(0, 2, 1) @ self._reach
+
+    def on_faces(self, rhs: Array) -> Array:
+        """Right-hand sides of the faces (N, face, k) from those of sectors (N, n, k).
+
+        Contributions of both sectors to a face add up.
+        """
+        face, inside = self._face, rhs[:, self._inner]
+        outer = rhs[:, self._outer] - self._reach.transpose(0, 2, 1) @ inside
+        return np.asarray(outer[:, :face] + np.roll(outer[:, face:], 1, axis=0))
+
+    def with_faces(self, faces: Array, rhs: Array) -> Array:
+        """Solution of the sectors (N, n, k) from that of the faces (N, face, k)."""
+        result = np.empty_like(rhs)
+        result[:, : self._face] = faces
+        result[:, rhs.shape[1] - self._face :] = np.roll(faces, -1, axis=0)
+        both, inside = result[:, self._outer], rhs[:, self._inner]
+        result[:, self._inner] = self._inverse @ inside - self._reach @ both
+        return result
+
+
 class CyclicFactor:
     """Factorised ring: each sector couples its first face, its inside, its last face.
 
@@ -33,19 +71,10 @@ class CyclicFactor:
         Raises:
             SingularRingError: If a pivot vanishes.
         """
-        n_sectors, n, _ = blocks.shape
+        n_sectors = len(blocks)
         self._face, self._sectors = face, n_sectors
-        inner = slice(face, n - face)
-        outer = np.r_[0:face, n - face : n]
-        self._outer, self._inner = outer, inner
-        try:
-            self._inverse = np.linalg.inv(blocks[:, inner, inner])
-        except np.linalg.LinAlgError as error:
-            raise SingularRingError from error
-        self._coupling = blocks[:, inner][:, :, outer]
-        self._reach = self._inverse @ self._coupling
-        schur = blocks[:, outer][:, :, outer]
-        schur = schur - self._coupling.transpose(0, 2, 1) @ self._reach
+        self._insides = Insides(blocks, face)
+        schur = self._insides.schur
         order = np.empty(n_sectors, dtype=np.int64)
         order[0::2] = np.arange((n_sectors + 1) // 2)
         order[1::2] = n_sectors - 1 - np.arange(n_sectors // 2)
@@ -82,19 +111,12 @@ class CyclicFactor:
         Returns:
             Solution at the degrees of freedom of each sector (N, n, k).
         """
-        face, n = self._face, rhs.shape[1]
-        inside = rhs[:, self._inner]
-        outer = rhs[:, self._outer] - self._reach.transpose(0, 2, 1) @ inside
-        faces = outer[:, :face] + np.roll(outer[:, face:], 1, axis=0)
+        face = self._face
+        faces = self._insides.on_faces(rhs)
         folded = faces[self._order].reshape(self._sectors * face, -1)
         solved, info = dgbtrs(self._lu, self._band, self._band, folded, self._pivots)
         if info != 0:
             raise SingularRingError
         faces = np.empty_like(faces)
         faces[self._order] = solved.reshape(self._sectors, face, -1)
-        result = np.empty_like(rhs)
-        result[:, :face] = faces
-        result[:, n - face :] = np.roll(faces, -1, axis=0)
-        both = result[:, self._outer]
-        result[:, self._inner] = self._inverse @ inside - self._reach @ both
-        return result
+        return self._insides.with_faces(faces, rhs)

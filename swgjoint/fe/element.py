@@ -1,4 +1,4 @@
-"""Bilinear quadrilateral with incompatible modes, for bending without locking."""
+"""Elements with incompatible modes, for bending without locking."""
 
 from __future__ import annotations
 
@@ -9,50 +9,59 @@ from skfem import ElementQuad1
 from skfem.element import DiscreteField
 
 
-class ElementQuadIncompatible(ElementQuad1):  # type: ignore[misc]
-    r"""Four-node quadrilateral with two incompatible modes per component (QM6).
+class IncompatibleModes:
+    r"""Adds the modes :math:`4x(1-x)`, one per direction, to a linear element.
 
-    Beside the bilinear functions the element has the modes :math:`4x(1-x)` and
-    :math:`4y(1-y)` as interior degrees of freedom. Their gradients are taken with the
-    Jacobian of the element centre,
+    They are interior degrees of freedom. Their gradients are taken with the Jacobian of
+    the element centre,
 
     .. math:: \nabla\phi = \frac{\det J_0}{\det J} J_0^{-T} \hat\nabla\phi,
 
     so that they do no work against a constant stress and the patch test holds on
-    distorted meshes. The thesis uses the same class of element (CPS4I).
+    distorted meshes.
 
     Source:
         Taylor, Beresford and Wilson (1976), "A non-conforming element for stress
         analysis", IJNME 10, 1211-1219.
     """
 
-    interior_dofs = 2
-    dofnames: ClassVar[list[str]] = ["u", "bx", "by"]
-    doflocs = np.array(
-        [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.5, 0.5], [0.5, 0.5]]
-    )
+    corners: ClassVar[int]
 
     def lbasis(self, X: Any, i: int) -> tuple[Any, Any]:
-        """Bilinear functions 0 to 3, incompatible modes 4 and 5."""
-        if i < 4:
-            return super().lbasis(X, i)  # type: ignore[no-any-return]
-        x, y = X
-        if i == 4:
-            return 4 * x * (1 - x), np.array([4 - 8 * x, 0 * y])
-        return 4 * y * (1 - y), np.array([0 * x, 4 - 8 * y])
+        """Functions of the corners, then the modes."""
+        if i < self.corners:
+            return super().lbasis(X, i)  # type: ignore[misc, no-any-return]
+        x = X[i - self.corners]
+        slope = np.zeros_like(X)
+        slope[i - self.corners] = 4 - 8 * x
+        return 4 * x * (1 - x), slope
 
     def gbasis(
         self, mapping: Any, X: Any, i: int, tind: Any = None
     ) -> tuple[DiscreteField, ...]:
         """Map to the global element, the modes with the Jacobian of the centre."""
-        if i < 4:
-            return super().gbasis(mapping, X, i, tind)  # type: ignore[no-any-return]
+        if i < self.corners:
+            return super().gbasis(mapping, X, i, tind)  # type: ignore[misc, no-any-return]
         phi, dphi = self.lbasis(X, i)
-        centre = np.array([[0.5], [0.5]])
-        inverse = mapping.invDF(centre, tind)[:, :, :, 0]  # (2, 2, n_elements)
+        centre = np.full((len(X), 1), 0.5)
+        inverse = mapping.invDF(centre, tind)[:, :, :, 0]  # (dim, dim, n_elements)
         scale = mapping.detDF(centre, tind) / mapping.detDF(X, tind)
         # one set of points for all elements, or one per element (facets)
         points = "il" if np.ndim(X) == 2 else "ikl"
         grad = np.einsum(f"ijk,{points}->jkl", inverse, dphi) * scale
         value = np.broadcast_to(phi, grad.shape[1:])
         return (DiscreteField(value=value, grad=grad),)
+
+
+class ElementQuadIncompatible(IncompatibleModes, ElementQuad1):  # type: ignore[misc]
+    """Four-node quadrilateral with two incompatible modes per component (QM6).
+
+    The thesis uses the same class of element (CPS4I).
+    """
+
+    corners = 4
+    interior_dofs = 2
+    dofnames: ClassVar[list[str]] = ["u", "bx", "by"]
+    doflocs = np.array(
+        [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.5, 0.5], [0.5, 0.5]]
+    )

@@ -69,8 +69,57 @@ class MeshingStep:
     """The equilibrium, for fields and pictures."""
 
 
+class Positions:
+    """What the runs of every model tell from their positions, ``steps``."""
+
+    steps: tuple[Any, ...]
+
+    @property
+    def outcome(self) -> Outcome:
+        """Converged, or what the first position that failed says."""
+        failed = (s.outcome for s in self.steps if not s.outcome.ok)
+        return next(failed, Outcome.CONVERGED)
+
+    @property
+    def states(self) -> tuple[Any, ...]:
+        """Equilibria of the positions that were solved."""
+        return tuple(step.state for step in self.steps if step.state is not None)
+
+    def series(self, name: str) -> Array:
+        """One quantity of the positions, NaN where a solve failed."""
+        return np.array([getattr(step, name) for step in self.steps], dtype=float)
+
+    def averages(self) -> dict[str, Any]:
+        """Means of the per-step maxima by member, null for a rigid one [MPa]."""
+        solved = [step.stress for step in self.steps if step.stress is not None]
+        members = ("flexspline", "circular_spline")
+        return {name: _averages([getattr(s, name) for s in solved]) for name in members}
+
+    def common_series(self) -> dict[str, list[Any]]:
+        """Lists of ``per_step`` that every model has; stress of the flexspline."""
+        return {
+            "angle_deg": list(self.series("input_angle") / deg),
+            **{
+                f"{kind}_MPa": [
+                    None
+                    if step.stress is None
+                    else getattr(step.stress.flexspline, kind) / 1e6
+                    for step in self.steps
+                ]
+                for kind in KINDS
+            },
+            "pairs_in_contact": [step.pairs_in_contact for step in self.steps],
+            "output_error_arcsec": list(self.series("output_error") / arcsec),
+            "wave_generator_torque_Nm": list(self.series("wave_generator_torque")),
+            "tooth_moment_Nm": list(self.series("tooth_moment")),
+            "energy_J": list(self.series("energy")),
+            "iterations": [step.iterations for step in self.steps],
+            "outcome": [step.outcome.name.lower() for step in self.steps],
+        }
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
-class MeshingRun:
+class MeshingRun(Positions):
     """A simulation of meshing."""
 
     design: Design
@@ -80,12 +129,6 @@ class MeshingRun:
     setup: tuple[SetupState, ...]
     cup_stiffness: float | None
     wall_s: float
-
-    @property
-    def outcome(self) -> Outcome:
-        """Converged, or what the first position that failed says."""
-        failed = (s.outcome for s in self.steps if not s.outcome.ok)
-        return next(failed, Outcome.CONVERGED)
 
     def _members(self) -> list[tuple[Superelement, int]]:
         ring = self.model.circular_spline.compliance
@@ -109,19 +152,9 @@ class MeshingRun:
         """Elements before condensation, of the deformable members."""
         return sum(int(e.mesh.mesh.t.shape[1]) * n for e, n in self._members())
 
-    @property
-    def states(self) -> tuple[State, ...]:
-        """Equilibria of the positions that were solved."""
-        return tuple(step.state for step in self.steps if step.state is not None)
-
-    def series(self, name: str) -> Array:
-        """One quantity of :class:`MeshingStep` over the steps."""
-        return np.array([getattr(step, name) for step in self.steps], dtype=float)
-
     def to_json(self) -> dict[str, Any]:
         """The JSON object of ``swgjoint meshing``; per-step stress: flexspline."""
         elastic = self.model.circular_spline.compliance is not None
-        solved = [step.stress for step in self.steps if step.stress is not None]
         cup = None if self.cup_stiffness is None else "closed-form torsion in series"
         ring = f"elastic, outside {self.design.circular_spline.outer_rim}"
         return {
@@ -143,29 +176,12 @@ class MeshingRun:
             "steps": len(self.steps),
             "wall_s": self.wall_s,
             "outcome": self.outcome.name.lower(),
-            "flexspline": averages([s.flexspline for s in solved]),
-            "circular_spline": averages([s.circular_spline for s in solved]),
-            "per_step": {
-                "angle_deg": list(self.series("input_angle") / deg),
-                **{
-                    f"{kind}_MPa": [
-                        None
-                        if step.stress is None
-                        else getattr(step.stress.flexspline, kind) / 1e6
-                        for step in self.steps
-                    ]
-                    for kind in KINDS
-                },
-                "pairs_in_contact": [step.pairs_in_contact for step in self.steps],
-                "output_error_arcsec": list(self.series("output_error") / arcsec),
-                "wave_generator_torque_Nm": list(self.series("wave_generator_torque")),
+            **self.averages(),
+            "per_step": self.common_series()
+            | {
                 "input_torque_Nm": list(self.series("input_torque")),
-                "tooth_moment_Nm": list(self.series("tooth_moment")),
-                "energy_J": list(self.series("energy")),
                 "friction_work_J": list(self.series("friction_work")),
                 "contact_arc_deg": [self._arcs(step.state) for step in self.steps],
-                "iterations": [step.iterations for step in self.steps],
-                "outcome": [step.outcome.name.lower() for step in self.steps],
             },
             "contact_forces_N": self._tooth_forces(),
             "root_stress": self._root_stress(),
@@ -202,7 +218,7 @@ class MeshingRun:
         }
 
 
-def averages(maxima: Sequence[StressMaxima | None]) -> dict[str, Any]:
+def _averages(maxima: Sequence[StressMaxima | None]) -> dict[str, Any]:
     """Means of the per-step maxima, null for a rigid member."""
     rows = [m.to_json() for m in maxima if m is not None]
     return {

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from math import pi
 
 import numpy as np
 from numpy.typing import NDArray
 
-from swgjoint.errors import Outcome
+from swgjoint.fe.following import follow
 from swgjoint.fe.ring import travelled
 from swgjoint.fe.solid.corotation import about_z
 from swgjoint.fe.solid.equilibrium import SolidLoad, SolidSolver
@@ -17,8 +16,6 @@ from swgjoint.fe.solid.ring import SolidRing
 from swgjoint.fe.solid.state import SolidState
 
 Array = NDArray[np.float64]
-
-HALVINGS = 5
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -46,7 +43,7 @@ class SolidContinuation:
             load = state.torque + part * (torque - state.torque)
             return self.solver(self.ring, s, SolidLoad(torque=load))
 
-        return self._follow(state, step)
+        return follow(state, step)
 
     def to_angle(self, state: SolidState, angle: float) -> SolidState:
         """Turn the input at constant torque."""
@@ -56,7 +53,7 @@ class SolidContinuation:
             guess = self.ahead(s, first + part * (angle - first))
             return self.solver(self.ring, guess, SolidLoad(torque=state.torque))
 
-        return self._follow(state, step)
+        return follow(state, step)
 
     def ahead(self, state: SolidState, angle: float) -> SolidState:
         """Predictor: the field travels with the wave generator, the output turns."""
@@ -86,19 +83,3 @@ class SolidContinuation:
             wave_generator_angle=angle,
             rotation=state.rotation + d_psi,
         )
-
-    def _follow(
-        self, state: SolidState, step: Callable[[SolidState, float], SolidState]
-    ) -> SolidState:
-        """Go from part 0 to 1 of a change; a failed try halves the increment."""
-        current, done, increment = state, 0.0, 1.0
-        while done < 1.0:
-            target = min(1.0, done + increment)
-            tried = step(current, target)
-            if tried.outcome.ok:
-                current, done = tried, target
-            elif increment <= 0.5**HALVINGS:
-                return replace(current, outcome=tried.outcome, history=tried.history)
-            else:
-                increment *= 0.5
-        return replace(current, outcome=Outcome.CONVERGED)

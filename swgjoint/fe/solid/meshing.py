@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.errors import ComputationError, Outcome
-from swgjoint.fe.meshing_run import averages
+from swgjoint.fe.meshing_run import Positions
 from swgjoint.fe.solid.checkpoint import Checkpoint
 from swgjoint.fe.solid.continuation import SolidContinuation
 from swgjoint.fe.solid.drive3d import check_modelled, solid_ring
@@ -25,7 +25,7 @@ from swgjoint.fe.solid.stress import Place, SolidMaxima
 from swgjoint.fe.stress import KINDS
 from swgjoint.gear.design import Design
 from swgjoint.progress import Progress, silent
-from swgjoint.units import arcsec, deg
+from swgjoint.units import deg
 
 Array = NDArray[np.float64]
 
@@ -62,7 +62,7 @@ class SolidStep:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class SolidRun:
+class SolidRun(Positions):
     """A simulation of meshing in space."""
 
     design: Design
@@ -71,12 +71,6 @@ class SolidRun:
     steps: tuple[SolidStep, ...]
     setup: tuple[SolidSetup, ...]
     wall_s: float
-
-    @property
-    def outcome(self) -> Outcome:
-        """Converged, or what the first position that failed says."""
-        failed = (s.outcome for s in self.steps if not s.outcome.ok)
-        return next(failed, Outcome.CONVERGED)
 
     @property
     def nodes(self) -> int:
@@ -96,15 +90,6 @@ class SolidRun:
         if gear is not None:
             total += gear.mesh.elements * self.model.teeth.ring_teeth
         return total
-
-    @property
-    def states(self) -> tuple[SolidState, ...]:
-        """Equilibria of the positions that were solved."""
-        return tuple(step.state for step in self.steps if step.state is not None)
-
-    def series(self, name: str) -> Array:
-        """One quantity of :class:`SolidStep` over the steps."""
-        return np.array([getattr(step, name) for step in self.steps], dtype=float)
 
     def to_json(self) -> dict[str, Any]:
         """The JSON object of ``swgjoint meshing``; per-step stress: flexspline."""
@@ -132,30 +117,13 @@ class SolidRun:
             "steps": len(self.steps),
             "wall_s": self.wall_s,
             "outcome": self.outcome.name.lower(),
-            "flexspline": averages([s.flexspline for s in solved]),
-            "circular_spline": averages([s.circular_spline for s in solved]),
-            "per_step": {
-                "angle_deg": list(self.series("input_angle") / deg),
-                **{
-                    f"{kind}_MPa": [
-                        None
-                        if step.stress is None
-                        else getattr(step.stress.flexspline, kind) / 1e6
-                        for step in self.steps
-                    ]
-                    for kind in KINDS
-                },
+            **self.averages(),
+            "per_step": self.common_series()
+            | {
                 "von_mises_at": [
                     None if step.stress is None else _place(step.stress.place)
                     for step in self.steps
                 ],
-                "pairs_in_contact": [step.pairs_in_contact for step in self.steps],
-                "output_error_arcsec": list(self.series("output_error") / arcsec),
-                "wave_generator_torque_Nm": list(self.series("wave_generator_torque")),
-                "tooth_moment_Nm": list(self.series("tooth_moment")),
-                "energy_J": list(self.series("energy")),
-                "iterations": [step.iterations for step in self.steps],
-                "outcome": [step.outcome.name.lower() for step in self.steps],
             },
             "parts_MPa": _parts(solved),
             "setup_MPa": [

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lu_factor, lu_solve
 
-from swgjoint.fe.cyclic import SingularRingError
+from swgjoint.fe.cyclic import Insides, SingularRingError
 
 Array = NDArray[np.float64]
 
@@ -32,48 +32,27 @@ class RingFactor:
         Raises:
             SingularRingError: If a pivot vanishes.
         """
-        n_sectors, n, _ = blocks.shape
-        self._face, self._sectors = face, n_sectors
-        self._inner = inner = slice(face, n - face)
-        self._outer = outer = np.r_[0:face, n - face : n]
-        try:
-            self._inverse = np.linalg.inv(blocks[:, inner, inner])
-        except np.linalg.LinAlgError as error:
-            raise SingularRingError from error
-        coupling = blocks[:, inner][:, :, outer]
-        self._reach = self._inverse @ coupling
-        schur = blocks[:, outer][:, :, outer]
-        schur = schur - coupling.transpose(0, 2, 1) @ self._reach
-        one, two = slice(0, face), slice(face, None)
+        self._last = last = len(blocks) - 1
+        self._insides = Insides(blocks, face)
+        schur, one, two = self._insides.schur, slice(0, face), slice(face, None)
         own = schur[:, one, one] + np.roll(schur[:, two, two], 1, axis=0)
-        ahead = schur[:, one, two].copy()  # from a face to the next one
-        arrow = schur[-1, two, one].copy()  # from a face to the last one
-        corner = own[-1].copy()
-        self._lu, self._ahead, self._arrow = [], [], []
-        for k in range(n_sectors - 1):
-            if k == n_sectors - 2:
+        ahead = schur[:last, one, two]  # from a face to the next one
+        arrow = schur[last, two, one]  # from a face to the last one
+        corner = own[last].copy()
+        self._lu, self._ahead, self._arrow = [], ahead[:-1], []
+        for k in range(last):
+            if k == last - 1:  # the next face is the last one
                 arrow = arrow + ahead[k]
-            both = np.concatenate([ahead[k], arrow], axis=1)
-            if k == n_sectors - 2:
-                both = arrow
-            lu = lu_factor(own[k], check_finite=False)
-            if not np.abs(np.diag(lu[0])).min() > 0.0:
-                raise SingularRingError
-            solved = lu_solve(lu, both, check_finite=False)
+            lu = _factor(own[k])
+            far = lu_solve(lu, arrow, check_finite=False)
+            corner -= arrow.T @ far
             self._lu.append(lu)
-            if k < n_sectors - 2:
-                next_row = ahead[k].T @ solved
-                own[k + 1] -= next_row[:, :face]
-                corner -= arrow.T @ solved[:, face:]
-                self._ahead.append(ahead[k])
-                self._arrow.append(arrow)
-                arrow = -next_row[:, face:]
-            else:
-                corner -= arrow.T @ solved
-                self._arrow.append(arrow)
-        self._corner = lu_factor(corner, check_finite=False)
-        if not np.abs(np.diag(self._corner[0])).min() > 0.0:
-            raise SingularRingError
+            self._arrow.append(arrow)
+            if k < last - 1:
+                near = lu_solve(lu, ahead[k], check_finite=False)
+                own[k + 1] -= ahead[k].T @ near
+                arrow = -ahead[k].T @ far
+        self._lu.append(_factor(corner))
 
     def solve(self, rhs: Array) -> Array:
         """Solve for many right-hand sides given per sector.
@@ -84,25 +63,24 @@ class RingFactor:
         Returns:
             Solution at the degrees of freedom of each sector (N, n, k).
         """
-        face, n, last = self._face, rhs.shape[1], self._sectors - 1
-        inside = rhs[:, self._inner]
-        outer = rhs[:, self._outer] - self._reach.transpose(0, 2, 1) @ inside
-        faces = outer[:, :face] + np.roll(outer[:, face:], 1, axis=0)
+        last, lu = self._last, self._lu
+        faces = self._insides.on_faces(rhs)
         for k in range(last):
-            faces[k] = lu_solve(self._lu[k], faces[k], check_finite=False)
+            faces[k] = lu_solve(lu[k], faces[k], check_finite=False)
             if k < last - 1:
-                pushed = faces[k]
-                faces[k + 1] -= self._ahead[k].T @ pushed
+                faces[k + 1] -= self._ahead[k].T @ faces[k]
             faces[last] -= self._arrow[k].T @ faces[k]
-        faces[last] = lu_solve(self._corner, faces[last], check_finite=False)
+        faces[last] = lu_solve(lu[last], faces[last], check_finite=False)
         for k in range(last - 1, -1, -1):
             pull = self._arrow[k] @ faces[last]
             if k < last - 1:
                 pull += self._ahead[k] @ faces[k + 1]
-            faces[k] -= lu_solve(self._lu[k], pull, check_finite=False)
-        result = np.empty_like(rhs)
-        result[:, :face] = faces
-        result[:, n - face :] = np.roll(faces, -1, axis=0)
-        both = result[:, self._outer]
-        result[:, self._inner] = self._inverse @ inside - self._reach @ both
-        return result
+            faces[k] -= lu_solve(lu[k], pull, check_finite=False)
+        return self._insides.with_faces(faces, rhs)
+
+
+def _factor(matrix: Array) -> tuple[Array, Array]:
+    lu, pivots = lu_factor(matrix, check_finite=False)
+    if not np.abs(np.diag(lu)).min() > 0.0:
+        raise SingularRingError
+    return lu, pivots

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
 from swgjoint.errors import DesignError
+from swgjoint.fe.block_circulant import between, respond
 from swgjoint.fe.solid.corotation import about_z
 from swgjoint.fe.solid.elasticity import Solid, solid
 from swgjoint.fe.solid.ring_factor import RingFactor
@@ -45,28 +46,15 @@ class RingGear:
 
     def displacement(self, force: Array) -> Array:
         """Flank displacement (N_c, n_b) [m] under flank forces (N_c, n_b) [N]."""
-        return self._respond(self.flank, force)
+        return respond(self.offsets, self.flank, force)
 
     def nodal_displacement(self, force: Array) -> Array:
         """Displacement of all nodes (N_c, n_nodes, 3) [m]."""
-        return self._respond(self.nodal, force).reshape(len(force), -1, 3)
-
-    def _respond(self, blocks: Array, force: Array) -> Array:
-        result = np.zeros((len(force), blocks.shape[1]))
-        loaded = np.flatnonzero(force.any(axis=1))
-        for offset, block in zip(self.offsets, blocks, strict=True):
-            result[(loaded + offset) % len(force)] += force[loaded] @ block.T
-        return result
+        return respond(self.offsets, self.nodal, force).reshape(len(force), -1, 3)
 
     def between(self, tooth: Index, weight: Array, teeth: int) -> Array:
         """Compliance between contact points (n, n) [m/N]; see the plane model."""
-        apart = (tooth[:, None] - tooth[None, :]) % teeth
-        result = np.zeros((len(tooth), len(tooth)))
-        for offset, block in zip(self.offsets, self.flank, strict=True):
-            here = apart == offset % teeth
-            if here.any():
-                result += np.where(here, weight @ block @ weight.T, 0.0)
-        return result
+        return between(self.offsets, self.flank, tooth, weight, teeth)
 
 
 def ring_gear(design: Design, profile: ToothProfile, mesh: StripMesh) -> RingGear:

@@ -1,0 +1,45 @@
+"""Compliance of the teeth of a ring: blocks that depend on the offset of the teeth."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+
+def respond(offsets: Index, blocks: Array, force: Array) -> Array:
+    """Displacement of all teeth (N, n_rows) [m].
+
+    Args:
+        offsets: k - j of the responding and the loaded tooth (n_offsets,).
+        blocks: Response in the frames of the teeth (n_offsets, n_rows, n_b) [m/N].
+        force: On the flanks of every tooth (N, n_b) [N].
+    """
+    result = np.zeros((len(force), blocks.shape[1]))
+    loaded = np.flatnonzero(force.any(axis=1))
+    for offset, block in zip(offsets, blocks, strict=True):
+        result[(loaded + offset) % len(force)] += force[loaded] @ block.T
+    return result
+
+
+def between(
+    offsets: Index, blocks: Array, tooth: Index, weight: Array, teeth: int
+) -> Array:
+    """Compliance between contact points (n, n) [m/N].
+
+    Args:
+        offsets: As in :func:`respond`.
+        blocks: Of the flanks (n_offsets, n_b, n_b) [m/N].
+        tooth: Tooth of each point (n,).
+        weight: Derivative of its gap by the flank displacement (n, n_b).
+        teeth: Teeth in the model.
+    """
+    apart = (tooth[:, None] - tooth[None, :]) % teeth
+    result = np.zeros((len(tooth), len(tooth)))
+    for offset, block in zip(offsets, blocks, strict=True):
+        here = apart == offset % teeth
+        if here.any():
+            result += np.where(here, weight @ block @ weight.T, 0.0)
+    return result
