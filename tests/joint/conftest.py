@@ -11,6 +11,14 @@ import pytest
 
 from swgjoint.joint.attach import attach
 from swgjoint.joint.drive import JointDrive
+from swgjoint.joint.reference import (
+    Motion,
+    metric_of,
+    other_acceleration,
+    relaxed_after,
+    rest_after,
+    scheme_force,
+)
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.hysteresis import Sliders
 
@@ -25,6 +33,18 @@ TWO_MASS = """
   </worldbody>
 </mujoco>
 """
+
+
+@dataclass(frozen=True, eq=False)
+class Twin:
+    """Where the scheme in numpy ends."""
+
+    q: np.ndarray
+    v: np.ndarray
+    rest: tuple[float, ...]
+    relaxed: float | None
+    rubs: list
+    """Friction of every step; none without."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +80,56 @@ class Bench:
             stretch = float(np.dot(drive.friction_direction, x)) - self.bristle[0]
             potential += 0.5 * drive.friction.stiffness * stretch**2
         return float(0.5 * np.sum(inertia * v**2) + potential)
+
+    def motion(self, **history: object) -> Motion:
+        """What the twin sees where the engine stands, after mj_forward."""
+        d = self.data
+        (theta, psi), rates = d.qpos[self.q], d.qvel[self.v]
+        weight, other = d.qLDiagInv[self.v], d.plugin_state[:2]
+        return Motion(
+            theta=theta,
+            psi=psi,
+            theta_rate=rates[0],
+            psi_rate=rates[1],
+            rotor_weight=weight[0],
+            link_weight=weight[1],
+            rotor_acceleration=other[0],
+            link_acceleration=other[1],
+            **history,  # type: ignore[arg-type]
+        )
+
+    def twin(self, steps: int) -> Twin:
+        """Steps of the scheme in numpy from where the engine stands; it stays there."""
+        drive, h = self.drive.drive, self.model.opt.timestep
+        inertia = np.array([self.drive.rotor_inertia, self.drive.link_inertia])
+        q, v = self.data.qpos[self.q].copy(), self.data.qvel[self.v].copy()
+        state, rest, relaxed = (0.0, 0.0), (0.0,) * len(drive.hysteresis), None
+        rubs = []
+        for _ in range(steps):
+            motion = Motion(
+                theta=q[0],
+                psi=q[1],
+                theta_rate=v[0],
+                psi_rate=v[1],
+                rotor_weight=1 / inertia[0],
+                link_weight=1 / inertia[1],
+                rotor_acceleration=state[0],
+                link_acceleration=state[1],
+                rest=rest,
+                relaxed=relaxed,
+            )
+            f = scheme_force(drive, motion, timestep=h, damping=self.drive.damping)
+            total = np.array([f.theta, f.psi]) + self.data.qfrc_applied[self.v]
+            metric = np.diag(inertia) + metric_of(drive, f, timestep=h)
+            v = v + np.linalg.solve(metric, h * total)
+            q = q + h * v
+            rates = {"timestep": h, "theta_rate": v[0], "psi_rate": v[1]}
+            state = other_acceleration(drive, motion, f, **rates)
+            rest = rest_after(drive, motion, timestep=h)
+            if drive.friction is not None:
+                relaxed = relaxed_after(drive, motion, f, **rates)
+                rubs.append(f.friction)
+        return Twin(q=q, v=v, rest=rest, relaxed=relaxed, rubs=rubs)
 
     @property
     def rest(self) -> np.ndarray:

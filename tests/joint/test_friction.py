@@ -19,10 +19,6 @@ from swgjoint.joint.friction_step import friction_step, stretch_after
 from swgjoint.joint.reference import (
     Motion,
     gradient_force,
-    metric_of,
-    other_acceleration,
-    relaxed_after,
-    rest_after,
     scheme_force,
 )
 from swgjoint.maps.drive_map import DriveMap
@@ -61,19 +57,7 @@ def random_motion(b, rng) -> Motion:
     b.place(theta, psi, *rates)
     b.data.plugin_state[:] = rng.normal(0, 30), rng.normal(0, 0.5), *rest, relaxed, 1.0
     mujoco.mj_forward(b.model, b.data)
-    weight, other = b.data.qLDiagInv[b.v], b.data.plugin_state[:2]
-    return Motion(
-        theta=theta,
-        psi=psi,
-        theta_rate=rates[0],
-        psi_rate=rates[1],
-        rotor_weight=weight[0],
-        link_weight=weight[1],
-        rotor_acceleration=other[0],
-        link_acceleration=other[1],
-        rest=tuple(rest),
-        relaxed=relaxed,
-    )
+    return b.motion(rest=tuple(rest), relaxed=relaxed)
 
 
 @pytest.mark.parametrize("integrator", ["RK4", "discrete"])
@@ -116,43 +100,19 @@ def test_trajectory_equals_twin(bench, rubbing):
     """300 loaded steps through rest and back equal the scheme in numpy, state too."""
     rotor = 0.144 / rubbing.ratio**2
     b = bench(rubbing, damping_ratio=0.02, rotor_inertia=rotor)
-    h = b.model.opt.timestep
     rate = 2.0 * abs(rubbing.ratio) / 60
     b.place(0.2, 0.2 / rubbing.ratio, rate, rate / rubbing.ratio)
     b.data.qfrc_applied[b.v] = -8.0 / rubbing.ratio, 3.0
-    inertia = np.array([rotor, b.drive.link_inertia])
-    q, v = b.data.qpos[b.q].copy(), b.data.qvel[b.v].copy()
-    state, rest, relaxed, stuck = (0.0, 0.0), (0.0,), None, 0
-    for _ in range(300):
-        motion = Motion(
-            theta=q[0],
-            psi=q[1],
-            theta_rate=v[0],
-            psi_rate=v[1],
-            rotor_weight=1 / inertia[0],
-            link_weight=1 / inertia[1],
-            rotor_acceleration=state[0],
-            link_acceleration=state[1],
-            rest=rest,
-            relaxed=relaxed,
-        )
-        f = scheme_force(rubbing, motion, timestep=h, damping=b.drive.damping)
-        total = np.array([f.theta, f.psi]) + b.data.qfrc_applied[b.v]
-        metric = np.diag(inertia) + metric_of(rubbing, f, timestep=h)
-        stuck += f.friction.offset == 70.0 * f.friction.stretch
-        v = v + np.linalg.solve(metric, h * total)
-        q = q + h * v
-        rates = {"timestep": h, "theta_rate": v[0], "psi_rate": v[1]}
-        state = other_acceleration(rubbing, motion, f, **rates)
-        rest = rest_after(rubbing, motion, timestep=h)
-        relaxed = relaxed_after(rubbing, motion, f, **rates)
+    twin = b.twin(300)
     mujoco.mj_step(b.model, b.data, 300)
     ratio = abs(rubbing.ratio)
     np.testing.assert_allclose(
-        b.data.qpos[b.q] / [ratio, 1], q / [ratio, 1], rtol=0, atol=1e-9
+        b.data.qpos[b.q] / [ratio, 1], twin.q / [ratio, 1], rtol=0, atol=1e-9
     )
-    np.testing.assert_allclose(b.bristle, [relaxed, 1.0], rtol=0, atol=1e-8 * ratio)
-    assert stuck < 300
+    np.testing.assert_allclose(
+        b.bristle, [twin.relaxed, 1.0], rtol=0, atol=1e-8 * ratio
+    )
+    assert sum(f.offset == 70.0 * f.stretch for f in twin.rubs) < 300
 
 
 positive = st.floats(1e-3, 1e3)

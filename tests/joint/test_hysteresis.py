@@ -13,10 +13,7 @@ import pytest
 from swgjoint.joint import plugin
 from swgjoint.joint.attach import attach
 from swgjoint.joint.reference import (
-    Motion,
     gradient_force,
-    other_acceleration,
-    rest_after,
     scheme_force,
 )
 from swgjoint.joint.region import check_region
@@ -46,18 +43,7 @@ def random_motion(b, rng):
     b.place(theta, psi, *rates)
     b.data.plugin_state[:] = rng.normal(0, 300), rng.normal(0, 5), *rest
     mujoco.mj_forward(b.model, b.data)
-    weight, other = b.data.qLDiagInv[b.v], b.data.plugin_state[:2]
-    return Motion(
-        theta=theta,
-        psi=psi,
-        theta_rate=rates[0],
-        psi_rate=rates[1],
-        rotor_weight=weight[0],
-        link_weight=weight[1],
-        rotor_acceleration=other[0],
-        link_acceleration=other[1],
-        rest=tuple(rest),
-    )
+    return b.motion(rest=tuple(rest))
 
 
 @pytest.mark.parametrize("integrator", ["RK4", "discrete"])
@@ -91,40 +77,15 @@ def test_trajectory_equals_twin(bench, lossy):
     """300 loaded steps with the state of the elements equal the scheme in numpy."""
     rotor = 0.144 / lossy.ratio**2
     b = bench(lossy, damping_ratio=0.02, rotor_inertia=rotor)
-    h = b.model.opt.timestep
     b.place(0.2, 0.2 / lossy.ratio, 20.0, 20.0 / lossy.ratio)
     b.data.qfrc_applied[b.v] = -20.0 / lossy.ratio, 12.0
-    inertia = np.array([rotor, b.drive.link_inertia])
-    q, v = b.data.qpos[b.q].copy(), b.data.qvel[b.v].copy()
-    state, rest = (0.0, 0.0), (0.0, 0.0)
-    for _ in range(300):
-        motion = Motion(
-            theta=q[0],
-            psi=q[1],
-            theta_rate=v[0],
-            psi_rate=v[1],
-            rotor_weight=1 / inertia[0],
-            link_weight=1 / inertia[1],
-            rotor_acceleration=state[0],
-            link_acceleration=state[1],
-            rest=rest,
-        )
-        f = scheme_force(lossy, motion, timestep=h, damping=b.drive.damping)
-        g = np.array([f.g_theta, f.g_psi])
-        total = np.array([f.theta, f.psi]) + b.data.qfrc_applied[b.v]
-        metric = np.diag(inertia) + h**2 * f.metric * np.outer(g, g)
-        v = v + np.linalg.solve(metric, h * total)
-        q = q + h * v
-        state = other_acceleration(
-            lossy, motion, f, timestep=h, theta_rate=v[0], psi_rate=v[1]
-        )
-        rest = rest_after(lossy, motion, timestep=h)
+    twin = b.twin(300)
     mujoco.mj_step(b.model, b.data, 300)
     ratio = abs(lossy.ratio)
     np.testing.assert_allclose(
-        b.data.qpos[b.q] / [ratio, 1], q / [ratio, 1], rtol=0, atol=1e-10
+        b.data.qpos[b.q] / [ratio, 1], twin.q / [ratio, 1], rtol=0, atol=1e-10
     )
-    np.testing.assert_allclose(b.rest, rest, rtol=0, atol=1e-10)
+    np.testing.assert_allclose(b.rest, twin.rest, rtol=0, atol=1e-10)
     assert np.abs(b.rest).min() > 1e-5  # they have slipped
 
 

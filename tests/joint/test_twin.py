@@ -7,9 +7,7 @@ import numpy as np
 import pytest
 
 from swgjoint.joint.reference import (
-    Motion,
     gradient_force,
-    other_acceleration,
     scheme_force,
 )
 
@@ -24,17 +22,7 @@ def random_motion(bench, rng, spread=1.5, speed=30.0):
     bench.place(theta, psi, *rates)
     bench.data.plugin_state[:] = other
     mujoco.mj_forward(bench.model, bench.data)
-    weight = bench.data.qLDiagInv[bench.v]
-    return Motion(
-        theta=theta,
-        psi=psi,
-        theta_rate=rates[0],
-        psi_rate=rates[1],
-        rotor_weight=weight[0],
-        link_weight=weight[1],
-        rotor_acceleration=other[0],
-        link_acceleration=other[1],
-    )
+    return bench.motion()
 
 
 def scale(drive):
@@ -99,43 +87,20 @@ def test_trajectory_equals_twin(bench, any_layout, torque):
     """300 loaded steps, plugin state included, equal the scheme solved in numpy."""
     rotor = 0.144 / any_layout.ratio**2
     b = bench(any_layout, damping_ratio=0.02, rotor_inertia=rotor)
-    h = b.model.opt.timestep
     b.place(0.2, 0.2 / any_layout.ratio, 20.0, 20.0 / any_layout.ratio)
     b.data.qfrc_applied[b.v] = -torque / any_layout.ratio, 0.6 * torque
-    inertia = np.array([rotor, b.drive.link_inertia])
-    q = b.data.qpos[b.q].copy()
-    v = b.data.qvel[b.v].copy()
-    state = (0.0, 0.0)
-    for _ in range(300):
-        motion = Motion(
-            theta=q[0],
-            psi=q[1],
-            theta_rate=v[0],
-            psi_rate=v[1],
-            rotor_weight=1 / inertia[0],
-            link_weight=1 / inertia[1],
-            rotor_acceleration=state[0],
-            link_acceleration=state[1],
-        )
-        f = scheme_force(any_layout, motion, timestep=h, damping=b.drive.damping)
-        g = np.array([f.g_theta, f.g_psi])
-        total = np.array([f.theta, f.psi]) + b.data.qfrc_applied[b.v]
-        metric = np.diag(inertia) + h**2 * f.metric * np.outer(g, g)
-        v = v + np.linalg.solve(metric, h * total)
-        q = q + h * v
-        state = other_acceleration(
-            any_layout, motion, f, timestep=h, theta_rate=v[0], psi_rate=v[1]
-        )
+    twin = b.twin(300)
     mujoco.mj_step(b.model, b.data, 300)
     ratio = abs(any_layout.ratio)
     np.testing.assert_allclose(
-        b.data.qpos[b.q] / [ratio, 1], q / [ratio, 1], rtol=0, atol=1e-10
+        b.data.qpos[b.q] / [ratio, 1], twin.q / [ratio, 1], rtol=0, atol=1e-10
     )
     np.testing.assert_allclose(
-        b.data.qvel[b.v] / [ratio, 1], v / [ratio, 1], rtol=0, atol=1e-7
+        b.data.qvel[b.v] / [ratio, 1], twin.v / [ratio, 1], rtol=0, atol=1e-7
     )
     # what the drive did not cause is what was applied, over the inertia
     if torque:
+        inertia = np.array([rotor, b.drive.link_inertia])
         np.testing.assert_allclose(
             b.data.plugin_state, b.data.qfrc_applied[b.v] / inertia, rtol=1e-6
         )
