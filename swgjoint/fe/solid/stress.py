@@ -30,7 +30,8 @@ def flexspline_stresses(ring: SolidRing, state: SolidState) -> dict[str, Array]:
     ):
         u = segment.displacement(frame.deformation, None if number else loads)
         stress = segment.stresses(u)
-        _average(stress, frame.turn, segment.mesh.first, segment.mesh.last)
+        faces = segment.mesh.first, segment.mesh.last
+        average_faces(stress, frame.turn, *faces, ring.closure)
         found[segment.name] = stress
     return found
 
@@ -46,15 +47,25 @@ def circular_spline_stresses(ring: SolidRing, state: SolidState) -> Array | None
     teeth = ring.teeth.circular_spline.profile.teeth
     turn = about_z(2.0 * np.pi / teeth * np.arange(ring.teeth.ring_teeth, dtype=float))
     segment = gear.mesh.teeth.segment
-    _average(stress, turn, segment.first, segment.last)
+    average_faces(stress, turn, segment.first, segment.last, ring.closure)
     return stress
 
 
-def _average(stress: Array, turn: Array, first: Index, last: Index) -> None:
-    """Average a face over the sectors that share it, in place."""
-    step = np.einsum("sji,sjk->sik", turn, np.roll(turn, -1, axis=0))
-    # the half model closes with a turn that the stress of the next sector shares
-    step[-1] = step[0]
+def average_faces(
+    stress: Array, turn: Array, first: Index, last: Index, closure: Array
+) -> None:
+    """Average a face over the sectors that share it, in place.
+
+    Args:
+        stress: By sector and node in the frames of the sectors (N, n_nodes, 6) [Pa].
+        turn: Those frames (N, 3, 3).
+        first: Nodes on the first face.
+        last: The same on the last one, which the next sector's first face meets.
+        closure: Factors of x, y, z that close the ring, of :class:`SolidRing`.
+    """
+    after = np.roll(turn, -1, axis=0)
+    after[-1] *= closure[:, None]
+    step = np.einsum("sji,sjk->sik", turn, after)
     mean = 0.5 * (
         stress[:, last] + turned_stress(np.roll(stress[:, first], -1, axis=0), step)
     )
