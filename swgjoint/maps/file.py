@@ -199,6 +199,7 @@ def read_map(path: str | Path, cls: type[Map]) -> Map:
         return map_from_bytes(_content(Path(path)), cls)
     except OSError as exc:
         raise MapFileError(f"map {path}: cannot be read: {exc.strerror}") from None
+    # zipfile knows some kinds of compression and encryption by name only
     except (ValueError, zipfile.BadZipFile, NotImplementedError, EOFError) as exc:
         lines = str(exc).splitlines() or [type(exc).__name__]
         more = f" (and {len(lines) - 1} more)" if len(lines) > 1 else ""
