@@ -10,20 +10,60 @@
 namespace swgjoint {
 namespace {
 
-// A and B of a harmonic go through the same products: two lanes at once.
+// Four harmonics go through the same products.
 #if defined(__GNUC__)
-typedef double Pair __attribute__((vector_size(16)));
+typedef double Lanes __attribute__((vector_size(8 * DriveMap::kLanes)));
+#define SWGJOINT_INLINE inline __attribute__((always_inline))
 #else
-struct Pair {
-  double v[2];
+struct Lanes {
+  double v[DriveMap::kLanes];
   double operator[](int i) const { return v[i]; }
-  void operator+=(Pair o) { v[0] += o.v[0], v[1] += o.v[1]; }
+  Lanes& operator+=(const Lanes& o) { return *this = *this + o; }
+  template <class F>
+  static Lanes Each(F f) { return {{f(0), f(1), f(2), f(3)}}; }
+  friend Lanes operator+(const Lanes& a, const Lanes& b) {
+    return Each([&](int i) { return a[i] + b[i]; });
+  }
+  friend Lanes operator-(const Lanes& a, const Lanes& b) {
+    return Each([&](int i) { return a[i] - b[i]; });
+  }
+  friend Lanes operator*(const Lanes& a, const Lanes& b) {
+    return Each([&](int i) { return a[i] * b[i]; });
+  }
+  friend Lanes operator*(const Lanes& a, double b) {
+    return Each([&](int i) { return a[i] * b; });
+  }
+  friend Lanes operator+(double a, const Lanes& b) {
+    return Each([&](int i) { return a + b[i]; });
+  }
 };
-inline Pair operator*(Pair a, Pair b) { return {a[0] * b[0], a[1] * b[1]}; }
-inline Pair operator*(Pair a, double b) { return {a[0] * b, a[1] * b}; }
+#define SWGJOINT_INLINE inline
 #endif
-inline Pair Load(const double* from) { return Pair{from[0], from[1]}; }
-inline void Store(double* to, Pair x) { to[0] = x[0], to[1] = x[1]; }
+SWGJOINT_INLINE void Load(const double* from, Lanes* x) {
+  std::memcpy(x, from, sizeof(Lanes));
+}
+SWGJOINT_INLINE void Store(double* to, const Lanes& x) {
+  std::memcpy(to, &x, sizeof(Lanes));
+}
+// The sums of the lanes of each of four.
+SWGJOINT_INLINE void Sums(const Lanes& a, const Lanes& b, const Lanes& c,
+                          const Lanes& d, double out[4]) {
+#if defined(__GNUC__) && !defined(__clang__)
+  typedef long long Index __attribute__((vector_size(sizeof(Lanes))));
+  const Lanes ab = __builtin_shuffle(a, b, Index{0, 4, 2, 6}) +
+                   __builtin_shuffle(a, b, Index{1, 5, 3, 7});
+  const Lanes cd = __builtin_shuffle(c, d, Index{0, 4, 2, 6}) +
+                   __builtin_shuffle(c, d, Index{1, 5, 3, 7});
+  Store(out, __builtin_shuffle(ab, cd, Index{0, 1, 4, 5}) +
+                 __builtin_shuffle(ab, cd, Index{2, 3, 6, 7}));
+#else
+  const Lanes* all[4] = {&a, &b, &c, &d};
+  for (int k = 0; k < 4; ++k) {
+    const Lanes& x = *all[k];
+    out[k] = (x[0] + x[1]) + (x[2] + x[3]);
+  }
+#endif
+}
 
 double Value(const double w[5], double d) {
   return w[0] + d * (w[1] + d * (w[2] + d * (w[3] + d * w[4])));
@@ -81,29 +121,26 @@ bool ParseNumbers(const char* text, std::vector<double>* out) {
 }
 
 bool DriveMap::Parse(const DriveText& text, std::string* error) {
-  std::vector<double> list;
+  std::vector<double> list, orders;
   if (!Numbers(text.ratio, "ratio", 1, &list, error)) return false;
   ratio_ = list[0];
   if (ratio_ == 0) return Fail(error, "ratio", "is 0");
 
   // orders by (theta, psi), the mean (0, 0) first
-  if (!Numbers(text.orders, "orders", 0, &list, error)) return false;
-  if (list.size() % 2) return Fail(error, "orders", "does not hold pairs");
-  n_ = static_cast<int>(list.size() / 2);
-  n_theta_.resize(n_);
-  n_psi_.resize(n_);
+  if (!Numbers(text.orders, "orders", 0, &orders, error)) return false;
+  if (orders.size() % 2) return Fail(error, "orders", "does not hold pairs");
+  n_ = static_cast<int>(orders.size() / 2);
   for (int k = 0; k < n_; ++k) {
-    n_theta_[k] = list[2 * k];
-    n_psi_[k] = list[2 * k + 1];
-    if (n_theta_[k] != std::rint(n_theta_[k]) || n_psi_[k] != std::rint(n_psi_[k]) ||
-        std::fabs(n_theta_[k]) > 1e6 || std::fabs(n_psi_[k]) > 1e6) {
+    const double theta = orders[2 * k], psi = orders[2 * k + 1];
+    if (theta != std::rint(theta) || psi != std::rint(psi) || std::fabs(theta) > 1e6 ||
+        std::fabs(psi) > 1e6) {
       return Fail(error, "orders", "holds a number that is no integer below 1e6");
     }
-    moves_psi_ |= n_psi_[k] != 0;
-    top_theta_ = std::max(top_theta_, std::fabs(n_theta_[k]));
-    top_psi_ = std::max(top_psi_, std::fabs(n_psi_[k]));
+    moves_psi_ |= psi != 0;
+    top_theta_ = std::max(top_theta_, std::fabs(theta));
+    top_psi_ = std::max(top_psi_, std::fabs(psi));
   }
-  if (n_theta_[0] != 0 || n_psi_[0] != 0) {
+  if (orders[0] != 0 || orders[1] != 0) {
     return Fail(error, "orders", "does not begin with the mean (0 0)");
   }
 
@@ -120,14 +157,33 @@ bool DriveMap::Parse(const DriveText& text, std::string* error) {
       !Numbers(text.kinematic_error, "kinematic_error", n * 2, &list, error)) {
     return false;
   }
-  error_ = list;
+  blocks_ = (n_ - 1 + kLanes - 1) / kLanes;
+  const size_t padded = static_cast<size_t>(blocks_) * kLanes;
+  std::vector<double> n_theta(padded, 0.0), n_psi(padded, 0.0);
+  for (auto* v : {&error_c_, &error_s_, &c_, &s_, &sinc_, &ch_}) {
+    v->assign(padded, 0.0);
+  }
+  weight_.assign(static_cast<size_t>(blocks_) * kWeights, 0.0);
+#ifdef SWGJOINT_AVX2
+  avx2_ = __builtin_cpu_supports("avx2");
+#endif
+  for (int k = 1; k < n_; ++k) {
+    n_theta[k - 1] = orders[2 * k];
+    n_psi[k - 1] = orders[2 * k + 1];
+    error_c_[k - 1] = list[2 * k];
+    error_s_[k - 1] = list[2 * k + 1];
+  }
+  error_mean_ = list[0];
+  n_theta_ = n_theta;
+  n_psi_ = n_psi;
 
   // one table for the intervals and, as parabolas about the end knots, beyond them
   segments_ = m + 2;
   base_.resize(segments_);
   low_.assign(segments_, -std::numeric_limits<double>::infinity());
   high_.assign(segments_, std::numeric_limits<double>::infinity());
-  table_.assign(static_cast<size_t>(segments_) * n_ * 10, 0.0);
+  mean_.assign(static_cast<size_t>(segments_) * 5, 0.0);
+  table_.assign(static_cast<size_t>(segments_) * blocks_ * kBlock, 0.0);
   for (int seg = 0; seg < segments_; ++seg) {
     base_[seg] = knots_[std::clamp(seg - 1, 0, m)];
     if (seg > 0) low_[seg] = knots_[seg - 1];
@@ -145,17 +201,23 @@ bool DriveMap::Parse(const DriveText& text, std::string* error) {
           to[1] = Slope(from, d);
           to[2] = 0.5 * end[4 * k + 2 * ab + (seg == 0 ? 0 : 1)];
         }
-        double* row = &table_[(static_cast<size_t>(seg) * n_ + k) * 10 + ab];
-        for (int p = 0; p < 5; ++p) row[2 * p] = to[p];
+        if (k == 0) {
+          if (ab == 0) std::copy(to, to + 5, &mean_[static_cast<size_t>(seg) * 5]);
+          continue;
+        }
+        const int block = (k - 1) / kLanes, lane = (k - 1) % kLanes;
+        double* row = &table_[(static_cast<size_t>(seg) * blocks_ + block) * kBlock];
+        for (int p = 0; p < 5; ++p) row[(2 * p + ab) * kLanes + lane] = to[p];
       }
     }
   }
 
   // sums and differences of earlier harmonics need no call of sin and cos
-  recipe_.assign(n_, Recipe());
-  for (int k = 1; k < n_; ++k) {
-    for (int a = 1; a < k && recipe_[k].a < 0; ++a) {
-      for (int b = 1; b <= a && recipe_[k].a < 0; ++b) {
+  const int count = n_ - 1;
+  recipe_.assign(count, Recipe());
+  for (int k = 0; k < count; ++k) {
+    for (int a = 0; a < k && recipe_[k].a < 0; ++a) {
+      for (int b = 0; b <= a && recipe_[k].a < 0; ++b) {
         for (double sign : {1.0, -1.0}) {
           if (n_theta_[a] + sign * n_theta_[b] == n_theta_[k] &&
               n_psi_[a] + sign * n_psi_[b] == n_psi_[k]) {
@@ -166,9 +228,6 @@ bool DriveMap::Parse(const DriveText& text, std::string* error) {
       }
     }
   }
-  for (auto* v : {&c_, &s_, &eta_, &sinc_, &ch_}) v->assign(n_, 0.0);
-  for (auto* v : {&weight_, &by_theta_, &by_psi_}) v->assign(2 * n_, 0.0);
-  weight_[0] = 1;  // of the mean
   return true;
 }
 
@@ -184,10 +243,10 @@ int DriveMap::SegmentNear(int guess, double torsion) const {
   return low_[guess] < torsion && torsion < high_[guess] ? guess : Segment(torsion);
 }
 
-void DriveMap::Rotate(double theta, double psi, double* c, double* s) const {
-  c[0] = 1;
-  s[0] = 0;
-  for (int k = 1; k < n_; ++k) {
+void DriveMap::Rotate(double theta, double psi) {
+  double* c = c_.data();
+  double* s = s_.data();
+  for (int k = 0; k < n_ - 1; ++k) {
     const Recipe& r = recipe_[k];
     if (r.a < 0) {
       const double phase = n_theta_[k] * theta + n_psi_[k] * psi;
@@ -201,25 +260,15 @@ void DriveMap::Rotate(double theta, double psi, double* c, double* s) const {
   }
 }
 
-// Coefficients of sum_k weight[2k] A_k + weight[2k+1] B_k in one segment.
-void DriveMap::Combine(int segment, const double* weight, double out[5]) const {
-  Pair sum[5] = {};
-  const double* row = &table_[static_cast<size_t>(segment) * n_ * 10];
-  for (int k = 0; k < n_; ++k, row += 10, weight += 2) {
-    for (int p = 0; p < 5; ++p) sum[p] += Load(weight) * Load(row + 2 * p);
-  }
-  for (int p = 0; p < 5; ++p) out[p] = sum[p][0] + sum[p][1];
-}
-
 void DriveMap::Gradient(double theta, double psi, DriveValue* out) {
   Begin(theta, psi);
   Secant(0.0, 0.0, out);
 }
 
 void DriveMap::Begin(double theta, double psi) {
-  Rotate(theta, psi, c_.data(), s_.data());
-  double e0 = 0;
-  for (int k = 0; k < n_; ++k) e0 += error_[2 * k] * c_[k] + error_[2 * k + 1] * s_[k];
+  Rotate(theta, psi);
+  double e0 = error_mean_;
+  for (int k = 0; k < n_ - 1; ++k) e0 += error_c_[k] * c_[k] + error_s_[k] * s_[k];
   torsion_ = theta / ratio_ + e0 - psi;
   j0_ = SegmentNear(j0_, torsion_);
   d0_ = torsion_ - base_[j0_];
@@ -227,70 +276,137 @@ void DriveMap::Begin(double theta, double psi) {
 
 // sin(eta)/eta and cos(eta) of half the phase step of every harmonic.
 void DriveMap::HalfStep(double dtheta, double dpsi) {
-  const double* __restrict n_theta = n_theta_.data();
-  const double* __restrict n_psi = n_psi_.data();
-  double* __restrict eta = eta_.data();
-  double* __restrict sinc = sinc_.data();
-  double* __restrict ch = ch_.data();
-  const double top = top_theta_ * std::fabs(dtheta) + top_psi_ * std::fabs(dpsi);
-  if (top <= 0.5) {
-    // what a step carries: |eta| <= 1/4, where these series end below 2^-53
-    for (int k = 1; k < n_; ++k) {
-      const double x = 0.5 * (n_theta[k] * dtheta + n_psi[k] * dpsi), z = x * x;
-      eta[k] = x;
-      sinc[k] = 1 + z * (-1. / 6 + z * (1. / 120 + z * (-1. / 5040 + z * (1. / 362880 +
-                z * (-1. / 39916800)))));
-      ch[k] = 1 + z * (-1. / 2 + z * (1. / 24 + z * (-1. / 720 + z * (1. / 40320 +
-              z * (-1. / 3628800 + z * (1. / 479001600))))));
-    }
-  } else {
-    for (int k = 1; k < n_; ++k) {
-      const double x = 0.5 * (n_theta[k] * dtheta + n_psi[k] * dpsi);
-      eta[k] = x;
-      sinc[k] = std::fabs(x) < 1e-4 ? 1 - x * x / 6 : std::sin(x) / x;
-      ch[k] = std::cos(x);
-    }
+  for (int k = 0; k < n_ - 1; ++k) {
+    const double x = 0.5 * (n_theta_[k] * dtheta + n_psi_[k] * dpsi);
+    sinc_[k] = std::fabs(x) < 1e-4 ? 1 - x * x / 6 : std::sin(x) / x;
+    ch_[k] = std::cos(x);
   }
 }
 
-// Weights of all A and B, their sums in the segment of the begin state, and g. One
-// sweep over the table; `row` is that segment's.
-template <bool kPsi>
-void DriveMap::Weigh(const double* row, DriveValue* out) {
-  Pair w[5], u[5] = {}, v[5] = {};
-  Pair g_theta = {}, g_psi = {};
-  // the mean: weight 1 of A, no secants
-  for (int p = 0; p < 5; ++p) w[p] = Pair{row[2 * p], 0.0};
-  for (int k = 1; k < n_; ++k) {
-    row += 10;
-    const double ch = ch_[k], sinc = sinc_[k], sh = eta_[k] * sinc;
-    const double c = c_[k] * ch - s_[k] * sh, s = s_[k] * ch + c_[k] * sh;
-    const Pair mean = Pair{c, s} * ch;
-    const Pair d = Pair{-s, c} * sinc;
-    const Pair theta = d * n_theta_[k];
-    const Pair error = Load(&error_[2 * k]);
-    g_theta += error * theta;
-    Pair table[5];
-    for (int p = 0; p < 5; ++p) table[p] = Load(row + 2 * p);
-    for (int p = 0; p < 5; ++p) w[p] += mean * table[p];
-    for (int p = 0; p < 5; ++p) u[p] += theta * table[p];
-    Store(&weight_[2 * k], mean);
-    Store(&by_theta_[2 * k], theta);
-    if (kPsi) {
-      const Pair psi = d * n_psi_[k];
-      g_psi += error * psi;
-      for (int p = 0; p < 5; ++p) v[p] += psi * table[p];
-      Store(&by_psi_[2 * k], psi);
+// Adds the coefficients of a sum over the harmonics in one segment; `weight` points
+// to those of A and B in the first block.
+void DriveMap::Combine(int segment, const double* weight, double out[5]) const {
+  Lanes sum[5] = {};
+  const double* row = &table_[static_cast<size_t>(segment) * blocks_ * kBlock];
+  for (int b = 0; b < blocks_; ++b, row += kBlock, weight += kWeights) {
+    Lanes wc, ws, even, odd;
+    Load(weight, &wc);
+    Load(weight + kLanes, &ws);
+    for (int p = 0; p < 5; ++p) {
+      Load(row + 2 * p * kLanes, &even);
+      Load(row + (2 * p + 1) * kLanes, &odd);
+      sum[p] += wc * even + ws * odd;
     }
   }
-  for (int p = 0; p < 5; ++p) {
-    w_[p] = w[p][0] + w[p][1];
-    u_theta_[p] = u[p][0] + u[p][1];
-    if (kPsi) u_psi_[p] = v[p][0] + v[p][1];
-  }
-  out->g_theta = 1.0 / ratio_ + (g_theta[0] + g_theta[1]);
-  out->g_psi = g_psi[0] + g_psi[1] - 1.0;
+  double low[4], high[4];
+  Sums(sum[0], sum[1], sum[2], sum[3], low);
+  Sums(sum[4], sum[4], sum[4], sum[4], high);
+  for (int p = 0; p < 4; ++p) out[p] += low[p];
+  out[4] += high[0];
 }
+
+// Weights of all A and B, their sums in the segment of the begin state, and g. One
+// sweep over the table; the processor decides how many lanes go at once, and the result
+// is the same to the last bit. kSmall: no phase moves by more than 0.5.
+template <bool kPsi, bool kSmall>
+SWGJOINT_INLINE void DriveMap::Sweep(double dtheta, double dpsi, DriveValue* out) {
+  const double* __restrict row =
+      table_.data() + static_cast<size_t>(j0_) * blocks_ * kBlock;
+  const double* __restrict in_sinc = sinc_.data();
+  const double* __restrict in_ch = ch_.data();
+  const double* __restrict in_c = c_.data();
+  const double* __restrict in_s = s_.data();
+  const double* __restrict in_theta = n_theta_.data();
+  const double* __restrict in_psi = n_psi_.data();
+  const double* __restrict in_error_c = error_c_.data();
+  const double* __restrict in_error_s = error_s_.data();
+  double* __restrict out_weight = weight_.data();
+  Lanes w[5] = {}, u[5] = {}, v[5] = {}, g_theta = {}, g_psi = {};
+  const int blocks = blocks_;
+  for (int b = 0, k = 0; b < blocks; ++b, k += kLanes, row += kBlock) {
+    Lanes n, m = {}, sinc, ch, c0, s0, error_c, error_s, even, odd;
+    Load(in_theta + k, &n);
+    if (kPsi) Load(in_psi + k, &m);
+    Lanes eta = n * (0.5 * dtheta);
+    if (kPsi) eta += m * (0.5 * dpsi);
+    if (kSmall) {
+      // |eta| <= 1/4, where these series end below 2^-53
+      const Lanes z = eta * eta;
+      sinc = 1 + z * (-1. / 6 + z * (1. / 120 + z * (-1. / 5040 + z * (1. / 362880 +
+             z * (-1. / 39916800)))));
+      ch = 1 + z * (-1. / 2 + z * (1. / 24 + z * (-1. / 720 + z * (1. / 40320 +
+           z * (-1. / 3628800 + z * (1. / 479001600))))));
+    } else {
+      Load(in_sinc + k, &sinc);
+      Load(in_ch + k, &ch);
+    }
+    Load(in_c + k, &c0);
+    Load(in_s + k, &s0);
+    Load(in_error_c + k, &error_c);
+    Load(in_error_s + k, &error_s);
+    const Lanes sh = eta * sinc;
+    const Lanes c = c0 * ch - s0 * sh, s = s0 * ch + c0 * sh;
+    const Lanes mean_c = c * ch, mean_s = s * ch;
+    const Lanes dc = s * sinc * -1, ds = c * sinc;
+    const Lanes theta_c = dc * n, theta_s = ds * n, psi_c = dc * m, psi_s = ds * m;
+    g_theta += error_c * theta_c + error_s * theta_s;
+    if (kPsi) g_psi += error_c * psi_c + error_s * psi_s;
+    double* weight = out_weight + b * kWeights;
+    Store(weight, mean_c);
+    Store(weight + kLanes, mean_s);
+    Store(weight + 2 * kLanes, theta_c);
+    Store(weight + 3 * kLanes, theta_s);
+    if (kPsi) {
+      Store(weight + 4 * kLanes, psi_c);
+      Store(weight + 5 * kLanes, psi_s);
+    }
+    for (int p = 0; p < 5; ++p) {
+      Load(row + 2 * p * kLanes, &even);
+      Load(row + (2 * p + 1) * kLanes, &odd);
+      w[p] += mean_c * even + mean_s * odd;
+      u[p] += theta_c * even + theta_s * odd;
+      if (kPsi) v[p] += psi_c * even + psi_s * odd;
+    }
+  }
+  const double* mean = &mean_[static_cast<size_t>(j0_) * 5];
+  double rest[4];
+  Sums(w[0], w[1], w[2], w[3], w_);
+  Sums(u[0], u[1], u[2], u[3], u_theta_);
+  Sums(w[4], u[4], g_theta, g_psi, rest);
+  for (int p = 0; p < 4; ++p) w_[p] += mean[p];
+  w_[4] = mean[4] + rest[0];
+  u_theta_[4] = rest[1];
+  out->g_theta = 1.0 / ratio_ + rest[2];
+  out->g_psi = rest[3] - 1.0;
+  if (kPsi) {
+    Sums(v[0], v[1], v[2], v[3], u_psi_);
+    Sums(v[4], v[4], v[4], v[4], rest);
+    u_psi_[4] = rest[0];
+  }
+}
+
+SWGJOINT_INLINE void DriveMap::WeighInline(double dtheta, double dpsi, DriveValue* out) {
+  const double top = top_theta_ * std::fabs(dtheta) + top_psi_ * std::fabs(dpsi);
+  if (top <= 0.5) {
+    moves_psi_ ? Sweep<true, true>(dtheta, dpsi, out)
+               : Sweep<false, true>(dtheta, dpsi, out);
+  } else {
+    HalfStep(dtheta, dpsi);
+    moves_psi_ ? Sweep<true, false>(dtheta, dpsi, out)
+               : Sweep<false, false>(dtheta, dpsi, out);
+  }
+}
+
+void DriveMap::Weigh(double dtheta, double dpsi, DriveValue* out) {
+  WeighInline(dtheta, dpsi, out);
+}
+
+#ifdef SWGJOINT_AVX2
+__attribute__((target("avx2"))) void DriveMap::WeighAvx2(double dtheta, double dpsi,
+                                                         DriveValue* out) {
+  WeighInline(dtheta, dpsi, out);
+}
+#endif
 
 // Mean torque across knots: piece by piece, no difference of two large energies.
 void DriveMap::Work(int j1, double x1, DriveValue* out) const {
@@ -298,7 +414,12 @@ void DriveMap::Work(int j1, double x1, DriveValue* out) const {
   const int step = j1 > j0_ ? 1 : -1;
   double from = torsion_;
   for (int j = j0_;; j += step) {
-    Combine(j, weight_.data(), w);
+    if (j == j0_) {
+      std::copy_n(w_, 5, w);
+    } else {
+      std::copy_n(&mean_[static_cast<size_t>(j) * 5], 5, w);
+      Combine(j, weight_.data(), w);
+    }
     const double to = j == j1 ? x1 : knots_[step > 0 ? j : j - 1];
     work += Divided(w, from - base_[j], to - base_[j]) * (to - from);
     from = to;
@@ -318,9 +439,11 @@ void DriveMap::Secant(double dtheta, double dpsi, DriveValue* out) {
   //   cos(phi + eta) - cos(phi - eta) = -2 sin(phi) sin(eta), likewise for sin,
   // so every harmonic has its secant by theta and psi in closed form, and the mean
   // of its two end values is cos(eta) times the value half way.
-  HalfStep(dtheta, dpsi);
-  const double* row = &table_[static_cast<size_t>(j0_) * n_ * 10];
-  moves_psi_ ? Weigh<true>(row, out) : Weigh<false>(row, out);
+#ifdef SWGJOINT_AVX2
+  avx2_ ? WeighAvx2(dtheta, dpsi, out) : Weigh(dtheta, dpsi, out);
+#else
+  Weigh(dtheta, dpsi, out);
+#endif
   const double x1 = torsion_ + (out->g_theta * dtheta + out->g_psi * dpsi);
   const int j1 = SegmentNear(j0_, x1);
   const double d1 = x1 - base_[j1];
@@ -338,13 +461,13 @@ void DriveMap::Secant(double dtheta, double dpsi, DriveValue* out) {
   out->slope = std::clamp(out->slope, 0.5 * bound.first, 0.5 * bound.second);
 
   // explicit derivative by the angles: mean of its values at the two torsions
-  const auto angle = [&](const double u[5], const std::vector<double>& weight) {
-    double end[5];
-    if (j1 != j0_) Combine(j1, weight.data(), end);
+  const auto angle = [&](const double u[5], int weights) {
+    double end[5] = {0, 0, 0, 0, 0};
+    if (j1 != j0_) Combine(j1, weight_.data() + weights * kLanes, end);
     return 0.5 * (Value(u, d0_) + Value(j1 == j0_ ? u : end, d1));
   };
-  out->e_theta = angle(u_theta_, by_theta_);
-  out->e_psi = moves_psi_ ? angle(u_psi_, by_psi_) : 0.0;
+  out->e_theta = angle(u_theta_, 2);
+  out->e_psi = moves_psi_ ? angle(u_psi_, 4) : 0.0;
 }
 
 }  // namespace swgjoint

@@ -6,6 +6,11 @@
 #include <string>
 #include <vector>
 
+// A second version of the inner loop, chosen at run time.
+#if defined(__GNUC__) && defined(__x86_64__)
+#define SWGJOINT_AVX2
+#endif
+
 namespace swgjoint {
 
 // Text attributes of an instance, as they stand in the model.
@@ -33,6 +38,11 @@ struct DriveValue {
 
 class DriveMap {
  public:
+  static constexpr int kLanes = 4;            // harmonics side by side
+  static constexpr int kBlock = 10 * kLanes;  // A0, B0, .. A4, B4 of them
+  // weights of A and B of them in the mean, in the secants by theta and by psi
+  static constexpr int kWeights = 6 * kLanes;
+
   // On failure returns false and says in `error` which attribute is wrong.
   bool Parse(const DriveText& text, std::string* error);
 
@@ -59,13 +69,20 @@ class DriveMap {
   int Segment(double torsion) const;
   int SegmentNear(int guess, double torsion) const;
   void HalfStep(double dtheta, double dpsi);
-  template <bool kPsi>
-  void Weigh(const double* row, DriveValue* out);
+  template <bool kPsi, bool kSmall>
+  void Sweep(double dtheta, double dpsi, DriveValue* out);
+  void WeighInline(double dtheta, double dpsi, DriveValue* out);
+  void Weigh(double dtheta, double dpsi, DriveValue* out);
+#ifdef SWGJOINT_AVX2
+  void WeighAvx2(double dtheta, double dpsi, DriveValue* out);
+  bool avx2_ = false;
+#endif
   void Work(int j1, double x1, DriveValue* out) const;
-  void Rotate(double theta, double psi, double* c, double* s) const;
+  void Rotate(double theta, double psi);
   void Combine(int segment, const double* weight, double out[5]) const;
 
-  int n_ = 0;         // harmonics, the mean first
+  int n_ = 0;         // harmonics, the mean included
+  int blocks_ = 0;    // of kLanes harmonics without the mean, zeros at the end
   int segments_ = 0;  // intervals between knots and the two continuations
   bool moves_psi_ = false;  // whether a harmonic depends on psi
   double ratio_ = 1;
@@ -73,19 +90,22 @@ class DriveMap {
   std::vector<double> knots_;
   std::vector<double> base_;   // (segments) torsion about which a segment expands
   std::vector<double> low_, high_;  // (segments) open interval of a segment
-  std::vector<double> table_;       // (segments, n, 10): A0, B0, .. A4, B4
+  std::vector<double> mean_;        // (segments, 5): A0, .. A4 of the mean
+  std::vector<double> table_;       // (segments, blocks, kBlock)
+  double error_mean_ = 0;
+  // per harmonic without the mean, padded to whole blocks
   std::vector<double> n_theta_, n_psi_;
-  std::vector<double> error_;  // (n, 2): amplitudes of cos and sin in e0
+  std::vector<double> error_c_, error_s_;  // amplitudes of cos and sin in e0
   std::vector<Recipe> recipe_;
 
   // begin state
   double torsion_ = 0, d0_ = 0;
   int j0_ = 0;  // segment; between steps the first guess, which changes no result
-  std::vector<double> c_, s_;  // (n) cos and sin of the phases
+  std::vector<double> c_, s_;  // cos and sin of the phases
 
-  // step, of (n) or (n, 2), so that nothing is allocated
-  std::vector<double> eta_, sinc_, ch_;  // half the phase step, sin(eta)/eta, cos(eta)
-  std::vector<double> weight_, by_theta_, by_psi_;  // of A and B: mean, secants
+  // step; sized beforehand, so that nothing is allocated
+  std::vector<double> sinc_, ch_;  // of half the phase step: sin(eta)/eta, cos(eta)
+  std::vector<double> weight_;     // (blocks, kWeights)
   double w_[5] = {}, u_theta_[5] = {}, u_psi_[5] = {};  // their sums in segment j0
 };
 
