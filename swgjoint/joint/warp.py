@@ -1,0 +1,214 @@
+r"""Level ``full`` in MuJoCo Warp: the law of the engine plugin as a passive callback.
+
+MuJoCo Warp takes no engine plugins. Its ``discrete`` integrator builds the metric after
+the passive stage from ``ten_J`` and ``ten_length``, as the engine does, so a callback
+can hand over direction and stiffness of the same step, see
+:mod:`swgjoint.joint.reference`, for many worlds at once::
+
+    drive = swgjoint.attach(spec, joint="j", drive=drive_map, rotor_inertia=4e-5)
+    model = without_plugin(spec)
+    m, d = mjw.put_model(model), mjw.make_data(model, nworld=4096)
+    install(m, d, [drive])
+    mjw.step(m, d)  # also inside a captured graph
+
+Held: potential with all harmonics, kinematic error, hysteresis, damping. Refused:
+friction of the map, and every integrator but ``discrete``.
+
+The law is evaluated in double precision, the engine's state is in single: a position
+is rounded by 6e-8 of itself, which is noise of about 1e-7 K in the torque at an output
+angle of 1 rad. A world's time must move on with every step, for it tells a step from a
+repeated ``forward`` and from a reset; single precision holds that for 1e7 steps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from swgjoint.errors import InputError, MissingExtraError
+from swgjoint.joint import plugin
+from swgjoint.joint.drive import JointDrive
+from swgjoint.maps.drive_map import DriveMap
+
+try:
+    import warp as wp
+
+    from swgjoint.joint.warp_law import Drive, Maps, Step, articulated, law, real, vec5
+except ImportError as error:
+    raise MissingExtraError(
+        "drives in MuJoCo Warp need mujoco-warp: pip install 'swgjoint[warp]'"
+    ) from error
+
+
+def without_plugin(spec: mujoco.MjSpec) -> mujoco.MjModel:
+    """Compile a spec without the drive plugin; rotors and tendons stay."""
+    plain = spec.copy()
+    for body in plain.bodies:
+        if body.plugin.plugin_name == plugin.NAME:
+            body.plugin.active = False
+    for instance in list(plain.plugins):
+        if instance.plugin_name == plugin.NAME:
+            plain.delete(instance)
+    return plain.compile()
+
+
+class WarpDrives:
+    """The callback: drives on a model of MuJoCo Warp, in a fixed number of worlds."""
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        drives: Sequence[JointDrive],
+        *,
+        worlds: int,
+        device: Any,
+    ) -> None:
+        rows: list[Any] = []
+        parts: dict[str, list[np.ndarray]] = {
+            "harmonic": [],
+            "segment": [],
+            "row": [],
+            "element": [],
+        }
+        for drive in drives:
+            one = _place(model, drive)
+            for key, values in _arrays(drive.drive).items():
+                setattr(one, key, sum(len(part) for part in parts[key]))
+                if key != "row":
+                    setattr(one, f"{key}s", len(values))
+                parts[key].append(values)
+            rows.append(one)
+        with wp.ScopedDevice(device):
+            self.maps = Maps()
+            for key, part in parts.items():
+                kind = vec5 if key == "row" else real
+                array = wp.array(np.concatenate(part), dtype=kind)
+                setattr(self.maps, key, array)
+            self.drives = wp.array(rows, dtype=Drive)
+            elements = sum(len(part) for part in parts["element"])
+            self.rest = wp.zeros((worlds, max(elements, 1)), dtype=real)
+            unknown = Step()
+            unknown.time = float("inf")  # taken as a reset
+            self.steps = wp.full((worlds, len(rows)), unknown, dtype=Step)
+            self.inertia = wp.zeros((worlds, model.nC), dtype=float)
+
+    def __call__(self, m: Any, d: Any) -> None:
+        """Add the drives to the passive forces and the metric of every world."""
+        # without springs the engine leaves the tendon out of its metric, too
+        if m.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_SPRING:
+            return
+        damped = not m.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_DAMPER
+        wp.launch(
+            articulated,
+            dim=d.nworld,
+            inputs=[m.M_rownnz, m.M_rowadr, m.M_colind, d.M, m.nv],
+            outputs=[self.inertia],
+        )
+        wp.launch(
+            law,
+            dim=(d.nworld, self.drives.size),
+            inputs=[
+                m.opt.timestep,
+                real(float(damped)),
+                self.drives,
+                self.maps,
+                m.M_rownnz,
+                m.M_rowadr,
+                self.inertia,
+                d.time,
+                d.qpos,
+                d.qvel,
+                d.ten_velocity,
+            ],
+            outputs=[self.steps, self.rest, d.ten_J, d.ten_length, d.qfrc_passive],
+        )
+
+
+def install(m: Any, d: Any, model: mujoco.MjModel, drives: Sequence[JointDrive]) -> Any:
+    """Let drives of level ``full`` act on a model of MuJoCo Warp.
+
+    Args:
+        m: What ``mujoco_warp.put_model`` made of ``model``; gets the callback.
+        d: Its data; as many worlds are served, on the same device.
+        model: What :func:`without_plugin` made of the spec.
+        drives: What ``attach`` returned; other levels are native and need nothing.
+
+    Returns:
+        The callback, :class:`WarpDrives`.
+
+    Raises:
+        InputError: For what is not held here.
+    """
+    integrator = mujoco.mjtIntegrator(int(m.opt.integrator))
+    if integrator != mujoco.mjtIntegrator.mjINT_DISCRETE:
+        name = integrator.name.removeprefix("mjINT_").lower()
+        raise InputError(
+            f"integrator {name}: drives in MuJoCo Warp hold under discrete; accepted:"
+            " discrete"
+        )
+    if m.callback.passive is not None:
+        raise InputError(
+            "the model of MuJoCo Warp has a passive callback already; accepted: none,"
+            " call both from one of your own"
+        )
+    full = [drive for drive in drives if drive.level == "full"]
+    for drive in full:
+        if drive.friction is not None:
+            raise InputError(
+                f"joint {drive.joint!r}: friction of the map is not held in MuJoCo"
+                " Warp; accepted: attach(..., friction=False), or level native"
+            )
+    call = WarpDrives(model, full, worlds=d.nworld, device=d.qpos.device)
+    m.callback.passive = call
+    return call
+
+
+def _place(model: mujoco.MjModel, drive: JointDrive) -> Any:
+    """Addresses of a drive in the model."""
+    try:
+        rotor, link = model.joint(drive.rotor), model.joint(drive.joint)
+        tendon = int(model.tendon(drive.tendon).id)
+    except KeyError as error:
+        raise InputError(
+            f"joint {drive.joint!r}: its drive is not in the model: {error}; accepted:"
+            " the model of without_plugin(spec)"
+        ) from error
+    one = Drive()
+    one.tendon = tendon
+    one.q_rotor, one.q_link = int(rotor.qposadr[0]), int(link.qposadr[0])
+    one.v_rotor, one.v_link = int(rotor.dofadr[0]), int(link.dofadr[0])
+    row = int(model.ten_J_rowadr[tendon])
+    columns = list(model.ten_J_colind[row : row + int(model.ten_J_rownnz[tendon])])
+    one.entry_rotor = row + columns.index(one.v_rotor)
+    one.entry_link = row + columns.index(one.v_link)
+    one.ratio, one.damping = drive.ratio, drive.damping
+    return one
+
+
+def _arrays(drive: DriveMap) -> dict[str, np.ndarray]:
+    """Rows of one map, as :class:`Maps` holds them."""
+    knots, n = drive.torsion_knots, len(drive.orders)
+    inside = np.moveaxis(drive.potential, 2, 0)  # (segments, harmonics, 2, 5)
+    ends = np.zeros((2, n, 2, 5))  # parabolas about the end knots
+    for power in (0, 1):
+        ends[..., power] = drive.coefficients(knots[[0, -1]], power)
+    ends[..., 2] = 0.5 * np.moveaxis(drive.end_stiffness, 2, 0)
+    return {
+        "harmonic": np.column_stack(
+            [drive.angle_orders.astype(float), drive.kinematic_error]
+        ),
+        "segment": np.column_stack(
+            [
+                np.concatenate([[-np.inf], knots]),
+                np.concatenate([knots, [np.inf]]),
+                knots[[0, *range(len(knots))]],
+            ]
+        ),
+        "row": np.concatenate([ends[:1], inside, ends[1:]]).reshape(-1, 5),
+        "element": np.array(
+            [(e.stiffness, e.yield_torsion) for e in drive.hysteresis]
+        ).reshape(-1, 2),
+    }

@@ -1,0 +1,398 @@
+# mypy: ignore-errors
+"""Kernels of :mod:`swgjoint.joint.warp`, in the language of Warp and with its types.
+
+The law as ``drive.cc`` and ``drive_map.cc`` compute it, without friction; one thread
+for one drive in one world.
+"""
+
+import warp as wp
+
+from swgjoint.joint import plugin
+
+real = wp.float64
+vec5 = wp.types.vector(length=5, dtype=real)
+_SPRING, _, _CUBIC = plugin.TENDON_STIFFNESS
+SPRING, CUBIC = wp.constant(real(_SPRING)), wp.constant(real(_CUBIC))
+NU1 = wp.constant(real(plugin.NUMERICAL_DAMPING))
+PASSES = wp.constant(plugin.PASSES)
+ZERO, HALF, ONE = (wp.constant(real(x)) for x in (0.0, 0.5, 1.0))
+
+
+@wp.struct
+class Drive:
+    """One drive: where it is in the model, and its rows in the arrays of the maps."""
+
+    tendon: int
+    q_rotor: int
+    q_link: int
+    v_rotor: int
+    v_link: int
+    entry_rotor: int
+    """Of the rotor in the tendon's row of ``ten_J``."""
+    entry_link: int
+    harmonic: int
+    """First one, then how many."""
+    harmonics: int
+    segment: int
+    """Below the knots, between them, and above."""
+    segments: int
+    row: int
+    """First row of the polynomials: segments, harmonics, A and B."""
+    element: int
+    elements: int
+    ratio: real
+    damping: real
+
+
+@wp.struct
+class Step:
+    """What the last evaluation left to the next, in one world."""
+
+    time: float
+    v_rotor: real
+    v_link: real
+    w_rotor: real
+    w_link: real
+    g_theta: real
+    g_psi: real
+    e_theta: real
+    e_psi: real
+    force: real
+    metric: real
+    torsion: real
+    a_rotor: real
+    """Acceleration that all other forces caused [rad/s²]."""
+    a_link: real
+
+
+@wp.struct
+class Sums:
+    """Harmonics of one segment over a step: coefficients in powers of the torsion."""
+
+    mean: vec5
+    by_theta: vec5
+    by_psi: vec5
+    g_theta: real
+    g_psi: real
+
+
+@wp.struct
+class Secant:
+    """Discrete gradient of V over a step, hysteresis added."""
+
+    begin: real
+    """Torsion at the beginning, and its change."""
+    change: real
+    g_theta: real
+    g_psi: real
+    torque: real
+    slope: real
+    k0: real
+    k1: real
+    e_theta: real
+    e_psi: real
+
+
+@wp.struct
+class Maps:
+    """All maps, one after the other."""
+
+    harmonic: wp.array2d(dtype=real)
+    """n_theta, n_psi, cosine and sine of e0."""
+    segment: wp.array2d(dtype=real)
+    """Begin, end and the torsion about which it expands [rad]."""
+    row: wp.array(dtype=vec5)
+    element: wp.array2d(dtype=real)
+    """Stiffness [N·m/rad] and reach [rad]."""
+
+
+@wp.func
+def value(w: vec5, d: real):
+    """Polynomial of the torsion about the base of its segment."""
+    return w[0] + d * (w[1] + d * (w[2] + d * (w[3] + d * w[4])))
+
+
+@wp.func
+def slope(w: vec5, d: real):
+    """Its first derivative."""
+    return w[1] + d * (real(2.0) * w[2] + d * (real(3.0) * w[3] + d * real(4.0) * w[4]))
+
+
+@wp.func
+def curvature(w: vec5, d: real):
+    """Its second derivative."""
+    return real(2.0) * w[2] + d * (real(6.0) * w[3] + d * real(12.0) * w[4])
+
+
+@wp.func
+def divided(w: vec5, a: real, b: real):
+    """(w(b) - w(a))/(b - a) without a difference."""
+    both = a + b
+    squares = a * a + b * b
+    return w[1] + w[2] * both + w[3] * (squares + a * b) + w[4] * both * squares
+
+
+@wp.func
+def divided_slope(w: vec5, a: real, b: real):
+    """Derivative of that by b."""
+    return (
+        w[2]
+        + w[3] * (a + real(2.0) * b)
+        + w[4] * (a * a + real(2.0) * a * b + real(3.0) * b * b)
+    )
+
+
+@wp.func
+def segment_at(drive: Drive, maps: Maps, torsion: real):
+    """Segment of a drive in which a torsion lies."""
+    found = int(0)  # noqa: RUF046, UP018  # a literal is a constant to Warp
+    for j in range(1, drive.segments):
+        if torsion >= maps.segment[drive.segment + j, 0]:
+            found = j
+    return found
+
+
+@wp.func
+def torsion_at(drive: Drive, maps: Maps, theta: real, psi: real):
+    """theta/i + e0 - psi."""
+    x = theta / drive.ratio - psi
+    for k in range(drive.harmonic, drive.harmonic + drive.harmonics):
+        phase = maps.harmonic[k, 0] * theta + maps.harmonic[k, 1] * psi
+        x += maps.harmonic[k, 2] * wp.cos(phase) + maps.harmonic[k, 3] * wp.sin(phase)
+    return x
+
+
+@wp.func
+def weigh(
+    drive: Drive,
+    maps: Maps,
+    segment: int,
+    theta: real,
+    psi: real,
+    dtheta: real,
+    dpsi: real,
+):
+    """Mean of the harmonics at both ends of a step, and their secants by the angles."""
+    out = Sums()
+    out.g_theta = ONE / drive.ratio
+    out.g_psi = -ONE
+    for k in range(drive.harmonics):
+        n_theta = maps.harmonic[drive.harmonic + k, 0]
+        n_psi = maps.harmonic[drive.harmonic + k, 1]
+        eta = HALF * (n_theta * dtheta + n_psi * dpsi)
+        phase = n_theta * theta + n_psi * psi + eta  # half way
+        sinc = ONE - eta * eta / real(6.0)
+        if wp.abs(eta) > real(1e-4):
+            sinc = wp.sin(eta) / eta
+        c, s = wp.cos(phase), wp.sin(phase)
+        row = drive.row + 2 * (segment * drive.harmonics + k)
+        a, b = maps.row[row], maps.row[row + 1]
+        out.mean += wp.cos(eta) * (c * a + s * b)
+        secant = sinc * (c * b - s * a)
+        out.by_theta += n_theta * secant
+        out.by_psi += n_psi * secant
+        error = sinc * (
+            c * maps.harmonic[drive.harmonic + k, 3]
+            - s * maps.harmonic[drive.harmonic + k, 2]
+        )
+        out.g_theta += n_theta * error
+        out.g_psi += n_psi * error
+    return out
+
+
+@wp.func
+def secant_over(
+    drive: Drive, maps: Maps, theta: real, psi: real, dtheta: real, dpsi: real
+):
+    """Discrete gradient of V over a step of the angles, as in ``drive_map.cc``."""
+    out = Secant()
+    out.begin = torsion_at(drive, maps, theta, psi)
+    j0 = segment_at(drive, maps, out.begin)
+    d0 = out.begin - maps.segment[drive.segment + j0, 2]
+    sums = weigh(drive, maps, j0, theta, psi, dtheta, dpsi)
+    out.g_theta = sums.g_theta
+    out.g_psi = sums.g_psi
+    out.change = sums.g_theta * dtheta + sums.g_psi * dpsi
+    x1 = out.begin + out.change
+    j1 = segment_at(drive, maps, x1)
+    d1 = x1 - maps.segment[drive.segment + j1, 2]
+    last = weigh(drive, maps, j1, theta, psi, dtheta, dpsi)
+    if j0 == j1:
+        out.torque = divided(sums.mean, d0, d1)
+        out.slope = divided_slope(sums.mean, d0, d1)
+    else:
+        # piece by piece across the knots, no difference of two large energies
+        work = real(0.0)
+        begin = real(out.begin)
+        j = int(j0)
+        for _ in range(wp.abs(j1 - j0) + 1):
+            piece = weigh(drive, maps, j, theta, psi, dtheta, dpsi)
+            base = maps.segment[drive.segment + j, 2]
+            to = x1
+            if j < j1:
+                to = maps.segment[drive.segment + j, 1]
+            if j > j1:
+                to = maps.segment[drive.segment + j, 0]
+            work += divided(piece.mean, begin - base, to - base) * (to - begin)
+            begin = to
+            j += wp.where(j1 > j0, 1, -1)
+        out.torque = work / out.change
+        out.slope = (slope(last.mean, d1) - out.torque) / out.change
+    out.k0 = curvature(sums.mean, d0)
+    out.k1 = curvature(last.mean, d1)
+    low, high = HALF * wp.min(out.k0, out.k1), HALF * wp.max(out.k0, out.k1)
+    out.slope = wp.clamp(out.slope, low, high)
+    out.e_theta = HALF * (value(sums.by_theta, d0) + value(last.by_theta, d1))
+    out.e_psi = HALF * (value(sums.by_psi, d0) + value(last.by_psi, d1))
+    return out
+
+
+@wp.func
+def slip(s: Secant, stiffness: real, reach: real, rest: real):
+    """Add the mean torque of one element of the hysteresis over the step."""
+    begin = wp.clamp(s.begin - rest, -reach, reach)
+    free = begin + s.change
+    end = wp.clamp(free, -reach, reach)
+    sticks = real(1.0)
+    if end != free:
+        sticks = (end - begin) / s.change
+    s.torque += stiffness * (HALF * (begin + end) * sticks + end * (ONE - sticks))
+    s.slope += HALF * stiffness * sticks * sticks
+    s.k0 += stiffness * sticks
+    s.k1 += stiffness * sticks
+    return s
+
+
+@wp.kernel
+def articulated(
+    M_rownnz: wp.array(dtype=int),
+    M_rowadr: wp.array(dtype=int),
+    M_colind: wp.array(dtype=int),
+    M: wp.array2d(dtype=float),
+    nv: int,
+    out: wp.array2d(dtype=float),
+):
+    """M with the dofs eliminated from the leaves: its diagonal is what each dof moves.
+
+    MuJoCo Warp has no factor of M before the passive stage, and other ones than this.
+    """
+    world = wp.tid()
+    for j in range(out.shape[1]):
+        out[world, j] = M[world, j]
+    for n in range(nv):
+        k = nv - 1 - n
+        row, ancestors = M_rowadr[k], M_rownnz[k] - 1
+        for a in range(ancestors):
+            factor = out[world, row + a] / out[world, row + ancestors]
+            other = M_rowadr[M_colind[row + a]]
+            for b in range(a + 1):
+                out[world, other + b] -= factor * out[world, row + b]
+
+
+@wp.kernel
+def law(
+    timestep: wp.array(dtype=float),
+    damped: real,
+    drives: wp.array(dtype=Drive),
+    maps: Maps,
+    M_rownnz: wp.array(dtype=int),
+    M_rowadr: wp.array(dtype=int),
+    inertia: wp.array2d(dtype=float),
+    time: wp.array(dtype=float),
+    qpos: wp.array2d(dtype=float),
+    qvel: wp.array2d(dtype=float),
+    ten_velocity: wp.array2d(dtype=float),
+    steps: wp.array2d(dtype=Step),
+    rest: wp.array2d(dtype=real),
+    ten_J: wp.array2d(dtype=float),
+    ten_length: wp.array2d(dtype=float),
+    qfrc_passive: wp.array2d(dtype=float),
+):
+    """Force, direction and stiffness of one drive in one world, as in ``drive.cc``."""
+    world, index = wp.tid()
+    drive = drives[index]
+    h = real(timestep[world % timestep.shape[0]])
+    vm, vl = real(qvel[world, drive.v_rotor]), real(qvel[world, drive.v_link])
+
+    # what was learned since the last evaluation: a step, a reset or nothing
+    last = steps[world, index]
+    if time[world] > last.time:
+        rm, rl = vm - last.v_rotor, vl - last.v_link
+        done = last.force + h * last.metric * (last.g_theta * rm + last.g_psi * rl)
+        last.a_rotor = rm / h + last.w_rotor * (last.g_theta * done + last.e_theta)
+        last.a_link = rl / h + last.w_link * (last.g_psi * done + last.e_psi)
+        for j in range(drive.element, drive.element + drive.elements):
+            low = last.torsion - maps.element[j, 1]
+            high = last.torsion + maps.element[j, 1]
+            rest[world, j] = wp.clamp(rest[world, j], low, high)
+    if time[world] < last.time:
+        last.a_rotor = ZERO
+        last.a_link = ZERO
+        for j in range(drive.element, drive.element + drive.elements):
+            rest[world, j] = ZERO
+
+    # take the native spring of the tendon out again, as the engine applied it
+    length = real(ten_length[world, drive.tendon])
+    native = length * (SPRING + CUBIC * length * length)
+    on_rotor = native * real(ten_J[world, drive.entry_rotor])
+    on_link = native * real(ten_J[world, drive.entry_link])
+
+    # inverse articulated inertias
+    rotor_end = M_rowadr[drive.v_rotor] + M_rownnz[drive.v_rotor] - 1
+    link_end = M_rowadr[drive.v_link] + M_rownnz[drive.v_link] - 1
+    wm, wl = ONE / real(inertia[world, rotor_end]), ONE / real(inertia[world, link_end])
+
+    # the scheme is a midpoint rule in positions half a step back
+    theta = real(qpos[world, drive.q_rotor]) - HALF * h * vm
+    psi = real(qpos[world, drive.q_link]) - HALF * h * vl
+    c = damped * drive.damping
+    dm, dl = real(0.0), real(0.0)
+    force, p = real(0.0), real(0.0)
+    s = Secant()
+    for _ in range(PASSES):
+        s = secant_over(
+            drive, maps, theta, psi, h * (vm + HALF * dm), h * (vl + HALF * dl)
+        )
+        for j in range(drive.element, drive.element + drive.elements):
+            s = slip(s, maps.element[j, 0], maps.element[j, 1], rest[world, j])
+        k = wp.max(ZERO, HALF * (s.k0 + s.k1))
+        w = s.g_theta * s.g_theta * wm + s.g_psi * s.g_psi * wl
+        ka = h * h * k * w
+        nu = NU1 * ka * ka / (real(16.0) + ka * ka)
+        force = s.torque - HALF * h * s.slope * (s.g_theta * dm + s.g_psi * dl)
+        force += (nu * k * h + c) * (s.g_theta * vm + s.g_psi * vl)
+        p = HALF * s.slope + real(0.75) * nu * k + HALF * c / h
+        # the step of the pair that this causes, for the next pass
+        am, al = last.a_rotor - wm * s.e_theta, last.a_link - wl * s.e_psi
+        turn = h * (s.g_theta * am + s.g_psi * al - w * force)
+        f = force + h * p * turn / (ONE + h * h * w * p)
+        dm = h * (am - wm * s.g_theta * f)
+        dl = h * (al - wl * s.g_psi * f)
+
+    # the tangent of the tendon's cubic spring at this length is the stiffness p
+    tangent = wp.max(ZERO, p - SPRING) / (real(3.0) * CUBIC)
+    length = wp.max(real(1e-12), wp.sqrt(tangent))
+    p = SPRING + real(3.0) * CUBIC * length * length
+    # the engine will add -h p times the tendon's velocity along g: cancel it
+    along = force - h * p * real(ten_velocity[world, drive.tendon])
+    on_rotor -= along * s.g_theta + s.e_theta
+    on_link -= along * s.g_psi + s.e_psi
+    ten_length[world, drive.tendon] = float(length)
+    ten_J[world, drive.entry_rotor] = float(s.g_theta)
+    ten_J[world, drive.entry_link] = float(s.g_psi)
+    qfrc_passive[world, drive.v_rotor] += float(on_rotor)
+    qfrc_passive[world, drive.v_link] += float(on_link)
+
+    last.time = time[world]
+    last.v_rotor = vm
+    last.v_link = vl
+    last.w_rotor = wm
+    last.w_link = wl
+    last.g_theta = s.g_theta
+    last.g_psi = s.g_psi
+    last.e_theta = s.e_theta
+    last.e_psi = s.e_psi
+    last.force = force
+    last.metric = p
+    last.torsion = s.begin
+    steps[world, index] = last

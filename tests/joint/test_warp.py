@@ -1,0 +1,279 @@
+"""Drives in MuJoCo Warp: the law of the plugin, on the CPU device, in many worlds.
+
+Not among the packages of the extra ``test`` (warp-lang alone is a wheel of 150 MB).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+import pytest
+
+from swgjoint.errors import InputError
+from swgjoint.joint.attach import attach
+from swgjoint.joint.reference import Motion, scheme_force
+from swgjoint.maps.drive_map import DriveMap
+from swgjoint.maps.friction import Friction
+from swgjoint.maps.hysteresis import Jenkin
+
+mjw = pytest.importorskip(
+    "mujoco_warp", reason="not installed; to run this: pip install 'swgjoint[warp]'"
+)
+wp = pytest.importorskip("warp")
+warp = pytest.importorskip("swgjoint.joint.warp")
+
+ELEMENTS = (
+    Jenkin(stiffness=1e4, yield_torque=3.0),
+    Jenkin(stiffness=3e3, yield_torque=6.0),
+)
+PAIR = """
+<mujoco>
+  <option timestep="1e-3" integrator="discrete" gravity="0 0 0"/>
+  <worldbody>
+    <body pos="0 0 .5">
+      <joint name="j" axis="0 0 1"/>
+      <inertial pos="0 0 0" mass="3" diaginertia=".4 .4 .4"/>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+ARM = """
+<mujoco>
+  <option timestep="1e-3" integrator="discrete"/>
+  <worldbody>
+    <body>
+      <joint name="a" axis="0 1 0" damping="1"/>
+      <inertial pos="0 0 .3" mass="6" diaginertia=".2 .2 .02"/>
+      <body pos="0 0 .6">
+        <joint name="b" axis="0 1 0" damping="1"/>
+        <inertial pos="0 0 .2" mass="3" diaginertia=".06 .06 .01"/>
+        <body pos="0 0 .4">
+          <joint name="c" axis="1 0 0" damping=".1"/>
+          <inertial pos="0 .1 .05" mass="1" diaginertia=".004 .003 .003"/>
+        </body>
+      </body>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+
+
+class Both:
+    """The same model in MuJoCo with the plugin and in MuJoCo Warp without it."""
+
+    def __init__(self, xml, drive, joints=("j",), worlds=1, **keys):
+        spec = mujoco.MjSpec.from_string(xml)
+        keys = {"rotor_inertia": 4e-5, "damping_ratio": 0.02} | keys
+        self.drives = [attach(spec, joint=j, drive=drive, **keys) for j in joints]
+        self.model = spec.compile()
+        self.data = mujoco.MjData(self.model)
+        self.plain = warp.without_plugin(spec)
+        with wp.ScopedDevice("cpu"):
+            self.m = mjw.put_model(self.plain)
+            self.d = mjw.make_data(self.plain, nworld=worlds)
+        self.call = warp.install(self.m, self.d, self.plain, self.drives)
+
+    def put(self, qpos, qvel, force=0.0):
+        """Set every world to a state in single precision, and MuJoCo to the first."""
+        shape = (self.d.nworld, -1)
+        for name, values in (
+            ("qpos", qpos),
+            ("qvel", qvel),
+            ("qfrc_applied", force + np.zeros(self.model.nv)),
+        ):
+            values = np.atleast_2d(np.asarray(values, np.float32))
+            rows = np.broadcast_to(values, (self.d.nworld, values.shape[1]))
+            getattr(self.d, name).assign(rows.reshape(shape))
+            getattr(self.data, name)[:] = values[0]
+
+    def pair(self, drive):
+        """Addresses of rotor and link."""
+        joints = [self.model.joint(name) for name in (drive.rotor, drive.joint)]
+        return [int(j.dofadr[0]) for j in joints]
+
+
+@pytest.fixture(params=["circular_spline_fixed", "flexspline_fixed"])
+def drive(request, synthetic_map: DriveMap) -> DriveMap:
+    """The synthetic map with side bands, without and with hysteresis."""
+    elements = ELEMENTS if request.param == "flexspline_fixed" else ()
+    return replace(synthetic_map, layout=request.param, hysteresis=elements)
+
+
+def test_force_direction_and_stiffness_equal_reference(drive):
+    """In 64 random worlds the callback hands over what the law in numpy says.
+
+    The states are made by two steps under random forces, so that the memory of the
+    scheme counts. Forces are handed over in single precision: 1e-6 of the largest.
+    """
+    both = Both(PAIR, drive, worlds=64)
+    rng = np.random.default_rng(3)
+    one, ((q, v),) = both.drives[0], [(both.pair(both.drives[0]),) * 2]
+    psi = rng.uniform(-0.3, 0.3, 64)
+    reach = 1.3 * drive.torsion_knots[-1]
+    theta = drive.ratio * (psi + rng.uniform(-reach, reach, 64))
+    both.put(
+        np.stack([theta, psi], -1)[:, np.argsort(q)],
+        rng.normal(0, [30.0, 0.5], (64, 2))[:, np.argsort(v)],
+        rng.normal(0, [1.0, 40.0], (64, 2))[:, np.argsort(v)],
+    )
+    for _ in range(2):
+        mjw.step(both.m, both.d)
+    mjw.forward(both.m, both.d)
+
+    d, h = both.d, float(both.m.opt.timestep.numpy()[0])
+    steps, rest = both.call.steps.numpy(), both.call.rest.numpy()
+    tendon = both.plain.tendon(one.tendon).id
+    largest = max(abs(t) for t in drive.torque_range)
+    knots, crossed = drive.torsion_knots, 0
+    for world in range(64):
+        (theta, psi), (dtheta, dpsi) = (
+            d.qpos.numpy()[world][q].astype(float),
+            d.qvel.numpy()[world][v].astype(float),
+        )
+        want = scheme_force(
+            drive,
+            Motion(
+                theta=theta,
+                psi=psi,
+                theta_rate=dtheta,
+                psi_rate=dpsi,
+                rotor_weight=1 / 4e-5,
+                link_weight=1 / 0.4,
+                rotor_acceleration=steps[world, 0]["a_rotor"],
+                link_acceleration=steps[world, 0]["a_link"],
+                rest=tuple(rest[world][: len(drive.hysteresis)]),
+            ),
+            timestep=h,
+            damping=one.damping,
+        )
+        g = np.array([want.g_theta, want.g_psi])
+        length = float(d.ten_length.numpy()[world, tendon])
+        assert 1e-9 + 3 * length**2 == pytest.approx(want.metric, rel=1e-6)
+        entries = [both.call.drives.numpy()[0][f"entry_{k}"] for k in ("rotor", "link")]
+        np.testing.assert_allclose(d.ten_J.numpy()[world][entries], g, rtol=1e-6)
+        shift = h * want.metric * float(d.ten_velocity.numpy()[world, tendon]) * g
+        np.testing.assert_allclose(
+            d.qfrc_passive.numpy()[world][v] * [abs(drive.ratio), 1],
+            (np.array([want.theta, want.psi]) + shift) * [abs(drive.ratio), 1],
+            rtol=0,
+            atol=1e-6 * (largest + np.abs(shift[1])),
+        )
+        begin = drive.torsion(theta - h * dtheta / 2, psi - h * dpsi / 2)
+        end = drive.torsion(theta + h * dtheta / 2, psi + h * dpsi / 2)
+        crossed += int(np.digitize(begin, knots) != np.digitize(end, knots))
+    assert crossed > 5  # also pieces of several polynomials
+
+
+def test_pair_moves_as_with_the_plugin(drive):
+    """250 loaded steps of a pair equal MuJoCo with the plugin.
+
+    The torsion swings by 2e-3 rad. Single precision rounds the angle of the rotor by
+    2e-7 rad and more, and the difference of the two swings grows with time: 2.5e-7 rad
+    at the end, 8e-7 after twice as many steps.
+    """
+    both = Both(PAIR, drive)
+    order = np.argsort(both.pair(both.drives[0]))
+    speed = 20.0
+    both.put(
+        np.array([0.0, 0.0])[order],
+        np.array([speed, speed / drive.ratio])[order],
+        np.array([-40.0 / drive.ratio, 24.0])[order],
+    )
+    torsion = []
+    for _ in range(250):
+        mujoco.mj_step(both.model, both.data)
+        mjw.step(both.m, both.d)
+        states = both.data.qpos[order], both.d.qpos.numpy()[0][order]
+        torsion.append([float(drive.torsion(*q)) for q in states])
+    torsion = np.array(torsion)
+    assert np.ptp(torsion[:, 0]) > 1e-3
+    np.testing.assert_allclose(torsion[:, 1], torsion[:, 0], rtol=0, atol=1e-6)
+
+
+def test_arm_moves_as_with_the_plugin(drive):
+    """Three driven joints of a falling arm, 150 steps, equal MuJoCo with the plugin.
+
+    4e-7 rad apart where the links have moved by up to 1.3 rad.
+    """
+    both = Both(ARM, drive, joints=("a", "b", "c"))
+    mujoco.mj_forward(both.model, both.data)
+    start = np.zeros(both.model.nq)
+    both.put(start, np.zeros(both.model.nv), 0.1 * np.arange(both.model.nv))
+    for _ in range(150):
+        mujoco.mj_step(both.model, both.data)
+        mjw.step(both.m, both.d)
+    links = [both.pair(one)[1] for one in both.drives]
+    want, got = both.data.qpos[links], both.d.qpos.numpy()[0][links]
+    assert np.abs(want).max() > 0.05
+    np.testing.assert_allclose(got, want, rtol=0, atol=2e-6)
+
+
+def test_articulated_inertia_is_that_of_the_engine(drive):
+    """The weights of the prediction are MuJoCo's, which factors M from the leaves."""
+    both = Both(ARM, drive, joints=("a", "b", "c"))
+    qpos = np.random.default_rng(1).uniform(-1, 1, both.model.nq)
+    both.put(qpos, np.zeros(both.model.nv))
+    mujoco.mj_forward(both.model, both.data)
+    mjw.forward(both.m, both.d)
+    for k, one in enumerate(both.drives):
+        step = both.call.steps.numpy()[0, k]
+        want = both.data.qLDiagInv[both.pair(one)]
+        # products of single precision
+        assert [step["w_rotor"], step["w_link"]] == pytest.approx(want, rel=1e-5)
+
+
+def test_repeated_forward_changes_nothing_and_reset_forgets(drive):
+    """``forward`` between steps leaves the memory alone; a reset empties it."""
+    ends = []
+    both = Both(PAIR, drive)
+    for extra in (0, 2):
+        mjw.reset_data(both.m, both.d)
+        both.put([0.0, 0.0], [5.0, 0.1], [0.5, -20.0])
+        for _ in range(20):
+            for _ in range(extra):
+                mjw.forward(both.m, both.d)
+            mjw.step(both.m, both.d)
+        ends.append(both.d.qpos.numpy().copy())
+    np.testing.assert_array_equal(ends[0], ends[1])
+
+
+def test_energy_is_kept(synthetic_map):
+    """Without damping the scheme neither makes nor takes energy in 300 steps.
+
+    Harmonics that the step carries, h w = 0.25: both lose 0.06 %.
+    """
+    drive = synthetic_map.with_harmonics(synthetic_map.orders[:, 0] < 100)
+    both = Both(PAIR.replace("1e-3", "5e-4"), drive, damping_ratio=0.0)
+    order = np.argsort(both.pair(both.drives[0]))
+
+    def energies():
+        states = [(both.data.qpos, both.data.qvel)]
+        states += [(both.d.qpos.numpy()[0], both.d.qvel.numpy()[0])]
+        for q, v in states:
+            v = v[order].astype(float)
+            x = q[order] - 0.5 * both.model.opt.timestep * v
+            potential = drive.energy(drive.torsion(*x), *x)
+            yield float(0.5 * np.array([4e-5, 0.4]) @ v**2 + potential)
+
+    both.put(np.array([0.1, 0.0])[order], np.zeros(2))
+    found = []
+    for _ in range(301):
+        mujoco.mj_step(both.model, both.data)
+        mjw.step(both.m, both.d)
+        found.append(list(energies()))
+    assert found[-1] == pytest.approx(found[0], rel=2e-3)
+
+
+def test_what_is_not_held_is_refused(synthetic_map):
+    """Friction of the map and other integrators raise one line, nothing gets lost."""
+    friction = Friction(stiffness=70.0, coulomb=0.05, static=0.05)
+    rubbing = replace(synthetic_map, friction=friction)
+    with pytest.raises(InputError, match="friction of the map is not held"):
+        Both(PAIR, rubbing, friction=True)
+    with pytest.raises(InputError, match="integrator rk4"):
+        Both(PAIR.replace("discrete", "RK4"), synthetic_map)
+    both = Both(PAIR, synthetic_map)
+    with pytest.raises(InputError, match="callback already"):
+        warp.install(both.m, both.d, both.plain, both.drives)
