@@ -30,7 +30,7 @@ from swgjoint.maps.torsion_table import on_knots
 
 Array = NDArray[np.float64]
 
-KEEP = 0.01
+KEEP = 0.005
 """Harmonics are kept whose kinematic error, or input-torque ripple at some load,
 reaches this part of the largest one."""
 

@@ -44,6 +44,16 @@ def test_map_of_a_design(layout):
 
 
 @pytest.mark.fe
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["reference-2d", "reference-2d-simplified"])
+def test_derivative_is_the_unseen_input_torque(name):
+    """The map of a design gives the input torque within 2 % of its ripple."""
+    check = build_map(Design.load(name), cache=False).info["energy_check"]
+    # at the worst torque, that of no-load cogging among them
+    assert check["relative"] < 0.02
+
+
+@pytest.mark.fe
 def test_energy_follows_from_torque():
     """Strain energy of the samples against the integral of torque over torsion."""
     given = samples("circular_spline_fixed")
