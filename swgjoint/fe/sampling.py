@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.errors import ComputationError
-from swgjoint.fe.continuation import Continuation
+from swgjoint.fe.continuation import Continuation, Unloaded
 from swgjoint.fe.drive2d import can_halve, left_out, ring_model
 from swgjoint.fe.state import State
-from swgjoint.fe.tolerance_sampling import sample_tolerances
+from swgjoint.fe.tolerance_sampling import SMALL, sample_tolerances
 from swgjoint.gear.cup import cup_torsional_stiffness
 from swgjoint.gear.design import Design
 from swgjoint.gear.kinematics import angle_coefficients, periodicity
@@ -29,6 +29,9 @@ Array = NDArray[np.float64]
 ANGLES = 96
 """Input positions over one pitch: contact events leave corners in the error, and 24
 positions alias them into a tenth of the ripple, 48 into a few percent, 96 into 2 %."""
+FAINT = 1e-8
+"""Part of the torque that takes up a clearance, that acts at its ends: no stiffness is
+zero."""
 EVERY = 4
 """Of these positions are solved in the second pitch, too."""
 LEVELS = (0.05, 0.15, 0.35, 0.65, 1.0)
@@ -42,14 +45,25 @@ class _Rows:
     """Solved positions of each torque; the table grows position by position."""
 
     follow: Continuation
+    small: float
+    """Torque that takes up a clearance [N·m]."""
     tick: Callable[[], None]
+    rest: list[Unloaded] = field(default_factory=list)
     states: dict[float, list[State]] = field(default_factory=dict)
 
-    def start(self, first: State, torques: list[float]) -> None:
+    @property
+    def free(self) -> bool:
+        """Whether clearance leaves the output free without torque somewhere."""
+        return any(one.sides is not None for one in self.rest)
+
+    def start(self, torques: list[float]) -> None:
         """Load the first position from zero torque outwards until a solve fails."""
-        self.states[0.0] = [first]
+        state = self.follow.meshed(self.follow.deflected())
+        if not state.outcome.ok:
+            raise _no_rest(0.0, state)
+        self._stand(self.follow.unloaded(state, self.small), 0.0)
         for sign in (1.0, -1.0):
-            state = first
+            state = self._towards(sign)
             for torque in sorted((t for t in torques if t * sign > 0.0), key=abs):
                 state = self.follow.to_torque(state, torque)
                 if not state.outcome.ok:
@@ -59,21 +73,13 @@ class _Rows:
 
     def advance(self, theta: float) -> None:
         """Add a position to every torque; drop those that fail and those beyond."""
-        unloaded = self.follow.to_angle(self.states[0.0][-1], theta)
-        if not unloaded.outcome.ok:
-            raise ComputationError(
-                f"no equilibrium without torque at input angle {theta:g} rad: "
-                f"{unloaded.outcome.value}"
-            )
+        self._stand(self.follow.unloaded_to(self.rest[-1], theta), theta)
         lost = set()
         for torque in sorted(self.states, key=abs):
-            if torque == 0.0:
-                self.states[torque].append(unloaded)
-                continue
             if (torque > 0.0) not in lost:
                 state = self.follow.to_angle(self.states[torque][-1], theta)
                 if not state.outcome.ok:
-                    state = self.follow.to_torque(unloaded, torque)
+                    state = self.follow.to_torque(self._towards(torque), torque)
                 if state.outcome.ok:
                     self.states[torque].append(state)
                     self.tick()
@@ -81,16 +87,88 @@ class _Rows:
             lost.add(torque > 0.0)
             del self.states[torque]
 
-    def table(self, torque: float, theta: Array) -> Array:
-        """Output error, energy, tangent compliance, input torque. Shape (4, n)."""
+    def tables(self, theta: Array) -> dict[float, Array]:
+        """Output error, energy, tangent compliance, input torque of every torque.
+
+        Shape (4, n) each. Clearance adds rows, see :func:`across_clearance`.
+        """
+        found = {torque: self._table(row, theta) for torque, row in self.states.items()}
+        found[0.0] = self._table([one.state for one in self.rest], theta)
+        if self.free:
+            for side, sign in ((0, 1.0), (1, -1.0)):
+                if not any(torque * sign > 0.0 for torque in self.states):
+                    continue
+                row = [
+                    one.sides[side]
+                    if one.sides is not None
+                    else self.follow.to_torque(one.state, sign * self.small)
+                    for one in self.rest
+                ]
+                taken_up = self._table(row, theta)
+                begin, onset = across_clearance(found[0.0], taken_up, sign * self.small)
+                found |= {sign * self.small: taken_up, begin: onset}
+            # the same stiffness on both sides of the middle
+            found[0.0][2] = onset[2]
+        return found
+
+    def _stand(self, unloaded: Unloaded, theta: float) -> None:
+        if not unloaded.state.outcome.ok:
+            raise _no_rest(theta, unloaded.state)
+        self.rest.append(unloaded)
+        self.tick()
+
+    def _towards(self, torque: float) -> State:
+        """Where a torque of this sign begins at the last position."""
+        rest = self.rest[-1]
+        if rest.sides is None:
+            return rest.state
+        return rest.sides[0 if torque > 0.0 else 1]
+
+    def _table(self, states: list[State], theta: Array) -> Array:
         follow = self.follow
         rows = [
             (follow.output_angle(s), s.energy, s.compliance, follow.input_torque(s))
-            for s in self.states[torque]
+            for s in states
         ]
         values = np.array(rows).T
         values[0] -= theta / follow.ratio
         return values
+
+
+def _no_rest(theta: float, state: State) -> ComputationError:
+    return ComputationError(
+        f"no equilibrium without torque at input angle {theta:g} rad:"
+        f" {state.outcome.value}"
+    )
+
+
+def across_clearance(
+    rest: Array, taken_up: Array, torque: float
+) -> tuple[float, Array]:
+    r"""Where the teeth begin to hold an output that is free without torque.
+
+    From the middle of the clearance the torque rises to the :data:`FAINT` part of the
+    one that takes it up; there the stiffness begins to grow, to K under that torque at
+    :math:`\ell = 3 T / 2 K`. A linear spring would begin at T/K with the energy
+    :math:`T^2 / 2 K`; a stiffness that grows steadily stores nearly that on this way.
+
+    Args:
+        rest: Output error, energy, compliance and input torque in the middle (4, n).
+        taken_up: The same under ``torque`` (4, n).
+        torque: A small one [N·m].
+
+    Returns:
+        Torque [N·m] and table (4, n) of the begin.
+    """
+    begin = FAINT * torque
+    apart = taken_up[0] - rest[0]  # against the sign of the torque
+    way = np.clip(1.0 - 1.5 * torque * taken_up[2] / -apart, 0.1, 1.0)
+    onset = rest.copy()
+    onset[0] += way * apart
+    onset[1] -= 0.5 * begin * way * apart
+    onset[2] = -way * apart / begin
+    onset[3] += FAINT * (taken_up[3] - rest[3])
+    return begin, onset
 
 
 def _mirrored(values: Array) -> Array:
@@ -144,18 +222,20 @@ def sample_map(
         done += 1
         progress(f"{drive.name}: equilibria", min(done, total), total)
 
-    rows = _Rows(follow=follow, tick=tick)
+    rows = _Rows(follow=follow, small=SMALL * ratings.rated_torque, tick=tick)
     try:
-        rows.start(_unloaded(follow), torques)
+        rows.start(torques)
         for angle in theta[1:]:
             rows.advance(float(angle))
+        tables = rows.tables(theta)
     except ComputationError as failure:
         raise ComputationError(f"{drive.name}: {failure}") from failure
 
-    tables = {torque: rows.table(torque, theta) for torque in rows.states}
-    truncated = len(tables) < len(torques) + 1
+    truncated = len(rows.states) < len(torques)
     # a second pitch, at the torque next to rated
-    check = min(tables, key=lambda t: abs(t - ratings.rated_torque))
+    if not rows.states:
+        raise _too_few(design, parts)
+    check = min(rows.states, key=lambda t: abs(t - ratings.rated_torque))
     state, second = rows.states[check][-1], []
     for angle in theta[::EVERY]:
         state = follow.to_angle(state, period + float(angle))
@@ -174,7 +254,7 @@ def sample_map(
     }
     if symmetric:
         opposite = {-t: _mirrored(values) for t, values in tables.items() if t}
-        solved = follow.to_torque(rows.states[0.0][1], -check)
+        solved = follow.to_torque(rows.rest[1].state, -check)
         there = follow.output_angle(solved) - theta[1] / design.ratio
         there -= opposite[-check][0, 1]
         info["mirror"] = {
@@ -185,10 +265,7 @@ def sample_map(
 
     used = np.array(sorted(tables))
     if used[0] >= 0.0 or used[-1] <= 0.0 or used.size < 5:
-        raise ComputationError(
-            f"{drive.name}: too few torques can be solved; the smallest is "
-            f"{parts[0]:g} N·m of {ratings.repeated_peak:g} N·m repeated peak"
-        )
+        raise _too_few(design, parts)
     error, energy, compliance, input_torque = np.array(
         [tables[t] for t in used]
     ).swapaxes(0, 1)
@@ -226,6 +303,7 @@ def sample_map(
         compliance=compliance,
         input_torque=input_torque,
         tolerances=tolerances,
+        free=rows.free,
         info=info
         | {
             "design_hash": design.content_hash(),
@@ -255,11 +333,8 @@ def _named(design: Design) -> dict[str, float] | None:
     return {k: v for k, v in values.items() if v} if has_errors(design) else None
 
 
-def _unloaded(follow: Continuation) -> State:
-    """The meshed drive at the first position without torque."""
-    state = follow.meshed(follow.deflected())
-    if state.outcome.ok:
-        state = follow.to_torque(state, 0.0)
-    if not state.outcome.ok:
-        raise ComputationError(f"no equilibrium without torque: {state.outcome.value}")
-    return state
+def _too_few(design: Design, parts: list[float]) -> ComputationError:
+    return ComputationError(
+        f"{design.drive.name}: too few torques can be solved; the smallest is "
+        f"{parts[0]:g} N·m of {parts[-1]:g} N·m repeated peak"
+    )

@@ -34,6 +34,9 @@ KEEP = 0.005
 """Harmonics are kept whose kinematic error, or input-torque ripple at some load,
 reaches this part of the largest one."""
 
+LADDER = 12
+"""Most knots across the end of a clearance."""
+
 
 def quartic_chain(knots: Array, values: Array) -> tuple[Array, Array]:
     """Piecewise quartics with given value, slope and second derivative at the knots.
@@ -178,7 +181,33 @@ def _knots(samples: MapSamples, torsion: Array) -> Array:
         ends = found.torque[[0, -1]]
         knots = mean(np.clip(samples.torque, *ends))
     knots[zero] = 0.0
+    if found is None and samples.free:
+        up = _clearance_knots(knots[zero + 3 :], torsion[zero + 1 : zero + 3])
+        down = _clearance_knots(
+            -knots[: zero - 2][::-1], -torsion[zero - 2 : zero][::-1]
+        )
+        knots = np.concatenate([-down[::-1], [0.0], up])
     return np.asarray(knots)
+
+
+def _clearance_knots(beyond: Array, ends: Array) -> Array:
+    """Knots of one side with a ladder across the end of the clearance.
+
+    Its place varies with the angle, more than the teeth of a stiff drive give: from
+    where no angle has left the clearance to where all have, in steps of one angle.
+
+    Args:
+        beyond: Usual knots, from the first torque after the one that takes up the
+            clearance (n,).
+        ends: Torsion at the end of the clearance and where it is taken up
+            (2, n_angles).
+    """
+    first, last = float(ends[0].min()), float(ends[1].max())
+    step = float((ends[1] - ends[0]).mean())
+    count = min(LADDER, int(np.ceil((last - first) / step)))
+    ladder = np.linspace(first, last, count + 1)
+    kept = beyond[beyond > last + 0.5 * (ladder[1] - ladder[0])]
+    return np.concatenate([ladder, kept])
 
 
 def _modes(values: Array) -> Array:
@@ -309,6 +338,8 @@ def energy_check(drive: DriveMap, samples: MapSamples) -> dict[str, float]:
     inside = (samples.torque > drive.torque_range[0]) & (
         samples.torque < drive.torque_range[1]
     )
+    if samples.free:  # the corner at the end of the clearance
+        inside[[zero - 2, zero - 1, zero + 1, zero + 2]] = False
     ripple = np.ptp(samples.input_torque, axis=1)
     energy = drive.energy(drive.torsion(theta, psi), theta, psi)
     gain = samples.energy - samples.energy[zero]

@@ -112,6 +112,9 @@ class MapSamples:
     """External torque on the input; not used by the fit, only to judge it [N·m]."""
     tolerances: ToleranceSamples | None = None
     """The drive with errors of its teeth; None without."""
+    free: bool = False
+    """Whether clearance leaves the output free without torque. The torques next to zero
+    are then no equilibria: they stand at the ends of the clearance."""
     info: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
