@@ -179,7 +179,8 @@ class FatigueFactors:
     """K_z, for an axial stress of about 0.3 of that around; von Mises would say
     1 - 0.3 + 0.3^2 = 0.79."""
     bending_shape: float = 1.510
-    """C_sigma, four forces at 25 deg from the major axis."""
+    """C_sigma, four forces at 25 deg from the major axis; the series gives 1.519, at
+    the minor axis."""
     shear_shape: float = 0.506
     """C_tau, the same."""
 

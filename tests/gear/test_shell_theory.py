@@ -80,6 +80,16 @@ def test_bending_stress_of_the_article():
     assert np.abs(stress[2:-2]).max() == pytest.approx(SHELL.bending_stress(), rel=1e-4)
 
 
+def test_shape_factor_of_four_forces():
+    """Loads at 25 deg from the major axis bend a ring by about the printed C_sigma."""
+    n = np.arange(2.0, 4000.0, 2.0)
+    share = np.cos(n * np.deg2rad(25.0)) / (n**2 - 1.0)
+    phi = np.linspace(0.0, pi / 2, 91)
+    bent = np.abs(share @ np.cos(np.outer(n, phi))).max()
+    factor = 0.5 * bent / np.sum(share / (n**2 - 1.0))
+    assert factor == pytest.approx(FatigueFactors().bending_shape, rel=0.01)
+
+
 def test_safety_factor_of_the_article():
     """S = 2.17 at 100 N·m, and it falls with the torque."""
     found = shell_safety_factor(SHELL, 100.0, **LIMITS)

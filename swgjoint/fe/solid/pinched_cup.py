@@ -37,9 +37,10 @@ from swgjoint.fe.solid.memory import require_memory, required_memory
 from swgjoint.fe.solid.ring_factor import RingFactor
 from swgjoint.fe.solid.segment import Segment, condense_segment
 from swgjoint.fe.solid.smooth_strip import smooth_strip
+from swgjoint.fe.solid.stress import average_faces
 from swgjoint.fe.solid.strip_mesh import StripMesh, flexspline_strip
 from swgjoint.gear.design import Design
-from swgjoint.gear.profile import tooth_profile
+from swgjoint.gear.profile import ToothProfile, tooth_profile
 from swgjoint.units import mm
 
 Array = NDArray[np.float64]
@@ -50,6 +51,8 @@ PLACES = ("mid_face", "open_edge", "face_width")
 MAX_ITERATIONS = 40
 STEP_TOLERANCE = 1e-10
 """Displacement increment at which the iteration ends [m]."""
+CLOSURE = np.array([-1.0, -1.0, 1.0])
+"""Factors of x, y, z that close the half."""
 ORDERS = Orders(wall=2)
 """Straight lines through the wall of the cup make it 1 % too stiff; what these orders
 leave is 0.2 %."""
@@ -90,6 +93,8 @@ class PinchedCup:
     segments: tuple[Segment, ...]
     root: float
     """Radius of the outside of the wall [m]."""
+    bore: int
+    """Loaded points on the bore, plane after plane; those on the flanks follow."""
 
     @cached_property
     def reference(self) -> Array:
@@ -137,15 +142,15 @@ class PinchedCup:
         Raises:
             ComputationError: If Newton's method fails.
         """
-        teeth = self.segments[0]
         share = self.share(place)
-        count = len(teeth.loaded) // (3 * len(share))
-        weight = np.repeat(share / count, count)
+        count = self.bore // len(share)
+        weight = np.zeros(len(self.segments[0].loaded) // 3)
+        weight[: self.bore] = np.repeat(share / count, count)
         x, last = self.reference.copy(), np.inf
         for iteration in range(1, MAX_ITERATIONS + 1):
             frames = self._frames(x, nonlinear)
             row, load = self._row(frames[0], weight, force)
-            step = self._step(frames, row, load, force)
+            step = self._step(frames, load[None], force * row[None])
             x += step.reshape(x.shape)
             last = float(np.abs(step).max())
             if last < STEP_TOLERANCE or not nonlinear:
@@ -156,11 +161,9 @@ class PinchedCup:
             f"{self.name}: two loads of {force:g} N: {Outcome.MAX_ITERATIONS.value}"
         )
 
-    def _frames(self, x: Array, nonlinear: bool) -> tuple[Frames, ...]:
+    def _frames(self, x: Array, fitted: bool) -> tuple[Frames, ...]:
         return tuple(
-            segment_frames(
-                segment, x[:, segment.masters], self._place, fitted=nonlinear
-            )
+            segment_frames(segment, x[:, segment.masters], self._place, fitted=fitted)
             for segment in self.segments
         )
 
@@ -190,15 +193,16 @@ class PinchedCup:
         row = carried + turning @ frame.gradient[0]
         return (row.reshape(-1, 3) @ frame.turn[0].T).ravel(), load
 
-    def _step(
-        self,
-        frames: tuple[Frames, ...],
-        row: Array,
-        load: Array,
-        force: float,
-    ) -> Array:
-        """Newton increment of the masters (N, 3 n) [m]."""
-        n = 3 * self.masters.size
+    def _step(self, frames: tuple[Frames, ...], loads: Array, pushed: Array) -> Array:
+        """Newton increment of the masters (N, 3 n) [m].
+
+        Args:
+            frames: Of all segments.
+            loads: Forces at the loaded points of the first k sectors, in their frames
+                (k, 3 p) [N].
+            pushed: The same on the masters of the teeth, global frame (k, 3 m) [N].
+        """
+        n, few = 3 * self.masters.size, len(loads)
         out = np.zeros((self.sectors, n))
         matrix = np.zeros((self.sectors, n, n))
         for number, (segment, frame) in enumerate(
@@ -208,8 +212,8 @@ class PinchedCup:
             elastic = frame.deformation @ segment.stiffness
             total = elastic.copy()
             if number == 0:
-                total[0] -= load @ segment.loaded_from_masters
-                out[0, dofs] += force * row
+                total[:few] -= loads @ segment.loaded_from_masters
+                out[:few, dofs] += pushed
             out[:, dofs] -= in_global(frame, projected(frame, elastic))
             local = matrices_in_global(frame, tangent(segment, frame, total))
             matrix[:, dofs[:, None], dofs] += local
@@ -222,13 +226,41 @@ class PinchedCup:
             matrix[0, [0, 2], [0, 2]] += scale
         # the last face of the half in the frame of the first one
         size = 3 * self.masters.face_size
-        sign = np.tile([-1.0, -1.0, 1.0], self.masters.face_size)
+        sign = np.tile(CLOSURE, self.masters.face_size)
         matrix[-1, -size:] *= sign[:, None]
         matrix[-1, :, -size:] *= sign
         out[-1, -size:] *= sign
         solved = RingFactor(matrix, size).solve(out[..., None])[..., 0]
         solved[-1, -size:] *= sign
         return np.asarray(solved)
+
+    def respond(self, loads: Array) -> tuple[Array, dict[str, Array]]:
+        """Small deflections under forces at the loaded points of all sectors.
+
+        Args:
+            loads: In the frames of the teeth (N, 3 p) [N].
+
+        Returns:
+            Displacement of the nodes of the teeth (N, n_nodes, 3) [m]; stress xx, yy,
+            zz, xy, yz, zx at the nodes by segment (N, n_nodes, 6) [Pa]; both in the
+            frames of the teeth.
+        """
+        frames = self._frames(self.reference, fitted=False)
+        carried = loads @ self.segments[0].loaded_from_masters
+        step = self._step(frames, loads, in_global(frames[0], carried))
+        moved = self._frames(self.reference + step.reshape(self.reference.shape), False)
+        displacements, stresses = [], {}
+        for number, (segment, frame) in enumerate(
+            zip(self.segments, moved, strict=True)
+        ):
+            force = None if number else loads
+            u = segment.displacement(frame.displacement, force)
+            stress = segment.stresses(u)
+            faces = segment.mesh.first, segment.mesh.last
+            average_faces(stress, frame.turn, *faces, CLOSURE)
+            displacements.append(u)
+            stresses[segment.name] = stress
+        return displacements[0], stresses
 
     def _found(
         self, x: Array, weight: Array, force: float, nonlinear: bool, iterations: int
@@ -249,10 +281,10 @@ class PinchedCup:
         plane = np.asarray(self.strip.teeth.plane.mesh.p)
         wall = np.hypot(*plane) < self.root * (1.0 + 1e-9)
         of_planes = out[nodes[:, wall]].mean(axis=1)
-        count = len(weight) // len(of_planes)
+        of_load = weight[: self.bore].reshape(len(of_planes), -1).sum(axis=1)
         return Pinched(
             force=force,
-            deflection=float(weight.reshape(-1, count).sum(axis=1) @ of_planes),
+            deflection=float(of_load @ of_planes),
             under_load=float(weight @ out[teeth.loaded[::3] // 3]),
             of_planes=of_planes,
             energy=2.0 * energy,
@@ -287,7 +319,8 @@ def pinched_cup(
     masters = strip_masters(strip, orders)
     material = design.material_of("flexspline")
     bore = strip.teeth.bore.ravel()
-    loaded = (3 * bore[:, None] + np.arange(3)).ravel()
+    points = bore if toothless else np.concatenate([bore, pitch_points(strip, profile)])
+    loaded = (3 * points[:, None] + np.arange(3)).ravel()
     segments = tuple(
         condense_segment(
             segment,
@@ -309,4 +342,16 @@ def pinched_cup(
         masters=masters,
         segments=segments,
         root=inner + rim,
+        bore=len(bore),
     )
+
+
+def pitch_points(strip: StripMesh, profile: ToothProfile) -> Index:
+    """Nodes of both flanks next to the pitch circle, plane after plane."""
+    plane = strip.teeth.plane
+    points = np.asarray(plane.mesh.p)
+    pair = []
+    for side in (plane.flank_right, plane.flank_left):
+        away = np.abs(np.hypot(*points[:, side]) - profile.pitch_radius)
+        pair.append(side[np.argmin(away)])
+    return np.asarray(strip.teeth.nodes[:, pair].ravel(), dtype=np.int64)
