@@ -44,7 +44,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--only",
         metavar="KEY,...",
         help="compute no more than these keys need: ratings alone need no finite"
-        " elements; stiffness, hysteresis loss and lost motion few positions",
+        " elements; stiffness, hysteresis loss and lost motion few positions; radial"
+        " stiffness and the fatigue safety factor those in space",
     )
     parser.add_argument(
         "--out", metavar="DIR", help="write spec.json and spec.png there"
@@ -57,7 +58,8 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     Returns:
         Every key of :data:`swgjoint.maps.spec_sheet.KEYS` (or those of ``--only``),
         None where the source cannot tell, with the reason in ``missing``; ``design``,
-        ``validity``, ``files``, ``wall_s``.
+        ``validity``, ``files``, ``wall_s``; ``radial_stiffness`` and ``fatigue`` with
+        what stands behind these two figures, where they were computed.
     """
     start = time.perf_counter()
     folder = output_folder(args.out) if args.out else None
@@ -66,8 +68,11 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     only = [] if args.only is None else [k.strip() for k in args.only.split(",")]
     keys = check_keys(only)
     drive, ratings, name = _drive(args, keys)
-    sheet = measure_spec(drive, ratings=ratings, only=keys)
-    result: dict[str, Any] = {"design": name, **sheet.as_dict()}
+    values, reasons, details = _solid(args, keys, ratings)
+    sheet = measure_spec(
+        drive, ratings=ratings, only=keys, known=values, unknown=reasons
+    )
+    result: dict[str, Any] = {"design": name, **sheet.as_dict(), **details}
     if drive is not None:
         result["validity"] = validity(drive)
         stated = drive.info.get("stated")
@@ -88,11 +93,12 @@ def _drive(args: argparse.Namespace, keys: tuple[str, ...]) -> tuple[Any, Any, s
     from swgjoint.maps.spec_sheet import needs_map, needs_turn
     from swgjoint.sim.drives import find_drive, load_drive
 
-    if not needs_map(keys) and args.model is None:
+    if not needs_map(keys):
         source = find_drive(args.drive)
         if not isinstance(source, DriveMap):
             return None, ratings_of(source), source.drive.name
-        return source, source.ratings, source.name
+        if args.model is None:
+            return source, source.ratings, source.name
     drive = load_drive(
         args.drive,
         model=args.model,
@@ -100,6 +106,27 @@ def _drive(args: argparse.Namespace, keys: tuple[str, ...]) -> tuple[Any, Any, s
         progress=args.progress,
     )
     return drive, drive.ratings, drive.name
+
+
+def _solid(
+    args: argparse.Namespace, keys: tuple[str, ...], ratings: Any
+) -> tuple[dict[str, float], dict[str, str], dict[str, Any]]:
+    """Figures of the solid model of a design, reasons of those it has not, details."""
+    from swgjoint.gear.design import Design
+    from swgjoint.maps.spec_sheet import SOLID_KEYS
+    from swgjoint.sim.drives import find_drive
+
+    wanted = [key for key in SOLID_KEYS if key in keys]
+    source = find_drive(args.drive) if wanted else None
+    if not isinstance(source, Design):
+        return {}, {}, {}
+    if args.model not in (None, "3d"):
+        reason = f"needs the 3d model, not --model {args.model}"
+        return {}, dict.fromkeys(wanted, reason), {}
+    from swgjoint.fe.solid.spec_figures import solid_figures
+
+    found = solid_figures(source, wanted, ratings.rated_torque, progress=args.progress)
+    return found.values, found.missing, found.details
 
 
 def _write(folder: Any, result: dict[str, Any], sheet: SpecSheet, start: float) -> None:
@@ -153,12 +180,40 @@ def report(result: dict[str, Any]) -> str:
             f" efficiency at {speed:g} rpm, efficiency at rated torque; friction from"
             f" {friction}"
         )
+    lines += _details(result)
     reasons: dict[str, list[str]] = {}
     for key, reason in result["missing"].items():
         reasons.setdefault(reason, []).append(_words(key)[0])
     lines += [f"- {', '.join(names)}: {reason}" for reason, names in reasons.items()]
     lines += [f"wrote {name}" for name in result["files"]]
     return "\n".join(lines)
+
+
+def _details(result: dict[str, Any]) -> list[str]:
+    """What stands behind the figures of the solid model."""
+    lines = []
+    if radial := result.get("radial_stiffness"):
+        bent = radial["large_rotations"]
+        lines.append(
+            "radial stiffness at mid-face, boss clamped; open edge"
+            f" {radial['open_edge_N_mm']:.4g}, load spread over the face width"
+            f" {radial['spread_over_face_width_N_mm']:.4g}, large rotations"
+            f" {bent['outward_N_mm']:.4g} pulled and {bent['inward_N_mm']:.4g} pressed"
+            f" by {bent['force_N']:.3g} N, finer displacements"
+            f" {radial['finer_displacements_N_mm']:.4g}, smooth shell"
+            f" {radial['smooth_shell_N_mm']:.4g} N/mm"
+        )
+    if found := result.get("fatigue"):
+        worst, middle = found["worst_section"], found["mid_face"]
+        lines.append(
+            f"fatigue at {found['torque_Nm']:.4g} N·m, nominal stress at the roots"
+            f" times concentration factors: least at z = {worst['z_mm']:.3g} mm"
+            f" ({worst['normal_amplitude_MPa']:.3g} MPa around), {middle['S']:.3g} at"
+            f" mid-face ({middle['normal_amplitude_MPa']:.3g} MPa); without factors,"
+            f" from the peak there {found['S_without_factors_mid_face']:.3g};"
+            f" shell theory {found['shell_theory']['S']:.3g}"
+        )
+    return lines
 
 
 def _source(result: dict[str, Any]) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from math import isnan
@@ -53,6 +53,8 @@ TURN_KEYS = (
 )
 """From one output turn."""
 _NO_FRICTION = "the map has no friction of bearing, seals and teeth at speed"
+SOLID_KEYS = ("fatigue_safety_factor", "radial_stiffness_N_mm")
+"""From the finite elements of a design in space, of which a map knows nothing."""
 ABSENT_KEYS = {
     "repeatability_arcmin": "the map has no random part: a repeated approach ends"
     " at the same position",
@@ -132,6 +134,8 @@ def measure_spec(
     *,
     ratings: Ratings | None = None,
     only: Collection[str] = (),
+    known: Mapping[str, float] | None = None,
+    unknown: Mapping[str, str] | None = None,
 ) -> SpecSheet:
     """Run the test procedures that the wanted keys need, and no others.
 
@@ -147,6 +151,8 @@ def measure_spec(
         drive: The map; None where :func:`needs_map` says so.
         ratings: Needed without a map, else those of the map.
         only: Keys of the sheet; all for none.
+        known: Values that were found elsewhere, of :data:`SOLID_KEYS`.
+        unknown: Reasons why they were not.
 
     Raises:
         InputError: If a key is unknown.
@@ -164,8 +170,9 @@ def measure_spec(
         "rated_torque_Nm": float(ratings.rated_torque),
         "repeated_peak_Nm": float(ratings.repeated_peak),
         "momentary_peak_Nm": float(ratings.momentary_peak),
+        **(known or {}),
     }
-    missing = ABSENT_KEYS | dict.fromkeys(LOSS_KEYS, _NO_FRICTION)
+    missing = ABSENT_KEYS | dict.fromkeys(LOSS_KEYS, _NO_FRICTION) | dict(unknown or {})
     loop, turns, losses = None, {}, None
     if drive is not None:
         if set(keys) & set(LOOP_KEYS):

@@ -8,6 +8,14 @@ import pytest
 
 from swgjoint.cli.main import main
 from swgjoint.fe import build_map as builder
+from swgjoint.fe.solid import spec_figures
+from swgjoint.fe.solid.fatigue import Fatigue, Limits, SectionFatigue
+from swgjoint.fe.solid.radial_stiffness import RadialStiffness
+from swgjoint.gear.shell_theory import (
+    SafetyFactor,
+    ShellDimensions,
+    shell_safety_factor,
+)
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.drives import load_drive
 
@@ -84,6 +92,104 @@ def test_only_what_a_design_needs(built, capsys):
     options = built.pop()
     assert "angles" not in options
     assert options["model"] == "2d"
+
+
+@pytest.fixture
+def solid(monkeypatch):
+    """Both figures of the solid model at once; the calls that were made."""
+    calls = []
+
+    def stiffness(design, progress):
+        calls.append(("radial", design.drive.name))
+        return RadialStiffness(
+            mid_face=65e3,
+            open_edge=50e3,
+            face_width=66e3,
+            outward=67e3,
+            inward=64e3,
+            force=26.0,
+            finer=65.1e3,
+            shell=51e3,
+        )
+
+    def safety(design, torques, progress):
+        calls.append(("fatigue", *torques))
+        limits, shell = Limits.of(design), ShellDimensions.of(design)
+        sections = tuple(
+            SectionFatigue(
+                z=z,
+                normal_amplitude=2e8,
+                normal_mean=0.0,
+                axial_amplitude=0.0,
+                shear_amplitude=0.0,
+                shear_mean=0.0,
+                safety=SafetyFactor(normal=S, shear=9.0, combined=S),
+            )
+            for z, S in ((-1e-3, 1.5), (0.0, 2.0))
+        )
+        theory = shell_safety_factor(
+            shell,
+            torques[0],
+            bending_limit=limits.bending,
+            torsion_limit=limits.torsion,
+        )
+        return [
+            Fatigue(
+                torque=torques[0],
+                sections=sections,
+                amplitude={"root, mid-face": 4e8},
+                shell=theory,
+                limits=limits,
+            )
+        ]
+
+    monkeypatch.setattr(spec_figures, "radial_stiffness", stiffness)
+    monkeypatch.setattr(spec_figures, "fatigue", safety)
+    return calls
+
+
+def test_figures_of_the_solid_model(built, solid, capsys):
+    """Each alone computes nothing else; details stand beside them."""
+    found = spec(capsys, "xb1-100-80", "--only", "radial_stiffness_N_mm")
+    assert found["radial_stiffness_N_mm"] == 65.0
+    assert found["radial_stiffness"]["open_edge_N_mm"] == 50.0
+    assert solid == [("radial", "xb1-100-80")]
+    found = spec(capsys, "stress-cup", "--only", "fatigue_safety_factor,T1_Nm")
+    assert found["fatigue_safety_factor"] == 1.5  # the worst section
+    assert found["fatigue"]["mid_face"]["S"] == 2.0
+    assert found["fatigue"]["S_without_factors_mid_face"] == 2.0
+    assert solid[1:] == [("fatigue", pytest.approx(86.85, abs=0.01))]
+    assert built == []
+    assert found["missing"] == {}
+    keys = "radial_stiffness_N_mm,fatigue_safety_factor"
+    assert main(["spec", "stress-cup", "--only", keys]) == 0
+    out = capsys.readouterr().out
+    assert "open edge 50," in out and "2 at mid-face (200 MPa)" in out
+
+
+def test_reasons_of_the_solid_model(built, capsys):
+    """No cup, no endurance limits, the plane model asked for: null with the reason."""
+    keys = "radial_stiffness_N_mm,fatigue_safety_factor"
+    for arguments, reason in (
+        (["reference-2d"], "needs a design with a [cup]"),
+        (["xb1-100-80", "--model", "2d"], "needs the 3d model, not --model 2d"),
+        (["CSG-25-100"], "a map holds torque and torsion only"),
+    ):
+        found = spec(capsys, *arguments, "--only", keys)
+        for key in keys.split(","):
+            assert found[key] is None
+            assert reason in found["missing"][key]
+    assert built == []
+    found = spec(capsys, "xb1-100-80", "--only", "fatigue_safety_factor")
+    assert "fatigue_limit_bending_MPa" in found["missing"]["fatigue_safety_factor"]
+
+
+@pytest.mark.slow
+def test_radial_stiffness_of_xb1(capsys):
+    """The figure itself, within the 1 % that mesh and displacements leave."""
+    found = spec(capsys, "xb1-100-80", "--only", "radial_stiffness_N_mm")
+    assert found["radial_stiffness_N_mm"] == pytest.approx(65.4, rel=0.01)
+    assert found["wall_s"] < 600.0
 
 
 def test_report(capsys, tmp_path, synthetic_map):

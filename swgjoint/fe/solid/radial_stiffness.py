@@ -14,7 +14,13 @@ from swgjoint.units import mm
 
 SMALL = 1.0
 """Load of the linear level, where only the ratio matters [N]."""
-FINER = replace(ORDERS, teeth=8, cup=5, at_teeth=6, around=4, rim=3)
+FINER = replace(
+    ORDERS,
+    teeth=ORDERS.teeth + 2,
+    cup=ORDERS.cup + 2,
+    at_teeth=ORDERS.at_teeth + 2,
+    around=ORDERS.around + 2,
+)
 """Next degrees of the displacements of faces and sections, to estimate the error."""
 
 

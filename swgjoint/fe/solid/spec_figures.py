@@ -1,0 +1,73 @@
+"""Figures of a spec sheet that no map holds: radial stiffness and fatigue."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from dataclasses import dataclass, field
+from typing import Any
+
+from swgjoint.errors import DesignError
+from swgjoint.fe.solid.fatigue import fatigue
+from swgjoint.fe.solid.radial_stiffness import radial_stiffness
+from swgjoint.gear.design import Design
+from swgjoint.progress import Progress, silent
+
+
+@dataclass(frozen=True, kw_only=True)
+class SolidFigures:
+    """What was found, in the units of the keys."""
+
+    values: dict[str, float] = field(default_factory=dict)
+    missing: dict[str, str] = field(default_factory=dict)
+    """Reason of every key that this design cannot have."""
+    details: dict[str, Any] = field(default_factory=dict)
+    """``radial_stiffness`` and ``fatigue``: where, how, and how sure."""
+
+
+def solid_figures(
+    design: Design,
+    keys: Collection[str],
+    torque: float,
+    *,
+    progress: Progress = silent,
+) -> SolidFigures:
+    """Compute the wanted ones of ``radial_stiffness_N_mm``, ``fatigue_safety_factor``.
+
+    The safety factor is the least of all sections over the face width.
+
+    Args:
+        design: The drive.
+        keys: Of the sheet; others are passed over.
+        torque: At which fatigue is assessed, the rated one [N·m].
+        progress: Called on the way.
+
+    Raises:
+        ComputationError: If a solve fails or memory will not do.
+    """
+    found = SolidFigures()
+
+    def radial() -> None:
+        result = radial_stiffness(design, progress=progress)
+        found.values["radial_stiffness_N_mm"] = result.mid_face / 1e3
+        found.details["radial_stiffness"] = result.to_json()
+
+    def safety() -> None:
+        (result,) = fatigue(design, [torque], progress=progress)
+        found.values["fatigue_safety_factor"] = result.worst.safety.combined
+        found.details["fatigue"] = result.to_json()
+
+    compute: dict[str, Callable[[], None]] = {
+        "fatigue_safety_factor": safety,
+        "radial_stiffness_N_mm": radial,
+    }
+    for key, work in compute.items():
+        if key not in keys:
+            continue
+        if design.cup is None:
+            found.missing[key] = "needs a design with a [cup]"
+            continue
+        try:
+            work()
+        except DesignError as fault:
+            found.missing[key] = "; ".join(str(fault).splitlines())
+    return found
