@@ -40,7 +40,7 @@ def can_halve(design: Design) -> bool:
 
 
 def check_modelled(design: Design, model: str) -> None:
-    """Refuse what the 2D model does not contain yet.
+    """Refuse what the 2D model does not contain, and what is no such model.
 
     Raises:
         DesignError: One line per key.
@@ -48,7 +48,7 @@ def check_modelled(design: Design, model: str) -> None:
     drive, tolerances = design.drive, design.tolerances
     faults = []
     if model != "2d":
-        faults.append(f"model {model!r} gives no map yet; available: '2d'")
+        faults.append(f"model {model!r} gives no map; available: '2d', '3d'")
     if tolerances.misalignment_arcmin:
         faults.append(
             f"tolerances.misalignment_arcmin = {tolerances.misalignment_arcmin:g}: the"
@@ -58,12 +58,12 @@ def check_modelled(design: Design, model: str) -> None:
         raise DesignError("\n".join(f"{drive.name}: {fault}" for fault in faults))
 
 
-def left_out(design: Design) -> str | None:
-    """Parts of the design that the 2D model cannot see, for the validity label."""
+def left_out(design: Design, model: str = "2d") -> str | None:
+    """Parts of the design that the model cannot see, for the validity label."""
     shapes = design.micro_geometry.model_dump(exclude={"crowning_kind"})
     parts = {
         "wave_generator.bearing": design.wave_generator.bearing is not None,
-        "micro_geometry": any(shapes.values()),
+        "micro_geometry": model == "2d" and any(shapes.values()),
     }
     return " and ".join(name for name, there in parts.items() if there) or None
 

@@ -8,7 +8,8 @@ from math import pi
 import numpy as np
 import pytest
 
-from swgjoint.fe.sampling import across_clearance, sample_map
+from swgjoint.fe.pattern import across_clearance
+from swgjoint.fe.sampling import sample_map
 from swgjoint.gear.design import Design
 from swgjoint.maps.equilibrium import output_angle
 from swgjoint.maps.fit import fit_map

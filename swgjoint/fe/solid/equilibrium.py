@@ -119,6 +119,8 @@ class _Step:
     """Gaps to it after the step (N, p) [m]."""
     torque: float
     """[N·m]."""
+    compliance: float
+    """-d(rotation)/dT of the whole drive [rad/(N·m)], NaN without a given torque."""
 
     @property
     def largest(self) -> float:
@@ -218,7 +220,7 @@ def _solve_linear(
         used = np.arange(n + 1)
     else:
         used = np.arange(n)
-    force, turn = np.zeros(n), 0.0
+    force, turn, compliance = np.zeros(n), 0.0, float("nan")
     active = np.zeros(n, dtype=bool)
     if len(used):
         guess = offset[:n] < 0.0
@@ -226,7 +228,13 @@ def _solve_linear(
             guess = found.contacts.on_flanks_of(state.held.contacts)
         z, active = solve_mixed(system[np.ix_(used, used)], offset[used], n, 0, guess)
         force = z[:n]
-        turn = float(z[n]) if load.torque is not None else 0.0
+        if load.torque is not None:
+            turn = float(z[n])
+            acting = np.append(np.flatnonzero(active), n)
+            unit = np.zeros(len(acting))
+            unit[-1] = -1.0 / ring.copies
+            answer = np.linalg.solve(system[np.ix_(acting, acting)], unit)
+            compliance = float(answer[-1])
     unknown = np.append(force, turn)
     increment = base + response @ unknown
     dudpsi = moment + float(stiffness @ unknown)
@@ -246,6 +254,7 @@ def _solve_linear(
         pressure=pressure,
         after=after,
         torque=-ring.copies * dudpsi,
+        compliance=compliance,
     )
 
 
@@ -302,6 +311,7 @@ def _advance(
         tooth_force=step.force[step.active],
         rotation=state.rotation + damping * step.turn,
         torque=step.torque,
+        compliance=step.compliance,
     )
     return new, not bool(bad.any())
 

@@ -47,6 +47,9 @@ class SolidState:
     """Moment of the tooth forces on the flexspline, whole drive [N·m]."""
     energy: float = 0.0
     """Strain energy, whole drive [J]."""
+    compliance: float = 0.0
+    """Tangent -d(rotation)/dT at the active contacts [rad/(N·m)], NaN where the
+    rotation is prescribed."""
     outcome: Outcome = Outcome.CONVERGED
     history: tuple[float, ...] = ()
     """Largest displacement increment of every iteration [m]."""
