@@ -20,6 +20,10 @@ STUDIES = {
         "swgjoint.study.ring:run_ring",
         "deflection of a plain ring between two rollers, thesis appendix A",
     ),
+    "articles": (
+        "swgjoint.study.articles:run_articles",
+        "force, deflection, stress and fatigue of three articles, with the 3D model",
+    ),
     "response": (
         "swgjoint.study.response:run_response",
         "two-mass frequency response of a joint beside its closed form",

@@ -1,0 +1,183 @@
+"""``swgjoint study articles``: three articles on flexsplines, computed again.
+
+Parts: ``deflection`` of the 80:1 drive, ``force`` that deforms XB1-100-80, ``stress``
+and ``fatigue`` of a cup. Closed forms as printed stand beside finite elements in space;
+``converged`` is the same with twice the elements per direction, where computed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from swgjoint.errors import InputError
+from swgjoint.files import write_whole
+from swgjoint.json_text import json_text
+from swgjoint.study.articles_file import ArticlesFile, changed
+from swgjoint.study.articles_rows import (
+    deflection_rows,
+    fatigue_rows,
+    force_rows,
+    stress_rows,
+)
+from swgjoint.study.articles_runs import Found, Task, run_task
+from swgjoint.study.pool import run_all
+from swgjoint.study.rows import Row, StudyOptions, StudyResult
+
+PARTS = ("deflection", "force", "stress", "fatigue")
+FINE = {"mesh.refinement": 2}
+
+
+def run_articles(options: StudyOptions) -> StudyResult:
+    """Run the chosen parts, or all of them.
+
+    Raises:
+        InputError: If a part or the fidelity is unknown.
+    """
+    if options.model not in (None, "3d"):
+        raise InputError(f"--model {options.model}: the articles need solids, 3d")
+    unknown = [part for part in options.only if part not in PARTS]
+    if unknown:
+        raise InputError(
+            f"--only {','.join(unknown)}: no such part; accepted: {', '.join(PARTS)}"
+        )
+    parts = [part for part in PARTS if not options.only or part in options.only]
+    study = ArticlesFile.load()
+    tasks = {task.name: task for part in parts for task in tasks_of(study, part)}
+    ordered = sorted(tasks.values(), key=lambda task: -task.size)
+    results = run_all(
+        run_task,
+        ordered,
+        jobs=options.jobs,
+        stage="computations",
+        progress=options.progress,
+    )
+    found = dict(zip((task.name for task in ordered), results, strict=True))
+    rows = [row for part in parts for row in rows_of(study, part, found)]
+    failed = [name for name, result in found.items() if "fault" in result]
+    summary = [_summary(part, study, found) for part in parts]
+    summary += [f"failed: {name}: {found[name]['fault']}" for name in failed]
+    more = {"source": study.source, "computations": found, "failed": failed}
+    files = _write(options, rows, parts, found)
+    return StudyResult(
+        rows=tuple(rows), summary=tuple(filter(None, summary)), more=more, files=files
+    )
+
+
+def tasks_of(study: ArticlesFile, part: str) -> list[Task]:
+    """What a part computes."""
+    if part == "deflection":
+        own = study.deflection
+        return [
+            Task(name="deflection", kind="deflected", design=changed(own.base), size=5)
+        ]
+    if part == "force":
+        force = study.force
+        design = changed(force.base)
+        tasks = [
+            Task(name="force", kind="pinched", design=design),
+            Task(name="force, smooth", kind="pinched", design=design, toothless=True),
+            Task(name="force, large", kind="rotated", design=design, size=2),
+            Task(
+                name="force, fine",
+                kind="pinched",
+                design=design.with_changes(FINE),
+                size=15,
+            ),
+        ]
+        return tasks + [
+            Task(
+                name=f"force, {v.name}",
+                kind="pinched",
+                design=changed(force.base, v.changes),
+            )
+            for v in force.variations
+        ]
+    own_stress = study.stress
+    design, torques = changed(own_stress.base), own_stress.torques_Nm
+    four = [
+        Task(name="four", kind="four", design=design, torques=torques, size=2),
+        Task(
+            name="four, fine",
+            kind="four",
+            design=design.with_changes(FINE),
+            torques=torques,
+            size=16,
+        ),
+    ]
+    if part == "stress":
+        crowned = changed(own_stress.base, own_stress.crowned)
+        return [
+            *four,
+            Task(name="ellipse", kind="deflected", design=design, size=5),
+            Task(name="crowned", kind="deflected", design=crowned, size=5),
+        ]
+    crowned = changed(own_stress.base, own_stress.crowned)
+    return [
+        *four,
+        Task(name="fatigue", kind="fatigue", design=design, torques=torques, size=30),
+        Task(
+            name="fatigue, crowned",
+            kind="fatigue",
+            design=crowned,
+            torques=torques,
+            size=30,
+        ),
+    ]
+
+
+def rows_of(study: ArticlesFile, part: str, found: Mapping[str, Found]) -> list[Row]:
+    """Rows of a part from what its tasks found."""
+    build = {
+        "deflection": lambda: deflection_rows(study.deflection, found["deflection"]),
+        "force": lambda: force_rows(study.force, found),
+        "stress": lambda: stress_rows(study.stress, found),
+        "fatigue": lambda: fatigue_rows(study.stress, found),
+    }
+    return build[part]()
+
+
+def _summary(part: str, study: ArticlesFile, found: Mapping[str, Found]) -> str:
+    if part == "force" and "fault" not in found["force"]:
+        values = [
+            result["mid_face"]
+            for name, result in found.items()
+            if name.startswith("force, ")
+            and "mid_face" in result
+            and name not in ("force, smooth", "force, fine")
+        ]
+        return (
+            f"radial stiffness of {study.force.base}: {found['force']['mid_face']:.3g}"
+            f" N/mm at mid-face; {min(values):.3g} to {max(values):.3g} with what the"
+            " article leaves open, each changed alone"
+        )
+    if part == "fatigue" and "fault" not in found["fatigue"]:
+        rows = found["fatigue"]["by_torque"]
+        first, last = rows[0], rows[-1]
+        return (
+            f"safety factor from {first['torque_Nm']:g} to {last['torque_Nm']:g} N·m:"
+            f" shell theory {first['shell_theory']['S']:.3g} to"
+            f" {last['shell_theory']['S']:.3g}, finite elements at mid-face"
+            f" {first['mid_face']['S']:.3g} to {last['mid_face']['S']:.3g}, worst"
+            f" section {first['worst_section']['S']:.3g} to"
+            f" {last['worst_section']['S']:.3g}"
+        )
+    return ""
+
+
+def _write(
+    options: StudyOptions,
+    rows: Sequence[Row],
+    parts: Sequence[str],
+    found: Mapping[str, Found],
+) -> tuple[str, ...]:
+    if options.folder is None:
+        return ()
+    from swgjoint.study.articles_plots import articles_picture
+
+    options.folder.mkdir(parents=True, exist_ok=True)
+    table = json_text([row.to_json() for row in rows]) + "\n"
+    files = [write_whole(options.folder / "articles.json", table)]
+    picture = articles_picture(parts, found)
+    if picture is not None:
+        files.append(write_whole(options.folder / "articles.png", picture))
+    return tuple(str(path) for path in files)
