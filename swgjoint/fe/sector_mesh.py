@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import cos, sin
+from math import ceil, cos, sin
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,10 +48,15 @@ class SectorMesh:
     """Arc length of the flank nodes on the profile [m]."""
 
 
+def multiplied(elements: int, refinement: float) -> int:
+    """Elements along an edge that has so many in the mesh of the thesis."""
+    return ceil(elements * refinement)
+
+
 def sector_mesh(
     profile: ToothProfile,
     rim: float,
-    refinement: int,
+    refinement: float,
     *,
     lower_rim: float | None = None,
 ) -> SectorMesh:
@@ -64,15 +69,15 @@ def sector_mesh(
     Args:
         profile: Flank of the member.
         rim: Thickness between root circle and inner (outer) diameter [m].
-        refinement: Multiplies the elements per direction.
+        refinement: Multiplies the elements per direction, see :func:`multiplied`.
         lower_rim: Thickness of the lower rim, to which a cup connects; that of the
             thesis for a plane model if None [m].
 
     Returns:
         The sector; both halves are mirror images.
     """
-    n, layers = FLANK * refinement, LAYERS * refinement
-    bore, lower = BORE * refinement, LOWER_RIM * refinement
+    n, layers = multiplied(FLANK, refinement), multiplied(LAYERS, refinement)
+    bore, lower = multiplied(BORE, refinement), multiplied(LOWER_RIM, refinement)
     side = -1.0 if profile.internal else 1.0
     inner = profile.dedendum_radius - side * rim
     if lower_rim is None:

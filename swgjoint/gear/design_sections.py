@@ -383,6 +383,6 @@ class JointSection(Section):
 
 
 class MeshSection(Section):
-    """Mesh of the finite elements; 1 is the mesh of the thesis."""
+    """Mesh of the finite elements; 1 is the mesh of the thesis, 0.5 a coarse one."""
 
-    refinement: Annotated[int, Field(ge=1, le=16)] = 1
+    refinement: Annotated[float, Field(ge=0.5, le=16)] = 1.0

@@ -175,7 +175,7 @@ def test_all_faults_at_once(reference):
             " <= 10000 mm",
             "drive.face_width_mm = true: accepted: a number > 0 mm and <= 10000 mm",
             "material.poisson_ratio = 0.5: accepted: >= 0 and < 0.5",
-            "mesh.refinement = 0: accepted: >= 1 and <= 16",
+            "mesh.refinement = 0: accepted: >= 0.5 and <= 16",
             "joint.damping_ratio = inf: accepted: a finite number >= 0 and <= 2",
         ]
     )

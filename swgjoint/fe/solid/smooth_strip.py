@@ -7,7 +7,13 @@ from math import pi
 import numpy as np
 from skfem import MeshQuad
 
-from swgjoint.fe.sector_mesh import BORE, LAYERS, LOWER_RIM, SectorMesh
+from swgjoint.fe.sector_mesh import (
+    BORE,
+    LAYERS,
+    LOWER_RIM,
+    SectorMesh,
+    multiplied,
+)
 from swgjoint.fe.solid.strip_mesh import (
     LARGEST_WALL,
     StripMesh,
@@ -25,14 +31,15 @@ def smooth_strip(design: Design) -> StripMesh:
     The rows of elements are those of the toothed strip, so that the cup joins alike.
     """
     n, rim = design.mesh.refinement, design.flexspline.rim_mm * mm
+    side = multiplied(BORE, n)
     inner, half = design.flexspline_inner_radius, pi / design.drive.teeth_flexspline
     wall = LARGEST_WALL * rim
     if design.cup is not None:
         wall = min(cup_wall(design), wall)
-    above = np.linspace(inner + rim, inner + wall, LAYERS * n + 1)
-    below = np.linspace(inner + wall, inner, LOWER_RIM * n + 1)
+    above = np.linspace(inner + rim, inner + wall, multiplied(LAYERS, n) + 1)
+    below = np.linspace(inner + wall, inner, multiplied(LOWER_RIM, n) + 1)
     radius = np.concatenate([above, below[1:]])
-    phi = np.linspace(half, -half, 2 * BORE * n + 1)  # clockwise face first
+    phi = np.linspace(half, -half, 2 * side + 1)  # clockwise face first
     grid = np.arange(len(radius) * len(phi)).reshape(len(radius), len(phi))
     points = radius[:, None, None] * np.stack([np.sin(phi), np.cos(phi)], axis=-1)
     cells = np.stack([grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]])
@@ -45,9 +52,9 @@ def smooth_strip(design: Design) -> StripMesh:
         face_first=grid[:, 0],
         face_last=grid[:, -1],
         bore=grid[-1],
-        flank_right=grid[0, : BORE * n + 1],
-        flank_left=grid[0, : BORE * n - 1 : -1],
-        flank_stations=phi[: BORE * n + 1],
+        flank_right=grid[0, : side + 1],
+        flank_left=grid[0, : side - 1 : -1],
+        flank_stations=phi[: side + 1],
     )
     width = design.drive.face_width_mm * mm
     if design.cup is None:
