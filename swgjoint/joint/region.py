@@ -19,7 +19,9 @@ torsion frequency of rotor against link:
   the steps takes energy from the resonance. Of what a damping ratio of 0.02 takes they
   take less than a hundredth even at h w = 0.5.
 
-A step outside is cut into equal parts that lie inside with a :data:`MARGIN`.
+A step outside is cut into equal parts that lie inside with a :data:`MARGIN`. RK4 and
+the others are bounded by the fastest frequency, that of a friction bristle that sticks
+and its decay included.
 
 Tested on random joints (K 1e2..1e7 N·m/rad, rotor 1e-7..1e-3, link 1e-4..1e2 kg·m²,
 i 30..160, low orders and tooth order with side bands, ripple 2-5 %, hardening to 26 K,
@@ -287,12 +289,31 @@ def _explicit_bounds(drive: JointDrive, h: float, integrator: str) -> tuple[Boun
     rotor = drive.ratio**2 * drive.rotor_inertia
     frequency = sqrt(stiffness * (1.0 / rotor + 1.0 / drive.link_inertia))
     # stability ends at 2.8 for RK4 and 2 for a semi-implicit step, in free oscillation
-    limit = 2.0 if integrator.upper() == "RK4" else 1.0
+    rk4 = integrator.upper() == "RK4"
+    limit, what = 2.0 if rk4 else 1.0, "the fastest torsion frequency"
+    damped: tuple[Bound, ...] = ()
+    law = drive.friction
+    if law is not None:
+        # a bristle that sticks: beyond it creeps below its yield torque, or diverges
+        mobility = 1.0 / drive.rotor_inertia
+        mobility += abs(drive.drive.friction_direction[1]) / drive.link_inertia
+        frequency = sqrt(frequency**2 + law.stiffness * mobility)
+        what = "the fastest frequency of torsion and friction bristle"
+        rate, most = (law.damping + law.viscous) * mobility, 2.5 if rk4 else 1.0
+        damped = (
+            Bound(
+                what=f"h times the decay rate of friction under {integrator}",
+                value=h * rate,
+                limit=most,
+                timestep=most / rate if rate else inf,
+            ),
+        )
     return (
         Bound(
-            what=f"h times the fastest torsion frequency under {integrator}",
+            what=f"h times {what} under {integrator}",
             value=h * frequency,
             limit=limit,
             timestep=limit / frequency,
         ),
+        *damped,
     )

@@ -4,8 +4,8 @@ Against the rigid arm: a 7-joint arm (iiwa 7) turns slowly under gravity with a 
 loop on every motor (``--bare``: no actuators and no gravity), slowly enough for the
 step to carry all harmonics, as `attach` sees to. One thread, `mj_step` in C, CPU time
 of the process; per level the median over interleaved pairs rigid, level of the ratio of
-their steps per second. ``full+friction`` is level full with friction that slips. Not a
-test: nothing is asserted.
+their steps per second. ``+friction`` is a level with friction that slips,
+``+hysteresis`` one with three elements. Not a test: nothing is asserted.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import copy
 import json
 import platform
 import time
+from dataclasses import replace
 
 import mujoco
 import numpy as np
@@ -23,6 +24,7 @@ from mujoco.batch import Batch
 from swgjoint.joint.attach import LEVELS, attach
 from swgjoint.maps.drive_map import DriveMap, Ratings
 from swgjoint.maps.friction import Friction
+from swgjoint.maps.hysteresis import Jenkin
 from swgjoint.sim.rigid_arm import RigidArm
 
 STIFFNESS = (4e4, 4e4, 3e4, 3e4, 1.5e4, 8e3, 8e3)
@@ -41,6 +43,12 @@ FRICTION = Friction(
     load=0.08,
     damping=0.07,
 )
+HYSTERESIS = (
+    Jenkin(stiffness=8e3, yield_torque=0.4),
+    Jenkin(stiffness=4e3, yield_torque=0.8),
+    Jenkin(stiffness=2e3, yield_torque=1.6),
+)
+LOSSES = ("hysteresis", "friction")
 START = (0.2, 0.5, -0.2, -1.2, 0.3, 0.8, 0.1)
 
 
@@ -89,15 +97,17 @@ def build(
     if bare:
         spec.option.gravity = [0, 0, 0]
     names = [joint.name for joint in spec.joints]
+    base, _, lossy = level.partition("+")
+    elements = HYSTERESIS if lossy == "hysteresis" else ()
     drives = [
         attach(
             spec,
             joint=name,
-            drive=drive(stiffness, orders),
-            level=level.removesuffix("+friction"),
+            drive=replace(drive(stiffness, orders), hysteresis=elements),
+            level=base,
             rotor_inertia=rotor,
             damping_ratio=0.02,
-            friction=level.endswith("+friction"),
+            friction=lossy == "friction",
         )
         for name, stiffness, rotor in zip(names, STIFFNESS, ROTOR, strict=True)
     ]
@@ -184,7 +194,8 @@ def batch(args: argparse.Namespace) -> dict[str, float]:
 def main() -> None:
     """Print the table, or JSON."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
-    levels = (*LEVELS, "full+friction")
+    losses = [f"{level}+{loss}" for loss in LOSSES for level in ("native", "full")]
+    levels = (*LEVELS, *losses)
     parser.add_argument("--levels", nargs="+", choices=levels, default=levels)
     parser.add_argument("--pairs", type=int, default=9)
     parser.add_argument("--steps", type=int, default=4_000)
@@ -198,10 +209,10 @@ def main() -> None:
         print(json.dumps({"rows": rows, "batch": many, "args": vars(args)}))
         return
     print(f"{platform.processor() or platform.machine()}, mujoco {mujoco.__version__}")
-    print(f"{'level':10} {'ratio':>6} {'low':>6} {'high':>6} {'µs/step':>8}")
+    print(f"{'level':17} {'ratio':>6} {'low':>6} {'high':>6} {'µs/step':>8}")
     for row in rows:
         print(
-            f"{row['level']:10} {row['against_rigid']:6.3f} {row['lowest']:6.3f}"
+            f"{row['level']:17} {row['against_rigid']:6.3f} {row['lowest']:6.3f}"
             f" {row['highest']:6.3f} {row['microseconds_a_step']:8.2f}"
         )
     print("Batch of 64, full, steps/s:", {k: round(v) for k, v in many.items()})

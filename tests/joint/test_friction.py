@@ -21,6 +21,7 @@ from swgjoint.joint.reference import (
     gradient_force,
     scheme_force,
 )
+from swgjoint.joint.region import check_region
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.friction import Friction
 from swgjoint.maps.hysteresis import Jenkin
@@ -438,3 +439,36 @@ def test_the_joint_runs_as_its_spec_sheet_says(bench):
     needed = 87.0 / abs(i) / (0.01 * sheet["efficiency_percent"])
     _, rate = turned(needed, np.sign(i) * 87.0, rate=speed)
     assert rate == pytest.approx(speed, rel=1e-2)
+
+
+@pytest.mark.parametrize(
+    ("law", "what"),
+    [
+        ({"stiffness": 700.0}, "torsion and friction bristle"),
+        ({"stiffness": 70.0, "damping": 0.2}, "decay rate of friction"),
+    ],
+)
+def test_rk4_is_refused_where_the_bristle_would_not_hold(bench, law, what):
+    """Outside the region it creeps below its yield torque or diverges; inside it rests.
+
+    The rotor carries two fifths of what the friction holds, for a second.
+    """
+    friction = Friction(coulomb=0.05, static=0.05, **law)
+    drive = replace(DriveMap.linear(2e4), friction=friction)
+
+    def moved(step):
+        b = bench(drive, step=step, integrator="RK4", damping_ratio=0.02)
+        region = check_region(b.drive, timestep=step, integrator="RK4")
+        b.data.qfrc_applied[b.v] = 0.02, 0.0
+        mujoco.mj_step(b.model, b.data, round(1.0 / step))
+        return region, b.data
+
+    region, data = moved(1e-3)
+    assert what in region.message and region.suggested_timestep is not None
+    reach = 0.05 / friction.stiffness
+    diverged = any(w.number for w in data.warning)
+    assert diverged or abs(data.qpos[:]).max() > 10.0 * reach
+    region, data = moved(region.suggested_timestep)
+    assert region.ok and not any(w.number for w in data.warning)
+    # the first swing goes a little over the reach
+    assert abs(data.qpos[:]).max() < 2.0 * reach
