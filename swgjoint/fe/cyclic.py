@@ -26,11 +26,17 @@ class Insides:
             self._inverse = np.linalg.inv(blocks[:, inner, inner])
         except np.linalg.LinAlgError as error:
             raise SingularRingError from error
-        coupling = blocks[:, inner][:, :, outer]
-        self._reach = self._inverse @ coupling
-        self.schur = blocks[:, outer][:, :, outer]
+        # sector by sector: products of all at once would not stay in the cache
+        size = 2 * face
+        self._reach = np.empty((len(blocks), n - size, size))
+        self.schur = np.empty((len(blocks), size, size))
         """What is left between both faces of a sector (N, 2 face, 2 face)."""
-        self.schur = self.schur - coupling.transpose(0, 2, 1) @ self._reach
+        for block, inverse, reach, schur in zip(
+            blocks, self._inverse, self._reach, self.schur, strict=True
+        ):
+            columns = block[:, outer]
+            np.matmul(inverse, columns[inner], out=reach)
+            np.subtract(columns[outer], columns[inner].T @ reach, out=schur)
 
     def on_faces(self, rhs: Array) -> Array:
         """Right-hand sides of the faces (N, face, k) from those of sectors (N, n, k).

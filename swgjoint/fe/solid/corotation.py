@@ -152,7 +152,6 @@ def in_global(frames: Frames, rows: Array) -> Array:
 def matrices_in_global(frames: Frames, matrix: Array) -> Array:
     """Matrices over masters from the frames to the global frame (N, 3 m, 3 m)."""
     n, m = frames.position.shape[:2]
-    blocks = matrix.reshape(n, m, 3, m, 3)
-    half = np.einsum("sij,sajbk->saibk", frames.turn, blocks)
-    full = np.einsum("slk,saibk->saibl", frames.turn, half)
+    half = frames.turn[:, None] @ matrix.reshape(n, m, 3, 3 * m)
+    full = half.reshape(n, 3 * m * m, 3) @ frames.turn.transpose(0, 2, 1)
     return np.asarray(full.reshape(n, 3 * m, 3 * m))

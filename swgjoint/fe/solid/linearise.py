@@ -84,7 +84,7 @@ def linearise(ring: SolidRing, state: SolidState) -> Linearised:
         local = matrices_in_global(frame, tangent(segment, frame, total))
         if number == 0:
             held = bore.inverse @ bore.rows
-            local += np.einsum("spi,spj->sij", bore.rows, held)
+            local += bore.rows.transpose(0, 2, 1) @ held
             pushed[:, dofs] += np.einsum("spi,sp->si", held, bore.free_gap)
         hessian[:, dofs[:, None], dofs] += local
     return Linearised(

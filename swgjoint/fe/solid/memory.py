@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 from swgjoint.errors import ComputationError
-from swgjoint.fe.solid.masters import Orders
+from swgjoint.fe.solid.masters import Orders, strip_masters
 from swgjoint.fe.solid.strip_mesh import StripMesh
 
 BYTES = 8
@@ -39,9 +39,7 @@ def required_memory(
     # condensation of the teeth: right-hand sides, their solution, what is kept
     condensing = BYTES * (3 * 3 * nodes * loaded + FILL * (3 * nodes) ** (4 / 3))
     kept = BYTES * (3 * nodes * loaded + loaded**2)
-    masters = 4 * (1 + orders.teeth + orders.cup * len(strip.cup))
-    masters += 2 * (orders.at_teeth - 1) + 2 * (orders.around - 1) * len(strip.cup)
-    size = 3 * masters
+    size = 3 * strip_masters(strip, orders).size
     solving = BYTES * sectors * size * (size + CONTACTS) * COPIES
     stresses = BYTES * sectors * nodes * (3 + 2 * 6 + 9)
     if ring is not None:
