@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,9 +21,10 @@ Index = NDArray[np.int64]
 def flexspline_stresses(ring: SolidRing, state: SolidState) -> dict[str, Array]:
     """Stress xx, yy, zz, xy, yz, zx at the nodes by segment [Pa]. (N, n_nodes, 6).
 
-    In the frames of the segments; nodes on the faces get the mean of their two sectors.
+    In the frames of the segments; nodes on the faces get the mean of their two sectors,
+    those on the sections that of their two segments.
     """
-    found = {}
+    found: dict[str, Array] = {}
     loads = ring.loads(state)
     frames = ring.frames(state)
     for number, (segment, frame) in enumerate(
@@ -33,6 +35,11 @@ def flexspline_stresses(ring: SolidRing, state: SolidState) -> dict[str, Array]:
         faces = segment.mesh.first, segment.mesh.last
         average_faces(stress, frame.turn, *faces, ring.closure)
         found[segment.name] = stress
+    for k, (one, other) in enumerate(pairwise(ring.strip.segments)):
+        if one.mesh.end is not None and other.mesh.begin is not None:
+            sections = one.mesh.end.ravel(), other.mesh.begin.ravel()
+            turns = frames[k].turn, frames[k + 1].turn
+            average_sections(found[one.name], found[other.name], turns, sections)
     return found
 
 
@@ -72,6 +79,24 @@ def average_faces(
     stress[:, last] = mean
     back = turned_stress(mean, step.transpose(0, 2, 1))
     stress[:, first] = np.roll(back, 1, axis=0)
+
+
+def average_sections(
+    one: Array, other: Array, turns: tuple[Array, Array], sections: tuple[Index, Index]
+) -> None:
+    """Average the section that two segments share, in place.
+
+    Args:
+        one: Stress by sector and node in the frames of a segment (N, n_nodes, 6) [Pa].
+        other: The same of the next segment.
+        turns: Frames of both (N, 3, 3).
+        sections: Nodes of the section in both, in the same order.
+    """
+    end, begin = sections
+    step = np.einsum("sji,sjk->sik", *turns)
+    mean = 0.5 * (one[:, end] + turned_stress(other[:, begin], step))
+    one[:, end] = mean
+    other[:, begin] = turned_stress(mean, step.transpose(0, 2, 1))
 
 
 def turned_stress(stress: Array, turn: Array) -> Array:

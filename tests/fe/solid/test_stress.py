@@ -7,7 +7,7 @@ import pytest
 
 from swgjoint.fe.solid.corotation import about_z
 from swgjoint.fe.solid.elasticity import COLUMNS, ROWS
-from swgjoint.fe.solid.stress import average_faces
+from swgjoint.fe.solid.stress import average_faces, average_sections
 
 
 @pytest.mark.parametrize("half", [False, True])
@@ -39,3 +39,32 @@ def test_faces_get_the_mean_of_their_sectors():
     assert averaged[:, 2] == pytest.approx(mean)
     assert averaged[:, 0] == pytest.approx(np.roll(mean, 1, axis=0))
     assert averaged[:, 1] == pytest.approx(nodal[:, 1])
+
+
+def test_sections_get_the_mean_of_their_segments():
+    """One stress seen in two frames stays; another one moves half-way to it."""
+    rng = np.random.default_rng(5)
+    stress = rng.normal(size=(3, 3))
+    stress += stress.T
+    turns = tuple(np.linalg.qr(rng.normal(size=(4, 3, 3)))[0] for _ in range(2))
+    one, other = (
+        np.repeat(
+            np.stack([seen[:, i, j] for i, j in zip(ROWS, COLUMNS, strict=True)], -1)[
+                :, None
+            ],
+            3,
+            axis=1,
+        )
+        for seen in (turn.transpose(0, 2, 1) @ stress @ turn for turn in turns)
+    )
+    sections = np.array([0, 1]), np.array([2, 0])
+    before = one.copy(), other.copy()
+    average_sections(one, other, turns, sections)
+    assert one == pytest.approx(before[0], abs=1e-12)
+    assert other == pytest.approx(before[1], abs=1e-12)
+    other[:, 2] *= 3.0
+    average_sections(one, other, turns, sections)
+    assert one[:, 0] == pytest.approx(2.0 * before[0][:, 0])
+    assert other[:, 2] == pytest.approx(2.0 * before[1][:, 2])
+    assert one[:, 1:] == pytest.approx(before[0][:, 1:])
+    assert other[:, :2] == pytest.approx(before[1][:, :2])
