@@ -200,7 +200,8 @@ def _details(result: dict[str, Any]) -> list[str]:
             f" {radial['spread_over_face_width_N_mm']:.4g}, large rotations"
             f" {bent['outward_N_mm']:.4g} pulled and {bent['inward_N_mm']:.4g} pressed"
             f" by {bent['force_N']:.3g} N, finer displacements"
-            f" {radial['finer_displacements_N_mm']:.4g}, smooth shell"
+            f" {radial['finer_displacements_N_mm']:.4g}, half the elements"
+            f" {radial['half_the_elements_N_mm']:.4g}, smooth shell"
             f" {radial['smooth_shell_N_mm']:.4g} N/mm"
         )
     if found := result.get("fatigue"):

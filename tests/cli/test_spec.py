@@ -109,6 +109,7 @@ def solid(monkeypatch):
             inward=64e3,
             force=26.0,
             finer=65.1e3,
+            coarser=65.5e3,
             shell=51e3,
         )
 
@@ -164,7 +165,11 @@ def test_figures_of_the_solid_model(built, solid, capsys):
     keys = "radial_stiffness_N_mm,fatigue_safety_factor"
     assert main(["spec", "stress-cup", "--only", keys]) == 0
     out = capsys.readouterr().out
-    assert "open edge 50," in out and "2 at mid-face (200 MPa)" in out
+    assert (
+        "open edge 50," in out
+        and "half the elements 65.5," in out
+        and "2 at mid-face (200 MPa)" in out
+    )
 
 
 def test_reasons_of_the_solid_model(built, capsys):

@@ -117,7 +117,9 @@ class PinchedCup:
         z = self.strip.teeth.z
         share = np.zeros(len(z))
         if place == "mid_face":
-            share[np.argmin(np.abs(z))] = 1.0
+            # two planes where none lies in the middle
+            near = np.abs(z) <= np.abs(z).min() + 1e-9 * np.ptp(z)
+            share[near] = 1.0 / near.sum()
         elif place == "open_edge":
             share[0] = 1.0
         else:

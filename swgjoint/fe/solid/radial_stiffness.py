@@ -12,6 +12,8 @@ from swgjoint.gear.wave_generator import lobe_height
 from swgjoint.progress import Progress, silent
 from swgjoint.units import mm
 
+COARSEST = 0.5
+"""Refinement that a mesh has at least."""
 SMALL = 1.0
 """Load of the linear level, where only the ratio matters [N]."""
 FINER = replace(
@@ -42,6 +44,8 @@ class RadialStiffness:
     """Load at which the secants were taken [N]."""
     finer: float
     """At mid-face with finer displacements of faces and sections, the same mesh."""
+    coarser: float
+    """At mid-face with half of the elements per direction."""
     shell: float
     """Closed form of a smooth cup with the wall of the cup, at mid-face."""
 
@@ -59,6 +63,7 @@ class RadialStiffness:
                 "inward_N_mm": self.inward / scale,
             },
             "finer_displacements_N_mm": self.finer / scale,
+            "half_the_elements_N_mm": self.coarser / scale,
             "smooth_shell_N_mm": self.shell / scale,
         }
 
@@ -75,6 +80,9 @@ def radial_stiffness(design: Design, *, progress: Progress = silent) -> RadialSt
         ComputationError: If a solve fails or memory will not do.
     """
     stage, parts = "radial stiffness", 4
+    half = max(COARSEST, 0.5 * design.mesh.refinement)
+    coarse = design.with_changes({"mesh.refinement": half})
+    coarser = pinched_cup(coarse).pull(SMALL).stiffness
     finer = pinched_cup(design, orders=FINER).pull(SMALL).stiffness
     progress(stage, 1, parts)
     cup = pinched_cup(design)
@@ -96,6 +104,7 @@ def radial_stiffness(design: Design, *, progress: Progress = silent) -> RadialSt
         inward=secants[1],
         force=force,
         finer=finer,
+        coarser=coarser,
         shell=smooth_cup_stiffness(design),
     )
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from functools import cache
 
-import numpy as np
 import pytest
 
 from swgjoint.errors import DesignError
@@ -40,6 +39,7 @@ def small_cup():
             "cup.length_mm": 20.0,
             "cup.fillet_mm": 0.8,
             "cup.bore_radius_mm": 6.0,
+            "mesh.refinement": 0.5,
         }
     )
     return pinched_cup(design, orders=Orders())
@@ -75,9 +75,9 @@ def test_loads_are_reciprocal():
     """A load at mid-face moves the open edge as much as the other way round."""
     cup = small_cup()
     middle, edge = cup.pull(1.0, "mid_face"), cup.pull(1.0, "open_edge")
-    at = int(np.argmax(cup.share("mid_face")))
     # mean over the wall, loads on the bore: the difference is the local dent
-    assert middle.of_planes[0] == pytest.approx(edge.of_planes[at], rel=1e-3)
+    there = edge.of_planes @ cup.share("mid_face")
+    assert middle.of_planes[0] == pytest.approx(there, rel=1e-3)
     assert middle.deflection < edge.deflection
 
 
@@ -109,7 +109,7 @@ def test_smooth_cup_is_the_inextensional_one():
 
     The closed form keeps the wall straight under the load and forgets the diaphragm.
     """
-    design = Design.load("xb1-100-80")
+    design = Design.load("xb1-100-80").with_changes({"mesh.refinement": 0.5})
     cup = pinched_cup(design, toothless=True)
     edge = smooth_cup_stiffness(design, open_edge=True)
     assert cup.pull(1.0, "open_edge").stiffness == pytest.approx(edge, rel=0.01)
@@ -137,7 +137,7 @@ def test_all_figures_in_their_units(monkeypatch):
         Design.load("xb1-100-80"), progress=lambda *args: seen.append(args)
     )
     assert found.mid_face == pytest.approx(cup.pull(1.0).stiffness)
-    assert found.finer == found.mid_face
+    assert found.finer == found.coarser == found.mid_face
     assert found.force == pytest.approx(0.4e-3 * found.mid_face)
     assert found.inward < found.mid_face < found.outward
     shown = found.to_json()
@@ -148,12 +148,12 @@ def test_all_figures_in_their_units(monkeypatch):
 
 @pytest.mark.slow
 def test_xb1_is_converged():
-    """65.5 N/mm: finer displacements and twice the elements change it by 1 %."""
+    """65.5 N/mm: finer displacements and twice the elements change it by 0.5 %."""
     design = Design.load("xb1-100-80")
     coarse = pinched_cup(design).pull(1.0).stiffness
     finer = pinched_cup(design, orders=module.FINER).pull(1.0).stiffness
     mesh = pinched_cup(design.with_changes({"mesh.refinement": 2})).pull(1.0).stiffness
-    assert coarse == pytest.approx(65.6e3, rel=5e-3)
+    assert coarse == pytest.approx(65.5e3, rel=5e-3)
     assert finer == pytest.approx(coarse, rel=4e-3)
-    assert mesh == pytest.approx(coarse, rel=8e-3)
-    assert finer < coarse and mesh < coarse  # both are bounds from above
+    assert mesh == pytest.approx(coarse, rel=5e-3)
+    assert mesh < coarse  # from above
