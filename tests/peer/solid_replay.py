@@ -22,6 +22,8 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 MPa = 1e6
+INSIDE = 4.0 * mm
+"""Half of the width over which root stress is compared; the teeth end at 5 mm."""
 # corners of scikit-fem's cube in the order of C3D8I
 CORNERS = np.array([7, 4, 1, 5, 6, 2, 0, 3])
 
@@ -107,6 +109,19 @@ class SolidReplay:
                 axis=-1,
             )
         return found
+
+    @cached_property
+    def root_stress(self) -> tuple[float, float]:
+        """Largest principal stress of the roots inside the face width, ours and theirs.
+
+        The back edge is left out: a re-entrant corner, whose stress grows on finer
+        meshes.
+        """
+        teeth = self.ring.strip.mesh.teeth
+        surface = np.concatenate([teeth.plane.flank_right, teeth.plane.flank_left])
+        inside = teeth.nodes[np.abs(teeth.z) <= INSIDE + 1e-9][:, surface]
+        ours, theirs = self.stresses("teeth", inside.ravel())
+        return float(ours[0].max()), float(theirs[0].max())
 
     def stresses(self, name: str, nodes: Index) -> tuple[Array, Array]:
         """Ours and theirs, tensile, compressive and von Mises (3, sectors, n) [Pa].

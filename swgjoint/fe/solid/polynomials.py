@@ -69,6 +69,7 @@ class Patch:
         """
         own = np.array([lobatto(self.degrees[j])[k] for j, k in self.points])
         deep = np.array([THROUGH[j] for j, _ in self.points])
+        # at the teeth the outside of the wall lies between the masters
         outer = np.array([k == 0 for _, k in self.points]) & (self.narrow > 0.0)
         deep[outer] = (deep[outer] - self.narrow) / (1.0 - self.narrow)
         values = np.linalg.solve(self._basis(own, deep).T, self._basis(along, depth).T)
@@ -80,9 +81,6 @@ class Patch:
         """Functions of the masters, not yet one at their own and zero at the others."""
         columns = []
         for level, station in self.points:
-            # at the teeth the outside of the wall lies between the masters
-            shift = self.narrow if station == 0 else 0.0
-            deep = shift + (1.0 - shift) * depth
             curve = lagrange(lobatto(self.degrees[level]), along)[:, station]
-            columns.append(curve * through(level, deep))
+            columns.append(curve * through(level, depth))
         return np.stack(columns, axis=1)
