@@ -28,28 +28,46 @@ def _reason(found: Found, reason: str) -> str:
     return str(found.get("fault", reason))
 
 
-def deflection_rows(own: Deflection, found: Found) -> list[Row]:
+def _at(found: Found, torque: float) -> Found:
+    """What was found at a torque, if it was computed there."""
+    rows = found.get("by_torque", [])
+    return next((row for row in rows if row["torque_Nm"] == torque), {})
+
+
+def deflection_rows(own: Deflection, results: Mapping[str, Found]) -> list[Row]:
     """Deflection of the 80:1 drive and where its largest stress lies."""
+    found, fine = results["deflection"], results["deflection, fine"]
     drive = changed(own.base).drive
     lobe = (
         0.5 * drive.module_mm * (drive.teeth_circular_spline - drive.teeth_flexspline)
     )
 
     def row(
-        quantity: str, unit: str, source: float | None, ours: float | None, reason: str
+        quantity: str,
+        unit: str,
+        source: float | None,
+        ours: float | str,
+        reason: str,
     ) -> Row:
+        """A value of ours, or the key of one that was computed."""
+        value: float | None
+        if isinstance(ours, float):
+            value, better, why = ours, None, reason
+        else:
+            key = ours
+            value = _value(found, lambda f: float(f[key]))
+            better = _value(fine, lambda f: float(f[key]))
+            why = _reason(found, reason)
         return Row(
             case=own.base,
             quantity=quantity,
             unit=unit,
             source_value=source,
-            ours=ours,
-            reason=reason,
+            ours=value,
+            converged=better,
+            reason=why,
             more={"part": "deflection"},
         )
-
-    def of(key: str) -> float | None:
-        return _value(found, lambda f: float(f[key]))
 
     coned = ""
     if "fault" not in found:
@@ -80,38 +98,36 @@ def deflection_rows(own: Deflection, found: Found) -> list[Row]:
             "largest radial displacement",
             "mm",
             own.largest_radial_mm,
-            of("largest_radial_mm"),
-            _reason(found, coned),
+            "largest_radial_mm",
+            coned,
         ),
         row(
             "the same at mid-face",
             "mm",
             None,
-            of("at_mid_face_mm"),
-            _reason(found, "not printed"),
+            "at_mid_face_mm",
+            "not printed",
         ),
         row(
             "largest von Mises stress",
             "MPa",
             None,
-            of("von_mises_MPa"),
-            _reason(
-                found, f"not printed; ours at the {where}, which grows on finer meshes"
-            ),
+            "von_mises_MPa",
+            f"not printed; ours at the {where}, which grows on finer meshes",
         ),
         row(
             "its angle from the major axis",
             "deg",
             0.0,
-            of("von_mises_from_major_deg"),
-            _reason(found, "stated: at the major axis, in root and transition"),
+            "von_mises_from_major_deg",
+            "stated: at the major axis, in root and transition",
         ),
         row(
             "von Mises stress at the minor axis",
             "MPa",
             None,
-            of("at_minor_MPa"),
-            _reason(found, "stated: significantly lower"),
+            "at_minor_MPa",
+            "stated: significantly lower",
         ),
     ]
 
@@ -322,7 +338,7 @@ def stress_rows(own: StressAndFatigue, found: Mapping[str, Found]) -> list[Row]:
         ("ellipse", "rigid ellipse"),
         ("crowned", "rigid ellipse, crowned and sloped"),
     ):
-        result = found[name]
+        result, finer = found[name], found.get(f"{name}, fine", {})
         place = str(result.get("von_mises_part", ""))
         rows.append(
             row(
@@ -331,6 +347,7 @@ def stress_rows(own: StressAndFatigue, found: Mapping[str, Found]) -> list[Row]:
                 own.largest_radial_mm if name == "ellipse" else None,
                 _value(result, lambda f: float(f["largest_radial_mm"])),
                 _reason(result, "the source sets w_0 = 0.372 mm by pressure on areas"),
+                finer.get("largest_radial_mm"),
             )
         )
         rows.append(
@@ -344,6 +361,7 @@ def stress_rows(own: StressAndFatigue, found: Mapping[str, Found]) -> list[Row]:
                     f"at the {place}; a straight generator bends the cup at its edge,"
                     " which four forces do not",
                 ),
+                finer.get("von_mises_MPa"),
             )
         )
     return rows
@@ -433,10 +451,14 @@ def fatigue_rows(own: StressAndFatigue, found: Mapping[str, Found]) -> list[Row]
         )
         for name, text in (("fatigue", "ellipse"), ("fatigue, crowned", "crowned")):
             result = found[name]
+            on_fine = {}
+            if name == "fatigue":
+                on_fine = _at(found["fatigue, fine"], torque)
             row(
                 f"S, meshing, {text}, mid-face",
                 pick(name, k, "mid_face", "S"),
                 _reason(result, f"{HELD_BACK}; nominal stress times K_sigma"),
+                converged=on_fine.get("mid_face", {}).get("S"),
             )
             row(
                 f"S, meshing, {text}, worst section",
@@ -447,5 +469,6 @@ def fatigue_rows(own: StressAndFatigue, found: Mapping[str, Found]) -> list[Row]
                 f"S, meshing, {text}, without factors",
                 pick(name, k, "S_without_factors_mid_face"),
                 _reason(result, f"{HELD_BACK}; from the peak in the fillet, mid-face"),
+                converged=on_fine.get("S_without_factors_mid_face"),
             )
     return rows

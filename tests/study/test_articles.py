@@ -105,6 +105,10 @@ def test_rows_of_all_parts(computed, capsys, tmp_path):
     pulls = "of which one pulls"
     assert pulls in by["stress-cup 120 N·m", "S, four forces, mid-face"]["reason"]
     assert pulls not in by["stress-cup 80 N·m", "S, four forces, mid-face"]["reason"]
+    # the finer mesh at every third torque
+    key = "S, meshing, ellipse, mid-face"
+    fine = [by[f"stress-cup {T} N·m", key]["converged"] for T in range(20, 141, 20)]
+    assert [value is not None for value in fine] == [True, False, False] * 2 + [True]
     assert result["failed"] == []
     names = [path.name for path in (tmp_path / "out").iterdir()]
     assert sorted(names) == ["articles.json", "articles.png"]
@@ -116,7 +120,7 @@ def test_parts_run_alone(computed, capsys):
     assert {
         row["part"] for row in articles(capsys, "--only", "deflection")["rows"]
     } == {"deflection"}
-    assert computed == ["deflection"]
+    assert sorted(computed) == ["deflection", "deflection, fine"]
     articles(capsys, "--only", "stress,fatigue")
     assert len(set(computed)) == len(computed)
     assert computed.count("four") == 1
