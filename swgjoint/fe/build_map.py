@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+from swgjoint.errors import ComputationError
 from swgjoint.fe.drive2d import check_modelled
+from swgjoint.fe.friction_loop import friction_loops
 from swgjoint.fe.sampling import ANGLES, sample_map
 from swgjoint.gear.design import Design
 from swgjoint.maps.cache import cached
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.fit import fit_map
+from swgjoint.maps.hysteresis_loops import with_hysteresis
 from swgjoint.progress import Progress, silent
 
 
@@ -20,6 +25,10 @@ def build_map(
     cache: bool = True,
 ) -> DriveMap:
     """Drive map of a design.
+
+    Its potential is that of the drive without friction; where the teeth have a friction
+    coefficient, elements of hysteresis follow their torque loop, and
+    ``info["friction_loop"]`` compares the two.
 
     Args:
         design: The drive.
@@ -36,9 +45,24 @@ def build_map(
     check_modelled(design, model)
 
     def build() -> DriveMap:
-        return fit_map(sample_map(design, angles=angles, progress=progress))
+        drive = fit_map(sample_map(design, angles=angles, progress=progress))
+        if not design.friction.tooth_coefficient:
+            return drive
+        return _with_friction(design, drive, progress)
 
     if not cache:
         return build()
     parts = {"design": design.content_hash(), "model": model, "angles": angles}
     return cached(parts, build, name=design.drive.name)
+
+
+def _with_friction(design: Design, drive: DriveMap, progress: Progress) -> DriveMap:
+    """The map with the hysteresis of the teeth; where it cannot be had it says so."""
+    top = min(drive.ratings.repeated_peak, *(abs(t) for t in drive.torque_range))
+    try:
+        loops = friction_loops(design, top=top, progress=progress)
+    except ComputationError as failure:
+        reason = f"friction of the teeth gives no hysteresis: {failure}"
+        missing = {**drive.info.get("missing", {}), "hysteresis_loss_arcmin": reason}
+        return replace(drive, info={**drive.info, "missing": missing})
+    return with_hysteresis(drive, loops)

@@ -1,0 +1,128 @@
+"""Torque loops at a locked input with friction of the teeth, for the hysteresis."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.errors import ComputationError
+from swgjoint.fe.continuation import Continuation
+from swgjoint.fe.drive2d import can_halve, ring_model
+from swgjoint.fe.sampling import SYMMETRIC
+from swgjoint.fe.state import State
+from swgjoint.gear.cup import cup_torsional_stiffness
+from swgjoint.gear.design import Design
+from swgjoint.gear.kinematics import periodicity
+from swgjoint.gear.tolerances import without_errors
+from swgjoint.maps.hysteresis_loops import FrictionLoop
+from swgjoint.progress import Progress, silent
+
+Array = NDArray[np.float64]
+
+POSITIONS = 4
+"""Input positions over one pitch, half a step from its ends. With a symmetric wave
+generator two of them are solved, for the others are their mirror images."""
+STEPS = 12
+"""Torques from zero to the largest, closer together at small ones."""
+FIRST_STEPS = 4
+"""The same in the first loading and unloading, which the drive has to forget."""
+
+
+def loop_torques(top: float, steps: int = STEPS) -> Array:
+    """0 -> T -> 0 -> -T in few steps, then -T -> T -> -T -> T [N·m].
+
+    Shape (3 FIRST_STEPS + 6 steps + 1,).
+    """
+    up = top * (np.arange(steps + 1) / steps) ** 1.5
+    few = up[:: steps // FIRST_STEPS]
+    rise = np.concatenate([-up[-2::-1], up[1:]])
+    return np.concatenate([few, few[-2::-1], -few[1:], rise, -rise, rise])
+
+
+def friction_loops(
+    design: Design,
+    *,
+    top: float,
+    positions: int = POSITIONS,
+    steps: int = STEPS,
+    progress: Progress = silent,
+) -> tuple[FrictionLoop, ...]:
+    """Loops of the drive with perfect teeth, friction carried from step to step.
+
+    Args:
+        design: The drive; its friction coefficient may be zero.
+        top: Largest torque [N·m].
+        positions: Over one pitch of the fixed member.
+        steps: Torques from zero to the largest, a multiple of :data:`FIRST_STEPS`.
+        progress: Called with the stage, the solves done and their number.
+
+    Raises:
+        ComputationError: If an equilibrium cannot be solved.
+    """
+    perfect, drive = without_errors(design), design.drive
+    period = (
+        2.0
+        * pi
+        / periodicity(drive.layout, drive.teeth_flexspline, drive.teeth_circular_spline)
+    )
+    parts = (np.arange(positions) + 0.5) / positions
+    if design.wave_generator.kind in SYMMETRIC:
+        parts = parts[: (positions + 1) // 2]
+    model = ring_model(perfect, half=can_halve(perfect))
+    rubbing = Continuation(model=model, ratio=design.ratio, layout=drive.layout)
+    smooth = replace(rubbing, model=replace(model, friction=None))
+    torque = loop_torques(top, steps)
+    outward = np.unique(torque)
+    cup = 0.0 if design.cup is None else 1.0 / cup_torsional_stiffness(design)
+    loops: list[FrictionLoop] = []
+    for k, part in enumerate(parts):
+        theta = period * float(part)
+        elastic: dict[float, State] = {}
+        for side in (outward[outward >= 0.0], outward[outward <= 0.0][::-1]):
+            states = _along(smooth, theta, side)
+            elastic |= dict(zip(side.tolist(), states, strict=True))
+        rubbed = _along(rubbing, theta, torque)
+        still = [elastic[t] for t in torque.tolist()]
+        ideal = theta / design.ratio
+        loops.append(
+            FrictionLoop(
+                input_angle=theta,
+                quarter=steps,
+                torque=torque,
+                torsion=np.array([ideal - rubbing.output_angle(s) for s in rubbed])
+                + cup * torque,
+                elastic_torsion=np.array(
+                    [ideal - smooth.output_angle(s) for s in still]
+                )
+                + cup * torque,
+                stiffness=1.0 / (np.array([s.compliance for s in still]) + cup),
+                work=np.array([s.friction_work for s in rubbed]),
+            )
+        )
+        progress(f"{drive.name}: friction loops", k + 1, len(parts))
+    return tuple(loops)
+
+
+def _along(follow: Continuation, theta: float, torques: Array) -> list[State]:
+    """Equilibria along a path of the torque that begins at zero, input locked."""
+    state = follow.meshed(follow.deflected(theta))
+    states = []
+    for torque in torques.tolist():
+        if state.outcome.ok:
+            state = follow.to_torque(state, torque)
+        if not state.outcome.ok:
+            raise ComputationError(
+                f"no equilibrium at {torque:.4g} N·m and input angle {theta:.4g} rad"
+                f" with a friction coefficient of {_coefficient(follow):g}:"
+                f" {state.outcome.value}"
+            )
+        states.append(state)
+    return states
+
+
+def _coefficient(follow: Continuation) -> float:
+    law = follow.model.friction
+    return 0.0 if law is None else law.coefficient

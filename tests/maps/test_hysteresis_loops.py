@@ -1,0 +1,128 @@
+"""Elements of hysteresis from loops with and without friction."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from swgjoint.maps.drive_map import DriveMap
+from swgjoint.maps.equilibrium import output_angle
+from swgjoint.maps.hysteresis import Jenkin
+from swgjoint.maps.hysteresis_loops import (
+    REACHES,
+    FrictionLoop,
+    fit_elements,
+    played_loop,
+    with_hysteresis,
+)
+from swgjoint.units import arcmin
+
+N = 24
+
+
+def path(top: float) -> np.ndarray:
+    """0 -> T -> -T -> T -> -T -> T [N·m]."""
+    up = np.linspace(-top, top, 2 * N + 1)[1:]
+    return np.concatenate([[0.0], up[N:], -up, up, -up, up])
+
+
+def blank(drive: DriveMap, theta: float, top: float = 90.0) -> FrictionLoop:
+    """A loop to be played: the torques of a map without friction."""
+    torque = path(top)
+    psi = output_angle(replace(drive, hysteresis=()), theta, torque)
+    x = drive.torsion(theta, psi)
+    return FrictionLoop(
+        input_angle=theta,
+        quarter=N,
+        torque=torque,
+        torsion=theta / drive.ratio - psi,
+        elastic_torsion=theta / drive.ratio - psi,
+        stiffness=drive.stiffness(x, theta, psi),
+        work=np.zeros(torque.size),
+    )
+
+
+def rubbed(drive: DriveMap, theta: float = 0.1) -> FrictionLoop:
+    """The loop that a map with elements makes, as if it were computed."""
+    return played_loop(drive, blank(drive, theta))
+
+
+def elements(drive: DriveMap, *parts: tuple[float, float]) -> tuple[Jenkin, ...]:
+    """Elements of given yield torques and yield torsions in parts of the travel."""
+    travel = float(np.ptp(blank(drive, 0.1).torsion))
+    return tuple(Jenkin(stiffness=f / (d * travel), yield_torque=f) for f, d in parts)
+
+
+def test_work_of_a_round_is_that_of_the_slip(synthetic_map):
+    """The area of a round, and the integral of R dx, are 4 f (X - f/k)."""
+    drive = replace(synthetic_map, hysteresis=elements(synthetic_map, (2.0, 0.05)))
+    loop = rubbed(drive)
+    (element,) = drive.hysteresis
+    half = 0.5 * float(np.ptp(loop.torsion))
+    lost = 4.0 * element.yield_torque * (half - element.yield_torsion)
+    x, r = (values[loop.round] for values in (loop.torsion, loop.friction_torque))
+    # the trapezoidal rule with 24 steps a quarter cuts corners
+    assert loop.area == pytest.approx(lost, rel=0.02)
+    assert float(np.trapezoid(r, x)) == pytest.approx(lost, rel=0.02)
+    assert loop.gap == pytest.approx(0.0, abs=1e-12)
+
+
+def test_elements_come_back(synthetic_map):
+    """A map with elements of the grid gives them back from its own loops."""
+    given = elements(synthetic_map, (2.0, REACHES[8]), (5.0, REACHES[5]))
+    drive = replace(synthetic_map, hysteresis=given)
+    loops = [rubbed(drive, theta) for theta in (0.0, 0.02)]
+    found = fit_elements(loops)
+    for loop in loops:
+        back = played_loop(replace(drive, hysteresis=found), loop)
+        # friction takes 1 % of the travel, and the grid of yield torsions with it
+        assert np.abs(back.width - loop.width).max() < 0.03 * loop.width.max()
+        assert np.abs(back.shift - loop.shift).max() < 0.05 * np.abs(loop.shift).max()
+    assert sum(e.yield_torque for e in found) == pytest.approx(7.0, rel=0.02)
+
+
+def test_no_friction_no_elements(synthetic_map):
+    """Loops of a conservative drive have no width and give no elements."""
+    loop = blank(synthetic_map, 0.1)
+    assert np.abs(loop.width).max() < 1e-15 and loop.friction_work == 0.0
+    assert fit_elements([replace(loop, torsion=loop.elastic_torsion)]) == ()
+
+
+def test_sticking_teeth_stiffen_without_loss(synthetic_map):
+    """An element that never slips comes back as such: a mid-line, no width."""
+    drive = replace(synthetic_map, hysteresis=elements(synthetic_map, (5.0, 1.0)))
+    loop = rubbed(drive)
+    assert np.abs(loop.width).max() < 1e-12 and np.abs(loop.shift).max() > 1e-5
+    found = replace(drive, hysteresis=fit_elements([loop]))
+    back = played_loop(found, loop)
+    assert np.abs(back.width).max() < 0.01 * np.abs(loop.shift).max()
+    assert back.shift == pytest.approx(loop.shift, abs=0.02 * np.abs(loop.shift).max())
+
+
+def test_report_compares_what_was_played(synthetic_map):
+    """Loss and work of the loops and of the map stand side by side in the info."""
+    given = elements(synthetic_map, (2.0, REACHES[6]))
+    loops = [rubbed(replace(synthetic_map, hysteresis=given), t) for t in (0.0, 0.02)]
+    loops = [
+        replace(one, work=np.linspace(0.0, one.area, one.torque.size)) for one in loops
+    ]
+    found = with_hysteresis(synthetic_map, loops)
+    report = found.info["friction_loop"]
+    assert report["hysteresis_loss_arcmin"] == [one.loss / arcmin for one in loops]
+    assert report["hysteresis_loss_map_arcmin"] == pytest.approx(
+        report["hysteresis_loss_arcmin"], rel=0.02
+    )
+    assert report["round_area_map_J"] == pytest.approx(report["round_area_J"], rel=0.02)
+    assert report["residual_width_max_arcmin"] < 0.02 * report["width_rms_arcmin"]
+    assert "tooth friction" in found.info["hysteresis"]
+    only = found.spec_sheet(only=["hysteresis_loss_arcmin"])
+    assert only["hysteresis_loss_arcmin"] > 0.0
+
+
+def test_round_of_unequal_branches_is_refused(synthetic_map):
+    """Widths are differences at equal torques: other paths are a ValueError."""
+    loop = blank(synthetic_map, 0.1)
+    with pytest.raises(ValueError, match="round of equal branches"):
+        replace(loop, torque=np.linspace(-1.0, 1.0, loop.torque.size))
