@@ -33,6 +33,7 @@ COMMANDS = {
     "run": "simulate an arm with its drives",
     "compare": "drives or levels side by side in one scene, against a spec",
     "study": "our values beside those of a source",
+    "bench": "error against run time",
     "stability": "stiff and extreme joints: run, cut into sub-steps, or refused",
     "view": "open a recording",
     "doctor": "versions, engine plugin, cache, optional parts",
