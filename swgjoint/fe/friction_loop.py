@@ -39,7 +39,8 @@ def loop_torques(top: float, steps: int = STEPS) -> Array:
     up = top * (np.arange(steps + 1) / steps) ** 1.5
     few = up[:: steps // FIRST_STEPS]
     rise = np.concatenate([-up[-2::-1], up[1:]])
-    return np.concatenate([few, few[-2::-1], -few[1:], rise, -rise, rise])
+    path = np.concatenate([few, few[-2::-1], -few[1:], rise, -rise, rise])
+    return np.asarray(path + 0.0)  # no negative zero
 
 
 def friction_loops(
@@ -113,6 +114,11 @@ def _along(follow: Continuation, theta: float, torques: Array) -> list[State]:
     for torque in torques.tolist():
         if state.outcome.ok:
             state = follow.to_torque(state, torque)
+        if not state.outcome.ok and not states:
+            raise ComputationError(
+                f"no equilibrium without torque at input angle {theta:.4g} rad; an"
+                " output that clearance leaves free is not led through a loop"
+            )
         if not state.outcome.ok:
             raise ComputationError(
                 f"no equilibrium at {torque:.4g} N·m and input angle {theta:.4g} rad"

@@ -124,6 +124,15 @@ def test_map_has_the_hysteresis_of_its_teeth():
     assert "tooth friction" in sheet["validity"]["hysteresis"]
 
 
+def test_free_output_is_refused():
+    """Clearance of the teeth: no torsion belongs to zero torque, and that is said."""
+    thin = Design.load("reference-2d-simplified").with_changes(
+        {"flexspline.thickness_coefficient": 0.95, "friction.tooth_coefficient": 0.1}
+    )
+    with pytest.raises(ComputationError, match="clearance leaves free"):
+        friction_loops(thin, top=TOP, positions=1, steps=4)
+
+
 def test_map_without_a_loop_says_why(monkeypatch, synthetic_map):
     """Where friction cannot be solved the map keeps its potential, with the reason."""
 
