@@ -110,7 +110,7 @@ def friction_loops(
 def _along(follow: Continuation, theta: float, torques: Array) -> list[State]:
     """Equilibria along a path of the torque that begins at zero, input locked."""
     state = follow.meshed(follow.deflected(theta))
-    states = []
+    states: list[State] = []
     for torque in torques.tolist():
         if state.outcome.ok:
             state = follow.to_torque(state, torque)
