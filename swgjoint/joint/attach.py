@@ -17,6 +17,7 @@ from swgjoint.joint.prescribed import kinematic_part, ratio_variation
 from swgjoint.maps.drive_map import DriveMap
 
 LEVELS = ("rigid", "kinematic", "linear", "native", "full")
+ROTORS = ("gyroscopic", "lumped")
 
 
 def attach(
@@ -28,6 +29,7 @@ def attach(
     rotor_inertia: float,
     damping_ratio: float | None = None,
     friction: bool = False,
+    rotor: str = "gyroscopic",
     max_input_speed: float | None = None,
     max_phase_step: float = 0.5,
 ) -> JointDrive:
@@ -71,6 +73,9 @@ def attach(
         damping_ratio: Share of critical damping of rotor against link with the link
             inertia at qpos0, the other joints held; that of the map if None [-].
         friction: Whether the model has the friction of the map, where it has any.
+        rotor: ``gyroscopic``, a body that its link carries along, or ``lumped``: its
+            kinetic energy is that of its rotation against that link alone (Spong
+            1987, J. Dyn. Sys. Meas. Control 109:310-319, assumption 2).
         max_input_speed: Largest speed of the rotor [rad/s]; harmonics that the step
             cannot carry at it are left out. None keeps all.
         max_phase_step: Largest phase step h n |theta rate| that is kept [rad].
@@ -84,6 +89,8 @@ def attach(
     if level not in LEVELS:
         raise InputError(f"level {level!r} unknown; accepted: {', '.join(LEVELS)}")
     _positive("rotor_inertia", rotor_inertia, "kg·m²")
+    if rotor not in ROTORS:
+        raise InputError(f"rotor {rotor!r} unknown; accepted: {', '.join(ROTORS)}")
     if damping_ratio is None:
         damping_ratio = drive.damping_ratio
     if not (np.isfinite(damping_ratio) and 0.0 <= damping_ratio < 1.0):
@@ -137,18 +144,19 @@ def attach(
         place.joint.armature = reflected
         damping = 0.0
     else:
-        names["rotor"] = rotor = f"{joint}_rotor"
+        names["rotor"] = hinge = f"{joint}_rotor"
         names["tendon"] = tendon = f"{joint}_drive"
-        body = add_rotor(spec, place, rotor, rotor_inertia, ratio)
+        lumped = rotor == "lumped"
+        body = add_rotor(spec, place, hinge, rotor_inertia, ratio, lumped=lumped)
         if level == "linear":
             add_tendon(
-                spec, tendon, rotor, joint, ratio, (stiffness, 0.0, 0.0), damping
+                spec, tendon, hinge, joint, ratio, (stiffness, 0.0, 0.0), damping
             )
         elif spring is not None:
-            hysteresis = add_native(spec, spring, tendon, rotor, joint, ratio, damping)
+            hysteresis = add_native(spec, spring, tendon, hinge, joint, ratio, damping)
         else:
             names["plugin"] = tendon
-            add_tendon(spec, tendon, rotor, joint, ratio, plugin.TENDON_STIFFNESS, 0.0)
+            add_tendon(spec, tendon, hinge, joint, ratio, plugin.TENDON_STIFFNESS, 0.0)
             spec.activate_plugin(plugin.NAME)
             instance = spec.add_plugin(
                 name=tendon, plugin_name=plugin.NAME, active=True
@@ -163,7 +171,7 @@ def attach(
                 add_tendon(
                     spec,
                     f"{joint}_friction",
-                    rotor,
+                    hinge,
                     joint,
                     ratio,
                     plugin.FRICTION_STIFFNESS,

@@ -13,18 +13,31 @@ from swgjoint.units import deg
 
 ROTOR_MASS = 1e-9
 """Mass of the rotor body [kg]; the arm's model already holds the motor's mass."""
+LUMPED_INERTIA = 1e-12
+"""Of the body of a lumped rotor [kg·m²]: the engine wants some."""
 
 
 def add_rotor(
-    spec: mujoco.MjSpec, place: Place, name: str, inertia: float, ratio: float
+    spec: mujoco.MjSpec,
+    place: Place,
+    name: str,
+    inertia: float,
+    ratio: float,
+    *,
+    lumped: bool,
 ) -> Any:
-    """Rotor body and hinge at the joint's place, nothing inherited from defaults."""
+    """Rotor body and hinge at the joint's place, nothing inherited from defaults.
+
+    A body turns with the link that carries it, with all that follows from its spin;
+    lumped, its kinetic energy is that of its own rotation against that link alone.
+    """
     body = place.parent.add_body(name=name, pos=place.pos, quat=place.quat)
     body.explicitinertial = True
     body.mass = ROTOR_MASS
     body.ipos = np.zeros(3)  # unset, it is not written to XML
     # a ball: the spin about the axis is what counts, and no axis needs aligning
-    body.inertia = np.full(3, inertia)
+    own = min(LUMPED_INERTIA, 1e-3 * inertia) if lumped else inertia
+    body.inertia = np.full(3, own)
     hinge = body.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_HINGE)
     hinge.pos = np.zeros(3)
     hinge.axis = place.axis
@@ -32,7 +45,7 @@ def add_rotor(
     hinge.damping = np.zeros(3)
     hinge.springdamper = np.zeros(2)
     hinge.springyield = 0.0
-    hinge.armature = 0.0
+    hinge.armature = inertia - own
     hinge.frictionloss = 0.0
     hinge.limited = mujoco.mjtLimited.mjLIMITED_FALSE
     hinge.actfrclimited = mujoco.mjtLimited.mjLIMITED_FALSE

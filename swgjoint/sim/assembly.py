@@ -150,6 +150,7 @@ def assemble(
             rotor_inertia=section.rotor_inertia_kgm2 or 0.0,
             damping_ratio=section.damping_ratio,
             friction=bool(section.friction),
+            rotor=section.rotor or "gyroscopic",
             # a joint at rest carries every order
             max_input_speed=float(abs(drive.ratio) * speed) or None,
         )

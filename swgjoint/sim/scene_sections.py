@@ -43,6 +43,8 @@ class JointSection(Section):
     """False leaves the hysteresis of the drive out."""
     friction: bool | None = None
     """True takes the friction of the drive in, at the levels native and full."""
+    rotor: Literal["gyroscopic", "lumped"] | None = None
+    """Whether the rotor is a body that its link carries along, the default."""
 
     @model_validator(mode="after")
     def _one_drive(self) -> Self:

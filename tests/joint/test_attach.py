@@ -307,3 +307,57 @@ def test_unresolved_harmonics_are_listed(spec, synthetic_map):
     alone = synthetic_map.coefficients(x, 1)[3] @ [np.cos(phase), np.sin(phase)]
     assert left.torque == pytest.approx(np.ptp(alone) / 2, rel=1e-4)
     assert len(got.drive.orders) == 4
+
+
+TURNTABLE = """
+<mujoco>
+  <option timestep="1e-4" gravity="0 0 0" integrator="RK4"/>
+  <worldbody>
+    <body name="table"><joint name="turn" axis="0 0 1"/>
+      <joint name="tilt" axis="0 1 0"/>
+      <geom size=".1" mass="1"/>
+      <body name="link" pos="0 0 .1"><joint name="joint" axis="1 0 0"/>
+        <geom type="capsule" fromto="0 0 0 .2 0 0" size=".02" mass=".1"/></body>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+
+
+@pytest.mark.parametrize(
+    ("rotor", "gyroscopic"), [("gyroscopic", 1.0), ("lumped", 0.0)]
+)
+def test_a_spinning_rotor_resists_turning_unless_lumped(rotor, part):
+    """Turning a spin J w about z by W takes J w W about y; lumped it takes nothing."""
+    spec = mujoco.MjSpec.from_string(TURNTABLE)
+    inertia, spin, turn = 2e-4, 300.0, 0.7
+    attach(
+        spec,
+        joint="joint",
+        drive=DriveMap.linear(1e4),
+        level="linear",
+        rotor_inertia=inertia,
+        rotor=rotor,
+    )
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    data.joint("turn").qvel = turn
+    mujoco.mj_forward(model, data)
+    still = data.joint("tilt").qfrc_bias.copy()
+    data.joint("joint_rotor").qvel = spin
+    mujoco.mj_forward(model, data)
+    moment = data.joint("tilt").qfrc_bias - still
+    assert abs(moment[0]) == pytest.approx(part * inertia * spin * turn, abs=1e-9)
+    mass = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, mass)
+    dof = int(model.joint("joint_rotor").dofadr[0])
+    assert mass[dof, dof] == pytest.approx(inertia, rel=1e-12)
+
+
+def test_an_unknown_rotor_is_refused(spec, synthetic_map):
+    """One line; the spec is unchanged."""
+    with pytest.raises(InputError, match="rotor 'stiff' unknown; accepted: gyroscopic"):
+        attach(
+            spec, joint="elbow", drive=synthetic_map, rotor_inertia=1e-5, rotor="stiff"
+        )
+    assert spec.body("elbow_rotor") is None
