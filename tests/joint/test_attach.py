@@ -324,9 +324,7 @@ TURNTABLE = """
 """
 
 
-@pytest.mark.parametrize(
-    ("rotor", "gyroscopic"), [("gyroscopic", 1.0), ("lumped", 0.0)]
-)
+@pytest.mark.parametrize(("rotor", "part"), [("gyroscopic", 1.0), ("lumped", 0.0)])
 def test_a_spinning_rotor_resists_turning_unless_lumped(rotor, part):
     """Turning a spin J w about z by W takes J w W about y; lumped it takes nothing."""
     spec = mujoco.MjSpec.from_string(TURNTABLE)
