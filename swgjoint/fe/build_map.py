@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 from swgjoint.errors import ComputationError
-from swgjoint.fe.drive2d import check_modelled
+from swgjoint.fe import drive2d
 from swgjoint.fe.friction_loop import friction_loops
-from swgjoint.fe.sampling import ANGLES, sample_map
+from swgjoint.fe.sampling import sample_map
+from swgjoint.fe.solid import drive3d
 from swgjoint.gear.design import Design
 from swgjoint.maps.cache import cached
 from swgjoint.maps.drive_map import DriveMap
@@ -20,7 +21,7 @@ def build_map(
     design: Design,
     *,
     model: str | None = None,
-    angles: int = ANGLES,
+    angles: int | None = None,
     progress: Progress = silent,
     cache: bool = True,
 ) -> DriveMap:
@@ -32,8 +33,9 @@ def build_map(
 
     Args:
         design: The drive.
-        model: Fidelity; default ``2d``.
-        angles: Wave-generator positions over one pitch of the fixed member.
+        model: Fidelity, ``2d`` or ``3d``; by default ``3d`` for a design with a cup.
+        angles: Wave-generator positions over one pitch of the fixed member; the
+            default of :func:`swgjoint.fe.sampling.sample_map` if None.
         progress: Called with the stage, the solves done and their number.
         cache: Whether to look in the cache of maps, and to store there.
 
@@ -42,10 +44,15 @@ def build_map(
         ComputationError: If no torque at all can be solved.
     """
     model = model or ("3d" if design.cup is not None else "2d")
-    check_modelled(design, model)
+    if model == "3d":
+        drive3d.check_modelled(design)
+    else:
+        drive2d.check_modelled(design, model)
 
     def build() -> DriveMap:
-        drive = fit_map(sample_map(design, angles=angles, progress=progress))
+        drive = fit_map(
+            sample_map(design, model=model, angles=angles, progress=progress)
+        )
         if not design.friction.tooth_coefficient:
             return drive
         return _with_friction(design, drive, progress)
