@@ -11,8 +11,8 @@ can hand over direction and stiffness of the same step, see
     install(m, d, [drive])
     mjw.step(m, d)  # also inside a captured graph
 
-Held: potential with all harmonics, kinematic error, hysteresis, damping. Refused:
-friction of the map, and every integrator but ``discrete``.
+The whole law is held: potential with all harmonics, kinematic error, hysteresis,
+friction, damping. Every integrator but ``discrete`` is refused.
 
 The law is evaluated in double precision, the engine's state is in single: a position
 is rounded by 6e-8 of itself, which is noise of about 1e-7 K in the torque at an output
@@ -155,12 +155,6 @@ def install(m: Any, d: Any, model: mujoco.MjModel, drives: Sequence[JointDrive])
             " call both from one of your own"
         )
     full = [drive for drive in drives if drive.level == "full"]
-    for drive in full:
-        if drive.friction is not None:
-            raise InputError(
-                f"joint {drive.joint!r}: friction of the map is not held in MuJoCo"
-                " Warp; accepted: attach(..., friction=False), or level native"
-            )
     call = WarpDrives(model, full, worlds=d.nworld, device=d.qpos.device)
     m.callback.passive = call
     return call
@@ -185,6 +179,12 @@ def _place(model: mujoco.MjModel, drive: JointDrive) -> Any:
     one.entry_rotor = row + columns.index(one.v_rotor)
     one.entry_link = row + columns.index(one.v_link)
     one.ratio, one.damping = drive.ratio, drive.damping
+    one.friction = -1
+    if drive.friction is not None:
+        one.friction = int(model.tendon(f"{drive.joint}_friction").id)
+        numbers = plugin.friction_numbers(drive.drive).tolist()
+        one.b_theta, one.b_psi, one.bristle, one.creep, one.coulomb = numbers[:5]
+        one.stiction, one.stribeck, one.viscous, one.load = numbers[5:]
     return one
 
 

@@ -1,8 +1,8 @@
 # mypy: ignore-errors
 """Kernels of :mod:`swgjoint.joint.warp`, in the language of Warp and with its types.
 
-The law as ``drive.cc`` and ``drive_map.cc`` compute it, without friction; one thread
-for one drive in one world.
+The law as ``drive.cc``, ``drive_map.cc`` and ``friction.cc`` compute it; one thread for
+one drive in one world.
 """
 
 import warp as wp
@@ -13,6 +13,7 @@ real = wp.float64
 vec5 = wp.types.vector(length=5, dtype=real)
 _SPRING, _, _CUBIC = plugin.TENDON_STIFFNESS
 SPRING, CUBIC = wp.constant(real(_SPRING)), wp.constant(real(_CUBIC))
+FRICTION_CUBIC = wp.constant(real(plugin.FRICTION_STIFFNESS[2]))
 NU1 = wp.constant(real(plugin.NUMERICAL_DAMPING))
 PASSES = wp.constant(plugin.PASSES)
 ZERO, HALF, ONE = (wp.constant(real(x)) for x in (0.0, 0.5, 1.0))
@@ -42,6 +43,31 @@ class Drive:
     elements: int
     ratio: real
     damping: real
+    friction: int
+    """Its tendon, -1 without."""
+    b_theta: real
+    b_psi: real
+    bristle: real
+    """Stiffness [N·m/rad], then its damping [N·m·s/rad]."""
+    creep: real
+    coulomb: real
+    stiction: real
+    stribeck: real
+    viscous: real
+    load: real
+
+
+@wp.struct
+class Rub:
+    """Friction in one step, as in ``friction.cc``; linear in the rotation."""
+
+    stretch: real
+    reach: real
+    offset: real
+    rate: real
+    force: real
+    metric: real
+    predicted: real
 
 
 @wp.struct
@@ -63,6 +89,13 @@ class Step:
     a_rotor: real
     """Acceleration that all other forces caused [rad/s²]."""
     a_link: real
+    rub: Rub
+    rotation: real
+    """beta at the beginning [rad]."""
+    relaxed: real
+    """beta at which the bristle is relaxed [rad]."""
+    known: int
+    """Whether that is known."""
 
 
 @wp.struct
@@ -263,6 +296,62 @@ def slip(s: Secant, stiffness: real, reach: real, rest: real):
     return s
 
 
+@wp.func
+def rub_over(
+    drive: Drive,
+    stretch: real,
+    yield_torque: real,
+    speed: real,
+    free: real,
+    response: real,
+    h: real,
+):
+    """Solve friction on the predicted step of a pair."""
+    out = Rub()
+    sigma = drive.bristle
+    out.reach = yield_torque / sigma
+    z = wp.clamp(stretch, -out.reach, out.reach)
+    out.stretch = z
+    d = h * (speed + HALF * free)
+    k = HALF * h * response
+    m = ONE + HALF * response * drive.viscous
+    out.offset = sigma * z
+    out.rate = HALF * sigma + drive.creep / h
+    dx = (d - k * out.offset) / (m + k * out.rate)
+    if wp.abs(z + dx) > out.reach:
+        # sticks over the way a, then slips: the mean torque times dx is exact work
+        sign = wp.where(dx > ZERO, ONE, -ONE)
+        a = out.reach - sign * z
+        creep = drive.creep * a / h
+        b = sign * d - k * (yield_torque + creep)
+        c = k * sigma * a * a
+        root = wp.sqrt(b * b + real(2.0) * m * c)
+        way = wp.where(b > ZERO, HALF * (b + root) / m, c / (root - b))
+        mean = sign * (yield_torque - HALF * sigma * a * a / way + creep)
+        dx = sign * way
+        # linear in the true dx, and never able to give back more than is stored
+        out.rate = HALF * sigma
+        out.offset = mean - out.rate * dx
+        if wp.abs(out.offset) > sigma * wp.abs(z):
+            out.offset = ZERO
+            out.rate = mean / dx
+    slope = out.rate + drive.viscous / h
+    out.force = out.offset + slope * h * speed
+    out.metric = HALF * slope
+    out.predicted = out.offset + slope * dx
+    return out
+
+
+@wp.func
+def stretch_after(drive: Drive, rub: Rub, dx: real):
+    """Stretch of the bristle after the rotation that the step came to."""
+    end = wp.clamp(rub.stretch + dx, -rub.reach, rub.reach)
+    work = (rub.offset + rub.rate * dx) * dx
+    stored = rub.stretch * rub.stretch + real(2.0) * work / drive.bristle
+    most = wp.sqrt(wp.max(ZERO, stored))
+    return wp.clamp(end, -most, most)
+
+
 @wp.kernel
 def articulated(
     M_rownnz: wp.array(dtype=int),
@@ -319,8 +408,19 @@ def law(
     if time[world] > last.time:
         rm, rl = vm - last.v_rotor, vl - last.v_link
         done = last.force + h * last.metric * (last.g_theta * rm + last.g_psi * rl)
-        last.a_rotor = rm / h + last.w_rotor * (last.g_theta * done + last.e_theta)
-        last.a_link = rl / h + last.w_link * (last.g_psi * done + last.e_psi)
+        on_rotor = last.g_theta * done + last.e_theta
+        on_link = last.g_psi * done + last.e_psi
+        if drive.friction >= 0:
+            change = drive.b_theta * rm + drive.b_psi * rl
+            rubbed = last.rub.force + h * last.rub.metric * change
+            on_rotor += drive.b_theta * rubbed
+            on_link += drive.b_psi * rubbed
+            was = drive.b_theta * last.v_rotor + drive.b_psi * last.v_link
+            dx = h * (was + HALF * change)
+            last.relaxed = last.rotation + dx - stretch_after(drive, last.rub, dx)
+            last.known = 1
+        last.a_rotor = rm / h + last.w_rotor * on_rotor
+        last.a_link = rl / h + last.w_link * on_link
         for j in range(drive.element, drive.element + drive.elements):
             low = last.torsion - maps.element[j, 1]
             high = last.torsion + maps.element[j, 1]
@@ -328,6 +428,7 @@ def law(
     if time[world] < last.time:
         last.a_rotor = ZERO
         last.a_link = ZERO
+        last.known = 0
         for j in range(drive.element, drive.element + drive.elements):
             rest[world, j] = ZERO
 
@@ -336,6 +437,11 @@ def law(
     native = length * (SPRING + CUBIC * length * length)
     on_rotor = native * real(ten_J[world, drive.entry_rotor])
     on_link = native * real(ten_J[world, drive.entry_link])
+    if drive.friction >= 0:
+        length = real(ten_length[world, drive.friction])
+        native = length * (SPRING + FRICTION_CUBIC * length * length)
+        on_rotor += native * drive.b_theta
+        on_link += native * drive.b_psi
 
     # inverse articulated inertias
     rotor_end = M_rowadr[drive.v_rotor] + M_rownnz[drive.v_rotor] - 1
@@ -349,6 +455,10 @@ def law(
     dm, dl = real(0.0), real(0.0)
     force, p = real(0.0), real(0.0)
     s = Secant()
+    rub = Rub()
+    speed = drive.b_theta * vm + drive.b_psi * vl
+    last.rotation = drive.b_theta * theta + drive.b_psi * psi
+    turned = wp.where(last.known == 1, last.rotation - last.relaxed, ZERO)
     for _ in range(PASSES):
         s = secant_over(
             drive, maps, theta, psi, h * (vm + HALF * dm), h * (vl + HALF * dl)
@@ -366,8 +476,29 @@ def law(
         am, al = last.a_rotor - wm * s.e_theta, last.a_link - wl * s.e_psi
         turn = h * (s.g_theta * am + s.g_psi * al - w * force)
         f = force + h * p * turn / (ONE + h * h * w * p)
+        middle = speed + HALF * (drive.b_theta * dm + drive.b_psi * dl)
         dm = h * (am - wm * s.g_theta * f)
         dl = h * (al - wl * s.g_psi * f)
+        if drive.friction >= 0:
+            x = middle / drive.stribeck
+            slips = drive.coulomb + drive.load * wp.abs(s.torque)
+            slips += (drive.stiction - drive.coulomb) * wp.exp(-x * x)
+            # (M + h² p g g')⁻¹ b: how the pair answers to friction
+            along = wm * drive.b_theta * s.g_theta + wl * drive.b_psi * s.g_psi
+            along *= h * h * p / (ONE + h * h * w * p)
+            rm = wm * (drive.b_theta - along * s.g_theta)
+            rl = wl * (drive.b_psi - along * s.g_psi)
+            rub = rub_over(
+                drive,
+                turned,
+                slips,
+                speed,
+                drive.b_theta * dm + drive.b_psi * dl,
+                h * (drive.b_theta * rm + drive.b_psi * rl),
+                h,
+            )
+            dm -= h * rm * rub.predicted
+            dl -= h * rl * rub.predicted
 
     # the tangent of the tendon's cubic spring at this length is the stiffness p
     tangent = wp.max(ZERO, p - SPRING) / (real(3.0) * CUBIC)
@@ -378,6 +509,15 @@ def law(
     on_rotor -= along * s.g_theta + s.e_theta
     on_link -= along * s.g_psi + s.e_psi
     ten_length[world, drive.tendon] = float(length)
+    if drive.friction >= 0:
+        # the same along b, a second term of the metric
+        tangent = wp.max(ZERO, rub.metric - SPRING) / (real(3.0) * FRICTION_CUBIC)
+        length = wp.max(real(1e-12), wp.sqrt(tangent))
+        rub.metric = SPRING + real(3.0) * FRICTION_CUBIC * length * length
+        ten_length[world, drive.friction] = float(length)
+        rubs = rub.force - h * rub.metric * real(ten_velocity[world, drive.friction])
+        on_rotor -= rubs * drive.b_theta
+        on_link -= rubs * drive.b_psi
     ten_J[world, drive.entry_rotor] = float(s.g_theta)
     ten_J[world, drive.entry_link] = float(s.g_psi)
     qfrc_passive[world, drive.v_rotor] += float(on_rotor)
@@ -395,4 +535,5 @@ def law(
     last.force = force
     last.metric = p
     last.torsion = s.begin
+    last.rub = rub
     steps[world, index] = last
