@@ -24,7 +24,8 @@ Array = NDArray[np.float64]
 
 POSITIONS = 4
 """Input positions over one pitch, half a step from its ends. With a symmetric wave
-generator two of them are solved, for the others are their mirror images."""
+generator two of them are solved, for the others are their mirror images. From position
+to position width and work vary by half; the mean of eight is within 2 %."""
 STEPS = 12
 """Torques from zero to the largest, closer together at small ones."""
 FIRST_STEPS = 4

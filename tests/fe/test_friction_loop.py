@@ -12,7 +12,9 @@ from swgjoint.errors import ComputationError
 from swgjoint.fe.continuation import Continuation
 from swgjoint.fe.drive2d import ring_model
 from swgjoint.fe.friction_loop import FIRST_STEPS, friction_loops, loop_torques
+from swgjoint.fe.sampling import sample_map
 from swgjoint.gear.design import Design
+from swgjoint.maps.fit import fit_map
 
 TOP = 40.0
 
@@ -109,10 +111,11 @@ def test_nothing_is_lost_where_nothing_slips():
 @pytest.mark.slow
 def test_map_has_the_hysteresis_of_its_teeth():
     """The map of a design with friction: a potential without, elements on top of it."""
-    drive = building.build_map(rubbing(0.1), angles=12, cache=False)
-    smooth = building.build_map(rubbing(0.0), angles=12, cache=False)
+    design = rubbing(0.1)
+    drive = building.build_map(design, angles=6, cache=False)
+    smooth = fit_map(sample_map(design, angles=6))
     np.testing.assert_array_equal(drive.potential, smooth.potential)
-    assert smooth.hysteresis == () and "friction_loop" not in smooth.info
+    assert smooth.hysteresis == () and len(drive.hysteresis) > 0
     report = drive.info["friction_loop"]
     taken = np.array(report["round_area_map_J"])
     # one set of elements for all positions, whose work differs by half
