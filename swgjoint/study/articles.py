@@ -74,7 +74,10 @@ def tasks_of(study: ArticlesFile, part: str) -> list[Task]:
     """What a part computes."""
     if part == "deflection":
         own = changed(study.deflection.base)
-        return _deflected("deflection", own, fine=True)
+        tasks = _deflected("deflection", own, fine=True)
+        for v in study.deflection.variations:
+            tasks += _deflected(f"deflection, {v.name}", own.with_changes(v.changes))
+        return tasks
     if part == "force":
         force = study.force
         design = changed(force.base)

@@ -33,6 +33,7 @@ class Deflection(Section):
     table_mm: Positive
     theory_mm: Positive
     largest_radial_mm: Positive
+    variations: Annotated[tuple[Variation, ...], Field(strict=False)] = ()
 
 
 class Force(Section):

@@ -81,6 +81,7 @@ def _safety(ax: Any, found: Mapping[str, Found]) -> None:
     theory = [row["shell_theory"]["S"] for row in rows]
     ax.plot(torque, theory, "k:", label="shell theory")
     ax.axhline(1.5, color="0.6", lw=0.8)
+    ax.set_ylim(0.0, 1.05 * max([1.5, *theory]))
     ax.set_ylabel("safety factor")
     ax.legend(fontsize="small")
 

@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from scipy.optimize import brentq
+
+from swgjoint.gear.material import Material
 from swgjoint.gear.shell_theory import (
     SERIES_SUM,
     FatigueFactors,
@@ -127,7 +130,25 @@ def deflection_rows(own: Deflection, results: Mapping[str, Found]) -> list[Row]:
             "MPa",
             None,
             "at_minor_MPa",
-            "stated: significantly lower",
+            "stated: significantly lower; bending around is as large there in shell"
+            " theory, too",
+        ),
+        *(
+            Row(
+                case=own.base,
+                quantity=f"largest radial displacement, {v.name}",
+                unit="mm",
+                source_value=None,
+                ours=_value(
+                    results[f"deflection, {v.name}"],
+                    lambda f: float(f["largest_radial_mm"]),
+                ),
+                reason=_reason(
+                    results[f"deflection, {v.name}"], "not stated by the article"
+                ),
+                more={"part": "deflection"},
+            )
+            for v in own.variations
         ),
     ]
 
@@ -367,13 +388,37 @@ def stress_rows(own: StressAndFatigue, found: Mapping[str, Found]) -> list[Row]:
     return rows
 
 
+def _torque_at(allowable: float, shell: ShellDimensions, steel: Material) -> float:
+    """Torque at which the closed forms reach a safety factor [N·m]."""
+    assert steel.fatigue_limit_bending and steel.fatigue_limit_torsion
+    limits = steel.fatigue_limit_bending, steel.fatigue_limit_torsion
+
+    def above(torque: float) -> float:
+        found = shell_safety_factor(
+            shell, torque, bending_limit=limits[0], torsion_limit=limits[1]
+        )
+        return found.combined - allowable
+
+    return float(brentq(above, 0.0, 1e5))
+
+
 def fatigue_rows(own: StressAndFatigue, found: Mapping[str, Found]) -> list[Row]:
     """Safety factors over the torque."""
     design = changed(own.base)
     shell, radius = ShellDimensions.of(design), 0.5 * design.pitch_diameter
     steel = design.material_of("flexspline")
     assert steel.fatigue_limit_bending and steel.fatigue_limit_torsion
-    rows = []
+    rows = [
+        Row(
+            case=own.base,
+            quantity=f"torque at S = {own.allowable:g}, shell theory",
+            unit="N·m",
+            source_value=None,
+            ours=_torque_at(own.allowable, shell, steel),
+            reason=f"{HELD_BACK}; the torque is even shear alone here",
+            more={"part": "fatigue"},
+        )
+    ]
 
     def pick(name: str, k: int, *keys: str) -> float | None:
         def value(f: Found) -> float:
@@ -463,7 +508,8 @@ def fatigue_rows(own: StressAndFatigue, found: Mapping[str, Found]) -> list[Row]
             row(
                 f"S, meshing, {text}, worst section",
                 pick(name, k, "worst_section", "S"),
-                _reason(result, f"{HELD_BACK}; edges, where it does not converge"),
+                _reason(result, f"{HELD_BACK}; with the ellipse at the back edge"),
+                converged=on_fine.get("worst_section", {}).get("S"),
             )
             row(
                 f"S, meshing, {text}, without factors",

