@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from swgjoint.fe.solid.linearise import bore_contact
+from swgjoint.fe.solid.teeth import FlankCrowning
 
 STEP = 1e-8
 
@@ -92,3 +93,22 @@ def test_contact_forces_push_and_close_gaps(small_ring, loaded):
     assert np.abs(contact.gap[loaded.touching]).max() < 1e-9
     assert not loaded.pressure[~loaded.touching].any()
     assert (loaded.pressure > 0.0).sum() > 50
+
+
+@pytest.mark.parametrize("circular", [False, True])
+def test_crowned_teeth_are_thinner_at_the_edges(small_ring, circular):
+    """Both flanks recede by the height there, along their normals, and not half way."""
+    strip = small_ring.strip
+    width = float(np.ptp(strip.mesh.teeth.z))
+    crowning = FlankCrowning(height=20e-6, width=width, circular=circular)
+    moved = crowning.displacement(strip)  # (n_planes, 2 n_b, 2)
+    depth = np.linalg.norm(moved, axis=-1)
+    assert depth[0] == pytest.approx(20e-6, rel=1e-6)
+    assert depth[-1] == pytest.approx(20e-6, rel=1e-6)
+    assert depth[len(depth) // 2] == pytest.approx(0.0, abs=1e-12)
+    right, left = np.split(moved[0], 2)
+    assert (right[:, 0] <= 0.0).all() and (left[:, 0] >= 0.0).all()
+    assert np.abs(right * np.array([-1.0, 1.0]) - left).max() < 1e-15
+    # the tooth gets thinner where the flank is steep, and no flank grows outward
+    assert right[:, 0].min() < -15e-6
+    assert (moved[0, :, 1] <= 1e-12).all()
