@@ -53,9 +53,6 @@ STEP_TOLERANCE = 1e-10
 """Displacement increment at which the iteration ends [m]."""
 CLOSURE = np.array([-1.0, -1.0, 1.0])
 """Factors of x, y, z that close the half."""
-ORDERS = Orders(wall=2)
-"""Straight lines through the wall of the cup make it 1 % too stiff; what these orders
-leave is 0.2 %."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -295,14 +292,15 @@ class PinchedCup:
 
 
 def pinched_cup(
-    design: Design, *, toothless: bool = False, orders: Orders = ORDERS
+    design: Design, *, toothless: bool = False, orders: Orders | None = None
 ) -> PinchedCup:
     """Condense the flexspline of a design.
 
     Args:
         design: The drive; a ring without a ``[cup]`` is free.
         toothless: A smooth wall of the rim's thickness where the teeth are.
-        orders: Degrees of the displacements of faces and sections.
+        orders: Degrees of the displacements of faces and sections; the usual ones if
+            None.
 
     Raises:
         DesignError: If it cannot be meshed or has an odd number of teeth, so that no
@@ -317,6 +315,7 @@ def pinched_cup(
         )
     profile = tooth_profile(design, "flexspline")
     strip = smooth_strip(design) if toothless else flexspline_strip(design, profile)
+    orders = orders or Orders()
     require_memory(name, required_memory(strip, None, teeth // 2, orders))
     masters = strip_masters(strip, orders)
     material = design.material_of("flexspline")

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
-from swgjoint.fe.solid.pinched_cup import ORDERS, pinched_cup
+from swgjoint.fe.solid.masters import Orders
+from swgjoint.fe.solid.pinched_cup import pinched_cup
 from swgjoint.gear.design import Design
 from swgjoint.gear.shell_theory import ShellDimensions, cup_stiffness
 from swgjoint.gear.wave_generator import lobe_height
@@ -17,11 +18,11 @@ COARSEST = 0.5
 SMALL = 1.0
 """Load of the linear level, where only the ratio matters [N]."""
 FINER = replace(
-    ORDERS,
-    teeth=ORDERS.teeth + 2,
-    cup=ORDERS.cup + 2,
-    at_teeth=ORDERS.at_teeth + 2,
-    around=ORDERS.around + 2,
+    Orders(),
+    teeth=Orders().teeth + 2,
+    cup=Orders().cup + 2,
+    at_teeth=Orders().at_teeth + 2,
+    around=Orders().around + 2,
 )
 """Next degrees of the displacements of faces and sections, to estimate the error."""
 
