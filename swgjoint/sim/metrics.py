@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
+HARMONIC_LEVELS = ("kinematic", "full")
 PHASE_STEP = 0.5
 """Largest phase of an order per step that counts as resolved [rad]."""
 NOISE = 1e-6
@@ -116,9 +117,13 @@ def highest_resolved_order(run: Run, j: int) -> float | None:
 def phase_step(run: Run, j: int) -> float:
     """Largest phase of the highest kept order in one step of the engine [rad].
 
-    Harmonics are kept by the commanded speed; a rotor may turn faster than that.
+    Harmonics are kept by the commanded speed; a rotor may turn faster than that. Levels
+    without harmonics have no such phase.
     """
-    order = max(run.assembly.transmissions[j].attached.kept_orders, default=0.0)
+    attached = run.assembly.transmissions[j].attached
+    if attached.level not in HARMONIC_LEVELS:
+        return 0.0
+    order = max(attached.kept_orders, default=0.0)
     speed = float(np.abs(run.motor_velocity[:, j]).max())
     return run.assembly.step * order * speed
 
@@ -130,7 +135,7 @@ def drive_order(run: Run, j: int, order: float) -> float | None:
     joints, which reach this one through the arm.
     """
     attached = run.assembly.transmissions[j].attached
-    if attached.level not in ("kinematic", "full") or not attached.kept_orders:
+    if attached.level not in HARMONIC_LEVELS or not attached.kept_orders:
         return None
     near = min(attached.kept_orders, key=lambda kept: abs(kept - order))
     turns = np.ptp(run.motor_position[run.steady, j]) / (2.0 * np.pi)

@@ -163,6 +163,15 @@ def test_a_rotor_that_outruns_its_command_is_named(bench):
     assert any("joint: its rotor turned faster than comm" in line for line in lines)
 
 
+@pytest.mark.parametrize("level", ["rigid", "linear"])
+def test_levels_without_harmonics_outrun_nothing(bench, level):
+    """The orders of a map that a level leaves out have no phase in its run."""
+    run = bench(erring(2e4), simulation__step_s=5e-3, joints__joint__level=level)
+    joint = run.metrics()["joints"]["joint"]
+    assert joint["level"] == level
+    assert joint["phase_step_rad"] == 0.0
+
+
 def test_a_scene_may_refuse_sub_steps(bench):
     """With max_sub_steps = 1 the bound is named with the step that would do."""
     keys = {"integrator": "RK4", "step_s": 0.005, "duration_s": 1.0}
