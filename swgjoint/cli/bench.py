@@ -19,7 +19,10 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="fe: finite elements in the plane and in space, coarse to fine",
     )
     parser.add_argument(
-        "--design", metavar="DESIGN", help="with a cup; default reference-3d-modified"
+        "--design",
+        metavar="DESIGN",
+        default="reference-3d-modified",
+        help="with a cup; default %(default)s",
     )
     parser.add_argument(
         "--out", metavar="DIR", help="write the table and the picture there"
@@ -35,7 +38,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     folder = output_folder(args.out) if args.out else None
     from swgjoint.gear.design import Design
 
-    design = None if args.design is None else Design.load(args.design)
+    design = Design.load(args.design)
     from swgjoint.study.fe_cost import run_fe_cost
 
     return run_fe_cost(design=design, folder=folder, progress=args.progress)

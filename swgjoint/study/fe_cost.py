@@ -38,7 +38,6 @@ from swgjoint.units import arcsec
 
 Array = NDArray[np.float64]
 
-DESIGN = "reference-3d-modified"
 POSITIONS = 4
 """Over one pitch; the same ones in every setting."""
 
@@ -88,7 +87,7 @@ class Found:
 
 def run_fe_cost(
     *,
-    design: Design | None = None,
+    design: Design,
     settings: Sequence[Setting] = SETTINGS,
     folder: Path | None = None,
     progress: Progress = silent,
@@ -105,7 +104,6 @@ def run_fe_cost(
         ComputationError: If the reference fails.
     """
     begin = time.perf_counter()
-    design = Design.load(DESIGN) if design is None else design
     check_modelled(design)
     found: list[Found | None] = []
     outcomes = []

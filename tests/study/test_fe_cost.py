@@ -13,6 +13,8 @@ from swgjoint.gear.design import Design
 from swgjoint.study import fe_cost
 from swgjoint.study.fe_cost import Found, Setting, run_fe_cost
 
+CUP = Design.load("reference-3d")
+
 
 def found(part):
     """A setting that is off by a part."""
@@ -35,7 +37,7 @@ def test_rows_compare_with_the_last_setting(monkeypatch, tmp_path):
         return found(parts[setting.refinement])
 
     monkeypatch.setattr(fe_cost, "_solved", solved)
-    result = run_fe_cost(settings=settings, folder=tmp_path / "out")
+    result = run_fe_cost(design=CUP, settings=settings, folder=tmp_path / "out")
     assert [row["outcome"] for row in result["rows"]] == [
         *["converged"] * 3,
         "no equilibrium",
@@ -61,7 +63,7 @@ def test_a_reference_that_fails_is_an_error(monkeypatch):
 
     monkeypatch.setattr(fe_cost, "_solved", failed)
     with pytest.raises(ComputationError, match="the reference, refinement 1: diverged"):
-        run_fe_cost(settings=[Setting(model="3d", refinement=1.0)])
+        run_fe_cost(design=CUP, settings=[Setting(model="3d", refinement=1.0)])
 
 
 def test_a_design_without_cup_is_refused():
@@ -73,10 +75,9 @@ def test_a_design_without_cup_is_refused():
 @pytest.mark.fe
 def test_plane_model_has_the_cup_in_series(monkeypatch):
     """Stiffness at rated torque behind that of the cup."""
-    design = Design.load("reference-3d")
     settings = [Setting(model="2d", refinement=0.5)]
-    both = run_fe_cost(design=design, settings=settings)["rows"][0]["value"]
+    both = run_fe_cost(design=CUP, settings=settings)["rows"][0]["value"]
     monkeypatch.setattr(fe_cost, "cup_torsional_stiffness", lambda design: np.inf)
-    ring = run_fe_cost(design=design, settings=settings)["rows"][0]["value"]
-    cup = cup_torsional_stiffness(design)
+    ring = run_fe_cost(design=CUP, settings=settings)["rows"][0]["value"]
+    cup = cup_torsional_stiffness(CUP)
     assert 1.0 / both == pytest.approx(1.0 / ring + 1.0 / cup, rel=1e-6)
