@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 from scipy.optimize import brentq
@@ -61,16 +62,7 @@ def deflection_rows(own: Deflection, results: Mapping[str, Found]) -> list[Row]:
             value = _value(found, lambda f: float(f[key]))
             better = _value(fine, lambda f: float(f[key]))
             why = _reason(found, reason)
-        return Row(
-            case=own.base,
-            quantity=quantity,
-            unit=unit,
-            source_value=source,
-            ours=value,
-            converged=better,
-            reason=why,
-            more={"part": "deflection"},
-        )
+        return _row("deflection", own.base, quantity, unit, source, value, why, better)
 
     coned = ""
     if "fault" not in found:
@@ -153,6 +145,42 @@ def deflection_rows(own: Deflection, results: Mapping[str, Found]) -> list[Row]:
     ]
 
 
+def _row(
+    part: str,
+    case: str,
+    quantity: str,
+    unit: str,
+    source: float | None,
+    ours: float | None,
+    reason: str | None,
+    converged: float | None = None,
+    **more: Any,
+) -> Row:
+    """A row of one part of the study."""
+    return Row(
+        case=case,
+        quantity=quantity,
+        unit=unit,
+        source_value=source,
+        ours=ours,
+        converged=converged,
+        reason=reason,
+        more={"part": part} | more,
+    )
+
+
+def _at_torque(found: Found, k: int, *keys: str) -> float | None:
+    """What a computation says at its torque number k, None where it failed."""
+
+    def value(f: Found) -> float:
+        part = f["by_torque"][k]
+        for key in keys:
+            part = part[key]
+        return float(part)
+
+    return _value(found, value)
+
+
 def force_rows(own: Force, found: Mapping[str, Found]) -> list[Row]:
     """Deformation force of XB1-100-80: formula, finite elements, what is open."""
     design = changed(own.base)
@@ -177,15 +205,8 @@ def force_rows(own: Force, found: Mapping[str, Found]) -> list[Row]:
         converged: float | None = None,
         **more: Any,
     ) -> Row:
-        return Row(
-            case=own.base,
-            quantity=quantity,
-            unit=unit,
-            source_value=source,
-            ours=ours,
-            converged=converged,
-            reason=reason,
-            more={"part": "force"} | more,
+        return _row(
+            "force", own.base, quantity, unit, source, ours, reason, converged, **more
         )
 
     base, fine, smooth = (found[f"force{n}"] for n in ("", ", fine", ", smooth"))
@@ -283,33 +304,10 @@ def stress_rows(own: StressAndFatigue, found: Mapping[str, Found]) -> list[Row]:
     shell = ShellDimensions.of(changed(own.base))
     four, fine = found["four"], found["four, fine"]
 
-    def row(
-        quantity: str,
-        unit: str,
-        source: float | None,
-        ours: float | None,
-        reason: str,
-        converged: float | None = None,
-    ) -> Row:
-        return Row(
-            case=own.base,
-            quantity=quantity,
-            unit=unit,
-            source_value=source,
-            ours=ours,
-            converged=converged,
-            reason=reason,
-            more={"part": "stress"},
-        )
+    row = partial(_row, "stress", own.base)
 
     def at_rest(*keys: str) -> tuple[float | None, float | None]:
-        def pick(f: Found) -> float:
-            value = f["by_torque"][0]
-            for key in keys:
-                value = value[key]
-            return float(value)
-
-        return _value(four, pick), _value(fine, pick)
+        return _at_torque(four, 0, *keys), _at_torque(fine, 0, *keys)
 
     nominal, nominal_fine = at_rest("mid_face", "normal_amplitude_MPa")
     peak, peak_fine = at_rest("von_mises_amplitude_MPa", "root, mid-face")
@@ -421,13 +419,7 @@ def fatigue_rows(own: StressAndFatigue, found: Mapping[str, Found]) -> list[Row]
     ]
 
     def pick(name: str, k: int, *keys: str) -> float | None:
-        def value(f: Found) -> float:
-            part = f["by_torque"][k]
-            for key in keys:
-                part = part[key]
-            return float(part)
-
-        return _value(found[name], value)
+        return _at_torque(found[name], k, *keys)
 
     for k, torque in enumerate(own.torques_Nm):
 
@@ -441,18 +433,9 @@ def fatigue_rows(own: StressAndFatigue, found: Mapping[str, Found]) -> list[Row]
             converged: float | None = None,
             torque: float = torque,
         ) -> None:
-            rows.append(
-                Row(
-                    case=f"{own.base} {torque:g} N·m",
-                    quantity=quantity,
-                    unit=unit,
-                    source_value=source,
-                    ours=ours,
-                    converged=converged,
-                    reason=reason,
-                    more={"part": "fatigue", "torque_Nm": torque},
-                )
-            )
+            case = f"{own.base} {torque:g} N·m"
+            values = quantity, unit, source, ours, reason, converged
+            rows.append(_row("fatigue", case, *values, torque_Nm=torque))
 
         theory = shell_safety_factor(
             shell,
