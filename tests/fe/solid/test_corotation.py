@@ -106,6 +106,20 @@ def test_tangent_is_the_derivative_of_the_gradient_for_small_strain(segment):
     assert errors[1] < 0.2 * errors[0]
 
 
+def test_forces_turn_with_a_stressed_segment(segment):
+    """Along an infinitesimal rotation the forces change by the rotation of themselves."""
+    x = deformed(segment, 1e-5)
+    frames = segment_frames(segment, x, PLACE)
+    force = frames.deformation @ segment.stiffness
+    matrix = matrices_in_global(frames, tangent(segment, frames, force))
+    acting = gradient(segment, x).reshape(x.shape)
+    for axis in np.eye(3):
+        turned = np.cross(axis, x).reshape(3, -1)
+        change = np.einsum("sij,sj->si", matrix, turned).reshape(x.shape)
+        wanted = np.cross(axis, acting)
+        assert np.linalg.norm(change - wanted) < 0.05 * np.linalg.norm(wanted)
+
+
 def test_condensed_segment_is_the_direct_solution(small_ring, small_design):
     """Boundary moved by its masters and a force in the bore: every node, and energy."""
     strip = small_ring.strip
