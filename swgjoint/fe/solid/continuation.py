@@ -14,16 +14,22 @@ from swgjoint.fe.solid.corotation import about_z
 from swgjoint.fe.solid.equilibrium import SolidLoad, SolidSolver
 from swgjoint.fe.solid.ring import SolidRing
 from swgjoint.fe.solid.state import SolidState
+from swgjoint.gear.kinematics import Layout, member_angles
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SolidContinuation(Follower[SolidState]):
-    """Follows equilibria of the 3D model. Circular spline fixed, input the wave."""
+    """Follows equilibria of the 3D model.
+
+    As :class:`swgjoint.fe.continuation.Continuation` does in the plane; what turns with
+    the flexspline is the bore of the diaphragm.
+    """
 
     ring: SolidRing
     ratio: float
+    layout: Layout = "circular_spline_fixed"
     solver: SolidSolver = field(default_factory=SolidSolver)
 
     @property
@@ -31,46 +37,77 @@ class SolidContinuation(Follower[SolidState]):
         """Of the flexspline."""
         return self.ring.strip.sectors
 
+    @property
+    def ring_is_output(self) -> bool:
+        """Whether the circular spline turns."""
+        return self.layout != "circular_spline_fixed"
+
     def input_angle(self, state: SolidState) -> float:
         """Theta [rad]."""
+        if self.layout == "wave_generator_fixed":
+            return state.rotation
         return state.wave_generator_angle
 
     def input_torque(self, state: SolidState) -> float:
         """External torque on the input [N·m]."""
+        if self.layout == "wave_generator_fixed":
+            return state.holding_torque
         return state.wave_generator_torque
 
     def output_angle(self, state: SolidState) -> float:
         """Psi [rad]."""
-        return state.rotation
+        return state.ring_rotation if self.ring_is_output else state.rotation
 
     def deflected(self, angle: float = 0.0) -> SolidState:
-        """Wave generator in place, output at the ideal ratio, no tooth contact."""
-        rotation = angle / self.ratio
-        start = self.ring.at_rest(angle, rotation)
-        return self.solver(self.ring, start, SolidLoad(rotation=rotation, teeth=False))
+        """Wave generator in place, members at the ideal ratio, no tooth contact."""
+        alpha, rotation, ring_rotation = self._ideal(angle)
+        start = self.ring.at_rest(alpha, rotation)
+        load = SolidLoad(rotation=rotation, teeth=False)
+        state = self.solver(self.ring, start, load)
+        return replace(state, ring_rotation=ring_rotation)
 
     def loaded(self, start: SolidState, torque: float, angle: float) -> SolidState:
         """Equilibrium under a torque, from a start with its input at that angle."""
-        return self.solver(self.ring, start, SolidLoad(torque=torque))
+        if not self.ring_is_output:
+            return self.solver(self.ring, start, SolidLoad(torque=torque))
+        held = angle if self.layout == "wave_generator_fixed" else 0.0
+        return self.solver(self.ring, start, SolidLoad(torque=torque, rotation=held))
 
     def held(self, state: SolidState) -> SolidState:
         """Equilibrium with the output where it is; the torque is what that takes."""
-        return self.solver(self.ring, state, SolidLoad(rotation=state.rotation))
+        found = self.solver(self.ring, state, SolidLoad(rotation=state.rotation))
+        if self.ring_is_output:
+            return replace(found, torque=-found.tooth_moment)
+        return found
 
     def turned(self, state: SolidState, output: float) -> SolidState:
-        """Predictor: the flexspline turned within a field that stays."""
-        return self._moved(state, state.wave_generator_angle, output)
+        """Predictor: the output turned at a fixed input, within a field that stays."""
+        alpha = state.wave_generator_angle
+        if self.ring_is_output:
+            return self._moved(state, alpha, state.rotation, output)
+        return self._moved(state, alpha, output, state.ring_rotation)
 
     def ahead(self, state: SolidState, angle: float) -> SolidState:
-        """Predictor: the field travels with the wave generator, the output turns."""
-        d_psi = (angle - state.wave_generator_angle) / self.ratio
-        return self._moved(state, angle, state.rotation + d_psi)
+        """Predictor: the field travels with the wave generator, the members turn."""
+        was, now = self._ideal(self.input_angle(state)), self._ideal(angle)
+        alpha, rotation, ring_rotation = (y - x for x, y in zip(was, now, strict=True))
+        return self._moved(
+            state,
+            state.wave_generator_angle + alpha,
+            state.rotation + rotation,
+            state.ring_rotation + ring_rotation,
+        )
 
-    def _moved(self, state: SolidState, angle: float, output: float) -> SolidState:
+    def _ideal(self, theta: float) -> tuple[float, float, float]:
+        """Angles of wave generator, flexspline and circular spline."""
+        return member_angles(self.layout, theta, theta / self.ratio)
+
+    def _moved(
+        self, state: SolidState, alpha: float, rotation: float, ring_rotation: float
+    ) -> SolidState:
         ring, strip = self.ring, self.ring.strip
-        d_alpha = angle - state.wave_generator_angle
-        d_psi = output - state.rotation
-        shift = (d_alpha - d_psi) / (2.0 * pi / strip.sectors)
+        d_alpha = alpha - state.wave_generator_angle
+        shift = (d_alpha - (rotation - state.rotation)) / (2.0 * pi / strip.sectors)
         teeth = ring.teeth.circular_spline.profile.teeth
         size = strip.masters.face_size
         last = strip.masters.size - size
@@ -79,7 +116,7 @@ class SolidContinuation(Follower[SolidState]):
         local = np.concatenate([state.faces, state.inside], axis=1)
         local = np.einsum("sji,saj->sai", there, local) - still
         moved = travelled(local, shift) + still
-        now = about_z(np.array(output)) @ ring.place
+        now = about_z(np.array(rotation)) @ ring.place
         x = np.einsum("sij,saj->sai", now, moved)
         return replace(
             state,
@@ -89,7 +126,11 @@ class SolidContinuation(Follower[SolidState]):
             touching=np.roll(state.touching, round(shift), axis=0),
             bore_force=travelled(state.bore_force, shift),
             flank_force=travelled(state.flank_force, shift),
-            ring_force=travelled(state.ring_force, d_alpha / (2.0 * pi / teeth)),
-            wave_generator_angle=angle,
-            rotation=output,
+            ring_force=travelled(
+                state.ring_force,
+                (d_alpha - (ring_rotation - state.ring_rotation)) / (2.0 * pi / teeth),
+            ),
+            wave_generator_angle=alpha,
+            rotation=rotation,
+            ring_rotation=ring_rotation,
         )

@@ -27,18 +27,22 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True)
 class SolidLoad:
-    """What is prescribed at the bore of the diaphragm: a torque or the rotation."""
+    """What is prescribed.
+
+    The torque alone: the bore of the diaphragm is the output. The rotation alone: it is
+    held. Both: it is held and the circular spline is the output.
+    """
 
     torque: float | None = None
     """T that the output exerts on its load, whole drive [N·m]."""
     rotation: float | None = None
-    """[rad]."""
+    """Of the bore of the diaphragm [rad]."""
     teeth: bool = True
     """Whether the teeth touch."""
 
     def __post_init__(self) -> None:
-        if (self.torque is None) == (self.rotation is None):
-            raise ValueError("give a torque or a rotation")
+        if self.torque is None and self.rotation is None:
+            raise ValueError("give a torque, a rotation, or both")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -113,14 +117,18 @@ class _Step:
     """Of the masters in the global frame (N, n) [m]."""
     turn: float
     """Of the bore of the diaphragm [rad]."""
+    ring_turn: float
+    """Of the circular spline [rad]."""
     pressure: Array
     """Of the wave generator (N, p) [N]."""
     after: Array
     """Gaps to it after the step (N, p) [m]."""
     torque: float
     """[N·m]."""
+    holding_torque: float
+    """On the bore of the diaphragm [N·m]."""
     compliance: float
-    """-d(rotation)/dT of the whole drive [rad/(N·m)], NaN without a given torque."""
+    """-d(output)/dT of the whole drive [rad/(N·m)], NaN without a given torque."""
 
     @property
     def largest(self) -> float:
@@ -136,7 +144,7 @@ def _solve_linear(
     reach: float,
     thorough: bool,
 ) -> _Step:
-    """Condense the ring to tooth forces and output rotation, solve, go back."""
+    """Condense the ring to tooth forces and the rotations, solve, go back."""
     masters, bore, strip = ring.strip.masters, linear.bore, ring.strip
     teeth_dofs = (3 * strip.teeth.masters[:, None] + np.arange(3)).ravel()
     held = (3 * masters.held[:, None] + np.arange(3)).ravel()
@@ -150,6 +158,7 @@ def _solve_linear(
             reach,
             state.held,
             thorough=thorough,
+            ring_rotation=state.ring_rotation,
         )
         n = len(found)
     # known motions of the bore of the diaphragm: to its place, and turning
@@ -202,42 +211,44 @@ def _solve_linear(
     base, response = solved[:, :, 0] + value[:, :, 0], solved[:, :, 1:]
     response[:, :, n] += value[:, :, 1]
 
-    # gaps and the torque on the bore of the diaphragm
-    system, offset = np.zeros((n + 1, n + 1)), np.zeros(n + 1)
+    # gaps, the torque on the bore of the diaphragm and that on the circular spline
+    system, offset = np.zeros((n + 2, n + 2)), np.zeros(n + 2)
     lever = value[:, held, 1]
     into = np.einsum("sh,shi->si", lever, linear.hessian[:, held])
-    system[n] = np.einsum("si,sik->k", into, response)
+    system[n, : n + 1] = np.einsum("si,sik->k", into, response)
     offset[n] = np.sum(lever * out_of[:, held]) + np.sum(into * base)
     if found is not None and n:
         seen = np.einsum("ki,kil->kl", rows, response[found.contacts.sector])
-        system[:n] = seen
+        system[:n, : n + 1] = seen
         system[:n, :n] += local
+        # turning the circular spline towards the teeth closes the gap by the lever arm
+        system[:n, n + 1] = system[n + 1, :n] = -found.arm
         offset[:n] = gap + np.einsum("ki,ki->k", rows, base[found.contacts.sector])
     stiffness, moment = system[n].copy(), offset[n]
+    # -(dU/dpsi + T) = 0: with the sign of the gaps the system is symmetric
+    system[n], offset[n] = -stiffness, -moment
+    used, output = np.arange(n), n if load.rotation is None else n + 1
     if load.torque is not None:
-        # -(dU/dpsi + T) = 0: with the sign of the gaps the system is symmetric
-        system[n], offset[n] = -system[n], -moment - load.torque / ring.copies
-        used = np.arange(n + 1)
-    else:
-        used = np.arange(n)
-    force, turn, compliance = np.zeros(n), 0.0, float("nan")
+        offset[output] -= load.torque / ring.copies
+        used = np.append(used, output)
+    unknown, compliance = np.zeros(n + 2), float("nan")
     active = np.zeros(n, dtype=bool)
     if len(used):
         guess = offset[:n] < 0.0
         if state.held is not None and found is not None and len(state.held):
             guess = found.contacts.on_flanks_of(state.held.contacts)
-        z, active = solve_mixed(system[np.ix_(used, used)], offset[used], n, 0, guess)
-        force = z[:n]
+        unknown[used], active = solve_mixed(
+            system[np.ix_(used, used)], offset[used], n, 0, guess
+        )
         if load.torque is not None:
-            turn = float(z[n])
-            acting = np.append(np.flatnonzero(active), n)
+            acting = np.append(np.flatnonzero(active), output)
             unit = np.zeros(len(acting))
             unit[-1] = -1.0 / ring.copies
             answer = np.linalg.solve(system[np.ix_(acting, acting)], unit)
             compliance = float(answer[-1])
-    unknown = np.append(force, turn)
-    increment = base + response @ unknown
-    dudpsi = moment + float(stiffness @ unknown)
+    force, (turn, ring_turn) = unknown[:n], unknown[n:]
+    increment = base + response @ unknown[: n + 1]
+    holding = ring.copies * (moment + float(stiffness @ unknown))
     change = np.einsum("spm,sm->sp", bore.rows, increment[:, teeth_dofs])
     by_teeth = np.zeros_like(change)
     if found is not None:
@@ -250,10 +261,12 @@ def _solve_linear(
         force=force,
         active=np.flatnonzero(active),
         increment=increment,
-        turn=rotation + turn - state.rotation,
+        turn=rotation + float(turn) - state.rotation,
+        ring_turn=float(ring_turn),
         pressure=pressure,
         after=after,
-        torque=-ring.copies * dudpsi,
+        torque=-holding if output == n or load.torque is None else load.torque,
+        holding_torque=holding,
         compliance=compliance,
     )
 
@@ -310,7 +323,9 @@ def _advance(
         held=kept,
         tooth_force=step.force[step.active],
         rotation=state.rotation + damping * step.turn,
+        ring_rotation=state.ring_rotation + damping * step.ring_turn,
         torque=step.torque,
+        holding_torque=step.holding_torque,
         compliance=step.compliance,
     )
     return new, not bool(bad.any())

@@ -39,8 +39,12 @@ class SolidState:
     wave_generator_angle: float = 0.0
     rotation: float = 0.0
     """Of the bore of the diaphragm [rad]."""
+    ring_rotation: float = 0.0
+    """Of the circular spline [rad]."""
     torque: float = 0.0
     """That the output exerts on its load, whole drive [N·m]."""
+    holding_torque: float = 0.0
+    """External torque on the bore of the diaphragm, whole drive [N·m]."""
     wave_generator_torque: float = 0.0
     """External torque on the wave generator, whole drive [N·m]."""
     tooth_moment: float = 0.0
@@ -48,8 +52,8 @@ class SolidState:
     energy: float = 0.0
     """Strain energy, whole drive [J]."""
     compliance: float = 0.0
-    """Tangent -d(rotation)/dT at the active contacts [rad/(N·m)], NaN where the
-    rotation is prescribed."""
+    """Tangent -d(output rotation)/dT at the active contacts [rad/(N·m)], NaN where no
+    torque is prescribed."""
     outcome: Outcome = Outcome.CONVERGED
     history: tuple[float, ...] = ()
     """Largest displacement increment of every iteration [m]."""

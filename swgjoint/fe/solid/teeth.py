@@ -86,6 +86,11 @@ class Teeth:
     ring_teeth: int
     """Teeth of the circular spline in the model."""
     crowning: FlankCrowning
+    shift: Array | None = None
+    """Manufacturing errors of the flexspline's teeth in their frames, plane by plane
+    or the same in all (N, n_planes or 1, 2) [m]."""
+    ring_shift: Array | None = None
+    """The same of the circular spline, which must be elastic (N_c, ..., 2) [m]."""
 
     @property
     def ring_dofs(self) -> int:
@@ -101,6 +106,7 @@ class Teeth:
         held: ToothRows | None,
         *,
         thorough: bool,
+        ring_rotation: float = 0.0,
     ) -> ToothRows:
         """Candidates at a state.
 
@@ -111,6 +117,7 @@ class Teeth:
             reach: Candidates with a larger gap are left out [m].
             held: Points of the last iteration that carry force.
             thorough: As in :meth:`ToothContact.search`.
+            ring_rotation: Of the circular spline [rad].
         """
         strip = self.strip
         n, planes, size = len(frame.turn), strip.planes, 2 * strip.flank_size
@@ -123,19 +130,24 @@ class Teeth:
         angle = np.arctan2(turn[:, 1, 0] - turn[:, 0, 1], turn[:, 0, 0] + turn[:, 1, 1])
         flat = rotate(nodes[..., :2], -angle[:, None, None])
         plane_flank = flat - strip.flank[..., :2] + self.crowning.displacement(strip)
+        if self.shift is not None:
+            plane_flank = plane_flank + self.shift[:, :, None]
         centre = flat.mean(axis=2)
+        seen = angle - ring_rotation
         ring = np.zeros((self.ring_teeth, planes, 0))
         if self.ring_gear is not None:
             ring = self.ring_gear.displacement(ring_force)
             ring = ring.reshape(self.ring_teeth, planes, -1)
+        if self.ring_shift is not None:
+            ring = ring + np.tile(self.ring_shift, ring.shape[2] // 2)
         parts, numbers = [], []
         for p in range(planes):
             search = ToothContact(
                 element=strip,
                 circular_spline=self.circular_spline,
                 ring_flank=ring[:, p],
-                angle=angle,
-                bearing=angle - np.arctan2(centre[:, p, 0], centre[:, p, 1]),
+                angle=seen,
+                bearing=seen - np.arctan2(centre[:, p, 0], centre[:, p, 1]),
             )
             old = None
             if held is not None and len(held):

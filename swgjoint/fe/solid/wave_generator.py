@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from swgjoint.fe.corotation import rotate
 from swgjoint.gear.design import Design
-from swgjoint.gear.wave_generator import WaveGenerator, wave_generator
+from swgjoint.gear.tolerances import flawed_wave_generator, wave_generator_offset
+from swgjoint.gear.wave_generator import WaveGenerator
 from swgjoint.units import mm, um
 
 Array = NDArray[np.float64]
@@ -34,17 +35,20 @@ class WaveGeneratorSurface:
     slope: float = 0.0
     """s [m]."""
     circular: bool = False
+    offset: Array | None = None
+    """Centre of the outline in the frame that turns with it (2,) [m]."""
 
     @classmethod
     def of(cls, design: Design) -> WaveGeneratorSurface:
         """That of a design."""
         shape = design.micro_geometry
         return cls(
-            outline=wave_generator(design),
+            outline=flawed_wave_generator(design),
             width=design.drive.face_width_mm * mm,
             crowning=shape.wave_generator_crowning_um * um,
             slope=shape.wave_generator_slope_um * um,
             circular=shape.crowning_kind == "circular",
+            offset=wave_generator_offset(design),
         )
 
     def gap(self, points: Array, alpha: float) -> tuple[Array, Array, Array]:
@@ -58,6 +62,8 @@ class WaveGeneratorSurface:
             Gap (n,) [m], gradient (n, 3), curvature (n,) [1/m].
         """
         flat = rotate(points[:, :2], -alpha)
+        if self.offset is not None:
+            flat = flat - self.offset
         gap, normal, curvature = self.outline.signed_distance(flat)
         lowered, by_z = crown(
             points[:, 2], self.crowning, self.width, circular=self.circular
