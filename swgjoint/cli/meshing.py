@@ -170,6 +170,13 @@ def report(result: dict[str, Any]) -> str:
         lines.append(
             f"output error, peak to peak: {max(error) - min(error):.4g} arcsec"
         )
+    for state in result.get("coning_mm") or []:
+        cone = "; ".join(
+            f"{axis} axis {state[axis]['open_edge']:.4f} at the open edge,"
+            f" {state[axis]['closed_edge']:.4f} at the closed one"
+            for axis in ("major", "minor")
+        )
+        lines.append(f"radial displacement [mm], {state['state']}: {cone}")
     lines.append(f"outcome: {result['outcome']}")
     failed = sum(name != "converged" for name in steps["outcome"])
     if failed:

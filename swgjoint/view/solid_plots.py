@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from swgjoint.units import deg, mm, um
+from swgjoint.units import deg, mm
 
 if TYPE_CHECKING:
     from swgjoint.fe.solid.meshing import SolidRun
@@ -17,19 +17,25 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-LARGER = 10.0
-"""Factor of the drawn deflection of the cup."""
+SHOWN = 0.2
+"""Largest drawn deflection over the size of the section, at most."""
+STATES = {
+    "wave_generator": "wave generator alone",
+    "meshed": "meshed",
+    "torque": "torque",
+}
+"""Of the set-up, as the legend has them."""
 
 
 def solid_pictures(run: SolidRun) -> dict[str, bytes]:
-    """PNG by name: contact patterns and deflected sections of the last position."""
-    if not run.states:
-        return {}
-    state = run.states[-1]
-    return {
-        "contact_pattern": contact_picture(run, state),
-        "cup_section": section_picture(run, state),
+    """PNG by name: the cup at torque, its coning, contacts of the last position."""
+    pictures = {
+        "cup_section": section_picture(run, run.setup[-1].state),
+        "coning": coning_picture(run),
     }
+    if run.states:
+        pictures["contact_pattern"] = contact_picture(run, run.states[-1])
+    return pictures
 
 
 def contact_picture(run: SolidRun, state: SolidState) -> bytes:
@@ -77,47 +83,84 @@ def contact_forces(ring: SolidRing, state: SolidState) -> tuple[Array, Array, Ar
 
 
 def section_picture(run: SolidRun, state: SolidState) -> bytes:
-    """The cup along its major and its minor axis, deflection enlarged."""
+    """The cup along its major and its minor axis at rest and deflected, enlarged."""
+    from matplotlib.collections import LineCollection, PolyCollection
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(10.0, 4.6), layout="constrained")
-    axes = figure.subplots(1, 2, sharey=True)
-    angle, _, _ = contact_forces(run.model, state)
-    for ax, title, sector in (
-        (axes[0], "major axis", int(np.abs(angle).argmin())),
-        (axes[1], "minor axis", int(np.abs(angle).argmax())),
-    ):
-        still, moved = _meridian(run.model, state, sector)
-        for side in (0, 1):
-            ax.plot(*(still[side].T / mm), "k--", lw=0.8)
-            drawn = still[side] + LARGER * (moved[side] - still[side])
-            ax.plot(*(drawn.T / mm), "tab:blue", lw=1.2)
-        teeth = still[1, :7]
-        lift = (moved[1, :7, 1] - teeth[:, 1]) / um
-        ax.set_title(
-            f"{title}: deflection x {LARGER:g}; bore {lift[0]:.0f} µm at the open end,"
-            f" {np.interp(run.model.strip.mesh.teeth.z[-1], teeth[:, 0], lift):.0f}"
-            " behind the teeth",
-            fontsize="small",
-        )
-        ax.set_xlabel("z [mm]")
+    from swgjoint.fe.solid.axial_section import axial_sections, on_axes
+
+    figure = Figure(figsize=(11.0, 6.0), layout="constrained")
+    axes = figure.subplots(1, 2, sharex=True, sharey=True)
+    both = [axial_sections(run.model, state, k) for k in on_axes(run.model, state)]
+    rest, moved = (
+        np.concatenate([getattr(part, name) for found in both for part in found])
+        for name in ("rest", "moved")
+    )
+    most, size = float(np.abs(moved - rest).max()), float(np.ptp(rest, axis=0).max())
+    larger = magnification(most, size)
+    for ax, title, found in zip(axes, ("major", "minor"), both, strict=True):
+        for part in found:
+            drawn = part.rest + larger * (part.moved - part.rest)
+            mesh = PolyCollection(
+                list(drawn[part.cells] / mm),
+                facecolor="lightsteelblue",
+                edgecolor="tab:blue",
+                linewidth=0.3,
+            )
+            ax.add_collection(mesh)
+            still = part.rest[outline(part.cells)] / mm
+            ax.add_collection(LineCollection(list(still), colors="k", linewidths=0.6))
+        ax.autoscale()
+        ax.set_title(f"{title} axis: deflection x {larger:g}, at rest in black")
+        ax.set_xlabel("z [mm], open end on the left")
         ax.set_aspect("equal")
         ax.grid(alpha=0.3)
     axes[0].set_ylabel("radius [mm]")
     return _png(figure)
 
 
-def _meridian(ring: SolidRing, state: SolidState, sector: int) -> tuple[Array, Array]:
-    """Outside and bore side of a face, at rest and deflected (2, n, 2): z, r [m]."""
-    from swgjoint.fe.solid.masters import face_lines
+def magnification(most: float, size: float) -> float:
+    """Factor 1, 2 or 5 times a power of ten that shows a deflection clearly.
 
-    found = []
-    for x in (ring.reference[sector], ring.masters(state)[sector]):
-        lines = face_lines(ring.strip.mesh, ring.strip.masters, x)
-        found.append(
-            np.stack([lines[..., 2], np.hypot(lines[..., 0], lines[..., 1])], -1)
-        )
-    return found[0], found[1]
+    Args:
+        most: Largest deflection [m].
+        size: Of the picture [m].
+    """
+    wanted = SHOWN * size / max(most, 1e-12)
+    power = 10.0 ** np.floor(np.log10(wanted))
+    return float(power * max(k for k in (1.0, 2.0, 5.0) if k * power <= wanted))
+
+
+def outline(cells: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Edges of one quadrilateral alone (n, 2)."""
+    edges = np.stack([cells, np.roll(cells, -1, axis=1)], axis=-1).reshape(-1, 2)
+    found, count = np.unique(np.sort(edges, axis=1), axis=0, return_counts=True)
+    return np.asarray(found[count == 1])
+
+
+def coning_picture(run: SolidRun) -> bytes:
+    """Radial displacement under the teeth over the face width, state by state."""
+    from matplotlib.figure import Figure
+
+    from swgjoint.fe.solid.axial_section import coning
+
+    figure = Figure(figsize=(10.0, 4.2), layout="constrained")
+    axes = figure.subplots(1, 2)
+    lines = dict(zip(STATES, ("--", ":", "-"), strict=True))
+    for state in run.setup:
+        found = coning(run.model, state.state)
+        label = STATES[state.name]
+        if state.name == "torque":
+            label = f"{run.torque:g} N·m"
+        for ax, radial in zip(axes, (found.major, found.minor), strict=True):
+            ax.plot(found.z / mm, radial / mm, lines[state.name], lw=1.5, label=label)
+    for ax, title in zip(axes, ("major", "minor"), strict=True):
+        ax.set_title(f"{title} axis: radial displacement of the bore")
+        ax.set_xlabel("z [mm], open edge on the left")
+        ax.grid(alpha=0.3)
+    axes[0].set_ylabel("outward [mm]")
+    axes[0].legend()
+    return _png(figure)
 
 
 def _png(figure: Any) -> bytes:

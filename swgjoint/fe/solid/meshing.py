@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from swgjoint.errors import ComputationError, Outcome
 from swgjoint.fe.meshing_run import Positions
+from swgjoint.fe.solid.axial_section import coning
 from swgjoint.fe.solid.checkpoint import Checkpoint
 from swgjoint.fe.solid.continuation import SolidContinuation
 from swgjoint.fe.solid.drive3d import check_modelled, solid_ring
@@ -128,6 +129,10 @@ class SolidRun(Positions):
             "parts_MPa": _parts(solved),
             "setup_MPa": [
                 {"state": found.name} | found.stress.to_json() for found in self.setup
+            ],
+            "coning_mm": [
+                {"state": found.name} | coning(self.model, found.state).to_json()
+                for found in self.setup
             ],
         }
 
