@@ -174,7 +174,9 @@ def _in_plane(design: Design) -> Continuation:
 
 def _in_space(design: Design) -> SolidContinuation:
     return SolidContinuation(
-        ring=solid_ring(design, half=can_halve(design)), ratio=design.ratio
+        ring=solid_ring(design, half=can_halve(design)),
+        ratio=design.ratio,
+        layout=design.drive.layout,
     )
 
 

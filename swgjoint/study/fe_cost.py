@@ -148,7 +148,9 @@ def _solved(design: Design, setting: Setting) -> Found:
         ring = solid_ring(changed, half=half, nonlinear=setting.nonlinear)
         return _measured(
             changed,
-            SolidContinuation(ring=ring, ratio=changed.ratio),
+            SolidContinuation(
+                ring=ring, ratio=changed.ratio, layout=changed.drive.layout
+            ),
             lambda state: SolidMaxima.at(ring, state).flexspline,
             0.0,
             begin,
@@ -156,7 +158,7 @@ def _solved(design: Design, setting: Setting) -> Found:
     plane = ring_model(changed, half=half, nonlinear=setting.nonlinear)
     return _measured(
         changed,
-        Continuation(model=plane, ratio=changed.ratio),
+        Continuation(model=plane, ratio=changed.ratio, layout=changed.drive.layout),
         lambda state: MemberMaxima.at(plane, state).flexspline,
         1.0 / cup_torsional_stiffness(changed),
         begin,

@@ -90,11 +90,6 @@ def check_modelled(design: Design) -> None:
     faults = []
     if design.cup is None:
         faults.append("the 3d model needs a [cup]; accepted without one: --model 2d")
-    if drive.layout != "circular_spline_fixed":
-        faults.append(
-            f"drive.layout = {drive.layout!r} is not modelled in 3d yet; accepted:"
-            " 'circular_spline_fixed'"
-        )
     if design.friction.tooth_coefficient:
         faults.append(
             f"friction.tooth_coefficient = {design.friction.tooth_coefficient:g} is not"

@@ -160,7 +160,9 @@ def fatigue(
     """
     limits, shell = Limits.of(design), ShellDimensions.of(design)
     ring = solid_ring(design, half=can_halve(design))
-    follow = SolidContinuation(ring=ring, ratio=design.ratio)
+    follow = SolidContinuation(
+        ring=ring, ratio=design.ratio, layout=design.drive.layout
+    )
     total = 2 + len(torques)
 
     def reached(state: SolidState, what: str, count: int) -> SolidState:

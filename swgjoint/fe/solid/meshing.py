@@ -50,6 +50,8 @@ class SolidStep:
     outcome: Outcome = Outcome.CONVERGED
     output_error: float = nan
     """Output angle minus theta/i, from the undeformed position [rad]."""
+    input_torque: float = nan
+    """External torque on the input [N·m]."""
     wave_generator_torque: float = nan
     """External torque on the wave generator [N·m]."""
     tooth_moment: float = nan
@@ -121,6 +123,7 @@ class SolidRun(Positions):
             **self.averages(),
             "per_step": self.common_series()
             | {
+                "input_torque_Nm": list(self.series("input_torque")),
                 "von_mises_at": [
                     None if step.stress is None else _place(step.stress.place)
                     for step in self.steps
@@ -193,7 +196,9 @@ def simulate_solid_meshing(
         nonlinear=nonlinear,
         elastic_circular_spline=elastic_circular_spline,
     )
-    follow = SolidContinuation(ring=ring, ratio=design.ratio)
+    follow = SolidContinuation(
+        ring=ring, ratio=design.ratio, layout=design.drive.layout
+    )
 
     def checked(state: SolidState, what: str) -> SolidState:
         if not state.outcome.ok:
@@ -239,7 +244,7 @@ def simulate_solid_meshing(
             checked(found, f"the input position {angle / deg:g} deg")
         if found.outcome.ok:
             state = found
-        rows.append(_step(ring, found, angle, design.ratio))
+        rows.append(_step(follow, found, angle))
         progress("meshing", k + 1, steps)
     return SolidRun(
         design=design,
@@ -251,13 +256,15 @@ def simulate_solid_meshing(
     )
 
 
-def _step(ring: SolidRing, state: SolidState, angle: float, ratio: float) -> SolidStep:
+def _step(follow: SolidContinuation, state: SolidState, angle: float) -> SolidStep:
+    ring = follow.ring
     if not state.outcome.ok:
         return SolidStep(input_angle=angle, outcome=state.outcome)
     pairs = set() if state.held is None else set(state.held.contacts.sector.tolist())
     return SolidStep(
         input_angle=angle,
-        output_error=state.rotation - angle / ratio,
+        output_error=follow.output_angle(state) - angle / follow.ratio,
+        input_torque=follow.input_torque(state),
         wave_generator_torque=state.wave_generator_torque,
         tooth_moment=state.tooth_moment,
         energy=state.energy,
