@@ -13,9 +13,9 @@ from swgjoint.fe.continuation import Continuation
 from swgjoint.fe.drive2d import can_halve, ring_model
 from swgjoint.fe.sampling import SYMMETRIC
 from swgjoint.fe.state import State
-from swgjoint.gear.cup import cup_torsional_stiffness
 from swgjoint.gear.design import Design
 from swgjoint.gear.kinematics import periodicity
+from swgjoint.gear.mounting import series_compliance
 from swgjoint.gear.tolerances import without_errors
 from swgjoint.maps.hysteresis_loops import FrictionLoop
 from swgjoint.progress import Progress, silent
@@ -78,7 +78,7 @@ def friction_loops(
     smooth = replace(rubbing, model=replace(model, friction=None))
     torque = loop_torques(top, steps)
     outward = np.unique(torque)
-    cup = 0.0 if design.cup is None else 1.0 / cup_torsional_stiffness(design)
+    series = series_compliance(design, cup=True)
     loops: list[FrictionLoop] = []
     for k, part in enumerate(parts):
         theta = period * float(part)
@@ -95,12 +95,12 @@ def friction_loops(
                 quarter=steps,
                 torque=torque,
                 torsion=np.array([ideal - rubbing.output_angle(s) for s in rubbed])
-                + cup * torque,
+                + series * torque,
                 elastic_torsion=np.array(
                     [ideal - smooth.output_angle(s) for s in still]
                 )
-                + cup * torque,
-                stiffness=1.0 / (np.array([s.compliance for s in still]) + cup),
+                + series * torque,
+                stiffness=1.0 / (np.array([s.compliance for s in still]) + series),
                 work=np.array([s.friction_work for s in rubbed]),
             )
         )

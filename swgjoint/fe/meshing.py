@@ -14,8 +14,8 @@ from swgjoint.fe.meshing_run import MeshingRun, MeshingStep, SetupState
 from swgjoint.fe.ring import RingModel
 from swgjoint.fe.state import State
 from swgjoint.fe.stress import MemberMaxima
-from swgjoint.gear.cup import cup_torsional_stiffness
 from swgjoint.gear.design import Design
+from swgjoint.gear.mounting import series_compliance
 from swgjoint.maps.catalogue import ratings_of
 from swgjoint.progress import Progress, silent
 from swgjoint.units import deg
@@ -88,7 +88,7 @@ def simulate_meshing(
         elastic_circular_spline=elastic_circular_spline,
     )
     follow = Continuation(model=ring, ratio=design.ratio, layout=design.drive.layout)
-    cup = None if design.cup is None else cup_torsional_stiffness(design)
+    series = series_compliance(design, cup=True)
 
     def checked(state: State, what: str) -> State:
         if not state.outcome.ok:
@@ -126,7 +126,7 @@ def simulate_meshing(
             checked(found, f"the input position {angle / deg:g} deg")
         if found.outcome.ok:
             state = found
-        rows.append(_step(ring, follow, found, angle, torque, cup))
+        rows.append(_step(ring, follow, found, angle, torque, series))
         progress("meshing", k + 1, steps)
     return MeshingRun(
         design=design,
@@ -134,7 +134,6 @@ def simulate_meshing(
         torque=torque,
         steps=tuple(rows),
         setup=tuple(setup),
-        cup_stiffness=cup,
         wall_s=time.perf_counter() - begin,
     )
 
@@ -145,20 +144,21 @@ def _step(
     state: State,
     angle: float,
     torque: float,
-    cup: float | None,
+    series: float,
 ) -> MeshingStep:
     """Results at one position; of a solve that failed, only its outcome."""
     if not state.outcome.ok:
         return MeshingStep(input_angle=angle, outcome=state.outcome)
-    twist = 0.0 if cup is None else torque / cup
     return MeshingStep(
         input_angle=angle,
         wave_generator_angle=state.wave_generator_angle,
-        output_error=follow.output_angle(state) - twist - angle / follow.ratio,
+        output_error=follow.output_angle(state)
+        - series * torque
+        - angle / follow.ratio,
         input_torque=follow.input_torque(state),
         wave_generator_torque=state.wave_generator_torque,
         tooth_moment=state.tooth_moment,
-        energy=state.energy + (0.0 if cup is None else 0.5 * torque**2 / cup),
+        energy=state.energy + 0.5 * series * torque**2,
         friction_work=state.friction_work,
         pairs_in_contact=_pairs(ring, state),
         contact_nodes=ring.copies * int(state.touching.sum()),

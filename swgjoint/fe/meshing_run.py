@@ -18,6 +18,7 @@ from swgjoint.fe.state import State
 from swgjoint.fe.stress import KINDS, MemberMaxima, StressMaxima
 from swgjoint.fe.superelement import Superelement
 from swgjoint.gear.design import Design
+from swgjoint.gear.mounting import springs_of
 from swgjoint.gear.tolerances import has_errors
 from swgjoint.units import arcsec, deg
 
@@ -127,7 +128,6 @@ class MeshingRun(Positions):
     torque: float
     steps: tuple[MeshingStep, ...]
     setup: tuple[SetupState, ...]
-    cup_stiffness: float | None
     wall_s: float
 
     def _members(self) -> list[tuple[Superelement, int]]:
@@ -155,7 +155,7 @@ class MeshingRun(Positions):
     def to_json(self) -> dict[str, Any]:
         """The JSON object of ``swgjoint meshing``; per-step stress: flexspline."""
         elastic = self.model.circular_spline.compliance is not None
-        cup = None if self.cup_stiffness is None else "closed-form torsion in series"
+        cup = None if self.design.cup is None else "closed-form torsion in series"
         ring = f"elastic, outside {self.design.circular_spline.outer_rim}"
         return {
             "design": self.design.drive.name,
@@ -166,6 +166,7 @@ class MeshingRun(Positions):
                 "circular_spline": ring if elastic else "rigid",
                 "half": self.model.half,
                 "cup": cup,
+                "springs_Nm_rad": springs_of(self.design),
                 "tooth_friction": self.design.friction.tooth_coefficient or None,
                 "tolerances": has_errors(self.design) or None,
                 "left_out": left_out(self.design),

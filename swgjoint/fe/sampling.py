@@ -16,9 +16,9 @@ from swgjoint.fe.pattern import EVERY, solve_pattern
 from swgjoint.fe.solid.continuation import SolidContinuation
 from swgjoint.fe.solid.drive3d import solid_ring
 from swgjoint.fe.tolerance_sampling import SMALL, sample_tolerances
-from swgjoint.gear.cup import cup_torsional_stiffness
 from swgjoint.gear.design import Design
 from swgjoint.gear.kinematics import angle_coefficients, periodicity
+from swgjoint.gear.mounting import series_compliance, springs_of
 from swgjoint.gear.tolerances import has_errors, without_errors
 from swgjoint.maps.catalogue import ratings_of
 from swgjoint.maps.samples import MapSamples
@@ -104,12 +104,11 @@ def sample_map(
             f"{parts[0]:g} N·m of {parts[-1]:g} N·m repeated peak"
         )
     error, energy, compliance, input_torque = found.table
-    cup = None
-    if model == "2d" and design.cup is not None:
-        cup = cup_torsional_stiffness(design)
-        error = error - (used / cup)[:, None]
-        energy = energy + (0.5 * used**2 / cup)[:, None]
-        compliance = compliance + 1.0 / cup
+    # a cup that the plane lacks, boss and housing springs
+    series = series_compliance(design, cup=model == "2d")
+    error = error - (used * series)[:, None]
+    energy = energy + (0.5 * used**2 * series)[:, None]
+    compliance = compliance + series
     tolerances = None
     if has_errors(design):
         tolerances = sample_tolerances(
@@ -118,8 +117,7 @@ def sample_map(
             rated_torque=ratings.rated_torque,
             progress=progress,
         )
-        if cup is not None:
-            tolerances = tolerances.in_series(cup)
+        tolerances = tolerances.in_series(series)
     # the pattern follows the gear angle that depends on the input alone, written so
     # that its phase grows with theta
     alpha, beta = angle_coefficients(drive.layout)
@@ -148,7 +146,10 @@ def sample_map(
                 "level": "nonlinear",
                 "circular_spline": "elastic, outside "
                 + design.circular_spline.outer_rim,
-                "cup": None if cup is None else "closed-form torsion in series",
+                "cup": "closed-form torsion in series"
+                if model == "2d" and design.cup is not None
+                else None,
+                "springs_Nm_rad": springs_of(design),
                 "friction": "left out of the potential"
                 if design.friction.tooth_coefficient
                 else None,

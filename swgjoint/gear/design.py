@@ -15,10 +15,12 @@ from swgjoint.errors import DesignError, InputError
 from swgjoint.faults import Fault, Section, parse_toml, read_toml, validated
 from swgjoint.gear import kinematics
 from swgjoint.gear.design_sections import (
+    Boss,
     CircularSplineMember,
     Cup,
     Drive,
     Friction,
+    Housing,
     JointSection,
     MaterialSection,
     Member,
@@ -50,6 +52,8 @@ class Design(Section):
     circular_spline: CircularSplineMember
     wave_generator: WaveGenerator
     cup: Cup | None = None
+    boss: Boss | None = None
+    housing: Housing | None = None
     micro_geometry: MicroGeometry = MicroGeometry()
     tolerances: Tolerances = Tolerances()
     friction: Friction = Friction()

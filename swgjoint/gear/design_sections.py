@@ -320,6 +320,18 @@ class Cup(Section):
     bore_radius_mm: Millimetre
 
 
+class Boss(Section):
+    """Spring between the flexspline's bore and its shaft or frame."""
+
+    torsional_stiffness_Nm_rad: Annotated[float, Field(gt=0, le=1e12)]
+
+
+class Housing(Section):
+    """Spring between the circular spline and its frame or shaft."""
+
+    torsional_stiffness_Nm_rad: Annotated[float, Field(gt=0, le=1e12)]
+
+
 class MicroGeometry(Section):
     """Crowning and slope; all zero by default."""
 

@@ -66,13 +66,13 @@ class ToleranceSamples:
             table = frozen_array(getattr(self, key), key, shape=shape)
             object.__setattr__(self, key, table)
 
-    def in_series(self, stiffness: float) -> ToleranceSamples:
-        """The same drive behind a spring at its output [N·m/rad]."""
+    def in_series(self, compliance: float) -> ToleranceSamples:
+        """The same drive behind a spring at its output [rad/(N·m)]."""
         t = self.torque[:, None]
-        spring = np.stack([-t, 0.5 * t**2, np.ones_like(t)]) / stiffness
+        spring = np.stack([-t, 0.5 * t**2, np.ones_like(t)]) * compliance
         solved = self.solved
         if solved is not None:
-            twisted = solved.output_error - solved.torque / stiffness
+            twisted = solved.output_error - solved.torque * compliance
             solved = replace(solved, output_error=twisted)
         return replace(
             self,

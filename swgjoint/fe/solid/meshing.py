@@ -25,6 +25,7 @@ from swgjoint.fe.solid.state import SolidState
 from swgjoint.fe.solid.stress import Place, SolidMaxima
 from swgjoint.fe.stress import KINDS
 from swgjoint.gear.design import Design
+from swgjoint.gear.mounting import series_compliance, springs_of
 from swgjoint.progress import Progress, silent
 from swgjoint.units import deg
 
@@ -109,6 +110,7 @@ class SolidRun(Positions):
                 "level": "nonlinear" if self.model.nonlinear else "linear",
                 "circular_spline": gear if elastic else "rigid",
                 "half": self.model.half,
+                "springs_Nm_rad": springs_of(self.design),
                 "micro_geometry": any(shapes.values()),
                 "stress": "largest nodal value; edges and the step from rim to cup"
                 " do not converge with the mesh",
@@ -200,6 +202,8 @@ def simulate_solid_meshing(
         ring=ring, ratio=design.ratio, layout=design.drive.layout
     )
 
+    series = series_compliance(design, cup=False)
+
     def checked(state: SolidState, what: str) -> SolidState:
         if not state.outcome.ok:
             raise ComputationError(
@@ -244,7 +248,7 @@ def simulate_solid_meshing(
             checked(found, f"the input position {angle / deg:g} deg")
         if found.outcome.ok:
             state = found
-        rows.append(_step(follow, found, angle))
+        rows.append(_step(follow, found, angle, series))
         progress("meshing", k + 1, steps)
     return SolidRun(
         design=design,
@@ -256,18 +260,22 @@ def simulate_solid_meshing(
     )
 
 
-def _step(follow: SolidContinuation, state: SolidState, angle: float) -> SolidStep:
+def _step(
+    follow: SolidContinuation, state: SolidState, angle: float, series: float
+) -> SolidStep:
     ring = follow.ring
     if not state.outcome.ok:
         return SolidStep(input_angle=angle, outcome=state.outcome)
     pairs = set() if state.held is None else set(state.held.contacts.sector.tolist())
     return SolidStep(
         input_angle=angle,
-        output_error=follow.output_angle(state) - angle / follow.ratio,
+        output_error=follow.output_angle(state)
+        - series * state.torque
+        - angle / follow.ratio,
         input_torque=follow.input_torque(state),
         wave_generator_torque=state.wave_generator_torque,
         tooth_moment=state.tooth_moment,
-        energy=state.energy,
+        energy=state.energy + 0.5 * series * state.torque**2,
         pairs_in_contact=ring.copies * len(pairs),
         stress=SolidMaxima.at(ring, state),
         iterations=len(state.history),
