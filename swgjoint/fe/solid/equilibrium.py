@@ -145,11 +145,7 @@ def _solve_linear(
     thorough: bool,
 ) -> _Step:
     """Condense the ring to tooth forces and the rotations, solve, go back."""
-    masters, bore, strip = ring.strip.masters, linear.bore, ring.strip
-    teeth_dofs = (3 * strip.teeth.masters[:, None] + np.arange(3)).ravel()
-    held = (3 * masters.held[:, None] + np.arange(3)).ravel()
-    n_sectors, size = linear.gradient.shape
-    found, n = None, 0
+    found = None
     if load.teeth:
         found = ring.teeth.find(
             linear.frames[0],
@@ -160,9 +156,99 @@ def _solve_linear(
             thorough=thorough,
             ring_rotation=state.ring_rotation,
         )
-        n = len(found)
-    # known motions of the bore of the diaphragm: to its place, and turning
+    condensed = condense(ring, state, linear, found, load.rotation)
+    system, offset = condensed.system, condensed.offset.copy()
+    n = 0 if found is None else len(found)
+    used, output = np.arange(n), n if load.rotation is None else n + 1
+    if load.torque is not None:
+        offset[output] -= load.torque / ring.copies
+        used = np.append(used, output)
+    unknown, compliance = np.zeros(n + 2), float("nan")
+    active = np.zeros(n, dtype=bool)
+    if len(used):
+        guess = offset[:n] < 0.0
+        if state.held is not None and found is not None and len(state.held):
+            guess = found.contacts.on_flanks_of(state.held.contacts)
+        unknown[used], active = solve_mixed(
+            system[np.ix_(used, used)], offset[used], n, 0, guess
+        )
+        if load.torque is not None:
+            acting = np.append(np.flatnonzero(active), output)
+            unit = np.zeros(len(acting))
+            unit[-1] = -1.0 / ring.copies
+            answer = np.linalg.solve(system[np.ix_(acting, acting)], unit)
+            compliance = float(answer[-1])
+    force, (turn, ring_turn) = unknown[:n], unknown[n:]
+    increment = condensed.base + condensed.response @ unknown[: n + 1]
+    bore, strip = linear.bore, ring.strip
+    moved = increment[:, _dofs(strip.teeth.masters)]
+    change = np.einsum("spm,sm->sp", bore.rows, moved)
+    by_teeth = np.zeros_like(change)
+    if found is not None:
+        np.add.at(by_teeth, found.contacts.sector, force[:, None] * condensed.coupling)
+    free = bore.free_gap + change + by_teeth
+    pressure = -np.einsum("spq,sq->sp", bore.inverse, free)
+    after = free + np.einsum("spq,sq->sp", bore.compliance, pressure)
     rotation = state.rotation if load.rotation is None else load.rotation
+    holding = -ring.copies * float(condensed.offset[n] + system[n] @ unknown)
+    return _Step(
+        found=found,
+        force=force,
+        active=np.flatnonzero(active),
+        increment=increment,
+        turn=rotation + float(turn) - state.rotation,
+        ring_turn=float(ring_turn),
+        pressure=pressure,
+        after=after,
+        torque=-holding if output == n or load.torque is None else load.torque,
+        holding_torque=holding,
+        compliance=compliance,
+    )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Condensed:
+    """The linearised ring seen from its n tooth contacts and its rotations.
+
+    Unknowns are the tooth forces, then how far the bore of the diaphragm and the
+    circular spline turn. What they give are the gaps, then minus the moments on the
+    two; with these signs the matrix is symmetric.
+    """
+
+    system: Array
+    """(n + 2, n + 2)."""
+    offset: Array
+    """The same at no tooth force, members where they are (n + 2,)."""
+    coupling: Array
+    """Gaps to the wave generator by tooth forces (n, p) [m/N]."""
+    base: Array
+    """Motion of the masters at no tooth force (N, size) [m]."""
+    response: Array
+    """The same by tooth forces and the rotation of the bore (N, size, n + 1)."""
+
+
+def condense(
+    ring: SolidRing,
+    state: SolidState,
+    linear: Linearised,
+    found: ToothRows | None,
+    rotation: float | None = None,
+) -> Condensed:
+    """Condense the ring to tooth contacts and rotations.
+
+    Args:
+        ring: The ring.
+        state: At which it is linearised.
+        linear: Its tangent there.
+        found: Tooth contacts.
+        rotation: To which the bore of the diaphragm is brought; where it is if None.
+    """
+    masters, bore, strip = ring.strip.masters, linear.bore, ring.strip
+    teeth_dofs, held = _dofs(strip.teeth.masters), _dofs(masters.held)
+    n_sectors, size = linear.gradient.shape
+    n = 0 if found is None else len(found)
+    # known motions of the bore of the diaphragm: to its place, and turning
+    rotation = state.rotation if rotation is None else rotation
     target = np.einsum("ij,saj->sai", about_z(np.array(rotation)), ring.reference)
     value = np.zeros((n_sectors, size, 2))
     still = (target - ring.masters(state)).reshape(n_sectors, -1)
@@ -224,51 +310,14 @@ def _solve_linear(
         # turning the circular spline towards the teeth closes the gap by the lever arm
         system[:n, n + 1] = system[n + 1, :n] = -found.arm
         offset[:n] = gap + np.einsum("ki,ki->k", rows, base[found.contacts.sector])
-    stiffness, moment = system[n].copy(), offset[n]
-    # -(dU/dpsi + T) = 0: with the sign of the gaps the system is symmetric
-    system[n], offset[n] = -stiffness, -moment
-    used, output = np.arange(n), n if load.rotation is None else n + 1
-    if load.torque is not None:
-        offset[output] -= load.torque / ring.copies
-        used = np.append(used, output)
-    unknown, compliance = np.zeros(n + 2), float("nan")
-    active = np.zeros(n, dtype=bool)
-    if len(used):
-        guess = offset[:n] < 0.0
-        if state.held is not None and found is not None and len(state.held):
-            guess = found.contacts.on_flanks_of(state.held.contacts)
-        unknown[used], active = solve_mixed(
-            system[np.ix_(used, used)], offset[used], n, 0, guess
-        )
-        if load.torque is not None:
-            acting = np.append(np.flatnonzero(active), output)
-            unit = np.zeros(len(acting))
-            unit[-1] = -1.0 / ring.copies
-            answer = np.linalg.solve(system[np.ix_(acting, acting)], unit)
-            compliance = float(answer[-1])
-    force, (turn, ring_turn) = unknown[:n], unknown[n:]
-    increment = base + response @ unknown[: n + 1]
-    holding = ring.copies * (moment + float(stiffness @ unknown))
-    change = np.einsum("spm,sm->sp", bore.rows, increment[:, teeth_dofs])
-    by_teeth = np.zeros_like(change)
-    if found is not None:
-        np.add.at(by_teeth, found.contacts.sector, force[:, None] * coupling)
-    free = bore.free_gap + change + by_teeth
-    pressure = -np.einsum("spq,sq->sp", bore.inverse, free)
-    after = free + np.einsum("spq,sq->sp", bore.compliance, pressure)
-    return _Step(
-        found=found,
-        force=force,
-        active=np.flatnonzero(active),
-        increment=increment,
-        turn=rotation + float(turn) - state.rotation,
-        ring_turn=float(ring_turn),
-        pressure=pressure,
-        after=after,
-        torque=-holding if output == n or load.torque is None else load.torque,
-        holding_torque=holding,
-        compliance=compliance,
+    system[n], offset[n] = -system[n], -offset[n]
+    return Condensed(
+        system=system, offset=offset, coupling=coupling, base=base, response=response
     )
+
+
+def _dofs(masters: NDArray[np.int64]) -> NDArray[np.int64]:
+    return np.asarray((3 * masters[:, None] + np.arange(3)).ravel())
 
 
 def _solve_ring(ring: SolidRing, matrix: Array, columns: Array) -> Array:
