@@ -87,10 +87,12 @@ class Teeth:
     """Teeth of the circular spline in the model."""
     crowning: FlankCrowning
     shift: Array | None = None
-    """Manufacturing errors of the flexspline's teeth in their frames, plane by plane
-    or the same in all (N, n_planes or 1, 2) [m]."""
+    """Manufacturing errors of the flexspline's teeth in their frames (N, 2) [m]."""
     ring_shift: Array | None = None
-    """The same of the circular spline, which must be elastic (N_c, ..., 2) [m]."""
+    """The same of the circular spline, which must be elastic (N_c, 2) [m]."""
+    tilt: Array | None = None
+    """Slope in x and y of the axis of the circular spline, which meets that of the
+    drive in the middle of the face width and stands still (2,) [rad]."""
 
     @property
     def ring_dofs(self) -> int:
@@ -131,15 +133,14 @@ class Teeth:
         flat = rotate(nodes[..., :2], -angle[:, None, None])
         plane_flank = flat - strip.flank[..., :2] + self.crowning.displacement(strip)
         if self.shift is not None:
-            plane_flank = plane_flank + self.shift[:, :, None]
+            plane_flank = plane_flank + self.shift[:, None, None]
         centre = flat.mean(axis=2)
         seen = angle - ring_rotation
         ring = np.zeros((self.ring_teeth, planes, 0))
         if self.ring_gear is not None:
             ring = self.ring_gear.displacement(ring_force)
             ring = ring.reshape(self.ring_teeth, planes, -1)
-        if self.ring_shift is not None:
-            ring = ring + np.tile(self.ring_shift, ring.shape[2] // 2)
+        ring = ring + np.tile(self._ring_offset(ring_rotation), ring.shape[2] // 2)
         parts, numbers = [], []
         for p in range(planes):
             search = ToothContact(
@@ -161,6 +162,20 @@ class Teeth:
         for part in parts[1:]:
             contacts = Contacts.joined(contacts, part)
         return self._rows(contacts, np.concatenate(numbers), frame, nodes, angle)
+
+    def _ring_offset(self, ring_rotation: float) -> Array:
+        """Errors of the circular spline's teeth in their frames (N_c, n_planes, 2)."""
+        planes = self.strip.mesh.teeth.z
+        offset = np.zeros((self.ring_teeth, len(planes), 2))
+        if self.ring_shift is not None:
+            offset += self.ring_shift[:, None]
+        if self.tilt is not None:
+            # tooth j stands half a pitch on from space j
+            pitch = 2.0 * np.pi / self.circular_spline.profile.teeth
+            place = pitch * (np.arange(self.ring_teeth) + 0.5) + ring_rotation
+            turned = rotate(self.tilt, -np.asarray(place, dtype=float))
+            offset += np.multiply.outer(turned, planes).transpose(0, 2, 1)
+        return offset
 
     def _rows(
         self,
@@ -186,7 +201,7 @@ class Teeth:
         at = np.einsum("kji,kj->ki", turn, point)
         on_nodes = np.zeros((n, strip.planes, 2, size, 3))
         on_nodes[np.arange(n), plane, side] = spline[:, :, None] * seen[:, None, :]
-        weight = on_nodes.reshape(n, -1)
+        weight = on_nodes.reshape(n, strip.flank_dofs)
         carried = weight @ teeth.loaded_from_masters[: strip.flank_dofs]
         m = frame.position.shape[1]
         middle = at - frame.centre[sector] - teeth.position.mean(axis=0)
@@ -201,7 +216,7 @@ class Teeth:
             contacts=contacts,
             plane=plane,
             weight=weight,
-            ring_weight=ring_weight.reshape(n, -1),
+            ring_weight=ring_weight.reshape(n, strip.planes * ring),
             rows=rows.reshape(n, 3 * m),
             arm=arm,
         )
