@@ -16,6 +16,7 @@ from swgjoint.files import write_whole
 from swgjoint.gear.design import Design
 from swgjoint.json_text import json_text
 from swgjoint.study.articles_file import ArticlesFile, changed
+from swgjoint.study.articles_lobes import lobe_rows
 from swgjoint.study.articles_rows import (
     deflection_rows,
     fatigue_rows,
@@ -85,6 +86,7 @@ def tasks_of(study: ArticlesFile, part: str) -> list[Task]:
             Task(name="force", kind="pinched", design=design),
             Task(name="force, smooth", kind="pinched", design=design, toothless=True),
             Task(name="force, large", kind="rotated", design=design, size=2),
+            Task(name="force, lobes", kind="lobes", design=design, size=4),
             Task(
                 name="force, fine",
                 kind="pinched",
@@ -140,7 +142,10 @@ def rows_of(study: ArticlesFile, part: str, found: Mapping[str, Found]) -> list[
     """Rows of a part from what its tasks found."""
     build = {
         "deflection": lambda: deflection_rows(study.deflection, found),
-        "force": lambda: force_rows(study.force, found),
+        "force": lambda: [
+            *force_rows(study.force, found),
+            *lobe_rows(study.force, found["force, lobes"]),
+        ],
         "stress": lambda: stress_rows(study.stress, found),
         "fatigue": lambda: fatigue_rows(study.stress, found),
     }

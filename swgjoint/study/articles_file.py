@@ -36,6 +36,16 @@ class Deflection(Section):
     variations: Annotated[tuple[Variation, ...], Field(strict=False)] = ()
 
 
+class Springs(Section):
+    """An elastic wave generator, chosen: the source prints none."""
+
+    name: Text
+    stiffness_N_mm: Annotated[float, Field(ge=0, le=1e6)]
+    """Of each lobe."""
+    preload_N: Annotated[float, Field(ge=0, le=1e6)]
+    """Force of each lobe at the lobe height of the drive."""
+
+
 class Force(Section):
     """Force that deforms XB1-100-80."""
 
@@ -45,6 +55,7 @@ class Force(Section):
     series_sum: Positive
     slope_N_mm: Positive
     variations: Annotated[tuple[Variation, ...], Field(strict=False)] = ()
+    springs: Annotated[tuple[Springs, ...], Field(strict=False)] = ()
 
 
 class StressAndFatigue(Section):

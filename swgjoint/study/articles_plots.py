@@ -21,7 +21,7 @@ def articles_picture(parts: Sequence[str], found: Mapping[str, Found]) -> bytes 
     """
     panels: list[Callable[[Any, Mapping[str, Found]], None]] = []
     if "force" in parts:
-        panels.append(_force)
+        panels += [_force, _lobes]
     if "fatigue" in parts:
         panels += [_amplitude, _safety]
     if not panels:
@@ -55,6 +55,24 @@ def _force(ax: Any, found: Mapping[str, Found]) -> None:
     ax.set_title("XB1-100-80, boss clamped", fontsize="medium")
     ax.legend(fontsize="small")
     ax.grid(alpha=0.3)
+
+
+def _lobes(ax: Any, found: Mapping[str, Found]) -> None:
+    """Force and play over the deflection of a lobe."""
+    result = found.get("force, lobes", {})
+    ax.set_title("between two lobes, large rotations", fontsize="medium")
+    ax.set_xlabel("deflection of a lobe [mm]")
+    ax.set_ylabel("force of a lobe [N]")
+    ax.grid(alpha=0.3)
+    if "force_N" not in result:
+        return
+    deflection = result["deflection_mm"]
+    ax.plot(deflection, result["force_N"], "tab:blue", marker=".")
+    ax.axvline(result["height_mm"], color="0.6", lw=0.8)
+    right = ax.twinx()
+    right.plot(deflection, result["play_mrad"], "tab:red", marker=".", ls="--")
+    right.axhline(0.0, color="tab:red", lw=0.5)
+    right.set_ylabel("play of the output [mrad]; line: w_0", color="tab:red")
 
 
 _LINES = (

@@ -12,6 +12,7 @@ from swgjoint.errors import ComputationError, DesignError
 from swgjoint.fe.drive2d import can_halve
 from swgjoint.fe.solid.continuation import SolidContinuation
 from swgjoint.fe.solid.drive3d import solid_ring
+from swgjoint.fe.solid.elastic_wave_generator import lobe_characteristic
 from swgjoint.fe.solid.elasticity import stress_maxima
 from swgjoint.fe.solid.fatigue import Limits, assess, fatigue
 from swgjoint.fe.solid.four_forces import four_forces
@@ -64,6 +65,17 @@ def _rotated(task: Task) -> Found:
     return {
         "outward": cup.pull(force, nonlinear=True).stiffness / 1e3,
         "inward": cup.pull(-force, nonlinear=True).stiffness / 1e3,
+    }
+
+
+def _lobes(task: Task) -> Found:
+    """Force [N] and play [mrad] over the deflection of a lobe [mm]."""
+    found = lobe_characteristic(task.design)
+    return {
+        "height_mm": found.height / mm,
+        "deflection_mm": (found.deflection / mm).tolist(),
+        "force_N": found.force.tolist(),
+        "play_mrad": (1e3 * found.play).tolist(),
     }
 
 
@@ -139,6 +151,7 @@ def _deflected(task: Task) -> Found:
 KINDS: dict[str, Callable[[Task], Found]] = {
     "pinched": _pinched,
     "rotated": _rotated,
+    "lobes": _lobes,
     "four": _four,
     "fatigue": _fatigue,
     "deflected": _deflected,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from math import nan, pi
 
 import pytest
 
@@ -14,7 +15,15 @@ from swgjoint.study import articles as study
 from swgjoint.study.articles_file import ArticlesFile
 from swgjoint.study.articles_runs import Task, run_task
 
+BROKEN = ("deflection", "force", "force, lobes", "fatigue", "four, fine")
 KEYS = {"case", "quantity", "unit", "source_value", "ours", "converged", "reason"}
+LOBES = {
+    "height_mm": 0.4,
+    "deflection_mm": [0.0, 0.1, 0.2, 0.3, 0.4, 0.5],
+    "force_N": [0.0, 6.5, 13.0, 19.5, 26.0, 32.5],
+    "play_mrad": [nan, nan, 3.0, 1.0, -1.0, -3.0],
+}
+"""65 N/mm; play that falls by 20 rad/m and vanishes at 0.35 mm."""
 
 
 def section(safety):
@@ -28,6 +37,8 @@ def instant(task):
         return {"mid_face": value, "open_edge": 40.0, "face_width": value}
     if task.kind == "rotated":
         return {"outward": 67.0, "inward": 64.0}
+    if task.kind == "lobes":
+        return LOBES
     if task.kind == "deflected":
         return {
             "largest_radial_mm": 0.52,
@@ -92,6 +103,19 @@ def test_rows_of_all_parts(computed, capsys, tmp_path):
     longest = max(len(v.name) for v in ArticlesFile.load().force.variations)
     assert stiffness["high"] == pytest.approx(50.0 + 0.1 * (longest + len("force, ")))
     assert stiffness["low"] < stiffness["high"]
+    lobe = {key[1]: row for key, row in by.items() if key[0] == "xb1-100-80"}
+    assert lobe["lobe force at w_0"]["ours"] == pytest.approx(26.0)
+    assert lobe["lobe force at which play vanishes"]["ours"] == pytest.approx(22.75)
+    take_up = lobe["play that a micrometre of lobe takes up"]["ours"]
+    assert take_up == pytest.approx(20e-6 * 10800 / pi, rel=0.01)
+    name = "springs, constant force of 20 N: "
+    assert lobe[name + "lobe force"]["ours"] == pytest.approx(20.0)
+    assert lobe[name + "lobe deflection"]["ours"] == pytest.approx(20 / 65)
+    assert lobe[name + "force on the teeth"]["ours"] == 0.0
+    # 30 N + 5 N/mm 0.05 mm on the cup's 22.75 N
+    name = "springs, 5 N/mm, 30 N: "
+    assert lobe[name + "play"]["ours"] == 0.0
+    assert lobe[name + "force on the teeth"]["ours"] == pytest.approx(7.5)
     deflection = by["dca-80-to-1", "largest radial displacement"]
     assert (deflection["source_value"], deflection["ours"]) == (0.517, 0.52)
     assert "coned" in deflection["reason"]
@@ -134,12 +158,12 @@ def test_what_fails_stays_in_the_table(monkeypatch, capsys):
     """No value, the outcome as the reason, the name among the failed ones."""
 
     def run(task):
-        broken = task.name in ("deflection", "force", "fatigue", "four, fine")
+        broken = task.name in BROKEN
         return {"fault": f"{task.name} broke"} if broken else instant(task)
 
     monkeypatch.setattr(study, "run_task", run)
     result = articles(capsys)
-    assert set(result["failed"]) == {"deflection", "force", "fatigue", "four, fine"}
+    assert set(result["failed"]) == set(BROKEN)
     lost = [row for row in result["rows"] if "broke" in row["reason"]]
     assert all(row["ours"] is None for row in lost)
     assert {row["part"] for row in lost} == {"deflection", "force", "fatigue"}

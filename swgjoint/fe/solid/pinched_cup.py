@@ -68,6 +68,10 @@ class Pinched:
     of_planes: Array
     """Outward, mean over the wall above the loaded sector, from the open edge on [m].
     """
+    masters: Array
+    """Where they stand, global frame (N, n, 3) [m]."""
+    load: Array
+    """Forces at the loaded points of the first sector, in its frame (3 p,) [N]."""
     energy: float
     """Strain energy, whole cup [J]."""
     iterations: int
@@ -91,7 +95,9 @@ class PinchedCup:
     root: float
     """Radius of the outside of the wall [m]."""
     bore: int
-    """Loaded points on the bore, plane after plane; those on the flanks follow."""
+    """Loaded points on the bore, plane after plane."""
+    first: int = 0
+    """Loaded points on the flanks before them; others on the flanks follow."""
 
     @cached_property
     def reference(self) -> Array:
@@ -108,6 +114,10 @@ class PinchedCup:
         held = 3 * self.masters.held[:, None] + np.arange(3)
         size = 0 if len(self.segments) == 1 else held.size
         return np.asarray(held.ravel()[:size], dtype=np.int64)
+
+    @property
+    def _on_bore(self) -> slice:
+        return slice(self.first, self.first + self.bore)
 
     def share(self, place: str) -> Array:
         """Part of the load in every plane (n_planes,)."""
@@ -144,10 +154,10 @@ class PinchedCup:
         share = self.share(place)
         count = self.bore // len(share)
         weight = np.zeros(len(self.segments[0].loaded) // 3)
-        weight[: self.bore] = np.repeat(share / count, count)
+        weight[self._on_bore] = np.repeat(share / count, count)
         x, last = self.reference.copy(), np.inf
         for iteration in range(1, MAX_ITERATIONS + 1):
-            frames = self._frames(x, nonlinear)
+            frames = self.frames(x, nonlinear=nonlinear)
             row, load = self._row(frames[0], weight, force)
             step = self._step(frames, load[None], force * row[None])
             x += step.reshape(x.shape)
@@ -160,9 +170,12 @@ class PinchedCup:
             f"{self.name}: two loads of {force:g} N: {Outcome.MAX_ITERATIONS.value}"
         )
 
-    def _frames(self, x: Array, fitted: bool) -> tuple[Frames, ...]:
+    def frames(self, x: Array, *, nonlinear: bool) -> tuple[Frames, ...]:
+        """Frames of all segments with the masters at x (N, n, 3) [m]."""
         return tuple(
-            segment_frames(segment, x[:, segment.masters], self._place, fitted=fitted)
+            segment_frames(
+                segment, x[:, segment.masters], self._place, fitted=nonlinear
+            )
             for segment in self.segments
         )
 
@@ -244,10 +257,11 @@ class PinchedCup:
             zz, xy, yz, zx at the nodes by segment (N, n_nodes, 6) [Pa]; both in the
             frames of the teeth.
         """
-        frames = self._frames(self.reference, fitted=False)
+        frames = self.frames(self.reference, nonlinear=False)
         carried = loads @ self.segments[0].loaded_from_masters
         step = self._step(frames, loads, in_global(frames[0], carried))
-        moved = self._frames(self.reference + step.reshape(self.reference.shape), False)
+        x = self.reference + step.reshape(self.reference.shape)
+        moved = self.frames(x, nonlinear=False)
         displacements, stresses = [], {}
         for number, (segment, frame) in enumerate(
             zip(self.segments, moved, strict=True)
@@ -264,7 +278,7 @@ class PinchedCup:
     def _found(
         self, x: Array, weight: Array, force: float, nonlinear: bool, iterations: int
     ) -> Pinched:
-        frames = self._frames(x, nonlinear)
+        frames = self.frames(x, nonlinear=nonlinear)
         frame, teeth = frames[0], self.segments[0]
         _, load = self._row(frame, weight, force)
         energy = sum(
@@ -280,12 +294,14 @@ class PinchedCup:
         plane = np.asarray(self.strip.teeth.plane.mesh.p)
         wall = np.hypot(*plane) < self.root * (1.0 + 1e-9)
         of_planes = out[nodes[:, wall]].mean(axis=1)
-        of_load = weight[: self.bore].reshape(len(of_planes), -1).sum(axis=1)
+        of_load = weight[self._on_bore].reshape(len(of_planes), -1).sum(axis=1)
         return Pinched(
             force=force,
             deflection=float(of_load @ of_planes),
             under_load=float(weight @ out[teeth.loaded[::3] // 3]),
             of_planes=of_planes,
+            masters=x,
+            load=load,
             energy=2.0 * energy,
             iterations=iterations,
         )

@@ -1,0 +1,273 @@
+r"""What an elastic wave generator does to a cup: lobe force, deflection, play.
+
+An elastic wave generator presses its lobes outward with springs instead of setting
+their height. With w the deflection of a lobe, :math:`w_0` the height of the lobes of
+the drive, k the stiffness and :math:`F_0` the force of a lobe at that height,
+
+.. math:: F = F_0 + k\,(w_0 - w) = F_{cup}(w).
+
+:math:`F_{cup}` is the force of two opposite loads with large rotations
+(:mod:`swgjoint.fe.solid.pinched_cup`): to first order the radial stiffness times w. A
+rigid wave generator is :math:`k \to \infty`, a soft one with preload k = 0.
+
+The play of the teeth is the rotation of the unloaded output between the contacts of its
+two directions, teeth undeformed. It falls as w grows; where it vanishes the teeth take
+up. From there on they are taken as a rigid stop: what the springs have beyond
+:math:`F_{cup}` presses the teeth, an upper bound, because real teeth give way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import inf, nan
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline, PchipInterpolator
+from scipy.optimize import brentq
+
+from swgjoint.errors import InputError
+from swgjoint.fe.solid.corotation import Frames, about_z
+from swgjoint.fe.solid.drive3d import solid_ring
+from swgjoint.fe.solid.pinched_cup import PinchedCup
+from swgjoint.fe.solid.ring import SolidRing
+from swgjoint.gear.design import Design
+from swgjoint.gear.wave_generator import lobe_height
+from swgjoint.progress import Progress, silent
+from swgjoint.units import mm
+
+Array = NDArray[np.float64]
+
+HEIGHTS = (0.25, 0.5, 0.75, 0.85, 0.95, 1.05, 1.15, 1.25)
+"""Of the lobes over that of the drive, about, where the cup is solved."""
+REACH = 0.5
+"""Gaps of teeth that count [modules]; without any the teeth pass each other."""
+FLAT = 0.1
+"""Lever over the pitch radius below which a contact has no side."""
+TURNS = 12
+"""Rotations at most until a tooth touches."""
+TOUCHES = 1e-10
+"""Rotation that counts as none [rad]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ElasticWaveGenerator:
+    """Springs behind two lobes."""
+
+    stiffness: float
+    """Of each lobe, inf if rigid [N/m]."""
+    preload: float
+    """Force of each lobe at the lobe height of the drive; without effect if rigid [N].
+    """
+
+
+@dataclass(frozen=True, kw_only=True)
+class WorkingPoint:
+    """Where an elastic wave generator and a cup balance, without torque."""
+
+    deflection: float
+    """Of a lobe, outward [m]."""
+    force: float
+    """Of a lobe [N]."""
+    on_teeth: float
+    """Part of the force that presses the teeth into the spaces, at most [N]."""
+    play: float
+    """Of the output, 0 where the teeth are pressed; NaN where the lobes are so low that
+    teeth beside them overlap [rad]."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LobeCharacteristic:
+    """A cup between two lobes, from rest on."""
+
+    height: float
+    """Of the lobes of the drive [m]."""
+    deflection: Array
+    """Of a lobe, increasing from 0 (n,) [m]."""
+    force: Array
+    """That it takes, the teeth free (n,) [N]."""
+    play: Array
+    """Of the output, see :func:`play` (n,) [rad]."""
+
+    def force_at(self, deflection: float) -> float:
+        """Force of a lobe [N].
+
+        Raises:
+            InputError: Outside the range that was solved.
+        """
+        self._check(deflection)
+        return float(CubicSpline(self.deflection, self.force)(deflection))
+
+    def deflection_at(self, force: float) -> float:
+        """Deflection of a lobe [m].
+
+        Raises:
+            InputError: Outside the range that was solved.
+        """
+        if not self.force[0] <= force <= self.force[-1]:
+            raise InputError(
+                f"lobe force {force:.4g} N; accepted: 0 to {self.force[-1]:.4g} N"
+            )
+        return float(CubicSpline(self.force, self.deflection)(force))
+
+    def play_at(self, deflection: float) -> float:
+        """Play of the output, NaN where it has none that is finite [rad]."""
+        self._check(deflection)
+        finite = np.isfinite(self.play)
+        w, play = self.deflection[finite], self.play[finite]
+        if len(w) < 2 or not w[0] <= deflection <= w[-1]:
+            return nan
+        return float(PchipInterpolator(w, play)(deflection))
+
+    @property
+    def take_up(self) -> float:
+        """Deflection at which the play vanishes, inf beyond the range [m]."""
+        finite = np.isfinite(self.play)
+        w, play = self.deflection[finite], self.play[finite]
+        free = np.flatnonzero(play > 0.0)
+        if not len(free):
+            return float(w[0]) if len(w) else inf
+        if free[-1] == len(w) - 1:
+            return inf
+        return float(brentq(self.play_at, w[free[-1]], w[free[-1] + 1]))
+
+    def working_point(self, generator: ElasticWaveGenerator) -> WorkingPoint:
+        """Balance of springs and cup, the teeth a rigid stop.
+
+        Raises:
+            InputError: If they balance outside the range that was solved.
+        """
+        rigid, k = np.isinf(generator.stiffness), generator.stiffness
+        low, high, stop = self.deflection[0], self.deflection[-1], self.take_up
+
+        def springs(w: float) -> float:
+            return generator.preload + k * (self.height - w)
+
+        def pushed(w: float) -> float:
+            return springs(w) - self.force_at(w)
+
+        if rigid:
+            w = min(self.height, stop)
+        else:
+            end = float(min(high, stop))
+            if pushed(low) < 0.0 or (pushed(end) > 0.0 and stop > high):
+                most = self.force[-1] + k * (high - self.height)
+                raise InputError(
+                    f"preload {generator.preload:.4g} N with {k / 1e3:.4g} N/mm;"
+                    f" accepted: {-k * self.height:.4g} to {most:.4g} N"
+                )
+            w = end
+            if pushed(end) < 0.0:
+                w = float(brentq(pushed, low, end, xtol=1e-15))
+        pressed, cup = w == stop, self.force_at(w)
+        force = cup
+        if pressed:
+            force = inf if rigid else springs(w)
+        return WorkingPoint(
+            deflection=w,
+            force=force,
+            on_teeth=force - cup,
+            play=0.0 if pressed else self.play_at(w),
+        )
+
+    def _check(self, deflection: float) -> None:
+        low, high = self.deflection[0], self.deflection[-1]
+        if not low <= deflection <= high:
+            raise InputError(
+                f"deflection {deflection / mm:.4g} mm; accepted: {low / mm:.4g} to"
+                f" {high / mm:.4g} mm"
+            )
+
+
+def lobe_characteristic(
+    design: Design,
+    *,
+    place: str = "mid_face",
+    heights: Sequence[float] = HEIGHTS,
+    progress: Progress = silent,
+) -> LobeCharacteristic:
+    """Press the flexspline of a design apart and look at its teeth.
+
+    Args:
+        design: The drive, with a ``[cup]``.
+        place: One of :data:`swgjoint.fe.solid.pinched_cup.PLACES`.
+        heights: Deflections over the lobe height of the drive, about, increasing.
+        progress: Called after every one.
+
+    Raises:
+        DesignError: If it cannot be meshed, has an odd number of teeth or is not
+            modelled in space.
+        ComputationError: If a solve fails or memory will not do.
+    """
+    ring = solid_ring(design, half=True, elastic_circular_spline=False)
+    cup, height = cup_of(ring, design), lobe_height(design)
+    stiffness = cup.pull(1.0, place).stiffness
+    rows = [(0.0, 0.0, nan)]  # at rest the teeth of every drive overlap
+    for k, share in enumerate(heights):
+        pulled = cup.pull(share * stiffness * height, place, nonlinear=True)
+        frame = cup.frames(pulled.masters, nonlinear=True)[0]
+        load = np.zeros((ring.sectors, len(pulled.load)))
+        load[0] = pulled.load
+        free = play(ring, frame, load, design.ratio)
+        rows.append((pulled.force, pulled.deflection, free))
+        progress("lobe force", k + 1, len(heights))
+    force, deflection, plays = np.array(rows).T
+    return LobeCharacteristic(
+        height=height, force=force, deflection=deflection, play=plays
+    )
+
+
+def cup_of(ring: SolidRing, design: Design) -> PinchedCup:
+    """The flexspline of half a drive, to be pulled apart."""
+    strip, flank = ring.strip, ring.strip.flank_dofs // 3
+    return PinchedCup(
+        name=design.drive.name,
+        sectors=ring.sectors,
+        strip=strip.mesh,
+        masters=strip.masters,
+        segments=strip.segments,
+        root=design.flexspline_inner_radius + design.flexspline.rim_mm * mm,
+        bore=len(strip.bore),
+        first=flank,
+    )
+
+
+def play(ring: SolidRing, frame: Frames, load: Array, ratio: float) -> float:
+    r"""Rotation of the output between the contacts of its two directions [rad].
+
+    The deflected flexspline turns as a whole until a tooth touches. That turns the
+    lobes, too; for lobes that stand the ratio i makes it :math:`1 - 1/i` times as much.
+
+    Args:
+        ring: Half or all of the drive.
+        frame: Frames of its toothed segments, no tooth in contact.
+        load: At their loaded degrees of freedom (N, n_b) [N].
+        ratio: Signed i.
+
+    Returns:
+        Negative where flanks overlap, inf where none are near; NaN where teeth overlap
+        that no rotation can part.
+    """
+    profile = ring.strip.profile
+    reach = REACH * 2.0 * profile.pitch_radius / profile.teeth
+    flat = FLAT * profile.pitch_radius
+    still = np.zeros((ring.teeth.ring_teeth, ring.teeth.ring_dofs))
+    sides = []
+    for sign in (1.0, -1.0):
+        angle = 0.0
+        for _ in range(TURNS):
+            turned = replace(frame, turn=about_z(np.array(angle)) @ frame.turn)
+            rows = ring.teeth.find(turned, load, still, reach, None, thorough=True)
+            gap, arm = rows.contacts.gap, sign * rows.arm
+            if (gap[np.abs(arm) < flat] < 0.0).any():
+                return nan
+            closing = arm < -flat
+            if not closing.any():
+                return inf
+            step = float(np.min(gap[closing] / -arm[closing]))
+            angle += sign * step
+            if abs(step) < TOUCHES:
+                break
+        sides.append(sign * angle)
+    return sum(sides) * (1.0 - 1.0 / ratio)

@@ -1,0 +1,174 @@
+"""Elastic wave generators: balance of springs and cup, limits, play of the teeth."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import inf, isnan, nan, radians, tan
+
+import numpy as np
+import pytest
+
+from swgjoint.errors import InputError
+from swgjoint.fe.solid.continuation import SolidContinuation
+from swgjoint.fe.solid.drive3d import solid_ring
+from swgjoint.fe.solid.elastic_wave_generator import (
+    ElasticWaveGenerator,
+    LobeCharacteristic,
+    cup_of,
+    lobe_characteristic,
+    play,
+)
+from swgjoint.fe.solid.pinched_cup import pinched_cup
+from swgjoint.gear.design import Design
+from swgjoint.gear.wave_generator import lobe_height
+
+HEIGHT = 0.4e-3
+STIFFNESS = 60e3
+
+
+@pytest.fixture(scope="module")
+def cup():
+    """A made-up cup: 60 N/mm that stiffens, play that vanishes at 0.45 mm."""
+    w = np.linspace(0.0, 0.5e-3, 11)
+    play = 20.0 * (0.45e-3 - w)
+    play[0] = nan
+    force = STIFFNESS * w * (1.0 + 50.0 * w)
+    return LobeCharacteristic(height=HEIGHT, deflection=w, force=force, play=play)
+
+
+@pytest.fixture(scope="module")
+def drive():
+    """A small cup, thin as XB1-100-80, and its characteristic."""
+    design = Design.load("xb1-100-80").with_changes(
+        {
+            "drive.teeth_flexspline": 80,
+            "drive.teeth_circular_spline": 82,
+            "drive.face_width_mm": 8.0,
+            "flexspline.rim_mm": 0.4,
+            "cup.length_mm": 20.0,
+            "cup.fillet_mm": 0.8,
+            "cup.bore_radius_mm": 6.0,
+            "mesh.refinement": 0.5,
+        }
+    )
+    return design, lobe_characteristic(design, heights=(0.02, 0.55, 0.75, 0.9))
+
+
+def test_springs_and_cup_balance(cup):
+    """The spring's line meets the cup's curve."""
+    for k, preload in ((0.0, 20.0), (5e3, 18.0), (80e3, 12.0), (5e3, 4.0)):
+        at = cup.working_point(ElasticWaveGenerator(stiffness=k, preload=preload))
+        assert at.force == pytest.approx(preload + k * (HEIGHT - at.deflection))
+        assert at.force == pytest.approx(cup.force_at(at.deflection))
+        assert at.play == pytest.approx(20.0 * (0.45e-3 - at.deflection))
+        assert at.on_teeth == 0.0
+
+
+def test_rigid_is_the_limit_of_stiff_springs(cup):
+    """Springs without end hold the lobe height, whatever their preload."""
+    rigid = cup.working_point(ElasticWaveGenerator(stiffness=inf, preload=0.0))
+    assert rigid.deflection == HEIGHT
+    errors = []
+    for k in (1e6, 1e7, 1e8):
+        at = cup.working_point(ElasticWaveGenerator(stiffness=k, preload=5.0))
+        errors.append(HEIGHT - at.deflection)
+        assert at.force == pytest.approx(rigid.force, rel=1.1 * STIFFNESS / k)
+    # the miss falls with the compliance of the springs
+    assert errors[1] / errors[0] == pytest.approx(0.1, rel=0.1)
+    assert errors[2] / errors[1] == pytest.approx(0.1, rel=0.02)
+
+
+def test_soft_springs_keep_their_force(cup):
+    """Without stiffness the force is the preload on any cup; a rigid one follows it."""
+    soft = ElasticWaveGenerator(stiffness=0.0, preload=15.0)
+    rigid = ElasticWaveGenerator(stiffness=inf, preload=15.0)
+    stiffer = replace(cup, force=1.2 * cup.force)
+    assert cup.working_point(soft).force == pytest.approx(15.0)
+    assert stiffer.working_point(soft).force == pytest.approx(15.0)
+    ratio = stiffer.working_point(rigid).force / cup.working_point(rigid).force
+    assert ratio == pytest.approx(1.2)
+
+
+def test_teeth_stop_springs_that_are_strong_enough(cup):
+    """Beyond the take-up the teeth carry what the cup does not."""
+    assert cup.take_up == pytest.approx(0.45e-3)
+    strong = ElasticWaveGenerator(stiffness=5e3, preload=35.0)
+    at = cup.working_point(strong)
+    assert at.deflection == pytest.approx(0.45e-3) and at.play == 0.0
+    assert at.force == pytest.approx(35.0 - 5e3 * 0.05e-3)
+    assert at.on_teeth == pytest.approx(at.force - cup.force_at(0.45e-3))
+    assert at.on_teeth > 0.0
+    # a rigid wave generator against rigid teeth
+    low = replace(cup, height=0.47e-3)
+    jammed = low.working_point(ElasticWaveGenerator(stiffness=inf, preload=0.0))
+    assert jammed.deflection == pytest.approx(0.45e-3) and jammed.on_teeth == inf
+    # no end of the play in the range
+    loose = replace(cup, play=np.abs(cup.play) + 1e-3)
+    weak = ElasticWaveGenerator(stiffness=5e3, preload=20.0)
+    assert loose.take_up == inf and loose.working_point(weak).play > 0.0
+
+
+def test_outside_the_range_is_refused(cup):
+    """One line with the value and the range."""
+    loose = replace(cup, play=np.abs(cup.play) + 1e-3)
+    with pytest.raises(
+        InputError, match=r"preload 500 N with 0 N/mm.*accepted: -?0 to"
+    ):
+        loose.working_point(ElasticWaveGenerator(stiffness=0.0, preload=500.0))
+    with pytest.raises(InputError, match=r"deflection 0.6 mm; accepted: 0 to 0.5 mm"):
+        cup.force_at(0.6e-3)
+    with pytest.raises(InputError, match=r"lobe force 99 N; accepted: 0 to"):
+        cup.deflection_at(99.0)
+    assert cup.deflection_at(cup.force_at(0.33e-3)) == pytest.approx(0.33e-3, rel=1e-4)
+
+
+@pytest.mark.fe
+def test_slope_at_rest_is_the_radial_stiffness(drive):
+    """Small loads: linear, odd, as stiff as the pinched cup at mid-face."""
+    design, found = drive
+    pinched = pinched_cup(design).pull(1.0).stiffness
+    # 2 % of the lobe height: large rotations add 0.03 %
+    small = float(found.deflection[1])
+    assert found.force_at(small) / small == pytest.approx(pinched, rel=1e-3)
+    assert found.force_at(0.5 * small) / (0.5 * small) == pytest.approx(
+        pinched, rel=1e-3
+    )
+    ring = solid_ring(design, half=True, elastic_circular_spline=False)
+    same = cup_of(ring, design)
+    assert same.pull(1.0).stiffness == pytest.approx(pinched, rel=1e-9)
+    # odd to first order: 1.4 % of the deflection is 1e-3 of the stiffness
+    out, back = (same.pull(sign * 1e-2, nonlinear=True) for sign in (1.0, -1.0))
+    assert back.deflection == pytest.approx(-out.deflection, rel=1e-4)
+
+
+@pytest.mark.fe
+def test_play_falls_as_flanks_come_nearer(drive):
+    """A lobe that comes out by dw takes up 2 tan(alpha) dw/r, the play closes once."""
+    design, found = drive
+    assert isnan(found.play[1])  # at 2 % of the height teeth overlap off the lobes
+    assert found.height == lobe_height(design)
+    assert found.play[2] > found.play[3] > found.play[4]
+    slope = (found.play[3] - found.play[4]) / (
+        found.deflection[4] - found.deflection[3]
+    )
+    profile_angle = design.flexspline.pressure_angle_deg
+    flat = 2.0 * tan(radians(profile_angle)) / (0.5 * design.pitch_diameter)
+    # coning at the open edge and the curved flanks
+    assert slope == pytest.approx(flat, rel=0.5)
+    assert found.play_at(found.take_up) == pytest.approx(0.0, abs=1e-9)
+    assert found.deflection[3] < found.take_up < found.deflection[4]
+
+
+@pytest.mark.fe
+def test_play_is_what_the_solved_drive_leaves_free(small_design):
+    """Between the outputs at a tiny torque and its opposite, on the wave generator."""
+    design = small_design.with_changes({"mesh.refinement": 0.5})
+    ring = solid_ring(design, half=True, elastic_circular_spline=False)
+    drive = SolidContinuation(ring=ring, ratio=design.ratio)
+    state = drive.deflected()
+    found = play(ring, ring.frames(state)[0], ring.loads(state), design.ratio)
+    ends = drive.unloaded(drive.meshed(state), 1e-3).sides
+    assert ends is not None
+    free = abs(ends[1].rotation - ends[0].rotation)
+    # the ratio of 20 is 5 % of it
+    assert found == pytest.approx(free, rel=0.005)
