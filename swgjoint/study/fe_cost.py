@@ -104,6 +104,11 @@ def run_fe_cost(
         ComputationError: If the reference fails.
     """
     begin = time.perf_counter()
+    if design.cup is None:
+        raise DesignError(
+            f"{design.drive.name}: bench fe goes by the model in space, which needs a"
+            " [cup]; accepted: a design with one, such as reference-3d-modified"
+        )
     check_modelled(design)
     found: list[Found | None] = []
     outcomes = []

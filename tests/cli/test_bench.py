@@ -38,4 +38,5 @@ def test_bench_refuses_a_plane_design(capsys):
     assert main(["bench", "fe", "--design", "reference-2d"]) == 2
     lines = capsys.readouterr().err.splitlines()
     assert len(lines) == 1
-    assert "reference-2d: the 3d model needs a [cup]" in lines[0]
+    assert "reference-2d: bench fe goes by the model in space" in lines[0]
+    assert "accepted: a design with one" in lines[0] and "--model" not in lines[0]

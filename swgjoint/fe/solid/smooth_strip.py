@@ -17,9 +17,9 @@ from swgjoint.fe.sector_mesh import (
 from swgjoint.fe.solid.strip_mesh import (
     LARGEST_WALL,
     StripMesh,
-    _cup,
-    _teeth,
+    cup_segments,
     cup_wall,
+    teeth_mesh,
 )
 from swgjoint.gear.design import Design
 from swgjoint.units import mm
@@ -58,6 +58,6 @@ def smooth_strip(design: Design) -> StripMesh:
     )
     width = design.drive.face_width_mm * mm
     if design.cup is None:
-        return StripMesh(teeth=_teeth(plane, width, n))
-    apron, *cup = _cup(design, plane, width, n)
-    return StripMesh(teeth=_teeth(plane, width, n, apron), cup=tuple(cup))
+        return StripMesh(teeth=teeth_mesh(plane, width, n))
+    apron, *cup = cup_segments(design, plane, width, n)
+    return StripMesh(teeth=teeth_mesh(plane, width, n, apron), cup=tuple(cup))

@@ -141,19 +141,19 @@ def flexspline_strip(design: Design, profile: ToothProfile) -> StripMesh:
     plane = sector_mesh(profile, rim, n, lower_rim=wall)
     width = design.drive.face_width_mm * mm
     if wall is None:
-        return StripMesh(teeth=_teeth(plane, width, n))
-    apron, *cup = _cup(design, plane, width, n)
-    return StripMesh(teeth=_teeth(plane, width, n, apron), cup=tuple(cup))
+        return StripMesh(teeth=teeth_mesh(plane, width, n))
+    apron, *cup = cup_segments(design, plane, width, n)
+    return StripMesh(teeth=teeth_mesh(plane, width, n, apron), cup=tuple(cup))
 
 
 def circular_spline_strip(design: Design, profile: ToothProfile) -> StripMesh:
     """Strip of the circular spline: the teeth over the face width."""
     rim, n = design.circular_spline.rim_mm * mm, design.mesh.refinement
     plane = sector_mesh(profile, rim, n)
-    return StripMesh(teeth=_teeth(plane, design.drive.face_width_mm * mm, n))
+    return StripMesh(teeth=teeth_mesh(plane, design.drive.face_width_mm * mm, n))
 
 
-def _teeth(
+def teeth_mesh(
     plane: SectorMesh, width: float, n: float, apron: SegmentMesh | None = None
 ) -> TeethMesh:
     """The section extruded over the face width, the first part of the cup behind."""
@@ -204,7 +204,7 @@ def _joined(mesh: MeshHex, more: MeshHex) -> tuple[MeshHex, Index]:
     return MeshHex(np.ascontiguousarray(points.T), cells), number
 
 
-def _cup(
+def cup_segments(
     design: Design, plane: SectorMesh, width: float, n: float
 ) -> tuple[SegmentMesh, ...]:
     """Cylinder, fillet and diaphragm or flange."""
