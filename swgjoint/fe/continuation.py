@@ -4,11 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+from numpy.typing import NDArray
+
 from swgjoint.fe.equilibrium import Load, NewtonSolver
 from swgjoint.fe.following import Follower
+from swgjoint.fe.influence import Influence
 from swgjoint.fe.ring import RingModel
 from swgjoint.fe.state import State
+from swgjoint.fe.tolerance_influence import influence
 from swgjoint.gear.kinematics import Layout
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -90,6 +97,20 @@ class Continuation(Follower[State]):
             state.rotation + rotation,
             state.ring_rotation + ring_rotation,
         )
+
+    def influence(self, state: State) -> Influence:
+        """How the gap of every tooth acts on the output, at an equilibrium."""
+        return influence(self.model, state, ring_is_output=self.ring_is_output)
+
+    def with_errors(
+        self, flexspline: Array, circular_spline: Array, tilt: Array
+    ) -> Continuation:
+        """The same drive with errors of its teeth; a plane has no axis to tilt."""
+        assert not tilt.any()
+        model = replace(
+            self.model, tooth_shift=flexspline, ring_tooth_shift=circular_spline
+        )
+        return replace(self, model=model)
 
     def _ideal(self, theta: float) -> tuple[float, float, float]:
         """Angles of wave generator, flexspline and circular spline."""

@@ -8,11 +8,17 @@ from dataclasses import dataclass, replace
 from math import pi
 from typing import TYPE_CHECKING, Generic, TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
+
 from swgjoint.errors import Outcome
+from swgjoint.fe.influence import Influence
 
 if TYPE_CHECKING:
     from swgjoint.fe.solid.state import SolidState
     from swgjoint.fe.state import State
+
+Array = NDArray[np.float64]
 
 HALVINGS = 5
 TAKE_UP = 150
@@ -97,6 +103,22 @@ class Follower(ABC, Generic[AnyState]):
     @abstractmethod
     def turned(self, state: AnyState, output: float) -> AnyState:
         """Predictor: the output turned at a fixed input."""
+
+    @abstractmethod
+    def influence(self, state: AnyState) -> Influence:
+        """How the gap of every tooth acts on the output, at an equilibrium."""
+
+    @abstractmethod
+    def with_errors(
+        self, flexspline: Array, circular_spline: Array, tilt: Array
+    ) -> Follower[AnyState]:
+        """The same drive with errors of its teeth and of its axis.
+
+        Args:
+            flexspline: Shifts of its teeth in their frames (N, 2) [m].
+            circular_spline: The same of the other member (N_c, 2) [m].
+            tilt: Slope of the axis of the circular spline over z (2,) [rad].
+        """
 
     def meshed(self, deflected: AnyState) -> AnyState:
         """Teeth in contact, no member rotated; the torque is what that takes."""

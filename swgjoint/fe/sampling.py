@@ -115,6 +115,7 @@ def sample_map(
             design,
             repeated_peak=float(used[-1]),
             rated_torque=ratings.rated_torque,
+            model=model,
             progress=progress,
         )
         tolerances = tolerances.in_series(series)
@@ -174,8 +175,9 @@ def _in_plane(design: Design) -> Continuation:
 
 
 def _in_space(design: Design) -> SolidContinuation:
+    perfect = without_errors(design)
     return SolidContinuation(
-        ring=solid_ring(design, half=can_halve(design)),
+        ring=solid_ring(perfect, half=can_halve(perfect)),
         ratio=design.ratio,
         layout=design.drive.layout,
     )

@@ -9,21 +9,25 @@ a few positions within one pitch, and the errors of all pitches are superposed t
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from math import lcm, pi
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.errors import ComputationError
 from swgjoint.fe.continuation import Continuation
+from swgjoint.fe.corotation import rotate
 from swgjoint.fe.drive2d import ring_model
-from swgjoint.fe.state import State
-from swgjoint.fe.tolerance_influence import Influence, Response, influence
+from swgjoint.fe.following import Follower
+from swgjoint.fe.influence import Influence, Response
+from swgjoint.fe.solid.continuation import SolidContinuation
+from swgjoint.fe.solid.drive3d import solid_ring
 from swgjoint.gear.design import Design, MemberName
 from swgjoint.gear.kinematics import periodicity
 from swgjoint.gear.tolerances import (
     ToothErrors,
+    axis_tilt,
     has_errors,
     tooth_errors,
     with_perfect_teeth,
@@ -46,17 +50,20 @@ LEVELS = (0.15, 0.45, 1.0)
 SMALL = 0.01
 """Part of the rated torque of either sign between whose positions an output without
 torque stands where clearance leaves it free."""
-CHECKS = 12
-"""Positions that are solved without linearisation, too, to judge the map."""
+CHECKS = {"2d": 12, "3d": 3}
+"""Positions that are solved without linearisation, too, to judge the map; in space one
+takes half a minute."""
 MEMBERS: tuple[MemberName, MemberName] = ("flexspline", "circular_spline")
 FREE = 100.0
 """Compliance, in the median of all positions, from which the output counts as free."""
 
 
 def pitches_of(design: Design) -> int:
-    """Pitches after which the errors of the teeth repeat; 1 without such errors."""
+    """Pitches after which errors of teeth and axis repeat; 1 without such errors."""
     shifts = [tooth_errors(design, member).shift for member in MEMBERS]
     counts = [len(shift) for shift in shifts if shift.any()]
+    if axis_tilt(design).any() and design.drive.layout != "wave_generator_fixed":
+        counts.append(round(2.0 * pi / pitch_of(design)))
     return lcm(*counts)
 
 
@@ -87,9 +94,46 @@ def shifted(errors: ToothErrors, pitches: Index, layout: str) -> Array:
     return np.asarray(errors.shift[(np.arange(count) + onwards[:, None]) % count])
 
 
+def gap_errors(design: Design, pitches: Index) -> tuple[Array, Array, Array]:
+    """Shifts of both members' teeth and slope of the axis after whole pitches.
+
+    As the first pitch sees them: (n, N, 2), (n, N_c, 2) [m], (n, 2) [rad].
+    """
+    own, other = (
+        shifted(tooth_errors(design, member), pitches, design.drive.layout)
+        for member in MEMBERS
+    )
+    return own, other, tilted(design, pitches)
+
+
+def tilted(design: Design, pitches: Index) -> Array:
+    """Slope of the axis, turned back with the wave generator to the first pitch.
+
+    Args:
+        design: The drive.
+        pitches: Whole pitches that the input has moved on (n,).
+
+    Returns:
+        Shape (n, 2) [rad].
+    """
+    stands = design.drive.layout == "wave_generator_fixed"
+    angle = np.asarray((0.0 if stands else -pitch_of(design)) * pitches, dtype=float)
+    return rotate(axis_tilt(design), angle)
+
+
+def perfect_drive(design: Design, model: str = "2d") -> Follower[Any]:
+    """All of the drive, its teeth and its axis perfect, without friction."""
+    perfect, layout = with_perfect_teeth(design), design.drive.layout
+    if model == "3d":
+        ring = solid_ring(perfect)
+        return SolidContinuation(ring=ring, ratio=design.ratio, layout=layout)
+    plane = ring_model(perfect, friction=False)
+    return Continuation(model=plane, ratio=design.ratio, layout=layout)
+
+
 def influences(
-    design: Design, *, phases: int = PHASES
-) -> tuple[Continuation, list[tuple[State, Influence]]]:
+    design: Design, *, phases: int = PHASES, model: str = "2d"
+) -> tuple[Follower[Any], list[tuple[Any, Influence]]]:
     """The drive with perfect teeth, unloaded and linearised at positions in a pitch.
 
     Errors of its wave generator turn with it, so that all pitches are alike.
@@ -97,17 +141,13 @@ def influences(
     Args:
         design: The drive; errors of its wave generator are kept.
         phases: Positions, equally spaced.
+        model: Fidelity, ``2d`` or ``3d``.
 
     Raises:
         ComputationError: If the unloaded drive cannot be solved.
     """
-    perfect, drive = with_perfect_teeth(design), design.drive
-    follow = Continuation(
-        model=ring_model(perfect, friction=False),
-        ratio=design.ratio,
-        layout=drive.layout,
-    )
-    period = pitch_of(design)
+    drive, period = design.drive, pitch_of(design)
+    follow = perfect_drive(design, model)
     state = follow.meshed(follow.deflected())
     if state.outcome.ok:
         state = follow.to_torque(state, 0.0)
@@ -120,8 +160,7 @@ def influences(
                 f"{drive.name}: no equilibrium without torque and errors:"
                 f" {state.outcome.value}"
             )
-        linear = influence(follow.model, state, ring_is_output=follow.ring_is_output)
-        found.append((state, linear))
+        found.append((state, follow.influence(state)))
     return follow, found
 
 
@@ -131,6 +170,7 @@ def sample_tolerances(
     repeated_peak: float,
     rated_torque: float,
     phases: int | None = None,
+    model: str = "2d",
     progress: Progress = silent,
 ) -> ToleranceSamples:
     """Superposed equilibria over the cycle of the teeth.
@@ -140,6 +180,7 @@ def sample_tolerances(
         repeated_peak: Largest torque [N·m].
         rated_torque: [N·m].
         phases: Positions within a pitch; fewer than usual for many pitches if None.
+        model: Fidelity, ``2d`` or ``3d``.
         progress: Called with the stage, the positions done and their number.
 
     Raises:
@@ -150,15 +191,13 @@ def sample_tolerances(
     if phases is None:
         most = PHASES if pitches_of(design) > 1 else ALONE
         phases = int(np.clip(POSITIONS // pitches_of(design), 2, most))
-    follow, linear = influences(design, phases=phases)
+    follow, linear = influences(design, phases=phases, model=model)
     reference = linear
     if has_errors(with_perfect_teeth(design)):
-        reference = influences(without_errors(design), phases=phases)[1]
+        perfect_design = without_errors(design)
+        reference = influences(perfect_design, phases=phases, model=model)[1]
     pitches = np.arange(pitches_of(design), dtype=np.int64)
-    errors = [
-        shifted(tooth_errors(design, member), pitches, drive.layout)
-        for member in MEMBERS
-    ]
+    errors = gap_errors(design, pitches)
     levels = np.array([part * repeated_peak for part in LEVELS])
     tables, perfect, free = [], [], 0
     for k, ((state, at), (still, flawless)) in enumerate(
@@ -185,7 +224,8 @@ def sample_tolerances(
     table = np.stack(tables, axis=-1)
     # spread over the cycle and the phases of a pitch
     count = pitches.size * phases
-    chosen = np.arange(CHECKS) * (count // CHECKS) + np.arange(CHECKS) % phases
+    checks = CHECKS[model]
+    chosen = np.arange(checks) * (count // checks) + np.arange(checks) % phases
     states = [state for state, _ in linear]
     solved = full_solves(design, follow, states, chosen % count, (0.0, rated_torque))
     return ToleranceSamples(
@@ -201,8 +241,8 @@ def sample_tolerances(
 
 def full_solves(
     design: Design,
-    follow: Continuation,
-    states: list[State],
+    follow: Follower[Any],
+    states: list[Any],
     positions: Index,
     torques: Sequence[float],
 ) -> FullSolves:
@@ -218,13 +258,8 @@ def full_solves(
     rows = []
     step = pitch_of(design) / len(states)
     pitch, phase = np.divmod(positions, len(states))
-    shifts = [
-        shifted(tooth_errors(design, member), pitch, design.drive.layout)
-        for member in MEMBERS
-    ]
-    for k, (own, other) in enumerate(zip(*shifts, strict=True)):
-        model = replace(follow.model, tooth_shift=own, ring_tooth_shift=other)
-        flawed, state = replace(follow, model=model), states[phase[k]]
+    for k, errors in enumerate(zip(*gap_errors(design, pitch), strict=True)):
+        flawed, state = follow.with_errors(*errors), states[phase[k]]
         for torque in torques:
             state = flawed.to_torque(state, torque)
             angle = flawed.output_angle(state) if state.outcome.ok else np.nan

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from swgjoint.gear.design import Design, MemberName
 from swgjoint.gear.wave_generator import WaveGenerator, wave_generator
 from swgjoint.gear.wave_generators.oval import Oval
-from swgjoint.units import um
+from swgjoint.units import arcmin, um
 
 Array = NDArray[np.float64]
 
@@ -33,7 +33,7 @@ TEETH = (
 # streams of the random parts
 _PITCH = {"flexspline": 1, "circular_spline": 2}
 _RANDOM = {"flexspline": 3, "circular_spline": 4}
-_OVALITY, _ECCENTRICITY, _WAVE_GENERATOR, _OUTLINE = 5, 6, 7, 8
+_OVALITY, _ECCENTRICITY, _WAVE_GENERATOR, _OUTLINE, _TILT = 5, 6, 7, 8, 9
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -100,6 +100,19 @@ def wave_generator_offset(design: Design) -> Array:
     return size * np.array([-np.sin(turn), np.cos(turn)])
 
 
+def axis_tilt(design: Design) -> Array:
+    """Slope in x and y, over z, of the axis of the circular spline (2,) [rad].
+
+    The axis meets that of flexspline and wave generator in the middle of the face width
+    and leans from it by the key, towards a direction that the seed gives; it stands
+    still with the bearings, also where the circular spline turns about it. At z from
+    the middle its teeth stand off by z times that.
+    """
+    turn = _stream(design.tolerances.seed, _TILT).uniform(0.0, 2.0 * np.pi)
+    size = design.tolerances.misalignment_arcmin * arcmin
+    return size * np.array([-np.sin(turn), np.cos(turn)])
+
+
 def flawed_wave_generator(design: Design) -> WaveGenerator:
     """Outline of the wave generator with its ovality, about its centre.
 
@@ -115,8 +128,12 @@ def flawed_wave_generator(design: Design) -> WaveGenerator:
 
 
 def with_perfect_teeth(design: Design) -> Design:
-    """The same drive without errors of its teeth; those of the wave generator stay."""
-    return design.with_changes({f"tolerances.{key}": 0.0 for key in TEETH})
+    """The same drive without errors of its teeth and of its axis.
+
+    Those of the wave generator stay.
+    """
+    keys = (*TEETH, "misalignment_arcmin")
+    return design.with_changes({f"tolerances.{key}": 0.0 for key in keys})
 
 
 def without_errors(design: Design) -> Design:

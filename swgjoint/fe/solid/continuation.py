@@ -9,11 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.fe.following import Follower
+from swgjoint.fe.influence import Influence
 from swgjoint.fe.ring import travelled
 from swgjoint.fe.solid.corotation import about_z
 from swgjoint.fe.solid.equilibrium import SolidLoad, SolidSolver
 from swgjoint.fe.solid.ring import SolidRing
 from swgjoint.fe.solid.state import SolidState
+from swgjoint.fe.solid.tolerance_influence import influence
 from swgjoint.gear.kinematics import Layout, member_angles
 
 Array = NDArray[np.float64]
@@ -97,6 +99,19 @@ class SolidContinuation(Follower[SolidState]):
             state.rotation + rotation,
             state.ring_rotation + ring_rotation,
         )
+
+    def influence(self, state: SolidState) -> Influence:
+        """How the gap of every tooth acts on the output, at an equilibrium."""
+        return influence(self.ring, state, ring_is_output=self.ring_is_output)
+
+    def with_errors(
+        self, flexspline: Array, circular_spline: Array, tilt: Array
+    ) -> SolidContinuation:
+        """The same drive with errors of its teeth and of its axis."""
+        teeth = replace(
+            self.ring.teeth, shift=flexspline, ring_shift=circular_spline, tilt=tilt
+        )
+        return replace(self, ring=replace(self.ring, teeth=teeth))
 
     def _ideal(self, theta: float) -> tuple[float, float, float]:
         """Angles of wave generator, flexspline and circular spline."""

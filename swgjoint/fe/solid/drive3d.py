@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import numpy as np
+from numpy.typing import NDArray
+
 from swgjoint.errors import DesignError
 from swgjoint.fe.circular_spline import CircularSpline
 from swgjoint.fe.contact_patch import averaged_spline
@@ -16,9 +19,11 @@ from swgjoint.fe.solid.teeth import FlankCrowning, Teeth
 from swgjoint.fe.solid.wave_generator import WaveGeneratorSurface
 from swgjoint.gear.design import Design
 from swgjoint.gear.profile import tooth_profile
-from swgjoint.gear.tolerances import has_errors
+from swgjoint.gear.tolerances import axis_tilt, has_errors, tooth_errors
 from swgjoint.gear.wave_generator import lobe_height
 from swgjoint.units import mm, um
+
+Array = NDArray[np.float64]
 
 
 def solid_ring(
@@ -39,7 +44,8 @@ def solid_ring(
         orders: Degrees of the displacements of faces and sections.
 
     Raises:
-        DesignError: If the design cannot be built or the half model does not apply.
+        DesignError: If the design cannot be built, the half model does not apply, or
+            errors meet a rigid circular spline.
         ComputationError: If the memory of the machine will not do.
     """
     name = design.drive.name
@@ -59,7 +65,15 @@ def solid_ring(
         gear = ring_gear(design, facing, ring)
         stations = gear.mesh.teeth.plane.flank_stations[:-1]
         surface = CircularSpline(profile=facing, weights=averaged_spline(stations))
-    shape = design.micro_geometry
+    shape, errors = design.micro_geometry, dict[str, Array]()
+    if has_errors(design):
+        if gear is None:
+            raise DesignError(f"{name}: tolerances need an elastic circular spline")
+        errors = {
+            "shift": tooth_errors(design, "flexspline").shift,
+            "ring_shift": tooth_errors(design, "circular_spline").shift,
+            "tilt": axis_tilt(design),
+        }
     return SolidRing(
         strip=strip,
         wave_generator=WaveGeneratorSurface.of(design),
@@ -73,6 +87,7 @@ def solid_ring(
                 width=design.drive.face_width_mm * mm,
                 circular=shape.crowning_kind == "circular",
             ),
+            **errors,
         ),
         lobe_height=lobe_height(design),
         half=half,
@@ -95,7 +110,5 @@ def check_modelled(design: Design) -> None:
             f"friction.tooth_coefficient = {design.friction.tooth_coefficient:g} is not"
             " modelled in 3d yet; accepted: 0"
         )
-    if has_errors(design) or design.tolerances.misalignment_arcmin:
-        faults.append("[tolerances] are not modelled in 3d yet; accepted: none")
     if faults:
         raise DesignError("\n".join(f"{drive.name}: {fault}" for fault in faults))

@@ -26,6 +26,7 @@ from swgjoint.fe.solid.stress import Place, SolidMaxima
 from swgjoint.fe.stress import KINDS
 from swgjoint.gear.design import Design
 from swgjoint.gear.mounting import series_compliance, springs_of
+from swgjoint.gear.tolerances import has_errors
 from swgjoint.progress import Progress, silent
 from swgjoint.units import deg
 
@@ -111,6 +112,7 @@ class SolidRun(Positions):
                 "circular_spline": gear if elastic else "rigid",
                 "half": self.model.half,
                 "springs_Nm_rad": springs_of(self.design),
+                "tolerances": has_errors(self.design) or None,
                 "micro_geometry": any(shapes.values()),
                 "stress": "largest nodal value; edges and the step from rim to cup"
                 " do not converge with the mesh",

@@ -163,6 +163,12 @@ class Teeth:
             contacts = Contacts.joined(contacts, part)
         return self._rows(contacts, np.concatenate(numbers), frame, nodes, angle)
 
+    def ring_place(self, ring_rotation: float) -> Array:
+        """Angles of the teeth of the circular spline (N_c,) [rad]."""
+        # tooth j stands half a pitch on from space j
+        pitch = 2.0 * np.pi / self.circular_spline.profile.teeth
+        return np.asarray(pitch * (np.arange(self.ring_teeth) + 0.5) + ring_rotation)
+
     def _ring_offset(self, ring_rotation: float) -> Array:
         """Errors of the circular spline's teeth in their frames (N_c, n_planes, 2)."""
         planes = self.strip.mesh.teeth.z
@@ -170,10 +176,7 @@ class Teeth:
         if self.ring_shift is not None:
             offset += self.ring_shift[:, None]
         if self.tilt is not None:
-            # tooth j stands half a pitch on from space j
-            pitch = 2.0 * np.pi / self.circular_spline.profile.teeth
-            place = pitch * (np.arange(self.ring_teeth) + 0.5) + ring_rotation
-            turned = rotate(self.tilt, -np.asarray(place, dtype=float))
+            turned = rotate(self.tilt, -self.ring_place(ring_rotation))
             offset += np.multiply.outer(turned, planes).transpose(0, 2, 1)
         return offset
 

@@ -58,12 +58,12 @@ def test_map_in_space(small_design):
 
 
 def test_what_the_model_in_space_lacks_is_refused():
-    """Errors of the teeth and friction, each with its line."""
-    design = Design.load("reference-3d").with_changes(
-        {"tolerances.random_pitch_um": 1.0, "friction.tooth_coefficient": 0.1}
+    """Friction of the teeth, and a drive without a cup, each with its line."""
+    design = Design.load("reference-2d").with_changes(
+        {"friction.tooth_coefficient": 0.1}
     )
     with pytest.raises(DesignError) as caught:
         build_map(design, model="3d")
     lines = str(caught.value).splitlines()
     assert len(lines) == 2
-    assert all("reference-3d" in line for line in lines)
+    assert all("reference-2d" in line for line in lines)

@@ -1,0 +1,99 @@
+"""How the gap of every tooth acts on the output of the drive in space.
+
+Tooth contacts may open and close anywhere over the face width; which bore nodes touch
+the wave generator stays as in the perfect drive.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.fe.corotation import rotate
+from swgjoint.fe.influence import Gaps, Influence, pivoted
+from swgjoint.fe.solid.equilibrium import condense
+from swgjoint.fe.solid.linearise import Linearised, linearise
+from swgjoint.fe.solid.ring import SolidRing
+from swgjoint.fe.solid.state import SolidState
+from swgjoint.fe.solid.teeth import ToothRows
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+REACH = 0.03
+"""Gap up to which a contact may close, in lobe heights. More points along the flanks
+than their local minima, as the plane model needs them, change nothing here."""
+
+
+def influence(ring: SolidRing, state: SolidState, *, ring_is_output: bool) -> Influence:
+    """Condense a drive with perfect teeth at an equilibrium.
+
+    Args:
+        ring: All sectors, an elastic circular spline, no errors of teeth and axis.
+        state: The equilibrium.
+        ring_is_output: Whether the circular spline is the output.
+    """
+    teeth = ring.teeth
+    errors = (teeth.shift, teeth.ring_shift, teeth.tilt)
+    flawed = any(error is not None and error.any() for error in errors)
+    if ring.half or teeth.ring_gear is None or flawed:
+        raise ValueError("needs all sectors, elastic, without errors of the teeth")
+    linear = linearise(ring, state)
+    found, carries = _tooth_contacts(ring, linear, state)
+    n = len(found)
+    condensed = condense(ring, state, linear, found)
+    # the other member stands: the bore of the diaphragm or the circular spline
+    used = np.append(np.arange(n), n + 1 if ring_is_output else n)
+    offset = condensed.offset[used]
+    offset[n] -= state.torque
+    return pivoted(
+        condensed.system[np.ix_(used, used)],
+        offset,
+        _gaps(ring, state, found, carries),
+        closed_supports=np.zeros(0, dtype=bool),
+        free=[n],
+        output=n,
+        sign=1.0,
+        angle=state.ring_rotation if ring_is_output else state.rotation,
+        torque=state.torque,
+    )
+
+
+def _gaps(ring: SolidRing, state: SolidState, found: ToothRows, carries: Mask) -> Gaps:
+    contacts, n = found.contacts, len(found)
+    own = contacts.weight.reshape(n, -1, 2).sum(axis=1)
+    z = ring.strip.mesh.teeth.z
+    by_plane = found.ring_weight.reshape(n, len(z), -1, 2).sum(axis=2)
+    place = ring.teeth.ring_place(state.ring_rotation)
+    leaning = np.einsum("kpi,p->ki", by_plane, z)
+    return Gaps(
+        sector=contacts.sector,
+        tooth=contacts.tooth,
+        direction=np.stack([own, by_plane.sum(axis=1)]),
+        by_tilt=rotate(leaning, place[contacts.tooth]),
+        carries=carries,
+    )
+
+
+def _tooth_contacts(
+    ring: SolidRing, linear: Linearised, state: SolidState
+) -> tuple[ToothRows, Mask]:
+    """Points that may touch, and which of them carry force at the state."""
+    held = state.held
+    if held is None or not len(held):
+        raise ValueError("needs an equilibrium whose teeth carry force")
+    found = ring.teeth.find(
+        linear.frames[0],
+        ring.loads(state),
+        state.ring_force,
+        REACH * ring.lobe_height,
+        held,
+        thorough=True,
+        ring_rotation=state.ring_rotation,
+    )
+    carries = np.zeros(len(found), dtype=bool)
+    for plane in np.unique(held.plane):
+        here = np.flatnonzero(found.plane == plane)
+        own = held.contacts.chosen(np.flatnonzero(held.plane == plane))
+        carries[here[own.nearest_in(found.contacts.chosen(here))]] = True
+    return found, carries
