@@ -80,14 +80,14 @@ class TrendCheck:
     ours: float | None
     """Parameter that we find; for ``flat`` the spread, largest/smallest - 1."""
     agrees: bool
-    refinement: int
+    refinement: float
 
     @property
     def text(self) -> str:
         """One line."""
         load = "T/10" if self.tenth else "T"
         if self.refinement > 1:
-            load += f", refinement {self.refinement}"
+            load += f", refinement {self.refinement:g}"
         kind = self.kind.replace("_m", " M")
         if self.ours is None:
             return f"{load}: {kind} stress {self.claim}: not computed"
@@ -163,6 +163,8 @@ def trend_checks(results: Sequence[CaseRecords]) -> list[TrendCheck]:
         finest = max(cases[0].nominal)
         for refinement in dict.fromkeys((1, finest)):
             for tenth in (True, False):
+                if refinement not in (cases[0].tenth if tenth else cases[0].nominal):
+                    continue
                 sweep = _Sweep(cases=cases, tenth=tenth, refinement=refinement)
                 for claim in ("lowest", "highest"):
                     checks += [
@@ -179,7 +181,7 @@ class _Sweep:
 
     cases: Sequence[CaseRecords]
     tenth: bool
-    refinement: int
+    refinement: float
 
     def values(self, kind: Kind) -> list[tuple[float, float]]:
         """(parameter, stress) where both are known."""

@@ -88,7 +88,12 @@ def _bars(axis: Any, results: Sequence[CaseRecords], kind: Any) -> None:
         )
         if tenth is None:
             continue
-        fine = [r.value(kind, tenth=tenth, refinement=3) for r in results]
+        fine = [
+            r.value(kind, tenth=tenth, refinement=r.meshes[-1])
+            if len(r.meshes) > 1
+            else None
+            for r in results
+        ]
         axis.plot(places, [_number(f) for f in fine], "_", color="0.3", ms=14, mew=2)
     turned = {"rotation": 90} if len(names) > 5 else {}
     axis.set_xticks(range(len(names)), names, fontsize=8, **turned)

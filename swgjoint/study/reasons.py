@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 WITHIN = 15.0
 """Deviation beyond which a row needs a reason [%]."""
@@ -24,14 +24,21 @@ class Facts:
     """What is known about one row [MPa]."""
 
     printed: float | None
+    value: float | None
+    """At the load by which rows are judged."""
     nominal: float | None
-    tenth: float | None
+    """At T."""
     away: float | None
-    """At T/10, away from loaded tooth contacts."""
+    """At the first load, away from loaded tooth contacts."""
     fine: float | None
-    """At T/10 on the finest mesh."""
+    """The same on the finest mesh."""
     places: Mapping[str, int]
-    """How often the largest stress at T/10 sat where."""
+    """How often the largest stress sat where."""
+    load: str = "T/10"
+    """By which rows are judged."""
+    by_mesh: Mapping[float, float] = field(default_factory=dict)
+    """At T by refinement, where that is told of every row: contacts at edges, which are
+    the largest stresses in space, grow with the mesh."""
     failures: tuple[str, ...] = ()
     note: str = ""
 
@@ -46,26 +53,39 @@ def percent(value: float | None, reference: float | None) -> float | None:
 def reason_for(facts: Facts) -> str | None:
     """Reason of a row, None where there is nothing to explain.
 
-    Failures always; beyond 15 % at T/10 where the stress sits, what the contacts and
-    the mesh have to do with it, and what the source leaves open; beyond 15 % at T only,
-    the torque.
+    Failures always, and what the meshes say where that is told; beyond 15 % at T/10 (in
+    space at T) where the stress sits, what the contacts and the mesh have to do with
+    it, and what the source leaves open; beyond 15 % at T only, the torque.
     """
     parts = list(facts.failures)
-    tenth = percent(facts.tenth, facts.printed)
+    value = percent(facts.value, facts.printed)
     nominal = percent(facts.nominal, facts.printed)
-    if tenth is not None and abs(tenth) > WITHIN:
-        parts += _deviation(facts, tenth)
-    elif nominal is not None and tenth is not None and abs(nominal) > WITHIN:
-        assert facts.nominal is not None and facts.tenth is not None
+    if value is not None and abs(value) > WITHIN:
+        parts += _deviation(facts, value)
+    elif nominal is not None and value is not None and abs(nominal) > WITHIN:
+        assert facts.nominal is not None and facts.value is not None
         parts.append(
-            f"torque: {nominal:+.0f} % at T, {tenth:+.0f} % at T/10; from T/10 to T"
-            f" ours changes by {facts.nominal - facts.tenth:+.0f} MPa"
+            f"torque: {nominal:+.0f} % at T, {value:+.0f} % at T/10; from T/10 to T"
+            f" ours changes by {facts.nominal - facts.value:+.0f} MPa"
         )
+    parts += _ladder(facts.by_mesh)
     return "; ".join(parts) or None
 
 
-def _deviation(facts: Facts, tenth: float) -> list[str]:
-    parts = [f"{tenth:+.0f} % at T/10"]
+def _ladder(by_mesh: Mapping[float, float]) -> list[str]:
+    """Stress mesh by mesh, and whether it settles."""
+    if len(by_mesh) < 2:
+        return []
+    *_, before, last = by_mesh.values()
+    change = 100.0 * (last / before - 1.0)
+    values = ", ".join(f"{value:.0f}" for value in by_mesh.values())
+    meshes = ", ".join(f"{mesh:g}" for mesh in by_mesh)
+    settled = "settles" if abs(change) <= MESH else "has no converged value"
+    return [f"{values} MPa at refinement {meshes} ({change:+.0f} %): {settled}"]
+
+
+def _deviation(facts: Facts, value: float) -> list[str]:
+    parts = [f"{value:+.0f} % at {facts.load}"]
     total = sum(facts.places.values())
     if total:
         place, count = max(facts.places.items(), key=lambda item: item[1])
@@ -74,9 +94,9 @@ def _deviation(facts: Facts, tenth: float) -> list[str]:
         away = percent(facts.away, facts.printed)
         if place == "contact" and away is not None:
             parts.append(f"{away:+.0f} % away from the contacts")
-    change = percent(facts.fine, facts.tenth)
+    change = percent(facts.fine, facts.value)
     fine = percent(facts.fine, facts.printed)
-    if change is not None and fine is not None:
+    if change is not None and fine is not None and not facts.by_mesh:
         if abs(change) > MESH:
             parts.append(f"the finest mesh changes it by {change:+.0f} %")
         else:

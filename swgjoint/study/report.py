@@ -33,16 +33,22 @@ _COLUMNS = {
 }
 
 _HEAD = """\
-# {source}: the two-dimensional studies, run again
+# {source}: the studies in {space}, run again
 
 Largest nodal stress of the flexspline in MPa, mean over {positions} positions of the
 wave generator in half a turn (refinement 1, the mesh of the thesis). T is the stated
-torque, T/10 an inference about what the thesis applied: its stresses rise with torque
-about ten times less than statics of a ring of the stated width asks for. Deviations are
-of ours from the thesis. "fine" is the finest mesh computed (refinement 3).
+torque, T/10 {tenth}. Deviations are
+of ours from the thesis. "fine" is the finest mesh computed (refinement {finest:g}, mean
+over {fine_positions} positions in one pitch).
 
 {summary}
 """
+_TENTH = {
+    "2d": """an inference about what the thesis applied: its stresses rise with torque
+about ten times less than statics of a ring of the stated width asks for""",
+    "3d": """stands beside it because in the plane the thesis' stresses speak for it;
+in space rows are judged at T, and finer meshes are at T only""",
+}
 
 
 def write_report(
@@ -98,7 +104,11 @@ def _markdown(
 ) -> str:
     head = _HEAD.format(
         source=study.source[:1].upper() + study.source[1:],
+        space="the plane" if study.model == "2d" else "space",
         positions=study.positions,
+        tenth=_TENTH[study.model],
+        finest=study.refinements[-1],
+        fine_positions=study.fine_positions,
         summary="\n".join(f"- {line}" for line in summary),
     )
     groups = {result.case.group.id: result.case.group for result in results}

@@ -7,7 +7,8 @@ torque that the thesis prints are about ten times too small for its stated torqu
 face width, so T is the physics and T/10 an inference about what the thesis applied.
 Nothing else is scaled. One mesh (refinement 1) and one extraction rule hold for all
 rows: the mean over the positions of the largest nodal stress of the flexspline. The
-mean over the same positions away from loaded tooth contacts stands beside it.
+mean over the same positions away from loaded tooth contacts stands beside it. In space
+T is what the rows are judged by, T/10 stands beside it, and finer meshes are at T only.
 """
 
 from __future__ import annotations
@@ -22,18 +23,9 @@ from swgjoint.study.pool import run_all
 from swgjoint.study.reasons import WITHIN
 from swgjoint.study.record import RunRecord, RunSpec, recorded
 from swgjoint.study.rows import Row, StudyOptions, StudyResult
-from swgjoint.study.thesis_rows import (
-    REFINEMENTS,
-    CaseRecords,
-    increase_rows,
-    stress_rows,
-)
+from swgjoint.study.thesis_rows import CaseRecords, increase_rows, stress_rows
 
 TENTH = 0.1
-FINE_POSITIONS = 12
-"""Positions on the finer meshes, over one pitch of the fixed member. Without tolerances
-the pattern repeats with that pitch, and 35 positions over half a turn (61 pitches) are
-35 equidistant phases of it: the mean over 12 phases agrees to 0.1 %."""
 
 
 def run_thesis(options: StudyOptions) -> StudyResult:
@@ -65,15 +57,15 @@ def run_cases(study: StudyFile, options: StudyOptions) -> StudyResult:
         progress=options.progress,
     )
     found = dict(zip((spec.key for spec in ordered), records, strict=True))
-    results = [_collect(case, plan[case.name], found) for case in cases]
+    results = [_collect(study, case, plan[case.name], found) for case in cases]
     return _result(study, results, options, begin, len(ordered))
 
 
-def _specs(study: StudyFile, case: Case) -> dict[tuple[bool, int], RunSpec]:
+def _specs(study: StudyFile, case: Case) -> dict[tuple[bool, float], RunSpec]:
     """Runs of a case by (whether at T/10, refinement)."""
     if case.design is None:
         return {}
-    specs = {}
+    specs: dict[tuple[bool, float], RunSpec] = {}
     for tenth in (False, True):
         torque = case.torque * (TENTH if tenth else 1.0)
         angle, group = case.entry.angle_deg, case.group
@@ -85,11 +77,12 @@ def _specs(study: StudyFile, case: Case) -> dict[tuple[bool, int], RunSpec]:
             turn=turn if angle is None else 2.0 * angle / 360.0,
             model=study.model,
         )
-        for refinement in REFINEMENTS if case.group.converge else ():
+        fine = study.refinements if group.converge else ()
+        for refinement in fine if study.by_tenth or not tenth else ():
             specs[tenth, refinement] = RunSpec(
                 design=case.design.with_changes({"mesh.refinement": refinement}),
                 torque=torque,
-                positions=FINE_POSITIONS,
+                positions=study.fine_positions,
                 turn=1.0 / _fixed_teeth(case.design),
                 model=study.model,
             )
@@ -105,8 +98,9 @@ def _fixed_teeth(design: Design) -> int:
 
 
 def _collect(
+    study: StudyFile,
     case: Case,
-    specs: Mapping[tuple[bool, int], RunSpec],
+    specs: Mapping[tuple[bool, float], RunSpec],
     found: Mapping[str, RunRecord],
 ) -> CaseRecords:
     records = {key: found[spec.key] for key, spec in specs.items()}
@@ -115,7 +109,7 @@ def _collect(
         records = {(False, 1): refused, (True, 1): refused}
     nominal = {fine: r for (tenth, fine), r in records.items() if not tenth}
     tenth = {fine: r for (tenth, fine), r in records.items() if tenth}
-    return CaseRecords(case=case, nominal=nominal, tenth=tenth)
+    return CaseRecords(case=case, nominal=nominal, tenth=tenth, by_tenth=study.by_tenth)
 
 
 def _result(
@@ -137,6 +131,7 @@ def _result(
             ("tenth", "deviation_tenth_percent"),
             ("nominal", "deviation_percent"),
             ("converged_tenth", "deviation_converged_tenth_percent"),
+            ("converged", "deviation_converged_percent"),
         )
     }
     failed = [
@@ -151,9 +146,13 @@ def _result(
         "ranks": [check.to_json() for check in ranks],
         "trends": [check.to_json() for check in trends],
         "failed_cases": failed,
+        "contradictions": list(study.contradictions),
         "runs": runs,
     }
-    summary = _summary(shares, ranks, trends, failed, runs)
+    summary = (
+        *_summary(shares, ranks, trends, failed, runs),
+        *(f"the source contradicts itself: {text}" for text in study.contradictions),
+    )
     files: tuple[str, ...] = ()
     if options.folder is not None:
         from swgjoint.study.report import write_report
@@ -184,9 +183,14 @@ def _summary(
         f"{runs} simulations of meshing; {len(failed)} cases with a failure"
         + (f": {'; '.join(failed)}" if failed else "")
     ]
-    names = {"tenth": "T/10", "nominal": "T", "converged_tenth": "T/10, finest mesh"}
+    names = {
+        "tenth": "T/10",
+        "nominal": "T",
+        "converged_tenth": "T/10, finest mesh",
+        "converged": "T, finest mesh",
+    }
     for key, share in shares.items():
-        total = share["computed"] if key == "converged_tenth" else share["printed"]
+        total = share["computed" if key.startswith("converged") else "printed"]
         if total:
             lines.append(
                 f"at {names[key]}: {share['within']} of {total} printed values within"
@@ -200,9 +204,11 @@ def _summary(
                 for check in trends
                 if check.tenth == tenth and check.refinement == refinement
             ]
+            if not here:
+                continue
             agree = sum(check.agrees for check in here)
             lines.append(
-                f"at {name}, refinement {refinement}: {agree} of {len(here)} stated"
+                f"at {name}, refinement {refinement:g}: {agree} of {len(here)} stated"
                 " trends found"
             )
             lines += [f"{c.part} at {c.text}" for c in here if not c.agrees]

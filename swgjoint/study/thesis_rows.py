@@ -11,20 +11,31 @@ from swgjoint.study.reasons import Facts, percent, reason_for
 from swgjoint.study.record import RunRecord
 from swgjoint.study.rows import Row
 
-REFINEMENTS = (2, 3)
-"""Meshes beyond the one of the thesis for the rows of its tables."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class CaseRecords:
     """All runs of a case: nominal and tenth torque, by refinement."""
 
     case: Case
-    nominal: Mapping[int, RunRecord]
-    tenth: Mapping[int, RunRecord]
+    nominal: Mapping[float, RunRecord]
+    tenth: Mapping[float, RunRecord]
+    by_tenth: bool = True
+    """Whether the rows are judged at T/10; else at T."""
+
+    @property
+    def meshes(self) -> tuple[float, ...]:
+        """Refinements, that of the thesis first."""
+        return tuple(sorted(self.nominal))
+
+    def by_mesh(self, kind: Kind, *, tenth: bool) -> dict[float, float]:
+        """Stress by refinement, where known [MPa]."""
+        found = {
+            mesh: self.value(kind, tenth=tenth, refinement=mesh) for mesh in self.meshes
+        }
+        return {mesh: value for mesh, value in found.items() if value is not None}
 
     def value(
-        self, kind: Kind, *, tenth: bool, refinement: int = 1, away: bool = False
+        self, kind: Kind, *, tenth: bool, refinement: float = 1, away: bool = False
     ) -> float | None:
         """Stress [MPa]; None where the run failed or was not made."""
         record = (self.tenth if tenth else self.nominal).get(refinement)
@@ -98,19 +109,28 @@ def increase_rows(results: Sequence[CaseRecords]) -> list[Row]:
 
 
 def _row(result: CaseRecords, kind: Kind) -> Row:
-    case, finest = result.case, REFINEMENTS[-1]
+    case, tenth = result.case, result.by_tenth
+    before, finest = (None, None, *result.meshes)[-2:]
+    if len(result.meshes) == 1:
+        finest = None
     printed = case.entry.printed[kind]
 
-    def ours(tenth: bool, refinement: int = 1, away: bool = False) -> float | None:
+    def ours(
+        tenth: bool, refinement: float | None = 1, away: bool = False
+    ) -> float | None:
+        if refinement is None:
+            return None
         return result.value(kind, tenth=tenth, refinement=refinement, away=away)
 
     facts = Facts(
         printed=printed,
+        value=ours(tenth),
+        load="T/10" if tenth else "T",
         nominal=ours(False),
-        tenth=ours(True),
-        away=ours(True, away=True),
-        fine=ours(True, finest),
-        places=result.places(kind, tenth=True),
+        away=ours(tenth, away=True),
+        fine=ours(tenth, finest),
+        by_mesh={} if tenth else result.by_mesh(kind, tenth=False),
+        places=result.places(kind, tenth=tenth),
         failures=result.failures,
         note=case.note,
     )
@@ -125,16 +145,21 @@ def _row(result: CaseRecords, kind: Kind) -> Row:
         more=_columns(
             result,
             kind,
-            ours_tenth=facts.tenth,
-            converged_tenth=facts.fine,
+            ours_tenth=ours(True),
+            converged_tenth=ours(True, finest),
             deviation_percent=percent(facts.nominal, printed),
-            deviation_tenth_percent=percent(facts.tenth, printed),
-            deviation_converged_tenth_percent=percent(facts.fine, printed),
-            last_refinement_percent=percent(facts.fine, ours(True, REFINEMENTS[-2])),
+            deviation_tenth_percent=percent(ours(True), printed),
+            deviation_converged_percent=percent(ours(False, finest), printed),
+            deviation_converged_tenth_percent=percent(ours(True, finest), printed),
+            last_refinement_percent=percent(facts.fine, ours(tenth, before)),
+            by_refinement={
+                f"{mesh:g}": value
+                for mesh, value in result.by_mesh(kind, tenth=False).items()
+            },
             away_from_contacts=ours(False, away=True),
-            away_from_contacts_tenth=facts.away,
+            away_from_contacts_tenth=ours(True, away=True),
             places=result.places(kind, tenth=False),
-            places_tenth=dict(facts.places),
+            places_tenth=result.places(kind, tenth=True),
         ),
     )
 
@@ -144,8 +169,10 @@ _NUMBERS = (
     "converged_tenth",
     "deviation_percent",
     "deviation_tenth_percent",
+    "deviation_converged_percent",
     "deviation_converged_tenth_percent",
     "last_refinement_percent",
+    "by_refinement",
     "away_from_contacts",
     "away_from_contacts_tenth",
     "places",

@@ -116,7 +116,7 @@ def facts(**changes):
     values = {
         "printed": 100.0,
         "nominal": 101.0,
-        "tenth": 100.0,
+        "value": 100.0,
         "away": 100.0,
         "fine": None,
         "places": {"fillet": 35},
@@ -137,13 +137,13 @@ def test_reasons_come_from_the_runs():
     assert reason_for(facts(nominal=140.0)) == (
         "torque: +40 % at T, +0 % at T/10; from T/10 to T ours changes by +40 MPa"
     )
-    high = facts(tenth=130.0, places={"contact": 30, "fillet": 5}, away=104.0)
+    high = facts(value=130.0, places={"contact": 30, "fillet": 5}, away=104.0)
     assert reason_for(high) == (
         "+30 % at T/10; largest beside loaded tooth contacts at 30 of 35 positions;"
         " +4 % away from the contacts"
     )
-    mesh = reason_for(facts(tenth=80.0, fine=98.4, note="the source is silent"))
+    mesh = reason_for(facts(value=80.0, fine=98.4, note="the source is silent"))
     assert "largest in the tooth fillets at 35 of 35 positions" in mesh
     assert "the finest mesh changes it by +23 %" in mesh
     assert mesh.endswith("the source is silent")
-    assert "no matter of the mesh (+1 %" in reason_for(facts(tenth=80.0, fine=81.0))
+    assert "no matter of the mesh (+1 %" in reason_for(facts(value=80.0, fine=81.0))

@@ -8,7 +8,7 @@ import pytest
 
 from swgjoint.errors import InputError
 from swgjoint.faults import validated
-from swgjoint.study import record, thesis, thesis_rows
+from swgjoint.study import record
 from swgjoint.study.cases import KINDS, StudyFile
 from swgjoint.study.record import RunRecord
 from swgjoint.study.rows import StudyOptions
@@ -179,13 +179,11 @@ def test_a_study_resumes(result, study, folders, monkeypatch):
 
 def test_finer_meshes(study, monkeypatch):
     """A group that converges has the value of the finest mesh and its last change."""
-    for module in (thesis, thesis_rows):
-        monkeypatch.setattr(module, "REFINEMENTS", (1, 2))
-    monkeypatch.setattr(thesis, "FINE_POSITIONS", 1)
     monkeypatch.setenv("SWGJOINT_CACHE", "")
     group = {**TINY["group"][0], "converge": True, "cases": [{"value": 1.0}]}
     group["lowest"] = {}
-    tiny = validated(StudyFile, {**TINY, "group": [group]}, where="tiny")
+    finer = {"refinements": [2], "fine_positions": 1, "group": [group]}
+    tiny = validated(StudyFile, {**TINY, **finer}, where="tiny")
     found = {row.more["kind"]: row for row in run_cases(tiny, StudyOptions()).rows}
     assert set(found) == set(KINDS)
     row = found["tensile"]
@@ -199,3 +197,52 @@ def test_chapter_seven_is_three_dimensional():
     """With the 3D model the study has the parts of chapter 7 and no others."""
     with pytest.raises(InputError, match=r"part 4\.4; accepted: 7\.9"):
         run_thesis(StudyOptions(model="3d", only=("4.4",)))
+
+
+def test_table_of_micro_geometry(tmp_path, monkeypatch):
+    """Table 7.4 at T and T/10, mesh by mesh at T: an edge that grows is said to."""
+    specs = []
+
+    def compute(spec):
+        specs.append(spec)
+        mesh = spec.design.mesh.refinement
+        crowned = spec.design.micro_geometry.wave_generator_crowning_um > 0.0
+        edge = 290.0 if crowned else 1000.0 * mesh**0.5
+        load = 1.0 if spec.torque == 20.0 else 0.9
+        stresses = dict.fromkeys(KINDS, load * edge)
+        return RunRecord(
+            outcome="converged",
+            average=stresses,
+            places={"von_mises": {"back edge": spec.positions}},
+            angle_deg=[0.0] * spec.positions,
+        )
+
+    monkeypatch.setenv("SWGJOINT_CACHE", "")
+    monkeypatch.setattr(record, "compute", compute)
+    options = StudyOptions(model="3d", only=("table-7.4",), folder=tmp_path / "out")
+    result = run_thesis(options)
+    meshes = [(s.torque, s.design.mesh.refinement, s.positions) for s in specs]
+    wanted = [(20.0, 1.0, 36), (2.0, 1.0, 36), (20.0, 1.4, 4), (20.0, 2.0, 4)]
+    assert sorted(meshes) == sorted(2 * wanted)
+    initial = rows_of(result, "table-7.4 initial")["von_mises"]
+    assert initial.source_value == 1160.326
+    assert initial.ours == pytest.approx(1000.0)
+    assert initial.more["ours_tenth"] == pytest.approx(900.0)
+    assert initial.converged == pytest.approx(1000.0 * 2**0.5)
+    assert initial.more["converged_tenth"] is None
+    assert list(initial.more["by_refinement"]) == ["1", "1.4", "2"]
+    line = "1000, 1183, 1414 MPa at refinement 1, 1.4, 2 (+20 %): has no converged"
+    assert line in initial.reason
+    # judged at T: 1000 is within 15 % of 1160
+    assert "at T/10" not in initial.reason
+    improved = rows_of(result, "table-7.4 improved")["compressive"]
+    assert improved.reason.startswith("-25 % at T; ")
+    assert improved.reason.endswith(
+        "290, 290, 290 MPa at refinement 1, 1.4, 2 (+0 %): settles"
+    )
+    assert result.more["shares"]["converged"]["computed"] == 6
+    # the sign of the slope, stated by the study and its report
+    assert any("figure 7.33 lowers it" in line for line in result.summary)
+    text = (tmp_path / "out/thesis.md").read_text(encoding="utf-8")
+    assert "figure 7.33 lowers it" in text and "the studies in space" in text
+    assert "| T/10 |" in text and "at T only" in text
