@@ -76,8 +76,8 @@ def _ladder(by_mesh: Mapping[float, float]) -> list[str]:
     """Stress mesh by mesh, and whether it settles."""
     if len(by_mesh) < 2:
         return []
-    *_, before, last = by_mesh.values()
-    change = 100.0 * (last / before - 1.0)
+    first, *_, last = by_mesh.values()
+    change = 100.0 * (last / first - 1.0)
     values = ", ".join(f"{value:.0f}" for value in by_mesh.values())
     meshes = ", ".join(f"{mesh:g}" for mesh in by_mesh)
     settled = "settles" if abs(change) <= MESH else "has no converged value"

@@ -222,23 +222,23 @@ def test_table_of_micro_geometry(tmp_path, monkeypatch):
     options = StudyOptions(model="3d", only=("table-7.4",), folder=tmp_path / "out")
     result = run_thesis(options)
     meshes = [(s.torque, s.design.mesh.refinement, s.positions) for s in specs]
-    wanted = [(20.0, 1.0, 36), (2.0, 1.0, 36), (20.0, 1.4, 4), (20.0, 2.0, 4)]
+    wanted = [(20.0, 1.0, 36), (2.0, 1.0, 36), (20.0, 1.3, 6), (20.0, 1.6, 6)]
     assert sorted(meshes) == sorted(2 * wanted)
     initial = rows_of(result, "table-7.4 initial")["von_mises"]
     assert initial.source_value == 1160.326
     assert initial.ours == pytest.approx(1000.0)
     assert initial.more["ours_tenth"] == pytest.approx(900.0)
-    assert initial.converged == pytest.approx(1000.0 * 2**0.5)
+    assert initial.converged == pytest.approx(1000.0 * 1.6**0.5)
     assert initial.more["converged_tenth"] is None
-    assert list(initial.more["by_refinement"]) == ["1", "1.4", "2"]
-    line = "1000, 1183, 1414 MPa at refinement 1, 1.4, 2 (+20 %): has no converged"
+    assert list(initial.more["by_refinement"]) == ["1", "1.3", "1.6"]
+    line = "1000, 1140, 1265 MPa at refinement 1, 1.3, 1.6 (+26 %): has no converged"
     assert line in initial.reason
     # judged at T: 1000 is within 15 % of 1160
     assert "at T/10" not in initial.reason
     improved = rows_of(result, "table-7.4 improved")["compressive"]
     assert improved.reason.startswith("-25 % at T; ")
     assert improved.reason.endswith(
-        "290, 290, 290 MPa at refinement 1, 1.4, 2 (+0 %): settles"
+        "290, 290, 290 MPa at refinement 1, 1.3, 1.6 (+0 %): settles"
     )
     assert result.more["shares"]["converged"]["computed"] == 6
     # the sign of the slope, stated by the study and its report
