@@ -196,28 +196,3 @@ def _place(segment: SegmentMesh, follow: SegmentMasters, position: Array) -> Non
         rest = points[part] - weight[:, known] @ position[follow.masters[known]]
         found = np.linalg.lstsq(weight[:, new], rest, rcond=None)[0]
         position[follow.masters[new]] = found
-
-
-def face_lines(strip: StripMesh, masters: Masters, x: Array) -> Array:
-    """Outside and bore side of the first face, from the open end to the bore.
-
-    Args:
-        strip: The mesh.
-        masters: Its masters.
-        x: Positions of all masters (n, 3) [m].
-
-    Returns:
-        Shape (2, n_points, 3) [m].
-    """
-    sides: list[list[Array]] = [[], []]
-    for segment, follow in zip(strip.segments, masters.segments, strict=True):
-        place = np.searchsorted(follow.boundary, segment.first)
-        points = follow.weight[place] @ x[follow.masters]
-        for side in (0, 1):
-            stations = np.unique(np.round(segment.position, 9))
-            for station in stations[0 if not sides[side] else 1 :]:
-                here = np.flatnonzero(np.abs(segment.position - station) < 1e-8)
-                depth = segment.depth[here]
-                k = here[depth.argmin() if side == 0 else depth.argmax()]
-                sides[side].append(points[k])
-    return np.array(sides)

@@ -7,12 +7,7 @@ import pytest
 from skfem import Basis, ElementHex1
 
 from swgjoint.fe.solid.corotation import about_z
-from swgjoint.fe.solid.masters import (
-    Orders,
-    SegmentMasters,
-    face_lines,
-    strip_masters,
-)
+from swgjoint.fe.solid.masters import Orders, SegmentMasters, strip_masters
 from swgjoint.fe.solid.segment import condense_segment
 from swgjoint.fe.solid.strip_mesh import circular_spline_strip, flexspline_strip
 from swgjoint.gear.design import Design
@@ -131,16 +126,6 @@ def test_segments_agree_on_the_section_between_them(strip):
             begin = np.searchsorted(follow.boundary, segment.begin.ravel())
             assert rows[begin] == pytest.approx(seen, abs=1e-12)
         seen = rows[np.searchsorted(follow.boundary, segment.end.ravel())]
-
-
-def test_lines_of_the_face_run_from_the_open_end_to_the_bore(strip):
-    """Outside and bore side of the undeformed face, a wall apart along the cup."""
-    masters = strip_masters(strip)
-    outside, inside = face_lines(strip, masters, masters.position)
-    assert outside[0, 2] == pytest.approx(-5e-3)
-    assert np.hypot(*inside[-1, :2]) == pytest.approx(20e-3, rel=1e-3)
-    apart = np.linalg.norm(outside - inside, axis=-1)
-    assert apart[-20:] == pytest.approx(np.full(20, 0.8e-3), rel=1e-2)
 
 
 def test_degrees_are_cut_to_what_the_nodes_can_tell_apart(strip):
