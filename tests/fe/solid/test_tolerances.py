@@ -248,3 +248,38 @@ def test_flawed_half_or_rigid_models_are_refused(design, reference):
         solid_ring(leaning, elastic_circular_spline=False)
     with pytest.raises(DesignError, match="half model"):
         solid_ring(leaning, half=True)
+
+
+@pytest.mark.slow
+def test_errors_keep_the_balance_of_energy(design):
+    """T_wg is the slope of U + T psi: outline eccentric and oval, teeth, axis."""
+    changes = ERRORS | {
+        "wave_generator_eccentricity_um": 3.0,
+        "wave_generator_ovality_um": 3.0,
+    }
+    flawed = design.with_changes({f"tolerances.{k}": v for k, v in changes.items()})
+    follow = replace(perfect_drive(design, "3d"), ring=solid_ring(flawed))
+    start = follow.to_torque(follow.meshed(follow.deflected()), TORQUE)
+    theta, step = 0.4 * pitch_of(flawed), 3e-4
+    middle = follow.to_angle(start, theta)
+    assert middle.outcome.ok
+    low, high = (follow.to_angle(middle, theta + s * step) for s in (-1, 1))
+    gained = high.energy - low.energy + TORQUE * (high.rotation - low.rotation)
+    torque = middle.wave_generator_torque
+    assert gained == pytest.approx(2.0 * step * torque, rel=1e-4)
+    assert middle.tooth_moment == pytest.approx(TORQUE - torque, abs=1e-6 * TORQUE)
+    # it is not the torque of the perfect drive
+    assert abs(torque - TORQUE / design.ratio) > 1e-3 * TORQUE
+
+
+@pytest.mark.slow
+def test_once_per_turn_needs_eccentricity_and_pitch_errors(design, reference):
+    """Unequal lobes show what equal ones cancel."""
+    values = {"circular_spline_cumulative_pitch_um": 3.0}
+    eccentric = {"tolerances.wave_generator_eccentricity_um": 3.0}
+    flawed = design.with_changes({f"tolerances.{k}": v for k, v in values.items()})
+    errors = gap_errors(flawed, np.arange(42))
+    _, found = influences(design.with_changes(eccentric), phases=1, model="3d")
+    both, without = (orders(at, errors) for at in (found[0][1], reference[2]))
+    assert both[1] > 10.0 * without[1]
+    assert both[1] > 0.01 * both[2]

@@ -27,10 +27,15 @@ def points():
     return np.stack([radius * np.cos(phi), radius * np.sin(phi), z], axis=-1)
 
 
+@pytest.mark.parametrize("error", [0.0, 50.0])
 @pytest.mark.parametrize("kind", ["parabolic", "circular"])
-def test_gradient_of_the_gap(kind):
-    """Against central differences in x, y and z."""
-    found = surface(micro_geometry__crowning_kind=kind)
+def test_gradient_of_the_gap(kind, error):
+    """Against central differences in x, y and z; round and centred, and not."""
+    found = surface(
+        micro_geometry__crowning_kind=kind,
+        tolerances__wave_generator_eccentricity_um=error,
+        tolerances__wave_generator_ovality_um=error,
+    )
     _, gradient, _ = found.gap(points(), ALPHA)
     h = 1e-8
     for axis in range(3):
