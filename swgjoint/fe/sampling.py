@@ -15,7 +15,8 @@ from swgjoint.fe.drive2d import can_halve, left_out, ring_model
 from swgjoint.fe.pattern import EVERY, solve_pattern
 from swgjoint.fe.solid.continuation import SolidContinuation
 from swgjoint.fe.solid.drive3d import solid_ring
-from swgjoint.fe.tolerance_sampling import SMALL, sample_tolerances
+from swgjoint.fe.tolerance_rest import SMALL
+from swgjoint.fe.tolerance_sampling import sample_tolerances
 from swgjoint.gear.design import Design
 from swgjoint.gear.kinematics import angle_coefficients, periodicity
 from swgjoint.gear.mounting import series_compliance, springs_of

@@ -9,159 +9,34 @@ a few positions within one pitch, and the errors of all pitches are superposed t
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import lcm, pi
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.errors import ComputationError
-from swgjoint.fe.continuation import Continuation
-from swgjoint.fe.corotation import rotate
-from swgjoint.fe.drive2d import ring_model
 from swgjoint.fe.following import Follower
-from swgjoint.fe.influence import Influence, Response
-from swgjoint.fe.solid.continuation import SolidContinuation
-from swgjoint.fe.solid.drive3d import solid_ring
-from swgjoint.gear.design import Design, MemberName
-from swgjoint.gear.kinematics import periodicity
-from swgjoint.gear.tolerances import (
-    ToothErrors,
-    axis_tilt,
-    has_errors,
-    tooth_errors,
-    with_perfect_teeth,
-    without_errors,
-)
+from swgjoint.fe.tolerance_cycle import gap_errors, pitch_of, pitches_of
+from swgjoint.fe.tolerance_rest import PHASES, SMALL, Rest, influences
+from swgjoint.gear.design import Design
+from swgjoint.gear.tolerances import has_errors, with_perfect_teeth, without_errors
 from swgjoint.maps.samples import FullSolves, ToleranceSamples
 from swgjoint.progress import Progress, silent
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-PHASES = 4
-"""Positions within a pitch: what the errors add varies slowly within one."""
 ALONE = 24
-"""The same without errors of the teeth, where one pitch is all there is."""
+"""Positions within a pitch without errors of the teeth, where one is all there is."""
 POSITIONS = 40_000
 """Positions of the cycle, if that leaves two in a pitch: what two minutes allow."""
 LEVELS = (0.15, 0.45, 1.0)
 """Sampled torques, of both signs, as parts of the repeated peak torque."""
-SMALL = 0.01
-"""Part of the rated torque of either sign between whose positions an output without
-torque stands where clearance leaves it free."""
 CHECKS = {"2d": 12, "3d": 3}
 """Positions that are solved without linearisation, too, to judge the map; in space one
 takes half a minute."""
-MEMBERS: tuple[MemberName, MemberName] = ("flexspline", "circular_spline")
 FREE = 100.0
 """Compliance, in the median of all positions, from which the output counts as free."""
-
-
-def pitches_of(design: Design) -> int:
-    """Pitches after which errors of teeth and axis repeat; 1 without such errors."""
-    shifts = [tooth_errors(design, member).shift for member in MEMBERS]
-    counts = [len(shift) for shift in shifts if shift.any()]
-    if axis_tilt(design).any() and design.drive.layout != "wave_generator_fixed":
-        counts.append(round(2.0 * pi / pitch_of(design)))
-    return lcm(*counts)
-
-
-def pitch_of(design: Design) -> float:
-    """Input angle after which the teeth stand alike [rad]."""
-    drive = design.drive
-    cycles = periodicity(
-        drive.layout, drive.teeth_flexspline, drive.teeth_circular_spline
-    )
-    return 2.0 * pi / cycles
-
-
-def shifted(errors: ToothErrors, pitches: Index, layout: str) -> Array:
-    """Shifts of the teeth that stand where those of the first pitch stood.
-
-    Args:
-        errors: Of one member.
-        pitches: Whole pitches that the input has moved on (n,).
-        layout: Which member is fixed.
-
-    Returns:
-        In the frames of the teeth (n, n_teeth, 2) [m].
-    """
-    count = len(errors.shift)
-    # the lobes move on to the next teeth; a wave generator that stands still sees the
-    # teeth come from behind
-    onwards = -pitches if layout == "wave_generator_fixed" else pitches
-    return np.asarray(errors.shift[(np.arange(count) + onwards[:, None]) % count])
-
-
-def gap_errors(design: Design, pitches: Index) -> tuple[Array, Array, Array]:
-    """Shifts of both members' teeth and slope of the axis after whole pitches.
-
-    As the first pitch sees them: (n, N, 2), (n, N_c, 2) [m], (n, 2) [rad].
-    """
-    own, other = (
-        shifted(tooth_errors(design, member), pitches, design.drive.layout)
-        for member in MEMBERS
-    )
-    return own, other, tilted(design, pitches)
-
-
-def tilted(design: Design, pitches: Index) -> Array:
-    """Slope of the axis, turned back with the wave generator to the first pitch.
-
-    Args:
-        design: The drive.
-        pitches: Whole pitches that the input has moved on (n,).
-
-    Returns:
-        Shape (n, 2) [rad].
-    """
-    stands = design.drive.layout == "wave_generator_fixed"
-    angle = np.asarray((0.0 if stands else -pitch_of(design)) * pitches, dtype=float)
-    return rotate(axis_tilt(design), angle)
-
-
-def perfect_drive(design: Design, model: str = "2d") -> Follower[Any]:
-    """All of the drive, its teeth and its axis perfect, without friction."""
-    perfect, layout = with_perfect_teeth(design), design.drive.layout
-    if model == "3d":
-        ring = solid_ring(perfect)
-        return SolidContinuation(ring=ring, ratio=design.ratio, layout=layout)
-    plane = ring_model(perfect, friction=False)
-    return Continuation(model=plane, ratio=design.ratio, layout=layout)
-
-
-def influences(
-    design: Design, *, phases: int = PHASES, model: str = "2d"
-) -> tuple[Follower[Any], list[tuple[Any, Influence]]]:
-    """The drive with perfect teeth, unloaded and linearised at positions in a pitch.
-
-    Errors of its wave generator turn with it, so that all pitches are alike.
-
-    Args:
-        design: The drive; errors of its wave generator are kept.
-        phases: Positions, equally spaced.
-        model: Fidelity, ``2d`` or ``3d``.
-
-    Raises:
-        ComputationError: If the unloaded drive cannot be solved.
-    """
-    drive, period = design.drive, pitch_of(design)
-    follow = perfect_drive(design, model)
-    state = follow.meshed(follow.deflected())
-    if state.outcome.ok:
-        state = follow.to_torque(state, 0.0)
-    found = []
-    for k in range(phases):
-        if k:
-            state = follow.to_angle(state, period * k / phases)
-        if not state.outcome.ok:
-            raise ComputationError(
-                f"{drive.name}: no equilibrium without torque and errors:"
-                f" {state.outcome.value}"
-            )
-        found.append((state, follow.influence(state)))
-    return follow, found
 
 
 def sample_tolerances(
@@ -198,24 +73,25 @@ def sample_tolerances(
         reference = influences(perfect_design, phases=phases, model=model)[1]
     pitches = np.arange(pitches_of(design), dtype=np.int64)
     errors = gap_errors(design, pitches)
+    none = tuple(np.zeros_like(one[:1]) for one in errors)
     levels = np.array([part * repeated_peak for part in LEVELS])
+    small = SMALL * rated_torque
+    has_play = any(rest.opposite is not None for rest in (*linear, *reference))
+    if has_play:
+        levels = np.append(small, levels)
     tables, perfect, free = [], [], 0
-    for k, ((state, at), (still, flawless)) in enumerate(
-        zip(linear, reference, strict=True)
-    ):
-        gaps, none = at.gap_change(*errors), np.zeros((1, len(flawless.sector)))
-        found, count = _over_torque(at, gaps, levels, SMALL * rated_torque)
+    for k, (rest, flawless) in enumerate(zip(linear, reference, strict=True)):
+        found, count = _over_torque(rest, errors, levels, small)
         if not np.isfinite(found).all():
             lost = np.isnan(found).any(axis=(0, 1)).sum()
             raise ComputationError(
                 f"{drive.name}: no equilibrium with the errors of the teeth at {lost}"
                 f" of {pitches.size} pitches; try smaller tolerances"
             )
-        alone, _ = _over_torque(flawless, none, levels, SMALL * rated_torque)
+        alone, _ = _over_torque(flawless, none, levels, small)
         ideal = pitch_of(design) * k / phases / design.ratio
-        for rows, energy in ((found, state.energy), (alone, still.energy)):
-            rows[0] -= ideal
-            rows[1] += energy
+        found[0] -= ideal
+        alone[0] -= ideal
         tables.append(found)
         perfect.append(alone[:, :, 0])
         free += count
@@ -226,8 +102,9 @@ def sample_tolerances(
     count = pitches.size * phases
     checks = CHECKS[model]
     chosen = np.arange(checks) * (count // checks) + np.arange(checks) % phases
-    states = [state for state, _ in linear]
-    solved = full_solves(design, follow, states, chosen % count, (0.0, rated_torque))
+    states = [rest.state for rest in linear]
+    torques = (rated_torque,) if has_play else (0.0, rated_torque)
+    solved = full_solves(design, follow, states, chosen % count, torques)
     return ToleranceSamples(
         pitches=pitches.size,
         phases=phases,
@@ -278,33 +155,40 @@ def full_solves(
 
 
 def _over_torque(
-    at: Influence, gaps: Array, levels: Array, small: float
+    rest: Rest, errors: tuple[Array, ...], levels: Array, small: float
 ) -> tuple[Array, int]:
     """Output angle, strain energy, compliance at all torques (3, n_torques, n_sets).
 
     And the number of sets whose unloaded output is free.
     """
+    gaps = [at.gap_change(*errors) for _, at in rest.sides]
 
-    def row(torque: float, response: Response) -> Array:
-        energy = response.potential - torque * response.output_angle
-        return np.stack([response.output_angle, energy, response.compliance])
+    def row(torque: float, chosen: Any, start: Any) -> tuple[Array, Any]:
+        side = 0 if torque >= 0.0 else 1
+        state, at = rest.sides[side]
+        found = at.respond(gaps[side][chosen], torque, start)
+        # of the equilibrium at which it is linearised
+        potential = found.potential + state.energy + at.torque * at.angle
+        energy = potential - torque * found.output_angle
+        return np.stack([found.output_angle, energy, found.compliance]), found.active
 
-    rest = at.respond(gaps, 0.0)
-    unloaded = row(0.0, rest)
-    # a few free positions leave the median as it is
-    free = ~(rest.compliance < FREE * np.nanmedian(rest.compliance))
+    unloaded, at_rest = np.zeros((3, len(gaps[0]))), None
+    free = np.ones(len(gaps[0]), dtype=bool)
+    if rest.opposite is None:
+        unloaded, at_rest = row(0.0, slice(None), None)
+        # a few free positions leave the median as it is
+        free = ~(unloaded[2] < FREE * np.nanmedian(unloaded[2]))
     if free.any():
-        ends = [row(t, at.respond(gaps[free], t)) for t in (small, -small)]
+        ends = [row(t, free, None)[0] for t in (small, -small)]
         middle = 0.5 * (ends[0] + ends[1])
         middle[2] = 0.5 * (ends[1][0] - ends[0][0]) / small
         unloaded[:, free] = middle
     sides = []
     for sign in (-1.0, 1.0):
-        active, rows = rest.active, []
+        active, rows = at_rest, []
         for level in levels:
-            response = at.respond(gaps, sign * level, active)
-            active = response.active
-            rows.append(row(sign * level, response))
+            found, active = row(sign * level, slice(None), active)
+            rows.append(found)
         sides.append(rows)
     table = [*sides[0][::-1], unloaded, *sides[1]]
     return np.stack(table, axis=1), int(free.sum())

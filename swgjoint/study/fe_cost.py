@@ -26,7 +26,7 @@ from swgjoint.fe.solid.continuation import SolidContinuation
 from swgjoint.fe.solid.drive3d import check_modelled, solid_ring
 from swgjoint.fe.solid.stress import SolidMaxima
 from swgjoint.fe.stress import MemberMaxima, StressMaxima
-from swgjoint.fe.tolerance_sampling import SMALL
+from swgjoint.fe.tolerance_rest import SMALL
 from swgjoint.files import write_whole
 from swgjoint.gear.cup import cup_torsional_stiffness
 from swgjoint.gear.design import Design

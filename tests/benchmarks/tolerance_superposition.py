@@ -16,13 +16,9 @@ from typing import Any
 
 import numpy as np
 
-from swgjoint.fe.tolerance_sampling import (
-    MEMBERS,
-    full_solves,
-    influences,
-    pitches_of,
-    shifted,
-)
+from swgjoint.fe.tolerance_cycle import MEMBERS, pitches_of, shifted
+from swgjoint.fe.tolerance_rest import influences
+from swgjoint.fe.tolerance_sampling import full_solves
 from swgjoint.files import write_whole
 from swgjoint.gear.design import Design
 from swgjoint.gear.tolerances import tooth_errors
@@ -40,7 +36,7 @@ def one_seed(design: Design, count: int, parts: list[float]) -> list[dict[str, A
     """A row for every torque, given as part of the rated one."""
     begin = time.perf_counter()
     follow, found = influences(design, phases=1)
-    state, at = found[0]
+    state, at = found[0].state, found[0].at
     cycle = pitches_of(design)
     rng = np.random.default_rng(design.tolerances.seed)
     positions = np.sort(rng.choice(cycle, count, replace=False))

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from swgjoint.fe.tolerance_sampling import MEMBERS, influences, pitches_of, shifted
+from swgjoint.fe.tolerance_cycle import MEMBERS, pitches_of, shifted
+from swgjoint.fe.tolerance_rest import influences
 from swgjoint.gear.design import Design
 from swgjoint.gear.tolerances import ToothErrors, tooth_errors
 
@@ -25,7 +26,7 @@ def flawed(**values) -> Design:
 def perfect():
     """Influences of the drive with a perfect and with an eccentric wave generator."""
     return {
-        bool(values): influences(flawed(**values), phases=1)[1][0][1]
+        bool(values): influences(flawed(**values), phases=1)[1][0].at
         for values in ({}, ECCENTRIC)
     }
 

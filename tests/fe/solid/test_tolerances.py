@@ -12,14 +12,8 @@ from swgjoint.errors import DesignError
 from swgjoint.fe.corotation import rotate
 from swgjoint.fe.solid.drive3d import solid_ring
 from swgjoint.fe.solid.tolerance_influence import influence
-from swgjoint.fe.tolerance_sampling import (
-    gap_errors,
-    influences,
-    perfect_drive,
-    pitch_of,
-    pitches_of,
-    shifted,
-)
+from swgjoint.fe.tolerance_cycle import gap_errors, pitch_of, pitches_of, shifted
+from swgjoint.fe.tolerance_rest import influences, perfect_drive
 from swgjoint.gear.design import Design
 from swgjoint.gear.tolerances import ToothErrors, axis_tilt
 
@@ -56,7 +50,7 @@ def design():
 def reference(design):
     """The perfect drive without load, and its influences."""
     follow, found = influences(design, phases=1, model="3d")
-    return follow, *found[0]
+    return follow, found[0].state, found[0].at
 
 
 def none(follow, at):
@@ -280,6 +274,38 @@ def test_once_per_turn_needs_eccentricity_and_pitch_errors(design, reference):
     flawed = design.with_changes({f"tolerances.{k}": v for k, v in values.items()})
     errors = gap_errors(flawed, np.arange(42))
     _, found = influences(design.with_changes(eccentric), phases=1, model="3d")
-    both, without = (orders(at, errors) for at in (found[0][1], reference[2]))
+    both, without = (orders(at, errors) for at in (found[0].at, reference[2]))
     assert both[1] > 10.0 * without[1]
     assert both[1] > 0.01 * both[2]
+
+
+@pytest.mark.slow
+def test_play_of_a_flawed_drive(small_design):
+    """Linearised at both ends of its clearance: where it ends, and beyond."""
+    values = {
+        "circular_spline_cumulative_pitch_um": 3.0,
+        "circular_spline_ovality_um": 2.0,
+        "misalignment_arcmin": 1.0,
+    }
+    changes = {f"tolerances.{key}": value for key, value in values.items()}
+    design = small_design.with_changes(changes | {"mesh.refinement": 0.5})
+    follow, (rest,) = influences(design, phases=1, model="3d")
+    assert rest.opposite is not None
+    # every sign of the torque has its own flanks
+    up, down = (state for state, _ in rest.sides)
+    assert up.rotation < down.rotation - 1e-3
+    apart, moved = [], []
+    for errors in zip(*gap_errors(design, np.array([0, 5])), strict=True):
+        flawed = follow.with_errors(*errors)
+        for sign, (state, at) in zip((1.0, -1.0), rest.sides, strict=True):
+            for torque in (abs(at.torque) * sign, 4.0 * TORQUE * sign):
+                none = at.respond(np.zeros((1, len(at.sector))), torque)
+                found = at.respond(at.gap_change(*errors)[None], torque)
+                perfect = follow.to_torque(state, torque)
+                full = flawed.to_torque(state, torque)
+                assert perfect.outcome.ok and full.outcome.ok
+                moved.append(full.rotation - perfect.rotation)
+                apart.append(found.output_angle[0] - none.output_angle[0] - moved[-1])
+    assert np.abs(moved).max() > 2e-5
+    # few teeth carry a small torque, on crowned flanks
+    assert np.abs(apart).max() < 0.05 * np.abs(moved).max()
