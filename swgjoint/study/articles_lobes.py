@@ -25,7 +25,6 @@ PRELOAD = (
     "the article has this force preload the teeth; it bends the cup, and teeth chosen"
     " here take up at the force below"
 )
-STOP = "at most: teeth as a rigid stop"
 
 
 def characteristic_of(found: Found) -> LobeCharacteristic:
@@ -35,6 +34,8 @@ def characteristic_of(found: Found) -> LobeCharacteristic:
         deflection=np.array(found["deflection_mm"]) * mm,
         force=np.array(found["force_N"]),
         play=1e-3 * np.array(found["play_mrad"]),
+        pressed_deflection=np.array(found["pressed_mm"]) * mm,
+        pressed_force=np.array(found["on_teeth_N"]),
     )
 
 
@@ -54,9 +55,11 @@ def lobe_rows(own: Force, found: Found) -> list[Row]:
             more={"part": "force"},
         )
 
-    nominal = closed = slope = None
+    nominal = wedged = closed = slope = None
     if cup is not None:
         nominal = cup.force_at(cup.height)
+        if cup.height <= cup.highest:
+            wedged = nominal + cup.on_teeth_at(cup.height)
         take_up = cup.take_up
         if not isinf(take_up):
             closed = cup.force_at(take_up)
@@ -65,6 +68,7 @@ def lobe_rows(own: Force, found: Found) -> list[Row]:
             slope = before / arcmin / (step / 1e-6)
     rows = [
         row("lobe force at w_0", "N", nominal, f"{PLACE}; {LOADED}; {PRELOAD}"),
+        row("the same with teeth", "N", wedged, "teeth and circular spline elastic"),
         row(
             "lobe deflection at which play vanishes",
             "mm",
@@ -99,6 +103,5 @@ def lobe_rows(own: Force, found: Found) -> list[Row]:
         parts = ("lobe deflection", "lobe force", "play", "force on the teeth")
         units = ("mm", "N", "arcmin", "N")
         for part, unit, value in zip(parts, units, values, strict=True):
-            why = f"{reason}; {STOP}" if part == "force on the teeth" else reason
-            rows.append(row(f"{name}: {part}", unit, value, why))
+            rows.append(row(f"{name}: {part}", unit, value, reason))
     return rows

@@ -6,6 +6,8 @@ import io
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from swgjoint.study.articles_runs import Found
 
 
@@ -67,7 +69,13 @@ def _lobes(ax: Any, found: Mapping[str, Found]) -> None:
     if "force_N" not in result:
         return
     deflection = result["deflection_mm"]
-    ax.plot(deflection, result["force_N"], "tab:blue", marker=".")
+    ax.plot(deflection, result["force_N"], "tab:blue", marker=".", label="cup")
+    pressed = np.array(result["pressed_mm"])
+    cup = np.interp(pressed, deflection, result["force_N"])
+    both = cup + np.array(result["on_teeth_N"])
+    ax.plot(pressed, both, "tab:green", marker=".", label="cup and teeth")
+    ax.set_ylim(0.0, 2.0 * max(result["force_N"]))
+    ax.legend(fontsize="small")
     ax.axvline(result["height_mm"], color="0.6", lw=0.8)
     right = ax.twinx()
     right.plot(deflection, result["play_mrad"], "tab:red", marker=".", ls="--")

@@ -76,6 +76,8 @@ def _lobes(task: Task) -> Found:
         "deflection_mm": (found.deflection / mm).tolist(),
         "force_N": found.force.tolist(),
         "play_mrad": (1e3 * found.play).tolist(),
+        "pressed_mm": (found.pressed_deflection / mm).tolist(),
+        "on_teeth_N": found.pressed_force.tolist(),
     }
 
 

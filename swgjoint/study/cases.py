@@ -19,7 +19,7 @@ Kind = Literal["tensile", "compressive", "von_mises"]
 KINDS: tuple[Kind, ...] = ("tensile", "compressive", "von_mises")
 
 Stress = Annotated[float, Field(gt=0, le=10_000)]
-Refinement = Annotated[float, Field(gt=0, le=16)]
+Refinement = Annotated[float, Field(gt=1, le=16)]
 Torque = Annotated[float, Field(ge=0, le=1e6)]
 Text = Annotated[str, Field(min_length=1, max_length=200)]
 Listed = Field(strict=False)  # TOML has lists, the models tuples

@@ -22,8 +22,10 @@ LOBES = {
     "deflection_mm": [0.0, 0.1, 0.2, 0.3, 0.4, 0.5],
     "force_N": [0.0, 6.5, 13.0, 19.5, 26.0, 32.5],
     "play_mrad": [nan, nan, 3.0, 1.0, -1.0, -3.0],
+    "pressed_mm": [0.35, 0.36],
+    "on_teeth_N": [0.0, 10.0],
 }
-"""65 N/mm; play that falls by 20 rad/m and vanishes at 0.35 mm."""
+"""65 N/mm; play that falls by 20 rad/m and vanishes at 0.35 mm; teeth of 1 N/µm."""
 
 
 def section(safety):
@@ -105,6 +107,7 @@ def test_rows_of_all_parts(computed, capsys, tmp_path):
     assert stiffness["low"] < stiffness["high"]
     lobe = {key[1]: row for key, row in by.items() if key[0] == "xb1-100-80"}
     assert lobe["lobe force at w_0"]["ours"] == pytest.approx(26.0)
+    assert lobe["the same with teeth"]["ours"] is None  # beyond 0.36 mm
     assert lobe["lobe force at which play vanishes"]["ours"] == pytest.approx(22.75)
     take_up = lobe["play that a micrometre of lobe takes up"]["ours"]
     assert take_up == pytest.approx(20e-6 * 10800 / pi, rel=0.01)
@@ -112,10 +115,11 @@ def test_rows_of_all_parts(computed, capsys, tmp_path):
     assert lobe[name + "lobe force"]["ours"] == pytest.approx(20.0)
     assert lobe[name + "lobe deflection"]["ours"] == pytest.approx(20 / 65)
     assert lobe[name + "force on the teeth"]["ours"] == 0.0
-    # 30 N + 5 N/mm 0.05 mm on the cup's 22.75 N
+    # 30 N + 5 N/mm 0.05 mm - 22.75 N of the cup over 1 N/µm and both stiffnesses
     name = "springs, 5 N/mm, 30 N: "
     assert lobe[name + "play"]["ours"] == 0.0
-    assert lobe[name + "force on the teeth"]["ours"] == pytest.approx(7.5)
+    wanted = 7.5 / (1.0 + 0.005 + 0.065)
+    assert lobe[name + "force on the teeth"]["ours"] == pytest.approx(wanted)
     deflection = by["dca-80-to-1", "largest radial displacement"]
     assert (deflection["source_value"], deflection["ours"]) == (0.517, 0.52)
     assert "coned" in deflection["reason"]

@@ -12,24 +12,25 @@ rigid wave generator is :math:`k \to \infty`, a soft one with preload k = 0.
 
 The play of the teeth is the rotation of the unloaded output between the contacts of its
 two directions, teeth undeformed. It falls as w grows; where it vanishes the teeth take
-up. From there on they are taken as a rigid stop: what the springs have beyond
-:math:`F_{cup}` presses the teeth, an upper bound, because real teeth give way.
+up, and from there on they carry what the springs have beyond :math:`F_{cup}`
+(:mod:`swgjoint.fe.solid.lobe_pads`; the circular spline elastic).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import inf, nan
+from math import inf, isinf, nan
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline, PchipInterpolator
 from scipy.optimize import brentq
 
-from swgjoint.errors import InputError
+from swgjoint.errors import ComputationError, InputError
 from swgjoint.fe.solid.corotation import Frames, about_z
 from swgjoint.fe.solid.drive3d import solid_ring
+from swgjoint.fe.solid.lobe_pads import force_on_teeth
 from swgjoint.fe.solid.pinched_cup import PinchedCup
 from swgjoint.fe.solid.ring import SolidRing
 from swgjoint.gear.design import Design
@@ -47,6 +48,8 @@ FLAT = 0.1
 """Lever over the pitch radius below which a contact has no side."""
 TURNS = 12
 """Rotations at most until a tooth touches."""
+BEYOND = (0.02, 0.05, 0.1, 0.15)
+"""Deflections beyond the take-up at which teeth are solved [lobe heights]."""
 TOUCHES = 1e-10
 """Rotation that counts as none [rad]."""
 
@@ -71,9 +74,9 @@ class WorkingPoint:
     force: float
     """Of a lobe [N]."""
     on_teeth: float
-    """Part of the force that presses the teeth into the spaces, at most [N]."""
+    """Part of the force that presses the teeth into the spaces [N]."""
     play: float
-    """Of the output, 0 where the teeth are pressed; NaN where the lobes are so low that
+    """Of the output, 0 where teeth are pressed; NaN where the lobes are so low that
     teeth beside them overlap [rad]."""
 
 
@@ -89,6 +92,10 @@ class LobeCharacteristic:
     """That it takes, the teeth free (n,) [N]."""
     play: Array
     """Of the output, see :func:`play` (n,) [rad]."""
+    pressed_deflection: Array
+    """From the take-up on; empty without one (m,) [m]."""
+    pressed_force: Array
+    """Part of the force of a lobe that the teeth take there, from 0 on (m,) [N]."""
 
     def force_at(self, deflection: float) -> float:
         """Force of a lobe [N].
@@ -132,43 +139,58 @@ class LobeCharacteristic:
             return inf
         return float(brentq(self.play_at, w[free[-1]], w[free[-1] + 1]))
 
+    def on_teeth_at(self, deflection: float) -> float:
+        """Part of the force of a lobe that the teeth take [N].
+
+        Raises:
+            InputError: Outside the range that was solved.
+        """
+        self._check(deflection)
+        if not deflection > self.take_up:
+            return 0.0
+        if deflection > self.highest:
+            raise InputError(
+                f"deflection {deflection / mm:.4g} mm; accepted: up to"
+                f" {self.highest / mm:.4g} mm, the teeth in contact"
+            )
+        through = PchipInterpolator(self.pressed_deflection, self.pressed_force)
+        return float(through(deflection))
+
+    @property
+    def highest(self) -> float:
+        """Deflection up to which force and contact of the teeth are known [m]."""
+        last = float(self.deflection[-1])
+        if isinf(self.take_up):
+            return last
+        return min(last, float(np.max(self.pressed_deflection, initial=self.take_up)))
+
     def working_point(self, generator: ElasticWaveGenerator) -> WorkingPoint:
-        """Balance of springs and cup, the teeth a rigid stop.
+        """Balance of springs, cup and teeth.
 
         Raises:
             InputError: If they balance outside the range that was solved.
         """
-        rigid, k = np.isinf(generator.stiffness), generator.stiffness
-        low, high, stop = self.deflection[0], self.deflection[-1], self.take_up
+        k, w = generator.stiffness, self.height
+        if not isinf(k):
+            low, high = float(self.deflection[0]), self.highest
 
-        def springs(w: float) -> float:
-            return generator.preload + k * (self.height - w)
+            def pushed(w: float) -> float:
+                springs = generator.preload + k * (self.height - w)
+                return springs - self.force_at(w) - self.on_teeth_at(w)
 
-        def pushed(w: float) -> float:
-            return springs(w) - self.force_at(w)
-
-        if rigid:
-            w = min(self.height, stop)
-        else:
-            end = float(min(high, stop))
-            if pushed(low) < 0.0 or (pushed(end) > 0.0 and stop > high):
-                most = self.force[-1] + k * (high - self.height)
+            if not pushed(low) >= 0.0 >= pushed(high):
+                least, most = (generator.preload - pushed(end) for end in (low, high))
                 raise InputError(
                     f"preload {generator.preload:.4g} N with {k / 1e3:.4g} N/mm;"
-                    f" accepted: {-k * self.height:.4g} to {most:.4g} N"
+                    f" accepted: {least:.4g} to {most:.4g} N"
                 )
-            w = end
-            if pushed(end) < 0.0:
-                w = float(brentq(pushed, low, end, xtol=1e-15))
-        pressed, cup = w == stop, self.force_at(w)
-        force = cup
-        if pressed:
-            force = inf if rigid else springs(w)
+            w = float(brentq(pushed, low, high, xtol=1e-15))
+        on_teeth = self.on_teeth_at(w)
         return WorkingPoint(
             deflection=w,
-            force=force,
-            on_teeth=force - cup,
-            play=0.0 if pressed else self.play_at(w),
+            force=self.force_at(w) + on_teeth,
+            on_teeth=on_teeth,
+            play=0.0 if w >= self.take_up else self.play_at(w),
         )
 
     def _check(self, deflection: float) -> None:
@@ -200,9 +222,10 @@ def lobe_characteristic(
             modelled in space.
         ComputationError: If a solve fails or memory will not do.
     """
-    ring = solid_ring(design, half=True, elastic_circular_spline=False)
+    ring = solid_ring(design, half=True)
     cup, height = cup_of(ring, design), lobe_height(design)
     stiffness = cup.pull(1.0, place).stiffness
+    total = len(heights) + len(BEYOND)
     rows = [(0.0, 0.0, nan)]  # at rest the teeth of every drive overlap
     for k, share in enumerate(heights):
         pulled = cup.pull(share * stiffness * height, place, nonlinear=True)
@@ -211,11 +234,33 @@ def lobe_characteristic(
         load[0] = pulled.load
         free = play(ring, frame, load, design.ratio)
         rows.append((pulled.force, pulled.deflection, free))
-        progress("lobe force", k + 1, len(heights))
+        progress("lobe force", k + 1, total)
     force, deflection, plays = np.array(rows).T
-    return LobeCharacteristic(
-        height=height, force=force, deflection=deflection, play=plays
+    none = np.zeros(0)
+    found = LobeCharacteristic(
+        height=height,
+        force=force,
+        deflection=deflection,
+        play=plays,
+        pressed_deflection=none,
+        pressed_force=none,
     )
+    if isinf(found.take_up):
+        return found
+    pressed, planes = [(found.take_up, 0.0)], cup.share(place)
+    for k, part in enumerate(BEYOND):
+        w = found.take_up + part * height
+        if w > deflection[-1]:
+            break
+        pulled = cup.pull(found.force_at(w), place, nonlinear=True)
+        try:
+            taken = force_on_teeth(ring, design.ratio, planes, pulled.of_planes)
+        except ComputationError:
+            break  # the range ends here
+        pressed.append((pulled.deflection, taken))
+        progress("lobe force", len(heights) + k + 1, total)
+    beyond, taken_by_teeth = np.array(pressed).T
+    return replace(found, pressed_deflection=beyond, pressed_force=taken_by_teeth)
 
 
 def cup_of(ring: SolidRing, design: Design) -> PinchedCup:

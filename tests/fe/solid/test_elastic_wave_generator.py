@@ -18,6 +18,7 @@ from swgjoint.fe.solid.elastic_wave_generator import (
     lobe_characteristic,
     play,
 )
+from swgjoint.fe.solid.lobe_pads import force_on_teeth, pad_force, with_pads
 from swgjoint.fe.solid.pinched_cup import pinched_cup
 from swgjoint.gear.design import Design
 from swgjoint.gear.wave_generator import lobe_height
@@ -28,12 +29,19 @@ STIFFNESS = 60e3
 
 @pytest.fixture(scope="module")
 def cup():
-    """A made-up cup: 60 N/mm that stiffens, play that vanishes at 0.45 mm."""
+    """A made-up cup: 60 N/mm that stiffens, teeth of 1 N/µm from 0.45 mm on."""
     w = np.linspace(0.0, 0.5e-3, 11)
     play = 20.0 * (0.45e-3 - w)
     play[0] = nan
     force = STIFFNESS * w * (1.0 + 50.0 * w)
-    return LobeCharacteristic(height=HEIGHT, deflection=w, force=force, play=play)
+    return LobeCharacteristic(
+        height=HEIGHT,
+        deflection=w,
+        force=force,
+        play=play,
+        pressed_deflection=np.array([0.45e-3, 0.46e-3, 0.49e-3]),
+        pressed_force=np.array([0.0, 10.0, 40.0]),
+    )
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +59,7 @@ def drive():
             "mesh.refinement": 0.5,
         }
     )
-    return design, lobe_characteristic(design, heights=(0.02, 0.55, 0.75, 0.9))
+    return design, lobe_characteristic(design, heights=(0.02, 0.55, 0.75, 0.9, 1.05))
 
 
 def test_springs_and_cup_balance(cup):
@@ -89,34 +97,34 @@ def test_soft_springs_keep_their_force(cup):
     assert ratio == pytest.approx(1.2)
 
 
-def test_teeth_stop_springs_that_are_strong_enough(cup):
-    """Beyond the take-up the teeth carry what the cup does not."""
+def test_teeth_carry_what_springs_have_beyond_the_take_up(cup):
+    """From there on cup and teeth together balance the springs; no play is left."""
     assert cup.take_up == pytest.approx(0.45e-3)
-    strong = ElasticWaveGenerator(stiffness=5e3, preload=35.0)
-    at = cup.working_point(strong)
-    assert at.deflection == pytest.approx(0.45e-3) and at.play == 0.0
-    assert at.force == pytest.approx(35.0 - 5e3 * 0.05e-3)
-    assert at.on_teeth == pytest.approx(at.force - cup.force_at(0.45e-3))
-    assert at.on_teeth > 0.0
-    # a rigid wave generator against rigid teeth
-    low = replace(cup, height=0.47e-3)
-    jammed = low.working_point(ElasticWaveGenerator(stiffness=inf, preload=0.0))
-    assert jammed.deflection == pytest.approx(0.45e-3) and jammed.on_teeth == inf
+    at = cup.working_point(ElasticWaveGenerator(stiffness=5e3, preload=35.0))
+    assert at.deflection > cup.take_up and at.play == 0.0
+    assert at.on_teeth == pytest.approx(1e6 * (at.deflection - 0.45e-3), rel=1e-6)
+    assert at.force == pytest.approx(35.0 + 5e3 * (HEIGHT - at.deflection))
+    assert at.force == pytest.approx(cup.force_at(at.deflection) + at.on_teeth)
+    # a rigid wave generator presses them as its height has it
+    high = replace(cup, height=0.47e-3)
+    rigid = ElasticWaveGenerator(stiffness=inf, preload=0.0)
+    assert high.working_point(rigid).on_teeth == pytest.approx(20.0)
     # no end of the play in the range
-    loose = replace(cup, play=np.abs(cup.play) + 1e-3)
+    none = {"pressed_deflection": np.zeros(0), "pressed_force": np.zeros(0)}
+    loose = replace(cup, play=np.abs(cup.play) + 1e-3, **none)
     weak = ElasticWaveGenerator(stiffness=5e3, preload=20.0)
     assert loose.take_up == inf and loose.working_point(weak).play > 0.0
+    assert loose.working_point(weak).on_teeth == 0.0
 
 
 def test_outside_the_range_is_refused(cup):
     """One line with the value and the range."""
-    loose = replace(cup, play=np.abs(cup.play) + 1e-3)
-    with pytest.raises(
-        InputError, match=r"preload 500 N with 0 N/mm.*accepted: -?0 to"
-    ):
-        loose.working_point(ElasticWaveGenerator(stiffness=0.0, preload=500.0))
+    with pytest.raises(InputError, match=r"preload 500 N with 0 N/mm.*accepted: 0 to"):
+        cup.working_point(ElasticWaveGenerator(stiffness=0.0, preload=500.0))
     with pytest.raises(InputError, match=r"deflection 0.6 mm; accepted: 0 to 0.5 mm"):
         cup.force_at(0.6e-3)
+    with pytest.raises(InputError, match=r"0.495 mm; accepted: up to 0.49 mm, the tee"):
+        cup.on_teeth_at(0.495e-3)
     with pytest.raises(InputError, match=r"lobe force 99 N; accepted: 0 to"):
         cup.deflection_at(99.0)
     assert cup.deflection_at(cup.force_at(0.33e-3)) == pytest.approx(0.33e-3, rel=1e-4)
@@ -157,6 +165,40 @@ def test_play_falls_as_flanks_come_nearer(drive):
     assert slope == pytest.approx(flat, rel=0.5)
     assert found.play_at(found.take_up) == pytest.approx(0.0, abs=1e-9)
     assert found.deflection[3] < found.take_up < found.deflection[4]
+
+
+@pytest.mark.fe
+def test_pads_find_the_teeth_where_the_play_ends(drive):
+    """No force on the teeth just below the take-up, more and more above it."""
+    design, found = drive
+    ring = solid_ring(design, half=True, elastic_circular_spline=False)
+    cup = cup_of(ring, design)
+
+    def on_teeth(w):
+        planes = cup.pull(found.force_at(w), nonlinear=True).of_planes
+        share = cup.share("mid_face")
+        return force_on_teeth(ring, design.ratio, share, planes)
+
+    # play of 0.02 mrad: 0.3 % of the deflection
+    assert on_teeth(0.997 * found.take_up) == pytest.approx(0.0, abs=1e-6)
+    assert on_teeth(1.003 * found.take_up) > 0.1
+    stiffness = np.diff(found.pressed_force) / np.diff(found.pressed_deflection)
+    assert np.all(np.diff(stiffness) > 0.0)
+    # teeth resist far more than the cup
+    assert stiffness[-1] > 10.0 * found.force_at(found.height) / found.height
+
+
+@pytest.mark.fe
+def test_a_pad_presses_as_the_load_does(drive):
+    """Without teeth its force is that of the load that deflects the cup as much."""
+    design, _ = drive
+    ring = solid_ring(design, half=True, elastic_circular_spline=False)
+    cup, share = cup_of(ring, design), cup_of(ring, design).share("mid_face")
+    pulled = cup.pull(30.0, nonlinear=True)
+    padded = with_pads(ring, share, pulled.of_planes)
+    state = SolidContinuation(ring=padded, ratio=design.ratio).deflected()
+    # the pad touches nodes, the load is spread over them
+    assert pad_force(padded, state) == pytest.approx(30.0, rel=2e-3)
 
 
 @pytest.mark.fe
