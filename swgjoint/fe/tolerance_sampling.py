@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from swgjoint.errors import ComputationError
 from swgjoint.fe.following import Follower
+from swgjoint.fe.pattern import FAINT, across_clearance
 from swgjoint.fe.tolerance_cycle import gap_errors, pitch_of, pitches_of
 from swgjoint.fe.tolerance_rest import PHASES, SMALL, Rest, influences
 from swgjoint.gear.design import Design
@@ -89,6 +90,8 @@ def sample_tolerances(
                 f" of {pitches.size} pitches; try smaller tolerances"
             )
         alone, _ = _over_torque(flawless, none, levels, small)
+        if has_play:
+            found, alone = _with_onsets(found, small), _with_onsets(alone, small)
         ideal = pitch_of(design) * k / phases / design.ratio
         found[0] -= ideal
         alone[0] -= ideal
@@ -102,9 +105,10 @@ def sample_tolerances(
     count = pitches.size * phases
     checks = CHECKS[model]
     chosen = np.arange(checks) * (count // checks) + np.arange(checks) % phases
-    states = [rest.state for rest in linear]
-    torques = (rated_torque,) if has_play else (0.0, rated_torque)
-    solved = full_solves(design, follow, states, chosen % count, torques)
+    torques = (0.0, rated_torque)
+    solved = full_solves(design, follow, linear, chosen % count, torques)
+    if has_play:
+        levels = np.append(FAINT * small, levels)
     return ToleranceSamples(
         pitches=pitches.size,
         phases=phases,
@@ -119,7 +123,7 @@ def sample_tolerances(
 def full_solves(
     design: Design,
     follow: Follower[Any],
-    states: list[Any],
+    rests: Sequence[Rest],
     positions: Index,
     torques: Sequence[float],
 ) -> FullSolves:
@@ -128,22 +132,29 @@ def full_solves(
     Args:
         design: A drive with errors of its teeth.
         follow: The same without them.
-        states: Its unloaded states at positions in a pitch.
-        positions: Numbers of positions in the cycle, ``len(states)`` a pitch.
+        rests: It without load at positions in a pitch.
+        positions: Numbers of positions in the cycle, ``len(rests)`` a pitch.
         torques: T at each of them [N·m].
     """
     rows = []
-    step = pitch_of(design) / len(states)
-    pitch, phase = np.divmod(positions, len(states))
+    step = pitch_of(design) / len(rests)
+    pitch, phase = np.divmod(positions, len(rests))
     for k, errors in enumerate(zip(*gap_errors(design, pitch), strict=True)):
-        flawed, state = follow.with_errors(*errors), states[phase[k]]
+        flawed, rest = follow.with_errors(*errors), rests[phase[k]]
+        state = rest.state
         for torque in torques:
-            state = flawed.to_torque(state, torque)
-            angle = flawed.output_angle(state) if state.outcome.ok else np.nan
-            error = angle - step * phase[k] / follow.ratio
-            rows.append(
-                (step * positions[k], torque, error, follow.input_torque(state))
+            if torque == 0.0 and rest.opposite is not None:
+                # in the middle of the clearance
+                found = [flawed.to_torque(s, at.torque) for s, at in rest.sides]
+            else:
+                state = flawed.to_torque(state, torque)
+                found = [state]
+            angle = np.mean(
+                [flawed.output_angle(s) if s.outcome.ok else np.nan for s in found]
             )
+            error = angle - step * phase[k] / follow.ratio
+            moment = np.mean([flawed.input_torque(s) for s in found])
+            rows.append((step * positions[k], torque, error, moment))
     table = np.array(rows).T
     table = table[:, np.isfinite(table[2])]
     return FullSolves(
@@ -181,6 +192,7 @@ def _over_torque(
     if free.any():
         ends = [row(t, free, None)[0] for t in (small, -small)]
         middle = 0.5 * (ends[0] + ends[1])
+        middle[1] -= 0.5 * small**2 * middle[2]  # what the small torque stores
         middle[2] = 0.5 * (ends[1][0] - ends[0][0]) / small
         unloaded[:, free] = middle
     sides = []
@@ -192,3 +204,22 @@ def _over_torque(
         sides.append(rows)
     table = [*sides[0][::-1], unloaded, *sides[1]]
     return np.stack(table, axis=1), int(free.sum())
+
+
+def _with_onsets(table: Array, small: float) -> Array:
+    """Rows where the teeth begin to hold a free output, on both sides of the middle.
+
+    Args:
+        table: Output angle, strain energy, compliance (3, n_torques, n_sets).
+        small: Torque of the rows beside the middle [N·m].
+    """
+    zero = table.shape[1] // 2
+    # the fourth quantity of a pattern, the input torque, has no part here
+    rows = np.concatenate([table, np.zeros_like(table[:1])])
+    sides = [
+        across_clearance(rows[:, zero], rows[:, zero + side], side * small)[1][:3]
+        for side in (-1, 1)
+    ]
+    table[2, zero] = sides[1][2]  # the same stiffness on both sides of the middle
+    table = np.insert(table, zero + 1, sides[1], axis=1)
+    return np.insert(table, zero, sides[0], axis=1)

@@ -41,7 +41,7 @@ def one_seed(design: Design, count: int, parts: list[float]) -> list[dict[str, A
     rng = np.random.default_rng(design.tolerances.seed)
     positions = np.sort(rng.choice(cycle, count, replace=False))
     torques = [part * ratings_of(design).rated_torque for part in parts]
-    solved = full_solves(design, follow, [state], positions, torques)
+    solved = full_solves(design, follow, found, positions, torques)
     solve_s = time.perf_counter() - begin
 
     def gaps(pitches: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ import pytest
 from swgjoint.fe.continuation import Continuation
 from swgjoint.fe.drive2d import ring_model
 from swgjoint.fe.tolerance_cycle import MEMBERS, pitch_of, pitches_of, shifted
-from swgjoint.fe.tolerance_rest import influences
+from swgjoint.fe.tolerance_rest import Rest, influences
 from swgjoint.fe.tolerance_sampling import full_solves
 from swgjoint.gear.design import Design
 from swgjoint.gear.tolerances import tooth_errors
@@ -84,7 +84,9 @@ def test_superposition_is_within_five_percent_of_full_solves(reference):
     for seed in (1, 2):
         design = flawed(**ERRORS, seed=seed)
         positions = np.random.default_rng(seed).choice(pitches_of(design), 2)
-        solved = full_solves(design, follow, [state], positions, (0.0, 20.0))
+        solved = full_solves(
+            design, follow, [Rest(state=state, at=at)], positions, (0.0, 20.0)
+        )
         assert solved.torque.size == 4
         for torque in (0.0, 20.0):
             every = gaps_at(design, at, np.arange(0, 7320, 20))
@@ -113,8 +115,8 @@ def test_a_pitch_on_the_next_teeth_stand_alike(name):
     if fixed:
         design = design.with_changes({"drive.layout": name})
     follow, found = influences(design, phases=1)
-    state, pitches = found[0].state, 5
-    moved = full_solves(design, follow, [state], np.array([pitches]), (20.0,))
+    pitches = 5
+    moved = full_solves(design, follow, found, np.array([pitches]), (20.0,))
     model = ring_model(design, friction=False)
     turned = Continuation(model=model, ratio=design.ratio, layout=design.drive.layout)
     there = turned.to_torque(turned.meshed(turned.deflected()), 20.0)

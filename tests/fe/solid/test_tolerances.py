@@ -10,12 +10,14 @@ import pytest
 
 from swgjoint.errors import DesignError
 from swgjoint.fe.corotation import rotate
+from swgjoint.fe.sampling import sample_map
 from swgjoint.fe.solid.drive3d import solid_ring
 from swgjoint.fe.solid.tolerance_influence import influence
 from swgjoint.fe.tolerance_cycle import gap_errors, pitch_of, pitches_of, shifted
 from swgjoint.fe.tolerance_rest import influences, perfect_drive
 from swgjoint.gear.design import Design
 from swgjoint.gear.tolerances import ToothErrors, axis_tilt
+from swgjoint.maps.fit import fit_map
 
 pytestmark = pytest.mark.fe
 
@@ -309,3 +311,24 @@ def test_play_of_a_flawed_drive(small_design):
     assert np.abs(moved).max() > 2e-5
     # few teeth carry a small torque, on crowned flanks
     assert np.abs(apart).max() < 0.05 * np.abs(moved).max()
+
+
+@pytest.mark.slow
+def test_map_of_a_flawed_drive_with_play(small_design):
+    """The map meets full solves that it has not seen; low orders are even."""
+    values = {
+        "circular_spline_cumulative_pitch_um": 3.0,
+        "circular_spline_ovality_um": 2.0,
+        "misalignment_arcmin": 1.0,
+    }
+    changes = {f"tolerances.{key}": value for key, value in values.items()}
+    design = small_design.with_changes(changes | {"mesh.refinement": 0.5})
+    drive = fit_map(sample_map(design, model="3d", angles=4))
+    assert drive.info["residual"]["relative_to_turn"] < 0.05
+    assert drive.info["tolerances"]["free_positions"] == 42 * 4
+    assert drive.info["label"]["tolerances"]["misalignment_arcmin"] == 1.0
+    sizes = np.hypot(*drive.kinematic_error.T)
+    size = dict(zip(map(tuple, drive.orders.tolist()), sizes, strict=True))
+    odd = [found for (p, _), found in size.items() if p % 2]
+    assert min(size[2, 0], size[4, 0]) > 1e-5
+    assert max(odd, default=0.0) < 0.05 * size[4, 0]
