@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 FEW_ANGLES = 3
 """Wave-generator positions of a design's map where every wanted figure is read with the
-input locked at the first one."""
+input locked at the first one, without manufacturing errors."""
 
 _UNITS = {
     "Nm": "N·m",
@@ -44,8 +44,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--only",
         metavar="KEY,...",
         help="compute no more than these keys need: ratings alone need no finite"
-        " elements; stiffness, hysteresis loss and lost motion few positions; radial"
-        " stiffness and the fatigue safety factor those in space",
+        " elements; stiffness, hysteresis loss and lost motion few positions and no"
+        " manufacturing errors; radial stiffness and the fatigue safety factor those in"
+        " space",
     )
     parser.add_argument(
         "--out", metavar="DIR", help="write spec.json and spec.png there"
@@ -75,6 +76,10 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     result: dict[str, Any] = {"design": name, **sheet.as_dict(), **details}
     if drive is not None:
         result["validity"] = validity(drive)
+        if "manufacturing_errors" in drive.info:
+            result["validity"]["manufacturing_errors"] = drive.info[
+                "manufacturing_errors"
+            ]
         stated = drive.info.get("stated")
         result["stated"] = stated if isinstance(stated, dict) else None
     else:
@@ -99,10 +104,12 @@ def _drive(args: argparse.Namespace, keys: tuple[str, ...]) -> tuple[Any, Any, s
             return None, ratings_of(source), source.drive.name
         if args.model is None:
             return source, source.ratings, source.name
+    turn = needs_turn(keys)
     drive = load_drive(
         args.drive,
         model=args.model,
-        angles=None if needs_turn(keys) else FEW_ANGLES,
+        angles=None if turn else FEW_ANGLES,
+        errors=turn,
         progress=args.progress,
     )
     return drive, drive.ratings, drive.name
@@ -223,6 +230,8 @@ def _source(result: dict[str, Any]) -> str:
     if validity.get("beyond_range"):
         low, high = validity["torque_range_Nm"]
         text += f"; loop leaves the sampled {low:.4g} to {high:.4g} N·m: continued"
+    if "manufacturing_errors" in validity:
+        text += "; manufacturing errors left out"
     return text
 
 

@@ -65,6 +65,7 @@ def load_drive(
     *,
     model: str | None = None,
     angles: int | None = None,
+    errors: bool = True,
     progress: Progress = silent,
 ) -> DriveMap:
     """The map of a ``.swg`` file, of the catalogue, or built from a design (cached).
@@ -73,6 +74,8 @@ def load_drive(
         reference: See :func:`find_drive`.
         model: Fidelity for a design; None for its default.
         angles: Wave-generator positions for a design; None for the default.
+        errors: Whether a design keeps its manufacturing errors, whose superposition
+            over the cycle of the teeth takes minutes.
         progress: Called while a map is built.
 
     Raises:
@@ -88,13 +91,20 @@ def load_drive(
             )
         return source
     from swgjoint.fe.build_map import build_map
+    from swgjoint.gear.tolerances import has_errors, without_errors
 
+    flawless = not errors and has_errors(source)
+    if flawless:
+        source = without_errors(source)
     if angles is None:
         drive = build_map(source, model=model, progress=progress)
     else:
         drive = build_map(source, model=model, angles=angles, progress=progress)
     missing = dict.fromkeys(LOSS_KEYS, without_friction(source))
-    return replace(drive, info={**drive.info, "missing": missing})
+    info = {**drive.info, "missing": missing}
+    if flawless:
+        info["manufacturing_errors"] = "left out"
+    return replace(drive, info=info)
 
 
 def find_drive(reference: str) -> DriveMap | Design:

@@ -16,6 +16,7 @@ from swgjoint.gear.shell_theory import (
     ShellDimensions,
     shell_safety_factor,
 )
+from swgjoint.gear.tolerances import has_errors
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.drives import load_drive
 
@@ -147,6 +148,23 @@ def solid(monkeypatch):
     monkeypatch.setattr(spec_figures, "radial_stiffness", stiffness)
     monkeypatch.setattr(spec_figures, "fatigue", safety)
     return calls
+
+
+def test_errors_are_left_out_of_figures_at_a_locked_input(
+    capsys, monkeypatch, synthetic_map
+):
+    """No superposition over the cycle of the teeth for a stiffness; for orders, one."""
+    asked = []
+
+    def build(design, **options):
+        asked.append(has_errors(design))
+        return synthetic_map
+
+    monkeypatch.setattr(builder, "build_map", build)
+    found = spec(capsys, "reference-2d-tolerances", "--only", "K1_Nm_rad")
+    assert found["validity"]["manufacturing_errors"] == "left out"
+    spec(capsys, "reference-2d-tolerances", "--only", "orders")
+    assert asked == [False, True]
 
 
 def test_figures_of_the_solid_model(built, solid, capsys):
