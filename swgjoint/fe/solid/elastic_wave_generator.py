@@ -28,11 +28,11 @@ from scipy.interpolate import CubicSpline, PchipInterpolator
 from scipy.optimize import brentq
 
 from swgjoint.errors import ComputationError, InputError
-from swgjoint.fe.solid.corotation import Frames, about_z
 from swgjoint.fe.solid.drive3d import solid_ring
 from swgjoint.fe.solid.lobe_pads import force_on_teeth
 from swgjoint.fe.solid.pinched_cup import PinchedCup
 from swgjoint.fe.solid.ring import SolidRing
+from swgjoint.fe.solid.tooth_play import play
 from swgjoint.gear.design import Design
 from swgjoint.gear.wave_generator import lobe_height
 from swgjoint.progress import Progress, silent
@@ -42,16 +42,8 @@ Array = NDArray[np.float64]
 
 HEIGHTS = (0.25, 0.5, 0.75, 0.85, 0.95, 1.05, 1.15, 1.25)
 """Of the lobes over that of the drive, about, where the cup is solved."""
-REACH = 0.5
-"""Gaps of teeth that count [modules]; without any the teeth pass each other."""
-FLAT = 0.1
-"""Lever over the pitch radius below which a contact has no side."""
-TURNS = 12
-"""Rotations at most until a tooth touches."""
 BEYOND = (0.02, 0.05, 0.1, 0.15)
 """Deflections beyond the take-up at which teeth are solved [lobe heights]."""
-TOUCHES = 1e-10
-"""Rotation that counts as none [rad]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,7 +83,7 @@ class LobeCharacteristic:
     force: Array
     """That it takes, the teeth free (n,) [N]."""
     play: Array
-    """Of the output, see :func:`play` (n,) [rad]."""
+    """Of the output, see :mod:`swgjoint.fe.solid.tooth_play` (n,) [rad]."""
     pressed_deflection: Array
     """From the take-up on; empty without one (m,) [m]."""
     pressed_force: Array
@@ -276,43 +268,3 @@ def cup_of(ring: SolidRing, design: Design) -> PinchedCup:
         bore=len(strip.bore),
         first=flank,
     )
-
-
-def play(ring: SolidRing, frame: Frames, load: Array, ratio: float) -> float:
-    r"""Rotation of the output between the contacts of its two directions [rad].
-
-    The deflected flexspline turns as a whole until a tooth touches. That turns the
-    lobes, too; for lobes that stand the ratio i makes it :math:`1 - 1/i` times as much.
-
-    Args:
-        ring: Half or all of the drive.
-        frame: Frames of its toothed segments, no tooth in contact.
-        load: At their loaded degrees of freedom (N, n_b) [N].
-        ratio: Signed i.
-
-    Returns:
-        Negative where flanks overlap, inf where none are near; NaN where teeth overlap
-        that no rotation can part.
-    """
-    profile = ring.strip.profile
-    reach = REACH * 2.0 * profile.pitch_radius / profile.teeth
-    flat = FLAT * profile.pitch_radius
-    still = np.zeros((ring.teeth.ring_teeth, ring.teeth.ring_dofs))
-    sides = []
-    for sign in (1.0, -1.0):
-        angle = 0.0
-        for _ in range(TURNS):
-            turned = replace(frame, turn=about_z(np.array(angle)) @ frame.turn)
-            rows = ring.teeth.find(turned, load, still, reach, None, thorough=True)
-            gap, arm = rows.contacts.gap, sign * rows.arm
-            if (gap[np.abs(arm) < flat] < 0.0).any():
-                return nan
-            closing = arm < -flat
-            if not closing.any():
-                return inf
-            step = float(np.min(gap[closing] / -arm[closing]))
-            angle += sign * step
-            if abs(step) < TOUCHES:
-                break
-        sides.append(sign * angle)
-    return sum(sides) * (1.0 - 1.0 / ratio)
