@@ -308,7 +308,7 @@ def condense(
         system[:n, : n + 1] = seen
         system[:n, :n] += local
         # turning the circular spline towards the teeth closes the gap by the lever arm
-        system[:n, n + 1] = system[n + 1, :n] = -found.arm
+        system[:n, n + 1] = system[n + 1, :n] = -found.ring_arm
         offset[:n] = gap + np.einsum("ki,ki->k", rows, base[found.contacts.sector])
     system[n], offset[n] = -system[n], -offset[n]
     return Condensed(

@@ -60,6 +60,8 @@ class ToothRows:
     """Derivative by the masters of the teeth, global frame (n, 3 m)."""
     arm: Array
     """Derivative by a rotation of the flexspline as a whole (n,) [m]."""
+    ring_arm: Array
+    """Minus that by a rotation of the circular spline about its own axis (n,) [m]."""
 
     def __len__(self) -> int:
         return len(self.plane)
@@ -200,6 +202,10 @@ class Teeth:
         on_side = nodes[sector, plane].reshape(n, 2, size, 3)[np.arange(n), side]
         point[:, 2] = np.einsum("kb,kb->k", spline, on_side[..., 2])
         arm = normal[:, 1] * point[:, 0] - normal[:, 0] * point[:, 1]
+        ring_arm = arm
+        if self.tilt is not None:
+            x, y = np.multiply.outer(self.tilt, strip.mesh.teeth.z[plane])
+            ring_arm = arm - (normal[:, 1] * x - normal[:, 0] * y)
         seen = np.einsum("kji,kj->ki", turn, normal)
         at = np.einsum("kji,kj->ki", turn, point)
         on_nodes = np.zeros((n, strip.planes, 2, size, 3))
@@ -222,6 +228,7 @@ class Teeth:
             ring_weight=ring_weight.reshape(n, strip.planes * ring),
             rows=rows.reshape(n, 3 * m),
             arm=arm,
+            ring_arm=ring_arm,
         )
 
     def compliance(self, found: ToothRows) -> Array:
