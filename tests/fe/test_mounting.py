@@ -133,6 +133,41 @@ def test_map_and_meshing_have_the_springs():
     assert energy[0] - energy[1] == pytest.approx(0.5 * TORQUE**2 * yielding, rel=1e-9)
 
 
+@pytest.mark.fe
+@pytest.mark.slow
+def test_meshing_in_space_has_the_springs():
+    """Output error and energy of a small drive whose cup is in the model itself."""
+    stiff = Design.load("reference-3d-modified").with_changes(
+        {
+            "drive.teeth_flexspline": 40,
+            "drive.teeth_circular_spline": 42,
+            "drive.layout": "flexspline_fixed",
+            "cup.length_mm": 14.0,
+            "cup.bore_radius_mm": 7.0,
+            "mesh.refinement": 0.5,
+        }
+    )
+    design = stiff.with_changes(
+        {
+            "boss.torsional_stiffness_Nm_rad": BOSS,
+            "housing.torsional_stiffness_Nm_rad": HOUSING,
+        }
+    )
+    yielding = 1.0 / HOUSING + (40 / 42) ** 2 / BOSS
+    runs = [
+        simulate_meshing(d, model="3d", torque=5.0, steps=1, half=True)
+        for d in (design, stiff)
+    ]
+    error = [run.series("output_error")[0] for run in runs]
+    assert error[1] - error[0] == pytest.approx(5.0 * yielding, rel=1e-9)
+    energy = [run.series("energy")[0] for run in runs]
+    assert energy[0] - energy[1] == pytest.approx(0.5 * 5.0**2 * yielding, rel=1e-6)
+    assert runs[0].to_json()["label"]["springs_Nm_rad"] == {
+        "boss": BOSS,
+        "housing": HOUSING,
+    }
+
+
 def test_springs_must_be_positive():
     """A spring without stiffness is none."""
     for name in ("boss", "housing"):
