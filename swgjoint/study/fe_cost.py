@@ -67,7 +67,6 @@ SETTINGS = (
     Setting(model="3d", refinement=0.7),
     Setting(model="3d", refinement=1.0),
     Setting(model="3d", refinement=1.4),
-    Setting(model="3d", refinement=2.0),
 )
 """The last one is the reference."""
 

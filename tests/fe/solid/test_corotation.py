@@ -107,7 +107,7 @@ def test_tangent_is_the_derivative_of_the_gradient_for_small_strain(segment):
 
 
 def test_forces_turn_with_a_stressed_segment(segment):
-    """Along an infinitesimal rotation the forces change by the rotation of themselves."""
+    """Along an infinitesimal rotation the forces change by their own rotation."""
     x = deformed(segment, 1e-5)
     frames = segment_frames(segment, x, PLACE)
     force = frames.deformation @ segment.stiffness
