@@ -292,16 +292,22 @@ def test_once_per_turn_needs_eccentricity_and_pitch_errors(design, reference):
     assert both[1] > 0.01 * both[2]
 
 
+def with_play(small_design):
+    """Crowned teeth with errors, coarse."""
+    return small_design.with_changes(
+        {
+            "tolerances.circular_spline_cumulative_pitch_um": 3.0,
+            "tolerances.circular_spline_ovality_um": 2.0,
+            "tolerances.misalignment_arcmin": 1.0,
+            "mesh.refinement": 0.5,
+        }
+    )
+
+
 @pytest.mark.slow
 def test_play_of_a_flawed_drive(small_design):
     """Linearised at both ends of its clearance: where it ends, and beyond."""
-    values = {
-        "circular_spline_cumulative_pitch_um": 3.0,
-        "circular_spline_ovality_um": 2.0,
-        "misalignment_arcmin": 1.0,
-    }
-    changes = {f"tolerances.{key}": value for key, value in values.items()}
-    design = small_design.with_changes(changes | {"mesh.refinement": 0.5})
+    design = with_play(small_design)
     follow, (rest,) = influences(design, phases=1, model="3d")
     assert rest.opposite is not None
     # every sign of the torque has its own flanks
@@ -327,13 +333,7 @@ def test_play_of_a_flawed_drive(small_design):
 @pytest.mark.slow
 def test_map_of_a_flawed_drive_with_play(small_design):
     """The map meets full solves that it has not seen; low orders are even."""
-    values = {
-        "circular_spline_cumulative_pitch_um": 3.0,
-        "circular_spline_ovality_um": 2.0,
-        "misalignment_arcmin": 1.0,
-    }
-    changes = {f"tolerances.{key}": value for key, value in values.items()}
-    design = small_design.with_changes(changes | {"mesh.refinement": 0.5})
+    design = with_play(small_design)
     drive = fit_map(sample_map(design, model="3d", angles=4))
     assert drive.info["residual"]["relative_to_turn"] < 0.05
     assert drive.info["tolerances"]["free_positions"] == 42 * 4

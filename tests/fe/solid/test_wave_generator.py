@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from swgjoint.fe.corotation import rotate
 from swgjoint.fe.solid.wave_generator import WaveGeneratorSurface, crown
 from swgjoint.gear.design import Design
 
@@ -91,3 +92,17 @@ def test_surface_turns_with_its_angle():
     turned, normals, _ = found.gap(points() @ turn.T, ALPHA)
     assert turned == pytest.approx(at_rest, abs=1e-15)
     assert normals == pytest.approx(normal @ turn.T, abs=1e-12)
+
+
+def test_eccentric_surface_is_the_centred_one_moved():
+    """By its offset, which turns with it."""
+    eccentric = surface(tolerances__wave_generator_eccentricity_um=50.0)
+    assert eccentric.offset is not None
+    centred = replace(eccentric, offset=None)
+    moved = points()
+    moved[:, :2] += rotate(eccentric.offset, ALPHA)
+    gap, gradient, curvature = eccentric.gap(moved, ALPHA)
+    wanted = centred.gap(points(), ALPHA)
+    assert gap == pytest.approx(wanted[0], abs=1e-14)
+    assert gradient == pytest.approx(wanted[1], abs=1e-9)
+    assert curvature == pytest.approx(wanted[2], rel=1e-9)
