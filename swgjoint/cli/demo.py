@@ -28,7 +28,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
-    """Build both maps, run the arm with each and rigid, write recording and picture.
+    """Build both maps, run the arm with each and rigid; recording, picture, report.
 
     Returns:
         ``map`` (figures of both maps), ``metrics`` (of the three runs, with
@@ -82,6 +82,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _write(folder: Path, runs: Any, rigid: Any, progress: Any) -> list[str]:
+    from swgjoint.cli.report_file import report_file
     from swgjoint.view.plots import comparison_png
     from swgjoint.view.recording import write_recording
 
@@ -90,7 +91,9 @@ def _write(folder: Path, runs: Any, rigid: Any, progress: Any) -> list[str]:
     progress("recording and picture", 1, 2)
     picture = comparison_png(runs, folder / "demo.png", rigid=rigid)
     progress("recording and picture", 2, 2)
-    return [str(recording), str(picture)]
+    shown = {"Torsion, error, ripple, its orders and tool error": picture.read_bytes()}
+    report = report_file(runs, folder, pictures=shown, progress=progress)
+    return [str(recording), str(picture), *report]
 
 
 def report(result: dict[str, Any]) -> str:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from swgjoint.cli.text import table
 from swgjoint.files import output_folder, write_whole
 from swgjoint.json_text import json_text
+from swgjoint.view.words import words
 
 if TYPE_CHECKING:
     from swgjoint.maps.spec_sheet import SpecSheet
@@ -17,14 +18,6 @@ FEW_ANGLES = 3
 """Wave-generator positions of a design's map where every wanted figure is read with the
 input locked at the first one, without manufacturing errors."""
 
-_UNITS = {
-    "Nm": "N·m",
-    "Nm_rad": "N·m/rad",
-    "arcmin": "arcmin",
-    "percent": "%",
-    "mm": "N/mm",
-    "factor": "",
-}
 _SHOWN_ORDERS = 6
 
 
@@ -157,9 +150,9 @@ def report(result: dict[str, Any]) -> str:
     header = ("", "measured", *(["stated"] if stated else []), "")
     rows = []
     for key in keys:
-        words, unit = _words(key)
+        name, unit = words(key)
         more = [stated.get(key)] if stated else []
-        rows.append((words, result[key], *more, unit))
+        rows.append((name, result[key], *more, unit))
     lines = [f"spec sheet of {result['design']} ({_source(result)})"]
     if rows:
         lines.append(table(rows, header=header))
@@ -190,7 +183,7 @@ def report(result: dict[str, Any]) -> str:
     lines += _details(result)
     reasons: dict[str, list[str]] = {}
     for key, reason in result["missing"].items():
-        reasons.setdefault(reason, []).append(_words(key)[0])
+        reasons.setdefault(reason, []).append(words(key)[0])
     lines += [f"- {', '.join(names)}: {reason}" for reason, names in reasons.items()]
     lines += [f"wrote {name}" for name in result["files"]]
     return "\n".join(lines)
@@ -233,13 +226,3 @@ def _source(result: dict[str, Any]) -> str:
     if "manufacturing_errors" in validity:
         text += "; manufacturing errors left out"
     return text
-
-
-def _words(key: str) -> tuple[str, str]:
-    """Key without its unit, and the unit."""
-    for suffix in sorted(_UNITS, key=len, reverse=True):
-        if key.endswith(f"_{suffix}"):
-            words = key.removesuffix(f"_{suffix}").removesuffix("_N")
-            words = key if suffix == "factor" else words
-            return words.replace("_", " "), _UNITS[suffix]
-    return key.replace("_", " "), ""

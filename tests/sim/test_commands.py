@@ -89,7 +89,11 @@ def test_the_demo_compares_two_drives_with_the_rigid_arm(
     assert lift["orders"][0]["order"] == pytest.approx(122.0, abs=0.2)
     pan = metrics["elliptical"]["joints"]["shoulder_pan_joint"]
     assert [item["order"] for item in pan["unresolved"]] == [122.0]
-    assert {Path(f).name for f in result["files"]} == {"run.rrd", "demo.png"}
+    assert {Path(f).name for f in result["files"]} == {
+        "run.rrd",
+        "demo.png",
+        "report.html",
+    }
     assert result["wall_s"] < 25.0
 
     from swgjoint.cli.demo import report

@@ -1,0 +1,155 @@
+"""How far the figures of a run may be trusted, in numbers.
+
+Three things limit a figure: the map (its level, the torque that it covers, what its
+fit dropped), the orders that the step leaves out, and the step itself. The last is
+measured: the same motion with the same orders at half the step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from swgjoint.errors import SwgError
+from swgjoint.sim.run import run_scene
+from swgjoint.sim.scene import Scene
+from swgjoint.units import arcmin
+
+if TYPE_CHECKING:
+    from swgjoint.maps.drive_map import DriveMap
+    from swgjoint.sim.run import Run
+
+STEP_KEYS = {
+    "ripple_rms_percent": ("ripple_rms_percent",),
+    "ripple_pp_percent": ("ripple_pp_percent",),
+    "transmission_error_arcmin": ("transmission_error_arcmin", "pp"),
+    "torsion_arcmin": ("torsion_arcmin", "mean"),
+}
+"""Figures whose change is given, by their place in the metrics of a joint."""
+MAX_STEPS = 400_000
+"""Of the finer run: some seconds."""
+
+
+def step_error(run: Run) -> dict[str, Any]:
+    """Change of the figures of a run when its step is halved.
+
+    The finer run keeps the orders of the coarser one: what the step leaves out is
+    listed as ``unresolved``, with its amplitude, and is no error of the integration.
+
+    Returns:
+        ``step_s`` of the finer run and ``joints``, by joint the absolute change under
+        :data:`STEP_KEYS`; ``reason`` instead of ``joints`` where it was not run.
+    """
+    step = 0.5 * run.assembly.step
+    steps = run.assembly.scene.simulation.duration_s / step
+    if steps > MAX_STEPS:
+        return {"step_s": step, "reason": f"not run: it would take {steps:.3g} steps"}
+    scene, drives = _same_orders(run)
+    try:
+        fine = run_scene(
+            scene.with_changes({"simulation.step_s": step}),
+            drives=drives,
+            name=f"{run.name} at half the step",
+        )
+    except SwgError as exc:
+        return {"step_s": step, "reason": f"not run: {exc}"}
+    coarse, finer = run.metrics()["joints"], fine.metrics()["joints"]
+    return {
+        "step_s": step,
+        "joints": {
+            joint: {
+                key: abs(_at(coarse[joint], path) - _at(finer[joint], path))
+                for key, path in STEP_KEYS.items()
+            }
+            for joint in run.joints
+        },
+    }
+
+
+def _same_orders(run: Run) -> tuple[Scene, dict[str, DriveMap]]:
+    """The scene with drives that hold the orders of the run and no others."""
+    scene = run.assembly.scene
+    sections, drives = {}, {}
+    for joint, transmission in zip(run.joints, run.assembly.transmissions, strict=True):
+        name = f"the drive of {joint} as it was run"
+        section = scene.of_joint(joint)
+        sections[joint] = section.model_copy(update={"drive": name, "linear": None})
+        drives[name] = transmission.attached.drive
+    return scene.model_copy(update={"joints": sections}), drives
+
+
+def _at(joint: Mapping[str, Any], path: tuple[str, ...]) -> float:
+    value: Any = joint
+    for key in path:
+        value = value[key]
+    return float(value)
+
+
+def map_error(drive: DriveMap) -> list[str]:
+    """What is known of the error of a map, one line each; empty if nothing is."""
+    info = drive.info
+    perfect = info.get("perfect_teeth")
+    source = perfect if isinstance(perfect, Mapping) else info
+    lines = []
+    energy, residual = source.get("energy_check"), source.get("residual")
+    if isinstance(energy, Mapping) and "relative" in energy:
+        lines.append(
+            "input torque of the finite elements, which the fit has not seen:"
+            f" {100.0 * float(energy['relative']):.2g} % of its ripple missed"
+        )
+    if isinstance(residual, Mapping) and "torque_Nm" in residual:
+        lines.append(
+            f"harmonics below {100.0 * float(residual['threshold']):.2g} % dropped:"
+            f" {float(residual['torque_Nm']):.2g} N·m,"
+            f" {float(residual['kinematic_error_rad']) / arcmin:.2g} arcmin"
+        )
+    stiffness = info.get("stiffness_range_Nm_rad")
+    if isinstance(stiffness, list | tuple) and len(stiffness) == 2:
+        low, high = (float(value) for value in stiffness)
+        lines.append(f"tangent stiffness {low:.4g} to {high:.4g} N·m/rad in its range")
+    return lines
+
+
+def warnings_of(run: Run) -> list[str]:
+    """What a reader of the figures must know, one line each."""
+    lines = []
+    for joint, figures in run.metrics()["joints"].items():
+        ratings = figures["ratings"]
+        if not ratings["within_map"]:
+            low, high = ratings["map_range_Nm"]
+            lines.append(
+                f"{joint}: {ratings['peak_Nm']:.3g} N·m leave the map"
+                f" ({low:.3g} to {high:.3g} N·m), which continues linearly there"
+            )
+        if ratings["ratcheting"]:
+            lines.append(
+                f"{joint}: teeth would skip at {ratings['ratcheting']['time_s']:.4g} s;"
+                " the run goes on elastic"
+            )
+        if not ratings["within"]:
+            lines.append(
+                f"{joint}: above its ratings, cubed mean {ratings['cubed_mean_Nm']:.3g}"
+                f" of {ratings['rated_Nm']:.3g} N·m, peak {ratings['peak_Nm']:.3g} of"
+                f" {ratings['repeated_peak_Nm']:.3g} N·m"
+            )
+    return lines
+
+
+def left_out_of(run: Run) -> list[str]:
+    """What the model leaves out and why, joints of the same together."""
+    joints: dict[tuple[str, str], list[str]] = {}
+    for item in run.contains["left_out"]:
+        joints.setdefault((item["part"], item["reason"]), []).append(item["joint"])
+    return [
+        f"left out: {part}, {reason}"
+        + ("" if len(names) == len(run.joints) else f" ({', '.join(names)})")
+        for (part, reason), names in joints.items()
+    ]
+
+
+def left_out_share(run: Run, j: int) -> float:
+    """Torque of the orders left out, rated load, root of summed squares [N·m]."""
+    left = run.assembly.transmissions[j].attached.unresolved
+    return float(np.sqrt(sum(item.torque**2 for item in left)))

@@ -1,0 +1,42 @@
+"""Keys of results as words with a unit, numbers as people read them."""
+
+from __future__ import annotations
+
+_UNITS = {
+    "Nm": "N·m",
+    "Nm_rad": "N·m/rad",
+    "arcmin": "arcmin",
+    "percent": "%",
+    "mm": "N/mm",
+    "factor": "",
+}
+
+
+def words(key: str) -> tuple[str, str]:
+    """Key of a spec sheet without its unit, and the unit."""
+    for suffix in sorted(_UNITS, key=len, reverse=True):
+        if key.endswith(f"_{suffix}"):
+            text = key.removesuffix(f"_{suffix}").removesuffix("_N")
+            text = key if suffix == "factor" else text
+            return text.replace("_", " "), _UNITS[suffix]
+    return key.replace("_", " "), ""
+
+
+def shown(value: object) -> str:
+    """A figure with four digits, - for None, yes and no."""
+    if value is None:
+        return "-"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if not isinstance(value, float):
+        return str(value)
+    if 1e4 <= abs(value) < 1e8:
+        return f"{float(f'{value:.4g}'):,.0f}"
+    if 0.0 < abs(value) < 1e-4:
+        return f"{value:.2e}"
+    return f"{value + 0.0:.4g}"
+
+
+def short(joint: str) -> str:
+    """Name of a joint without the word joint at its end."""
+    return joint.removesuffix("_joint").replace("_", " ") or joint

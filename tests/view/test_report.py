@@ -1,0 +1,209 @@
+"""The report: one page that needs nothing else and says what its figures are worth."""
+
+import base64
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+from swgjoint.errors import InputError, MissingExtraError
+from swgjoint.maps.drive_map import DriveMap
+from swgjoint.sim.run import Run, run_scene
+from swgjoint.view.report import Cell, Table, write_report
+from swgjoint.view.report_plots import envelope
+from swgjoint.view.validity import STEP_KEYS, _same_orders, step_error
+from swgjoint.view.words import shown, words
+
+SHORT = {"simulation.duration_s": 1.0, "trajectory.settle_s": 0.2}
+VOID = {"meta", "link", "img", "br", "hr", "input"}
+
+
+class Page(HTMLParser):
+    """Texts, attributes and open tags of a page."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.texts, self.attributes, self.tags, self.open = [], [], [], []
+        self.feed(text)
+
+    def handle_starttag(self, tag, attrs):  # noqa: D102
+        self.tags.append(tag)
+        self.attributes += [(tag, key, value) for key, value in attrs]
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):  # noqa: D102
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):  # noqa: D102
+        self.texts.append(data.strip())
+
+
+@pytest.fixture
+def run(synthetic_map: DriveMap) -> Run:
+    return run_scene("bench", overrides=SHORT, drives={"reference-2d": synthetic_map})
+
+
+def page_of(path) -> Page:
+    return Page(path.read_text(encoding="utf-8"))
+
+
+def test_the_page_needs_nothing_else(run, tmp_path):
+    """No address, no script; every picture is inside and is a PNG."""
+    path = write_report({"": run}, tmp_path / "report.html")
+    text = path.read_text(encoding="utf-8")
+    page = Page(text)
+    assert page.open == []
+    assert not re.search(r"\w+://|@import|url\(", text)
+    assert not {"script", "link", "iframe", "object"} & set(page.tags)
+    outside = [a for a in page.attributes if a[1] in ("src", "href", "srcset")]
+    assert len(outside) >= 2
+    for tag, key, value in outside:
+        assert (tag, key) == ("img", "src")
+        head, data = value.split(",", 1)
+        assert head == "data:image/png;base64"
+        assert base64.b64decode(data, validate=True).startswith(b"\x89PNG")
+    assert ("meta", "http-equiv", "Content-Security-Policy") in page.attributes
+    assert [p.name for p in tmp_path.iterdir()] == ["report.html"]
+
+
+def test_names_from_files_are_text_not_markup(synthetic_map, tmp_path):
+    """Markup in the names of drive, scene and run is shown, not obeyed."""
+    evil = "<script>alert(1)</script>"
+    drive = replace(synthetic_map, name=f"{evil}drive", info={"source": evil})
+    run = run_scene(
+        "bench",
+        overrides={**SHORT, "name": f"{evil}scene", "description": f'"{evil}'},
+        drives={"reference-2d": drive},
+    )
+    table = Table(header=[(evil, evil)], rows=[[Cell(evil, "bad")]], notes=[evil])
+    path = write_report({f"{evil}run": run}, tmp_path / "report.html", summary=table)
+    text = path.read_text(encoding="utf-8")
+    page = Page(text)
+    assert "script" not in page.tags
+    assert "<script" not in text
+    for name in ("drive", "run"):
+        assert any(f"{evil}{name}" in item for item in page.texts)
+    assert f"Scene {evil}scene" in page.texts
+
+
+def test_figures_are_those_of_the_metrics(run, tmp_path):
+    """Ripple, torsion, error and the use of ratings stand there as in the JSON."""
+    page = page_of(write_report({"soft": run}, tmp_path / "report.html"))
+    figures = run.metrics()["joints"]["joint"]
+    for value in (
+        figures["ripple_rms_percent"],
+        figures["torsion_arcmin"]["mean"],
+        figures["transmission_error_arcmin"]["pp"],
+        figures["ratings"]["peak_Nm"],
+        run.assembly.transmissions[0].drive.spec_sheet(("K1_Nm_rad",))["K1_Nm_rad"],
+    ):
+        assert shown(value) in page.texts
+
+
+def test_every_run_has_its_label_and_error_estimate(synthetic_map, tmp_path):
+    """Level, range of the map, orders left out, and the change at half the step."""
+    fast = {**SHORT, "trajectory.speed_deg_s.joint": 6.0}
+    run = run_scene("bench", overrides=fast, drives={"reference-2d": synthetic_map})
+    rigid = run_scene(
+        "bench",
+        overrides={**fast, "defaults.level": "rigid"},
+        drives={"reference-2d": synthetic_map},
+    )
+    page = page_of(write_report({"a": run, "b": rigid}, tmp_path / "report.html"))
+    assert page.texts.count("a") >= 2 and page.texts.count("b") >= 2
+    assert "synthetic (synthetic)" in page.texts
+    assert "122" in page.texts  # too fast at 6 deg/s, left out
+    error = step_error(run)["joints"]["joint"]
+    assert error["ripple_rms_percent"] > 0.0
+    assert f"{error['ripple_rms_percent']:.1g}" in page.texts
+    assert any("level rigid" in item for item in page.texts)
+
+
+def test_halving_the_step_keeps_the_orders(synthetic_map):
+    """An order that the step leaves out is not counted as an error of the step."""
+    fast = {**SHORT, "trajectory.speed_deg_s.joint": 6.0}
+    run = run_scene("bench", overrides=fast, drives={"reference-2d": synthetic_map})
+    assert [u.order for u in run.assembly.transmissions[0].attached.unresolved] == [122]
+    scene, drives = _same_orders(run)
+    fine = run_scene(scene.with_changes({"simulation.step_s": 0.0005}), drives=drives)
+    kept = [r.assembly.transmissions[0].attached.kept_orders for r in (run, fine)]
+    assert kept[0] == kept[1]
+    assert fine.assembly.load == run.assembly.load
+
+
+def test_the_error_estimate_falls_with_the_step(synthetic_map):
+    """The change at half the step is smaller from a smaller step, for every figure."""
+    changes = [
+        step_error(
+            run_scene(
+                "bench",
+                overrides={**SHORT, "simulation.step_s": step},
+                drives={"reference-2d": synthetic_map},
+            )
+        )
+        for step in (0.001, 0.000125)
+    ]
+    assert [found["step_s"] for found in changes] == [0.0005, 0.0000625]
+    coarse, fine = (found["joints"]["joint"] for found in changes)
+    for key in STEP_KEYS:
+        assert fine[key] < 0.5 * coarse[key] or coarse[key] < 1e-9
+
+
+def test_a_step_that_cannot_be_halved_says_so(run, monkeypatch):
+    """A finer run that is too long is not run, with the reason."""
+    monkeypatch.setattr("swgjoint.view.validity.MAX_STEPS", 1500)
+    found = step_error(run)
+    assert "joints" not in found
+    assert found["reason"] == "not run: it would take 2e+03 steps"
+
+
+def test_the_report_is_written_whole_or_not_at_all(run, tmp_path, monkeypatch):
+    """A failure on the way leaves nothing; a folder that is missing is refused."""
+    with pytest.raises(InputError, match="cannot write"):
+        write_report({"": run}, tmp_path / "none" / "report.html", check_step=False)
+
+    def fail(*_: object) -> None:
+        raise RuntimeError("no picture")
+
+    monkeypatch.setattr("swgjoint.view.report.joint_png", fail)
+    with pytest.raises(RuntimeError, match="no picture"):
+        write_report({"": run}, tmp_path / "report.html", check_step=False)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_missing_extra_is_named(run, tmp_path, monkeypatch):
+    """Without jinja2 the line says what to install."""
+    monkeypatch.setitem(__import__("sys").modules, "jinja2", None)
+    with pytest.raises(MissingExtraError, match=r"swgjoint\[report\]"):
+        write_report({"": run}, tmp_path / "report.html")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_thinned_line_keeps_every_peak():
+    """Both extremes of a long signal survive, a short one is left as it is."""
+    x = np.linspace(0.0, 1.0, 50_000)
+    y = np.sin(40.0 * x)
+    y[31_234], y[7] = 3.0, -4.0
+    thin_x, thin_y = envelope(x, y)
+    assert thin_x.size <= 3_002 and (np.diff(thin_x) > 0).all()
+    assert thin_y.max() == 3.0 and thin_y.min() == -4.0
+    assert thin_x[thin_y.argmax()] == x[31_234]
+    assert envelope(x[:100], y[:100])[1].size == 100
+
+
+def test_figures_read_as_people_write_them():
+    """Units come from the key; thousands are grouped; small ones keep their digits."""
+    assert words("K1_Nm_rad") == ("K1", "N·m/rad")
+    assert words("radial_stiffness_N_mm") == ("radial stiffness", "N/mm")
+    assert [shown(v) for v in (None, True, 940884.8, 0.0, 3.14159, 2e-6, "x")] == [
+        "-",
+        "yes",
+        "940,900",
+        "0",
+        "3.142",
+        "2.00e-06",
+        "x",
+    ]
