@@ -16,14 +16,14 @@ from swgjoint.joint.native import native_map
 from swgjoint.joint.region import check_region
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.progress import Progress, silent
+from swgjoint.sim.commanded import check_motion, trajectory_of
 from swgjoint.sim.control import add_actuators, control_gains, feedforward
 from swgjoint.sim.drives import check_joint_names, drive_of
 from swgjoint.sim.rigid_arm import RigidArm, compile_spec
 from swgjoint.sim.scene import MAX_STEPS, Scene
 from swgjoint.sim.scene_sections import JointSection
-from swgjoint.sim.trajectory import Trajectory, constant_speed, sweep
+from swgjoint.sim.trajectory import Trajectory
 from swgjoint.sim.transmission import Transmission
-from swgjoint.units import deg
 
 Array = NDArray[np.float64]
 
@@ -125,7 +125,8 @@ def assemble(
         arm=scene.arm,
     )
     sections = _complete_sections(scene, arm.joints)
-    trajectory = trajectory_of(scene, arm.joints)
+    check_motion(scene, {section.level for section in sections})
+    trajectory = trajectory_of(scene, arm)
     known = dict(drives or {})
     spec = arm.spec()
     spec.option.timestep = scene.simulation.step_s
@@ -171,7 +172,7 @@ def assemble(
     if sub_steps > 1:
         _check_length(scene, sub_steps)
         spec.option.timestep = scene.simulation.step_s / sub_steps
-        trajectory = trajectory_of(scene, arm.joints, sub_steps=sub_steps)
+        trajectory = trajectory_of(scene, arm, sub_steps=sub_steps)
     load = np.array(
         [
             _load_torque(scene, name, t.drive)
@@ -234,37 +235,6 @@ def _touching(arm: RigidArm, trajectory: Trajectory) -> NDArray[np.bool_]:
     low, high = model.jnt_range.T
     beyond = (trajectory.position <= low) | (trajectory.position >= high)
     return np.asarray(collides | (model.jnt_limited.astype(bool) & beyond.any(axis=0)))
-
-
-def trajectory_of(
-    scene: Scene, joints: tuple[str, ...], *, sub_steps: int = 1
-) -> Trajectory:
-    """The commanded motion of all joints of an arm, at every step or part of one."""
-    section, timing = scene.trajectory, scene.simulation
-    start = np.array([section.start_deg.get(name, 0.0) for name in joints]) * deg
-    if section.kind == "constant_speed":
-        speed = np.array([section.speed_deg_s.get(name, 0.0) for name in joints])
-        return constant_speed(
-            start=start,
-            speed=speed * deg,
-            duration=timing.duration_s,
-            step=timing.step_s,
-            settle=section.settle_s,
-            sub_steps=sub_steps,
-        )
-    end = [
-        section.end_deg.get(name, section.start_deg.get(name, 0.0)) for name in joints
-    ]
-    return sweep(
-        start=start,
-        end=np.array(end) * deg,
-        duration=timing.duration_s,
-        step=timing.step_s,
-        hold=section.hold_s,
-        ramp=section.ramp_s,
-        settle=section.settle_s,
-        sub_steps=sub_steps,
-    )
 
 
 def transmission_of(attached: JointDrive, drive: DriveMap) -> Transmission:

@@ -37,6 +37,25 @@ def control_gains(section: Controller, inertia: Array) -> tuple[Array, Array]:
     return inertia * omega**2, 2.0 * zeta * omega * inertia
 
 
+def answer_speed(section: Controller, jump: Array) -> Array:
+    r"""Largest speed of the answer to a step, of a rigid drive without limits [rad/s].
+
+    Of the oscillator with the loop's :math:`\omega, \zeta`, whose velocity loop sees no
+    step: :math:`A\omega\,e^{-\zeta\varphi/\sin\varphi}` with
+    :math:`\cos\varphi = \zeta`, and :math:`A\omega/e` from :math:`\zeta = 1` on. Gains
+    that are given outright: those of the default frequency.
+
+    Args:
+        section: The scene's controller.
+        jump: Of every joint [rad]. Shape (n_joints,).
+    """
+    omega = 2.0 * np.pi * (section.natural_frequency_Hz or DEFAULT_FREQUENCY)
+    zeta = min(section.damping_ratio or DEFAULT_DAMPING_RATIO, 1.0)
+    phi = np.arccos(zeta)
+    decay = zeta * float(phi / np.sin(phi)) if phi else 1.0
+    return np.asarray(np.abs(jump) * omega * np.exp(-decay))
+
+
 def feedforward(
     kind: FeedForward,
     *,

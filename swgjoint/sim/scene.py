@@ -13,16 +13,14 @@ from swgjoint.errors import InputError
 from swgjoint.faults import Fault, Section, parse_toml, read_toml, validated
 from swgjoint.models_path import find
 from swgjoint.sim.scene_sections import (
-    ConstantSpeed,
     Controller,
     JointSection,
     Level,
     Load,
     Recording,
     Simulation,
-    Sweep,
-    TrajectorySection,
 )
+from swgjoint.sim.trajectory_sections import TrajectorySection
 
 MAX_STEPS = 2_000_000
 """Steps of the engine in a run."""
@@ -236,10 +234,8 @@ def _anchor_paths(data: dict[str, Any], folder: Path) -> None:
             table[key] = str(folder / value)
 
     anchor(data, "arm")
+    anchor(data.get("trajectory"), "file")
     anchor(data.get("defaults"), "drive")
     joints = data.get("joints")
     for joint in joints.values() if isinstance(joints, dict) else ():
         anchor(joint, "drive")
-
-
-__all__ = ["ConstantSpeed", "Scene", "Sweep", "parse_override"]

@@ -15,8 +15,6 @@ Integrator = Literal["discrete", "RK4"]
 FeedForward = Literal["none", "gravity", "gravity_inertia"]
 
 Positive = Annotated[float, Field(gt=0)]
-Seconds = Annotated[float, Field(ge=0, le=10_000)]
-Degrees = Annotated[float, Field(ge=-3_600, le=3_600)]
 
 
 class LinearDrive(Section):
@@ -60,56 +58,6 @@ class JointSection(Section):
         if "drive" in own or "linear" in own:
             rest = {k: v for k, v in rest.items() if k not in ("drive", "linear")}
         return JointSection(**{key: getattr(base, key) for key in rest} | values)
-
-
-class Sweep(Section):
-    """All joints together from start to end: rest, ramp, constant speed, ramp, rest."""
-
-    kind: Literal["sweep"] = "sweep"
-    hold_s: Seconds = 0.2
-    ramp_s: Annotated[float, Field(gt=0, le=10_000)] = 1.0
-    settle_s: Seconds = 0.0
-    """Start of the constant-speed part that the metrics leave out."""
-    start_deg: dict[str, Degrees] = Field(default_factory=dict)
-    """Joint angles; a joint that is not named starts at 0."""
-    end_deg: dict[str, Degrees] = Field(default_factory=dict)
-    """Joint angles; a joint that is not named stays."""
-
-    @property
-    def shortest_s(self) -> float:
-        """Time without any constant-speed part [s]."""
-        return 2.0 * (self.hold_s + self.ramp_s) + self.settle_s
-
-    @property
-    def named_joints(self) -> dict[str, set[str]]:
-        """Joints that each key names."""
-        return {"start_deg": set(self.start_deg), "end_deg": set(self.end_deg)}
-
-
-class ConstantSpeed(Section):
-    """Constant joint speeds from the first instant."""
-
-    kind: Literal["constant_speed"] = "constant_speed"
-    settle_s: Seconds = 0.0
-    """Start that the metrics leave out."""
-    start_deg: dict[str, Degrees] = Field(default_factory=dict)
-    speed_deg_s: dict[str, Degrees]
-
-    @property
-    def shortest_s(self) -> float:
-        """Time without any part that the metrics use [s]."""
-        return self.settle_s
-
-    @property
-    def named_joints(self) -> dict[str, set[str]]:
-        """Joints that each key names."""
-        return {
-            "start_deg": set(self.start_deg),
-            "speed_deg_s": set(self.speed_deg_s),
-        }
-
-
-TrajectorySection = Annotated[Sweep | ConstantSpeed, Field(discriminator="kind")]
 
 
 class Controller(Section):

@@ -25,7 +25,17 @@ class Trajectory:
     steady: slice
     """Samples of the constant-speed part that the metrics use."""
     steady_velocity: Array
-    """Speed of that part [rad/s]. Shape (n_joints,)."""
+    """Speed of that part [rad/s], 0 where no speed is constant. Shape (n_joints,)."""
+    arrival: float | None = None
+    """When the command reaches its last pose and rests [s]; None: it never does."""
+    visits: tuple[tuple[int, float], ...] = ()
+    """Poses that are visited again and again: number and end of the rest there [s]."""
+    passes: tuple[float, ...] = ()
+    """Starts of runs along one path at constant speed of the tool [s]."""
+    pass_time: float = 0.0
+    """Duration of each of them [s]."""
+    answer_speed: Array | None = None
+    """Speed that joints reach although none is commanded [rad/s]. Shape (n_joints,)."""
 
     def every(self, n: int) -> Trajectory:
         """The same motion at every n-th sample, the first included."""
@@ -40,7 +50,12 @@ class Trajectory:
 
     @property
     def top_speed(self) -> Array:
-        """Largest commanded speed of every joint [rad/s]. Shape (n_joints,)."""
+        """Largest commanded speed of every joint [rad/s]. Shape (n_joints,).
+
+        Of a step, which commands none, that of the controller's answer.
+        """
+        if self.answer_speed is not None:
+            return self.answer_speed
         return np.asarray(np.abs(self.velocity).max(axis=0))
 
 
@@ -94,8 +109,9 @@ def sweep(
         position=start + path[:, None] * speed,
         velocity=(up_v - down_v)[:, None] * speed,
         acceleration=((up_a - down_a) / ramp)[:, None] * speed,
-        steady=_window(time, hold + ramp + settle, top),
+        steady=window(time, hold + ramp + settle, top),
         steady_velocity=speed,
+        arrival=duration - hold,
     )
 
 
@@ -115,7 +131,7 @@ def constant_speed(
         position=start + time[:, None] * speed,
         velocity=np.broadcast_to(speed, (time.size, speed.size)).copy(),
         acceleration=np.zeros((time.size, speed.size)),
-        steady=_window(time, settle, duration),
+        steady=window(time, settle, duration),
         steady_velocity=speed,
     )
 
@@ -126,7 +142,7 @@ def time_grid(duration: float, step: float, sub_steps: int = 1) -> Array:
     return np.asarray(np.arange(count + 1) * (step / sub_steps))
 
 
-def _window(time: Array, first: float, last: float) -> slice:
+def window(time: Array, first: float, last: float) -> slice:
     """Samples between two times, ends included."""
     tolerance = 1e-9
     return slice(

@@ -1,0 +1,267 @@
+"""The table ``[trajectory]`` of a scene file, one class per kind of motion."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from swgjoint.faults import Fault, Section
+
+Positive = Annotated[float, Field(gt=0)]
+Seconds = Annotated[float, Field(ge=0, le=10_000)]
+Degrees = Annotated[float, Field(ge=-3_600, le=3_600)]
+Vector = Annotated[tuple[float, float, float], Field(strict=False)]
+Cycles = Annotated[int, Field(ge=1, le=1_000)]
+Plane = Literal["+x", "-x", "+y", "-y"]
+
+
+class Motion(Section):
+    """What all motions share."""
+
+    start_deg: dict[str, Degrees] = Field(default_factory=dict)
+    """Joint angles at the first instant; a joint that is not named starts at 0."""
+
+    @property
+    def shortest_s(self) -> float:
+        """Time that must be left for the motion to exist [s]."""
+        return 0.0
+
+    @property
+    def named_joints(self) -> dict[str, set[str]]:
+        """Joints that each key names."""
+        return {"start_deg": set(self.start_deg)}
+
+
+class Sweep(Motion):
+    """All joints together from start to end: rest, ramp, constant speed, ramp, rest."""
+
+    kind: Literal["sweep"] = "sweep"
+    hold_s: Seconds = 0.2
+    ramp_s: Annotated[float, Field(gt=0, le=10_000)] = 1.0
+    settle_s: Seconds = 0.0
+    """Start of the constant-speed part that the metrics leave out."""
+    end_deg: dict[str, Degrees] = Field(default_factory=dict)
+    """Joint angles; a joint that is not named stays."""
+
+    @property
+    def shortest_s(self) -> float:
+        """Time without any constant-speed part [s]."""
+        return 2.0 * (self.hold_s + self.ramp_s) + self.settle_s
+
+    @property
+    def named_joints(self) -> dict[str, set[str]]:
+        """Joints that each key names."""
+        return {"start_deg": set(self.start_deg), "end_deg": set(self.end_deg)}
+
+
+class ConstantSpeed(Motion):
+    """Constant joint speeds from the first instant."""
+
+    kind: Literal["constant_speed"] = "constant_speed"
+    settle_s: Seconds = 0.0
+    """Start that the metrics leave out."""
+    speed_deg_s: dict[str, Degrees]
+
+    @property
+    def shortest_s(self) -> float:
+        """Time without any part that the metrics use [s]."""
+        return self.settle_s
+
+    @property
+    def named_joints(self) -> dict[str, set[str]]:
+        """Joints that each key names."""
+        return {
+            "start_deg": set(self.start_deg),
+            "speed_deg_s": set(self.speed_deg_s),
+        }
+
+
+class Step(Motion):
+    """Joint angles jump once; what follows is the controller's answer."""
+
+    kind: Literal["step"] = "step"
+    at_s: Annotated[float, Field(gt=0, le=10_000)] = 0.2
+    step_deg: dict[str, Degrees]
+    """How far each joint jumps."""
+
+    @property
+    def shortest_s(self) -> float:
+        """Time before the jump [s]."""
+        return self.at_s
+
+    @property
+    def named_joints(self) -> dict[str, set[str]]:
+        """Joints that each key names."""
+        return {"start_deg": set(self.start_deg), "step_deg": set(self.step_deg)}
+
+
+class Trapezoid(Motion):
+    """Point to point at constant acceleration, speed and deceleration, then rest.
+
+    All joints start and stop together, and the one that needs longest runs at a limit.
+    """
+
+    kind: Literal["trapezoid"] = "trapezoid"
+    hold_s: Seconds = 0.2
+    """Rest before the motion; after it the arm rests until the end."""
+    end_deg: dict[str, Degrees]
+    max_speed_deg_s: Annotated[float, Field(gt=0, le=3_600)]
+    max_acceleration_deg_s2: Annotated[float, Field(gt=0, le=1e6)]
+
+    @property
+    def shortest_s(self) -> float:
+        """Rest and motion [s]."""
+        return self.hold_s + self.move_s
+
+    @property
+    def move_s(self) -> float:
+        """Time of the motion [s]."""
+        way = max(
+            (abs(end - self.start_deg.get(j, 0.0)) for j, end in self.end_deg.items()),
+            default=0.0,
+        )
+        speed, acceleration = self.max_speed_deg_s, self.max_acceleration_deg_s2
+        if way * acceleration >= speed**2:
+            return way / speed + speed / acceleration
+        return 2.0 * float((way / acceleration) ** 0.5)
+
+    @property
+    def named_joints(self) -> dict[str, set[str]]:
+        """Joints that each key names."""
+        return {"start_deg": set(self.start_deg), "end_deg": set(self.end_deg)}
+
+
+class Chirp(Motion):
+    """One joint swings about its start, faster and faster (or slower and slower)."""
+
+    kind: Literal["chirp"] = "chirp"
+    joint: str
+    amplitude_deg: Annotated[float, Field(gt=0, le=360)]
+    from_Hz: Annotated[float, Field(gt=0, le=1_000)]
+    to_Hz: Annotated[float, Field(gt=0, le=1_000)]
+    hold_s: Seconds = 0.2
+    """Rest before and after."""
+    ramp_s: Annotated[float, Field(gt=0, le=10_000)] = 0.5
+    """Time in which the amplitude grows, and in which it fades."""
+
+    @property
+    def shortest_s(self) -> float:
+        """Time without any part at full amplitude [s]."""
+        return 2.0 * (self.hold_s + self.ramp_s)
+
+    @property
+    def named_joints(self) -> dict[str, set[str]]:
+        """Joints that each key names."""
+        return {"start_deg": set(self.start_deg), "joint": {self.joint}}
+
+
+class FromFile(Motion):
+    """Joint angles from a CSV file, smoothly through all of its points."""
+
+    kind: Literal["csv"] = "csv"
+    file: str
+    """Columns ``time_s`` and ``<joint>_deg`` or ``<joint>_rad``."""
+    hold_s: Seconds = 0.2
+    """Rest before; after the last point the arm rests until the end."""
+
+    @property
+    def shortest_s(self) -> float:
+        """Rest before the motion [s]."""
+        return self.hold_s
+
+
+class ToolMotion(Motion):
+    """A motion that the tool site makes; joints follow by inverse kinematics."""
+
+    orientation: Literal["hold", "free"] | None = None
+    """Whether the tool keeps its orientation; None: from six joints on."""
+
+
+class Line(ToolMotion):
+    """The tool goes straight forth and back, resting at either end."""
+
+    kind: Literal["line"] = "line"
+    displacement_mm: Vector
+    """From the tool at ``start_deg`` to the far end, in the world."""
+    cycles: Cycles = 1
+    hold_s: Seconds = 0.2
+    """Rest at the start and at every turning point."""
+    ramp_s: Annotated[float, Field(gt=0, le=10_000)] = 0.2
+
+    @property
+    def shortest_s(self) -> float:
+        """Time without any part at constant speed [s]."""
+        return self.hold_s + 2 * self.cycles * (self.hold_s + 2.0 * self.ramp_s)
+
+    @model_validator(mode="after")
+    def _goes_somewhere(self) -> Self:
+        if not any(self.displacement_mm):
+            raise Fault(("displacement_mm", "[0, 0, 0] mm; accepted: a direction"))
+        return self
+
+
+class Circle(ToolMotion):
+    """The tool runs round a circle: rest, ramp, constant speed, ramp, rest."""
+
+    kind: Literal["circle"] = "circle"
+    radius_mm: Annotated[float, Field(gt=0, le=10_000)]
+    normal: Vector = (0.0, 0.0, 1.0)
+    """Axis of the circle in the world; the tool turns about it right-handed."""
+    towards: Vector = (1.0, 0.0, 0.0)
+    """Direction from the tool at ``start_deg`` to the centre, made square to it."""
+    cycles: Cycles = 1
+    hold_s: Seconds = 0.2
+    ramp_s: Annotated[float, Field(gt=0, le=10_000)] = 0.5
+
+    @property
+    def shortest_s(self) -> float:
+        """Time without any part at constant speed [s]."""
+        return 2.0 * (self.hold_s + self.ramp_s)
+
+    @model_validator(mode="after")
+    def _spans_a_plane(self) -> Self:
+        (a, b, c), (x, y, z) = self.normal, self.towards
+        across = (b * z - c * y, c * x - a * z, a * y - b * x)
+        size = (a * a + b * b + c * c) * (x * x + y * y + z * z)
+        if sum(v * v for v in across) <= 1e-12 * size:
+            raise Fault(
+                ("towards", "along normal; accepted: a direction across the normal")
+            )
+        return self
+
+
+class Iso9283(ToolMotion):
+    """The pose cycle of ISO 9283: P1 in the middle of a cube, P2 to P5 around it."""
+
+    kind: Literal["iso9283"] = "iso9283"
+    edge_mm: Annotated[float, Field(gt=0, le=10_000)] = 250.0
+    """Edge of the cube; the standard has 250, 400, 630 and 1000 mm. Its centre P1 is
+    the tool at ``start_deg``, its edges lie along the axes of the world."""
+    plane: Plane = "+x"
+    """Horizontal direction in which the diagonal plane rises: the four planes of the
+    standard are the four directions."""
+    cycles: Cycles = 30
+    hold_s: Seconds = 0.2
+    """Rest at P1 before the first cycle."""
+    rest_s: Annotated[float, Field(gt=0, le=10_000)] = 0.4
+    """Rest at every pose; the pose is measured at its end."""
+
+    @property
+    def shortest_s(self) -> float:
+        """Time of all rests [s]."""
+        return self.hold_s + 5 * self.cycles * self.rest_s
+
+
+TrajectorySection = Annotated[
+    Sweep
+    | ConstantSpeed
+    | Step
+    | Trapezoid
+    | Chirp
+    | FromFile
+    | Line
+    | Circle
+    | Iso9283,
+    Field(discriminator="kind"),
+]
