@@ -11,7 +11,9 @@ from swgjoint.errors import InputError
 from swgjoint.joint import plugin
 from swgjoint.joint.drive import JointDrive, UnresolvedOrder, prune
 from swgjoint.joint.elements import add_native, add_rotor, add_tendon
+from swgjoint.joint.motors import clear_armature, move_to_rotor
 from swgjoint.joint.native import fit_native
+from swgjoint.joint.obstacles import actuators_on
 from swgjoint.joint.place import check_option, find_place
 from swgjoint.joint.prescribed import kinematic_part, ratio_variation
 from swgjoint.maps.drive_map import DriveMap
@@ -44,15 +46,24 @@ def attach(
     ``<joint>_drive`` with the length theta/i - psi: a native spring and damper, the
     same with a cubic part (and tendons ``<joint>_hysteresis<k>`` where the map has
     hysteresis), or the carrier of the engine plugin's instance of the same name, which
-    evaluates ``drive``, hysteresis included. The rotor takes the place of the joint's
-    own armature, which is set to 0. Keyframes grow by the rotor, at the position
-    without torsion.
+    evaluates ``drive``, hysteresis included. Keyframes grow by the rotor, at the
+    position without torsion.
+
+    The rotor takes the place of the armature that the file gives the joint or its
+    actuators. Actuators that act on the joint turn the rotor instead, in the units of
+    the joint: the gear g becomes g/i, so that a motor's input is still torque at the
+    link and a servo's still the angle of the link, as the motor's encoder tells it, see
+    :func:`~swgjoint.joint.motors.move_to_rotor`. All else stays with the link: damping,
+    friction loss, springs and limits of the joint, tendons, contacts, sensors (those of
+    an actuator are on the motor side, like it). Models that are put together with
+    ``MjSpec.attach`` may have their drives before or after, see
+    :meth:`JointDrive.with_prefix`; integrator and step are those of the outer one.
 
     With ``friction`` the friction of the map is in the model, too: friction loss and
     damping of the rotor at ``native``; at ``full`` the whole law, with a tendon
     ``<joint>_friction`` that carries its part of the integrator's metric.
 
-    No actuator is added and none is changed. The motor belongs on the rotor::
+    No actuator is added. A motor of its own units belongs on the rotor::
 
         got = attach(spec, joint="elbow", drive=drive, rotor_inertia=4e-5)
         motor = spec.add_actuator(name="elbow_motor", target=got.rotor or got.joint)
@@ -66,7 +77,8 @@ def attach(
 
     Args:
         spec: Model to edit.
-        joint: Name of a hinge, the first joint of its body.
+        joint: Name of a hinge, the first joint of its body, that follows no other
+            joint and is not moved through a tendon or by a muscle.
         drive: Map of the drive.
         level: ``rigid``, ``kinematic``, ``linear``, ``native`` or ``full``.
         rotor_inertia: Rotor and wave generator about their axis [kg·m²].
@@ -140,6 +152,8 @@ def attach(
     # nothing can fail from here on: the spec is edited whole or not at all
     names: dict[str, str | None] = {"rotor": None, "tendon": None, "plugin": None}
     hysteresis: tuple[str, ...] = ()
+    motors = tuple(a.name for a in actuators_on(spec, joint).values())
+    clear_armature(spec, joint)
     if not has_rotor:
         place.joint.armature = reflected
         damping = 0.0
@@ -148,6 +162,7 @@ def attach(
         names["tendon"] = tendon = f"{joint}_drive"
         lumped = rotor == "lumped"
         body = add_rotor(spec, place, hinge, rotor_inertia, ratio, lumped=lumped)
+        move_to_rotor(spec, place, spec.joint(hinge), ratio=ratio, reflected=reflected)
         if level == "linear":
             add_tendon(
                 spec, tendon, hinge, joint, ratio, (stiffness, 0.0, 0.0), damping
@@ -195,6 +210,7 @@ def attach(
         unresolved=unresolved,
         native=spring,
         hysteresis=hysteresis,
+        motors=motors,
     )
 
 

@@ -74,6 +74,24 @@ class JointDrive:
     """What ``native`` holds of the map; None at other levels."""
     hysteresis: tuple[str, ...] = ()
     """Tendons of the Jenkin elements of ``native``, in the order of the map's."""
+    motors: tuple[str, ...] = ()
+    """Actuators that the model had on the joint; with a rotor they turn that."""
+
+    def with_prefix(self, prefix: str) -> JointDrive:
+        """The same drive in a model that ``MjSpec.attach`` took in under a prefix."""
+
+        def renamed(name: str | None) -> str | None:
+            return None if name is None else prefix + name
+
+        return replace(
+            self,
+            joint=prefix + self.joint,
+            rotor=renamed(self.rotor),
+            tendon=renamed(self.tendon),
+            plugin=renamed(self.plugin),
+            hysteresis=tuple(prefix + name for name in self.hysteresis),
+            motors=tuple(prefix + name for name in self.motors),
+        )
 
     @property
     def elements(self) -> tuple[Jenkin, ...]:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.errors import InputError
+from swgjoint.joint.obstacles import actuators_on, driven_joint
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -19,11 +20,20 @@ class Place:
 
     joint: Any
     parent: Any
+    model: mujoco.MjModel
+    """The model before the drive."""
+    index: int
+    """Of the joint in it."""
     pos: NDArray[np.float64]
     quat: NDArray[np.float64]
     axis: NDArray[np.float64]
     ref: float
+    armature: float
+    """Of the joint and of the actuators on it [kg·m²]."""
     inertia: float
+    """At qpos0, the other joints held, without armature [kg·m²]."""
+    free_inertia: float
+    """At qpos0, the other joints free, with armature [kg·m²]."""
 
 
 def check_option(spec: mujoco.MjSpec, level: str) -> None:
@@ -87,45 +97,42 @@ def find_place(spec: mujoco.MjSpec, name: str, rotor_inertia: float) -> Place:
     Raises:
         InputError: If the joint is unknown or cannot take a drive.
     """
-    found = spec.joint(name)
-    if found is None:
-        known = ", ".join(j.name for j in spec.joints if j.name) or "none"
-        raise InputError(f"joint {name!r} is not in the model; its joints: {known}")
-    if found.type != mujoco.mjtJoint.mjJNT_HINGE:
-        kind = mujoco.mjtJoint(found.type).name.removeprefix("mjJNT_").lower()
-        raise InputError(f"joint {name!r} is a {kind} joint; a drive needs a hinge")
-    for taken in (f"{name}_rotor", f"{name}_drive"):
-        if spec.body(taken) or spec.joint(taken) or spec.tendon(taken):
-            raise InputError(
-                f"joint {name!r} has a drive already: {taken!r} is in the model"
-            )
+    found = driven_joint(spec, name)
     _check_compiler(spec, rotor_inertia)
-    body = found.parent
-    if body.joints[0].name != name:
-        raise InputError(
-            f"joint {name!r} is not the first joint of body {body.name!r}; give it a "
-            "body of its own"
-        )
     copy = spec.copy()
     copy.compiler.fusestatic = False  # keeps every body where the spec has it
     try:
         model = copy.compile()
     except ValueError as error:
-        raise InputError(f"the model does not compile: {error}") from error
+        line = " ".join(str(error).split())
+        raise InputError(f"the model does not compile: {line}") from error
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     mass = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, mass)
     j = int(model.joint(name).id)
     b, dof = int(model.jnt_bodyid[j]), int(model.jnt_dofadr[j])
+    if model.jnt_actgravcomp[j] and model.body_gravcomp.any():
+        raise InputError(
+            f"joint {name!r} has actuatorgravcomp, a torque on the link past the drive;"
+            " accepted: false"
+        )
+    motors = list(actuators_on(spec, name))
+    armature = float(model.dof_armature[dof]) + float(
+        model.actuator_armature[motors] @ model.actuator_gear[motors, 0] ** 2
+    )
     offset = np.zeros(3)
     mujoco.mju_rotVecQuat(offset, model.jnt_pos[j], model.body_quat[b])
     return Place(
         joint=found,
-        parent=body.parent,
+        parent=found.parent.parent,
+        model=model,
+        index=j,
         pos=model.body_pos[b] + offset,
         quat=model.body_quat[b].copy(),
         axis=model.jnt_axis[j].copy(),
         ref=float(model.qpos0[model.jnt_qposadr[j]]),
-        inertia=float(mass[dof, dof] - model.dof_armature[dof]),
+        armature=armature,
+        inertia=float(mass[dof, dof]) - armature,
+        free_inertia=float(1.0 / np.linalg.inv(mass)[dof, dof]),
     )
