@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from swgjoint.cli.text import table
-from swgjoint.files import output_folder
+from swgjoint.errors import InputError
+from swgjoint.files import output_folder, write_whole
+
+if TYPE_CHECKING:
+    from swgjoint.sim.scene import Scene
 
 JOINT_HEADER = (
     "joint",
@@ -26,8 +30,19 @@ JOINT_UNITS = ("", "", "arcmin", "arcmin", "arcmin", "arcmin", "%", "%", "", "")
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
-    """Scene, changes, output folder."""
-    parser.add_argument("scene", metavar="SCENE", help="scene file or bundled name")
+    """Scene or arm, drive, changes, output folder."""
+    parser.add_argument(
+        "scene",
+        metavar="SCENE|ARM",
+        help="scene file, MJCF or URDF file of an arm, or bundled name; an arm gets"
+        " a gentle sweep and, unless --drive says otherwise, drives by rule",
+    )
+    parser.add_argument(
+        "--drive",
+        metavar="NAME",
+        help="design, map or catalogue drive of all joints; of one joint:"
+        " --set joints.JOINT.drive=NAME",
+    )
     parser.add_argument(
         "--set",
         metavar="KEY=VALUE",
@@ -37,7 +52,13 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="change a key of the scene, e.g. simulation.step_s=0.0005; repeatable",
     )
     parser.add_argument(
-        "--out", metavar="DIR", help="folder that receives run.rrd; none if absent"
+        "--out",
+        metavar="DIR",
+        help="folder that receives run.rrd, for an arm also its scene.toml; none if"
+        " absent",
+    )
+    parser.add_argument(
+        "--report", action="store_true", help="write report.html into DIR, too"
     )
 
 
@@ -45,24 +66,51 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     """Simulate the scene.
 
     Returns:
-        ``joints``, ``tool``, ``steps_per_s``, ``contains``, ``files`` and the rest of
-        :meth:`swgjoint.sim.run.Run.metrics`.
+        ``joints``, ``tool``, ``steps_per_s``, ``contains``, ``files``, ``arm`` and the
+        rest of :meth:`swgjoint.sim.run.Run.metrics`.
     """
+    if args.report and not args.out:
+        raise InputError("--report needs a folder; accepted: --out DIR")
     folder = output_folder(args.out) if args.out else None
     from swgjoint.sim.run import run_scene
-    from swgjoint.sim.scene import Scene
 
-    scene = Scene.load_file(args.scene, args.overrides)
+    scene, of_arm = _scene(args)
     result = run_scene(scene, progress=args.progress)
     files = []
     if folder is not None:
         files.append(str(result.to_rerun(folder / "run.rrd")))
+        if of_arm:
+            from swgjoint.sim.scene_toml import scene_toml
+
+            files.append(str(write_whole(folder / "scene.toml", scene_toml(scene))))
+        if args.report:
+            from swgjoint.cli.report_file import report_file
+
+            files += report_file({"": result}, folder, progress=args.progress)
+    arm = result.assembly.arm
     return {
         "scene": scene.name,
+        "arm": {"file": str(arm.path), "held": arm.held},
+        "drives_by_rule": of_arm and args.drive is None,
         **result.metrics(),
         "contains": result.contains,
         "files": files,
     }
+
+
+def _scene(args: argparse.Namespace) -> tuple[Scene, bool]:
+    """The scene that is asked for, and whether it was made around an arm."""
+    from swgjoint.sim.arm_scene import is_arm, scene_of_arm
+    from swgjoint.sim.scene import Scene
+
+    if is_arm(args.scene):
+        return scene_of_arm(
+            args.scene, drive=args.drive, overrides=args.overrides
+        ), True
+    if args.drive:
+        scene = Scene.load_file(args.scene).with_drive(args.drive)
+        return scene.with_changes(args.overrides), False
+    return Scene.load_file(args.scene, args.overrides), False
 
 
 def report(result: dict[str, Any]) -> str:
@@ -74,6 +122,7 @@ def report(result: dict[str, Any]) -> str:
         joint_table(result["joints"]),
         *notes(result["joints"]),
         tool_line(result["tool"]),
+        _drives_line(result) if result["drives_by_rule"] else "",
         f"model: {contains['degrees_of_freedom']} degrees of freedom,"
         f" {contains['tendons']} tendons, {contains['plugin_instances']} plugin"
         f" instances, {contains['integrator']} at {1e3 * contains['step_s']:g} ms,"
@@ -181,6 +230,15 @@ def tool_line(tool: dict[str, Any]) -> str:
     return (
         f"tool against the commanded path: {tool['path_rms_mm']:.4f} mm rms,"
         f" {tool['path_max_mm']:.4f} mm at most, {tool['ap_mm']:.4f} mm at the end"
+    )
+
+
+def _drives_line(result: dict[str, Any]) -> str:
+    """Drives that nobody has asked for."""
+    joints = result["contains"]["joints"].items()
+    return (
+        "drives by rule (others: --drive NAME, --set joints.JOINT.drive=NAME): "
+        + ", ".join(f"{name} {joint['drive']}" for name, joint in joints)
     )
 
 

@@ -10,54 +10,69 @@ from numpy.typing import NDArray
 
 from swgjoint.errors import InputError
 from swgjoint.models_path import find
+from swgjoint.sim.arm_file import read_arm
 
 Array = NDArray[np.float64]
 
 
 class RigidArm:
-    """One MJCF arm with ideal joints; the reference for control and errors.
+    """One MJCF or URDF arm with ideal joints; the reference for control and errors.
 
     Attributes:
-        path: The MJCF file.
-        model: The compiled arm as the file has it.
+        path: The file.
+        model: The compiled arm, see :class:`~swgjoint.sim.arm_file.ArmFile`.
         joints: Names of its joints, in the order of all arrays.
+        held: Joints of the file that do not move, and their type.
+        effort: Torque limits of joints that the file states [N·m].
     """
 
     def __init__(self, reference: str, *, tool_site: str = "tool") -> None:
         """Load an arm, given as a path or as the name of a bundled one.
 
+        Args:
+            reference: Path or bundled name.
+            tool_site: Site whose place is the tool, or a body whose frame it is.
+
         Raises:
-            InputError: If the file is missing, not MJCF, or has a joint that is not a
-                hinge.
+            InputError: If the file is missing, neither MJCF nor URDF, or has no hinge.
         """
         self.path: Path = find(reference, "arms", ".xml", what="arm")
+        file = read_arm(self.path)
+        self.held, self.effort = file.held, file.effort
+        self._spec = file.spec
+        self._mark_tool(tool_site)
+        if not self._spec.joints:
+            others = ", ".join(
+                f"{name} is a {kind}" for name, kind in self.held.items()
+            )
+            raise InputError(
+                f"{self.path}: the arm has no hinge joint"
+                f"{f' ({others})' if others else ''}; a drive needs one"
+            )
         self.model = compile_spec(self.spec(), where=str(self.path))
         model = self.model
         self.joints = tuple(model.joint(j).name for j in range(model.njnt))
-        if not self.joints:
-            raise InputError(f"{self.path}: the arm has no joint; needed: hinge joints")
-        for name, kind in zip(self.joints, model.jnt_type, strict=True):
-            if kind != mujoco.mjtJoint.mjJNT_HINGE:
-                word = mujoco.mjtJoint(kind).name.removeprefix("mjJNT_").lower()
-                raise InputError(
-                    f"{self.path}: joint {name!r} is of type {word}; accepted in a"
-                    " scene: hinge joints"
-                )
         self.tool = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, tool_site)
-        if self.tool < 0 and tool_site != "tool":
-            sites = [model.site(k).name for k in range(model.nsite)]
-            raise InputError(
-                f"{self.path}: site {tool_site!r} does not exist; accepted:"
-                f" {', '.join(sites) or 'none in this arm'}"
-            )
         self._data = mujoco.MjData(model)
 
     def spec(self) -> mujoco.MjSpec:
         """A fresh editable copy of the arm."""
-        try:
-            return mujoco.MjSpec.from_file(str(self.path))
-        except ValueError as exc:
-            raise InputError(f"{self.path}: not an MJCF arm: {_line(exc)}") from None
+        return self._spec.copy()
+
+    def _mark_tool(self, name: str) -> None:
+        """Give a body that stands for the tool a site of its name."""
+        spec = self._spec
+        if spec.site(name) is not None:
+            return
+        body = spec.body(name)
+        if body is not None:
+            body.add_site(name=name)
+        elif name != "tool":
+            known = [e.name for e in [*spec.sites, *spec.bodies[1:]] if e.name]
+            raise InputError(
+                f"{self.path}: site {name!r} does not exist; accepted:"
+                f" {', '.join(known) or 'none in this arm'}"
+            )
 
     def torques(self, position: Array, velocity: Array, acceleration: Array) -> Array:
         """Joint torques that the motion needs, gravity included [N·m].

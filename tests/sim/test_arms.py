@@ -50,16 +50,16 @@ def test_inverse_dynamics_is_linear_in_the_acceleration():
 
 
 def test_an_arm_with_another_kind_of_joint_is_refused(tmp_path):
-    """A slide is named with its type; broken XML is one line."""
+    """A slide alone is named with its type; broken XML is one line."""
     arm = tmp_path / "arm.xml"
     arm.write_text(
         "<mujoco><worldbody><body><joint name='lift' type='slide'/>"
         "<geom size='1'/></body></worldbody></mujoco>"
     )
-    with pytest.raises(InputError, match="joint 'lift' is of type slide"):
+    with pytest.raises(InputError, match=r"no hinge joint \(lift is a slide\)"):
         RigidArm(str(arm))
     arm.write_text("<mujoco><worldbody>")
-    with pytest.raises(InputError, match="not an MJCF arm") as caught:
+    with pytest.raises(InputError, match="not an MJCF arm and no URDF") as caught:
         RigidArm(str(arm))
     assert "\n" not in str(caught.value)
 

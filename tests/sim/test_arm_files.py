@@ -1,0 +1,287 @@
+"""Arms of any owner in a scene: MJCF and URDF, and scenes made around them."""
+
+from __future__ import annotations
+
+import json
+import warnings
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from swgjoint.cli.main import main
+from swgjoint.errors import InputError
+from swgjoint.sim.arm_scene import MARGIN, SWEEP, gentle_sweep, is_arm, scene_of_arm
+from swgjoint.sim.rigid_arm import RigidArm
+from swgjoint.sim.run import run_scene
+from swgjoint.sim.scene import Scene
+from swgjoint.units import deg
+
+LINK = """
+  <link name="{name}"><inertial><origin xyz="0.2 0 0"/><mass value="{mass}"/>
+    <inertia ixx="0.01" iyy="0.05" izz="0.06" ixy="0" ixz="0" iyz="0"/></inertial>
+    <collision><origin xyz="0.2 0 0" rpy="0 1.5708 0"/>{shape}</collision></link>
+"""
+CYLINDER = '<geometry><cylinder radius="0.08" length="0.6"/></geometry>'
+URDF = """<?xml version="1.0"?>
+<robot name="two">
+  <link name="base"/>
+  {upper}{fore}{hand}
+  <joint name="lift" type="revolute"><parent link="base"/><child link="upper"/>
+    <origin xyz="0 0 0.3"/><axis xyz="0 1 0"/>
+    <limit lower="-3" upper="-0.5" effort="60" velocity="2"/>
+    <dynamics damping="0.4" friction="0.2"/></joint>
+  <joint name="elbow" type="continuous"><parent link="upper"/><child link="fore"/>
+    <origin xyz="0.4 0 0"/><axis xyz="0 1 0"/>{mimic}</joint>
+  <joint name="flange" type="fixed"><parent link="fore"/><child link="hand"/>
+    <origin xyz="0.35 0 0"/></joint>
+  <link name="finger"><inertial><mass value="0.1"/><inertia ixx="1e-4" iyy="1e-4"
+    izz="1e-4" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="finger" type="prismatic"><parent link="hand"/><child link="finger"/>
+    <axis xyz="0 1 0"/><limit lower="0" upper="0.04" effort="20"/></joint>
+</robot>
+"""
+STEADY = "defaults.linear={stiffness_Nm_rad=2e4,rated_torque_Nm=50.0}"
+QUICK = ["--set", "simulation.duration_s=2.0"]
+
+
+def urdf(folder: Path, *, shape: str = CYLINDER, mimic: str = "") -> str:
+    """A two-link arm with a gripper finger; neighbours overlap."""
+    parts = {
+        name: LINK.format(name=name, mass=mass, shape=shape)
+        for name, mass in (("upper", 3.0), ("fore", 2.0), ("hand", 0.5))
+    }
+    file = folder / "two.urdf"
+    file.write_text(URDF.format(**parts, mimic=mimic))
+    return str(file)
+
+
+def quiet_arm(reference: str) -> RigidArm:
+    with pytest.warns(UserWarning, match=r"finger \(slide\)"):
+        return RigidArm(reference)
+
+
+def test_a_urdf_moves_as_the_same_arm_in_mjcf(tmp_path):
+    """Torques agree with an MJCF of the same numbers; friction is the link's."""
+    arm = quiet_arm(urdf(tmp_path))
+    body = '<inertial pos=".2 0 0" mass="{}" diaginertia=".01 .05 .06"/>'
+    (tmp_path / "twin.xml").write_text(
+        f"""<mujoco><worldbody><body pos="0 0 .3">
+        <joint name="lift" axis="0 1 0" damping=".4" frictionloss=".2"/>{body.format(3)}
+        <body pos=".4 0 0"><joint name="elbow" axis="0 1 0"/>{body.format(2)}
+        <body pos=".35 0 0">{body.format(0.5)}<body><inertial pos="0 0 0" mass=".1"
+        diaginertia="1e-4 1e-4 1e-4"/></body></body></body></body></worldbody>
+        </mujoco>"""
+    )
+    twin = RigidArm(str(tmp_path / "twin.xml"))
+    assert arm.joints == twin.joints == ("lift", "elbow")
+    q, v, a = np.random.default_rng(5).uniform(-1.0, 1.0, (3, 8, 2))
+    q[:, 0] -= 1.7  # inside the limits: a limit pushes
+    np.testing.assert_allclose(arm.torques(q, v, a), twin.torques(q, v, a), atol=1e-9)
+
+
+def test_what_a_urdf_says_of_its_joints(tmp_path):
+    """Limits, efforts, fixed links by name, a held finger, no collisions."""
+    arm = quiet_arm(urdf(tmp_path))
+    assert arm.held == {"finger": "slide"}
+    assert arm.effort == {"lift": 60.0}
+    np.testing.assert_array_equal(arm.model.jnt_limited, [1, 0])
+    np.testing.assert_allclose(arm.model.joint("lift").range, [-3.0, -0.5])
+    assert not arm.model.jnt_actfrclimited.any()
+    assert not arm.model.geom_contype.any()
+    with pytest.warns(UserWarning, match="finger"):
+        tool = RigidArm(arm.path.as_posix(), tool_site="hand")
+    place = tool.tool_positions(np.zeros((1, 2)))[0]
+    np.testing.assert_allclose(place, [0.75, 0.0, 0.3], atol=1e-12)
+
+
+def test_meshes_of_a_urdf_are_found_or_named(tmp_path):
+    """A package is a folder above or beside; what is missing is left out, one line."""
+    package = tmp_path / "my_arm"
+    (package / "urdf").mkdir(parents=True)
+    (package / "meshes").mkdir()
+    tetrahedron = "v 0 0 0\nv .3 0 0\nv 0 .05 0\nv 0 0 .05\nf 1 3 2\nf 1 2 4\nf 1 4 3\n"
+    (package / "meshes" / "link.obj").write_text(tetrahedron + "f 2 3 4\n")
+    for reference in ("package://my_arm/meshes/link.obj", "../meshes/link.obj"):
+        shape = f'<geometry><mesh filename="{reference}"/></geometry>'
+        assert quiet_arm(urdf(package / "urdf", shape=shape)).model.nmesh == 1
+    for reference in ("package://my_arm/meshes/link.dae", "package://other/link.obj"):
+        shape = f'<geometry><mesh filename="{reference}"/></geometry>'
+        file = urdf(package / "urdf", shape=shape)
+        with (
+            pytest.warns(UserWarning, match="finger"),
+            pytest.warns(UserWarning, match=f"1 meshes not found.*{reference}") as got,
+        ):
+            arm = RigidArm(file)
+        assert arm.model.ngeom == 0
+        assert arm.model.body_mass.sum() == pytest.approx(5.6)
+        assert all("\n" not in str(w.message) for w in got)
+
+
+def test_a_joint_that_mimics_another_is_refused(tmp_path):
+    """The line names both; a finger that mimics a finger is held like it."""
+    with pytest.raises(InputError, match="ties elbow and lift; accepted in a scene"):
+        RigidArm(urdf(tmp_path, mimic='<mimic joint="lift" multiplier="2"/>'))
+
+
+OWN = """
+<mujoco>
+  <compiler angle="degree" {compiler}/>
+  <default><joint armature="0.5" damping="0.3"/></default>
+  {asset}
+  <worldbody>
+    <body name="upper"><joint name="lift" axis="0 1 0" actuatorfrcrange="-9 9"/>
+      <geom type="capsule" fromto="0 0 0 .4 0 0" size=".04" mass="3"/>
+      <body pos=".4 0 0"><joint axis="0 1 0" range="10 60" limited="true"/>
+        <geom type="capsule" fromto="0 0 0 .3 0 0" size=".03" mass="1"/>{more}</body>
+    </body>
+  </worldbody>
+  <actuator><position name="servo" joint="lift" kp="100" forcerange="-40 40"/>
+  </actuator>
+  <sensor><actuatorfrc actuator="servo"/></sensor>
+  <keyframe><key qpos="0.1 0.5" ctrl="0.1"/></keyframe>
+</mujoco>
+"""
+
+
+def own(folder: Path, **parts: str) -> str:
+    file = folder / "own.xml"
+    file.write_text(OWN.format(**{"compiler": "", "asset": "", "more": "", **parts}))
+    return str(file)
+
+
+def test_a_scene_takes_the_mechanics_of_a_file_and_no_more(tmp_path):
+    """Motors, sensors, keyframes, armature go; the model has those of the scene."""
+    arm = RigidArm(own(tmp_path))
+    assert arm.joints == ("lift", "joint_1")
+    assert arm.effort == {"lift": 9.0}
+    assert not arm.model.dof_armature.any()
+    np.testing.assert_array_equal(arm.model.dof_damping, 0.3)
+    scene = scene_of_arm(str(arm.path), overrides=[STEADY])
+    run = run_scene(scene, overrides={"simulation.duration_s": 2.0})
+    model = run.assembly.model
+    assert (model.nu, model.nsensor, model.nkey) == (2, 0, 0)
+    needed = run.assembly.link_torque[run.steady]
+    assert np.abs(run.output_torque[run.steady] - needed).max() < 0.05
+
+
+def test_the_sweep_keeps_to_the_limits(tmp_path):
+    """It starts at the reference where that is allowed and turns 20 degrees."""
+    arm = RigidArm(own(tmp_path))
+    start, end = gentle_sweep(arm)
+    np.testing.assert_allclose(start, [0.0, 15.0 * deg])
+    np.testing.assert_allclose(np.abs(end - start), SWEEP)
+    panda = RigidArm("panda")
+    low, high = panda.model.jnt_range.T
+    room = MARGIN * (high - low)
+    for position in gentle_sweep(panda):
+        assert (position >= low + room - 1e-12).all()
+        assert (position <= high - room + 1e-12).all()
+
+
+def test_drives_by_rule_cover_what_the_file_or_the_weight_asks_for():
+    """Efforts of the UR5e's source give the drives of its catalogue scene."""
+    scene = scene_of_arm("ur5e")
+    arm = RigidArm("ur5e")
+    assert arm.effort == {}
+    weight = np.abs(arm.gravity(np.array(gentle_sweep(arm)))).max(axis=0)
+    drives = [scene.of_joint(name).drive for name in arm.joints]
+    assert drives[1] == "CSG-25-100"  # 87 N·m rated, 48 N·m needed; size 20 has 52
+    assert weight[1] == pytest.approx(52.0, rel=0.1)
+    assert scene.of_joint(arm.joints[1]).rotor_inertia_kgm2 == pytest.approx(8.26e-5)
+    chosen = scene_of_arm("ur5e", drive="reference-2d")
+    assert {chosen.of_joint(name).drive for name in arm.joints} == {"reference-2d"}
+
+
+def test_run_takes_an_arm_and_leaves_its_scene(tmp_path, capsys):
+    """The scene file that it writes runs to the same figures from any folder."""
+    file = urdf(tmp_path)
+    set_drive = ["--set", "joints.elbow.drive=CSG-20-100", "--set", "tool_site=hand"]
+    out = tmp_path / "out"
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        arguments = ["run", file, "--drive", "CSG-17-100", *set_drive, *QUICK]
+        assert main([*arguments, "--out", str(out), "--json"]) == 0
+        result = json.loads(capsys.readouterr().out)
+        names = {k: v["drive"] for k, v in result["contains"]["joints"].items()}
+        assert names == {"lift": "CSG-17-100", "elbow": "CSG-20-100"}
+        assert [Path(f).name for f in result["files"]] == ["run.rrd", "scene.toml"]
+        assert result["tool"]["path_rms_mm"] > 0
+        assert main(["run", str(out / "scene.toml"), "--json"]) == 0
+        again = json.loads(capsys.readouterr().out)
+    assert again["joints"] == result["joints"]
+    assert again["tool"] == result["tool"]
+
+
+def test_a_drive_for_all_joints_of_a_scene(capsys):
+    """Option --drive replaces that of a scene, too."""
+    keys = ["--set", "simulation.duration_s=1.0", "--set", "defaults.level=linear"]
+    assert main(["run", "bench", "--drive", "CSG-14-100", *keys, "--json"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert result["contains"]["joints"]["joint"]["drive"] == "CSG-14-100"
+
+
+def test_a_bundled_name_is_a_scene_before_it_is_an_arm():
+    """The bench is both; a file is what its suffix says."""
+    assert not is_arm("bench") and is_arm("panda") and is_arm("my/arm.URDF")
+    assert not is_arm("panda-sweep") and not is_arm("my/scene.toml")
+
+
+@pytest.mark.parametrize(
+    ("parts", "arguments", "says"),
+    [
+        ({}, ["--drive", "CSG-99-100"], "CSG-99-100"),
+        ({}, ["--set", "joints.knee.drive=CSG-17-100"], "joints.knee: no such joint"),
+        ({}, ["--set", "tool_site=hook"], "site 'hook' does not exist; accepted"),
+        ({}, ["--report"], "--report needs a folder; accepted: --out DIR"),
+        (
+            {"asset": '<asset><mesh name="m" file="gone.stl"/></asset>'},
+            [],
+            "cannot compile it: Error: Error opening file",
+        ),
+        (
+            {"more": '</body><body><joint name="s"/><joint name="t" axis="1 0 0"/>'
+             '<geom size=".1"/>'},
+            [],
+            "'t' is not the first joint of body",
+        ),
+    ],
+)  # fmt: skip
+def test_bad_input_is_one_line(parts, arguments, says, tmp_path, capsys):
+    """Status 2, one line that says what would do."""
+    assert main(["run", own(tmp_path, **parts), *arguments]) == 2
+    err = capsys.readouterr().err
+    assert says in err
+    assert len(err.splitlines()) == 1
+
+
+def test_an_arm_without_a_hinge_is_named(tmp_path, capsys):
+    """What it has instead is said."""
+    file = tmp_path / "lift.xml"
+    file.write_text(
+        "<mujoco><worldbody><body><joint name='lift' type='slide'/>"
+        "<geom size='1'/></body></worldbody></mujoco>"
+    )
+    assert main(["run", str(file)]) == 2
+    err = capsys.readouterr().err
+    assert "no hinge joint (lift is a slide); a drive needs one" in err
+    assert len(err.splitlines()) == 1
+
+
+def test_a_scene_names_a_urdf_beside_it(tmp_path, monkeypatch):
+    """The path is relative to the scene file."""
+    urdf(tmp_path)
+    (tmp_path / "mine.toml").write_text(
+        f"""name = "mine"\narm = "two.urdf"
+        [defaults]\n{STEADY.removeprefix("defaults.")}
+        rotor_inertia_kgm2 = 1e-4\nlevel = "linear"
+        [trajectory]\nkind = "constant_speed"\nstart_deg = {{lift = -90.0}}
+        speed_deg_s = {{elbow = 3.0}}\n[simulation]\nduration_s = 0.2\n"""
+    )
+    monkeypatch.chdir("/")
+    with pytest.warns(UserWarning, match="finger"):
+        run = run_scene(Scene.load_file(tmp_path / "mine.toml"))
+    assert run.joints == ("lift", "elbow")
+    assert run.assembly.model.nv == 4
+    assert mujoco.mj_name2id(run.assembly.model, mujoco.mjtObj.mjOBJ_BODY, "hand") > 0
