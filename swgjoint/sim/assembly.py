@@ -16,9 +16,12 @@ from swgjoint.joint.native import native_map
 from swgjoint.joint.region import check_region
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.progress import Progress, silent
+from swgjoint.sim.actuators import Loops, add_actuators
 from swgjoint.sim.commanded import check_motion, trajectory_of
-from swgjoint.sim.control import add_actuators, control_gains, feedforward
+from swgjoint.sim.control import control_gains, feedforward, integral_gain
 from swgjoint.sim.drives import check_joint_names, drive_of
+from swgjoint.sim.feature_sections import Disturbance, ToolForce
+from swgjoint.sim.payload import arms_of
 from swgjoint.sim.rigid_arm import RigidArm, compile_spec
 from swgjoint.sim.scene import MAX_STEPS, Scene
 from swgjoint.sim.scene_sections import JointSection
@@ -39,16 +42,19 @@ class Assembly:
     """Joints that the scene's own step would leave outside the region of their
     integration, and what they exceed there."""
     arm: RigidArm
+    known_arm: RigidArm
+    """What the controller takes the arm for; without a payload that it does not know.
+    """
     model: mujoco.MjModel
     joints: tuple[str, ...]
     transmissions: tuple[Transmission, ...]
     trajectory: Trajectory
-    stiffness: Array
-    """Control gain on the motor angle [N·m/rad]. Shape (n_joints,)."""
-    damping: Array
-    """Control gain on the motor speed [N·m·s/rad]. Shape (n_joints,)."""
+    loops: Loops
+    link_inertia: Array
+    """About every joint at the start, as the controller knows it [kg·m²]."""
     load: Array
     """Torque of the load against every joint [N·m]. Shape (n_joints,)."""
+    disturbances: tuple[Disturbance, ...]
     link_torque: Array
     """Drive torque that the rigid arm needs on the motion [N·m]. (n, n_joints)."""
     feedforward: Array
@@ -113,11 +119,21 @@ def assemble(
             holds even with the sub-steps that the scene accepts; the message names the
             bound and the step that would do.
     """
-    arm = RigidArm(scene.arm, tool_site=scene.tool_site)
+    arm, known_arm = arms_of(
+        scene.arm,
+        tool_site=scene.tool_site,
+        payload=scene.payload,
+        where=scene.where,
+    )
     check_joint_names(
         {
             "joints": set(scene.joints),
             "load": set(scene.load),
+            **{
+                f"disturbance[{k}].joint": {d.joint}
+                for k, d in enumerate(scene.disturbance)
+                if not isinstance(d, ToolForce)
+            },
             **{f"trajectory.{k}": v for k, v in scene.trajectory.named_joints.items()},
         },
         arm.joints,
@@ -181,19 +197,24 @@ def assemble(
     )
     ratio = np.array([t.ratio for t in transmissions])
     rotor = np.array([t.rotor_inertia for t in transmissions])
-    stiffness, damping = control_gains(
-        scene.controller, rotor + arm.inertia(trajectory.position[0]) / ratio**2
+    link_inertia = known_arm.inertia(trajectory.position[0])
+    loops = _loops(scene, transmissions, sections, rotor + link_inertia / ratio**2)
+    add_actuators(
+        spec,
+        transmissions,
+        loops,
+        load,
+        scene.disturbance,
+        tool_site=_site_of_force(scene, arm),
     )
-    add_actuators(spec, transmissions, stiffness, damping, load)
     model = compile_spec(spec, where=f"scene {scene.name!r}")
     # torques of the rigid arm change little within a step
     coarse = trajectory.every(sub_steps)
-    link_torque, weight = (
+    motion = (coarse.position, coarse.velocity, coarse.acceleration)
+    link_torque = load + _between(arm.torques(*motion), sub_steps)
+    known_torque, weight = (
         load + _between(torque, sub_steps)
-        for torque in (
-            arm.torques(coarse.position, coarse.velocity, coarse.acceleration),
-            arm.gravity(coarse.position),
-        )
+        for torque in (known_arm.torques(*motion), known_arm.gravity(coarse.position))
     )
     prescribed, prescribed_rate = _prescribed(
         trajectory.position,
@@ -206,18 +227,22 @@ def assemble(
         sub_steps=sub_steps,
         outside=outside,
         arm=arm,
+        known_arm=known_arm,
         model=model,
         joints=arm.joints,
         transmissions=tuple(transmissions),
         trajectory=trajectory,
-        stiffness=stiffness,
-        damping=damping,
+        loops=loops,
+        link_inertia=link_inertia,
         load=load,
+        disturbances=tuple(scene.disturbance),
         link_torque=link_torque,
         feedforward=feedforward(
-            scene.controller.feedforward,
+            "gravity_inertia"
+            if scene.controller.kind == "computed_torque"
+            else scene.controller.feedforward,
             weight=weight,
-            link_torque=link_torque,
+            link_torque=known_torque,
             acceleration=trajectory.acceleration,
             ratio=ratio,
             rotor_inertia=rotor,
@@ -226,6 +251,44 @@ def assemble(
         prescribed_rate=prescribed_rate,
         **_addresses(model, arm.joints, transmissions),
     )
+
+
+def _loops(
+    scene: Scene,
+    transmissions: list[Transmission],
+    sections: tuple[JointSection, ...],
+    inertia: Array,
+) -> Loops:
+    """Gains and limits of all motors.
+
+    Args:
+        scene: The scene.
+        transmissions: Of all joints.
+        sections: Of all joints.
+        inertia: Of motor and link at the motor [kg·m²]. Shape (n_joints,).
+    """
+    section = scene.controller
+    stiffness, damping = control_gains(section, inertia)
+    own = [t.drive.ratings.rated_torque / abs(t.ratio) for t in transmissions]
+    limit = section.integral_limit_Nm
+    return Loops(
+        stiffness=stiffness,
+        damping=damping,
+        integral=integral_gain(section, stiffness, inertia),
+        integral_limit=np.array(own) if limit is None else np.full(len(own), limit),
+        limits=tuple(s.motor for s in sections),
+        sampled=scene.sampled,
+    )
+
+
+def _site_of_force(scene: Scene, arm: RigidArm) -> str:
+    """Name of the tool site; refuses a force on a tool that does not exist."""
+    if arm.tool < 0 and any(isinstance(d, ToolForce) for d in scene.disturbance):
+        raise InputError(
+            f"{scene.where}: disturbance: tool_force on arm {scene.arm!r}, which has no"
+            " site for the tool; needed: tool_site"
+        )
+    return scene.tool_site
 
 
 def _touching(arm: RigidArm, trajectory: Trajectory) -> NDArray[np.bool_]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from swgjoint.faults import Section
 from swgjoint.joint.prescribed import ratio_variation
 
 if TYPE_CHECKING:
@@ -33,12 +34,47 @@ def contents(assembly: Assembly) -> dict[str, Any]:
         "sub_steps": assembly.sub_steps,
         "sub_stepped_for": dict(assembly.outside),
         "joints": {t.joint: _joint(t) for t in assembly.transmissions},
+        **_features(assembly),
         "left_out": [
             {"joint": t.joint, **item}
             for t in assembly.transmissions
             for item in _left_out(t)
         ],
     }
+
+
+def _features(assembly: Assembly) -> dict[str, Any]:
+    """Controller, and of limits, payload, sensors, disturbances what there is."""
+    scene, loops = assembly.scene, assembly.loops
+    step = scene.simulation.step_s
+    found: dict[str, Any] = {
+        "controller": {
+            "kind": scene.controller.kind,
+            "feedback": scene.controller.feedback,
+            "control_period_s": (scene.controller.control_period_s or step)
+            if loops.sampled
+            else None,
+            "runs_in": "Python, sampled" if loops.sampled else "the engine's actuators",
+        }
+    }
+    limits = {
+        name: _given(one)
+        for name, one in zip(assembly.joints, loops.limits, strict=True)
+        if one is not None
+    }
+    if limits:
+        found["motor_limits"] = limits
+    if scene.payload is not None:
+        found["payload"] = scene.payload.model_dump()
+    if scene.sensors is not None:
+        found["sensors"] = _given(scene.sensors)
+    if scene.disturbance:
+        found["disturbances"] = [_given(one) for one in scene.disturbance]
+    return found
+
+
+def _given(section: Section) -> dict[str, Any]:
+    return section.model_dump(exclude_none=True)
 
 
 def _joint(transmission: Transmission) -> dict[str, Any]:

@@ -1,25 +1,19 @@
-"""Motor-side position control: gains, feed-forward, actuators, inputs per step."""
+"""Motor-side position control: gains and feed-forward."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
-
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.sim.scene_sections import Controller, FeedForward
-from swgjoint.sim.transmission import Transmission
-
-if TYPE_CHECKING:
-    from swgjoint.sim.assembly import Assembly
 
 Array = NDArray[np.float64]
 
 DEFAULT_FREQUENCY = 8.0
 """Natural frequency of the motor control where a scene gives none [Hz]."""
 DEFAULT_DAMPING_RATIO = 1.0
+INTEGRAL_TIME = 4.0
+"""Of a PID loop times its natural frequency; stable above 1/(2 zeta)."""
 
 
 def control_gains(section: Controller, inertia: Array) -> tuple[Array, Array]:
@@ -35,6 +29,21 @@ def control_gains(section: Controller, inertia: Array) -> tuple[Array, Array]:
     omega = 2.0 * np.pi * (section.natural_frequency_Hz or DEFAULT_FREQUENCY)
     zeta = section.damping_ratio or DEFAULT_DAMPING_RATIO
     return inertia * omega**2, 2.0 * zeta * omega * inertia
+
+
+def integral_gain(section: Controller, stiffness: Array, inertia: Array) -> Array:
+    """Gain on the integral of the motor angle's error [N·m/(rad·s)]. (n_joints,).
+
+    Args:
+        section: The scene's controller.
+        stiffness: Gain on the motor angle [N·m/rad]. Shape (n_joints,).
+        inertia: Of motor and link at the motor [kg·m²]. Shape (n_joints,).
+    """
+    if section.kind != "pid":
+        return np.zeros_like(stiffness)
+    if section.integral_time_s is not None:
+        return stiffness / section.integral_time_s
+    return np.asarray(stiffness * np.sqrt(stiffness / inertia) / INTEGRAL_TIME)
 
 
 def answer_speed(section: Controller, jump: Array) -> Array:
@@ -80,76 +89,3 @@ def feedforward(
     if kind == "gravity":
         return weight / ratio
     return link_torque / ratio + ratio * rotor_inertia * acceleration
-
-
-def add_actuators(
-    spec: mujoco.MjSpec,
-    transmissions: Sequence[Transmission],
-    stiffness: Array,
-    damping: Array,
-    load: Array,
-) -> None:
-    """A motor with its control loop on every joint, and a load where there is one.
-
-    Control inputs in this order: all motors, then the loads that are not zero.
-
-    The loop is the actuator's own affine law, torque = control - kp angle - kd speed,
-    because MuJoCo then solves it within the step: a light rotor under a stiff loop
-    stays stable where a loop evaluated once per step would not. Without a rotor the
-    motor acts on the joint through the gear, so angle and speed are the motor's too.
-    """
-    for actuator in list(spec.actuators):
-        spec.delete(actuator)  # motors of the arm's file would act beside ours
-    for t, kp, kd in zip(transmissions, stiffness, damping, strict=True):
-        rigid = t.law is None
-        motor = spec.add_actuator(
-            name=f"{t.joint}_motor",
-            target=t.joint if rigid else t.attached.rotor,
-            trntype=mujoco.mjtTrn.mjTRN_JOINT,
-            gaintype=mujoco.mjtGain.mjGAIN_FIXED,
-            biastype=mujoco.mjtBias.mjBIAS_AFFINE,
-        )
-        motor.gear[0] = t.ratio if rigid else 1.0
-        motor.gainprm[0] = 1.0
-        motor.biasprm[:3] = [0.0, -kp, -kd]
-    for t, torque in zip(transmissions, load, strict=True):
-        if torque:
-            against = spec.add_actuator(
-                name=f"{t.joint}_load",
-                target=t.joint,
-                trntype=mujoco.mjtTrn.mjTRN_JOINT,
-            )
-            against.gear[0] = -1.0
-
-
-def control_inputs(assembly: Assembly) -> Array:
-    """Actuator inputs of every step, motors then loads. Shape (n_steps, n_inputs).
-
-    The integrator ``discrete`` evaluates the loop at the end of the step, so the
-    reference of that instant goes in; others evaluate it at the start. At level
-    ``kinematic`` the angle that the loop sees is off by the prescribed error, and the
-    rotor's inertia acts against that error's acceleration; see
-    :mod:`swgjoint.joint.prescribed`.
-    """
-    path, ratio = assembly.trajectory, assembly.ratio
-    inputs = (
-        assembly.stiffness * ratio * (path.position + assembly.prescribed)
-        + assembly.damping * ratio * (path.velocity + assembly.prescribed_rate)
-        + assembly.feedforward
-    )
-    at_end = assembly.scene.simulation.integrator == "discrete"
-    steps = inputs[1:] if at_end else inputs[:-1]
-    acceleration = np.diff(assembly.prescribed_rate, axis=0) / assembly.step
-    steps = steps + assembly.rotor_inertia * ratio * acceleration
-    load = assembly.load[assembly.load != 0.0]
-    return np.hstack([steps, np.broadcast_to(load, (len(steps), load.size))])
-
-
-def motor_torque(assembly: Assembly, theta: Array, theta_rate: Array) -> Array:
-    """Torque of every motor in the recorded states [N·m]. Shapes (n, n_joints)."""
-    path, ratio = assembly.trajectory, assembly.ratio
-    return np.asarray(
-        assembly.stiffness * (ratio * path.position - theta)
-        + assembly.damping * (ratio * path.velocity - theta_rate)
-        + assembly.feedforward
-    )

@@ -118,7 +118,7 @@ def _balance(assembly: Assembly, shift: float) -> tuple[Array, Array]:
                     output_torque=float(needed[j]),
                     motor_reference=float(ratio[j] * reference[j]),
                     motor_torque=float(motor_torque[j]),
-                    stiffness=float(assembly.stiffness[j]),
+                    stiffness=float(assembly.loops.stiffness[j]),
                 )
         if np.abs(psi - last).max() < 1e-13:
             break

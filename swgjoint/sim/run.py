@@ -16,11 +16,12 @@ from numpy.typing import NDArray
 from swgjoint.errors import ComputationError
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.progress import Progress, silent
+from swgjoint.sim.actuators import control_inputs, limited, wanted_torque
 from swgjoint.sim.assembly import Assembly, assemble
 from swgjoint.sim.contains import contents
-from swgjoint.sim.control import control_inputs, motor_torque
 from swgjoint.sim.equilibrium import set_start
 from swgjoint.sim.metrics import run_metrics
+from swgjoint.sim.sampled_loop import run_sampled
 from swgjoint.sim.scene import Scene
 
 Array = NDArray[np.float64]
@@ -61,6 +62,8 @@ class Run:
     """That the drive exerts on the link [N·m]. Shape (n, n_joints)."""
     motor_torque: Array
     """[N·m]. Shape (n, n_joints)."""
+    wanted_torque: Array
+    """What the controller asked the motors for, without limits [N·m]. Same shape."""
     tool_position: Array
     """Tool in the world [m]. Shape (n, 3), or (n, 0) where the arm has no tool."""
     tool_reference: Array
@@ -146,6 +149,18 @@ def simulate(assembly: Assembly, *, name: str, progress: Progress = silent) -> R
     state = np.empty(mujoco.mj_stateSize(model, _STATE))
     mujoco.mj_getState(model, data, state, _STATE)
 
+    if assembly.loops.sampled:
+        begin = time.perf_counter()
+        states, rates, wanted = run_sampled(
+            assembly,
+            data,
+            inputs,
+            check=lambda new: _check_finite(assembly, data, new),
+            progress=lambda done: progress(f"run {name}", done, len(inputs)),
+        )
+        wall = time.perf_counter() - begin
+        return _recorded(assembly, name, states, rates, wall, wanted=wanted)
+
     # the engine's own rollout: no Python between two steps, every state recorded
     steps, parts = len(inputs), assembly.sub_steps
     states = np.empty((steps // parts + 1, state.size))
@@ -195,7 +210,13 @@ def _check_finite(assembly: Assembly, data: mujoco.MjData, states: Array) -> Non
 
 
 def _recorded(
-    whole: Assembly, name: str, states: Array, rates: Array, wall: float
+    whole: Assembly,
+    name: str,
+    states: Array,
+    rates: Array,
+    wall: float,
+    *,
+    wanted: Array | None = None,
 ) -> Run:
     """Signals of all joints from the recorded states.
 
@@ -205,6 +226,8 @@ def _recorded(
         states: One per step of the scene. Shape (n, n_state).
         rates: Link speeds at every step of the engine [rad/s].
         wall: Time that the steps took [s].
+        wanted: Motor torque that a sampled loop asked for at every step of the engine
+            [N·m]; None for the engine's own loops.
     """
     assembly, ratio = whole.recorded(), whole.ratio
     model, path = assembly.model, assembly.trajectory
@@ -217,7 +240,17 @@ def _recorded(
     theta[:, flexible] = q[:, assembly.motor_position[flexible]]
     theta_rate[:, flexible] = v[:, assembly.motor_velocity[flexible]]
 
-    motor = motor_torque(assembly, theta, theta_rate)
+    if wanted is None:
+        integral = _integrals(assembly, states)
+        wanted = wanted_torque(assembly, theta, theta_rate, integral)
+    else:
+        wanted = wanted[:: whole.sub_steps]
+    motor = np.column_stack(
+        [
+            limited(wanted[:, j], theta_rate[:, j], limits)
+            for j, limits in enumerate(assembly.loops.limits)
+        ]
+    )
     # no rotor: what the motor gives less what its rotor takes; the integrator's own
     # acceleration is the velocity difference of the step that led to the state
     ideal = ratio * (rates - whole.prescribed_rate)
@@ -244,7 +277,23 @@ def _recorded(
         transmission_error=error,
         output_torque=output,
         motor_torque=motor,
+        wanted_torque=wanted,
         tool_position=assembly.arm.tool_positions(position),
         tool_reference=assembly.arm.tool_positions(path.position),
         wall=wall,
     )
+
+
+def _integrals(assembly: Assembly, states: Array) -> Array:
+    """Integral of the error in the engine's loops [rad·s]. Shape (n, n_joints).
+
+    As it acted on the way to the state: the engine integrates after the forces.
+    """
+    model = assembly.model
+    integral = np.zeros((len(states), len(assembly.joints)))
+    first = 1 + model.nq + model.nv
+    for j in np.flatnonzero(assembly.loops.integral):
+        address = model.actuator_actadr[j]
+        if address >= 0:
+            integral[1:, j] = states[:-1, first + address]
+    return integral

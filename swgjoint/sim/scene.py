@@ -12,6 +12,7 @@ from pydantic import Field, PrivateAttr, model_validator
 from swgjoint.errors import InputError
 from swgjoint.faults import Fault, Section, parse_toml, read_toml, validated
 from swgjoint.models_path import find
+from swgjoint.sim.feature_sections import Disturbance, Payload, Sensors
 from swgjoint.sim.scene_sections import (
     Controller,
     JointSection,
@@ -42,6 +43,11 @@ class Scene(Section):
     controller: Controller = Controller()
     load: dict[str, Load] = Field(default_factory=dict)
     """Constant torque that the load exerts against a joint."""
+    sensors: Sensors | None = None
+    """What the controller reads; None reads every angle exactly and at once."""
+    payload: Payload | None = None
+    disturbance: list[Disturbance] = Field(default_factory=list)
+    """Torques and forces that the controller does not know of."""
     simulation: Simulation
     recording: Recording = Recording()
 
@@ -73,9 +79,37 @@ class Scene(Section):
                     f" {MAX_STEPS} steps in a run",
                 )
             )
+        times = {"controller.control_period_s": self.controller.control_period_s}
+        for side in ("motor", "link") if self.sensors else ():
+            sensor = getattr(self.sensors, side)
+            if sensor is not None:
+                times[f"sensors.{side}.delay_s"] = sensor.delay_s
+        if self.sensors and self.sensors.link and self.controller.feedback == "motor":
+            faults.append(
+                (
+                    "sensors.link",
+                    "read by nobody; accepted: with controller.feedback = 'link'",
+                )
+            )
+        faults += [
+            (key, f"{value:g} s; accepted: a multiple of step_s, {step:g} s")
+            for key, value in times.items()
+            if value is not None and abs(value / step - round(value / step)) > 1e-6
+        ]
         if faults:
             raise Fault(*faults)
         return self
+
+    @property
+    def sampled(self) -> bool:
+        """Whether the controller is a loop of its own, once a control period."""
+        controller = self.controller
+        return (
+            controller.kind == "computed_torque"
+            or controller.control_period_s is not None
+            or controller.feedback == "link"
+            or self.sensors is not None
+        )
 
     @classmethod
     def load_file(

@@ -8,11 +8,13 @@ from pydantic import Field, model_validator
 
 from swgjoint.faults import Fault, Section
 from swgjoint.joint.region import MAX_SUB_STEPS
+from swgjoint.sim.feature_sections import MotorLimits
 
 Level = Literal["rigid", "kinematic", "linear", "native", "full"]
 LEVELS: tuple[str, ...] = get_args(Level)
 Integrator = Literal["discrete", "RK4"]
 FeedForward = Literal["none", "gravity", "gravity_inertia"]
+ControlKind = Literal["pd", "pid", "computed_torque"]
 
 Positive = Annotated[float, Field(gt=0)]
 
@@ -43,6 +45,8 @@ class JointSection(Section):
     """True takes the friction of the drive in, at the levels native and full."""
     rotor: Literal["gyroscopic", "lumped"] | None = None
     """Whether the rotor is a body that its link carries along, the default."""
+    motor: MotorLimits | None = None
+    """Limits of the motor; None: it gives what the controller asks for."""
 
     @model_validator(mode="after")
     def _one_drive(self) -> Self:
@@ -63,37 +67,70 @@ class JointSection(Section):
 class Controller(Section):
     r"""Position control of every motor on its own encoder.
 
-    .. math:: \tau = k_p (\theta_r - \theta) + k_d (\dot\theta_r - \dot\theta)
-        + \tau_\text{ff}, \quad \theta_r = i q_r.
+    ``pd`` and, with the integral of the error, ``pid``:
+
+    .. math:: \tau = k_p e + k_d \dot e + k_i \int e\,dt + \tau_\text{ff}, \quad
+        e = i q_r - \theta.
 
     Gains either from a natural frequency and a damping ratio, which hold for a rigid
     drive, :math:`k_p = J\omega^2`, :math:`k_d = 2\zeta J\omega` with
-    :math:`J = J_m + J_l(q_0)/i^2`, or given outright.
+    :math:`J = J_m + J_l(q_0)/i^2`, or given outright; :math:`k_i = k_p/T_i`.
+
+    ``computed_torque`` is the inverse dynamics of the rigid arm (M, h) with its rotors
+    (J) at the measured motion, motor angles over the ratio:
+
+    .. math:: \tau = \left(M a + h\right)/i + i J a, \quad
+        a = \ddot q_r + 2\zeta\omega(\dot q_r - \dot\theta/i)
+        + \omega^2(q_r - \theta/i).
     """
 
-    kind: Literal["pd"] = "pd"
+    kind: ControlKind = "pd"
     natural_frequency_Hz: Annotated[float, Field(gt=0, le=1_000)] | None = None
     damping_ratio: Annotated[float, Field(gt=0, le=10)] | None = None
     stiffness_Nm_rad: Annotated[float, Field(gt=0)] | None = None
     """Motor side, N·m of motor torque per rad of motor angle."""
     damping_Nms_rad: Annotated[float, Field(ge=0)] | None = None
+    integral_time_s: Positive | None = None
+    """Of ``pid``; None: 4 over the loop's natural frequency in rad/s."""
+    integral_limit_Nm: Positive | None = None
+    """Largest motor torque of the integral; None: that of the rated torque."""
     feedforward: FeedForward = "gravity"
     """Torques of the rigid arm on the reference motion, and of the constant load."""
+    control_period_s: Positive | None = None
+    """Given, the loop is computed once a period and its torque held; a multiple of
+    ``step_s``. None: ``pd`` and ``pid`` act within every step of the engine, a loop
+    that must be sampled (computed torque, sensors, link feedback) once a step."""
+    feedback: Literal["motor", "link"] = "motor"
+    """Whose angle the position error is taken from; the speed is the motor's."""
 
     @model_validator(mode="after")
-    def _one_pair(self) -> Self:
+    def _fits(self) -> Self:
+        faults = []
         by_frequency = (self.natural_frequency_Hz, self.damping_ratio)
         by_gain = (self.stiffness_Nm_rad, self.damping_Nms_rad)
-        if by_gain == (None, None):
-            return self
-        if None in by_gain or by_frequency != (None, None):
-            raise Fault(
+        if by_gain != (None, None) and (
+            None in by_gain or by_frequency != (None, None)
+        ):
+            faults.append(
                 (
                     "stiffness_Nm_rad",
                     "accepted: stiffness_Nm_rad with damping_Nms_rad, or"
                     " natural_frequency_Hz with damping_ratio, not both",
                 )
             )
+        if self.kind == "computed_torque" and by_gain != (None, None):
+            faults.append(
+                (
+                    "stiffness_Nm_rad",
+                    "with computed_torque; accepted: natural_frequency_Hz with"
+                    " damping_ratio",
+                )
+            )
+        for key in ("integral_time_s", "integral_limit_Nm"):
+            if self.kind != "pid" and getattr(self, key) is not None:
+                faults.append((key, f"with {self.kind}; accepted: with pid"))
+        if faults:
+            raise Fault(*faults)
         return self
 
 

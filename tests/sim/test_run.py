@@ -6,8 +6,8 @@ import pytest
 
 from swgjoint.errors import ComputationError, InputError
 from swgjoint.maps.drive_map import DriveMap
+from swgjoint.sim.actuators import control_inputs
 from swgjoint.sim.assembly import assemble
-from swgjoint.sim.control import control_inputs
 from swgjoint.sim.equilibrium import set_start
 from swgjoint.sim.run import run_scene
 from swgjoint.sim.scene import Scene

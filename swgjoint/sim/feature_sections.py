@@ -1,0 +1,128 @@
+"""Tables of a scene file for what a joint need not have: limits, sensors, payload."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from swgjoint.faults import Fault, Section
+
+Vector = Annotated[tuple[float, float, float], Field(strict=False)]
+Positive = Annotated[float, Field(gt=0)]
+Seconds = Annotated[float, Field(ge=0, le=10_000)]
+
+
+class MotorLimits(Section):
+    """What a motor can do, all at the motor shaft; each limit is optional."""
+
+    torque_limit_Nm: Positive | None = None
+    stall_torque_Nm: Positive | None = None
+    """Torque-speed line: at most this at rest, nothing at the no-load speed."""
+    no_load_speed_rpm: Positive | None = None
+    torque_constant_Nm_A: Positive | None = None
+    """With it the metrics state the current."""
+    current_limit_A: Positive | None = None
+
+    @model_validator(mode="after")
+    def _pairs(self) -> Self:
+        faults = []
+        if (self.stall_torque_Nm is None) != (self.no_load_speed_rpm is None):
+            faults.append(
+                (
+                    "stall_torque_Nm",
+                    "accepted: stall_torque_Nm and no_load_speed_rpm together",
+                )
+            )
+        if self.current_limit_A is not None and self.torque_constant_Nm_A is None:
+            faults.append(("current_limit_A", "needed with it: torque_constant_Nm_A"))
+        if faults:
+            raise Fault(*faults)
+        return self
+
+    @property
+    def torque(self) -> float | None:
+        """Largest torque at any speed, of torque and current [N·m]; None: any."""
+        bounds = [] if self.torque_limit_Nm is None else [self.torque_limit_Nm]
+        if self.current_limit_A is not None and self.torque_constant_Nm_A is not None:
+            bounds.append(self.current_limit_A * self.torque_constant_Nm_A)
+        return min(bounds, default=None)
+
+
+class Sensor(Section):
+    """An angle sensor as the controller reads it."""
+
+    counts_per_turn: Annotated[int, Field(ge=4, le=2**32)] | None = None
+    """Resolution; None reads the angle itself. Speed is then its change over a control
+    period."""
+    delay_s: Seconds = 0.0
+    """Age of a reading when the controller uses it; a multiple of ``step_s``."""
+
+
+class Sensors(Section):
+    """Angle sensors of every joint; what is absent reads exactly and at once."""
+
+    motor: Sensor | None = None
+    link: Sensor | None = None
+
+
+class Payload(Section):
+    """A body at the tool site, in the axes of that site."""
+
+    mass_kg: Annotated[float, Field(gt=0, le=1_000)]
+    centre_mm: Vector = (0.0, 0.0, 0.0)
+    """Centre of mass."""
+    inertia_kgm2: Vector = (0.0, 0.0, 0.0)
+    """About the axes through its centre; zeros: a point mass."""
+    known: bool = True
+    """Whether the controller's model of the arm has it."""
+
+    @model_validator(mode="after")
+    def _is_a_body(self) -> Self:
+        a, b, c = sorted(self.inertia_kgm2)
+        if a < 0.0 or a + b < c * (1.0 - 1e-9):
+            raise Fault(
+                (
+                    "inertia_kgm2",
+                    f"{list(self.inertia_kgm2)} kg·m²; accepted: >= 0, the largest not"
+                    " above the sum of the others",
+                )
+            )
+        return self
+
+
+class JointPulse(Section):
+    """A constant torque against a joint for a while, as if somebody leaned on it."""
+
+    kind: Literal["joint_pulse"] = "joint_pulse"
+    joint: str
+    torque_Nm: float
+    """On the link, positive along the joint."""
+    start_s: Seconds
+    duration_s: Positive
+
+
+class JointSine(Section):
+    """A torque on a joint that swings."""
+
+    kind: Literal["joint_sine"] = "joint_sine"
+    joint: str
+    torque_Nm: float
+    """Amplitude, on the link."""
+    frequency_Hz: Annotated[float, Field(gt=0, le=1_000)]
+    start_s: Seconds = 0.0
+    duration_s: Positive | None = None
+    """None: until the end."""
+
+
+class ToolForce(Section):
+    """A constant force on the tool site for a while."""
+
+    kind: Literal["tool_force"] = "tool_force"
+    force_N: Vector
+    """In the world."""
+    start_s: Seconds
+    duration_s: Positive
+
+
+Disturbance = Annotated[JointPulse | JointSine | ToolForce, Field(discriminator="kind")]
