@@ -3,24 +3,13 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 from typing import Any
 
 from swgjoint.cli.text import table
 from swgjoint.errors import InputError
 from swgjoint.files import output_folder, write_whole
 from swgjoint.json_text import json_text
-
-COLUMNS = {
-    "argument": "",
-    "level": "level",
-    "ripple_rms_percent": "ripple rms %",
-    "ripple_pp_percent": "pp %",
-    "transmission_error_arcmin": "trans. error pp arcmin",
-    "K1_Nm_rad": "K1 N·m/rad",
-    "von_mises_MPa": "von Mises MPa",
-    "peak_torque_of_rating": "peak of rating",
-    "wall_s": "s",
-}
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -49,7 +38,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="TOML file with a table [spec] of limits; exit status 1 if one is missed",
     )
-    parser.add_argument("--out", metavar="DIR", help="write compare.json and a picture")
+    parser.add_argument(
+        "--out", metavar="DIR", help="write compare.json, a picture and the report"
+    )
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
@@ -60,20 +51,20 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     """
     folder = output_folder(args.out) if args.out else None
     from swgjoint.sim.scene import Scene
-    from swgjoint.study.compare import (
-        LOWER,
-        SORTABLE,
-        compare,
-        comparison_picture,
-        read_spec,
-    )
+    from swgjoint.study.compare import LOWER, SLOW, SORTABLE, compare, read_spec
+    from swgjoint.study.compare_shown import columns, left_out_notes
 
     if args.sort is not None and args.sort not in SORTABLE:
         raise InputError(f"--sort {args.sort}; accepted: {', '.join(SORTABLE)}")
     spec = read_spec(args.spec) if args.spec else None
     scene = Scene.load_file(args.scene, args.overrides)
     rows = compare(
-        args.arguments, scene, model=args.model, spec=spec, progress=args.progress
+        args.arguments,
+        scene,
+        model=args.model,
+        spec=spec,
+        fatigue=SLOW in {args.sort, *(spec or {})},
+        progress=args.progress,
     )
     if args.sort is not None:
         sign = -1.0 if args.sort in LOWER else 1.0
@@ -85,16 +76,39 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         "rows": [row.to_json() for row in rows],
         "spec": spec,
         "passed": None if spec is None else not any(row.missed for row in rows),
+        "columns": columns(rows),
+        "notes": left_out_notes(rows),
         "files": [],
     }
     if folder is not None:
-        folder.mkdir(parents=True, exist_ok=True)
-        picture = comparison_picture(rows, scene.name)
-        result["files"] = [
-            str(write_whole(folder / "compare.png", picture)),
-            str(write_whole(folder / "compare.json", json_text(result) + "\n")),
-        ]
+        result["files"] = _write(folder, result, rows, spec, args.progress)
     return result
+
+
+def _write(
+    folder: Path, result: dict[str, Any], rows: Any, spec: Any, progress: Any
+) -> list[str]:
+    """Picture, figures and report."""
+    from swgjoint.cli.report_file import report_file
+    from swgjoint.study.compare_shown import comparison_picture, comparison_table
+
+    folder.mkdir(parents=True, exist_ok=True)
+    picture = comparison_picture(rows, result["scene"], spec)
+    runs: dict[str, Any] = {}
+    for row in rows:  # an argument may be given twice, a run of the report has one name
+        again = sum(name.split(" (again")[0] == row.argument for name in runs)
+        runs[f"{row.argument} (again {again})" if again else row.argument] = row.run
+    return [
+        str(write_whole(folder / "compare.png", picture)),
+        str(write_whole(folder / "compare.json", json_text(result) + "\n")),
+        *report_file(
+            runs,
+            folder,
+            summary=comparison_table(rows, spec),
+            pictures={"Figures side by side": picture},
+            progress=progress,
+        ),
+    ]
 
 
 def status(result: dict[str, Any]) -> int:
@@ -104,17 +118,30 @@ def status(result: dict[str, Any]) -> int:
 
 def report(result: dict[str, Any]) -> str:
     """One line an argument, then what misses the spec."""
-    rows = [[row[key] for key in COLUMNS] for row in result["rows"]]
+    from swgjoint.view.words import shown
+
+    columns, spec = result["columns"], result["spec"]
+    verdict = [] if spec is None else ["spec"]
+    header = ("", "level", *(name for name, _ in columns.values()), *verdict)
+    units = ("", "", *(unit for _, unit in columns.values()), *[""] * len(verdict))
+    rows = [
+        (
+            row["argument"],
+            row["level"],
+            *(shown(row[key]) for key in columns),
+            *(["MISSED" if row["missed"] else "kept"] if verdict else []),
+        )
+        for row in result["rows"]
+    ]
     lines = [
-        f"scene {result['scene']}, worst joint",
-        table(rows, header=tuple(COLUMNS.values())),
+        f"scene {result['scene']}, worst joint; K1 and stress of the drive",
+        table([units, *rows], header=header),
+        *result["notes"],
     ]
     for row in result["rows"]:
         for key in row["missed"]:
-            value = row[key]
-            told = "not told" if value is None else f"{value:.4g}"
-            limit = result["spec"][key]
-            lines.append(f"{row['argument']}: {key} {told}, limit {limit:g}")
+            told = "not told" if row[key] is None else shown(row[key])
+            lines.append(f"{row['argument']}: {key} {told}, limit {spec[key]:g}")
     if result["passed"]:
         lines.append("every limit of the spec is kept")
     return "\n".join([*lines, *(f"wrote {name}" for name in result["files"])])

@@ -7,10 +7,9 @@ are those of its worst joint.
 
 from __future__ import annotations
 
-import io
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +21,7 @@ from swgjoint.gear.design import Design
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.progress import Progress, silent
 from swgjoint.sim.drives import find_drive, load_drive
+from swgjoint.sim.metrics import drive_order, strongest_left_out
 from swgjoint.sim.run import Run, run_scene
 from swgjoint.sim.scene import Scene
 from swgjoint.sim.scene_sections import LEVELS, JointSection
@@ -32,14 +32,22 @@ UPPER = (
     "ripple_rms_percent",
     "ripple_pp_percent",
     "transmission_error_arcmin",
+    "transmission_error_ripple_arcmin",
+    "torsion_arcmin",
+    "tool_path_rms_mm",
+    "tool_ap_mm",
+    "tool_rp_mm",
     "von_mises_MPa",
     "peak_torque_of_rating",
+    "cubed_mean_torque_of_rating",
     "wall_s",
 )
 """Figures that a spec limits from above."""
-LOWER = ("K1_Nm_rad",)
+LOWER = ("K1_Nm_rad", "fatigue_safety_factor", "real_time_factor")
 """Figures that a spec limits from below."""
 SORTABLE = (*UPPER, *LOWER)
+SLOW = "fatigue_safety_factor"
+"""Computed only where a spec or the order asks for it: minutes in space."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,19 +61,37 @@ class Compared:
     ripple_pp_percent: float
     transmission_error_arcmin: float
     """Peak to peak."""
+    transmission_error_ripple_arcmin: float
+    """Peak to peak of its strongest line at an order of the drive."""
+    torsion_arcmin: float
+    """Largest mean, without its sign."""
+    tool_path_rms_mm: float | None
+    tool_ap_mm: float | None
+    tool_rp_mm: float | None
     K1_Nm_rad: float | None
     von_mises_MPa: float | None
+    fatigue_safety_factor: float | None
     peak_torque_of_rating: float
     """Over the repeated peak torque."""
+    cubed_mean_torque_of_rating: float
+    """Over the rated torque."""
+    real_time_factor: float
+    """Simulated time over that of the steps."""
     joint: str
     """The one with the most ripple."""
+    strongest_order_left_out: tuple[str, ...]
+    """Joints too fast for the step to carry the strongest order of their drive."""
     wall_s: float
+    """Of everything, maps included."""
+    run: Run = field(repr=False, compare=False)
     missed: tuple[str, ...] = ()
     """Limits of the spec that it does not keep."""
 
     def to_json(self) -> dict[str, Any]:
         """All figures."""
-        return {key: getattr(self, key) for key in self.__dataclass_fields__}
+        return {
+            key: getattr(self, key) for key in self.__dataclass_fields__ if key != "run"
+        }
 
 
 def read_spec(path: str | Path) -> dict[str, float]:
@@ -97,6 +123,7 @@ def compare(
     *,
     model: str | None = None,
     spec: Mapping[str, float] | None = None,
+    fatigue: bool = False,
     progress: Progress = silent,
 ) -> list[Compared]:
     """Run the scene once for every argument, in the order given.
@@ -106,6 +133,7 @@ def compare(
         scene: The scene.
         model: Fidelity of designs; their default if None.
         spec: Limits by figure; see :data:`UPPER` and :data:`LOWER`.
+        fatigue: Whether to assess the fatigue of designs with a cup.
         progress: Called with the stage, what is done and their number.
 
     Raises:
@@ -117,15 +145,16 @@ def compare(
         begin = time.perf_counter()
         source = sources[name]
         if source is None:
-            run = run_scene(_with_level(scene, name))
-            drive, stress, level = None, None, name
+            run = run_scene(_with_level(scene, name), name=name)
+            drive, stress, safety = None, None, None
         else:
             drive = load_drive(name, model=model, progress=progress)
-            run = run_scene(_with_drive(scene, name), drives={name: drive})
+            run = run_scene(_with_drive(scene, name), drives={name: drive}, name=name)
             stress = _stress(source, drive, model)
-            level = ""
-        row = _row(name, run, drive, stress, time.perf_counter() - begin)
-        row = replace(row, level=level or row.level)
+            safety = _safety(source, drive, progress) if fatigue else None
+        row = _row(name, run, drive, level=name if source is None else None)
+        row = replace(row, von_mises_MPa=stress, fatigue_safety_factor=safety)
+        row = replace(row, wall_s=time.perf_counter() - begin)
         rows.append(replace(row, missed=missed(row, spec or {})))
         progress("compared", number + 1, len(arguments))
     return rows
@@ -167,42 +196,77 @@ def _changed(scene: Scene, change: Any) -> Scene:
     )
 
 
-def _row(
-    name: str, run: Run, drive: DriveMap | None, stress: float | None, wall: float
-) -> Compared:
-    joints = run.metrics()["joints"]
+def _row(name: str, run: Run, drive: DriveMap | None, *, level: str | None) -> Compared:
+    """Figures of one run; those of the design itself are filled in later."""
+    metrics = run.metrics()
+    joints, tool = metrics["joints"], metrics["tool"]
     if drive is None:  # the softest drive of the scene
         drives = [t.drive for t in run.assembly.transmissions]
         drive = min(drives, key=lambda d: d.mean_stiffness)
     worst = max(joints, key=lambda j: float(joints[j]["ripple_rms_percent"]))
+    ratings = [joint["ratings"] for joint in joints.values()]
+    errors = [joint["transmission_error_arcmin"] for joint in joints.values()]
 
-    def largest(*keys: str) -> float:
-        values = []
-        for joint in joints.values():
-            value = joint
-            for key in keys:
-                value = value[key]
-            values.append(float(value))
-        return max(values)
+    def largest(key: str) -> float:
+        return max(float(joint[key]) for joint in joints.values())
 
-    peaks = [
-        joint["ratings"]["peak_Nm"] / joint["ratings"]["repeated_peak_Nm"]
-        for joint in joints.values()
-    ]
-    sheet = drive.spec_sheet(("K1_Nm_rad",))
     return Compared(
         argument=name,
         design=drive.name,
-        level=joints[worst]["level"],
+        level=level or joints[worst]["level"],
         ripple_rms_percent=largest("ripple_rms_percent"),
         ripple_pp_percent=largest("ripple_pp_percent"),
-        transmission_error_arcmin=largest("transmission_error_arcmin", "pp"),
-        K1_Nm_rad=sheet["K1_Nm_rad"],
-        von_mises_MPa=stress,
-        peak_torque_of_rating=max(peaks),
+        transmission_error_arcmin=max(float(error["pp"]) for error in errors),
+        transmission_error_ripple_arcmin=_error_ripple(run, joints),
+        torsion_arcmin=max(
+            abs(float(joint["torsion_arcmin"]["mean"])) for joint in joints.values()
+        ),
+        tool_path_rms_mm=tool["path_rms_mm"],
+        tool_ap_mm=tool["ap_mm"],
+        tool_rp_mm=tool["rp_mm"],
+        K1_Nm_rad=drive.spec_sheet(("K1_Nm_rad",))["K1_Nm_rad"],
+        von_mises_MPa=None,
+        fatigue_safety_factor=None,
+        peak_torque_of_rating=max(
+            float(of["peak_Nm"] / of["repeated_peak_Nm"]) for of in ratings
+        ),
+        cubed_mean_torque_of_rating=max(
+            float(of["cubed_mean_Nm"] / of["rated_Nm"]) for of in ratings
+        ),
+        real_time_factor=float(run.time[-1] / run.wall),
         joint=worst,
-        wall_s=wall,
+        strongest_order_left_out=tuple(
+            t.joint for t in run.assembly.transmissions if strongest_left_out(t)
+        ),
+        wall_s=0.0,
+        run=run,
     )
+
+
+def _error_ripple(run: Run, joints: Mapping[str, Any]) -> float:
+    """Twice the strongest line of the transmission error at an order of its drive.
+
+    The whole peak to peak is mostly torsion that follows the load.
+    """
+    lines = [
+        2.0 * float(line["amplitude_arcmin"])
+        for j, name in enumerate(run.joints)
+        for line in joints[name]["transmission_error_orders"]
+        if drive_order(run, j, line["order"]) is not None
+    ]
+    return max(lines, default=0.0)
+
+
+def _safety(
+    source: Design | DriveMap, drive: DriveMap, progress: Progress
+) -> float | None:
+    """Least fatigue safety factor of a design with a cup at rated torque [-]."""
+    if isinstance(source, DriveMap) or source.cup is None:
+        return None
+    from swgjoint.fe.solid.spec_figures import solid_figures
+
+    found = solid_figures(source, [SLOW], drive.ratings.rated_torque, progress=progress)
+    return found.values.get(SLOW)
 
 
 def _stress(
@@ -232,32 +296,3 @@ def _stress(
         return None
     average = run.to_json()["flexspline"]["average_max_MPa"]
     return float(average["von_mises"])
-
-
-def comparison_picture(rows: Sequence[Compared], scene: str) -> bytes:
-    """PNG: bars of every figure, one panel each."""
-    from matplotlib.figure import Figure
-
-    panels = {
-        "ripple_rms_percent": "torque ripple rms [% of rated]",
-        "transmission_error_arcmin": "transmission error pp [arcmin]",
-        "K1_Nm_rad": "K1 [N·m/rad]",
-        "von_mises_MPa": "von Mises stress [MPa]",
-    }
-    figure = Figure(figsize=(3.2 * len(panels), 1.6 + 0.35 * len(rows)))
-    figure.set_layout_engine("constrained")
-    axes = figure.subplots(1, len(panels), sharey=True)
-    names = [row.argument for row in rows]
-    for ax, (key, title) in zip(axes, panels.items(), strict=True):
-        values = [getattr(row, key) for row in rows]
-        ax.barh(names, [value or 0.0 for value in values], color="tab:blue")
-        for k, value in enumerate(values):
-            text = " not told" if value is None else f" {value:.3g}"
-            ax.text(value or 0.0, k, text, va="center", fontsize="small")
-        ax.set_title(title, fontsize="small")
-        ax.margins(x=0.25)
-    axes[0].invert_yaxis()
-    figure.suptitle(f"scene {scene}, worst joint", fontsize="medium")
-    out = io.BytesIO()
-    figure.savefig(out, format="png", dpi=110)
-    return out.getvalue()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 
 import pytest
 
@@ -39,6 +40,8 @@ def test_levels_keep_the_drives_of_the_scene(capsys):
     assert rigid["level"] == "rigid" and full["level"] == "full"
     assert rigid["ripple_pp_percent"] == pytest.approx(0.0, abs=1e-6)
     assert rigid["transmission_error_arcmin"] == 0.0
+    assert rigid["transmission_error_ripple_arcmin"] == rigid["torsion_arcmin"] == 0.0
+    assert full["torsion_arcmin"] > 0.1
 
 
 def test_sorting_puts_the_best_first(capsys):
@@ -57,8 +60,86 @@ def test_spec_decides_the_exit_status(tmp_path, capsys):
     assert found(capsys, STIFF, "--spec", str(spec))["passed"] is True
 
 
+def test_a_spec_limits_from_both_sides(tmp_path, capsys):
+    """More is worse for torsion, better for stiffness and speed."""
+    spec = tmp_path / "spec.toml"
+    spec.write_text(
+        "[spec]\ntorsion_arcmin = 1e-9\nreal_time_factor = 1e-3\n"
+        "peak_torque_of_rating = 0.8\nfatigue_safety_factor = 1\n"
+    )
+    (row,) = found(capsys, STIFF, "--spec", str(spec), status=1)["rows"]
+    # no fatigue is known of a catalogue drive: what cannot be told is not kept
+    assert row["missed"] == ["torsion_arcmin", "fatigue_safety_factor"]
+    assert row["fatigue_safety_factor"] is None
+    assert 0.0 < row["peak_torque_of_rating"] < 0.8 < row["real_time_factor"]
+
+
+def test_the_picture_and_the_report_show_every_argument(tmp_path, capsys):
+    """The same argument twice keeps its rows; the limit and what misses it is there."""
+    spec = tmp_path / "spec.toml"
+    spec.write_text("[spec]\nK1_Nm_rad = 1e4\n")
+    out = tmp_path / "out"
+    arguments = [SOFT, STIFF, SOFT, "--spec", str(spec), "--out", str(out)]
+    assert main(["compare", *arguments, *SHORT]) == 1
+    text = capsys.readouterr().out
+    assert re.search(f"^{SOFT}: K1_Nm_rad 47.., limit 10000$", text, re.MULTILINE)
+    assert text.count("MISSED") == 2 and text.count("kept") == 1
+    names = ["compare.json", "compare.png", "report.html"]
+    assert sorted(p.name for p in out.iterdir()) == names
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert f"{SOFT} (again 1)" in page
+    assert page.count('class="bad">missed') == 2
+    assert "K1_Nm_rad at least 10000" in page
+    width = int.from_bytes((out / "compare.png").read_bytes()[16:20], "big")
+    assert width > 1000
+
+
+DRIVES = {
+    "elliptical": "reference-2d",
+    "parabolic": "reference-2d-parabolic",
+    "simplified": "reference-2d-simplified",
+    "four rollers": "reference-2d-four-roller",
+}
+
+
+@pytest.mark.slow
+@pytest.mark.fe
+def test_wave_generators_come_out_in_the_known_order(capsys, monkeypatch):
+    """Stiffness and error ripple on the UR5e follow what holds the rim.
+
+    The ellipse holds it all around; four rollers leave it free between them. Torque
+    ripple is error times stiffness: the parabolic drive, thirteen times stiffer than
+    four rollers at a seventh of their error, has the most of it.
+    """
+    monkeypatch.setenv("SWGJOINT_CACHE", "")  # coarser maps than the cache may hold
+    monkeypatch.setattr("swgjoint.study.compare.STRESS_POSITIONS", 1)
+    monkeypatch.setattr("swgjoint.fe.sampling.ANGLES", 12)
+    assert main(["compare", *DRIVES.values(), "--scene", "ur5e-sweep", "--json"]) == 0
+    rows = json.loads(capsys.readouterr().out)["rows"]
+    of = dict(zip(DRIVES, rows, strict=True))
+    K = {name: row["K1_Nm_rad"] for name, row in of.items()}
+    assert K["elliptical"] > 5.0 * K["parabolic"]  # 9.4e5, 9.6e4 N·m/rad
+    assert K["parabolic"] > 4.0 * K["simplified"]  # 1.5e4
+    assert K["simplified"] > 1.5 * K["four rollers"]  # 7.2e3
+    error = {k: row["transmission_error_ripple_arcmin"] for k, row in of.items()}
+    assert error["simplified"] > 2.0 * error["elliptical"]  # 0.040, 0.011 arcmin
+    assert error["parabolic"] > error["simplified"]  # 0.050
+    assert error["four rollers"] > 4.0 * error["parabolic"]  # 0.36
+    ripple = {name: row["ripple_rms_percent"] for name, row in of.items()}
+    assert ripple["four rollers"] > 1.5 * ripple["elliptical"]  # 2.0, 0.95 %
+    assert ripple["elliptical"] > 1.5 * ripple["simplified"]  # 0.45 %
+    assert ripple["parabolic"] > ripple["four rollers"]  # 3.2 %
+    torsion = {name: row["torsion_arcmin"] for name, row in of.items()}
+    assert torsion["four rollers"] > torsion["simplified"] > torsion["parabolic"]
+    assert torsion["parabolic"] > torsion["elliptical"]
+    for row in rows:  # lift and elbow alone are slow enough for the step
+        left = set(row["strongest_order_left_out"])
+        assert not {"shoulder_lift_joint", "elbow_joint"} & left and len(left) == 4
+
+
 def test_design_has_a_stress_and_a_picture(tmp_path, capsys, monkeypatch):
-    """A design brings its stress; table and picture lie in the folder."""
+    """A design brings its stress; table, picture and report lie in the folder."""
+    monkeypatch.setenv("SWGJOINT_CACHE", "")  # a coarser map than the cache may hold
     monkeypatch.setattr("swgjoint.study.compare.STRESS_POSITIONS", 1)
     monkeypatch.setattr("swgjoint.fe.sampling.ANGLES", 4)
     out = tmp_path / "out"
@@ -66,7 +147,8 @@ def test_design_has_a_stress_and_a_picture(tmp_path, capsys, monkeypatch):
     (row,) = result["rows"]
     # 321 MPa at 20 N·m on the mesh of the thesis
     assert 280.0 < row["von_mises_MPa"] < 360.0
-    assert sorted(p.name for p in out.iterdir()) == ["compare.json", "compare.png"]
+    names = ["compare.json", "compare.png", "report.html"]
+    assert sorted(p.name for p in out.iterdir()) == names
 
 
 @pytest.mark.parametrize(
