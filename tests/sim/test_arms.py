@@ -178,3 +178,71 @@ def test_an_arm_with_catalogue_drives_carries_its_weight(name):
     ).all()
     for joint in run.metrics()["joints"].values():
         assert joint["ratings"]["within"]
+
+
+def tube(length, outer, inner):
+    """Mass [kg], inertia about its centre along x, y, z [kg·m²], centre on x [m]."""
+    mass = 2700.0 * PI * (outer**2 - inner**2) * length
+    across = mass * (3 * (outer**2 + inner**2) + length**2) / 12
+    return mass, np.array([mass * (outer**2 + inner**2) / 2, across, across])
+
+
+def disc(mass, radius, width, axis):
+    """The same of a disc whose axis is x or y."""
+    inertia = np.full(3, mass * (3 * radius**2 + width**2) / 12)
+    inertia[axis] = mass * radius**2 / 2
+    return mass, inertia
+
+
+def together(length, first, second):
+    """Mass, centre and inertia of a tube and a disc at its end."""
+    mass = first[0] + second[0]
+    centre = (first[0] * length / 2 + second[0] * length) / mass
+    inertia = first[1] + second[1]
+    for part, place in ((first, length / 2), (second, length)):
+        inertia = inertia + part[0] * (place - centre) ** 2 * np.array([0, 1, 1])
+    return mass, centre, inertia
+
+
+LINKS = (
+    together(0.4, tube(0.4, 0.03, 0.027), disc(1.5, 0.04, 0.08, axis=1)),
+    together(0.35, tube(0.35, 0.025, 0.022), disc(0.2, 0.03, 0.02, axis=0)),
+)
+
+
+def test_the_two_link_arm_has_the_inertia_of_its_tubes_and_discs():
+    """The numbers of the file follow from the sizes that it states."""
+    model = RigidArm("two-link").model
+    for name, (mass, centre, inertia) in zip(
+        ("upper_arm", "forearm"), LINKS, strict=True
+    ):
+        body = model.body(name)
+        assert body.mass[0] == pytest.approx(mass, rel=1e-9)
+        np.testing.assert_allclose(body.ipos, [centre, 0, 0], rtol=1e-9)
+        # the engine sorts principal axes
+        np.testing.assert_allclose(np.sort(body.inertia), np.sort(inertia), rtol=1e-7)
+
+
+def test_the_two_link_arm_obeys_the_textbook_equations():
+    """Inertia, Coriolis and weight of two links in a vertical plane, in closed form."""
+    (m1, c1, i1), (m2, c2, i2) = LINKS
+    a, g = 0.4, 9.81
+    q, v, acc = np.random.default_rng(9).uniform(-2.0, 2.0, (3, 20, 2))
+    cosine, sine = np.cos(q[:, 1]), np.sin(q[:, 1])
+    k = m2 * a * c2
+    own = i2[1] + m2 * c2**2
+    both = own + k * cosine
+    whole = i1[1] + m1 * c1**2 + m2 * a**2 + own + 2 * k * cosine
+    # positive angles lower the arm: weight pushes that way
+    reach = np.cos(q[:, 0] + q[:, 1])
+    weight2 = -m2 * g * c2 * reach
+    weight1 = weight2 - (m1 * c1 + m2 * a) * g * np.cos(q[:, 0])
+    expected = [
+        whole * acc[:, 0]
+        + both * acc[:, 1]
+        - k * sine * (2 * v[:, 0] * v[:, 1] + v[:, 1] ** 2)
+        + weight1,
+        both * acc[:, 0] + own * acc[:, 1] + k * sine * v[:, 0] ** 2 + weight2,
+    ]
+    got = RigidArm("two-link").torques(q, v, acc)
+    np.testing.assert_allclose(got, np.transpose(expected), atol=1e-6)
