@@ -33,8 +33,9 @@ class StderrProgress:
             return
         self._shown = now
         spent = now - self._start
-        left = spent / done * (total - done) if done else 0.0
-        tail = f"{spent:.1f} s" if last else f"{left:.0f} s left"
+        tail = f" {spent:.1f} s" if last else ""
+        if done and not last:
+            tail = f" {spent / done * (total - done):.0f} s left"
         end = "\n" if last or not live else ""
         start = "\r\x1b[K" if live else ""
-        print(f"{start}{stage}: {done}/{total} {tail}", end=end, file=sys.stderr)
+        print(f"{start}{stage}: {done}/{total}{tail}", end=end, file=sys.stderr)

@@ -111,6 +111,8 @@ def run_fe_cost(
     check_modelled(design)
     found: list[Found | None] = []
     outcomes = []
+    stage = f"{design.drive.name}: settings"
+    progress(stage, 0, len(settings))
     for k, setting in enumerate(settings):
         try:
             found.append(_solved(design, setting))
@@ -118,7 +120,7 @@ def run_fe_cost(
         except (ComputationError, DesignError) as failure:
             found.append(None)
             outcomes.append(str(failure))
-        progress(f"{design.drive.name}: settings", k + 1, len(settings))
+        progress(stage, k + 1, len(settings))
     best = found[-1]
     if best is None:
         raise ComputationError(f"the reference, {settings[-1].name}: {outcomes[-1]}")

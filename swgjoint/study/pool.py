@@ -31,9 +31,10 @@ def run_all(
         tasks: Put long ones first.
         jobs: Processes.
         stage: Name for the progress.
-        progress: Called after every task.
+        progress: Called first of all and after every task.
     """
     found: dict[int, Found] = {}
+    progress(stage, 0, len(tasks))
     if jobs == 1 or len(tasks) < 2:
         for k, task in enumerate(tasks):
             found[k] = function(task)

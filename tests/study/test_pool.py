@@ -22,7 +22,7 @@ def test_results_keep_the_order_of_the_tasks(jobs):
         progress=lambda *args: seen.append(args),
     )
     assert found == [3.0, 2.0, 1.0]
-    assert seen == [("roots", k, 3) for k in (1, 2, 3)]
+    assert seen == [("roots", k, 3) for k in (0, 1, 2, 3)]
 
 
 def test_an_error_ends_the_run():
