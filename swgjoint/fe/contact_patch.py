@@ -14,6 +14,8 @@ Force and displacement stay conjugate, so the energy balance holds exactly.
 
 from __future__ import annotations
 
+from math import ceil
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
@@ -28,7 +30,7 @@ FINENESS = 6
 QUADRATURE = 24
 
 
-def averaged_spline(stations: Array) -> CubicSpline:
+def averaged_spline(stations: Array, half: float | None = None) -> CubicSpline:
     """Weights of the flank nodes in the displacement averaged around an arc length.
 
     Beyond the ends of the flank its displacement goes on by odd reflection, so that
@@ -36,14 +38,16 @@ def averaged_spline(stations: Array) -> CubicSpline:
 
     Args:
         stations: Arc length of the nodes, equally spaced (n,) [m].
+        half: Half length a of the patch [m]; by default a part of the flank.
 
     Returns:
         Cubic spline with values of shape (n,).
     """
     nodal = CubicSpline(stations, np.eye(stations.size))
     first, last = float(stations[0]), float(stations[-1])
-    half = (last - first) / PATCH_PARTS
-    knots = np.linspace(first, last, PATCH_PARTS * FINENESS + 1)
+    parts = PATCH_PARTS if half is None else (last - first) / half
+    half = (last - first) / parts
+    knots = np.linspace(first, last, ceil(parts * FINENESS) + 1)
     x, weight = np.polynomial.legendre.leggauss(QUADRATURE)
     weight = weight * (1.0 - x**2) ** 3
     weight /= weight.sum()

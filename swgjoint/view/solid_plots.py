@@ -74,12 +74,12 @@ def contact_forces(ring: SolidRing, state: SolidState) -> tuple[Array, Array, Ar
     x = ring.masters(state).mean(axis=1)
     angle = np.arctan2(-x[:, 0], x[:, 1]) - state.wave_generator_angle
     angle = np.remainder(angle + 0.5 * np.pi, np.pi) - 0.5 * np.pi
-    flanks = np.zeros((sectors, planes))
-    if state.held is not None:
-        sector = state.held.contacts.sector
-        np.add.at(flanks, (sector, state.held.plane), state.tooth_force)
-    bore = state.pressure.reshape(sectors, planes, -1).sum(axis=2)
-    return angle, flanks, bore
+    teeth, first = ring.strip.teeth, ring.strip.flank_dofs
+    nodal = teeth.nodal_force(ring.loads(state))
+    by_side = nodal[:, :first].reshape(sectors, planes, 2, -1, 3).sum(axis=3)
+    flanks = np.linalg.norm(by_side, axis=3).sum(axis=2)
+    bore = np.linalg.norm(nodal[:, first:].reshape(sectors, planes, -1, 3), axis=3)
+    return angle, flanks, bore.sum(axis=2)
 
 
 def section_picture(run: SolidRun, state: SolidState) -> bytes:

@@ -197,7 +197,8 @@ def _forces(ring: SolidRing, state: SolidState, cup: QuarterCup) -> Array:
     """Nodal forces of the wave generator on the quarter (n, 3) [N]."""
     number = cup.numbers["teeth"][:, ring.strip.mesh.teeth.bore.ravel()]
     turn = ring.frames(state)[0].turn[: len(number)]
-    force = state.bore_force.reshape(ring.sectors, -1, 3)[: len(number)]
+    force = ring.strip.teeth.nodal_force(ring.loads(state))
+    force = force[: len(number), ring.strip.flank_dofs :].reshape(len(number), -1, 3)
     force = np.einsum("sij,spj->spi", turn, force)
     result = np.zeros_like(cup.points)
     there = number >= 0

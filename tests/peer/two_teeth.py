@@ -130,7 +130,8 @@ def two_teeth(
     frame = left @ right
     moved = (now - centres[1]) @ frame - (still - centres[0])
     moved = moved.reshape(2, -1, 3)
-    force = state.bore_force.reshape(ring.sectors, -1, 3)[both]
+    force = teeth.nodal_force(ring.loads(state))[both, ring.strip.flank_dofs :]
+    force = force.reshape(2, -1, 3)
     force = np.einsum("sij,spj->spi", frames.turn[both], force) @ frame
     spread = _spread(ring.strip.mesh, strip)
 

@@ -264,9 +264,9 @@ def condense(
         loads = ring.loads(state)
         flank = strip.flank_dofs
         through = found.weight @ strip.teeth.compliance[:flank]
-        p = bore.gap.shape[1]
-        at_bore = through[:, flank:].reshape(n, p, 3)
-        coupling = np.einsum("kpi,kpi->kp", at_bore, bore.normal[sector])
+        at_bore = through[:, flank:].reshape(n, -1, 3)
+        coupling = np.einsum("kbi,kbi->kb", at_bore, bore.normal[sector])
+        coupling = bore.with_vertices(coupling, sector)
         eased = np.einsum("kp,kpq->kq", coupling, bore.inverse[sector])
         rows[:, teeth_dofs] = found.rows - np.einsum(
             "kp,kpm->km", eased, bore.rows[sector]
@@ -345,13 +345,12 @@ def _advance(
     bore, masters = linear.bore, ring.strip.masters
     local = np.einsum("spp->sp", bore.compliance)
     wrong = np.where(bore.active, -step.pressure * local, -step.after)
-    bad = wrong > 1e-15
+    bad = bore.present & (wrong > 1e-15)
     if bad.any() and one_at_a_time:
-        bad = wrong == wrong.max()
+        bad &= wrong == wrong[bad].max()
     size, last = masters.face_size, masters.size - masters.face_size
     moved = damping * step.increment
     x = ring.masters(state) + moved.reshape(len(moved), -1, 3)
-    force = step.pressure[:, :, None] * bore.normal
     flank_force = np.zeros_like(state.flank_force)
     ring_force = np.zeros_like(state.ring_force)
     kept = None
@@ -365,8 +364,8 @@ def _advance(
         faces=x[:, :size],
         inside=x[:, size:last],
         pressure=step.pressure,
-        bore_force=force.reshape(len(force), -1),
-        touching=state.touching ^ bad,
+        bore_force=bore.nodal_force(step.pressure),
+        touching=bore.active ^ bad,
         flank_force=flank_force,
         ring_force=ring_force,
         held=kept,
@@ -397,12 +396,10 @@ def _finished(
     points = np.einsum(
         "sij,spj->spi", frames[0].turn, ring.bore_positions(frames[0], state)
     )
-    _, normal, _ = ring.wave_generator.gap(
-        points.reshape(-1, 3), state.wave_generator_angle
+    force = np.einsum(
+        "sij,spj->spi", frames[0].turn, state.bore_force.reshape(points.shape)
     )
-    arm = (points[..., 0].ravel() * normal[:, 1]) - points[..., 1].ravel() * normal[
-        :, 0
-    ]
+    moment = points[..., 0] * force[..., 1] - points[..., 1] * force[..., 0]
     teeth = 0.0 if state.held is None else float(state.tooth_force @ state.held.arm)
     # in one order in memory, so that a state read from a file goes on bit for bit
     return replace(
@@ -412,6 +409,6 @@ def _finished(
         outcome=outcome,
         history=tuple(history),
         energy=ring.copies * energy,
-        wave_generator_torque=ring.copies * float(state.pressure.ravel() @ arm),
+        wave_generator_torque=ring.copies * float(moment.sum()),
         tooth_moment=ring.copies * teeth,
     )

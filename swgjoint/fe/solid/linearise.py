@@ -1,7 +1,8 @@
 r"""Tangent of the ring with the wave generator's contact eliminated in every sector.
 
-Contact points of a sector touch each other and the masters through the compliance C of
-the toothed segment alone, so their forces are condensed sector by sector:
+Contact points of a sector, the bore nodes and a vertex in every line of them along the
+axis, touch each other and the masters through the compliance C of the toothed segment
+alone, so their forces are condensed sector by sector:
 
 .. math:: \lambda = -W^{-1}(g + B\,\delta q + D F), \quad W = n^T C n,
 
@@ -12,10 +13,13 @@ tooth forces. What remains is a ring of small matrices.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import inf
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from swgjoint.fe.solid.across import FLAT, WIDE, crown_bend, vertices
 from swgjoint.fe.solid.corotation import (
     Frames,
     in_global,
@@ -28,18 +32,29 @@ from swgjoint.fe.solid.ring import SolidRing
 from swgjoint.fe.solid.state import SolidState
 
 Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class BoreContact:
-    """Contact points on the bore at one state; p of them in each sector."""
+    """Contact points on the bore at one state; p of them in each sector.
+
+    These are the b bore nodes, plane after plane; after them the vertices of the gap
+    over the face width, one for every line of nodes along the axis; and the slopes of
+    the gap there, rows that hold while a vertex carries force and do no work at rest.
+    """
 
     gap: Array
     """(N, p) [m]."""
     normal: Array
-    """Gradient of the gap in the frames of the teeth (N, p, 3)."""
-    active: NDArray[np.bool_]
-    """(N, p)."""
+    """Gradient of the gap at the nodes in the frames of the teeth (N, b, 3)."""
+    vertex: Array
+    """Vertices and slopes there by the nodes (N, p - b, b)."""
+    present: Mask
+    """Which points can open and close (N, p)."""
+    active: Mask
+    """Which touch (N, p)."""
     rows: Array
     """B, by the masters of the teeth in the global frame (N, p, 3 m)."""
     free_gap: Array
@@ -48,6 +63,17 @@ class BoreContact:
     """W of all points (N, p, p) [m/N]."""
     inverse: Array
     """W^-1 of the active points, zero elsewhere (N, p, p) [N/m]."""
+
+    def with_vertices(self, nodal: Array, sector: Index) -> Array:
+        """Of all points, from that of the nodes, in given sectors (n, b) -> (n, p)."""
+        vertex = np.einsum("kvb,kb->kv", self.vertex[sector], nodal)
+        return np.concatenate([nodal, vertex], axis=1)
+
+    def nodal_force(self, pressure: Array) -> Array:
+        """In the frames of the teeth (N, 3 b) [N], from that of all points (N, p)."""
+        b = self.normal.shape[1]
+        size = pressure[:, :b] + np.einsum("svb,sv->sb", self.vertex, pressure[:, b:])
+        return np.asarray((size[..., None] * self.normal).reshape(len(size), -1))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -96,15 +122,17 @@ def bore_contact(ring: SolidRing, state: SolidState, frame: Frames) -> BoreConta
     """Contact points of all sectors."""
     teeth, first = ring.strip.teeth, ring.strip.flank_dofs
     n, p = state.touching.shape
+    b = len(ring.strip.bore)
     local = ring.bore_positions(frame, state)
     points = np.einsum("sij,spj->spi", frame.turn, local)
     gap, normal, _ = ring.wave_generator.gap(
         points.reshape(-1, 3), state.wave_generator_angle
     )
-    gap = gap.reshape(n, p)
-    normal = np.einsum("sji,spj->spi", frame.turn, normal.reshape(n, p, 3))
+    gap = gap.reshape(n, b)
+    normal = np.einsum("sji,spj->spi", frame.turn, normal.reshape(n, b, 3))
+    vertex, found, bend, covered = _vertices(ring, gap, state.touching[:, :b])
     # by masters in the frame: carried by the teeth, and turned with the frame
-    carry = teeth.loaded_from_masters[first:].reshape(p, 3, -1)
+    carry = teeth.loaded_from_masters[first:].reshape(b, 3, -1)
     carried = np.einsum("spi,pim->spm", normal, carry)
     m = frame.position.shape[1]
     middle = local - frame.centre[:, None] - teeth.position.mean(axis=0)
@@ -112,23 +140,80 @@ def bore_contact(ring: SolidRing, state: SolidState, frame: Frames) -> BoreConta
     s = -spin(frame.position).reshape(n, 3 * m, 3)
     turning -= np.einsum("spm,smw->spw", carried, s)
     rows = carried + np.einsum("spw,swm->spm", turning, frame.gradient)
-    rows = np.einsum("sij,spaj->spai", frame.turn, rows.reshape(n, p, m, 3))
-    compliance = teeth.compliance[first:, first:].reshape(p, 3, p, 3)
+    rows = np.einsum("sij,spaj->spai", frame.turn, rows.reshape(n, b, m, 3))
+    rows = rows.reshape(n, b, 3 * m)
+    compliance = teeth.compliance[first:, first:].reshape(b, 3, b, 3)
     seen = np.einsum("iajb,sjb->siaj", compliance, normal)
-    w = np.einsum("sia,siaj->sij", normal, seen)
+    nodal = np.einsum("sia,siaj->sij", normal, seen)
+    p = b + vertex.shape[1]
+    w = np.zeros((n, p, p))
+    w[:, :b, :b], w[:, b:, :b] = nodal, vertex @ nodal
+    w[:, :b, b:] = w[:, b:, :b].transpose(0, 2, 1)
+    w[:, b:, b:] = w[:, b:, :b] @ vertex.transpose(0, 2, 1)
+    lines = found.shape[1]
+    at, rolls = np.arange(b, b + lines), np.arange(b + lines, p)
+    present = np.ones((n, p), dtype=bool)
+    present[:, at], present[:, rolls] = found, False
+    present[:, :b] = ~covered
+    active = state.touching & present
+    active[:, rolls] = active[:, at] & (state.pressure[:, at] > 0.0)
+    loaded = np.where(active[:, rolls], state.pressure[:, at], 1.0)
+    w[:, rolls, rolls] += bend / loaded
     moved = ring.loads(state) @ teeth.compliance[:, first:]
-    old = np.einsum("spi,spi->sp", normal, moved.reshape(n, p, 3))
-    active = state.touching
+    free = gap - np.einsum("spi,spi->sp", normal, moved.reshape(n, b, 3))
     on = active[:, :, None] & active[:, None, :]
     size = np.mean(np.einsum("spp->sp", w))
     safe = np.where(on, w, 0.0) + np.where(active, 0.0, size)[:, :, None] * np.eye(p)
     inverse = np.where(on, np.linalg.inv(safe), 0.0)
+
+    def with_vertices(of_nodes: Array) -> Array:
+        return np.concatenate([of_nodes, vertex @ of_nodes], axis=1)
+
     return BoreContact(
-        gap=gap,
+        gap=with_vertices(gap[..., None])[..., 0],
         normal=normal,
+        vertex=vertex,
+        present=present,
         active=active,
-        rows=rows.reshape(n, p, 3 * m),
-        free_gap=gap - old,
+        rows=with_vertices(rows),
+        free_gap=with_vertices(free[..., None])[..., 0],
         compliance=w,
         inverse=inverse,
+    )
+
+
+def _vertices(
+    ring: SolidRing, gap: Array, touching: Mask
+) -> tuple[Array, Mask, Array, Mask]:
+    """Vertices of the gap along the axis, given which of the bore nodes touch.
+
+    Returns:
+        Weights of the bore nodes, of the vertices and of the slopes there (N, 2 L, b);
+        which of the L lines have a vertex, and its bend (N, L); for which of the nodes
+        vertices stand (N, b).
+    """
+    n, b = gap.shape
+    planes = ring.strip.planes
+    lines = b // planes
+    crown = crown_bend(ring.wave_generator.crowning, ring.strip.mesh.teeth.z)
+
+    def over(nodal: NDArray[Any]) -> NDArray[Any]:
+        return nodal.reshape(n, planes, lines).transpose(1, 0, 2).reshape(planes, -1)
+
+    # planes that share a contact keep it until it is clearly bent
+    wide = over(touching).sum(axis=0) > 1
+    flat = (
+        crown * FLAT * np.where(wide, WIDE, 1.0) if crown else np.full(len(wide), inf)
+    )
+    seen = vertices(over(gap), flat)
+    means = np.zeros((n, 2, lines, planes, lines))
+    line = np.arange(lines)
+    for k, weight in enumerate((seen.weight, seen.slope)):
+        spread = weight.reshape(planes, n, lines).transpose(2, 1, 0)
+        means[:, k, line, :, line] = spread
+    return (
+        means.reshape(n, 2 * lines, b),
+        seen.found.reshape(n, lines),
+        seen.bend.reshape(n, lines),
+        seen.covered.reshape(planes, n, lines).transpose(1, 0, 2).reshape(n, b),
     )

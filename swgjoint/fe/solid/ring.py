@@ -119,12 +119,13 @@ class SolidRing:
         moved[..., 2] += axial
         moved = np.einsum("ij,saj->sai", about_z(np.array(rotation)), moved)
         size, n_bore = strip.masters.face_size, len(strip.bore)
+        points = n_bore + 2 * (n_bore // strip.planes)
         last = strip.masters.size - size
         return SolidState(
             faces=moved[:, :size],
             inside=moved[:, size:last],
-            pressure=np.zeros((self.sectors, n_bore)),
-            touching=np.zeros((self.sectors, n_bore), dtype=bool),
+            pressure=np.zeros((self.sectors, points)),
+            touching=np.zeros((self.sectors, points), bool),
             bore_force=np.zeros((self.sectors, 3 * n_bore)),
             flank_force=np.zeros((self.sectors, strip.flank_dofs)),
             ring_force=np.zeros((self.teeth.ring_teeth, self.teeth.ring_dofs)),

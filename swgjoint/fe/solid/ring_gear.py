@@ -11,6 +11,7 @@ from scipy.sparse.linalg import splu
 
 from swgjoint.errors import DesignError
 from swgjoint.fe.block_circulant import between, respond
+from swgjoint.fe.solid.across import spread_over
 from swgjoint.fe.solid.corotation import about_z
 from swgjoint.fe.solid.elasticity import Solid, solid
 from swgjoint.fe.solid.ring_factor import RingFactor
@@ -33,7 +34,8 @@ class RingGear:
     """Response of the flanks to forces on them, by the offset of the teeth.
 
     Forces and displacements in x and y in the frames of the teeth, plane after plane,
-    right then left flank.
+    right then left flank; forces are spread over a part of the face width, and
+    displacements of the flanks averaged over it.
     """
 
     mesh: StripMesh
@@ -94,7 +96,8 @@ def ring_gear(design: Design, profile: ToothProfile, mesh: StripMesh) -> RingGea
         options={"SymmetricMode": True},
     )
     units = np.zeros((len(free), len(flank)))
-    units[np.searchsorted(free, flank), np.arange(len(flank))] = 1.0
+    spread = spread_over(teeth.z, 2 * teeth.flank.shape[1])
+    units[np.searchsorted(free, flank)] = spread.toarray()
     pull = matrix[free][:, boundary].toarray()
     solved = factor.solve(np.concatenate([-pull, units], axis=1))
     n = len(boundary)
@@ -119,6 +122,6 @@ def ring_gear(design: Design, profile: ToothProfile, mesh: StripMesh) -> RingGea
         mesh=mesh,
         body=body,
         offsets=offsets,
-        flank=nodal[:, flank],
+        flank=np.stack([spread.T @ part[flank] for part in nodal]),
         nodal=nodal,
     )

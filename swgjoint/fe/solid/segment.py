@@ -21,7 +21,7 @@ Index = NDArray[np.int64]
 class Segment:
     r"""One condensed segment in the frame of its tooth.
 
-    With d the displacements of its masters, F forces at the loaded degrees of freedom:
+    With d the displacements of its masters, F forces on the loaded surfaces:
 
     .. math:: u_b = A d + C F, \quad f = \hat K d - A^T F,
 
@@ -39,6 +39,8 @@ class Segment:
     """K hat [N/m]. Shape (3 n_m, 3 n_m)."""
     loaded: Index
     """Loaded degrees of freedom among those of the nodes (n_b,); none for a cup."""
+    spread: sparse.csr_matrix
+    """S, forces there of forces F; u_b are averages with it (n_b, n_b)."""
     loaded_from_masters: Array
     """A. Shape (n_b, 3 n_m)."""
     compliance: Array
@@ -50,12 +52,16 @@ class Segment:
     stress: sparse.csr_matrix
     """Stress at the nodes from their displacements (6 n_nodes, 3 n_nodes) [Pa/m]."""
 
+    def nodal_force(self, force: Array) -> Array:
+        """Forces S F at the loaded degrees of freedom (n, n_b) [N]."""
+        return np.asarray((self.spread @ force.T).T)
+
     def displacement(self, d: Array, force: Array | None = None) -> Array:
         """Displacement of all nodes (n, n_nodes, 3) [m].
 
         Args:
             d: Of the masters in n sectors (n, 3 n_m) [m].
-            force: At the loaded degrees of freedom (n, n_b) [N].
+            force: F on the loaded surfaces (n, n_b) [N].
         """
         u = d @ self.nodal.T
         if force is not None:
@@ -80,6 +86,7 @@ def condense_segment(
     youngs_modulus: float,
     poisson_ratio: float,
     loaded: Index | None = None,
+    spread: sparse.csr_matrix | None = None,
     held: Index | None = None,
 ) -> Segment:
     """Condense a segment, in real arithmetic, once per member.
@@ -91,10 +98,11 @@ def condense_segment(
         youngs_modulus: [Pa].
         poisson_ratio: [-].
         loaded: Degrees of freedom at which forces may act (n_b,).
+        spread: S of :class:`Segment`; by default forces act where they are.
         held: Nodes that do not move, beside the boundary.
     """
     body = solid(mesh.mesh, youngs_modulus, poisson_ratio)
-    return _condensed(mesh, body, masters, position, loaded, held)
+    return _condensed(mesh, body, masters, position, loaded, spread, held)
 
 
 def _condensed(
@@ -103,6 +111,7 @@ def _condensed(
     masters: SegmentMasters,
     position: Array,
     loaded: Index | None,
+    spread: sparse.csr_matrix | None,
     held: Index | None,
 ) -> Segment:
     def dofs(nodes: Index) -> Index:
@@ -114,6 +123,8 @@ def _condensed(
     free = np.setdiff1d(np.arange(size), fixed)
     follow = np.kron(masters.weight, np.eye(3))
     force_dofs = np.zeros(0, dtype=np.int64) if loaded is None else loaded
+    if spread is None:
+        spread = sparse.eye_array(len(force_dofs), format="csr")
     factor = splu(
         matrix[free][:, free].tocsc(),
         permc_spec="MMD_AT_PLUS_A",
@@ -121,7 +132,7 @@ def _condensed(
     )
     pull = matrix[free][:, boundary] @ follow
     units = np.zeros((len(free), len(force_dofs)))
-    units[np.searchsorted(free, force_dofs), np.arange(len(force_dofs))] = 1.0
+    units[np.searchsorted(free, force_dofs)] = spread.toarray()
     solved = factor.solve(np.concatenate([-pull, units], axis=1))
     n = follow.shape[1]
     nodal = np.zeros((size, n))
@@ -140,7 +151,7 @@ def _condensed(
         stiffness = strain @ stiffness @ strain
         carried = np.tile(np.eye(3), (size // 3, 1)) / np.sqrt(count)
         nodal += (carried - nodal @ move) @ move.T
-    compliance = nodal_from_force[force_dofs]
+    compliance = spread.T @ nodal_from_force[force_dofs]
     return Segment(
         name=mesh.name,
         mesh=mesh,
@@ -148,7 +159,8 @@ def _condensed(
         position=position[masters.masters],
         stiffness=stiffness,
         loaded=force_dofs,
-        loaded_from_masters=nodal[force_dofs],
+        spread=spread,
+        loaded_from_masters=spread.T @ nodal[force_dofs],
         compliance=0.5 * (compliance + compliance.T),
         nodal=nodal,
         nodal_from_force=nodal_from_force,

@@ -23,11 +23,13 @@ class SolidState:
     inside: Array
     """Masters inside the sectors (N, n_inside, 3) [m]."""
     pressure: Array
-    """Force of the wave generator per gradient of its gap (N, n_bore) [N]."""
+    """Force of the wave generator per gradient of its gap, at the bore nodes, at the
+    vertices of the gap over the face width and of the slopes there
+    (N, n_bore + 2 n_lines) [N]."""
     touching: Mask
-    """Which bore nodes touch it (N, n_bore)."""
+    """Which of these points touch it, shape of ``pressure``."""
     bore_force: Array
-    """The same forces in the frames of the teeth (N, 3 n_bore) [N]."""
+    """The same as nodal forces in the frames of the teeth (N, 3 n_bore) [N]."""
     flank_force: Array
     """Tooth forces as nodal forces in those frames (N, n_flank) [N]."""
     ring_force: Array

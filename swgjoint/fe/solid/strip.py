@@ -7,9 +7,11 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import sparse
 from scipy.interpolate import CubicSpline
 
 from swgjoint.fe.contact_patch import averaged_spline
+from swgjoint.fe.solid.across import spread_over
 from swgjoint.fe.solid.masters import Masters, Orders, strip_masters
 from swgjoint.fe.solid.segment import Segment, condense_segment
 from swgjoint.fe.solid.strip_mesh import StripMesh
@@ -25,7 +27,7 @@ class Strip:
     """One tooth sector of the flexspline, condensed; the teeth are the first segment.
 
     Forces act at flank nodes, plane after plane, right then left flank, and after them
-    at bore nodes, plane after plane.
+    at bore nodes, plane after plane, all of them spread over a part of the face width.
     """
 
     sectors: int
@@ -97,6 +99,13 @@ def flexspline(
     material = design.material_of("flexspline")
     flank, bore = mesh.teeth.flank.ravel(), mesh.teeth.bore.ravel()
     loaded = (3 * np.concatenate([flank, bore])[:, None] + np.arange(3)).ravel()
+    spread = sparse.block_diag(
+        [
+            spread_over(mesh.teeth.z, 3 * surface.shape[1])
+            for surface in (mesh.teeth.flank, mesh.teeth.bore)
+        ],
+        format="csr",
+    )
     segments = tuple(
         condense_segment(
             segment,
@@ -105,6 +114,7 @@ def flexspline(
             youngs_modulus=material.youngs_modulus,
             poisson_ratio=material.poisson_ratio,
             loaded=loaded if number == 0 else None,
+            spread=spread if number == 0 else None,
         )
         for number, (segment, follow) in enumerate(
             zip(mesh.segments, masters.segments, strict=True)

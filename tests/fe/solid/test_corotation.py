@@ -135,7 +135,7 @@ def test_condensed_segment_is_the_direct_solution(small_ring, small_design):
     free = np.setdiff1d(np.arange(n), fixed)
     u, force = np.zeros(n), np.zeros(n)
     u[fixed] = (follow.weight @ d.reshape(-1, 3)).ravel()
-    force[segment.loaded] = load
+    force[segment.loaded] = segment.nodal_force(load[None])[0]
     right = force[free] - body.stiffness[free][:, fixed] @ u[fixed]
     u[free] = spsolve(body.stiffness[free][:, free].tocsc(), right)
     found = segment.displacement(d[None], load[None])[0].ravel()

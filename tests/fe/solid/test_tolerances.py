@@ -334,8 +334,10 @@ def test_play_of_a_flawed_drive(small_design):
 def test_map_of_a_flawed_drive_with_play(small_design):
     """The map meets full solves that it has not seen; low orders are even."""
     design = with_play(small_design)
-    drive = fit_map(sample_map(design, model="3d", angles=4))
+    # four angles alias: teeth come into contact one after the other on coarse flanks
+    drive = fit_map(sample_map(design, model="3d", angles=8))
     assert drive.info["residual"]["relative_to_turn"] < 0.05
+    assert drive.info["energy_check"]["relative"] < 0.05
     assert drive.info["tolerances"]["free_positions"] == 42 * 4
     assert drive.info["label"]["tolerances"]["misalignment_arcmin"] == 1.0
     sizes = np.hypot(*drive.kinematic_error.T)
