@@ -19,7 +19,7 @@ from swgjoint.files import write_whole
 from swgjoint.json_text import json_text
 
 RUN = "run.json"
-SCHEMA = 3
+SCHEMA = 4
 
 
 @dataclass(frozen=True, kw_only=True)
