@@ -224,13 +224,21 @@ def notes(joints: dict[str, Any]) -> list[str]:
 
 
 def tool_line(tool: dict[str, Any]) -> str:
-    """Error of the tool in one line."""
-    if tool["path_rms_mm"] is None:
-        return ""
-    return (
-        f"tool against the commanded path: {tool['path_rms_mm']:.4f} mm rms,"
-        f" {tool['path_max_mm']:.4f} mm at most, {tool['ap_mm']:.4f} mm at the end"
-    )
+    """Errors of the tool in one line, those that the motion has."""
+    parts = []
+    if tool["path_rms_mm"] is not None:
+        parts.append(
+            f"against the commanded path {tool['path_rms_mm']:.4f} mm rms,"
+            f" {tool['path_max_mm']:.4f} mm at most"
+        )
+    if tool["rp_mm"] is not None:
+        parts.append(f"AP {tool['ap_mm']:.4f} mm, RP {tool['rp_mm']:.4f} mm")
+    elif tool["ap_mm"] is not None:
+        parts.append(f"{tool['ap_mm']:.4f} mm at the end")
+    for key, name in (("at_mm", "AT"), ("rt_mm", "RT")):
+        if tool.get(key) is not None:
+            parts.append(f"{name} {tool[key]:.4f} mm")
+    return f"tool: {', '.join(parts)}" if parts else ""
 
 
 def _drives_line(result: dict[str, Any]) -> str:

@@ -1,6 +1,7 @@
 """Figures of a run, defined once; keys and units are those of the JSON output.
 
-All joint figures are taken over the constant-speed part of the motion, at every step.
+Joint figures are taken over the constant-speed part of the motion, at every step; a
+motion without such a part (a chirp, a path of the tool) gives them over the motion.
 
 Torque ripple of the arm in motion: output torque of the drive, less the torque that
 the rigid arm needs at the same instant of the commanded motion (its weight changes
@@ -15,7 +16,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from swgjoint.sim.energy import joint_energy, run_energy
 from swgjoint.sim.orders import OrderLine, strongest_lines
+from swgjoint.sim.tool_metrics import joint_settling, tool_metrics
 from swgjoint.units import arcmin, mm, rpm
 
 if TYPE_CHECKING:
@@ -32,6 +35,7 @@ NOISE = 1e-6
 SLACK = 1.01
 """Ratings have two or three digits; a run at rated torque is within them."""
 RIPPLE_OF = "arm in motion, rigid-arm torque and straight line removed"
+NOT_STEADY = "whole motion, no speed is constant: no ripple alone, but dynamics too"
 
 
 def run_metrics(run: Run) -> dict[str, Any]:
@@ -40,7 +44,8 @@ def run_metrics(run: Run) -> dict[str, Any]:
         "joints": {name: joint_metrics(run, j) for j, name in enumerate(run.joints)},
         "tool": tool_metrics(run),
         "window_s": [float(t) for t in run.time[run.steady][[0, -1]]],
-        "ripple_of": RIPPLE_OF,
+        "ripple_of": RIPPLE_OF if _any_steady(run) else f"{RIPPLE_OF}; {NOT_STEADY}",
+        "energy": run_energy(run),
         "sub_steps": run.assembly.sub_steps,
         "steps_per_s": run.steps_per_second,
     }
@@ -90,7 +95,39 @@ def joint_metrics(run: Run, j: int) -> dict[str, Any]:
         "torsion_arcmin": spread(run.torsion[window, j] / arcmin),
         "input_turns": float(abs(angle[-1] - angle[0]) / (2.0 * np.pi)),
         "ratings": use_of_ratings(run, j),
+        "motor": use_of_motor(run, j),
+        "energy": joint_energy(run, j),
+        "settling": joint_settling(run, j),
     }
+
+
+def _any_steady(run: Run) -> bool:
+    """Whether a joint turns at constant speed, or none is commanded to move at all."""
+    path = run.assembly.trajectory
+    return bool(path.steady_velocity.any()) or not (
+        path.velocity.any() or path.answer_speed is not None
+    )
+
+
+def use_of_motor(run: Run, j: int) -> dict[str, Any]:
+    """Torque and current of one motor over the run, and how long it was at a limit."""
+    torque = run.motor_torque[:, j]
+    limits = run.assembly.loops.limits[j]
+    found: dict[str, Any] = {
+        "peak_Nm": float(np.abs(torque).max()),
+        "rms_Nm": float(np.sqrt(np.mean(torque**2))),
+    }
+    if limits is None:
+        return found
+    lacking = np.abs(run.wanted_torque[:, j] - torque)
+    step = run.assembly.scene.simulation.step_s
+    limit = 1e-9 * max(found["peak_Nm"], 1e-300)
+    found["at_limit_s"] = float(np.count_nonzero(lacking[1:] > limit) * step)
+    constant = limits.torque_constant_Nm_A
+    if constant is not None:
+        found["current_peak_A"] = found["peak_Nm"] / constant
+        found["current_rms_A"] = found["rms_Nm"] / constant
+    return found
 
 
 def torque_deviation(run: Run, j: int) -> Array:
@@ -237,26 +274,6 @@ def cubed_mean(torque: Array, speed: Array) -> float:
     """
     weight = np.abs(speed)
     return float(np.average(np.abs(torque) ** 3, weights=weight) ** (1.0 / 3.0))
-
-
-def tool_metrics(run: Run) -> dict[str, Any]:
-    """Errors of the tool against the commanded path; None where it cannot be told."""
-    if run.tool_position.shape[1] == 0:
-        return {
-            "ap_mm": None,
-            "rp_mm": None,
-            "path_rms_mm": None,
-            "missing": {"tool": "the arm has no such site"},
-        }
-    error = run.tool_error() / mm
-    return {
-        "ap_mm": float(error[-1]),
-        "rp_mm": None,
-        "path_rms_mm": float(np.sqrt(np.mean(error**2))),
-        "path_max_mm": float(error.max()),
-        "against": "commanded path; ap_mm at the last pose, approached once",
-        "missing": {"rp_mm": "repeatability needs repeated approaches of a pose"},
-    }
 
 
 def against_rigid(run: Run, rigid: Run) -> dict[str, float]:

@@ -64,6 +64,10 @@ class Run:
     """[N·m]. Shape (n, n_joints)."""
     wanted_torque: Array
     """What the controller asked the motors for, without limits [N·m]. Same shape."""
+    slipping_torque: Array
+    """Of the hysteresis, along the torsion [N·m]; 0 where there is none. Same shape."""
+    friction_torque: Array
+    """Of the wave generator against the flexspline [N·m]. Same shape."""
     tool_position: Array
     """Tool in the world [m]. Shape (n, 3), or (n, 0) where the arm has no tool."""
     tool_reference: Array
@@ -256,13 +260,15 @@ def _recorded(
     ideal = ratio * (rates - whole.prescribed_rate)
     slowing = np.diff(ideal, axis=0, prepend=ideal[:1])[:: whole.sub_steps] / whole.step
     output = ratio * (motor - assembly.rotor_inertia * slowing)
-    torsion, error = np.zeros_like(position), assembly.prescribed.copy()
+    torsion, slipping, friction = np.zeros((3, *position.shape))
+    error = assembly.prescribed.copy()
     for j in np.flatnonzero(flexible):
         got = assembly.transmissions[j].signals(
             theta[:, j], position[:, j], theta_rate[:, j], velocity[:, j]
         )
         torsion[:, j], error[:, j] = got.torsion, got.transmission_error
         output[:, j] = got.torque
+        slipping[:, j], friction[:, j] = got.slipping, got.friction
     return Run(
         name=name,
         assembly=assembly,
@@ -278,6 +284,8 @@ def _recorded(
         output_torque=output,
         motor_torque=motor,
         wanted_torque=wanted,
+        slipping_torque=slipping,
+        friction_torque=friction,
         tool_position=assembly.arm.tool_positions(position),
         tool_reference=assembly.arm.tool_positions(path.position),
         wall=wall,

@@ -18,6 +18,7 @@ from swgjoint.sim.scene_sections import (
     JointSection,
     Level,
     Load,
+    Metrics,
     Recording,
     Simulation,
 )
@@ -50,6 +51,7 @@ class Scene(Section):
     """Torques and forces that the controller does not know of."""
     simulation: Simulation
     recording: Recording = Recording()
+    metrics: Metrics = Metrics()
 
     _where: str = PrivateAttr(default="scene")
 

@@ -165,3 +165,12 @@ class Recording(Section):
 
     pose_rate_Hz: Annotated[float, Field(gt=0, le=10_000)] = 50.0
     """Rate of the body poses that the viewer shows."""
+
+
+class Metrics(Section):
+    """What the figures of a run refer to."""
+
+    settle_band_mm: Positive = 0.1
+    """Half width of the band about the last tool position that settling refers to."""
+    settle_band_arcmin: Positive = 1.0
+    """The same about the last angle of every joint."""

@@ -10,11 +10,21 @@ from numpy.typing import NDArray
 from swgjoint.joint.drive import JointDrive, JointSignals
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.friction import play_friction
-from swgjoint.maps.hysteresis import play_hysteresis
+from swgjoint.maps.hysteresis import play_hysteresis, stretches
 
 Array = NDArray[np.float64]
 
 _CHUNK = 1024  # samples at once: the coefficient table of a chunk stays in the cache
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PlayedSignals(JointSignals):
+    """Signals of a record, with the torques that have a history; shapes (n,)."""
+
+    slipping: Array
+    """Of the hysteresis, along the torsion [N·m]."""
+    friction: Array
+    """Of the wave generator against the flexspline [N·m]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -51,7 +61,7 @@ class Transmission:
 
     def signals(
         self, theta: Array, psi: Array, theta_rate: Array, psi_rate: Array
-    ) -> JointSignals:
+    ) -> PlayedSignals:
         """Torsion, transmission error and output torque of recorded states. (n,).
 
         The law at the true positions and velocities of each state; hysteresis and
@@ -68,11 +78,10 @@ class Transmission:
         ]
         torsion = np.concatenate([p.torsion for p in pieces])
         torque = np.concatenate([p.torque for p in pieces])
+        played, rubs = np.zeros((2, theta.size))
         elements = self.attached.elements
         if elements:
-            # as a run starts: native relaxed at zero torsion, full where it stands
-            first = torsion[0] if self.level == "full" else 0.0
-            played = play_hysteresis(elements, torsion - first)
+            played = play_hysteresis(elements, torsion - self._relaxed(torsion))
             slopes = [
                 self.attached.output_slope(theta[k : k + _CHUNK], psi[k : k + _CHUNK])
                 for k in range(0, theta.size, _CHUNK)
@@ -88,8 +97,29 @@ class Transmission:
                 torque / self.ratio,
             )
             torque = torque - by_psi * rubs
-        return JointSignals(
+        return PlayedSignals(
             torsion=torsion,
             transmission_error=np.concatenate([p.transmission_error for p in pieces]),
             torque=torque,
+            slipping=played,
+            friction=rubs,
         )
+
+    def held(self, torsion: Array) -> float:
+        """Change of the energy in the springs of the hysteresis over a record [J].
+
+        Args:
+            torsion: [rad]. Shape (n,).
+        """
+        total, torsion = 0.0, torsion - self._relaxed(torsion)
+        for element in self.attached.elements:
+            first, last = stretches(torsion, element.yield_torsion)[[0, -1]]
+            total += 0.5 * element.stiffness * float(last**2 - first**2)
+        return total
+
+    def _relaxed(self, torsion: Array) -> float:
+        """Torsion at which a run's hysteresis starts relaxed [rad].
+
+        ``native`` relaxed at zero torsion, ``full`` where it stands.
+        """
+        return float(torsion[0]) if self.level == "full" else 0.0
