@@ -117,7 +117,7 @@ def report(result: dict[str, Any]) -> str:
     """Table of the joints, error of the tool, what the model contains."""
     contains = result["contains"]
     lines = [
-        f"scene {result['scene']}, constant speed from"
+        f"scene {result['scene']}, {result['window_of']} from"
         f" {result['window_s'][0]:.3g} to {result['window_s'][1]:.3g} s",
         joint_table(result["joints"]),
         *notes(result["joints"]),
