@@ -40,6 +40,11 @@ def read_arm(path: Path) -> ArmFile:
     Raises:
         InputError: If the file is no arm, or joints of it cannot move on their own.
     """
+    if path.suffix.lower() == ".xacro":
+        raise InputError(
+            f"{path}: a template of a URDF; accepted: what 'xacro {path.name}' makes of"
+            " it, as a file ending .urdf"
+        )
     try:
         spec = mujoco.MjSpec.from_file(str(path))
     except ValueError as exc:

@@ -30,7 +30,7 @@ DURATION = 4.0
 
 def is_arm(reference: str) -> bool:
     """Whether a reference names an arm and no scene: a file or a bundled name."""
-    if Path(reference).suffix.lower() in (".xml", ".urdf"):
+    if Path(reference).suffix.lower() in (".xml", ".urdf", ".xacro"):
         return True
     return (
         not Path(reference).is_file()

@@ -35,7 +35,7 @@ ARM = """
           <joint name="elbow" ref="20" range="-100 100"/>
           <geom name="fore" type="mesh" mesh="link" mass="2"/>
           <body name="hand" pos=".3 0 0" childclass="wrist">
-            <joint name="wrist" axis="1 0 0"/>
+            <joint name="wrist" axis="1 0 0" stiffness="3" springref="10"/>
             <geom name="hand" type="box" size=".05 .02 .03" mass=".5"/>
             <site name="tool" pos=".05 0 0"/>
           </body>
@@ -141,7 +141,7 @@ def test_a_keyframe_means_the_same_pose(arm):
 
 
 def test_link_keeps_what_is_its_own(arm):
-    """Limits, damping and friction loss stay; armature is the rotor's alone."""
+    """Limits, damping, friction loss and spring stay; armature is the rotor's."""
     before = mujoco.MjModel.from_xml_path(arm)
     spec = mujoco.MjSpec.from_file(arm)
     drives = driven(spec)
@@ -149,11 +149,13 @@ def test_link_keeps_what_is_its_own(arm):
     for name in JOINTS:
         old, new = before.joint(name), model.joint(name)
         np.testing.assert_array_equal(new.range, old.range)
-        for part in ("damping", "frictionloss", "armature"):
+        for part in ("damping", "frictionloss", "stiffness", "armature"):
             kept = 0.0 if part == "armature" else getattr(old, part)
             np.testing.assert_array_equal(getattr(new, part), kept)
             rotor = getattr(model.joint(f"{name}_rotor"), part)
             np.testing.assert_array_equal(rotor, 0.0)
+        spring = model.qpos_spring[new.qposadr[0]]
+        assert spring == before.qpos_spring[old.qposadr[0]]
         assert drives[name].motors == (
             {"shoulder": "a", "elbow": "b", "wrist": "c"}[name],
         )
@@ -455,3 +457,44 @@ def test_two_arms_in_one_model_move_like_one(arm, angle, first, synthetic_map):
         np.testing.assert_allclose(there, single.joint(name).qpos, atol=1e-9)
         own = drives[name].observe(lone, single).torque
         assert drive.observe(model, data).torque == pytest.approx(own, abs=1e-6)
+
+
+URDF = """
+<robot name="two">
+  <link name="base"/>
+  <link name="mount"/>
+  <link name="upper"><inertial><mass value="2"/><origin xyz=".1 0 0"/>
+    <inertia ixx=".1" iyy=".1" izz=".1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <link name="flange"/>
+  <link name="fore"><inertial><mass value="1"/><origin xyz=".1 0 0"/>
+    <inertia ixx=".1" iyy=".1" izz=".1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+  <joint name="fixed" type="fixed"><parent link="base"/><child link="mount"/>
+    <origin xyz="0 .1 .3" rpy=".3 .2 .1"/></joint>
+  <joint name="lift" type="revolute"><parent link="mount"/><child link="upper"/>
+    <origin xyz="0 0 .2" rpy="0 .4 0"/><axis xyz="0 1 0"/>
+    <limit lower="-2" upper="2" effort="50"/></joint>
+  <joint name="stiff" type="fixed"><parent link="upper"/><child link="flange"/>
+    <origin xyz=".3 0 0" rpy="0 0 .5"/></joint>
+  <joint name="elbow" type="continuous"><parent link="flange"/><child link="fore"/>
+    <axis xyz="0 0 1"/></joint>
+</robot>
+"""
+
+
+@pytest.mark.parametrize("level", ["linear", "full"])
+def test_a_urdf_takes_drives_on_links_that_the_compiler_fuses(level):
+    """Rotors stand at their joints though links in between vanish; efforts go along."""
+    spec = mujoco.MjSpec.from_string(URDF)
+    drives = driven(spec, level, ("lift", "elbow"))
+    model = spec.compile()
+    names = {model.body(k).name for k in range(model.nbody)}
+    assert names == {"world", "upper", "lift_rotor", "fore", "elbow_rotor"}
+    data = at_rest(model, drives, [0.7, -0.3])
+    mujoco.mj_kinematics(model, data)
+    for name, drive in drives.items():
+        link, rotor = model.joint(name).id, model.joint(drive.rotor).id
+        np.testing.assert_allclose(data.xanchor[link], data.xanchor[rotor], atol=1e-12)
+        np.testing.assert_allclose(data.xaxis[link], data.xaxis[rotor], atol=1e-12)
+    limit = model.jnt_actfrcrange[model.joint("lift_rotor").id]
+    np.testing.assert_allclose(limit * abs(drives["lift"].ratio), [-50.0, 50.0])
+    assert model.nplugin == (2 if level == "full" else 0)

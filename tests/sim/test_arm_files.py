@@ -269,6 +269,14 @@ def test_an_arm_without_a_hinge_is_named(tmp_path, capsys):
     assert len(err.splitlines()) == 1
 
 
+def test_a_template_is_named(tmp_path, capsys):
+    """A xacro file says what makes a URDF of it."""
+    file = tmp_path / "arm.urdf.xacro"
+    file.write_text("<robot/>")
+    assert main(["run", str(file)]) == 2
+    assert "accepted: what 'xacro arm.urdf.xacro' makes" in capsys.readouterr().err
+
+
 def test_a_scene_names_a_urdf_beside_it(tmp_path, monkeypatch):
     """The path is relative to the scene file."""
     urdf(tmp_path)
