@@ -122,7 +122,7 @@ def report(result: dict[str, Any]) -> str:
         joint_table(result["joints"]),
         *notes(result["joints"]),
         tool_line(result["tool"]),
-        _drives_line(result) if result["drives_by_rule"] else "",
+        _drives_line(result) if result.get("drives_by_rule") else "",
         f"model: {contains['degrees_of_freedom']} degrees of freedom,"
         f" {contains['tendons']} tendons, {contains['plugin_instances']} plugin"
         f" instances, {contains['integrator']} at {1e3 * contains['step_s']:g} ms,"
