@@ -22,7 +22,7 @@ zero."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Pattern:
+class Pattern(Generic[AnyState]):
     """Equilibria over one pitch, torques of either sign."""
 
     torque: Array
@@ -35,6 +35,8 @@ class Pattern:
     are then added, see :func:`across_clearance`."""
     truncated: bool
     """Whether torques are left out at which a solve failed, and those beyond."""
+    states: dict[float, list[AnyState]]
+    """Solved positions by torque, those without torque included."""
     info: dict[str, Any]
     """How well the pattern repeats and is its own mirror image."""
 
@@ -49,7 +51,7 @@ def solve_pattern(
     rated: float,
     symmetric: bool,
     tick: Callable[[], None],
-) -> Pattern:
+) -> Pattern[AnyState]:
     """Solve all positions; the claims that the map rests on are checked at one torque.
 
     Args:
@@ -107,6 +109,7 @@ def solve_pattern(
         table=np.array([tables[t] for t in used]).swapaxes(0, 1),
         free=rows.free,
         truncated=len(rows.states) < len(torques),
+        states={0.0: [one.state for one in rows.rest]} | rows.states,
         info=info,
     )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from functools import partial
 from math import pi
 from typing import Any
 
@@ -12,9 +13,11 @@ from numpy.typing import NDArray
 from swgjoint.errors import ComputationError
 from swgjoint.fe.continuation import Continuation
 from swgjoint.fe.drive2d import can_halve, left_out, ring_model
-from swgjoint.fe.pattern import EVERY, solve_pattern
+from swgjoint.fe.pattern import EVERY, Pattern, solve_pattern
+from swgjoint.fe.shape_fields import drive_fields, plane_fields, plane_surface
 from swgjoint.fe.solid.continuation import SolidContinuation
 from swgjoint.fe.solid.drive3d import solid_ring
+from swgjoint.fe.solid.shape_fields import solid_fields, solid_surface
 from swgjoint.fe.tolerance_rest import SMALL
 from swgjoint.fe.tolerance_sampling import sample_tolerances
 from swgjoint.gear.design import Design
@@ -90,12 +93,17 @@ def sample_map(
     }
     try:
         # two calls: states in the plane and in space differ
+        found: Pattern[Any]
         if model == "3d":
             solid = _in_space(design)
             found = solve_pattern(solid, theta, period, torques, **settings)
+            surface = solid_surface(solid.ring)
+            shown = partial(solid_fields, solid.ring, surface=surface)
         else:
             plane = _in_plane(design)
             found = solve_pattern(plane, theta, period, torques, **settings)
+            surface = plane_surface(plane.model)
+            shown = partial(plane_fields, plane.model, surface=surface)
     except ComputationError as failure:
         raise ComputationError(f"{drive.name}: {failure}") from failure
     used = found.torque
@@ -140,6 +148,7 @@ def sample_map(
         input_torque=input_torque,
         tolerances=tolerances,
         free=found.free,
+        fields=drive_fields(design, found.states, shown, surface, symmetric=symmetric),
         info=found.info
         | {
             "design_hash": design.content_hash(),

@@ -27,6 +27,7 @@ from numpy.typing import ArrayLike, NDArray
 from swgjoint.arrays import frozen_array
 from swgjoint.errors import InputError
 from swgjoint.gear.kinematics import LAYOUTS, angle_coefficients, ratio
+from swgjoint.maps.fields import DriveFields
 from swgjoint.maps.friction import Friction
 from swgjoint.maps.hysteresis import MAX_ELEMENTS, Jenkin
 
@@ -79,6 +80,8 @@ class DriveMap:
     """Parallel elements that add to the torque along the torsion; none by default."""
     friction: Friction | None = None
     """Of the wave generator against the flexspline; None by default."""
+    fields: DriveFields | None = None
+    """Shape and stress of the flexspline, to be shown; none without finite elements."""
     info: Mapping[str, Any] = field(default_factory=dict)
     """Provenance and residuals, JSON values only."""
 

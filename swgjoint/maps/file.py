@@ -1,7 +1,8 @@
 """The ``.swg`` file: a drive map as an uncompressed npz with a JSON header.
 
-Members: ``header.npy`` (JSON text as bytes) and the arrays of
-:class:`~swgjoint.maps.drive_map.DriveMap`. The reader trusts nothing: no member is
+Members: ``header.npy`` (JSON text as bytes), the arrays of
+:class:`~swgjoint.maps.drive_map.DriveMap` and, where the map has them, those of its
+:class:`~swgjoint.maps.fields.DriveFields`. The reader trusts nothing: no member is
 compressed or pickled, sizes are checked against the bytes that are there before
 anything is allocated, and the map must be finite, increasing and continuous.
 """
@@ -31,13 +32,14 @@ from swgjoint.files import write_whole
 from swgjoint.json_text import json_text
 from swgjoint.maps.checks import check_map
 from swgjoint.maps.drive_map import DriveMap, Ratings
+from swgjoint.maps.fields import DriveFields
 from swgjoint.maps.friction import Friction
 from swgjoint.maps.hysteresis import Jenkin
 
-SCHEMA_VERSION = 3
-"""2 added ``hysteresis``, 3 ``friction`` and the ratcheting torque; an older map is
-read as one without."""
-_READABLE = (1, 2, SCHEMA_VERSION)
+SCHEMA_VERSION = 4
+"""2 added ``hysteresis``, 3 ``friction`` and the ratcheting torque, 4 fields to be
+shown; an older map is read as one without."""
+_READABLE = (1, 2, 3, SCHEMA_VERSION)
 MAX_BYTES = 64_000_000
 """A map with a thousand harmonics and a hundred knots is below 10 MB."""
 
@@ -47,6 +49,22 @@ _ARRAYS: dict[str, tuple[str, int, str]] = {
     "potential": ("<f8", 4, "J/rad^k"),
     "end_stiffness": ("<f8", 3, "N·m/rad"),
     "kinematic_error": ("<f8", 2, "rad"),
+}
+_FIELDS: dict[str, tuple[str, int, str]] = {
+    f"fields_{key}": (dtype, len(DriveFields.SHAPES[key]), unit)
+    for key, dtype, unit in (
+        ("torque", "<f8", "N·m"),
+        ("first_place", "<f8", "rad"),
+        ("points", "<f8", "m"),
+        ("triangles", "<i8", "nodes"),
+        # to be looked at: seven digits are enough
+        ("displacement", "<f4", "m"),
+        ("von_mises", "<f4", "Pa"),
+        ("tooth_force", "<f4", "N"),
+        ("wave_generator_force", "<f4", "N"),
+        ("wave_generator", "<f8", "m"),
+        ("circular_spline", "<f8", "m"),
+    )
 }
 _NPY = re.compile(
     rb"\x93NUMPY\x01\x00(?P<length>..)\{'descr': '(?P<dtype>[<|][fiuc][0-9]{1,2})', "
@@ -121,6 +139,7 @@ class Header(Section):
     ratings: RatingsHeader
     hysteresis: list[JenkinHeader] = Field(default_factory=list)
     friction: FrictionHeader | None = None
+    fields_period_rad: float | None = None
     info: dict[str, Any]
 
 
@@ -129,7 +148,7 @@ def map_bytes(drive: DriveMap) -> bytes:
     header = {
         "format": "swgjoint drive map",
         "schema_version": SCHEMA_VERSION,
-        "units": {key: unit for key, (_, _, unit) in _ARRAYS.items()}
+        "units": {key: unit for key, (_, _, unit) in (_ARRAYS | _FIELDS).items()}
         | {"ratings": "N·m"},
         "versions": {
             "swgjoint": __version__,
@@ -155,6 +174,7 @@ def map_bytes(drive: DriveMap) -> bytes:
             key: _plain(getattr(drive.friction, name))
             for key, name in _FRICTION.items()
         },
+        "fields_period_rad": drive.fields and float(drive.fields.period),
         "info": dict(drive.info),
     }
     text = json_text(header, indent=None).encode()
@@ -163,6 +183,13 @@ def map_bytes(drive: DriveMap) -> bytes:
         key: np.ascontiguousarray(getattr(drive, key), dtype=dtype)
         for key, (dtype, _, _) in _ARRAYS.items()
     }
+    if drive.fields is not None:
+        members |= {
+            key: np.ascontiguousarray(
+                getattr(drive.fields, key.removeprefix("fields_")), dtype=dtype
+            )
+            for key, (dtype, _, _) in _FIELDS.items()
+        }
     out = io.BytesIO()
     with zipfile.ZipFile(out, "w", zipfile.ZIP_STORED) as archive:
         for key, array in members.items():
@@ -214,10 +241,22 @@ def map_from_bytes(data: bytes, cls: type[Map]) -> Map:
     """
     members = _members(data)
     header = _header(members.pop("header"))
-    arrays = {
+    arrays: dict[str, Any] = {
         key: _array(members[key], key, dtype, ndim)
         for key, (dtype, ndim, _) in _ARRAYS.items()
     }
+    period, fields = header.fields_period_rad, None
+    if (period is None) != (len(members) == len(_ARRAYS)):
+        raise MapFileError(
+            f"fields_period_rad {period} with {len(members)} arrays; accepted: null"
+            " without fields, a number with them"
+        )
+    if period is not None:
+        shown: dict[str, Any] = {
+            key.removeprefix("fields_"): _array(members[key], key, dtype, ndim)
+            for key, (dtype, ndim, _) in _FIELDS.items()
+        }
+        fields = DriveFields(period=period, **shown)
     drive = cls(
         name=header.name,
         level=header.level,
@@ -234,6 +273,7 @@ def map_from_bytes(data: bytes, cls: type[Map]) -> Map:
             for element in header.hysteresis
         ),
         friction=_friction(header.friction),
+        fields=fields,
         info=header.info,
         **arrays,
     )
@@ -261,6 +301,7 @@ def _content(path: Path) -> bytes:
 def _members(data: bytes) -> dict[str, bytes]:
     """Bytes of every member of the archive, checked against its directory."""
     names = {f"{key}.npy" for key in ("header", *_ARRAYS)}
+    more = names | {f"{key}.npy" for key in _FIELDS}
     if len(data) < _END.size or not data.startswith(b"PK\x03\x04"):
         raise MapFileError(f"not a .swg file ({len(data)} bytes)")
     signature, disk, first, here, entries, size, _, comment = _END.unpack(
@@ -269,11 +310,11 @@ def _members(data: bytes) -> dict[str, bytes]:
     if signature != b"PK\x05\x06" or comment or disk or first or here != entries:
         raise MapFileError("truncated or damaged: no end of the archive")
     zip64 = data[-_END.size - 20 : -_END.size].startswith(b"PK\x06\x07")
-    if entries != len(names) or size > 4096 or zip64:
+    if entries not in (len(names), len(more)) or size > 4096 or zip64:
         raise MapFileError(f"{entries} members; accepted: {', '.join(sorted(names))}")
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         infos = archive.infolist()
-        if {info.filename for info in infos} != names:
+        if {info.filename for info in infos} not in (names, more):
             found = ", ".join(sorted(info.filename[:40] for info in infos))
             raise MapFileError(f"members {found}; needed {', '.join(sorted(names))}")
         for info in infos:

@@ -129,6 +129,7 @@ def fit_map(samples: MapSamples, *, keep: float = KEEP) -> DriveMap:
         kinematic_error=error_modes,
         ratings=samples.ratings,
         damping_ratio=samples.damping_ratio,
+        fields=samples.fields,
     )
     info = dict(samples.info)
     if toleranced is not None:

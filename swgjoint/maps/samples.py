@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from swgjoint.arrays import frozen_array
 from swgjoint.maps.drive_map import Ratings
+from swgjoint.maps.fields import DriveFields
 
 Array = NDArray[np.float64]
 
@@ -115,6 +116,8 @@ class MapSamples:
     free: bool = False
     """Whether clearance leaves the output free without torque. The torques next to zero
     are then no equilibria: they stand at the ends of the clearance."""
+    fields: DriveFields | None = None
+    """Of the flexspline with perfect teeth, to be shown."""
     info: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

@@ -111,7 +111,7 @@ def test_numpy_reads_the_file_without_pickle(synthetic_map, tmp_path):
         assert np.array_equal(arrays["potential"], synthetic_map.potential)
         header = json.loads(arrays["header"].tobytes())
     assert header["units"]["torsion_knots"] == "rad"
-    assert header["schema_version"] == 3
+    assert header["schema_version"] == 4
 
 
 def test_info_that_is_no_number_becomes_null(synthetic_map, tmp_path):
@@ -288,7 +288,7 @@ def hostile(data: bytes, kind: str, rng: np.random.Generator) -> bytes:
     name = str(rng.choice(sorted(header)))
     values = [float("1e400"), [], {"x": 1}, -7, "\x00" * 50, [[[]]] * 9, None, True]
     wrong = values[int(rng.integers(len(values)))]
-    if wrong is None and name == "friction":
+    if wrong is None and name in ("friction", "fields_period_rad"):
         wrong = 3
     if name in ("name", "level") and isinstance(wrong, str):
         wrong = 3  # any text is a name
@@ -320,7 +320,7 @@ def test_wrong_headers(synthetic_map, tmp_path):
     header = header_of(data)
     ratings = header["ratings"]
     cases = {
-        "schema version 4": {**header, "schema_version": 4},
+        "schema version 5": {**header, "schema_version": 5},
         "schema version 0": {**header, "schema_version": 0},
         "header: layout": {k: v for k, v in header.items() if k != "layout"},
         "unknown key": {**header, "code": "x"},
@@ -342,12 +342,17 @@ def test_wrong_headers(synthetic_map, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("version", "new"), [(1, {"hysteresis", "friction"}), (2, {"friction"})]
+    ("version", "new"),
+    [
+        (1, {"hysteresis", "friction", "fields_period_rad"}),
+        (2, {"friction", "fields_period_rad"}),
+        (3, {"fields_period_rad"}),
+    ],
 )
 def test_an_older_file_is_read_without_what_is_new(
     synthetic_map, tmp_path, version, new
 ):
-    """A map from before hysteresis, or friction and ratcheting, is read without."""
+    """A map from before hysteresis, friction and ratcheting, or fields, has none."""
     data = map_bytes(synthetic_map)
     header = {k: v for k, v in header_of(data).items() if k not in new}
     del header["ratings"]["ratcheting_torque"]

@@ -1,0 +1,67 @@
+"""Fields of solved positions in space for the map; see :mod:`swgjoint.fe.shape_fields`.
+
+The surface goes along the bore of the open edge, over the teeth at both edges of the
+face width, and down the outside of the cup, one row of nodes a section.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.fe.shape_fields import (
+    EVERY,
+    SectorFields,
+    Surface,
+    outline_rows,
+    surface_of,
+)
+from swgjoint.fe.solid.corotation import about_z
+from swgjoint.fe.solid.elasticity import stress_maxima
+from swgjoint.fe.solid.ring import SolidRing
+from swgjoint.fe.solid.state import SolidState
+from swgjoint.fe.solid.stress import flexspline_stresses
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+
+def solid_surface(ring: SolidRing) -> Surface:
+    """Outside of a sector, nodes of its segments numbered one after the other."""
+    strip = ring.strip.mesh
+    bore, outline = outline_rows(strip.teeth.plane)
+    open_edge, back = strip.teeth.nodes[0], strip.teeth.nodes[-1]
+    rows: list[Index] = [open_edge[bore], open_edge[outline], back[outline]]
+    first = 0
+    for segment in strip.segments:
+        if segment.end is not None:
+            rows.append(first + segment.end[::EVERY, 0])
+        first += segment.mesh.p.shape[1]
+    points = np.concatenate([np.asarray(s.mesh.p).T for s in strip.segments])
+    return surface_of(points, rows)
+
+
+def solid_fields(ring: SolidRing, state: SolidState, surface: Surface) -> SectorFields:
+    """An equilibrium in space."""
+    loads, frames = ring.loads(state), ring.frames(state)
+    # from where the teeth stood, undeformed and turned with the flexspline
+    stood = about_z(np.array(state.rotation)) @ ring.place
+    moved = []
+    for number, (segment, frame) in enumerate(
+        zip(ring.strip.segments, frames, strict=True)
+    ):
+        u = segment.displacement(frame.displacement, None if number else loads)
+        back = np.einsum("sji,sjk->sik", stood, frame.turn)
+        rest = np.asarray(segment.mesh.mesh.p).T
+        moved.append(np.einsum("sij,snj->sni", back, rest + u) - rest)
+    stress = flexspline_stresses(ring, state)
+    mises = [stress_maxima(stress[s.name])[2] for s in ring.strip.segments]
+    forces = ring.strip.teeth.nodal_force(loads).reshape(len(loads), -1, 3)
+    turned = np.einsum("sji,sjk,snk->sni", stood, frames[0].turn, forces)
+    first = ring.strip.flank_dofs // 3
+    return SectorFields(
+        displacement=np.concatenate(moved, axis=1)[:, surface.nodes],
+        von_mises=np.concatenate(mises, axis=1)[:, surface.nodes],
+        tooth_force=turned[:, :first].sum(axis=1),
+        wave_generator_force=turned[:, first:].sum(axis=1),
+    )
