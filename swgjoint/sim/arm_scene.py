@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -61,8 +62,11 @@ def scene_of_arm(
     Raises:
         InputError: If the arm cannot be used.
     """
-    arm = RigidArm(reference)
-    start, end = gentle_sweep(arm)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # the run says it
+        arm = RigidArm(reference)
+        start, end = gentle_sweep(arm)
+        by_rule = {} if drive else _by_rule(arm, start, end)
     data: dict[str, Any] = {
         "name": arm.path.stem,
         "description": f"Sweep of all joints of {arm.path.name}",
@@ -81,10 +85,9 @@ def scene_of_arm(
     if drive is not None:
         data["defaults"] |= {"drive": drive, "rotor_inertia_kgm2": _rotor(drive)}
     else:
-        names = _by_rule(arm, start, end)
         data["joints"] = {
             joint: {"drive": name, "rotor_inertia_kgm2": _rotor(name)}
-            for joint, name in names.items()
+            for joint, name in by_rule.items()
         }
     return Scene.from_data(data, where=f"scene of {reference}", overrides=overrides)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
 import mujoco
@@ -82,11 +83,22 @@ class RigidArm:
             velocity: [rad/s]. Shape (n, n_joints).
             acceleration: [rad/s²]. Shape (n, n_joints).
         """
-        data, out = self._data, np.empty_like(position)
+        data, out, touching = self._data, np.empty_like(position), ""
         for row, q, v, a in zip(out, position, velocity, acceleration, strict=True):
             data.qpos[:], data.qvel[:], data.qacc[:] = q, v, a
             mujoco.mj_inverse(self.model, data)
             row[:] = data.qfrc_inverse
+            if data.ncon and not touching:
+                bodies = self.model.geom_bodyid[data.contact.geom[0]]
+                names = sorted(self.model.body(b).name for b in bodies)
+                touching = " and ".join(map(repr, names))
+        if touching:
+            warnings.warn(
+                f"{self.path}: bodies {touching} touch on the commanded motion and push"
+                " each other; where that is not meant: an <exclude> of the pair, or"
+                " contype and conaffinity 0 for their geoms",
+                stacklevel=1,  # once, whoever asks
+            )
         return out
 
     def gravity(self, position: Array) -> Array:

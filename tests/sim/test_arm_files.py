@@ -193,8 +193,7 @@ def test_drives_by_rule_are_the_smallest_that_carry_the_arm(tmp_path):
         assert scene.of_joint(name).drive == fits[0]
     lift = scene.of_joint("shoulder_lift_joint")
     assert (lift.drive, lift.rotor_inertia_kgm2) == ("CSG-25-100", 8.26e-5)
-    with pytest.warns(UserWarning, match="finger"):
-        scene = scene_of_arm(urdf(tmp_path))
+    scene = scene_of_arm(urdf(tmp_path))
     assert scene.of_joint("lift").drive == "CSG-17-100"  # 60 of 70 N·m
     chosen = scene_of_arm("ur5e", drive="reference-2d")
     assert {chosen.of_joint(name).drive for name in arm.joints} == {"reference-2d"}
@@ -205,17 +204,20 @@ def test_run_takes_an_arm_and_leaves_its_scene(tmp_path, capsys):
     file = urdf(tmp_path)
     set_drive = ["--set", "joints.elbow.drive=CSG-20-100", "--set", "tool_site=hand"]
     out = tmp_path / "out"
+    arguments = ["run", file, "--drive", "CSG-17-100", *set_drive, *QUICK]
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        arguments = ["run", file, "--drive", "CSG-17-100", *set_drive, *QUICK]
+        warnings.simplefilter("default")
         assert main([*arguments, "--out", str(out), "--json"]) == 0
-        result = json.loads(capsys.readouterr().out)
-        names = {k: v["drive"] for k, v in result["contains"]["joints"].items()}
-        assert names == {"lift": "CSG-17-100", "elbow": "CSG-20-100"}
-        assert [Path(f).name for f in result["files"]] == ["run.rrd", "scene.toml"]
-        assert result["tool"]["path_rms_mm"] > 0
+        first = capsys.readouterr()
         assert main(["run", str(out / "scene.toml"), "--json"]) == 0
         again = json.loads(capsys.readouterr().out)
+    result = json.loads(first.out)
+    assert first.err.count("held at the reference position") == 1
+    names = {k: v["drive"] for k, v in result["contains"]["joints"].items()}
+    assert names == {"lift": "CSG-17-100", "elbow": "CSG-20-100"}
+    assert [Path(f).name for f in result["files"]] == ["run.rrd", "scene.toml"]
+    assert result["arm"]["held"] == {"finger": "slide"}
+    assert result["tool"]["path_rms_mm"] > 0
     assert again["joints"] == result["joints"]
     assert again["tool"] == result["tool"]
 
@@ -273,6 +275,17 @@ def test_an_arm_without_a_hinge_is_named(tmp_path, capsys):
     err = capsys.readouterr().err
     assert "no hinge joint (lift is a slide); a drive needs one" in err
     assert len(err.splitlines()) == 1
+
+
+def test_shapes_that_push_each_other_are_named(tmp_path):
+    """Overlapping bodies of an MJCF arm give one line; neighbours may overlap."""
+    hand = '<body name="hand" pos="-.3 0 0"><joint/><geom size=".08"/></body>'
+    arm = RigidArm(own(tmp_path, more=hand))
+    zero = np.zeros((3, 3))
+    with pytest.warns(UserWarning, match="'hand' and 'upper' touch.*<exclude>") as got:
+        arm.gravity(zero)
+    assert len(got) == 1
+    RigidArm(own(tmp_path)).gravity(zero[:, :2])
 
 
 def test_a_template_is_named(tmp_path, capsys):
