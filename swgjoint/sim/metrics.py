@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.sim.energy import joint_energy, run_energy
-from swgjoint.sim.orders import OrderLine, strongest_lines
+from swgjoint.sim.orders import OrderLine, resample, strongest_lines
 from swgjoint.sim.tool_metrics import joint_settling, tool_metrics
 from swgjoint.units import arcmin, mm, rpm
 
@@ -64,6 +64,7 @@ def joint_metrics(run: Run, j: int) -> dict[str, Any]:
     error = run.transmission_error[window, j] / arcmin
     lines = _lines(angle, ripple, highest, floor=NOISE * rated)
     error_lines = _lines(angle, error, highest, floor=NOISE)
+    untold = orders_untold(angle, highest)
     return {
         "level": transmission.level,
         "drive": drive.name,
@@ -100,7 +101,17 @@ def joint_metrics(run: Run, j: int) -> dict[str, Any]:
         "motor": use_of_motor(run, j),
         "energy": joint_energy(run, j),
         "settling": joint_settling(run, j),
+        **({} if untold is None else {"missing": {"orders": untold}}),
     }
+
+
+def orders_untold(angle: Array, highest: float | None) -> str | None:
+    """Why a record has no orders per input turn; None where it has."""
+    if highest is None:
+        return "the joint has no constant speed"
+    if resample(angle, angle) is None:
+        return "the input turns less than half a turn, or to and fro"
+    return None
 
 
 def _any_steady(run: Run) -> bool:

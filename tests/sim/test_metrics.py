@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 
 from swgjoint.maps.drive_map import DriveMap
-from swgjoint.sim.metrics import against_rigid, cubed_mean, spread, torque_ripple
+from swgjoint.sim.metrics import (
+    against_rigid,
+    cubed_mean,
+    orders_untold,
+    spread,
+    torque_ripple,
+)
 from swgjoint.sim.run import run_scene
 from swgjoint.units import arcmin
 
@@ -81,6 +87,19 @@ def test_a_too_fast_sweep_reports_the_tooth_order_and_shows_no_false_line(
         products = [abs(a + b) for a in kept for b in (*kept, *(-k for k in kept), 0.0)]
         assert min(abs(line["order"] - n) for n in products) < 0.3
     assert any("122" in item["part"] for item in run.contains["left_out"])
+
+
+def test_orders_that_cannot_be_told_say_why(bench):
+    """A joint at rest has no speed; one that goes to and fro has no angle to count."""
+    still = bench(LINEAR, trajectory__speed_deg_s__joint=0.0).metrics()
+    joint = still["joints"]["joint"]
+    assert joint["orders"] == []
+    assert joint["missing"]["orders"] == "the joint has no constant speed"
+    t = np.linspace(0.0, 60.0, 4001)
+    assert orders_untold(np.sin(t), 10.0).endswith("or to and fro")
+    assert orders_untold(t, 10.0) is None
+    turned = bench(LINEAR, simulation__duration_s=2.0).metrics()
+    assert "missing" not in turned["joints"]["joint"]
 
 
 def test_weight_is_no_ripple():
