@@ -7,7 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from swgjoint.sim.metrics import strongest_left_out, torque_deviation
+from swgjoint.sim.metrics import (
+    highest_resolved_order,
+    strongest_left_out,
+    torque_deviation,
+)
+from swgjoint.view.joint_pictures import WIDTH, phase_scales
 
 if TYPE_CHECKING:
     from swgjoint.sim.run import Run
@@ -29,28 +34,41 @@ def blueprint_of(runs: Mapping[str, Run]) -> Any:
         paths = [f"{prefixes[label]}joint/{joint}/{signal}" for label in labels]
         return _plot(title, paths)
 
-    tabs = [
-        rrb.Vertical(
-            rrb.Horizontal(
-                plot(joint, "torsion [arcmin]", "torsion_arcmin", flexible),
-                plot(
-                    joint,
-                    "transmission error [arcmin]",
-                    "transmission_error_arcmin",
-                    flexible,
-                ),
-            ),
+    bounds = rrb.VisualBounds2D(
+        x_range=[-1.2 * WIDTH, 1.35 * WIDTH], y_range=[-1.2, 1.2]
+    )
+    tabs = []
+    for joint in joints_by_interest(runs):
+        j = first.joints.index(joint)
+        pictures = []
+        if any(highest_resolved_order(run, j) for run in runs.values()):
+            bars = [
+                f"{prefixes[label]}joint/{joint}/ripple_orders" for label in flexible
+            ]
+            title = "ripple by order per input turn [% of rated]"
+            pictures.append(
+                rrb.BarChartView(name=title, contents=[f"+ {path}" for path in bars])
+            )
+        if phase_scales(runs, j) is not None:
+            pictures.append(
+                rrb.Spatial2DView(
+                    name="torque against torsion",
+                    origin=f"/phase/{joint}",
+                    contents="$origin/**",
+                    visual_bounds=bounds,
+                )
+            )
+        error = "transmission error [arcmin]"
+        rest = "torque less that of the rigid arm [N·m]"
+        views = [
+            plot(joint, "torsion [arcmin]", "torsion_arcmin", flexible),
+            plot(joint, error, "transmission_error_arcmin", flexible),
             plot(joint, "output torque [N·m]", "output_torque_Nm", runs),
-            plot(
-                joint,
-                "output torque less that of the rigid arm [N·m]",
-                "torque_deviation_Nm",
-                flexible,
-            ),
-            name=joint.removesuffix("_joint"),
-        )
-        for joint in joints_by_interest(runs)
-    ]
+            plot(joint, rest, "torque_deviation_Nm", flexible),
+            *pictures,
+        ]
+        name = joint.removesuffix("_joint")
+        tabs.append(rrb.Grid(*views, grid_columns=2, name=name))
     right: list[Any] = [rrb.Tabs(*tabs, active_tab=0)]
     if first.tool_position.shape[1]:
         paths = [f"{prefixes[label]}tool/error_mm" for label in flexible]
@@ -64,8 +82,8 @@ def blueprint_of(runs: Mapping[str, Run]) -> Any:
                 line_grid=True,
                 background=[30, 33, 38],
             ),
-            rrb.Vertical(*right, row_shares=[3.2, 1.0][: len(right)]),
-            column_shares=[1.0, 1.25],
+            rrb.Vertical(*right, row_shares=[4.0, 1.0][: len(right)]),
+            column_shares=[1.0, 1.6],
         ),
         rrb.TimePanel(state="collapsed", timeline="time"),
         rrb.SelectionPanel(state="hidden"),

@@ -5,6 +5,7 @@ Entity paths, below ``<run>/`` where a recording holds several runs:
 =====================================  ============================================
 ``arm/<body>``                         pose in the world, at the scene's pose rate
 ``arm/<body>/<geom>``                  shape, once
+``arm/<body>/drive/<joint>``           disc, coloured by the use of the rating
 ``tool/path``                          commanded path of the tool, once
 ``joint/<joint>/output_torque_Nm``     torque of the drive on the link
 ``joint/<joint>/torque_deviation_Nm``  the same less that of the rigid arm
@@ -13,11 +14,13 @@ Entity paths, below ``<run>/`` where a recording holds several runs:
 ``joint/<joint>/transmission_error_arcmin``
 ``joint/<joint>/position_deg``         link
 ``joint/<joint>/reference_deg``        commanded
+``joint/<joint>/ripple_orders``        bars over the order per input turn, once
 ``tool/error_mm``                      distance from the commanded path, or from the
                                        rigid arm where the recording holds its run
 =====================================  ============================================
 
-Signals are at every step, on the timeline ``time``.
+Signals are at every step, on the timeline ``time``. Torque against torsion lies at
+``phase/<joint>/<run>``, beside the runs: scaled to a picture, with a point that moves.
 """
 
 from __future__ import annotations
@@ -35,7 +38,17 @@ from numpy.typing import NDArray
 from swgjoint.sim.metrics import torque_deviation
 from swgjoint.units import arcmin, deg, mm
 from swgjoint.view.blueprint import SPACING, blueprint_of
+from swgjoint.view.drive_markers import log_drives, send_loads
 from swgjoint.view.geometry import quaternion_xyzw, shape_of
+from swgjoint.view.joint_pictures import (
+    log_phase_frame,
+    log_phase_path,
+    phase_path,
+    phase_points,
+    phase_scales,
+    ripple_bars,
+    send_phase,
+)
 
 if TYPE_CHECKING:
     from swgjoint.sim.run import Run
@@ -46,6 +59,16 @@ TIMELINE = "time"
 COLORS = ((31, 119, 180), (214, 96, 30), (110, 110, 110), (44, 140, 70))
 """One for each run, in pictures too."""
 LABEL_COLOR = (250, 250, 250)
+SIGNALS = (
+    "output_torque_Nm",
+    "torque_deviation_Nm",
+    "motor_torque_Nm",
+    "torsion_arcmin",
+    "transmission_error_arcmin",
+    "position_deg",
+    "reference_deg",
+)
+"""Of a joint, as :func:`signals_of` has them."""
 
 
 def write_recording(
@@ -69,11 +92,9 @@ def write_recording(
     os.close(handle)
     beside = Path(name)
     try:
-        first = next(iter(runs.values()))
-        stream = rr.RecordingStream(f"swgjoint {first.assembly.scene.name}")
+        stream = rr.RecordingStream(stream_name(runs))
         stream.save(beside, default_blueprint=blueprint_of(runs))
-        for k, (label, run) in enumerate(runs.items()):
-            _log_run(stream, label, run, k, len(runs), rigid)
+        log_runs(stream, runs, rigid=rigid)
         stream.flush()
         stream.disconnect()
         beside.chmod(0o644)
@@ -82,6 +103,19 @@ def write_recording(
         with contextlib.suppress(FileNotFoundError):
             beside.unlink()
     return path
+
+
+def stream_name(runs: Mapping[str, Run]) -> str:
+    """What the viewer calls a recording of these runs."""
+    first = next(iter(runs.values()))
+    return f"swgjoint {first.assembly.scene.name}"
+
+
+def log_runs(stream: Any, runs: Mapping[str, Run], *, rigid: Run | None = None) -> None:
+    """Send the runs into a recording that is open; see :func:`write_recording`."""
+    # the bulk first: the viewer's library encodes it while the rest is put together
+    log_moving(stream, runs, rigid=rigid)
+    log_still(stream, runs)
 
 
 def signals_of(run: Run, j: int) -> dict[str, Array]:
@@ -97,47 +131,105 @@ def signals_of(run: Run, j: int) -> dict[str, Array]:
     }
 
 
-def _log_run(
-    stream: Any, label: str, run: Run, k: int, count: int, rigid: Run | None
-) -> None:
+def log_still(stream: Any, runs: Mapping[str, Run]) -> None:
+    """What does not change: shapes, paths, spectra, style of the lines."""
     import rerun as rr
 
-    prefix = f"{label}/" if label else ""
-    color = COLORS[k % len(COLORS)]
-    if count > 1:
-        # side by side: their differences are far below what an overlay could show
-        place = [0.0, SPACING * (0.5 * (count - 1) - k), 0.0]
-        stream.log(label, rr.Transform3D(translation=place), static=True)
-        stream.log(
-            f"{prefix}label",
-            rr.Points3D(
-                [[0.0, 0.0, -0.06]],
-                radii=[0.001],
-                labels=[label],
-                colors=[LABEL_COLOR],
-                show_labels=True,
-            ),
-            static=True,
-        )
-    _log_arm(stream, prefix, run, color)
-    for j, joint in enumerate(run.joints):
-        for name, values in signals_of(run, j).items():
-            path = f"{prefix}joint/{joint}/{name}"
-            _send_scalars(stream, path, run.time, values, label or name, color)
-    if run.tool_position.shape[1]:
-        error = run.tool_error(rigid) / mm
-        path = f"{prefix}tool/error_mm"
-        _send_scalars(stream, path, run.time, error, label or "error_mm", color)
+    first = next(iter(runs.values()))
+    scales = {name: phase_scales(runs, j) for j, name in enumerate(first.joints)}
+    for joint, of_joint in scales.items():
+        if of_joint is not None:
+            log_phase_frame(stream, joint, of_joint)
+    for k, (label, run) in enumerate(runs.items()):
+        prefix, color = prefix_of(label), color_of_run(k)
+        if len(runs) > 1:
+            # side by side: their differences are far below what an overlay could show
+            place = [0.0, SPACING * (0.5 * (len(runs) - 1) - k), 0.0]
+            stream.log(label, rr.Transform3D(translation=place), static=True)
+            stream.log(
+                f"{prefix}label",
+                rr.Points3D(
+                    [[0.0, 0.0, -0.06]],
+                    radii=[0.001],
+                    labels=[label],
+                    colors=[LABEL_COLOR],
+                    show_labels=True,
+                ),
+                static=True,
+            )
+        _log_shapes(stream, prefix, run, color)
+        for j, joint in enumerate(run.joints):
+            for name in SIGNALS:
+                _log_style(
+                    stream, f"{prefix}joint/{joint}/{name}", label or name, color
+                )
+            bars = ripple_bars(run, j)
+            if bars is not None:
+                stream.log(
+                    f"{prefix}joint/{joint}/ripple_orders",
+                    rr.BarChart(bars[1], abscissa=bars[0], color=color),
+                    static=True,
+                )
+            if (of_joint := scales[joint]) is not None:
+                path = phase_path(joint, label)
+                log_phase_path(stream, path, phase_points(run, j, of_joint), color)
+        if run.tool_position.shape[1]:
+            _log_style(stream, f"{prefix}tool/error_mm", label or "error_mm", color)
 
 
-def _send_scalars(
+def log_moving(
     stream: Any,
-    path: str,
-    time: Array,
-    values: Array,
-    name: str,
-    color: tuple[int, int, int],
+    runs: Mapping[str, Run],
+    *,
+    rigid: Run | None = None,
+    part: slice = slice(None),
 ) -> None:
+    """What changes with time: signals, poses, loads of the drives.
+
+    Args:
+        stream: The recording.
+        runs: Runs by name.
+        rigid: See :func:`write_recording`.
+        part: Samples that are sent, all by default.
+    """
+    import rerun as rr
+
+    first = next(iter(runs.values()))
+    time = rr.TimeColumn(TIMELINE, duration=first.time[part])
+    inside = np.zeros(first.time.size, dtype=bool)
+    inside[part] = True
+    rows = np.array([row for row in pose_rows(first) if inside[row]], dtype=np.intp)
+    at_rows = rr.TimeColumn(TIMELINE, duration=first.time[rows])
+    for label, run in runs.items():
+        prefix = prefix_of(label)
+        if rows.size:
+            _send_poses(stream, prefix, run, at_rows, rows)
+            send_loads(stream, prefix, run, at_rows, rows)
+        for j, joint in enumerate(run.joints):
+            for name, values in signals_of(run, j).items():
+                _send_scalars(
+                    stream, f"{prefix}joint/{joint}/{name}", time, values[part]
+                )
+            scales = phase_scales(runs, j)
+            if scales is not None and rows.size:
+                points = phase_points(run, j, scales)[rows]
+                send_phase(stream, phase_path(joint, label), points, at_rows)
+        if run.tool_position.shape[1]:
+            error = run.tool_error(rigid)[part] / mm
+            _send_scalars(stream, f"{prefix}tool/error_mm", time, error)
+
+
+def prefix_of(label: str) -> str:
+    """Path of a run, with a slash at its end; empty for a lone run."""
+    return f"{label}/" if label else ""
+
+
+def color_of_run(k: int) -> tuple[int, int, int]:
+    """Colour of the run of this number."""
+    return COLORS[k % len(COLORS)]
+
+
+def _log_style(stream: Any, path: str, name: str, color: tuple[int, int, int]) -> None:
     import rerun as rr
 
     line = rr.SeriesLines(
@@ -148,53 +240,60 @@ def _send_scalars(
         aggregation_policy=rr.components.AggregationPolicy.MinMax,
     )
     stream.log(path, line, static=True)
-    stream.send_columns(
-        path,
-        indexes=[rr.TimeColumn(TIMELINE, duration=time)],
-        columns=rr.Scalars.columns(scalars=values),
-    )
 
 
-def _log_arm(stream: Any, prefix: str, run: Run, color: tuple[int, int, int]) -> None:
-    """Shapes once, body poses over time, path of the tool."""
+def _send_scalars(stream: Any, path: str, time: Any, values: Array) -> None:
     import rerun as rr
 
-    arm, model = run.assembly.arm, run.assembly.arm.model
+    columns = rr.Scalars.columns(scalars=values)
+    stream.send_columns(path, indexes=[time], columns=columns)
+
+
+def _log_shapes(
+    stream: Any, prefix: str, run: Run, color: tuple[int, int, int]
+) -> None:
+    """Shapes of the arm and its drives, path of the tool."""
+    import rerun as rr
+
+    model = run.assembly.arm.model
     for geom in range(model.ngeom):
         shape = shape_of(model, geom)
         if shape is None:
             continue
         body = model.body(model.geom_bodyid[geom]).name
         path = f"{prefix}arm/{body}/{model.geom(geom).name or geom}"
-        stream.log(path, shape, static=True)
+        place = rr.Transform3D(
+            translation=model.geom_pos[geom],
+            quaternion=quaternion_xyzw(model.geom_quat[geom]),
+        )
+        stream.log(path, shape, place, static=True)
+    log_drives(stream, prefix, run)
+    if run.tool_reference.shape[1]:
+        commanded = run.tool_reference[pose_rows(run)]
         stream.log(
-            path,
-            rr.Transform3D(
-                translation=model.geom_pos[geom],
-                quaternion=quaternion_xyzw(model.geom_quat[geom]),
-            ),
+            f"{prefix}tool/path",
+            rr.LineStrips3D([commanded], colors=[color], radii=[0.0025]),
             static=True,
         )
-    rows = pose_rows(run)
+
+
+def _send_poses(
+    stream: Any, prefix: str, run: Run, time: Any, rows: NDArray[np.intp]
+) -> None:
+    """Poses of the bodies at some samples; those fixed to the world are static."""
+    import rerun as rr
+
+    arm, model = run.assembly.arm, run.assembly.arm.model
     places, turns = arm.body_poses(run.position[rows])
     for body in range(1, model.nbody):
         path = f"{prefix}arm/{model.body(body).name}"
         place, turn = places[:, body], quaternion_xyzw(turns[:, body])
-        if model.body_weldid[body] == 0:  # fixed to the world
+        if model.body_weldid[body] == 0:
             pose = rr.Transform3D(translation=place[0], quaternion=turn[0])
             stream.log(path, pose, static=True)
             continue
-        stream.send_columns(
-            path,
-            indexes=[rr.TimeColumn(TIMELINE, duration=run.time[rows])],
-            columns=rr.Transform3D.columns(translation=place, quaternion=turn),
-        )
-    if run.tool_reference.shape[1]:
-        stream.log(
-            f"{prefix}tool/path",
-            rr.LineStrips3D([run.tool_reference[rows]], colors=[color], radii=[0.0025]),
-            static=True,
-        )
+        columns = rr.Transform3D.columns(translation=place, quaternion=turn)
+        stream.send_columns(path, indexes=[time], columns=columns)
 
 
 def pose_rows(run: Run) -> NDArray[np.intp]:

@@ -98,7 +98,7 @@ def test_a_recording_is_written_whole_or_not_at_all(run, tmp_path, monkeypatch):
     def fail(*_: object) -> None:
         raise RuntimeError("no pose")
 
-    monkeypatch.setattr("swgjoint.view.recording._log_arm", fail)
+    monkeypatch.setattr("swgjoint.view.recording._send_poses", fail)
     with pytest.raises(RuntimeError, match="no pose"):
         run.to_rerun(tmp_path / "run.rrd")
     assert list(tmp_path.iterdir()) == []

@@ -1,0 +1,113 @@
+"""Pictures of a joint in a recording: orders of its ripple, torque against torsion."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.sim.metrics import highest_resolved_order, torque_ripple
+from swgjoint.sim.orders import order_spectrum
+from swgjoint.units import arcmin
+
+if TYPE_CHECKING:
+    from swgjoint.sim.run import Run
+
+Array = NDArray[np.float64]
+
+BARS = 400
+"""Bars of a spectrum at most; each is the largest amplitude of its part."""
+WIDTH = 1.6
+"""Of the phase picture, its height from the middle is 1."""
+_POINTS = 2000
+_FRAME = (120, 120, 120)
+
+
+def ripple_bars(run: Run, j: int) -> tuple[Array, Array] | None:
+    """Orders and amplitudes of the torque ripple of one joint.
+
+    Returns:
+        Middle of every bar [cycles per turn of the input] and largest amplitude in it,
+        zero to peak [% of rated torque]; both of shape (n,). None for a joint that
+        stands still.
+    """
+    highest = highest_resolved_order(run, j)
+    if highest is None:
+        return None
+    rated = run.assembly.transmissions[j].drive.ratings.rated_torque
+    spectrum = order_spectrum(run.motor_position[run.steady, j], torque_ripple(run, j))
+    if spectrum is None:
+        return None
+    inside = (spectrum.order > 0.0) & (spectrum.order <= highest)
+    order, amplitude = spectrum.order[inside], spectrum.amplitude[inside]
+    if not order.size:
+        return None
+    per = -(-order.size // BARS)
+    starts = np.arange(0, order.size, per)
+    middle = np.add.reduceat(order, starts) / np.diff(np.append(starts, order.size))
+    return middle, 100.0 / rated * np.maximum.reduceat(amplitude, starts)
+
+
+def phase_scales(runs: Mapping[str, Run], j: int) -> tuple[float, float] | None:
+    """Largest torsion [arcmin] and torque [N·m] of a joint; None without torsion."""
+    torsion = max(float(np.abs(run.torsion[:, j]).max()) for run in runs.values())
+    torque = max(float(np.abs(run.output_torque[:, j]).max()) for run in runs.values())
+    return (torsion / arcmin, torque) if torsion > 0.0 and torque > 0.0 else None
+
+
+def phase_points(run: Run, j: int, scales: tuple[float, float]) -> Array:
+    """Torsion to the right, torque upwards, in the units of the picture. (n, 2)."""
+    x = WIDTH * run.torsion[:, j] / (scales[0] * arcmin)
+    return np.column_stack([x, -run.output_torque[:, j] / scales[1]])
+
+
+def log_phase_frame(stream: Any, joint: str, scales: tuple[float, float]) -> None:
+    """Axes of the picture of one joint, with the values at their ends."""
+    import rerun as rr
+
+    torsion, torque = scales
+    axes = [[[-WIDTH, 0.0], [WIDTH, 0.0]], [[0.0, 1.0], [0.0, -1.0]]]
+    stream.log(
+        f"phase/{joint}/axes",
+        rr.LineStrips2D(axes, colors=[_FRAME], radii=[0.004]),
+        static=True,
+    )
+    stream.log(
+        f"phase/{joint}/ends",
+        rr.Points2D(
+            [[WIDTH, 0.0], [0.0, -1.0]],
+            labels=[f"{torsion:.3g} arcmin", f"{torque:.3g} N·m"],
+            colors=[_FRAME],
+            radii=[0.01],
+            show_labels=True,
+        ),
+        static=True,
+    )
+
+
+def phase_path(joint: str, label: str) -> str:
+    """Where the curve of one run lies."""
+    return f"phase/{joint}/{label or 'run'}"
+
+
+def log_phase_path(
+    stream: Any, path: str, points: Array, color: tuple[int, int, int]
+) -> None:
+    """Torque against torsion of one run, and the look of the point that moves."""
+    import rerun as rr
+
+    stride = -(-len(points) // _POINTS)
+    line = rr.LineStrips2D([points[::stride]], colors=[color], radii=[0.004])
+    stream.log(f"{path}/path", line, static=True)
+    point = rr.Points2D.from_fields(radii=[0.03], colors=[color])
+    stream.log(f"{path}/now", point, static=True)
+
+
+def send_phase(stream: Any, path: str, points: Array, time: Any) -> None:
+    """Where the run is at some samples. Points of shape (n, 2)."""
+    import rerun as rr
+
+    columns = rr.Points2D.columns(positions=points)
+    stream.send_columns(f"{path}/now", indexes=[time], columns=columns)
