@@ -212,10 +212,14 @@ def assemble(
     coarse = trajectory.every(sub_steps)
     motion = (coarse.position, coarse.velocity, coarse.acceleration)
     link_torque = load + _between(arm.torques(*motion), sub_steps)
-    known_torque, weight = (
-        load + _between(torque, sub_steps)
-        for torque in (known_arm.torques(*motion), known_arm.gravity(coarse.position))
-    )
+    kind = scene.controller.feedforward
+    if scene.controller.kind == "computed_torque":
+        kind = "gravity_inertia"  # where it starts; its loop has its own
+    known_torque = link_torque
+    if kind == "gravity":
+        known_torque = load + _between(known_arm.gravity(coarse.position), sub_steps)
+    elif known_arm is not arm:
+        known_torque = load + _between(known_arm.torques(*motion), sub_steps)
     prescribed, prescribed_rate = _prescribed(
         trajectory.position,
         transmissions,
@@ -238,10 +242,7 @@ def assemble(
         disturbances=tuple(scene.disturbance),
         link_torque=link_torque,
         feedforward=feedforward(
-            "gravity_inertia"
-            if scene.controller.kind == "computed_torque"
-            else scene.controller.feedforward,
-            weight=weight,
+            kind,
             link_torque=known_torque,
             acceleration=trajectory.acceleration,
             ratio=ratio,

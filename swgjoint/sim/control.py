@@ -68,7 +68,6 @@ def answer_speed(section: Controller, jump: Array) -> Array:
 def feedforward(
     kind: FeedForward,
     *,
-    weight: Array,
     link_torque: Array,
     acceleration: Array,
     ratio: Array,
@@ -78,14 +77,14 @@ def feedforward(
 
     Args:
         kind: ``none``, ``gravity`` or ``gravity_inertia``.
-        weight: Drive torque that carries weight and load. Shape (n, n_joints).
-        link_torque: Drive torque on the whole motion. Shape (n, n_joints).
+        link_torque: Drive torque that carries weight and load, for
+            ``gravity_inertia`` that on the whole motion. Shape (n, n_joints).
         acceleration: Of the links [rad/s²]. Shape (n, n_joints).
         ratio: Signed ratios. Shape (n_joints,).
         rotor_inertia: [kg·m²]. Shape (n_joints,).
     """
     if kind == "none":
-        return np.zeros_like(weight)
+        return np.zeros_like(link_torque)
     if kind == "gravity":
-        return weight / ratio
+        return link_torque / ratio
     return link_torque / ratio + ratio * rotor_inertia * acceleration

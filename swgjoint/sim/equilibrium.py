@@ -103,22 +103,28 @@ def _balance(assembly: Assembly, shift: float) -> tuple[Array, Array]:
     moving = assembly.trajectory.velocity[0] != 0.0
     theta, psi = ratio * reference, reference.copy()
     commanded = arm.gravity(reference[None])[0]
-    for _ in range(30):
+    for turn in range(30):
         needed = link_torque + arm.gravity(psi[None])[0] - commanded
         last = psi.copy()
         for j, transmission in enumerate(assembly.transmissions):
             if transmission.law is None:
                 error = transmission.attached.prescribed_error(theta[j])
                 psi[j] = reference[j] + float(error)
-                continue
-            psi[j] = link_equilibrium(transmission, theta[j], float(needed[j]))
-            if not moving[j]:
+            elif moving[j]:
+                psi[j] = link_equilibrium(
+                    transmission,
+                    theta[j],
+                    float(needed[j]),
+                    guess=float(psi[j]) if turn else None,
+                )
+            else:
                 theta[j], psi[j] = joint_equilibrium(
                     transmission,
                     output_torque=float(needed[j]),
                     motor_reference=float(ratio[j] * reference[j]),
                     motor_torque=float(motor_torque[j]),
                     stiffness=float(assembly.loops.stiffness[j]),
+                    guess=(float(theta[j]), float(psi[j])) if turn else None,
                 )
         if np.abs(psi - last).max() < 1e-13:
             break
@@ -126,7 +132,11 @@ def _balance(assembly: Assembly, shift: float) -> tuple[Array, Array]:
 
 
 def link_equilibrium(
-    transmission: Transmission, theta: float, output_torque: float
+    transmission: Transmission,
+    theta: float,
+    output_torque: float,
+    *,
+    guess: float | None = None,
 ) -> float:
     """Link angle at which a drive with its motor held exerts a torque [rad].
 
@@ -134,18 +144,21 @@ def link_equilibrium(
         transmission: A drive with a law between the angles.
         theta: Motor angle [rad].
         output_torque: That the drive exerts on the link [N·m].
+        guess: Link angle near the solution [rad]; None: that of the mean curve.
     """
     law, rated = transmission.law, transmission.drive.ratings.rated_torque
     assert law is not None
-    error = law.error_at(law.phases(theta, theta / law.ratio))[0]
-    psi = theta / law.ratio + float(error) - law.mean_torsion(output_torque)
+    if guess is None:
+        error = law.error_at(law.phases(theta, theta / law.ratio))[0]
+        guess = theta / law.ratio + float(error) - law.mean_torsion(output_torque)
+    psi, softest = guess, 1e-3 * law.mean_stiffness
     for _ in range(50):
         value = float(law.forces(theta, psi)[1]) - output_torque
         if abs(value) <= RTOL * rated:
             return psi
         # the output torque falls with the link angle, by about the stiffness
         rise = law.forces(theta, psi + 1e-8)[1] - law.forces(theta, psi - 1e-8)[1]
-        slope = min(float(rise) / 2e-8, -1e-3 * law.mean_stiffness)
+        slope = min(float(rise) / 2e-8, -softest)
         psi -= value / slope
     raise ComputationError(_message(transmission, output_torque, abs(value)))
 
@@ -157,6 +170,7 @@ def joint_equilibrium(
     motor_reference: float,
     motor_torque: float,
     stiffness: float,
+    guess: tuple[float, float] | None = None,
 ) -> tuple[float, float]:
     r"""Motor and link angle at which one drive rests under a torque.
 
@@ -170,6 +184,8 @@ def joint_equilibrium(
         motor_reference: Commanded motor angle [rad].
         motor_torque: Of the motor at that angle [N·m].
         stiffness: Of the motor's position loop [N·m/rad].
+        guess: Angles near the solution [rad], as of nearly the same torque; None: the
+            reference.
 
     Raises:
         ComputationError: If the descent does not settle.
@@ -197,12 +213,10 @@ def joint_equilibrium(
             scale * np.array([-on_input - motor, output_torque - on_output])
         )
 
-    x = np.array(
-        [
-            motor_reference / law.ratio,
-            link_equilibrium(transmission, motor_reference, output_torque),
-        ]
-    )
+    if guess is None:
+        held = link_equilibrium(transmission, motor_reference, output_torque)
+        guess = motor_reference, held
+    x = np.array(guess) / scale
     step = 1e-9  # differences of the gradient: 1e-9 rad against 1e-3 rad of torsion
     for _ in range(500):
         value = gradient(x)
