@@ -8,13 +8,13 @@ import pytest
 from rerun.chunk import RrdReader
 
 from swgjoint.cli.main import main
-from swgjoint.cli.view import _VIEWERS
 from swgjoint.errors import InputError
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.run import Run, run_scene
 from swgjoint.units import mm
 from swgjoint.view.plots import comparison_png
 from swgjoint.view.recording import pose_rows, signals_of, write_recording
+from swgjoint.view.viewer import STARTED
 
 SHORT = {"simulation.duration_s": 1.0, "trajectory.settle_s": 0.2}
 
@@ -138,7 +138,7 @@ def test_the_view_command_serves_a_page_on_loopback(run, tmp_path, capsys):
             assert page.status == 200
             assert b"<html" in page.read().lower()
     finally:
-        for process in _VIEWERS:
+        for process in STARTED:
             process.terminate()
             process.wait(timeout=20)
-        _VIEWERS.clear()
+        STARTED.clear()
