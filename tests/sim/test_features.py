@@ -107,24 +107,25 @@ def test_a_torque_limit_accelerates_evenly(bench):
     assert np.abs(run.wanted_torque).max() > 5.0
 
 
-def test_a_torque_speed_line_lets_the_speed_rise_exponentially(bench):
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_a_torque_speed_line_lets_the_speed_rise_exponentially(bench, way):
     """A demand never met: w = w0 (1 - exp(-t stall / (J w0)))."""
     stall, top = 0.5, 300.0 * np.pi / 30.0
     run = bench(
         LINEAR,
         defaults__level="rigid",
         defaults__motor={"stall_torque_Nm": stall, "no_load_speed_rpm": 300.0},
-        trajectory=STEP | {"step_deg": {"joint": 170.0}},
+        trajectory=STEP | {"step_deg": {"joint": 170.0 * way}},
         load={},
         simulation={"duration_s": 0.15, "step_s": 1e-4},
     )
     t = np.maximum(run.time - 0.0499, 0.0)  # from the step that ends at 0.05 s
-    expected = -top * (1.0 - np.exp(-t * stall / (INERTIA * top)))
+    expected = -way * top * (1.0 - np.exp(-t * stall / (INERTIA * top)))
     # first order in the step: h / (2 e) over the time constant of 24 ms
     np.testing.assert_allclose(run.motor_velocity[:, 0], expected, atol=1e-3 * top)
     assert np.abs(run.motor_velocity).max() > 0.9 * top
     # on the line: what is left of the stall torque at that speed
-    line = -stall * (1.0 - np.abs(run.motor_velocity[:, 0]) / top)
+    line = -way * stall * (1.0 - np.abs(run.motor_velocity[:, 0]) / top)
     np.testing.assert_allclose(run.motor_torque[t > 1e-3, 0], line[t > 1e-3], rtol=1e-9)
 
 
