@@ -28,7 +28,7 @@ def contents(assembly: Assembly) -> dict[str, Any]:
         "degrees_of_freedom": int(model.nv),
         "tendons": int(model.ntendon),
         "plugin_instances": int(model.nplugin),
-        "actuators": int(model.nu),
+        "actuators": int(model.nactuator),
         "integrator": assembly.scene.simulation.integrator,
         "step_s": assembly.scene.simulation.step_s,
         "sub_steps": assembly.sub_steps,

@@ -152,6 +152,26 @@ def test_a_csv_scene_reads_its_file(tmp_path):
     np.testing.assert_allclose(ends, [10.0, 10.0, 15.0, 20.0, 20.0], atol=1e-12)
 
 
+def test_a_csv_lies_beside_its_scene(tmp_path):
+    """A file that a scene names is looked for in the folder of that scene."""
+    (tmp_path / "points.csv").write_text("time_s,joint_deg\n0,0\n1,5\n")
+    scene = scene_of("[trajectory]\nkind = 'csv'\nfile = 'points.csv'")
+    text = """
+        name = "beside"
+        arm = "bench"
+        [trajectory]
+        kind = "csv"
+        file = "points.csv"
+        [simulation]
+        duration_s = 2.0
+        """
+    (tmp_path / "beside.toml").write_text(text)
+    loaded = Scene.load_file(tmp_path / "beside.toml")
+    assert loaded.trajectory.file == str(tmp_path / "points.csv")
+    with pytest.raises(InputError, match=r"points\.csv: cannot be read"):
+        trajectory_of(scene, RigidArm("bench"))
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [

@@ -1,0 +1,80 @@
+"""Speed of whole scenes against real time: python tests/benchmarks/scene_speed.py.
+
+Assembly, start, steps, signals and the recording that is written, with the maps at hand
+and all modules imported; CPU time of the process on one core, the median of some runs.
+Not a test: nothing is asserted.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+
+from swgjoint.sim.drives import load_drive
+from swgjoint.sim.run import run_scene
+from swgjoint.sim.scene import Scene
+
+DEFAULT = ("ur5e-sweep", "ur5e-catalogue", "ur5e-circle", "ur5e-payload-step")
+
+
+def main() -> None:
+    """One row per scene, as JSON with --json."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("scenes", nargs="*", default=DEFAULT)
+    parser.add_argument("--runs", type=int, default=5)
+    parser.add_argument("--json", action="store_true")
+    args = parser.parse_args()
+    rows = [measure(name, args.runs) for name in args.scenes]
+    if args.json:
+        print(json.dumps(rows))
+        return
+    for row in rows:
+        print(
+            f"{row['scene']:18s} {row['simulated_s']:6.1f} s simulated:"
+            f" {row['with_recording']:5.1f} times real time with its recording"
+            f" ({row['file_MB']:.1f} MB), {row['without']:5.1f} without,"
+            f" {row['metrics_s']:.2f} s for the metrics,"
+            f" {row['steps_per_s']:.3g} steps/s"
+        )
+
+
+def measure(name: str, runs: int) -> dict[str, float | str]:
+    """CPU times of one scene."""
+    scene = Scene.load_file(name)
+    named = {section.drive for section in (scene.defaults, *scene.joints.values())}
+    drives = {drive: load_drive(drive) for drive in named if drive}
+    times, speeds = [], []
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "run.rrd"
+        for k in range(runs + 1):
+            begin = time.process_time()
+            run = run_scene(scene, drives=drives)
+            ran = time.process_time()
+            run.to_rerun(path)
+            written = time.process_time()
+            run.metrics()
+            done = time.process_time()
+            if k:  # the first one imports
+                times.append((ran - begin, written - begin, done - written))
+                speeds.append(run.steps_per_second)
+        size = path.stat().st_size / 1e6
+    ran, written, figures = np.median(times, axis=0)
+    simulated = float(run.time[-1])
+    return {
+        "scene": name,
+        "simulated_s": simulated,
+        "with_recording": simulated / written,
+        "without": simulated / ran,
+        "metrics_s": float(figures),
+        "file_MB": size,
+        "steps_per_s": float(np.median(speeds)),
+    }
+
+
+if __name__ == "__main__":
+    main()
