@@ -21,16 +21,15 @@ from swgjoint.view.blueprint import is_rigid, joints_by_interest
 from swgjoint.view.recording import COLORS
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from swgjoint.sim.run import Run
 
 
 def comparison_png(
     runs: Mapping[str, Run], path: str | Path, *, rigid: Run | None = None
 ) -> Path:
-    """Torsion, transmission error, ripple with its orders, and tool error of runs.
-
-    The time plots show the joint with the largest ripple among those whose strongest
-    order is resolved; the bars show all joints.
+    """Write the picture of :func:`comparison_figure`.
 
     Args:
         runs: Runs by name.
@@ -39,6 +38,21 @@ def comparison_png(
 
     Returns:
         The path.
+    """
+    buffer = io.BytesIO()
+    comparison_figure(runs, rigid=rigid).savefig(buffer, format="png", dpi=110)
+    return write_whole(path, buffer.getvalue())
+
+
+def comparison_figure(runs: Mapping[str, Run], *, rigid: Run | None = None) -> Figure:
+    """Torsion, transmission error, ripple with its orders, and tool error of runs.
+
+    The time plots show the joint with the largest ripple among those whose strongest
+    order is resolved; the bars show all joints.
+
+    Args:
+        runs: Runs by name.
+        rigid: The run that tool errors refer to; None for the commanded path.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -81,9 +95,7 @@ def comparison_png(
     handles, names = axes[0, 0].get_legend_handles_labels()
     figure.legend(handles, names, loc="outside upper right", ncols=len(names))
     figure.suptitle(f"scene {first.assembly.scene.name}", fontsize=13)
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=110)
-    return write_whole(path, buffer.getvalue())
+    return figure
 
 
 def _ripple(over_turns: Any, over_order: Any, run: Run, j: int, style: Any) -> None:
