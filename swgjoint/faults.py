@@ -11,7 +11,7 @@ import tomllib
 from collections.abc import Mapping
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any, TypeVar, get_origin
+from typing import Any, TypeVar, get_args, get_origin
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import ErrorDetails
@@ -177,6 +177,8 @@ def _lines(model: type[BaseModel], detail: ErrorDetails) -> list[str]:
         return [f"{path} = {_shown(value, '')}: accepted: {ctx['expected']}"]
     if kind in _BOUND_ERRORS:
         return [f"{path} = {_shown(value, key)}: accepted: {_accepted(info, key)}"]
+    if kind == "too_long":
+        return [f"{path} = {_shown(value, '')}: accepted: {_accepted(info, key)}"]
     if kind in _TYPES:
         wanted = _TYPES[kind]
         if info is not None and (limits := _limits(info, key)):
@@ -210,7 +212,8 @@ def _walk(
             continue
         owner, info = here, here.model_fields.get(part)
         models = _models_in(info.annotation) if info is not None else []
-        union = info is not None and info.discriminator is not None
+        # by kind, of the field itself or of the items of a list
+        union = len(models) > 1 and all("kind" in m.model_fields for m in models)
         options = {_tag(m): m for m in models} if union else {}
         here = models[0] if len(models) == 1 and not union else None
         named = info is not None and get_origin(info.annotation) is dict
@@ -256,6 +259,9 @@ def _accepted(info: Any, key: str) -> str:
     annotation = getattr(info, "annotation", None)
     if _models_in(annotation):
         return "a table"
+    items = get_args(annotation)
+    if get_origin(annotation) is tuple and Ellipsis not in items:
+        return f"a list of {len(items)} numbers"
     unit = unit_of(key)
     names: dict[Any, str] = {
         float: "a number",

@@ -343,6 +343,12 @@ def test_a_sine_shakes_at_its_frequency(bench):
                               "start_s": 0.0, "duration_s": 1.0}]},
             "disturbance[0].joint.elbow: no such joint",
         ),
+        (
+            {"disturbance": [{"kind": "tool_force", "force_N": [1.0, 2.0],
+                              "start_s": 0.0, "duration_s": 1.0}]},
+            "disturbance[0].force_N[2]: missing; accepted: a list of 3 numbers",
+        ),
+        ({"disturbance": [{"kind": "push"}]}, "disturbance[0].kind = 'push': accepted"),
         ({"trajectory": {"kind": "step", "step_deg": {"joint": 1.0}},
           "defaults.level": "kinematic"}, "step' at level kinematic"),
     ],
