@@ -6,8 +6,8 @@ With attained positions :math:`x_j` of n approaches of one pose, their barycentr
 .. math:: AP = |\bar x - x_c|, \qquad
     RP = \bar l + 3 \sqrt{\textstyle\sum_j (l_j - \bar l)^2 / (n - 1)}
 
-(7.2.1, 7.2.2); along a path the same in planes square to the command, the largest value
-along it: AT and RT (8.2, 8.3). Positions only, no orientations.
+and along a path the same in planes square to the command, the largest value along it:
+AT and RT. Positions only, no orientations.
 """
 
 from __future__ import annotations

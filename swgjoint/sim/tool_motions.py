@@ -126,7 +126,7 @@ def circle(
 
 
 def cube_poses(centre: Array, edge: float, plane: str) -> Array:
-    """P1 to P5 of ISO 9283 (1998), section 6.5 [m]. Shape (5, 3).
+    """P1 to P5 of ISO 9283 (1998) [m]. Shape (5, 3).
 
     The diagonal plane of the cube holds two opposite edges that are level and both
     space diagonals between them; P1 is the centre, P2 to P5 lie on the diagonals in the
