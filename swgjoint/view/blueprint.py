@@ -12,11 +12,13 @@ from swgjoint.sim.metrics import (
     strongest_left_out,
     torque_deviation,
 )
+from swgjoint.view.drive_view import drive_path, drives_shown, eye, fields_of
 from swgjoint.view.joint_pictures import WIDTH, phase_scales
 
 if TYPE_CHECKING:
     from swgjoint.sim.run import Run
 
+BACKGROUND = (30, 33, 38)
 SPACING = 0.75
 """Distance between the arms of several runs [m]."""
 
@@ -73,15 +75,24 @@ def blueprint_of(runs: Mapping[str, Run]) -> Any:
     if first.tool_position.shape[1]:
         paths = [f"{prefixes[label]}tool/error_mm" for label in flexible]
         right.append(_plot("tool error [mm]", paths))
+    left: list[Any] = [
+        rrb.Spatial3DView(
+            name=f"{first.assembly.scene.name}",
+            contents=[*(f"+ {p}**" for p in prefixes.values()), "- /drive/**"],
+            eye_controls=_eye(runs),
+            line_grid=True,
+            background=BACKGROUND,
+        )
+    ]
+    drives = [
+        _drive(runs[label], joint, label)
+        for label, joint in drives_shown(runs, joints_by_interest(runs)).items()
+    ]
+    if drives:
+        left.append(rrb.Tabs(*drives, active_tab=0))
     return rrb.Blueprint(
         rrb.Horizontal(
-            rrb.Spatial3DView(
-                name=f"{first.assembly.scene.name}",
-                contents=[f"+ {p}**" for p in prefixes.values()],
-                eye_controls=_eye(runs),
-                line_grid=True,
-                background=[30, 33, 38],
-            ),
+            rrb.Vertical(*left),
             rrb.Vertical(*right, row_shares=[4.0, 1.0][: len(right)]),
             column_shares=[1.0, 1.6],
         ),
@@ -126,6 +137,23 @@ def _plot(title: str, contents: list[str]) -> Any:
         contents=[f"+ {path}" for path in contents],
         plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.RightTop),
         axis_x=rrb.TimeAxis(link=rrb.components.LinkAxis.LinkToGlobal),
+    )
+
+
+def _drive(run: Run, joint: str, label: str) -> Any:
+    """The drive of a joint, seen along its axis."""
+    import rerun.blueprint as rrb
+
+    fields = fields_of(run, joint)
+    assert fields is not None
+    name = f"drive of {joint.removesuffix('_joint')}"
+    return rrb.Spatial3DView(
+        name=f"{name}, {label}" if label else name,
+        origin=f"/{drive_path(joint, label)}",
+        contents="$origin/**",
+        eye_controls=eye(fields),
+        line_grid=False,
+        background=BACKGROUND,
     )
 
 

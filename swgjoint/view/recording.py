@@ -19,7 +19,8 @@ Entity paths, below ``<run>/`` where a recording holds several runs:
                                        rigid arm where the recording holds its run
 =====================================  ============================================
 
-Signals are at every step, on the timeline ``time``. Torque against torsion lies at
+Signals are at every step, on the timeline ``time``. Beside the runs lies the drive of
+one joint, see :mod:`swgjoint.view.drive_view`. Torque against torsion lies at
 ``phase/<joint>/<run>``, beside the runs: scaled to a picture, with a point that moves.
 """
 
@@ -37,8 +38,15 @@ from numpy.typing import NDArray
 
 from swgjoint.sim.metrics import torque_deviation
 from swgjoint.units import arcmin, deg, mm
-from swgjoint.view.blueprint import SPACING, blueprint_of
+from swgjoint.view.blueprint import SPACING, blueprint_of, joints_by_interest
 from swgjoint.view.drive_markers import log_drives, send_loads
+from swgjoint.view.drive_view import (
+    drive_path,
+    drives_shown,
+    frames_of,
+    log_drive,
+    send_drive,
+)
 from swgjoint.view.geometry import quaternion_xyzw, shape_of
 from swgjoint.view.joint_pictures import (
     log_phase_frame,
@@ -175,6 +183,8 @@ def log_still(stream: Any, runs: Mapping[str, Run]) -> None:
                 log_phase_path(stream, path, phase_points(run, j, of_joint), color)
         if run.tool_position.shape[1]:
             _log_style(stream, f"{prefix}tool/error_mm", label or "error_mm", color)
+    for label, joint in drives_shown(runs, joints_by_interest(runs)).items():
+        log_drive(stream, drive_path(joint, label), runs[label], joint)
 
 
 def log_moving(
@@ -217,6 +227,13 @@ def log_moving(
         if run.tool_position.shape[1]:
             error = run.tool_error(rigid)[part] / mm
             _send_scalars(stream, f"{prefix}tool/error_mm", time, error)
+    for label, joint in drives_shown(runs, joints_by_interest(runs)).items():
+        run = runs[label]
+        drawn = np.intersect1d(frames_of(run, joint, pose_rows(run)), rows)
+        if drawn.size:
+            at_drawn = rr.TimeColumn(TIMELINE, duration=run.time[drawn])
+            path = drive_path(joint, label)
+            send_drive(stream, path, run, joint, at_drawn, drawn)
 
 
 def prefix_of(label: str) -> str:

@@ -1,0 +1,278 @@
+"""The drive of a joint while the arm moves: its flexspline with stress and forces.
+
+Finite elements are not run again: the map's fields are interpolated to the recorded
+angles and torque. The deflection is drawn as it is. A few hundred frames cover a run,
+however long, so that a recording stays small.
+
+=================================  ================================================
+``drive/<joint>/<run>/flexspline``  surface, coloured by the von Mises stress
+``.../tooth``                       one tooth of it, to see it turn
+``.../circular_spline``             outline
+``.../wave_generator``              outline
+``.../tooth_forces``                of the circular spline on the flexspline
+``.../bore_forces``                 of the wave generator on the flexspline
+=================================  ================================================
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.maps.fields import DriveFields, FlexsplineShape
+from swgjoint.view.geometry import quaternion_xyzw
+
+if TYPE_CHECKING:
+    from swgjoint.sim.run import Run
+
+Array = NDArray[np.float64]
+
+FRAMES = 100
+"""Most of one drive in a recording."""
+BYTES = 6_000_000
+"""Of one drive in a recording, about."""
+ARROW = 0.2
+"""Length of the largest force in radii of the flexspline."""
+LIFT = 0.03
+"""How far in front of the flexspline outlines and forces are drawn, in radii."""
+
+
+def drive_path(joint: str, label: str) -> str:
+    """Where the drive of a joint is drawn."""
+    return f"drive/{joint}/{label}" if label else f"drive/{joint}"
+
+
+def drives_shown(runs: Mapping[str, Run], joints: list[str]) -> dict[str, str]:
+    """The joint whose drive is drawn, by run: the first of these that has fields."""
+    for joint in joints:
+        found = {
+            label: joint
+            for label, run in runs.items()
+            if fields_of(run, joint) is not None
+        }
+        if found:
+            return found
+    return {}
+
+
+def fields_of(run: Run, joint: str) -> DriveFields | None:
+    """Fields of the drive of a joint; None where its map has none, or it is rigid."""
+    transmission = run.assembly.transmissions[run.joints.index(joint)]
+    return None if transmission.level == "rigid" else transmission.drive.fields
+
+
+def frames_of(run: Run, joint: str, rows: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Samples at which the drive is drawn, of those at which the arm is.
+
+    Args:
+        run: The run.
+        joint: One whose drive has fields.
+        rows: Samples at which the arm is drawn.
+    """
+    fields = fields_of(run, joint)
+    assert fields is not None
+    teeth = run.assembly.transmissions[run.joints.index(joint)].drive.teeth_flexspline
+    each = teeth * (16 * len(fields.points) + 48)
+    count = max(2, min(FRAMES, BYTES // each))
+    every = -(-len(rows) // count)
+    return rows[::every]
+
+
+def angles(layout: str, theta: Array, psi: Array) -> tuple[Array, Array, Array]:
+    """Rotations of flexspline, circular spline and wave generator [rad].
+
+    Args:
+        layout: Of the drive.
+        theta: Of the input against the fixed member [rad].
+        psi: Of the output [rad].
+    """
+    still = np.zeros_like(theta)
+    return {
+        "circular_spline_fixed": (psi, still, theta),
+        "flexspline_fixed": (still, psi, theta),
+        "wave_generator_fixed": (theta, psi, still),
+    }[layout]
+
+
+def log_drive(stream: Any, path: str, run: Run, joint: str) -> None:
+    """What of a drive does not change; arguments as for :func:`send_drive`."""
+    import rerun as rr
+
+    drive = run.assembly.transmissions[run.joints.index(joint)].drive
+    fields = drive.fields
+    assert fields is not None
+    teeth, n = drive.teeth_flexspline, len(fields.points)
+    triangles = (fields.triangles + n * np.arange(teeth)[:, None, None]).reshape(-1, 3)
+    z = in_front(fields)
+    stream.log(
+        f"{path}/flexspline",
+        rr.Mesh3D.from_fields(triangle_indices=triangles.astype(np.uint32)),
+        static=True,
+    )
+    count = drive.teeth_circular_spline
+    around = 2.0 * np.pi * (np.arange(count) + 0.5) / count
+    ring = np.concatenate([turned(fields.circular_spline, a) for a in around])
+    for name, outline, color in (
+        ("circular_spline", ring, (110, 150, 230)),
+        ("wave_generator", fields.wave_generator, (230, 230, 230)),
+    ):
+        closed = np.concatenate([outline, outline[:1]])
+        points = np.concatenate([closed, np.full((len(closed), 1), z)], axis=1)
+        stream.log(
+            f"{path}/{name}",
+            rr.LineStrips3D([points], colors=[color], radii=[rr.Radius.ui_points(1.0)]),
+            static=True,
+        )
+
+
+def send_drive(
+    stream: Any,
+    path: str,
+    run: Run,
+    joint: str,
+    time: Any,
+    rows: NDArray[np.intp],
+) -> None:
+    """What of a drive changes.
+
+    Args:
+        stream: The recording.
+        path: From :func:`drive_path`.
+        run: The run.
+        joint: One whose drive has fields.
+        time: Time column of the rows.
+        rows: Samples, from :func:`frames_of`.
+    """
+    import rerun as rr
+
+    j = run.joints.index(joint)
+    drive = run.assembly.transmissions[j].drive
+    fields = drive.fields
+    assert fields is not None
+    theta, psi = run.motor_position[rows, j], run.position[rows, j]
+    flexspline, circular, wave = angles(drive.layout, theta, psi)
+    shapes: list[FlexsplineShape] = [
+        fields.flexspline(drive.teeth_flexspline, f, w, t)
+        for f, w, t in zip(flexspline, wave, run.output_torque[rows, j], strict=True)
+    ]
+    count, size = len(rows), shapes[0].von_mises.size
+    points = np.array([shape.points.reshape(-1, 3) for shape in shapes])
+    top = float(fields.von_mises.max())
+    colors = stress_color(np.array([s.von_mises.ravel() for s in shapes]) / top)
+    each = np.full(count, size)
+    stream.send_columns(
+        f"{path}/flexspline",
+        indexes=[time],
+        columns=[
+            *rr.Mesh3D.columns(
+                vertex_positions=points.reshape(-1, 3).astype(np.float32),
+                vertex_colors=colors.ravel(),
+            ).partition(each)
+        ],
+    )
+    # the tip of the tooth that stood on +y
+    tip = int(np.hypot(*fields.points[:, :2].T).argmax())
+    stream.send_columns(
+        f"{path}/tooth",
+        indexes=[time],
+        columns=rr.Points3D.columns(
+            positions=points[:, tip],
+            radii=[0.015 * radius(fields)] * count,
+            colors=[0xFFFFFFFF] * count,
+        ),
+    )
+    for name, turn in (("circular_spline", circular), ("wave_generator", wave)):
+        half = 0.5 * turn
+        wxyz = np.stack([np.cos(half), 0 * half, 0 * half, np.sin(half)], axis=-1)
+        stream.send_columns(
+            f"{path}/{name}",
+            indexes=[time],
+            columns=rr.Transform3D.columns(quaternion=quaternion_xyzw(wxyz)),
+        )
+    _send_forces(stream, path, fields, shapes, time)
+
+
+def _send_forces(
+    stream: Any,
+    path: str,
+    fields: DriveFields,
+    shapes: list[FlexsplineShape],
+    time: Any,
+) -> None:
+    """Arrows at the tips of the teeth and at the bore, one scale for both."""
+    import rerun as rr
+
+    largest = max(
+        float(np.linalg.norm(part, axis=-1).max())
+        for part in (fields.tooth_force, fields.wave_generator_force)
+    )
+    scale = ARROW * radius(fields) / max(largest, 1e-9)
+    distance, z = np.hypot(*fields.points[:, :2].T), in_front(fields)
+    edge = fields.points[:, 2] == fields.points[:, 2].min()
+    outer = np.where(edge, distance, -np.inf).argmax()
+    inner = np.where(edge, distance, np.inf).argmin()
+    for name, node, color, forces in (
+        ("tooth_forces", outer, 0xFFC832FF, [s.tooth_force for s in shapes]),
+        ("bore_forces", inner, 0x50DCA0FF, [s.wave_generator_force for s in shapes]),
+    ):
+        vectors = scale * np.array(forces)
+        vectors[..., 2] = 0.0
+        # arrows end where they push
+        tips = np.array([s.points[:, node] for s in shapes])
+        tips[..., 2] = z
+        sizes = np.full(len(shapes), vectors.shape[1])
+        stream.send_columns(
+            f"{path}/{name}",
+            indexes=[time],
+            columns=[
+                *rr.Arrows3D.columns(
+                    origins=(tips - vectors).reshape(-1, 3),
+                    vectors=vectors.reshape(-1, 3),
+                ).partition(sizes),
+                *rr.Arrows3D.columns(colors=[color] * len(shapes)),
+            ],
+        )
+
+
+def eye(fields: DriveFields) -> Any:
+    """Camera that looks along the axis, into the open end of a cup."""
+    import rerun.blueprint as rrb
+
+    side, r = float(np.sign(in_front(fields))), radius(fields)
+    # a little aslant, so that the depth of a cup shows
+    return rrb.EyeControls3D(
+        position=[0.0, -0.4 * r, side * 2.0 * r],
+        look_target=[0.0, 0.0, 0.0],
+        eye_up=[0.0, 1.0, 0.0],
+    )
+
+
+def in_front(fields: DriveFields) -> float:
+    """Where along z outlines and forces lie: before the open edge, above a plane model [m]."""
+    z = fields.points[:, 2]
+    flat = float(np.ptp(z)) == 0.0
+    return float(LIFT * radius(fields) if flat else z.min() - LIFT * radius(fields))
+
+
+def radius(fields: DriveFields) -> float:
+    """Largest of the flexspline at rest [m]."""
+    return float(np.hypot(*fields.points[:, :2].T).max())
+
+
+def turned(points: Array, angle: float) -> Array:
+    """Points of the plane turned about the axis (n, 2)."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.asarray(points @ np.array([[c, s], [-s, c]]))
+
+
+def stress_color(share: Array) -> NDArray[np.uint32]:
+    """Colours of the stress over its largest, 0xRRGGBBAA, shape of the share."""
+    from matplotlib import colormaps
+
+    rgba = colormaps["turbo"](np.clip(share, 0.0, 1.0), bytes=True).astype(np.uint32)
+    return np.asarray(
+        (rgba[..., 0] << 24) | (rgba[..., 1] << 16) | (rgba[..., 2] << 8) | 255
+    )
