@@ -78,7 +78,11 @@ def blueprint_of(runs: Mapping[str, Run]) -> Any:
     left: list[Any] = [
         rrb.Spatial3DView(
             name=f"{first.assembly.scene.name}",
-            contents=[*(f"+ {p}**" for p in prefixes.values()), "- /drive/**"],
+            contents=[
+                *(f"+ {p}**" for p in prefixes.values()),
+                "- /drive/**",
+                "- /phase/**",
+            ],
             eye_controls=_eye(runs),
             line_grid=True,
             background=BACKGROUND,

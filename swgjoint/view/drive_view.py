@@ -9,6 +9,7 @@ however long, so that a recording stays small.
 ``.../tooth``                       one tooth of it, to see it turn
 ``.../circular_spline``             outline
 ``.../wave_generator``              outline
+``.../scale``                       label that says what the colours are
 ``.../tooth_forces``                of the circular spline on the flexspline
 ``.../bore_forces``                 of the wave generator on the flexspline
 =================================  ================================================
@@ -23,6 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.maps.fields import DriveFields, FlexsplineShape
+from swgjoint.units import MPa
 from swgjoint.view.geometry import quaternion_xyzw
 
 if TYPE_CHECKING:
@@ -36,7 +38,7 @@ BYTES = 6_000_000
 """Of one drive in a recording, about."""
 ARROW = 0.2
 """Length of the largest force in radii of the flexspline."""
-LIFT = 0.03
+LIFT = 0.004
 """How far in front of the flexspline outlines and forces are drawn, in radii."""
 
 
@@ -112,6 +114,17 @@ def log_drive(stream: Any, path: str, run: Run, joint: str) -> None:
         rr.Mesh3D.from_fields(triangle_indices=triangles.astype(np.uint32)),
         static=True,
     )
+    top = float(fields.von_mises.max()) / MPa
+    stream.log(
+        f"{path}/scale",
+        rr.Points3D(
+            [[0.0, 0.0, z]],
+            radii=[rr.Radius.ui_points(0.5)],
+            labels=[f"von Mises stress: blue 0, red {top:.0f} MPa"],
+            show_labels=True,
+        ),
+        static=True,
+    )
     count = drive.teeth_circular_spline
     around = 2.0 * np.pi * (np.arange(count) + 0.5) / count
     ring = np.concatenate([turned(fields.circular_spline, a) for a in around])
@@ -123,7 +136,7 @@ def log_drive(stream: Any, path: str, run: Run, joint: str) -> None:
         points = np.concatenate([closed, np.full((len(closed), 1), z)], axis=1)
         stream.log(
             f"{path}/{name}",
-            rr.LineStrips3D([points], colors=[color], radii=[rr.Radius.ui_points(1.0)]),
+            rr.LineStrips3D([points], colors=[color], radii=[rr.Radius.ui_points(0.5)]),
             static=True,
         )
 
@@ -242,16 +255,21 @@ def eye(fields: DriveFields) -> Any:
     import rerun.blueprint as rrb
 
     side, r = float(np.sign(in_front(fields))), radius(fields)
-    # a little aslant, so that the depth of a cup shows
+    # aslant if there is a depth to show
+    down = -0.6 * r if side < 0.0 else 0.0
     return rrb.EyeControls3D(
-        position=[0.0, -0.4 * r, side * 2.0 * r],
+        position=[0.0, down, side * 1.9 * r],
         look_target=[0.0, 0.0, 0.0],
         eye_up=[0.0, 1.0, 0.0],
     )
 
 
 def in_front(fields: DriveFields) -> float:
-    """Where along z outlines and forces lie: before the open edge, above a plane model [m]."""
+    """Where along z outlines and forces lie [m].
+
+    Before the open edge, above a model of the plane; hardly, so that nothing shifts
+    when it is seen aslant.
+    """
     z = fields.points[:, 2]
     flat = float(np.ptp(z)) == 0.0
     return float(LIFT * radius(fields) if flat else z.min() - LIFT * radius(fields))
