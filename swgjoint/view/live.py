@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.errors import InputError
-from swgjoint.view.blueprint import blueprint_of
+from swgjoint.view.blueprint import blueprint_of, joints_by_interest
+from swgjoint.view.drive_view import drives_shown
 from swgjoint.view.recording import log_moving, log_still, stream_name
 from swgjoint.view.viewer import LOOPBACK, start_viewer, wait_for
 
@@ -64,14 +65,15 @@ def stream_runs(
     wait_for(loopback_port(url), process)
     stream = rr.RecordingStream(stream_name(runs))
     stream.connect_grpc(url, default_blueprint=blueprint_of(runs))
-    log_still(stream, runs)
+    drives = drives_shown(runs, joints_by_interest(runs))
+    log_still(stream, runs, drives=drives)
     time_of = next(iter(runs.values())).time
     begin = time.monotonic()
     for part in _parcels(time_of, None if pace is None else pace * PART_S):
         if pace is not None:
             due = begin + float(time_of[part.stop - 1] - time_of[0]) / pace
             time.sleep(max(0.0, due - time.monotonic()))
-        log_moving(stream, runs, rigid=rigid, part=part)
+        log_moving(stream, runs, drives=drives, rigid=rigid, part=part)
     stream.flush()
     stream.disconnect()
     return url

@@ -122,8 +122,9 @@ def stream_name(runs: Mapping[str, Run]) -> str:
 def log_runs(stream: Any, runs: Mapping[str, Run], *, rigid: Run | None = None) -> None:
     """Send the runs into a recording that is open; see :func:`write_recording`."""
     # the bulk first: the viewer's library encodes it while the rest is put together
-    log_moving(stream, runs, rigid=rigid)
-    log_still(stream, runs)
+    drives = drives_shown(runs, joints_by_interest(runs))
+    log_moving(stream, runs, rigid=rigid, drives=drives)
+    log_still(stream, runs, drives=drives)
 
 
 def signals_of(run: Run, j: int) -> dict[str, Array]:
@@ -139,8 +140,16 @@ def signals_of(run: Run, j: int) -> dict[str, Array]:
     }
 
 
-def log_still(stream: Any, runs: Mapping[str, Run]) -> None:
-    """What does not change: shapes, paths, spectra, style of the lines."""
+def log_still(
+    stream: Any, runs: Mapping[str, Run], *, drives: Mapping[str, str]
+) -> None:
+    """What does not change: shapes, paths, spectra, style of the lines.
+
+    Args:
+        stream: The recording.
+        runs: Runs by name.
+        drives: Of :func:`swgjoint.view.drive_view.drives_shown`.
+    """
     import rerun as rr
 
     first = next(iter(runs.values()))
@@ -183,7 +192,7 @@ def log_still(stream: Any, runs: Mapping[str, Run]) -> None:
                 log_phase_path(stream, path, phase_points(run, j, of_joint), color)
         if run.tool_position.shape[1]:
             _log_style(stream, f"{prefix}tool/error_mm", label or "error_mm", color)
-    for label, joint in drives_shown(runs, joints_by_interest(runs)).items():
+    for label, joint in drives.items():
         log_drive(stream, drive_path(joint, label), runs[label], joint)
 
 
@@ -191,6 +200,7 @@ def log_moving(
     stream: Any,
     runs: Mapping[str, Run],
     *,
+    drives: Mapping[str, str],
     rigid: Run | None = None,
     part: slice = slice(None),
 ) -> None:
@@ -199,6 +209,7 @@ def log_moving(
     Args:
         stream: The recording.
         runs: Runs by name.
+        drives: Of :func:`swgjoint.view.drive_view.drives_shown`.
         rigid: See :func:`write_recording`.
         part: Samples that are sent, all by default.
     """
@@ -227,7 +238,7 @@ def log_moving(
         if run.tool_position.shape[1]:
             error = run.tool_error(rigid)[part] / mm
             _send_scalars(stream, f"{prefix}tool/error_mm", time, error)
-    for label, joint in drives_shown(runs, joints_by_interest(runs)).items():
+    for label, joint in drives.items():
         run = runs[label]
         drawn = np.intersect1d(frames_of(run, joint, pose_rows(run)), rows)
         if drawn.size:
