@@ -21,20 +21,21 @@ from numpy.typing import NDArray
 from swgjoint.arrays import frozen_array
 
 Array = NDArray[np.float64]
+Table = NDArray[np.float32]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FlexsplineShape:
-    """The flexspline at one position; everything in the frame of the drive."""
+    """The flexspline at one position or several (...), in the frame of the drive."""
 
-    points: Array
-    """Of the surface by tooth (N, n_nodes, 3) [m]."""
-    von_mises: Array
-    """There (N, n_nodes) [Pa]."""
-    tooth_force: Array
-    """On each tooth by the circular spline (N, 3) [N]."""
-    wave_generator_force: Array
-    """On the bore below each tooth by the wave generator (N, 3) [N]."""
+    points: Table
+    """Of the surface by tooth (..., N, n_nodes, 3) [m]."""
+    von_mises: Table
+    """There (..., N, n_nodes) [Pa]."""
+    tooth_force: Table
+    """On each tooth by the circular spline (..., N, 3) [N]."""
+    wave_generator_force: Table
+    """On the bore below each tooth by the wave generator (..., N, 3) [N]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -55,13 +56,13 @@ class DriveFields:
     """Undeformed nodes of the surface (n_nodes, 3) [m]."""
     triangles: NDArray[np.int64]
     """Of the surface between them (n_triangles, 3)."""
-    displacement: Array
+    displacement: Table
     """At equally spaced places over a period (n_torques, n_places, n_nodes, 3) [m]."""
-    von_mises: Array
+    von_mises: Table
     """(n_torques, n_places, n_nodes) [Pa]."""
-    tooth_force: Array
+    tooth_force: Table
     """On the tooth by the circular spline (n_torques, n_places, 3) [N]."""
-    wave_generator_force: Array
+    wave_generator_force: Table
     """On the bore by the wave generator (n_torques, n_places, 3) [N]."""
     wave_generator: Array
     """Outline, its first lobe on +y (n_wave_generator, 2) [m]."""
@@ -94,6 +95,10 @@ class DriveFields:
                     raise ValueError(
                         f"fields: {key} has shape {values.shape}, needs {wanted} {axis}"
                     )
+            if axes[:2] == ("torques", "places"):
+                # to be looked at: seven digits are enough
+                values = values.astype(np.float32)
+                values.setflags(write=False)
             if key == "triangles":
                 values = values.astype(np.int64)
                 if values.min() < 0 or values.max() >= sizes["nodes"]:
@@ -103,44 +108,46 @@ class DriveFields:
         if (np.diff(self.torque) <= 0.0).any():
             raise ValueError("fields: torque [N·m] must increase")
 
-    def at(self, place: Array, torque: float) -> tuple[Array, Array, Array, Array]:
+    def at(
+        self, place: Array, torque: float | Array
+    ) -> tuple[Table, Table, Table, Table]:
         """Displacement, von Mises stress, tooth and wave-generator force at places.
 
         Linear between the stored ones; beyond the largest torques theirs.
 
         Args:
-            place: Of n teeth [rad].
-            torque: T [N·m].
+            place: Of teeth (...) [rad].
+            torque: T, of a shape that broadcasts to these [N·m].
 
         Returns:
-            Shapes (n, n_nodes, 3), (n, n_nodes), (n, 3), (n, 3), in the frames of the
-            teeth.
+            Shapes (..., n_nodes, 3), (..., n_nodes), (..., 3), (..., 3), in the frames
+            of the teeth.
         """
-        t = self.torque
-        j = int(np.clip(np.searchsorted(t, torque) - 1, 0, max(len(t) - 2, 0)))
-        k = min(j + 1, len(t) - 1)
-        share = float(np.clip((torque - t[j]) / (t[k] - t[j]), 0, 1)) if k > j else 0.0
-        below = self._row(j, np.asarray(place))
-        if share == 0.0:
-            return below
-        above = self._row(k, np.asarray(place))
-        one, two, three, four = (
-            a + share * (b - a) for a, b in zip(below, above, strict=True)
+        t = np.asarray(torque, dtype=float)
+        j = np.clip(
+            np.searchsorted(self.torque, t) - 1, 0, max(len(self.torque) - 2, 0)
         )
-        return one, two, three, four
-
-    def _row(self, j: int, place: Array) -> tuple[Array, Array, Array, Array]:
-        """The same at a stored torque."""
+        k = np.minimum(j + 1, len(self.torque) - 1)
+        step = self.torque[k] - self.torque[j]
+        share = np.clip((t - self.torque[j]) / np.where(k > j, step, 1.0), 0.0, 1.0)
         count = self.displacement.shape[1]
-        x = (place - self.first_place[j]) / self.period * count
-        low = np.floor(x)
-        part, low = x - low, low.astype(np.int64) % count
+        corners: list[tuple[NDArray[np.int64], NDArray[np.int64], Table]] = []
+        for row, weight in ((j, 1.0 - share), (k, share)):
+            x = (np.asarray(place) - self.first_place[row]) / self.period * count
+            low = np.floor(x)
+            part, low = x - low, low.astype(np.int64) % count
+            for at, w in ((low, 1.0 - part), ((low + 1) % count, part)):
+                corners.append((row, at, (weight * w).astype(np.float32)))
 
-        def between(table: Array) -> Array:
-            w = part.reshape(-1, *[1] * (table.ndim - 2))
-            return np.asarray(
-                (1.0 - w) * table[j, low] + w * table[j, (low + 1) % count]
-            )
+        def between(table: Table) -> Table:
+            more = (1,) * (table.ndim - 2)
+            found: Table | None = None
+            for row, at, w in corners:
+                one = table[row, at]
+                one *= w.reshape(*w.shape, *more)
+                found = one if found is None else np.add(found, one, out=found)
+            assert found is not None
+            return found
 
         return (
             between(self.displacement),
@@ -150,25 +157,42 @@ class DriveFields:
         )
 
     def flexspline(
-        self, teeth: int, rotation: float, wave_generator_angle: float, torque: float
+        self,
+        teeth: int,
+        rotation: float | Array,
+        wave_generator_angle: float | Array,
+        torque: float | Array,
     ) -> FlexsplineShape:
-        """The whole flexspline.
+        """The whole flexspline at one position or several, of any shape (...).
 
         Args:
             teeth: Of the flexspline.
-            rotation: Of the flexspline [rad].
-            wave_generator_angle: [rad].
-            torque: T [N·m].
+            rotation: Of the flexspline (...) [rad].
+            wave_generator_angle: (...) [rad].
+            torque: T (...) [N·m].
         """
-        angle: Array = 2.0 * pi / teeth * np.arange(teeth, dtype=float) + rotation
-        u, stress, tooth, bore = self.at(angle - wave_generator_angle, torque)
-        c, s = np.cos(angle), np.sin(angle)
-        turn = np.zeros((teeth, 3, 3))
-        turn[:, 0, 0] = turn[:, 1, 1] = c
-        turn[:, 0, 1], turn[:, 1, 0], turn[:, 2, 2] = -s, s, 1.0
-        return FlexsplineShape(
-            points=np.einsum("kij,knj->kni", turn, self.points + u),
-            von_mises=stress,
-            tooth_force=np.einsum("kij,kj->ki", turn, tooth),
-            wave_generator_force=np.einsum("kij,kj->ki", turn, bore),
+        turn, passed, load = (
+            np.asarray(value, dtype=float)[..., None]
+            for value in (rotation, wave_generator_angle, torque)
         )
+        angle = 2.0 * pi / teeth * np.arange(teeth, dtype=float) + turn
+        u, stress, tooth, bore = self.at(
+            angle - passed, np.broadcast_to(load, angle.shape)
+        )
+        u += self.points.astype(np.float32)
+        return FlexsplineShape(
+            points=_turned(u, angle[..., None]),
+            von_mises=stress,
+            tooth_force=_turned(tooth, angle),
+            wave_generator_force=_turned(bore, angle),
+        )
+
+
+def _turned(vectors: Table, angle: Array) -> Table:
+    """Vectors (..., 3) turned about z by angles (...) [rad]."""
+    c, s = (f(angle).astype(np.float32) for f in (np.cos, np.sin))
+    x, y = vectors[..., 0], vectors[..., 1]
+    turned = vectors.copy()
+    turned[..., 0] = c * x - s * y
+    turned[..., 1] = s * x + c * y
+    return turned

@@ -167,15 +167,12 @@ def send_drive(
     assert fields is not None
     theta, psi = run.motor_position[rows, j], run.position[rows, j]
     flexspline, circular, wave = angles(drive.layout, theta, psi)
-    shapes: list[FlexsplineShape] = [
-        fields.flexspline(drive.teeth_flexspline, f, w, t)
-        for f, w, t in zip(flexspline, wave, run.output_torque[rows, j], strict=True)
-    ]
-    count, size = len(rows), shapes[0].von_mises.size
-    points = np.array([shape.points.reshape(-1, 3) for shape in shapes])
-    top = float(fields.von_mises.max())
-    colors = stress_color(np.array([s.von_mises.ravel() for s in shapes]) / top)
-    each = np.full(count, size)
+    torque = run.output_torque[rows, j]
+    shape = fields.flexspline(drive.teeth_flexspline, flexspline, wave, torque)
+    count = len(rows)
+    points = shape.points.reshape(count, -1, 3)
+    colors = stress_color(shape.von_mises / float(fields.von_mises.max()))
+    each = np.full(count, points.shape[1])
     stream.send_columns(
         f"{path}/flexspline",
         indexes=[time],
@@ -205,14 +202,14 @@ def send_drive(
             indexes=[time],
             columns=rr.Transform3D.columns(quaternion=quaternion_xyzw(wxyz)),
         )
-    _send_forces(stream, path, fields, shapes, time)
+    _send_forces(stream, path, fields, shape, time)
 
 
 def _send_forces(
     stream: Any,
     path: str,
     fields: DriveFields,
-    shapes: list[FlexsplineShape],
+    shape: FlexsplineShape,
     time: Any,
 ) -> None:
     """Arrows at the tips of the teeth and at the bore, one scale for both."""
@@ -228,15 +225,15 @@ def _send_forces(
     outer = np.where(edge, distance, -np.inf).argmax()
     inner = np.where(edge, distance, np.inf).argmin()
     for name, node, color, forces in (
-        ("tooth_forces", outer, 0xFFC832FF, [s.tooth_force for s in shapes]),
-        ("bore_forces", inner, 0x50DCA0FF, [s.wave_generator_force for s in shapes]),
+        ("tooth_forces", outer, 0xFFC832FF, shape.tooth_force),
+        ("bore_forces", inner, 0x50DCA0FF, shape.wave_generator_force),
     ):
-        vectors = scale * np.array(forces)
+        vectors = scale * forces
         vectors[..., 2] = 0.0
         # arrows end where they push
-        tips = np.array([s.points[:, node] for s in shapes])
+        tips = shape.points[:, :, node].copy()
         tips[..., 2] = z
-        sizes = np.full(len(shapes), vectors.shape[1])
+        count, teeth, _ = vectors.shape
         stream.send_columns(
             f"{path}/{name}",
             indexes=[time],
@@ -244,8 +241,8 @@ def _send_forces(
                 *rr.Arrows3D.columns(
                     origins=(tips - vectors).reshape(-1, 3),
                     vectors=vectors.reshape(-1, 3),
-                ).partition(sizes),
-                *rr.Arrows3D.columns(colors=[color] * len(shapes)),
+                ).partition(np.full(count, teeth)),
+                *rr.Arrows3D.columns(colors=[color] * count),
             ],
         )
 
@@ -286,7 +283,7 @@ def turned(points: Array, angle: float) -> Array:
     return np.asarray(points @ np.array([[c, s], [-s, c]]))
 
 
-def stress_color(share: Array) -> NDArray[np.uint32]:
+def stress_color(share: NDArray[np.floating[Any]]) -> NDArray[np.uint32]:
     """Colours of the stress over its largest, 0xRRGGBBAA, shape of the share."""
     from matplotlib import colormaps
 

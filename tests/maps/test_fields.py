@@ -61,7 +61,8 @@ def test_samples_come_back_and_places_between_are_near(shown):
     place = np.pi / PLACES * np.array([0.0, 7.0, 7.5, PLACES + 3.0, -2.0]) - 0.02
     u, stress, tooth, bore = shown.at(place, 20.0)
     error = np.abs(u[:, 0] - moved(place, 20.0)).max(axis=1)
-    assert error[[0, 1, 3, 4]] == pytest.approx(0.0, abs=1e-15)
+    # single precision of a millimetre
+    assert error[[0, 1, 3, 4]] == pytest.approx(0.0, abs=1e-9)
     assert 0.0 < error[2] <= 1e-3 * (2.0 * np.pi / PLACES) ** 2 / 8.0 * 1.01
     assert stress.shape == (5, 2)
     assert bore == pytest.approx(-tooth)
@@ -81,8 +82,10 @@ def test_the_picture_turns_with_everything(shown):
     c, s = np.cos(0.7), np.sin(0.7)
     turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     for key in ("points", "tooth_force", "wave_generator_force"):
-        assert getattr(other, key) == pytest.approx(getattr(one, key) @ turn.T)
-    assert other.von_mises == pytest.approx(one.von_mises)
+        expected = pytest.approx(getattr(one, key) @ turn.T, rel=1e-5, abs=1e-5)
+        assert getattr(other, key) == expected
+    assert other.points == pytest.approx(one.points @ turn.T, abs=1e-7)
+    assert other.von_mises == pytest.approx(one.von_mises, rel=1e-5)
     # the oval follows the wave generator: farthest out at its lobes
     radius = np.hypot(*one.points.mean(axis=1)[:, :2].T)
     out = 2.0 * np.pi / TEETH * radius.argmax() + 0.2 - 0.5
@@ -107,14 +110,13 @@ def test_unsound_fields_are_refused(shown, key, change, says):
 
 
 def test_a_file_keeps_them(synthetic_map, shown, tmp_path):
-    """Single precision in the file, all else bit for bit; a map without has none."""
+    """Bit for bit; a map without has none."""
     drive = replace(synthetic_map, fields=shown)
     drive.save(tmp_path / "a.swg")
     found = DriveMap.load(tmp_path / "a.swg").fields
     for part in fields(DriveFields):
         was, now = getattr(shown, part.name), getattr(found, part.name)
-        assert now == pytest.approx(np.asarray(was), rel=1e-7, abs=1e-12)
-    assert map_bytes(replace(drive, fields=found)) == map_bytes(drive)
+        assert np.array_equal(now, was)
     assert map_from_bytes(map_bytes(synthetic_map), DriveMap).fields is None
 
 
