@@ -167,14 +167,13 @@ class JointDrive:
                 transmission_error=error,
                 torque=elastic + self.damping * rate + slipping,
             )
-        _, e_theta, e_psi = self.drive.error_at(self.drive.phases(theta, psi))
-        g_theta, g_psi = 1.0 / self.ratio + e_theta, -1.0 + e_psi
-        rate = g_theta * theta_rate + g_psi * psi_rate
+        law = self.drive.law(theta, psi)
+        rate = law.by_theta * theta_rate + law.by_psi * psi_rate
         return JointSignals(
-            torsion=self.drive.torsion(theta, psi),
+            torsion=law.torsion,
             transmission_error=error,
-            torque=self.drive.forces(theta, psi)[1]
-            - (self.damping * rate + slipping) * g_psi
+            torque=law.output_force
+            - (self.damping * rate + slipping) * law.by_psi
             - self.drive.friction_direction[1] * friction,
         )
 

@@ -49,6 +49,22 @@ class Ratings:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class Law:
+    """Torsion and generalised forces of the potential at some angles, one shape."""
+
+    torsion: Array
+    """[rad]."""
+    by_theta: Array
+    """Derivative of the torsion by the input angle [-]."""
+    by_psi: Array
+    """The same by the output angle [-]."""
+    input_force: Array
+    """-dV/dtheta [N·m]."""
+    output_force: Array
+    """-dV/dpsi, the torque on the output [N·m]."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class DriveMap:
     """Potential, hysteresis and friction of one drive; immutable."""
 
@@ -297,19 +313,21 @@ class DriveMap:
         j = np.clip(np.searchsorted(knots, inside, side="right") - 1, 0, knots.size - 2)
         d = (inside - knots[j])[..., None, None]
         c = np.moveaxis(self.potential, 2, 0)[j]  # (..., n_harmonics, 2, 5)
-        v0 = c[..., 0] + d * (
-            c[..., 1] + d * (c[..., 2] + d * (c[..., 3] + d * c[..., 4]))
-        )
-        v1 = c[..., 1] + d * (2 * c[..., 2] + d * (3 * c[..., 3] + d * 4 * c[..., 4]))
-        v2 = 2 * c[..., 2] + d * (6 * c[..., 3] + d * 12 * c[..., 4])
         out = (x - inside)[..., None, None]
+        beyond = bool(out.any())
         low, high = self.end_stiffness[..., 0], self.end_stiffness[..., 1]
-        k_end = np.where(out < 0, low, high)
-        if derivative == 0:
-            return np.asarray(v0 + out * (v1 + 0.5 * out * k_end))
-        if derivative == 1:
-            return np.asarray(v1 + out * k_end)
-        return np.asarray(np.where(out == 0, v2, k_end))
+        k_end = np.where(out < 0, low, high) if beyond else high
+        if derivative == 2:
+            v2 = 2 * c[..., 2] + d * (6 * c[..., 3] + d * 12 * c[..., 4])
+            return np.asarray(np.where(out == 0, v2, k_end))
+        if derivative == 1 or beyond:
+            v1 = 2 * c[..., 2] + d * (3 * c[..., 3] + d * 4 * c[..., 4])
+            v1 = c[..., 1] + d * v1
+            if derivative == 1:
+                return np.asarray(v1 + out * k_end if beyond else v1)
+        v0 = c[..., 1] + d * (c[..., 2] + d * (c[..., 3] + d * c[..., 4]))
+        v0 = c[..., 0] + d * v0
+        return np.asarray(v0 + out * (v1 + 0.5 * out * k_end) if beyond else v0)
 
     def _sum(self, torsion: ArrayLike, phases: Array, derivative: int) -> Array:
         ab = self.coefficients(torsion, derivative)
@@ -335,16 +353,30 @@ class DriveMap:
         The second is the torque T that the drive exerts on the output; minus the
         first is the external torque that holds the input in slow motion.
         """
+        law = self.law(theta, psi)
+        return law.input_force, law.output_force
+
+    def law(self, theta: ArrayLike, psi: ArrayLike) -> Law:
+        """All that the potential says at given angles; shapes of the angles."""
         phases = self.phases(theta, psi)
-        e0, e_theta, e_psi = self.error_at(phases)
-        x = np.asarray(theta, float) / self.ratio + e0 - np.asarray(psi, float)
-        torque = self._sum(x, phases, 1)
-        ab = self.coefficients(x)
-        slope = ab[..., 1] * np.cos(phases) - ab[..., 0] * np.sin(phases)
+        cos, sin = np.cos(phases), np.sin(phases)
+        a, b = self.kinematic_error.T
         n_theta, n_psi = self.angle_orders.T
-        return (
-            -torque * (1.0 / self.ratio + e_theta) - np.sum(slope * n_theta, axis=-1),
-            -torque * (-1.0 + e_psi) - np.sum(slope * n_psi, axis=-1),
+        x = np.asarray(theta, float) / self.ratio - np.asarray(psi, float)
+        x = x + np.sum(a * cos + b * sin, axis=-1)
+        slope = b * cos - a * sin
+        g_theta = 1.0 / self.ratio + np.sum(slope * n_theta, axis=-1)
+        g_psi = -1.0 + np.sum(slope * n_psi, axis=-1)
+        by_torsion = self.coefficients(x, 1)
+        torque = np.sum(by_torsion[..., 0] * cos + by_torsion[..., 1] * sin, axis=-1)
+        ab = self.coefficients(x)
+        by_phase = ab[..., 1] * cos - ab[..., 0] * sin
+        return Law(
+            torsion=x,
+            by_theta=g_theta,
+            by_psi=g_psi,
+            input_force=-torque * g_theta - np.sum(by_phase * n_theta, axis=-1),
+            output_force=-torque * g_psi - np.sum(by_phase * n_psi, axis=-1),
         )
 
     # -- figures that a joint needs -------------------------------------------
