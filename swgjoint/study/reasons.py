@@ -9,6 +9,8 @@ WITHIN = 15.0
 """Deviation beyond which a row needs a reason [%]."""
 MESH = 5.0
 """Change between the mesh of the thesis and the finest one that is worth a word [%]."""
+SETTLED = 2.0
+"""Change from the last mesh but one to the finest up to which a value settles [%]."""
 
 _PLACES = {
     "fillet": "in the tooth fillets",
@@ -36,6 +38,8 @@ class Facts:
     """How often the largest stress sat where."""
     load: str = "T/10"
     """By which rows are judged."""
+    tenth: float | None = None
+    """At T/10 where rows are judged at T."""
     by_mesh: Mapping[float, float] = field(default_factory=dict)
     """At T by refinement, where that is told of every row: contacts at edges, which are
     the largest stresses in space, grow with the mesh."""
@@ -76,16 +80,23 @@ def _ladder(by_mesh: Mapping[float, float]) -> list[str]:
     """Stress mesh by mesh, and whether it settles."""
     if len(by_mesh) < 2:
         return []
-    first, *_, last = by_mesh.values()
-    change = 100.0 * (last / first - 1.0)
+    *_, before, last = by_mesh.values()
+    change = 100.0 * (last / before - 1.0)
     values = ", ".join(f"{value:.0f}" for value in by_mesh.values())
     meshes = ", ".join(f"{mesh:g}" for mesh in by_mesh)
-    settled = "settles" if abs(change) <= MESH else "has no converged value"
-    return [f"{values} MPa at refinement {meshes} ({change:+.0f} %): {settled}"]
+    settled = "settles" if abs(change) <= SETTLED else "has no converged value"
+    return [
+        f"{values} MPa at refinement {meshes}, {change:+.1f} % at the end: {settled}"
+    ]
 
 
 def _deviation(facts: Facts, value: float) -> list[str]:
     parts = [f"{value:+.0f} % at {facts.load}"]
+    tenth = percent(facts.tenth, facts.printed)
+    if tenth is not None:
+        assert facts.value is not None and facts.tenth is not None
+        more = facts.value - facts.tenth
+        parts.append(f"{tenth:+.0f} % at T/10, the torque adds {more:+.0f} MPa")
     total = sum(facts.places.values())
     if total:
         place, count = max(facts.places.items(), key=lambda item: item[1])

@@ -126,6 +126,7 @@ def _row(result: CaseRecords, kind: Kind) -> Row:
         printed=printed,
         value=ours(tenth),
         load="T/10" if tenth else "T",
+        tenth=None if tenth else ours(True),
         nominal=ours(False),
         away=ours(tenth, away=True),
         fine=ours(tenth, finest),

@@ -147,3 +147,23 @@ def test_reasons_come_from_the_runs():
     assert "the finest mesh changes it by +23 %" in mesh
     assert mesh.endswith("the source is silent")
     assert "no matter of the mesh (+1 %" in reason_for(facts(value=80.0, fine=81.0))
+
+
+def test_values_at_both_loads_and_on_all_meshes():
+    """Judged at T: what T/10 gives, and whether the last mesh still changes it."""
+    told = facts(
+        value=150.0,
+        nominal=150.0,
+        load="T",
+        tenth=80.0,
+        places={},
+        by_mesh={1: 150.0, 1.3: 160.0, 1.6: 162.0},
+    )
+    assert reason_for(told) == (
+        "+50 % at T; -20 % at T/10, the torque adds +70 MPa; 150, 160, 162 MPa at"
+        " refinement 1, 1.3, 1.6, +1.2 % at the end: settles"
+    )
+    grows = reason_for(facts(by_mesh={1: 100.0, 1.3: 110.0, 1.6: 120.0}))
+    assert grows is not None and grows.endswith(
+        "+9.1 % at the end: has no converged value"
+    )

@@ -231,14 +231,14 @@ def test_table_of_micro_geometry(tmp_path, monkeypatch):
     assert initial.converged == pytest.approx(1000.0 * 1.6**0.5)
     assert initial.more["converged_tenth"] is None
     assert list(initial.more["by_refinement"]) == ["1", "1.3", "1.6"]
-    line = "1000, 1140, 1265 MPa at refinement 1, 1.3, 1.6 (+26 %): has no converged"
+    line = "1000, 1140, 1265 MPa at refinement 1, 1.3, 1.6, +10.9 % at the end: has no"
     assert line in initial.reason
     # judged at T: 1000 is within 15 % of 1160
     assert "at T/10" not in initial.reason
     improved = rows_of(result, "table-7.4 improved")["compressive"]
     assert improved.reason.startswith("-25 % at T; ")
     assert improved.reason.endswith(
-        "290, 290, 290 MPa at refinement 1, 1.3, 1.6 (+0 %): settles"
+        "290, 290, 290 MPa at refinement 1, 1.3, 1.6, +0.0 % at the end: settles"
     )
     assert result.more["shares"]["converged"]["computed"] == 6
     # the sign of the slope, stated by the study and its report
