@@ -23,10 +23,16 @@ SPACING = 0.75
 """Distance between the arms of several runs [m]."""
 
 
-def blueprint_of(runs: Mapping[str, Run]) -> Any:
-    """Layout for runs of one motion, see :func:`swgjoint.view.recording`."""
+def blueprint_of(runs: Mapping[str, Run], joints: list[str] | None = None) -> Any:
+    """Layout for runs of one motion, see :func:`swgjoint.view.recording`.
+
+    Args:
+        runs: Runs by name.
+        joints: In the order of their tabs; that of :func:`joints_by_interest` if None.
+    """
     import rerun.blueprint as rrb
 
+    joints = joints_by_interest(runs) if joints is None else joints
     first = next(iter(runs.values()))
     prefixes = {label: f"/{label}/" if label else "/" for label in runs}
     # torsion and error of a rigid arm are a line at zero that would set the scale
@@ -40,7 +46,7 @@ def blueprint_of(runs: Mapping[str, Run]) -> Any:
         x_range=[-1.2 * WIDTH, 1.35 * WIDTH], y_range=[-1.2, 1.2]
     )
     tabs = []
-    for joint in joints_by_interest(runs):
+    for joint in joints:
         j = first.joints.index(joint)
         pictures = []
         if any(highest_resolved_order(run, j) for run in runs.values()):
@@ -90,7 +96,7 @@ def blueprint_of(runs: Mapping[str, Run]) -> Any:
     ]
     drives = [
         _drive(runs[label], joint, label)
-        for label, joint in drives_shown(runs, joints_by_interest(runs)).items()
+        for label, joint in drives_shown(runs, joints).items()
     ]
     if drives:
         left.append(rrb.Tabs(*drives, active_tab=0))

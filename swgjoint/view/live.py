@@ -64,8 +64,9 @@ def stream_runs(
         process, url = start_viewer()
     wait_for(loopback_port(url), process)
     stream = rr.RecordingStream(stream_name(runs))
-    stream.connect_grpc(url, default_blueprint=blueprint_of(runs))
-    drives = drives_shown(runs, joints_by_interest(runs))
+    joints = joints_by_interest(runs)
+    stream.connect_grpc(url, default_blueprint=blueprint_of(runs, joints))
+    drives = drives_shown(runs, joints)
     log_still(stream, runs, drives=drives)
     time_of = next(iter(runs.values())).time
     begin = time.monotonic()

@@ -101,8 +101,12 @@ def write_recording(
     beside = Path(name)
     try:
         stream = rr.RecordingStream(stream_name(runs))
-        stream.save(beside, default_blueprint=blueprint_of(runs))
-        log_runs(stream, runs, rigid=rigid)
+        joints = joints_by_interest(runs)
+        stream.save(beside, default_blueprint=blueprint_of(runs, joints))
+        # the bulk first: rerun encodes it while the rest is put together
+        drives = drives_shown(runs, joints)
+        log_moving(stream, runs, rigid=rigid, drives=drives)
+        log_still(stream, runs, drives=drives)
         stream.flush()
         stream.disconnect()
         beside.chmod(0o644)
@@ -117,14 +121,6 @@ def stream_name(runs: Mapping[str, Run]) -> str:
     """What the viewer calls a recording of these runs."""
     first = next(iter(runs.values()))
     return f"swgjoint {first.assembly.scene.name}"
-
-
-def log_runs(stream: Any, runs: Mapping[str, Run], *, rigid: Run | None = None) -> None:
-    """Send the runs into a recording that is open; see :func:`write_recording`."""
-    # the bulk first: the viewer's library encodes it while the rest is put together
-    drives = drives_shown(runs, joints_by_interest(runs))
-    log_moving(stream, runs, rigid=rigid, drives=drives)
-    log_still(stream, runs, drives=drives)
 
 
 def signals_of(run: Run, j: int) -> dict[str, Array]:
@@ -159,6 +155,7 @@ def log_still(
             log_phase_frame(stream, joint, of_joint)
     for k, (label, run) in enumerate(runs.items()):
         prefix, color = prefix_of(label), color_of_run(k)
+        styles = {name: _style(label or name, color) for name in (*SIGNALS, "error_mm")}
         if len(runs) > 1:
             # side by side: their differences are far below what an overlay could show
             place = [0.0, SPACING * (0.5 * (len(runs) - 1) - k), 0.0]
@@ -177,9 +174,8 @@ def log_still(
         _log_shapes(stream, prefix, run, color)
         for j, joint in enumerate(run.joints):
             for name in SIGNALS:
-                _log_style(
-                    stream, f"{prefix}joint/{joint}/{name}", label or name, color
-                )
+                path = f"{prefix}joint/{joint}/{name}"
+                stream.log(path, styles[name], static=True)
             bars = ripple_bars(run, j)
             if bars is not None:
                 stream.log(
@@ -191,7 +187,7 @@ def log_still(
                 path = phase_path(joint, label)
                 log_phase_path(stream, path, phase_points(run, j, of_joint), color)
         if run.tool_position.shape[1]:
-            _log_style(stream, f"{prefix}tool/error_mm", label or "error_mm", color)
+            stream.log(f"{prefix}tool/error_mm", styles["error_mm"], static=True)
     for label, joint in drives.items():
         log_drive(stream, drive_path(joint, label), runs[label], joint)
 
@@ -257,17 +253,16 @@ def color_of_run(k: int) -> tuple[int, int, int]:
     return COLORS[k % len(COLORS)]
 
 
-def _log_style(stream: Any, path: str, name: str, color: tuple[int, int, int]) -> None:
+def _style(name: str, color: tuple[int, int, int]) -> Any:
     import rerun as rr
 
-    line = rr.SeriesLines(
+    return rr.SeriesLines(
         names=[name],
         colors=[color],
         widths=[1.2],
         # zoomed out, a mean of neighbours would hide the ripple
         aggregation_policy=rr.components.AggregationPolicy.MinMax,
     )
-    stream.log(path, line, static=True)
 
 
 def _send_scalars(stream: Any, path: str, time: Any, values: Array) -> None:
