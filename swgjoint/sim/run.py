@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Mapping
+from copy import deepcopy
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -102,6 +104,10 @@ class Run:
 
     def metrics(self) -> dict[str, Any]:
         """Figures of the run under the keys of ``swgjoint run --json``."""
+        return deepcopy(self._figures)
+
+    @cached_property
+    def _figures(self) -> dict[str, Any]:
         return run_metrics(self)
 
     def to_rerun(self, path: str | Path) -> Path:
