@@ -55,7 +55,11 @@ def blueprint_of(runs: Mapping[str, Run], joints: list[str] | None = None) -> An
             ]
             title = "ripple by order per input turn [% of rated]"
             pictures.append(
-                rrb.BarChartView(name=title, contents=[f"+ {path}" for path in bars])
+                rrb.BarChartView(
+                    name=title,
+                    contents=[f"+ {path}" for path in bars],
+                    plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.LeftTop),
+                )
             )
         if phase_scales(runs, j) is not None:
             pictures.append(
