@@ -113,7 +113,7 @@ def test_wave_generators_come_out_in_the_known_order(capsys, monkeypatch):
     """
     monkeypatch.setenv("SWGJOINT_CACHE", "")  # coarser maps than the cache may hold
     monkeypatch.setattr("swgjoint.study.compare.STRESS_POSITIONS", 1)
-    monkeypatch.setattr("swgjoint.fe.sampling.ANGLES", 12)
+    monkeypatch.setattr("swgjoint.fe.sampling.ANGLES", 6)
     assert main(["compare", *DRIVES.values(), "--scene", "ur5e-sweep", "--json"]) == 0
     rows = json.loads(capsys.readouterr().out)["rows"]
     of = dict(zip(DRIVES, rows, strict=True))
