@@ -45,7 +45,8 @@ def test_shown_commands_parse(shown):
     if hasattr(args, "design"):
         assert args.design in bundled_names("drives", ".toml")
     if hasattr(args, "scene"):
-        assert args.scene in bundled_names("scenes", ".toml")
+        arms = bundled_names("arms", ".xml") if name == "run" else []
+        assert args.scene in (*bundled_names("scenes", ".toml"), *arms)
 
 
 def test_shown_python_uses_public_names():
