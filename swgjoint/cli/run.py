@@ -60,6 +60,14 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--report", action="store_true", help="write report.html into DIR, too"
     )
+    parser.add_argument(
+        "--live",
+        metavar="URL",
+        nargs="?",
+        const="",
+        help="send the run to a viewer on this machine, at the pace of a clock; by"
+        " default to one that is started",
+    )
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
@@ -87,6 +95,11 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
             from swgjoint.cli.report_file import report_file
 
             files += report_file({"": result}, folder, progress=args.progress)
+    live = None
+    if args.live is not None:
+        from swgjoint.view.live import stream_runs
+
+        live = stream_runs({"": result}, url=args.live or None, pace=1.0)
     arm = result.assembly.arm
     return {
         "scene": scene.name,
@@ -95,6 +108,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         **result.metrics(),
         "contains": result.contains,
         "files": files,
+        "live": live,
     }
 
 

@@ -120,6 +120,7 @@ def log_drive(stream: Any, path: str, run: Run, joint: str) -> None:
         rr.Points3D(
             [[0.0, 0.0, z]],
             radii=[rr.Radius.ui_points(0.5)],
+            colors=[(250, 250, 250)],
             labels=[f"von Mises stress: blue 0, red {top:.0f} MPa"],
             show_labels=True,
         ),

@@ -101,3 +101,21 @@ def test_the_demo_compares_two_drives_with_the_rigid_arm(
     text = report(result)
     assert "tool against the rigid arm" in text
     assert "shoulder_lift" in text
+
+
+def test_run_goes_to_a_viewer_on_this_machine_only(capsys, monkeypatch):
+    """At the pace of a clock; an address elsewhere is refused."""
+    sent = {}
+
+    def stream(runs, **options):
+        sent.update(options, runs=list(runs))
+        return "rerun+http://127.0.0.1:9876/proxy"
+
+    with monkeypatch.context() as patch:
+        patch.setattr("swgjoint.view.live.stream_runs", stream)
+        assert main(["run", "bench", *SHORT, "--live", "--json"]) == 0
+    assert sent == {"runs": [""], "url": None, "pace": 1.0}
+    assert json.loads(capsys.readouterr().out)["live"].startswith("rerun+http://127.")
+    elsewhere = "rerun+http://192.0.2.1:9876/proxy"
+    assert main(["run", "bench", *SHORT, "--live", elsewhere]) == 2
+    assert "192.0.2.1" in capsys.readouterr().err
