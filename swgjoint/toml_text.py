@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 
 def toml_text(data: Mapping[str, Any]) -> str:
-    """Nested tables of numbers, texts, booleans and lists as TOML."""
+    """Nested tables of numbers, texts, booleans, lists and lists of tables as TOML."""
     lines: list[str] = []
     _write(data, (), lines)
     return "\n".join(lines).strip() + "\n"
@@ -16,12 +17,20 @@ def toml_text(data: Mapping[str, Any]) -> str:
 
 def _write(table: Mapping[str, Any], path: tuple[str, ...], lines: list[str]) -> None:
     scalars = {k: v for k, v in table.items() if not isinstance(v, Mapping)}
-    if path and scalars:
-        lines += ["", f"[{'.'.join(path)}]"]
-    lines += [f"{key} = {_value(value)}" for key, value in scalars.items()]
+    if path and (scalars or not table):
+        lines += ["", f"[{'.'.join(map(_key, path))}]"]
+    lines += _pairs(scalars)
     for key, value in table.items():
         if isinstance(value, Mapping):
             _write(value, (*path, key), lines)
+
+
+def _pairs(table: Mapping[str, Any]) -> list[str]:
+    return [f"{_key(key)} = {_value(value)}" for key, value in table.items()]
+
+
+def _key(name: str) -> str:
+    return name if re.fullmatch(r"[A-Za-z0-9_-]+", name) else _value(name)
 
 
 def _value(value: Any) -> str:
@@ -32,6 +41,8 @@ def _value(value: Any) -> str:
     if isinstance(value, str):
         # a JSON string is a TOML basic string; TOML alone forbids a bare DEL
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(value, Mapping):
+        return f"{{{', '.join(_pairs(value))}}}"
     if isinstance(value, Sequence):
         return f"[{', '.join(_value(item) for item in value)}]"
     raise TypeError(f"{type(value).__name__} has no TOML form here")
