@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass
+from itertools import count
 from pathlib import Path
 
 import mujoco
@@ -57,8 +58,12 @@ def read_arm(path: Path) -> ArmFile:
         for geom in spec.geoms:
             geom.contype = geom.conaffinity = 0
     for kind, elements in (("body", spec.bodies), ("joint", spec.joints)):
+        named = {element.name for element in elements}
         for k, element in enumerate(elements):
-            element.name = element.name or f"{kind}_{k}"
+            if not element.name:
+                names = (f"{kind}_{j}" for j in count(k))
+                element.name = next(name for name in names if name not in named)
+                named.add(element.name)
     limits = _effort(spec)
     for element in [*spec.sensors, *spec.actuators, *spec.keys]:
         spec.delete(element)

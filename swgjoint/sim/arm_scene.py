@@ -50,8 +50,8 @@ def scene_of_arm(
 
     Without a drive each joint gets the smallest CSG of ratio 100 whose repeated peak
     torque is at least what the file lets its motor exert or, where the file does not
-    say, whose rated torque is at least what the sweep needs; the largest if none is. A
-    rule to start from, not the choice of the arm's maker. The rotor has twice the
+    say, whose rated torque is at least the weight on the sweep; the largest if none is.
+    A rule to start from, not the choice of the arm's maker. The rotor has twice the
     inertia of the wave generator of its size: a motor of the same inertia is assumed.
 
     Args:

@@ -312,3 +312,16 @@ def test_a_scene_names_a_urdf_beside_it(tmp_path, monkeypatch):
     assert run.joints == ("lift", "elbow")
     assert run.assembly.model.nv == 4
     assert mujoco.mj_name2id(run.assembly.model, mujoco.mjtObj.mjOBJ_BODY, "hand") > 0
+
+
+def test_names_that_are_made_up_are_free(tmp_path):
+    """A joint without a name beside one that has the next name in line."""
+    path = tmp_path / "named.xml"
+    path.write_text(
+        """<mujoco><worldbody><body name="body_1"><joint name="joint_1" axis="0 0 1"/>
+        <geom size="0.1"/><body><joint axis="0 1 0"/><geom size="0.1"/>
+        </body></body></worldbody></mujoco>"""
+    )
+    arm = RigidArm(str(path))
+    assert len(set(arm.joints)) == 2
+    assert "joint_1" in arm.joints
