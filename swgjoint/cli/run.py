@@ -79,6 +79,10 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     """
     if args.report and not args.out:
         raise InputError("--report needs a folder; accepted: --out DIR")
+    if args.live:
+        from swgjoint.view.live import loopback_port
+
+        loopback_port(args.live)
     folder = output_folder(args.out) if args.out else None
     from swgjoint.sim.run import run_scene
 
