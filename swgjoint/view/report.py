@@ -144,11 +144,19 @@ def write_report(
     return write_whole(path, page)
 
 
+WINDOWS = {
+    "constant speed": "at the constant-speed part of the motion",
+    "motion": "over the whole motion",
+}
+"""What figures are taken over."""
+
+
 def summary_table(runs: Mapping[str, Run]) -> Table:
     """One line a run: worst joint and tool."""
-    rows = []
+    rows, window = [], ""
     for label, run in runs.items():
         metrics = run.metrics()
+        window = metrics["window_of"]
         joints = metrics["joints"].values()
         peaks = [
             joint["ratings"]["peak_Nm"] / joint["ratings"]["repeated_peak_Nm"]
@@ -185,7 +193,7 @@ def summary_table(runs: Mapping[str, Run]) -> Table:
             ("speed", "times real time"),
         ],
         rows=rows,
-        notes=["Largest of all joints, at the constant-speed part of the motion."],
+        notes=[f"Largest of all joints, {WINDOWS[window]}."],
     )
 
 
