@@ -215,18 +215,37 @@ def limited(command: Array, speed: Array, limits: MotorLimits | None) -> Array:
 def wanted_torque(
     assembly: Assembly, theta: Array, theta_rate: Array, integral: Array
 ) -> Array:
-    """Torque that the engine's loops ask for in recorded states [N·m]. (n, n_joints).
+    """Torque that the engine's loops ask for on the way to each recorded state [N·m].
+
+    The torque beside a state is that of the step that led to it, at the start and at
+    the end of that step. The integrator ``discrete`` acts with the end alone: both are
+    the same. Others hold the reference while the motor turns on, taken at its mean
+    speed over the step: a stiff loop swings a light rotor within every step, which the
+    speeds at its ends do not show.
 
     Args:
-        assembly: The scene as recorded.
-        theta: Motor angles [rad]. Shape (n, n_joints).
+        assembly: The scene as it was run.
+        theta: Motor angles in the recorded states [rad]. Shape (n, n_joints).
         theta_rate: [rad/s]. Shape (n, n_joints).
         integral: Of the angle's error [rad·s]. Shape (n, n_joints).
+
+    Returns:
+        Shape (2, n, n_joints).
     """
     path, ratio, loops = assembly.trajectory, assembly.ratio, assembly.loops
-    return np.asarray(
-        loops.stiffness * (ratio * path.position - theta)
-        + loops.damping * (ratio * path.velocity - theta_rate)
-        + loops.integral * integral
-        + assembly.feedforward
-    )
+    parts = assembly.sub_steps
+    # as the loop sees them: a prescribed error moves reference and angle alike
+    angle = ratio * (path.position + assembly.prescribed)
+    speed = ratio * (path.velocity + assembly.prescribed_rate)
+    asked = loops.stiffness * angle + loops.damping * speed + assembly.feedforward
+    theta = theta + ratio * assembly.prescribed[::parts]
+    given = loops.integral * integral - loops.stiffness * theta
+    if assembly.scene.simulation.integrator == "discrete":
+        theta_rate = theta_rate + ratio * assembly.prescribed_rate[::parts]
+        wanted = asked[::parts] + given - loops.damping * theta_rate
+        return np.stack([wanted, wanted])
+    # the mean of what the parts of a step were given
+    held = asked[:-1].reshape(-1, parts, len(ratio)).mean(axis=1)
+    held -= loops.damping * np.diff(theta, axis=0) / (parts * assembly.step)
+    first = held + given[:-1]
+    return np.stack([np.vstack([first[:1], x]) for x in (first, held + given[1:])])

@@ -123,11 +123,11 @@ def dissipation(run: Run, j: int) -> float:
 
 
 def _motor_work(run: Run, j: int, part: slice) -> float:
-    torque = run.motor_torque[part, j]
+    # the torque beside a state is that of the whole way to it
+    torque = run.motor_torque[part, j][1:]
     if run.assembly.scene.simulation.integrator == "discrete":
-        # the torque beside a state acted on the whole way to it
-        return float(torque[1:] @ _way(run, run.motor_velocity[part, j]))
-    return _work(torque, run.motor_position[part, j])
+        return float(torque @ _way(run, run.motor_velocity[part, j]))
+    return float(torque @ np.diff(run.motor_position[part, j]))
 
 
 def _way(run: Run, speed: Array) -> Array:

@@ -37,7 +37,8 @@ class Run:
     """A recorded run; arrays hold every state, the first included.
 
     Angles and torques at the output side unless named motor; n states, joints in the
-    order of ``joints``. Torques and torsions are the drive's law at the recorded state.
+    order of ``joints``. Torques and torsions are the drive's law at the recorded state;
+    the motor's torque is the mean over the step that led to it.
     """
 
     name: str
@@ -252,15 +253,21 @@ def _recorded(
 
     if wanted is None:
         integral = _integrals(assembly, states)
-        wanted = wanted_torque(assembly, theta, theta_rate, integral)
+        asked = wanted_torque(whole, theta, theta_rate, integral)
     else:
-        wanted = wanted[:: whole.sub_steps]
-    motor = np.column_stack(
+        asked = np.stack(2 * [wanted[:: whole.sub_steps]])
+    speed = theta_rate
+    if assembly.scene.simulation.integrator != "discrete":
+        speed = np.diff(theta, axis=0) / np.diff(path.time)[:, None]
+        speed = np.vstack([speed[:1], speed])
+    motor = np.stack(
         [
-            limited(wanted[:, j], theta_rate[:, j], limits)
+            limited(asked[:, :, j], speed[:, j], limits)
             for j, limits in enumerate(assembly.loops.limits)
-        ]
-    )
+        ],
+        axis=-1,
+    ).mean(axis=0)
+    wanted = asked.mean(axis=0)
     # no rotor: what the motor gives less what its rotor takes; the integrator's own
     # acceleration is the velocity difference of the step that led to the state
     ideal = ratio * (rates - whole.prescribed_rate)
@@ -301,7 +308,8 @@ def _recorded(
 def _integrals(assembly: Assembly, states: Array) -> Array:
     """Integral of the error in the engine's loops [rad·s]. Shape (n, n_joints).
 
-    As it acted on the way to the state: the engine integrates after the forces.
+    Under ``discrete`` as it acted on the way to the state: the engine integrates after
+    the forces.
     """
     model = assembly.model
     integral = np.zeros((len(states), len(assembly.joints)))
@@ -309,5 +317,7 @@ def _integrals(assembly: Assembly, states: Array) -> Array:
     for j in np.flatnonzero(assembly.loops.integral):
         address = model.actuator_actadr[j]
         if address >= 0:
-            integral[1:, j] = states[:-1, first + address]
+            integral[:, j] = states[:, first + address]
+    if assembly.scene.simulation.integrator == "discrete":
+        integral[1:] = integral[:-1].copy()
     return integral

@@ -23,16 +23,17 @@ LOSSY = replace(
 SWEEP = {"kind": "sweep", "hold_s": 0.1, "ramp_s": 0.3, "end_deg": {"joint": 10.0}}
 
 
+@pytest.mark.parametrize("integrator", ["discrete", "RK4"])
 @pytest.mark.parametrize("level", ["rigid", "linear", "native", "full"])
 @pytest.mark.parametrize("drive", [LINEAR, LOSSY], ids=["plain", "lossy"])
-def test_the_balance_closes(bench, level, drive):
+def test_the_balance_closes(bench, level, drive, integrator):
     """Work in is storage and losses, with hysteresis and friction and without."""
     run = bench(
         drive,
         defaults__level=level,
         defaults__friction=True,
         trajectory=SWEEP,
-        simulation={"duration_s": 1.5, "step_s": 1e-4},
+        simulation={"duration_s": 1.5, "step_s": 1e-4, "integrator": integrator},
     )
     energy = run.metrics()["energy"]
     joint = run.metrics()["joints"]["joint"]["energy"]
