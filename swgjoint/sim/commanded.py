@@ -37,8 +37,21 @@ def trajectory_of(scene: Scene, arm: RigidArm, *, sub_steps: int = 1) -> Traject
     """The commanded motion of all joints of an arm, at every step or part of one.
 
     Raises:
-        InputError: If the arm cannot make the motion.
+        InputError: If the arm cannot make the motion, or no sample of the run is left
+            for the metrics.
     """
+    path = _motion_of(scene, arm, sub_steps)
+    if path.steady.stop <= path.steady.start:
+        raise InputError(
+            f"{scene.where}: simulation.step_s: {scene.simulation.step_s:g} s leaves no"
+            " sample in the part of the motion that the metrics use; accepted: a"
+            " smaller step or a longer motion"
+        )
+    return path
+
+
+def _motion_of(scene: Scene, arm: RigidArm, sub_steps: int) -> Trajectory:
+    """The motion by its kind."""
     section, timing = scene.trajectory, scene.simulation
     joints = arm.joints
     start = _angles(section.start_deg, joints)

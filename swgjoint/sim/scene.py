@@ -65,12 +65,16 @@ class Scene(Section):
         duration, step = self.simulation.duration_s, self.simulation.step_s
         needed = self.trajectory.shortest_s
         faults = []
-        if duration <= needed:
+        run = round(duration / step) * step
+        if run <= needed + 1e-9:
+            rounded = (
+                "" if abs(run - duration) < 1e-9 else f", {run:g} s in whole steps"
+            )
             faults.append(
                 (
                     "simulation.duration_s",
-                    f"{duration:g} s; accepted: more than the {needed:g} s that holds,"
-                    " ramps and settling of the trajectory take",
+                    f"{duration:g} s{rounded}; accepted: more than the {needed:g} s that"
+                    " holds, ramps and settling of the trajectory take",
                 )
             )
         if duration / step > MAX_STEPS:
@@ -96,7 +100,11 @@ class Scene(Section):
         faults += [
             (key, f"{value:g} s; accepted: a multiple of step_s, {step:g} s")
             for key, value in times.items()
-            if value is not None and abs(value / step - round(value / step)) > 1e-6
+            if value
+            and (
+                round(value / step) < 1
+                or abs(value / step - round(value / step)) > 1e-6
+            )
         ]
         if faults:
             raise Fault(*faults)

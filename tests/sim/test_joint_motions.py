@@ -193,6 +193,21 @@ def test_a_bad_csv_is_one_line(tmp_path, text, message):
     assert len(str(caught.value).splitlines()) == 1
 
 
+def test_a_motion_between_two_samples_is_refused(tmp_path):
+    """Points 0.1 ms apart that no sample of 1 ms meets leave nothing to measure."""
+    path = tmp_path / "points.csv"
+    path.write_text("time_s,joint_deg\n0,0\n0.0001,0.001\n")
+    for hold, met in ((0.5, True), (0.5005, False)):
+        scene = scene_of(
+            f"[trajectory]\nkind = 'csv'\nfile = {str(path)!r}\nhold_s = {hold}"
+        )
+        if met:
+            assert trajectory_of(scene, RigidArm("bench")).steady.stop == 501
+            continue
+        with pytest.raises(InputError, match=r"step_s: 0\.001 s leaves no sample"):
+            trajectory_of(scene, RigidArm("bench"))
+
+
 def test_a_step_jumps_once():
     """Before it the start, from it on the end, no speed is commanded."""
     scene = scene_of("[trajectory]\nkind='step'\nat_s=0.5\nstep_deg={joint=2.0}")

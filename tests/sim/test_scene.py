@@ -61,6 +61,27 @@ def test_a_run_must_be_longer_than_its_ramps():
     ]
 
 
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"simulation.duration_s": 0.0004}, "0.0004 s, 0 s in whole steps; accepted"),
+        ({"simulation.duration_s": 0.20045, "trajectory": {
+            "kind": "step", "at_s": 0.2004, "step_deg": {"joint": 1.0}}},
+         "0.20045 s, 0.2 s in whole steps; accepted: more than the 0.2004 s"),
+        ({"simulation.duration_s": 2.2004, "trajectory": {
+            "kind": "iso9283", "cycles": 1}}, "2.2004 s, 2.2 s in whole steps"),
+        ({"controller.control_period_s": 1e-9}, "1e-09 s; accepted: a multiple of"),
+        ({"sensors.motor.delay_s": 1e-9}, "1e-09 s; accepted: a multiple of step_s"),
+    ],
+)  # fmt: skip
+def test_times_that_no_step_reaches_are_refused(changes, message):
+    """A run, a period or a delay is a whole number of steps, and not zero of them."""
+    with pytest.raises(InputError) as caught:
+        Scene.from_toml(GOOD).with_changes(changes)
+    assert message in str(caught.value)
+    assert len(str(caught.value).splitlines()) == 1
+
+
 def test_two_drives_at_once_are_refused():
     """A named drive beside a linear one is ambiguous."""
     text = GOOD.replace("[joints.joint]", "[joints.joint]\ndrive = 'a'\nlinear = {}")
