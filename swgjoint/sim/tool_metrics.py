@@ -26,6 +26,8 @@ Array = NDArray[np.float64]
 
 PATH_POINTS = 50
 """Planes along a path in which the passes are compared."""
+ON_PLANE = 1e-9
+"""Distance from its plane within which a crossing is found [m]."""
 REST = 16
 """Samples of rest from which on settling can be told."""
 
@@ -66,14 +68,15 @@ def path_repeatability(attained: Array) -> float:
     return max(pose_repeatability(crossings) for crossings in attained.swapaxes(0, 1))
 
 
-def crossings(run: Run) -> tuple[Array, Array]:
+def crossings(run: Run) -> tuple[Array, Array] | None:
     """Where the tool crosses planes square to the commanded path, in every pass [m].
 
     The crossing is looked for from the commanded instant on, so a lag along the path is
     no error of the path.
 
     Returns:
-        Attained, shape (n_passes, n_planes, 3), and commanded, shape (n_planes, 3).
+        Attained, shape (n_passes, n_planes, 3), and commanded, shape (n_planes, 3);
+        None where the tool misses a plane.
     """
     from scipy.interpolate import CubicSpline
 
@@ -90,8 +93,14 @@ def crossings(run: Run) -> tuple[Array, Array]:
         for _ in range(20):
             ahead = ((tool(instant) - asked) * along).sum(axis=1)
             rate = (tool(instant, 1) * along).sum(axis=1)
-            instant = np.clip(instant - ahead / rate, run.time[0], run.time[-1])
-        attained.append(tool(instant))
+            with np.errstate(divide="ignore", invalid="ignore"):  # a tool at rest
+                instant = instant - ahead / rate
+            instant = np.clip(instant, run.time[0], run.time[-1])
+        found = tool(instant)
+        ahead = ((found - asked) * along).sum(axis=1)
+        if not (np.abs(ahead) <= ON_PLANE).all():
+            return None
+        attained.append(found)
     return np.array(attained), np.asarray(command(path.passes[0] + offsets))
 
 
@@ -213,7 +222,11 @@ def _passes(run: Run) -> dict[str, Any]:
     if not count:
         reason = "no pass along a path of the tool at constant speed"
         return {"missing": {"at_mm": reason, "rt_mm": reason}}
-    attained, commanded = crossings(run)
+    crossed = crossings(run)
+    if crossed is None:
+        reason = "the tool does not cross the planes of the path"
+        return {"passes": count, "missing": {"at_mm": reason, "rt_mm": reason}}
+    attained, commanded = crossed
     found: dict[str, Any] = {
         "passes": count,
         "at_mm": path_accuracy(attained, commanded) / mm,

@@ -161,6 +161,24 @@ def test_crossings_are_those_of_a_displaced_circle():
     assert path_repeatability(attained) < 1e-9
 
 
+@pytest.mark.parametrize("fate", ["falls", "rests", "stops"])
+def test_a_tool_that_misses_the_planes_has_no_path_figures(fate):
+    """A tool that falls, never starts or stops on its way says so, with no warning."""
+    run = ur5e("rigid", CIRCLE, 9.0)
+    tool = run.tool_reference.copy()
+    if fate == "falls":
+        tool = tool - np.outer(run.time, [1.0, 0.2, 1.0])
+    elif fate == "rests":
+        tool[:] = tool[0]
+    else:
+        tool[run.time > 2.5] = tool[run.time > 2.5][0]
+    found = tool_metrics(replace(run, tool_position=tool))
+    for key in ("at_mm", "rt_mm"):
+        assert found[key] is None
+        why = "the tool does not cross the planes of the path"
+        assert found["missing"][key] == why
+
+
 def test_what_a_motion_does_not_have_is_null_with_the_reason(bench):
     """No figure without a motion for it, and the reason beside it."""
     turning = bench(STIFF).metrics()["tool"]
