@@ -89,8 +89,8 @@ def _write(
     folder: Path, result: dict[str, Any], rows: Any, spec: Any, progress: Any
 ) -> list[str]:
     """Picture, figures and report."""
-    from swgjoint.cli.report_file import report_file
     from swgjoint.study.compare_shown import comparison_picture, comparison_table
+    from swgjoint.view.report import write_report
 
     folder.mkdir(parents=True, exist_ok=True)
     picture = comparison_picture(rows, result["scene"], spec)
@@ -98,17 +98,19 @@ def _write(
     for row in rows:  # an argument may be given twice, a run of the report has one name
         again = sum(name.split(" (again")[0] == row.argument for name in runs)
         runs[f"{row.argument} (again {again})" if again else row.argument] = row.run
-    return [
-        str(write_whole(folder / "compare.png", picture)),
-        str(write_whole(folder / "compare.json", json_text(result) + "\n")),
-        *report_file(
-            runs,
-            folder,
-            summary=comparison_table(rows, spec),
-            pictures={"Figures side by side": picture},
-            progress=progress,
-        ),
+    report = write_report(
+        runs,
+        folder / "report.html",
+        summary=comparison_table(rows, spec),
+        pictures={"Figures side by side": picture},
+        progress=progress,
+    )
+    files = [
+        write_whole(folder / "compare.png", picture),
+        write_whole(folder / "compare.json", json_text(result) + "\n"),
+        report,
     ]
+    return [str(path) for path in files]
 
 
 def status(result: dict[str, Any]) -> int:

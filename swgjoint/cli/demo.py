@@ -82,9 +82,9 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _write(folder: Path, runs: Any, rigid: Any, progress: Any) -> list[str]:
-    from swgjoint.cli.report_file import report_file
     from swgjoint.view.plots import comparison_png
     from swgjoint.view.recording import write_recording
+    from swgjoint.view.report import write_report
 
     progress("recording and picture", 0, 2)
     recording = write_recording(runs, folder / "run.rrd", rigid=rigid)
@@ -92,8 +92,9 @@ def _write(folder: Path, runs: Any, rigid: Any, progress: Any) -> list[str]:
     picture = comparison_png(runs, folder / "demo.png", rigid=rigid)
     progress("recording and picture", 2, 2)
     shown = {"Torsion, error, ripple, its orders and tool error": picture.read_bytes()}
-    report = report_file(runs, folder, pictures=shown, progress=progress)
-    return [str(recording), str(picture), *report]
+    page = folder / "report.html"
+    report = write_report(runs, page, pictures=shown, progress=progress)
+    return [str(recording), str(picture), str(report)]
 
 
 def report(result: dict[str, Any]) -> str:

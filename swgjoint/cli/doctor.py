@@ -17,7 +17,7 @@ from swgjoint.errors import SwgError
 EXTRAS = {
     "control": ("pinocchio", "casadi"),
     "envs": ("gymnasium",),
-    "report": ("jinja2", "pyvista"),
+    "report": ("pyvista",),
     "notebooks": ("jupytext", "ipykernel"),
     "cluster": ("dask", "distributed", "dask_jobqueue"),
     "tune": ("cma", "optuna"),

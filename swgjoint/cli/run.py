@@ -96,9 +96,10 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
             files.append(str(write_whole(folder / "scene.toml", scene_toml(scene))))
         if args.report:
-            from swgjoint.cli.report_file import report_file
+            from swgjoint.view.report import write_report
 
-            files += report_file({"": result}, folder, progress=args.progress)
+            page = folder / "report.html"
+            files.append(str(write_report({"": result}, page, progress=args.progress)))
     live = None
     if args.live is not None:
         from swgjoint.view.live import stream_runs

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from swgjoint import __version__
-from swgjoint.errors import MissingExtraError
 from swgjoint.files import write_whole
 from swgjoint.json_text import json_text, plain
 from swgjoint.maps.spec_sheet import measure_spec, validity
@@ -76,9 +75,6 @@ def write_report(
         pictures: PNG below it by title.
         check_step: Whether every run is repeated at half its step.
         progress: Called with what is done.
-
-    Raises:
-        MissingExtraError: If jinja2 is not installed.
     """
     template = _template()
     runs = {label or run.name: run for label, run in runs.items()}
@@ -418,12 +414,8 @@ def _inline(data: bytes) -> str:
 
 
 def _template() -> Any:
-    try:
-        from jinja2 import Environment, PackageLoader, StrictUndefined
-    except ImportError:
-        raise MissingExtraError(
-            "the report needs jinja2: pip install 'swgjoint[report]'"
-        ) from None
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
     environment = Environment(
         loader=PackageLoader("swgjoint.view", "."),
         autoescape=True,

@@ -8,7 +8,7 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from swgjoint.errors import InputError, MissingExtraError
+from swgjoint.errors import InputError
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.run import Run, run_scene
 from swgjoint.view.report import Cell, Table, write_report
@@ -171,14 +171,6 @@ def test_the_report_is_written_whole_or_not_at_all(run, tmp_path, monkeypatch):
     monkeypatch.setattr("swgjoint.view.report.joint_png", fail)
     with pytest.raises(RuntimeError, match="no picture"):
         write_report({"": run}, tmp_path / "report.html", check_step=False)
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_a_missing_extra_is_named(run, tmp_path, monkeypatch):
-    """Without jinja2 the line says what to install."""
-    monkeypatch.setitem(__import__("sys").modules, "jinja2", None)
-    with pytest.raises(MissingExtraError, match=r"swgjoint\[report\]"):
-        write_report({"": run}, tmp_path / "report.html")
     assert list(tmp_path.iterdir()) == []
 
 
