@@ -126,3 +126,39 @@ class ToolForce(Section):
 
 
 Disturbance = Annotated[JointPulse | JointSine | ToolForce, Field(discriminator="kind")]
+
+
+def too_fast(frequency: float, step: float) -> list[str]:
+    """What to say of a frequency [Hz] that steps of this length [s] cannot carry."""
+    highest = 0.1 / step
+    if frequency <= highest * (1.0 + 1e-9):
+        return []
+    return [
+        f"{frequency:g} Hz; accepted: at most {highest:g} Hz, ten steps of"
+        f" {step:g} s in a period"
+    ]
+
+
+def misfits(
+    disturbance: JointPulse | JointSine | ToolForce, *, run: float, step: float
+) -> list[tuple[str, str]]:
+    """Keys of a disturbance that would have no effect or another one, and why.
+
+    Args:
+        disturbance: The table.
+        run: Length of the run [s].
+        step: Of the scene [s].
+    """
+    found = []
+    if isinstance(disturbance, JointSine):
+        fast = too_fast(disturbance.frequency_Hz, step)
+        found += [("frequency_Hz", fault) for fault in fast]
+    length, start = disturbance.duration_s, disturbance.start_s
+    if length is not None and length < step * (1.0 - 1e-9):
+        found.append(("duration_s", f"{length:g} s; accepted: >= step_s, {step:g} s"))
+    # it acts by its value in the middle of a step
+    if start > run - 0.5 * step:
+        found.append(
+            ("start_s", f"{start:g} s; accepted: before the run ends, at {run:g} s")
+        )
+    return found

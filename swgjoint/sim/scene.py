@@ -12,7 +12,13 @@ from pydantic import Field, PrivateAttr, model_validator
 from swgjoint.errors import InputError
 from swgjoint.faults import Fault, Section, parse_toml, read_toml, validated
 from swgjoint.models_path import find
-from swgjoint.sim.feature_sections import Disturbance, Payload, Sensors
+from swgjoint.sim.feature_sections import (
+    Disturbance,
+    Payload,
+    Sensors,
+    misfits,
+    too_fast,
+)
 from swgjoint.sim.scene_sections import (
     Controller,
     JointSection,
@@ -22,7 +28,7 @@ from swgjoint.sim.scene_sections import (
     Recording,
     Simulation,
 )
-from swgjoint.sim.trajectory_sections import TrajectorySection
+from swgjoint.sim.trajectory_sections import Chirp, TrajectorySection
 
 MAX_STEPS = 2_000_000
 """Steps of the engine in a run."""
@@ -73,8 +79,8 @@ class Scene(Section):
             faults.append(
                 (
                     "simulation.duration_s",
-                    f"{duration:g} s{rounded}; accepted: more than the {needed:g} s that"
-                    " holds, ramps and settling of the trajectory take",
+                    f"{duration:g} s{rounded}; accepted: more than the {needed:g} s"
+                    " that holds, ramps and settling of the trajectory take",
                 )
             )
         if duration / step > MAX_STEPS:
@@ -106,6 +112,15 @@ class Scene(Section):
                 or abs(value / step - round(value / step)) > 1e-6
             )
         ]
+        if isinstance(self.trajectory, Chirp):
+            faults += [
+                (f"trajectory.{key}", fault)
+                for key in ("from_Hz", "to_Hz")
+                for fault in too_fast(getattr(self.trajectory, key), step)
+            ]
+        for k, one in enumerate(self.disturbance):
+            found = misfits(one, run=run, step=step)
+            faults += [(f"disturbance[{k}].{key}", fault) for key, fault in found]
         if faults:
             raise Fault(*faults)
         return self
