@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
 from swgjoint.faults import Fault, Section
 
+Torque = Annotated[float, Field(ge=-1e6, le=1e6)]
 Vector = Annotated[tuple[float, float, float], Field(strict=False)]
 Positive = Annotated[float, Field(gt=0)]
 Seconds = Annotated[float, Field(ge=0, le=10_000)]
@@ -70,22 +72,34 @@ class Payload(Section):
     """A body at the tool site, in the axes of that site."""
 
     mass_kg: Annotated[float, Field(gt=0, le=1_000)]
-    centre_mm: Vector = (0.0, 0.0, 0.0)
+    centre_mm: Vector = (
+        0.0,
+        0.0,
+        0.0,
+    )
     """Centre of mass."""
-    inertia_kgm2: Vector = (0.0, 0.0, 0.0)
+    inertia_kgm2: Vector = (
+        0.0,
+        0.0,
+        0.0,
+    )
     """About the axes through its centre; zeros: a point mass."""
     known: bool = True
     """Whether the controller's model of the arm has it."""
 
     @model_validator(mode="after")
     def _is_a_body(self) -> Self:
+        if math.hypot(*self.centre_mm) > 10_000.0:
+            raise Fault(
+                ("centre_mm", f"{list(self.centre_mm)} mm; accepted: within 10000 mm")
+            )
         a, b, c = sorted(self.inertia_kgm2)
-        if a < 0.0 or a + b < c * (1.0 - 1e-9):
+        if a < 0.0 or c > 1e6 or a + b < c * (1.0 - 1e-9):
             raise Fault(
                 (
                     "inertia_kgm2",
-                    f"{list(self.inertia_kgm2)} kg·m²; accepted: >= 0, the largest not"
-                    " above the sum of the others",
+                    f"{list(self.inertia_kgm2)} kg·m²; accepted: 0 to 1e+06, the"
+                    " largest not above the sum of the others",
                 )
             )
         return self
@@ -96,7 +110,7 @@ class JointPulse(Section):
 
     kind: Literal["joint_pulse"] = "joint_pulse"
     joint: str
-    torque_Nm: float
+    torque_Nm: Torque
     """On the link, positive along the joint."""
     start_s: Seconds
     duration_s: Positive
@@ -107,7 +121,7 @@ class JointSine(Section):
 
     kind: Literal["joint_sine"] = "joint_sine"
     joint: str
-    torque_Nm: float
+    torque_Nm: Torque
     """Amplitude, on the link."""
     frequency_Hz: Annotated[float, Field(gt=0, le=1_000)]
     start_s: Seconds = 0.0
@@ -123,6 +137,12 @@ class ToolForce(Section):
     """In the world."""
     start_s: Seconds
     duration_s: Positive
+
+    @model_validator(mode="after")
+    def _is_bounded(self) -> Self:
+        if math.hypot(*self.force_N) > 1e6:
+            raise Fault(("force_N", f"{list(self.force_N)} N; accepted: <= 1e+06 N"))
+        return self
 
 
 Disturbance = Annotated[JointPulse | JointSine | ToolForce, Field(discriminator="kind")]

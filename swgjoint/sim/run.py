@@ -201,6 +201,12 @@ def simulate(assembly: Assembly, *, name: str, progress: Progress = silent) -> R
 def _check_finite(assembly: Assembly, data: mujoco.MjData, states: Array) -> None:
     """Stop a run that diverged; the engine would go on with a reset state."""
     nq, nv = assembly.model.nq, assembly.model.nv
+    if data.warning[mujoco.mjtWarning.mjWARN_BADCTRL].number:
+        raise ComputationError(
+            f"scene {assembly.scene.name!r}: before t = {states[-1, 0]:.3f} s a motor"
+            " or a disturbance was asked for more than 1e10, which the engine does not"
+            " apply; use lower gains of the controller"
+        )
     bad = any(
         data.warning[kind].number
         for kind in (

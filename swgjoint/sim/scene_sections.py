@@ -137,7 +137,7 @@ class Controller(Section):
 class Load(Section):
     """Constant torque of the load against a joint; the drive exerts the same."""
 
-    torque_Nm: float | None = None
+    torque_Nm: Annotated[float, Field(ge=-1e6, le=1e6)] | None = None
     rated_fraction: Annotated[float, Field(ge=-5, le=5)] | None = None
     """Share of the drive's rated torque."""
 

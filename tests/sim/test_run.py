@@ -185,6 +185,20 @@ def test_a_run_that_diverges_is_a_failure_with_advice(
         )
 
 
+@pytest.mark.parametrize("sampled", [False, True])
+def test_inputs_that_the_engine_drops_are_a_failure(bench, sampled):
+    """A loop that asks for 1e11 N·m and more is not run without its motor."""
+    gains = {"stiffness_Nm_rad": 1e13, "damping_Nms_rad": 1.0}
+    period = {"control_period_s": 1e-3} if sampled else {}
+    with pytest.raises(ComputationError, match="lower gains"):
+        bench(
+            DriveMap.linear(2e4, teeth_flexspline=120, teeth_circular_spline=122),
+            defaults__level="rigid",
+            controller=gains | period,
+            trajectory__start_deg={"joint": 10.0},
+        )
+
+
 def test_contents_name_what_is_in_the_model(bench, synthetic_map):
     """Rigid adds nothing; linear a rotor and a tendon; full a plugin instance too."""
     found = {
