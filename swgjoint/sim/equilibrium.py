@@ -25,7 +25,10 @@ def start_state(assembly: Assembly) -> tuple[Array, Array]:
     """Positions and velocities at the first instant, free of start-up ringing.
 
     The link of every joint lies where the drive carries weight and load. A joint that
-    starts at rest has its motor where motor torque, control loop and cogging balance.
+    starts at rest has its motor where motor torque, control loop and cogging balance,
+    the loop acting on the angle that it reads, the motor's or the link's. Computed
+    torque has gains that depend on the pose: with a payload that it does not know it
+    starts near its equilibrium, not in it.
     A joint that starts moving has its motor on the reference, turning evenly, and its
     link moves at the rate of its balance along the motion, because with kinematic
     error the link moves unevenly while the motor turns evenly.
@@ -101,6 +104,7 @@ def _balance(assembly: Assembly, shift: float) -> tuple[Array, Array]:
     reference = at(assembly.trajectory.position)
     link_torque, motor_torque = at(assembly.link_torque), at(assembly.feedforward)
     moving = assembly.trajectory.velocity[0] != 0.0
+    by_link = assembly.scene.controller.feedback == "link"
     theta, psi = ratio * reference, reference.copy()
     commanded = arm.gravity(reference[None])[0]
     for turn in range(30):
@@ -118,10 +122,12 @@ def _balance(assembly: Assembly, shift: float) -> tuple[Array, Array]:
                     guess=float(psi[j]) if turn else None,
                 )
             else:
+                # a loop on the link is one on the motor that is ahead by the wind-up
+                ahead = theta[j] - ratio[j] * psi[j] if by_link else 0.0
                 theta[j], psi[j] = joint_equilibrium(
                     transmission,
                     output_torque=float(needed[j]),
-                    motor_reference=float(ratio[j] * reference[j]),
+                    motor_reference=float(ratio[j] * reference[j] + ahead),
                     motor_torque=float(motor_torque[j]),
                     stiffness=float(assembly.loops.stiffness[j]),
                     guess=(float(theta[j]), float(psi[j])) if turn else None,

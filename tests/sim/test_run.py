@@ -73,6 +73,25 @@ def test_a_joint_at_rest_stays_at_rest(bench, synthetic_map):
     np.testing.assert_allclose(run.output_torque, 20.0, rtol=1e-6)
 
 
+@pytest.mark.parametrize("kind", ["pd", "computed_torque"])
+def test_an_arm_under_link_feedback_starts_at_rest(kind):
+    """The loop acts on the link, which starts on the reference; the motor is ahead."""
+    linear = {"linear": {"stiffness_Nm_rad": 1e4}, "level": "linear"}
+    scene = Scene.from_data(
+        {
+            "name": "held",
+            "arm": "two-link",
+            "defaults": {**linear, "rotor_inertia_kgm2": 1e-4},
+            "trajectory": {"kind": "sweep", "end_deg": {}},
+            "controller": {"kind": kind, "feedback": "link"},
+            "simulation": {"duration_s": 2.5},
+        }
+    )
+    run = run_scene(scene)
+    assert np.abs(run.torsion[0]).max() > 1e-4
+    assert np.ptp(run.position, axis=0).max() < 1e-7
+
+
 def test_the_arm_starts_with_its_weight_on_the_drives(synthetic_map):
     """All six joints of the UR5e rest in balance with gravity, none is ringing."""
     run = run_scene(
