@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -72,7 +73,7 @@ def comparison_figure(runs: Mapping[str, Run], *, rigid: Run | None = None) -> F
         style: dict[str, Any] = {"color": colors[label], "label": label, "lw": 1.0}
         axes[0, 0].plot(run.time, run.torsion[:, j] / arcmin, **style)
         axes[0, 1].plot(run.time, run.transmission_error[:, j] / arcmin, **style)
-        _ripple(axes[1, 0], axes[1, 1], run, j, style)
+        draw_ripple(axes[1, 0], axes[1, 1], run, j, style)
         if run.tool_position.shape[1]:
             axes[2, 0].plot(run.time, run.tool_error(rigid) / mm, **style)
     _bars(axes[2, 1], shown, colors)
@@ -98,8 +99,25 @@ def comparison_figure(runs: Mapping[str, Run], *, rigid: Run | None = None) -> F
     return figure
 
 
-def _ripple(over_turns: Any, over_order: Any, run: Run, j: int, style: Any) -> None:
-    """Ripple over the last input turns of the window, and its spectrum."""
+def draw_ripple(
+    over_turns: Any,
+    over_order: Any,
+    run: Run,
+    j: int,
+    style: Mapping[str, Any],
+    *,
+    line: Callable[..., Any] | None = None,
+) -> None:
+    """Ripple over the last half turn of the input, and its order spectrum.
+
+    Args:
+        over_turns: Axes of the ripple.
+        over_order: Axes of the spectrum.
+        run: The run.
+        j: Number of the joint.
+        style: Of the lines.
+        line: What draws the spectrum, given its axes; their own plot if None.
+    """
     transmission = run.assembly.transmissions[j]
     scale = 100.0 / transmission.drive.ratings.rated_torque
     angle = run.motor_position[run.steady, j]
@@ -112,7 +130,8 @@ def _ripple(over_turns: Any, over_order: Any, run: Run, j: int, style: Any) -> N
     if spectrum is None or highest is None:
         return
     inside = (spectrum.order >= 0.5) & (spectrum.order <= highest)
-    over_order.plot(spectrum.order[inside], spectrum.amplitude[inside], **style)
+    draw = over_order.plot if line is None else partial(line, over_order)
+    draw(spectrum.order[inside], spectrum.amplitude[inside], **style)
     over_order.set_xlim(0.0, highest)
     over_order.set_ylim(bottom=0.0)
 

@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from swgjoint.sim.metrics import highest_resolved_order, torque_ripple
-from swgjoint.sim.orders import order_spectrum
 from swgjoint.units import arcmin
 from swgjoint.view.blueprint import is_rigid
+from swgjoint.view.plots import draw_ripple
 from swgjoint.view.recording import COLORS
 from swgjoint.view.words import short
 
@@ -47,7 +46,7 @@ def joint_png(runs: Mapping[str, Run], joint: str) -> bytes:
         over_time(axes[0, 1], run.time, run.torsion[:, j] / arcmin, **style)
         error = run.transmission_error[:, j] / arcmin
         over_time(axes[0, 2], run.time, error, **style)
-        _ripple(axes[1, 0], axes[1, 1], run, j, style)
+        draw_ripple(axes[1, 0], axes[1, 1], run, j, style, line=over_time)
         window = run.steady
         axes[1, 2].plot(
             run.torsion[window, j] / arcmin, run.output_torque[window, j], **style
@@ -108,24 +107,6 @@ def envelope(
         keep += [int(low + piece.argmin()), int(low + piece.argmax())]
     rows = np.unique(keep)
     return x[rows], y[rows]
-
-
-def _ripple(over_turns: Any, over_order: Any, run: Run, j: int, style: Any) -> None:
-    """Ripple over the last half turn of the input, and its order spectrum."""
-    scale = 100.0 / run.assembly.transmissions[j].drive.ratings.rated_torque
-    angle = run.motor_position[run.steady, j]
-    ripple = scale * torque_ripple(run, j)
-    turns = np.abs(angle - angle[0]) / (2.0 * np.pi)
-    part = turns >= turns[-1] - 0.5
-    over_turns.plot(turns[part], ripple[part], **style)
-    over_turns.margins(x=0)
-    spectrum, highest = order_spectrum(angle, ripple), highest_resolved_order(run, j)
-    if spectrum is None or highest is None:
-        return
-    inside = (spectrum.order >= 0.5) & (spectrum.order <= highest)
-    over_time(over_order, spectrum.order[inside], spectrum.amplitude[inside], **style)
-    over_order.set_xlim(0.0, highest)
-    over_order.set_ylim(bottom=0.0)
 
 
 def _label(axis: Any, title: str, y: str) -> None:
