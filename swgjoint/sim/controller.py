@@ -1,0 +1,86 @@
+"""What a sampled controller is told before a motion and reads during it.
+
+Arrays end with the joints; axes in front of them are motions that run side by side, so
+that one controller drives a single joint, an arm or a batch of either.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.maps.drive_map import DriveMap
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class KnownJoints:
+    """Nominal data of the driven joints; the true ones may differ."""
+
+    names: tuple[str, ...]
+    drives: tuple[DriveMap, ...]
+    """Of every joint; ratio, layout and ratings are theirs."""
+    rotor_inertia: Array
+    """Motor rotor and wave generator [kg·m²]. Shape (n_joints,)."""
+    link_inertia: Array
+    """About every joint where the motion starts, others locked [kg·m²]. Same shape."""
+    damping: Array
+    """Of rotor against link along the torsion [N·m·s/rad]. Same shape."""
+    torque_limit: Array
+    """Of the motors [N·m], inf where there is none. Same shape."""
+
+    @property
+    def ratio(self) -> Array:
+        """Signed ratios, output = input / i. Shape (n_joints,)."""
+        return np.array([drive.ratio for drive in self.drives])
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Task:
+    """A commanded motion of the links at the instants of the control, n of them."""
+
+    period: float
+    """Between two instants [s]."""
+    position: Array
+    """[rad]. Shape (n, ..., n_joints)."""
+    velocity: Array
+    """[rad/s]. Same shape."""
+    acceleration: Array
+    """[rad/s²]. Same shape."""
+    link_torque: Array
+    """That the known arm, its weight and the known load ask of the drives on this
+    motion, inertia of the links included [N·m]. Same shape."""
+    joints: KnownJoints
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Measured:
+    """Readings of the sensors at one instant; shapes (..., n_joints)."""
+
+    motor_angle: Array
+    """[rad]."""
+    motor_speed: Array
+    """[rad/s]."""
+    link_angle: Array | None = None
+    """Of a link encoder [rad]; None where there is none."""
+    output_torque: Array | None = None
+    """Of a torque sensor behind the drive [N·m]; None where there is none."""
+
+
+class Controller(Protocol):
+    """Motor torques from readings, once a control period."""
+
+    def start(self, task: Task) -> None:
+        """Forget the last motion and prepare the next one."""
+
+    def torque(self, k: int, measured: Measured) -> Array:
+        """Torque of every motor until the next instant [N·m]. Shape (..., n_joints).
+
+        Args:
+            k: Instant of the task.
+            measured: What the sensors read there.
+        """
