@@ -16,6 +16,7 @@ from swgjoint.joint.native import fit_native
 from swgjoint.joint.obstacles import actuators_on
 from swgjoint.joint.place import check_option, find_place
 from swgjoint.joint.prescribed import kinematic_part, ratio_variation
+from swgjoint.joint.variation import SIZE
 from swgjoint.maps.drive_map import DriveMap
 
 LEVELS = ("rigid", "kinematic", "linear", "native", "full")
@@ -32,6 +33,7 @@ def attach(
     damping_ratio: float | None = None,
     friction: bool = False,
     rotor: str = "gyroscopic",
+    variable: bool = False,
     max_input_speed: float | None = None,
     max_phase_step: float = 0.5,
 ) -> JointDrive:
@@ -88,6 +90,8 @@ def attach(
         rotor: ``gyroscopic``, a body that its link carries along, or ``lumped``: its
             kinetic energy is that of its rotation against that link alone (Spong
             1987, J. Dyn. Sys. Meas. Control 109:310-319, assumption 2).
+        variable: At ``full``, give the tendon the numbers by which one specimen of the
+            drive may deviate from its map, see :mod:`swgjoint.joint.variation`.
         max_input_speed: Largest speed of the rotor [rad/s]; harmonics that the step
             cannot carry at it are left out. None keeps all.
         max_phase_step: Largest phase step h n |theta rate| that is kept [rad].
@@ -182,6 +186,10 @@ def attach(
             body.plugin.name = tendon
             body.plugin.plugin_name = plugin.NAME
             body.plugin.active = True
+            if variable:
+                spec.tendon(tendon).userdata = np.zeros(SIZE)
+                if spec.nuser_tendon >= 0:
+                    spec.nuser_tendon = max(spec.nuser_tendon, SIZE)
             if drive.friction is not None:
                 add_tendon(
                     spec,

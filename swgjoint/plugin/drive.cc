@@ -17,6 +17,8 @@ constexpr const char* kAttributes[] = {
 constexpr int kAccelerations = 2;  // states before those of the hysteresis
 constexpr int kBristle = 2;        // where it is relaxed, whether that is known
 constexpr size_t kMaxElements = 64;
+constexpr int kDeviations = 5;           // user data of the tendon
+constexpr mjtNum kLeastLosses = 1e-6;    // the bristle keeps some stiffness
 // Cubic coefficient that marks the tendon of the friction: so small that the spring
 // pulls with nothing, for its length, unlike a torsion, is a rotation of many turns.
 constexpr mjtNum kFrictionCubic = 1e-30;
@@ -192,7 +194,18 @@ mjtNum Drive::Rotation(const mjtNum* q) const {
   return friction_->b_theta() * q[0] + friction_->b_psi() * q[1];
 }
 
+// How the drive of this model deviates from its map; zeros, or no user data: nowhere.
+// Read in every step, so that simulations of one batch may differ.
+void Drive::Vary(const mjModel* m) {
+  if (m->nuser_tendon < kDeviations) return;
+  const mjtNum* by = m->tendon_user + tendon_ * m->nuser_tendon;
+  map_.Vary(1 + by[0], 1 + by[1], by[2], by[3]);
+  losses_ = std::max(kLeastLosses, 1 + by[4]);
+  if (friction_) friction_->Scale(losses_);
+}
+
 void Drive::Compute(const mjModel* m, mjData* d, int instance) {
+  Vary(m);
   step_.scheme = step_.gradient = false;
   // without springs the engine leaves the tendon out of its metric, too
   if (m->opt.disableflags & mjDSBL_SPRING) return;
@@ -227,7 +240,8 @@ void Drive::Place(const mjtNum* rest) {
 // sticks for the part f of the way.
 void Drive::Slip(mjtNum change, DriveValue* value) const {
   for (size_t j = 0; j < reach_.size(); ++j) {
-    const mjtNum k = stiffness_[j], begin = stretch_[j], free = begin + change;
+    const mjtNum k = losses_ * stiffness_[j], begin = stretch_[j];
+    const mjtNum free = begin + change;
     const mjtNum end = std::clamp(free, -reach_[j], reach_[j]);
     const mjtNum f = end == free ? 1 : (end - begin) / change;
     value->torque += k * (0.5 * (begin + end) * f + end * (1 - f));

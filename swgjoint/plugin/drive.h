@@ -46,6 +46,7 @@ class Drive {
   void Slip(mjtNum change, DriveValue* value) const;
   bool FindFriction(const mjModel* m, const char* text, int rotor, int link);
   mjtNum Rotation(const mjtNum* q) const;
+  void Vary(const mjModel* m);
 
   DriveMap map_;
   mjtNum damping_ = 0, numerical_damping_ = 0;
@@ -54,6 +55,7 @@ class Drive {
   int q_rotor_ = -1, q_link_ = -1, v_rotor_ = -1, v_link_ = -1;  // addresses
   // Jenkin elements: stiffness, torsion from rest to slip, torsion from rest now
   std::vector<mjtNum> stiffness_, reach_, stretch_;
+  mjtNum losses_ = 1;  // scale of hysteresis and friction
   std::optional<Friction> friction_;
   int friction_tendon_ = -1;  // carries its part of the metric
   Step step_;

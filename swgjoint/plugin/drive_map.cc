@@ -266,10 +266,10 @@ void DriveMap::Gradient(double theta, double psi, DriveValue* out) {
 }
 
 void DriveMap::Begin(double theta, double psi) {
-  Rotate(theta, psi);
+  Rotate(theta + shift_theta_, psi + shift_psi_);
   double e0 = error_mean_;
   for (int k = 0; k < n_ - 1; ++k) e0 += error_c_[k] * c_[k] + error_s_[k] * s_[k];
-  torsion_ = theta / ratio_ + e0 - psi;
+  torsion_ = theta / ratio_ + error_scale_ * e0 - psi;
   j0_ = SegmentNear(j0_, torsion_);
   d0_ = torsion_ - base_[j0_];
 }
@@ -376,8 +376,8 @@ SWGJOINT_INLINE void DriveMap::Sweep(double dtheta, double dpsi, DriveValue* out
   for (int p = 0; p < 4; ++p) w_[p] += mean[p];
   w_[4] = mean[4] + rest[0];
   u_theta_[4] = rest[1];
-  out->g_theta = 1.0 / ratio_ + rest[2];
-  out->g_psi = rest[3] - 1.0;
+  out->g_theta = 1.0 / ratio_ + error_scale_ * rest[2];
+  out->g_psi = error_scale_ * rest[3] - 1.0;
   if (kPsi) {
     Sums(v[0], v[1], v[2], v[3], u_psi_);
     Sums(v[4], v[4], v[4], v[4], rest);
@@ -468,6 +468,10 @@ void DriveMap::Secant(double dtheta, double dpsi, DriveValue* out) {
   };
   out->e_theta = angle(u_theta_, 2);
   out->e_psi = moves_psi_ ? angle(u_psi_, 4) : 0.0;
+  for (double* x : {&out->torque, &out->slope, &out->stiffness_begin,
+                    &out->stiffness_end, &out->e_theta, &out->e_psi}) {
+    *x *= scale_;
+  }
 }
 
 }  // namespace swgjoint

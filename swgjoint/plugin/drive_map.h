@@ -48,6 +48,15 @@ class DriveMap {
 
   double ratio() const { return ratio_; }
 
+  // From the next Begin or Gradient on: V times `potential`, e0 times `error`, and
+  // both where rotor and link stand further by the two angles.
+  void Vary(double potential, double error, double theta, double psi) {
+    scale_ = potential;
+    error_scale_ = error;
+    shift_theta_ = theta;
+    shift_psi_ = psi;
+  }
+
   // Gradient of V at one state.
   void Gradient(double theta, double psi, DriveValue* out);
 
@@ -86,6 +95,7 @@ class DriveMap {
   int segments_ = 0;  // intervals between knots and the two continuations
   bool moves_psi_ = false;  // whether a harmonic depends on psi
   double ratio_ = 1;
+  double scale_ = 1, error_scale_ = 1, shift_theta_ = 0, shift_psi_ = 0;  // Vary
   double top_theta_ = 0, top_psi_ = 0;  // largest orders
   std::vector<double> knots_;
   std::vector<double> base_;   // (segments) torsion about which a segment expands

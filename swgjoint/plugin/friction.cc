@@ -16,13 +16,14 @@ bool Friction::Parse(const std::vector<double>& list) {
   if (!std::all_of(list.begin() + 2, list.end(), [](double x) { return x >= 0; })) {
     return false;
   }
-  stiffness_ = list[2];
-  damping_ = list[3];
+  own_stiffness_ = list[2];
+  own_damping_ = list[3];
   coulomb_ = list[4];
   static_ = list[5];
   stribeck_ = list[6];
-  viscous_ = list[7];
+  own_viscous_ = list[7];
   load_ = list[8];
+  Scale(1);
   return stiffness_ > 0 && stribeck_ > 0 && static_ >= coulomb_;
 }
 
@@ -32,7 +33,7 @@ double Friction::Reach(double speed, double torque) const {
     const double x = speed / stribeck_;
     slip += (static_ - coulomb_) * std::exp(-x * x);
   }
-  return slip / stiffness_;
+  return slip / own_stiffness_;
 }
 
 double Friction::Torque(double x, double reach, double speed) const {

@@ -19,6 +19,13 @@ class Friction {
   // Reads "b_theta b_psi stiffness damping coulomb static stribeck viscous load".
   bool Parse(const std::vector<double>& list);
 
+  // All torques of the law times `scale` > 0; where it slips stays the same.
+  void Scale(double scale) {
+    stiffness_ = scale * own_stiffness_;
+    damping_ = scale * own_damping_;
+    viscous_ = scale * own_viscous_;
+  }
+
   double b_theta() const { return b_theta_; }
   double b_psi() const { return b_psi_; }
 
@@ -38,8 +45,9 @@ class Friction {
 
  private:
   double b_theta_ = 0, b_psi_ = 0;  // relative rotation by (theta, psi)
-  double stiffness_ = 1, damping_ = 0, coulomb_ = 0, static_ = 0, stribeck_ = 1;
-  double viscous_ = 0, load_ = 0;
+  double own_stiffness_ = 1, own_damping_ = 0, own_viscous_ = 0;  // as given
+  double stiffness_ = 1, damping_ = 0, viscous_ = 0;              // scaled
+  double coulomb_ = 0, static_ = 0, stribeck_ = 1, load_ = 0;
 };
 
 }  // namespace swgjoint

@@ -1,0 +1,99 @@
+r"""How one specimen of a drive deviates from its map, changed without compiling again.
+
+The engine plugin reads the deviations of a drive from the user data of its tendon in
+every step, five numbers, all 0 for the map itself. They can be written into a compiled
+model, or, simulation by simulation, into the ``tendon_user`` of a
+``mujoco.batch.Batch``::
+
+    got = attach(spec, joint="elbow", drive=drive, rotor_inertia=4e-5, variable=True)
+    user = batch.expand("tendon_user")                      # (nsim, ntendon, 5 or more)
+    user[:, model.tendon(got.tendon).id, :5] = one_row_per_simulation
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import isfinite
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.errors import InputError
+from swgjoint.maps.drive_map import DriveMap
+from swgjoint.maps.friction import Friction
+from swgjoint.maps.hysteresis import Jenkin
+
+Array = NDArray[np.float64]
+
+SIZE = 5
+"""Numbers that the plugin reads."""
+_TORQUES = (
+    *("stiffness", "damping", "coulomb", "static"),
+    *("viscous", "load", "bending"),
+)
+_SHARES = ("stiffness", "kinematic_error", "losses")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Variation:
+    r"""Deviations from a map; shares are parts of the map's own value.
+
+    .. math::
+        V' = (1 + s)\,V(\Delta, \theta + a, \psi + b), \quad
+        \Delta = \theta/i + (1 + r)\,e_0(\theta + a, \psi + b) - \psi
+    """
+
+    stiffness: float = 0.0
+    """s, of the potential: stiffness and the ripple that goes with the torque [-]."""
+    kinematic_error: float = 0.0
+    """r, of the amplitude of e0 [-]."""
+    theta: float = 0.0
+    """a, how much further the wave generator stands at the same motor angle [rad]."""
+    psi: float = 0.0
+    """b, the same of the output [rad]."""
+    losses: float = 0.0
+    """Of every torque of hysteresis and friction [-]; where they slip stays."""
+
+    def __post_init__(self) -> None:
+        for key, value in zip(self.__dataclass_fields__, self.numbers, strict=True):
+            low = -1.0 if key in _SHARES else -np.inf
+            if not (isfinite(value) and value > low):
+                accepted = "a finite number > -1" if key in _SHARES else "finite"
+                raise InputError(f"variation {key} {value}; accepted: {accepted}")
+
+    @property
+    def numbers(self) -> Array:
+        """In the order of the plugin. Shape (5,)."""
+        return np.array(
+            [self.stiffness, self.kinematic_error, self.theta, self.psi, self.losses],
+            float,
+        )
+
+    def of(self, drive: DriveMap) -> DriveMap:
+        """The map of the specimen, what the plugin then computes."""
+        shift = drive.angle_orders @ np.array([self.theta, self.psi])
+        size, losses = 1.0 + self.stiffness, 1.0 + self.losses
+
+        def shifted(pair: Array) -> Array:
+            """Amplitudes of cos and sin, axis 1, where every phase is further on."""
+            a, b = np.moveaxis(pair, 1, 0)
+            one = (len(shift), *[1] * (a.ndim - 1))
+            c, s = np.cos(shift).reshape(one), np.sin(shift).reshape(one)
+            return np.stack([a * c + b * s, b * c - a * s], 1)
+
+        def scaled(part: Jenkin | Friction, *keys: str) -> Any:
+            return replace(part, **{key: losses * getattr(part, key) for key in keys})
+
+        return replace(
+            drive,
+            potential=size * shifted(drive.potential),
+            end_stiffness=size * shifted(drive.end_stiffness),
+            kinematic_error=(1.0 + self.kinematic_error)
+            * shifted(drive.kinematic_error),
+            hysteresis=tuple(
+                scaled(element, "stiffness", "yield_torque")
+                for element in drive.hysteresis
+            ),
+            friction=drive.friction and scaled(drive.friction, *_TORQUES),
+        )

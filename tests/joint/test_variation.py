@@ -1,0 +1,160 @@
+"""A specimen that deviates from its map equals the map that it then has."""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+import pytest
+from mujoco.batch import Batch
+
+from swgjoint.errors import InputError
+from swgjoint.joint.reference import gradient_force, scheme_force
+from swgjoint.joint.variation import SIZE, Variation
+from swgjoint.maps.friction import Friction
+from swgjoint.maps.hysteresis import Jenkin
+
+SPECIMEN = Variation(
+    stiffness=-0.2, kinematic_error=0.4, theta=1.1, psi=-0.7, losses=0.5
+)
+
+
+@pytest.fixture
+def lossy(any_layout):
+    """The synthetic map in each layout, with hysteresis and friction."""
+    return replace(
+        any_layout,
+        hysteresis=(Jenkin(stiffness=2e4, yield_torque=2.0),),
+        friction=Friction(
+            stiffness=70.0,
+            damping=0.05,
+            coulomb=0.04,
+            static=0.06,
+            viscous=1e-3,
+            load=0.05,
+        ),
+    )
+
+
+def vary(b, variation=SPECIMEN):
+    """Write the deviations into the compiled model."""
+    t = b.model.tendon(b.drive.tendon).id
+    b.model.tendon_user[t] = variation.numbers
+
+
+def random_motion(b, rng):
+    """A state of the specimen, its elements between stuck and slipping."""
+    drive = b.drive.drive
+    theta = rng.uniform(-8, 8)
+    psi = theta / drive.ratio - rng.uniform(-1, 1) * drive.torsion_knots[-1]
+    rates = rng.normal(0, 20), rng.normal(0, 0.5)
+    rest = SPECIMEN.of(drive).torsion(theta, psi) + 2e-4 * rng.standard_normal(1)
+    beta = float(np.dot(drive.friction_direction, [theta, psi]))
+    relaxed = beta + 1e-3 * rng.standard_normal()
+    b.place(theta, psi, *rates)
+    b.data.plugin_state[:] = rng.normal(0, 300), rng.normal(0, 5), *rest, relaxed, 1.0
+    mujoco.mj_forward(b.model, b.data)
+    return b.motion(rest=tuple(rest), relaxed=relaxed)
+
+
+@pytest.mark.parametrize("integrator", ["RK4", "discrete"])
+def test_force_equals_twin_of_the_varied_map(bench, lossy, integrator):
+    """Force, direction and stiffness are the twin's of ``Variation.of``."""
+    b = bench(lossy, damping_ratio=0.05, integrator=integrator, variable=True)
+    vary(b)
+    other = SPECIMEN.of(lossy)
+    rng = np.random.default_rng(2)
+    t = b.model.tendon(b.drive.tendon).id
+    f = b.model.tendon("j_friction").id
+    h, damping = b.model.opt.timestep, b.drive.damping
+    top = max(abs(x) for x in other.torque_range)
+    row = b.model.ten_J_rowadr[t]
+    entries = [row + list(b.model.ten_J_colind[row:]).index(dof) for dof in b.v]
+    ratio, direction = abs(lossy.ratio), np.array(lossy.friction_direction)
+    for _ in range(100):
+        motion, shift = random_motion(b, rng), np.zeros(2)
+        if integrator == "discrete":
+            want = scheme_force(other, motion, timestep=h, damping=damping)
+            g = np.array([want.g_theta, want.g_psi])
+            np.testing.assert_allclose(b.data.ten_J[entries], g, rtol=1e-12)
+            metric = 1e-9 + 3.0 * b.data.ten_length[t] ** 2
+            assert metric == pytest.approx(want.metric, rel=1e-8)
+            # the engine's shifts along the two tendons are cancelled by the plugin
+            shift = h * want.metric * b.data.ten_velocity[t] * g
+            shift += h * want.friction.metric * b.data.ten_velocity[f] * direction
+            force = np.array([want.theta, want.psi])
+        else:
+            force = np.array(gradient_force(other, motion, damping=damping))
+        np.testing.assert_allclose(
+            b.data.qfrc_passive[b.v] * [ratio, 1.0],
+            (force + shift) * [ratio, 1.0],
+            rtol=0,
+            atol=1e-11 * top + 1e-12 * ratio * np.abs(shift).max(),
+        )
+
+
+def test_specimen_moves_as_its_own_map(bench, lossy):
+    """300 loaded steps of the specimen equal those of a model with its map."""
+    b = bench(lossy, variable=True)
+    vary(b)
+    own = bench(SPECIMEN.of(lossy), link=0.4, damping_ratio=0.0)
+    ends = []
+    for one in (b, own):
+        one.place(0.2, 0.2 / lossy.ratio, 20.0, 20.0 / lossy.ratio)
+        one.data.qfrc_applied[one.v] = 0.3, -10.0
+        mujoco.mj_step(one.model, one.data, 300)
+        ends.append(np.concatenate([one.data.qpos, one.data.qvel]))
+    np.testing.assert_allclose(ends[0], ends[1], rtol=1e-8)
+
+
+def test_zero_deviation_is_the_map_bit_by_bit(bench, lossy):
+    """Room for deviations, and none of them, change no bit of a run."""
+    ends = []
+    for keys in ({}, {"variable": True}):
+        b = bench(lossy, **keys)
+        assert b.model.nuser_tendon == (SIZE if keys else 0)
+        b.place(0.2, 0.2 / lossy.ratio, 20.0, 20.0 / lossy.ratio)
+        mujoco.mj_step(b.model, b.data, 200)
+        ends.append(np.concatenate([b.data.qpos, b.data.qvel, b.data.plugin_state]))
+    np.testing.assert_array_equal(*ends)
+
+
+def test_specimens_of_a_batch_equal_models_of_their_own(bench, lossy):
+    """Simulations that differ on two threads run as in separate models, bit by bit."""
+    b = bench(lossy, variable=True)
+    rng, count, steps = np.random.default_rng(3), 6, 120
+    numbers = np.array(
+        [
+            Variation(
+                stiffness=x[0], kinematic_error=x[1], theta=x[2], psi=x[3], losses=x[4]
+            ).numbers
+            for x in rng.uniform(-0.5, 0.5, (count, SIZE))
+        ]
+    )
+    t = b.model.tendon(b.drive.tendon).id
+    batch = Batch(b.model, count, nthread=2)
+    batch.expand("tendon_user")[:, t] = numbers
+    start = 0.2 / lossy.ratio + 0.3 * lossy.torsion_knots[-1]
+    batch.qpos[:, b.q], batch.qvel[:, b.v] = (0.2, start), (20.0, 0.1)
+    batch.step(nstep=steps)
+    ends = []
+    for k in range(count):
+        model = copy.copy(b.model)
+        model.tendon_user[t] = numbers[k]
+        data = mujoco.MjData(model)
+        data.qpos[b.q], data.qvel[b.v] = (0.2, start), (20.0, 0.1)
+        mujoco.mj_step(model, data, steps)
+        end = np.concatenate([data.qpos, data.qvel, data.plugin_state])
+        got = np.concatenate([batch.qpos[k], batch.qvel[k], batch.plugin_state[k]])
+        np.testing.assert_array_equal(got, end)
+        ends.append(end[:4])
+    assert np.ptp(ends, axis=0).min() > 0.0
+
+
+@pytest.mark.parametrize("key", ["stiffness", "kinematic_error", "losses"])
+def test_a_share_that_leaves_nothing_is_refused(key):
+    """A deviation of minus one leaves no spring, no error or no losses."""
+    with pytest.raises(InputError, match=f"{key} -1.0; accepted"):
+        Variation(**{key: -1.0})
