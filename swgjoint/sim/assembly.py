@@ -64,6 +64,8 @@ class Assembly:
     [rad]. Shape (n, n_joints)."""
     prescribed_rate: Array
     """Its rate as the integrator's velocities have it [rad/s]. Same shape."""
+    controlled_by: str | None
+    """Name of a controller from outside; None: the scene's own."""
     link_position: NDArray[np.intp]
     """Addresses of the link angles in qpos. Shape (n_joints,)."""
     link_velocity: NDArray[np.intp]
@@ -103,6 +105,7 @@ def assemble(
     scene: Scene,
     *,
     drives: Mapping[str, DriveMap] | None = None,
+    controlled_by: str | None = None,
     progress: Progress = silent,
 ) -> Assembly:
     """Build the model of a scene.
@@ -111,6 +114,8 @@ def assemble(
         scene: The scene.
         drives: Maps that stand for drive references of the scene; others are loaded
             or built.
+        controlled_by: Name of a controller from outside, whose motors only take
+            torques; None for the scene's own.
         progress: Called while maps are built.
 
     Raises:
@@ -142,6 +147,11 @@ def assemble(
     )
     sections = _complete_sections(scene, arm.joints)
     check_motion(scene, {section.level for section in sections})
+    if scene.sensors and scene.sensors.torque and controlled_by is None:
+        raise InputError(
+            f"{scene.where}: sensors.torque: read by nobody; accepted: with a"
+            " controller that is given to run_scene"
+        )
     trajectory = trajectory_of(scene, arm)
     known = dict(drives or {})
     spec = arm.spec()
@@ -199,6 +209,8 @@ def assemble(
     rotor = np.array([t.rotor_inertia for t in transmissions])
     link_inertia = known_arm.inertia(trajectory.position[0])
     loops = _loops(scene, transmissions, sections, rotor + link_inertia / ratio**2)
+    if controlled_by is not None:
+        loops = replace(loops, sampled=True)
     add_actuators(
         spec,
         transmissions,
@@ -250,6 +262,7 @@ def assemble(
         ),
         prescribed=prescribed,
         prescribed_rate=prescribed_rate,
+        controlled_by=controlled_by,
         **_addresses(model, arm.joints, transmissions),
     )
 

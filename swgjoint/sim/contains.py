@@ -47,9 +47,10 @@ def _features(assembly: Assembly) -> dict[str, Any]:
     """Controller, and of limits, payload, sensors, disturbances what there is."""
     scene, loops = assembly.scene, assembly.loops
     step = scene.simulation.step_s
+    given = assembly.controlled_by
     found: dict[str, Any] = {
         "controller": {
-            "kind": scene.controller.kind,
+            "kind": scene.controller.kind if given is None else given,
             "feedback": scene.controller.feedback,
             "control_period_s": (scene.controller.control_period_s or step)
             if loops.sampled

@@ -59,13 +59,28 @@ class Sensor(Section):
     period."""
     delay_s: Seconds = 0.0
     """Age of a reading when the controller uses it; a multiple of ``step_s``."""
+    noise_arcsec: Annotated[float, Field(ge=0, le=1e5)] = 0.0
+    """Standard deviation of every reading, normal, before it is counted. Speed is then
+    the change of the angle over a control period, too."""
+
+
+class TorqueSensor(Section):
+    """Behind every drive, for a controller that is given to ``run_scene``."""
+
+    delay_s: Seconds = 0.0
+    """Age of a reading when the controller uses it; a multiple of ``step_s``."""
+    noise_Nm: Annotated[float, Field(ge=0, le=1e6)] = 0.0
+    """Standard deviation of every reading, normal."""
 
 
 class Sensors(Section):
-    """Angle sensors of every joint; what is absent reads exactly and at once."""
+    """Sensors of every joint; without one an angle reads exactly and at once."""
 
     motor: Sensor | None = None
     link: Sensor | None = None
+    torque: TorqueSensor | None = None
+    seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
+    """Of the noise."""
 
 
 class Payload(Section):

@@ -15,16 +15,18 @@ import numpy as np
 from mujoco.rollout import Rollout
 from numpy.typing import NDArray
 
-from swgjoint.errors import ComputationError
+from swgjoint.errors import ComputationError, InputError
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.progress import Progress, silent
 from swgjoint.sim.actuators import control_inputs, limited, wanted_torque
 from swgjoint.sim.assembly import Assembly, assemble
 from swgjoint.sim.contains import contents
+from swgjoint.sim.controller import Controller
 from swgjoint.sim.equilibrium import set_start
 from swgjoint.sim.metrics import run_metrics
-from swgjoint.sim.sampled_loop import run_sampled
+from swgjoint.sim.sampled_loop import GivenLoop, Loop, SampledLoop, run_sampled
 from swgjoint.sim.scene import Scene
+from swgjoint.sim.task import task_of
 
 Array = NDArray[np.float64]
 
@@ -123,6 +125,8 @@ def run_scene(
     *,
     overrides: Mapping[str, Any] | Iterable[str] | None = None,
     drives: Mapping[str, DriveMap] | None = None,
+    controller: Controller | None = None,
+    known_drives: Mapping[str, DriveMap] | None = None,
     name: str | None = None,
     progress: Progress = silent,
 ) -> Run:
@@ -136,6 +140,13 @@ def run_scene(
         overrides: Dotted keys of the scene with other values, as a mapping or as
             ``key=value`` texts.
         drives: Maps that stand for the scene's drive references of these names.
+        controller: Drives the motors in place of the scene's own law, once a control
+            period on what the sensors of the scene read; limits of the motors,
+            payload, disturbances and start stay the scene's. It reads the link angle
+            where ``controller.feedback`` is ``link``, the output torque where
+            ``sensors.torque`` is there.
+        known_drives: What that controller takes the drives of some joints for; others
+            are told as they are simulated.
         name: What recordings and progress call the run; default: the scene's name.
         progress: Called with the steps done.
 
@@ -147,12 +158,35 @@ def run_scene(
         scene = Scene.load_file(scene, overrides)
     elif overrides:
         scene = scene.with_changes(overrides)
-    assembly = assemble(scene, drives=drives, progress=progress)
-    return simulate(assembly, name=name or scene.name, progress=progress)
+    assembly = assemble(
+        scene,
+        drives=drives,
+        controlled_by=None if controller is None else type(controller).__name__,
+        progress=progress,
+    )
+    loop = None
+    if controller is not None:
+        loop = GivenLoop(assembly, controller, task_of(assembly, known_drives))
+    elif known_drives:
+        raise InputError("known_drives without controller; accepted: both or none")
+    return simulate(assembly, name=name or scene.name, loop=loop, progress=progress)
 
 
-def simulate(assembly: Assembly, *, name: str, progress: Progress = silent) -> Run:
-    """Run an assembled scene; see :func:`run_scene`."""
+def simulate(
+    assembly: Assembly,
+    *,
+    name: str,
+    loop: Loop | None = None,
+    progress: Progress = silent,
+) -> Run:
+    """Run an assembled scene; see :func:`run_scene`.
+
+    Args:
+        assembly: The scene.
+        name: Of the run.
+        loop: Law of a controller from outside.
+        progress: Called with the steps done.
+    """
     model, path = assembly.model, assembly.trajectory
     inputs = control_inputs(assembly)
     data = mujoco.MjData(model)
@@ -164,6 +198,7 @@ def simulate(assembly: Assembly, *, name: str, progress: Progress = silent) -> R
         begin = time.perf_counter()
         states, rates, wanted = run_sampled(
             assembly,
+            loop or SampledLoop(assembly),
             data,
             inputs,
             check=lambda new: _check_finite(assembly, data, new),

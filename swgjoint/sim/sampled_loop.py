@@ -1,19 +1,23 @@
 """Controllers that run once a control period on what sensors read, in Python.
 
-For scenes that ask for it: computed torque, a control period, sensors, link feedback.
-Limits of the motors stay with the engine's actuators.
+For scenes that ask for it (computed torque, a control period, sensors, link feedback)
+and for controllers that are given to :func:`swgjoint.sim.run.run_scene`. Limits of the
+motors stay with the engine's actuators.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from swgjoint.sim.feature_sections import Sensor
+from swgjoint.errors import ComputationError
+from swgjoint.sim.controller import Controller, Measured, Task
+from swgjoint.sim.feature_sections import Sensor, TorqueSensor
+from swgjoint.units import arcsec
 
 if TYPE_CHECKING:
     from swgjoint.sim.assembly import Assembly
@@ -24,31 +28,71 @@ _CHUNK = 1000  # recorded states between two signs of life
 _STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
 
 
-class SampledLoop:
-    """The control law of all joints; holds readings and integrals between periods."""
+class Readings:
+    """What the sensors of a scene say; remembers the last angle of the motors."""
 
-    def __init__(self, assembly: Assembly) -> None:
-        """Prepare the loop of a scene that :attr:`Scene.sampled` says has one."""
-        scene = assembly.scene
-        self.assembly, self.controller = assembly, scene.controller
-        step = scene.simulation.step_s
-        period = scene.controller.control_period_s or step
-        self.period = round(period / step) * step
-        self.every = round(period / step) * assembly.sub_steps
-        """Steps of the engine per control period."""
-        sensors = scene.sensors
+    def __init__(self, assembly: Assembly, period: float) -> None:
+        """Prepare the sensors of a scene.
+
+        Args:
+            assembly: The scene.
+            period: Between two readings [s].
+        """
+        sensors = assembly.scene.sensors
         self._motor = (sensors.motor if sensors else None) or Sensor()
         self._link = (sensors.link if sensors else None) or Sensor()
-        self._integral = np.zeros(len(assembly.joints))
+        self._torque = (sensors.torque if sensors else None) or TorqueSensor()
+        self._noise = np.random.default_rng(sensors.seed if sensors else 0)
+        self._period, self._step = period, assembly.step
+        self._first_speed = assembly.ratio * assembly.trajectory.velocity[0]
         self._last: Array | None = None
-        section, ratio = scene.controller, assembly.ratio
-        inertia = assembly.rotor_inertia * ratio**2 + assembly.link_inertia
-        # per unit of inertia: the loop's own natural frequency and damping
-        self._kp = assembly.loops.stiffness * ratio**2 / inertia
-        self._kd = assembly.loops.damping * ratio**2 / inertia
-        self._by_link = section.feedback == "link"
 
-    def torque(self, k: int, theta: Array, psi: Array, theta_rate: Array) -> Array:
+    def motor(self, k: int, theta: Array, rate: Array) -> tuple[Array, Array]:
+        """Motor angles and speeds at sample k [rad], [rad/s]. Shapes (n_joints,)."""
+        angle = self._read(self._motor, theta, k)
+        if self._motor.counts_per_turn is None and not self._motor.noise_arcsec:
+            return angle, rate[self._age(self._motor, k)]
+        last, self._last = self._last, angle
+        if last is None:
+            return angle, self._first_speed
+        return angle, (angle - last) / self._period
+
+    def link(self, k: int, psi: Array) -> Array:
+        """Link angles at sample k [rad]. Shape (n_joints,)."""
+        return self._read(self._link, psi, k)
+
+    def torque(self, k: int, torque: Array) -> Array:
+        """Output torques at sample k [N·m]. Shape (n_joints,)."""
+        return self._noisy(torque[self._age(self._torque, k)], self._torque.noise_Nm)
+
+    def _read(self, sensor: Sensor, angle: Array, k: int) -> Array:
+        got = self._noisy(angle[self._age(sensor, k)], sensor.noise_arcsec * arcsec)
+        if sensor.counts_per_turn is None:
+            return np.asarray(got)
+        count = 2.0 * np.pi / sensor.counts_per_turn
+        return np.asarray(np.floor(got / count) * count)
+
+    def _noisy(self, exact: Array, deviation: float) -> Array:
+        if not deviation:
+            return exact
+        return exact + deviation * self._noise.standard_normal(exact.shape)
+
+    def _age(self, sensor: Sensor | TorqueSensor, k: int) -> int:
+        """Sample of a reading that is used at sample k; before the first, the first."""
+        return max(k - round(sensor.delay_s / self._step), 0)
+
+
+class Loop(Protocol):
+    """A control law that run_sampled asks at its ticks."""
+
+    every: int
+    """Steps of the engine per control period."""
+    senses_torque: bool
+    """Whether it reads the output torque."""
+
+    def torque(
+        self, k: int, theta: Array, psi: Array, theta_rate: Array, torque: Array
+    ) -> Array:
         """Torque of every motor from now on [N·m]. Shape (n_joints,).
 
         Args:
@@ -56,12 +100,37 @@ class SampledLoop:
             theta: Motor angles of all samples up to this one [rad]. (k + 1, n_joints).
             psi: Link angles. Same shape.
             theta_rate: Motor speeds [rad/s]. Same shape.
+            torque: Of the drives on their links, where it is sensed [N·m]. Same shape.
         """
+
+
+class SampledLoop:
+    """The scene's own law of all joints; holds integrals between periods."""
+
+    senses_torque = False
+
+    def __init__(self, assembly: Assembly) -> None:
+        """Prepare the loop of a scene that :attr:`Scene.sampled` says has one."""
+        self.assembly, self.controller = assembly, assembly.scene.controller
+        self.period, self.every = control_period(assembly)
+        self._readings = Readings(assembly, self.period)
+        self._integral = np.zeros(len(assembly.joints))
+        section, ratio = self.controller, assembly.ratio
+        inertia = assembly.rotor_inertia * ratio**2 + assembly.link_inertia
+        # per unit of inertia: the loop's own natural frequency and damping
+        self._kp = assembly.loops.stiffness * ratio**2 / inertia
+        self._kd = assembly.loops.damping * ratio**2 / inertia
+        self._by_link = section.feedback == "link"
+
+    def torque(
+        self, k: int, theta: Array, psi: Array, theta_rate: Array, torque: Array
+    ) -> Array:
+        """See :class:`Loop`."""
         whole, path = self.assembly, self.assembly.trajectory
         ratio, loops = whole.ratio, whole.loops
-        angle, speed = self._read_motor(k, theta, theta_rate)
+        angle, speed = self._readings.motor(k, theta, theta_rate)
         if self._by_link:
-            angle = ratio * self._read(self._link, psi, k)
+            angle = ratio * self._readings.link(k, psi)
         error = ratio * path.position[k] - angle
         if self.controller.kind == "computed_torque":
             slow = speed / ratio
@@ -87,30 +156,55 @@ class SampledLoop:
             self._integral = np.clip(grown, -largest, largest)
         return np.asarray(wanted)
 
-    def _read(self, sensor: Sensor, angle: Array, k: int) -> Array:
-        """Angles as a sensor gives them now [rad]. Shape (n_joints,)."""
-        got = angle[self._age(sensor, k)]
-        if sensor.counts_per_turn is None:
-            return np.asarray(got)
-        count = 2.0 * np.pi / sensor.counts_per_turn
-        return np.asarray(np.floor(got / count) * count)
 
-    def _read_motor(self, k: int, theta: Array, rate: Array) -> tuple[Array, Array]:
-        angle = self._read(self._motor, theta, k)
-        if self._motor.counts_per_turn is None:
-            return angle, rate[self._age(self._motor, k)]
-        last, self._last = self._last, angle
-        if last is None:
-            return angle, self.assembly.ratio * self.assembly.trajectory.velocity[0]
-        return angle, (angle - last) / self.period
+class GivenLoop:
+    """A controller from outside, told the task and given what the sensors read."""
 
-    def _age(self, sensor: Sensor, k: int) -> int:
-        """Sample of a reading that is used at sample k; before the first, the first."""
-        return max(k - round(sensor.delay_s / self.assembly.step), 0)
+    def __init__(self, assembly: Assembly, controller: Controller, task: Task) -> None:
+        """Start the controller on the task of the scene."""
+        scene = assembly.scene
+        self.controller, self._joints = controller, assembly.joints
+        self.period, self.every = control_period(assembly)
+        sensors = scene.sensors
+        self.senses_torque = sensors is not None and sensors.torque is not None
+        self._by_link = scene.controller.feedback == "link"
+        self._readings = Readings(assembly, self.period)
+        controller.start(task)
+
+    def torque(
+        self, k: int, theta: Array, psi: Array, theta_rate: Array, torque: Array
+    ) -> Array:
+        """See :class:`Loop`."""
+        angle, speed = self._readings.motor(k, theta, theta_rate)
+        measured = Measured(
+            motor_angle=angle,
+            motor_speed=speed,
+            link_angle=self._readings.link(k, psi) if self._by_link else None,
+            output_torque=self._readings.torque(k, torque)
+            if self.senses_torque
+            else None,
+        )
+        wanted = np.asarray(self.controller.torque(k // self.every, measured), float)
+        if wanted.shape != angle.shape or not np.isfinite(wanted).all():
+            raise ComputationError(
+                f"{type(self.controller).__name__}: torque {wanted} at instant"
+                f" {k // self.every}; accepted: one finite number [N·m] for each of"
+                f" {', '.join(self._joints)}"
+            )
+        return wanted
+
+
+def control_period(assembly: Assembly) -> tuple[float, int]:
+    """Control period [s] and steps of the engine in it."""
+    step = assembly.scene.simulation.step_s
+    period = assembly.scene.controller.control_period_s or step
+    whole = round(period / step)
+    return whole * step, whole * assembly.sub_steps
 
 
 def run_sampled(
     assembly: Assembly,
+    loop: Loop,
     data: mujoco.MjData,
     inputs: Array,
     *,
@@ -121,6 +215,7 @@ def run_sampled(
 
     Args:
         assembly: The scene.
+        loop: The control law.
         data: At its start; left at the end.
         inputs: Of the engine's actuators without the loop. Shape (n_steps, n_inputs).
         check: Called with the states since its last call.
@@ -132,9 +227,9 @@ def run_sampled(
         n_joints), the torque beside the state that it led to.
     """
     model, parts, n = assembly.model, assembly.sub_steps, len(inputs)
-    loop, joints = SampledLoop(assembly), len(assembly.joints)
+    joints = len(assembly.joints)
     states = np.empty((n // parts + 1, mujoco.mj_stateSize(model, _STATE)))
-    theta, psi, theta_rate, rates, wanted = np.zeros((5, n + 1, joints))
+    theta, psi, theta_rate, torque, rates, wanted = np.zeros((6, n + 1, joints))
     flexible = np.flatnonzero(assembly.motor_position >= 0)
     motor_q = assembly.motor_position[flexible]
     motor_v = assembly.motor_velocity[flexible]
@@ -147,8 +242,13 @@ def run_sampled(
         theta_rate[k] = ratio * (rates[k] - assembly.prescribed_rate[k])
         theta[k, flexible] = data.qpos[motor_q]
         theta_rate[k, flexible] = data.qvel[motor_v]
+        if loop.senses_torque:
+            for j, transmission in enumerate(assembly.transmissions):
+                torque[k, j] = transmission.attached.observe(model, data).torque
         wanted[k + 1] = (
-            loop.torque(k, theta, psi, theta_rate) if k % loop.every == 0 else wanted[k]
+            loop.torque(k, theta, psi, theta_rate, torque)
+            if k % loop.every == 0
+            else wanted[k]
         )
         data.ctrl[:] = inputs[k]
         data.ctrl[:joints] += wanted[k + 1]

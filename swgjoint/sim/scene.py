@@ -92,7 +92,7 @@ class Scene(Section):
                 )
             )
         times = {"controller.control_period_s": self.controller.control_period_s}
-        for side in ("motor", "link") if self.sensors else ():
+        for side in ("motor", "link", "torque") if self.sensors else ():
             sensor = getattr(self.sensors, side)
             if sensor is not None:
                 times[f"sensors.{side}.delay_s"] = sensor.delay_s

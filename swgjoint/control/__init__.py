@@ -1,0 +1,1 @@
+"""Model-based control: feed-forward, compensation, optimal control."""

@@ -1,0 +1,72 @@
+"""What a scene tells a controller that is given to it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from swgjoint.errors import InputError
+from swgjoint.maps.drive_map import DriveMap
+from swgjoint.sim.assembly import Assembly
+from swgjoint.sim.controller import KnownJoints, Task
+from swgjoint.sim.feature_sections import MotorLimits
+from swgjoint.sim.sampled_loop import control_period
+
+
+def task_of(
+    assembly: Assembly, known_drives: Mapping[str, DriveMap] | None = None
+) -> Task:
+    """The commanded motion at the instants of the control, and the nominal joints.
+
+    The known torque is that of the arm as the controller knows it, with weight, inertia
+    and the constant load; drives are told as they are simulated, without the orders
+    that the step does not carry.
+
+    Args:
+        assembly: The scene.
+        known_drives: Of some joints, what the controller takes them for.
+
+    Raises:
+        InputError: If a joint of ``known_drives`` is not one of the scene's.
+    """
+    known = dict(known_drives or {})
+    unknown = sorted(set(known) - set(assembly.joints))
+    if unknown:
+        raise InputError(
+            f"known_drives: no joint {unknown[0]!r}; accepted:"
+            f" {', '.join(assembly.joints)}"
+        )
+    period, every = control_period(assembly)
+    path = assembly.trajectory.every(every)
+    if assembly.known_arm is assembly.arm:
+        link_torque = assembly.link_torque[::every]
+    else:
+        link_torque = assembly.load + assembly.known_arm.torques(
+            path.position, path.velocity, path.acceleration
+        )
+    return Task(
+        period=period,
+        position=path.position,
+        velocity=path.velocity,
+        acceleration=path.acceleration,
+        link_torque=link_torque,
+        joints=KnownJoints(
+            names=assembly.joints,
+            drives=tuple(
+                known.get(t.joint, t.law or t.drive) for t in assembly.transmissions
+            ),
+            rotor_inertia=assembly.rotor_inertia,
+            link_inertia=assembly.link_inertia,
+            damping=np.array([t.attached.damping for t in assembly.transmissions]),
+            torque_limit=np.array([_limit(one) for one in assembly.loops.limits]),
+        ),
+    )
+
+
+def _limit(limits: MotorLimits | None) -> float:
+    """Largest torque of a motor at any speed [N·m]; inf where there is none."""
+    if limits is None:
+        return np.inf
+    bounds = (limits.torque, limits.stall_torque_Nm)
+    return min((b for b in bounds if b is not None), default=np.inf)

@@ -1,0 +1,214 @@
+"""Controllers from outside in scenes: the scene's own law, its sensors and limits."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from swgjoint.control.motor_side import MotorPID, ideal_plan, rigid_plan
+from swgjoint.errors import ComputationError, InputError
+from swgjoint.maps.drive_map import DriveMap
+from swgjoint.sim.run import run_scene
+from swgjoint.sim.scene import Scene
+
+LINEAR = DriveMap.linear(2e4, teeth_flexspline=120, teeth_circular_spline=122)
+SWEEP = {"kind": "sweep", "hold_s": 0.1, "ramp_s": 0.15, "end_deg": {"joint": 4.0}}
+SCENE = {
+    "name": "given",
+    "arm": "bench",
+    "defaults": {"drive": "map", "level": "full", "rotor_inertia_kgm2": 1e-4},
+    "trajectory": SWEEP,
+    "load": {"joint": {"torque_Nm": 20.0}},
+    "controller": {"feedforward": "gravity_inertia", "control_period_s": 0.001},
+    "simulation": {"duration_s": 0.6},
+}
+SENSORS = {
+    "sensors.motor.counts_per_turn": 4096,
+    "sensors.motor.delay_s": 0.002,
+    "sensors.motor.noise_arcsec": 30.0,
+    "sensors.seed": 3,
+}
+
+
+def run(drive=LINEAR, changes=None, **options):
+    scene = Scene.from_data(SCENE, overrides=changes)
+    return run_scene(scene, drives={"map": drive}, **options)
+
+
+class Spy:
+    """Gives no torque and remembers what it was told."""
+
+    def start(self, task):
+        """Keep the task."""
+        self.task, self.read = task, []
+
+    def torque(self, k, measured):
+        """Keep the reading."""
+        self.read.append((k, measured))
+        return np.zeros_like(measured.motor_angle)
+
+
+@pytest.mark.parametrize("kind", ["pd", "pid"])
+@pytest.mark.parametrize("changes", [{}, SENSORS, {"defaults.level": "rigid"}])
+def test_pid_from_outside_is_the_scenes_own(synthetic_map, kind, changes):
+    """Same gains, plan and sensors: the same run to round-off, sensors included."""
+    changes = {"controller.kind": kind, **changes}
+    own = run(synthetic_map, changes)
+    loops = own.assembly.loops
+    time = None if kind == "pd" else float((loops.stiffness / loops.integral)[0])
+    given = run(
+        synthetic_map, changes, controller=MotorPID(rigid_plan, integral_time=time)
+    )
+    for key in ("position", "motor_position", "motor_torque", "wanted_torque"):
+        np.testing.assert_allclose(
+            getattr(given, key), getattr(own, key), rtol=1e-10, atol=1e-12
+        )
+    assert given.contains["controller"]["kind"] == "MotorPID"
+    mine, other = given.metrics(), own.metrics()
+    assert json.loads(json.dumps(mine)).keys() == other.keys()
+    assert mine["energy"]["balance_error_J"] == pytest.approx(
+        other["energy"]["balance_error_J"], abs=1e-9
+    )
+
+
+def test_gains_and_period_follow_the_scene(synthetic_map):
+    """At another period, with gains given outright, it is the scene's law as well."""
+    changes = {
+        "controller.control_period_s": 0.003,
+        "controller.stiffness_Nm_rad": 0.6,
+        "controller.damping_Nms_rad": 0.02,
+    }
+    own = run(synthetic_map, changes)
+    pd = MotorPID(rigid_plan, stiffness=0.6, damping=0.02)
+    given = run(synthetic_map, changes, controller=pd)
+    np.testing.assert_allclose(given.position, own.position, rtol=1e-10, atol=1e-12)
+    assert pd.planned.angle.shape == (201, 1)
+
+
+def test_the_task_is_the_motion_at_the_instants_of_the_control():
+    """Motion, known torque and joints as the scene has them, one per period."""
+    spy = Spy()
+    motor = {"defaults.motor": {"torque_limit_Nm": 2.0}}
+    got = run(changes={"controller.control_period_s": 0.002, **motor}, controller=spy)
+    task, whole = spy.task, got.assembly
+    assert task.period == pytest.approx(0.002)
+    np.testing.assert_array_equal(task.position, got.reference[::2])
+    expected = 20.0 + 1.0 * whole.trajectory.acceleration[::2]
+    np.testing.assert_allclose(task.link_torque, expected, rtol=1e-6)
+    joints = task.joints
+    assert joints.names == ("joint",) and joints.ratio[0] == -60.0
+    assert joints.link_inertia[0] == pytest.approx(1.0)
+    assert joints.torque_limit[0] == 2.0
+    assert joints.damping[0] == whole.transmissions[0].attached.damping
+    assert [k for k, _ in spy.read] == list(range(300))
+
+
+def test_an_unknown_payload_is_not_in_the_known_torque():
+    """The controller is told the arm that it knows; the scene moves the other one."""
+    spy, keys = Spy(), {"arm": "two-link", "trajectory": {"kind": "step", "at_s": 0.1,
+                        "step_deg": {"elbow": 1.0}}, "load": {}}  # fmt: skip
+    payload = {"payload": {"mass_kg": 2.0, "known": False}}
+    scene = Scene.from_data(SCENE, overrides={**keys, **payload})
+    run_scene(scene, drives={"map": LINEAR}, controller=spy)
+    hidden = spy.task.link_torque
+    run(changes=keys, controller=spy)
+    np.testing.assert_array_equal(hidden, spy.task.link_torque)
+    run(changes={**keys, "payload": {"mass_kg": 2.0}}, controller=spy)
+    assert np.abs(hidden - spy.task.link_torque).max() > 1.0
+
+
+def test_readings_are_the_sensors(synthetic_map):
+    """Link angle by an encoder under link feedback, torque by its sensor, else none."""
+    spy = Spy()
+    got = run(synthetic_map, controller=spy)
+    assert spy.read[5][1].link_angle is None and spy.read[5][1].output_torque is None
+    np.testing.assert_array_equal(spy.read[5][1].motor_angle, got.motor_position[5])
+    late = {
+        "controller.feedback": "link",
+        "sensors.link.delay_s": 0.002,
+        "sensors.torque.delay_s": 0.003,
+    }
+    got = run(synthetic_map, late, controller=spy)
+    read = spy.read[400][1]
+    np.testing.assert_array_equal(read.link_angle, got.position[398])
+    np.testing.assert_allclose(read.output_torque, got.output_torque[397], rtol=1e-9)
+
+
+def test_noise_has_its_deviation_and_its_seed(synthetic_map):
+    """Readings scatter as stated; one seed, one run."""
+    spy, found = Spy(), []
+    keys = {
+        "controller.feedback": "link",
+        "sensors.motor.noise_arcsec": 60.0,
+        "sensors.link.noise_arcsec": 2.0,
+        "sensors.torque.noise_Nm": 0.5,
+    }
+    for seed in (1, 1, 2):
+        got = run(synthetic_map, {**keys, "sensors.seed": seed}, controller=spy)
+        n = len(spy.read)
+        found.append(
+            [
+                np.array([r.motor_angle for _, r in spy.read]) - got.motor_position[:n],
+                np.array([r.link_angle for _, r in spy.read]) - got.position[:n],
+                np.array([r.output_torque for _, r in spy.read])
+                - got.output_torque[:n],
+            ]
+        )
+    np.testing.assert_array_equal(found[0], found[1])
+    second = np.pi / 648000.0
+    for noise, other, deviation in zip(
+        found[0], found[2], (60 * second, 2 * second, 0.5), strict=True
+    ):
+        # 600 readings tell a deviation to 3 %
+        assert np.std(noise) == pytest.approx(deviation, rel=0.12)
+        assert np.abs(noise - other).max() > deviation
+
+
+def test_motors_keep_their_limits():
+    """What the controller asks for beyond the limit is not given, and is counted."""
+    got = run(changes={"defaults.motor": {"torque_limit_Nm": 0.3}},
+              controller=MotorPID(ideal_plan, frequency=30.0))  # fmt: skip
+    assert np.abs(got.motor_torque).max() <= 0.3
+    assert got.metrics()["joints"]["joint"]["motor"]["at_limit_s"] > 0.0
+
+
+def test_a_batch_of_motions_is_controlled_at_once():
+    """Leading axes are motions side by side, gains may differ from one to the next."""
+    spy = Spy()
+    run(controller=spy)
+    task, read = spy.task, spy.read[7][1]
+    alone = []
+    for frequency in (5.0, 9.0):
+        pid = MotorPID(frequency=frequency, integral_time=0.1)
+        pid.start(task)
+        alone.append([pid.torque(k, read) for k in (7, 8)][-1])
+    both = MotorPID(frequency=np.array([[5.0], [9.0]]), integral_time=0.1)
+    both.start(task)
+    got = [both.torque(k, read) for k in (7, 8)][-1]
+    np.testing.assert_allclose(got, np.stack(alone), rtol=1e-12)
+
+
+class Broken(Spy):
+    """Asks for something that is no torque."""
+
+    def torque(self, k, measured):
+        """Two numbers for one joint, after the first instant."""
+        return np.full(2, 1.0) if k else np.zeros(1)
+
+
+def test_bad_controllers_and_arguments_are_refused():
+    """One clear line each."""
+    with pytest.raises(ComputationError, match=r"Broken: torque .* for each of joint"):
+        run(controller=Broken())
+    with pytest.raises(InputError, match="known_drives without controller"):
+        run(known_drives={"joint": LINEAR})
+    with pytest.raises(InputError, match="no joint 'elbow'; accepted: joint"):
+        run(controller=Spy(), known_drives={"elbow": LINEAR})
+    with pytest.raises(InputError, match=r"sensors.torque: read by nobody"):
+        run(changes={"sensors.torque.noise_Nm": 0.1})
+    stiff = DriveMap.linear(9e4, teeth_flexspline=120, teeth_circular_spline=122)
+    spy = Spy()
+    run(controller=spy, known_drives={"joint": stiff})
+    assert spy.task.joints.drives == (stiff,)
