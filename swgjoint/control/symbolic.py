@@ -1,0 +1,271 @@
+r"""The joint with its map as CasADi expressions, for optimal control.
+
+The energy alone is written down; CasADi differentiates it, so that forces, their
+tangents and the Hessians that Newton-type solvers ask for belong to one potential:
+
+.. math:: F = -\nabla_{(\theta,\psi)} V(\Delta, \alpha, \beta) - C\,(g\cdot v)\,g
+
+A coefficient of V is a polynomial of degree four on each interval of the torsion, a
+parabola beyond the knots. The interval is picked by comparisons, which have no slope: V
+is twice continuously differentiable wherever the map is, and its derivatives are those
+of the polynomial in force.
+
+Hysteresis and friction have states, those of the plugin: the torsion at which each
+element is relaxed, and beta at which the bristle is. :func:`joint_forces` takes them as
+given, :func:`joint_history` moves them after a step. Both have corners where an element
+begins to slip. :func:`smooth_forces` has none and no states: friction at speed, smooth
+through rest; without the presliding of the bristle and without hysteresis, whose torque
+is at most the sum of the yield torques. Ratcheting is in neither.
+
+Source:
+    Andersson et al. (2019), "CasADi: a software framework for nonlinear optimization
+    and optimal control", Math. Prog. Comp. 11, 1-36. The law is that of
+    :func:`swgjoint.joint.reference.gradient_force`.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.errors import MissingExtraError
+from swgjoint.maps.drive_map import DriveMap
+
+Array = NDArray[np.float64]
+
+LARGE = 20_000
+"""Numbers in a map from which its functions keep matrices instead of scalars."""
+_SLIPS = 1.0 - 1e-9  # of its reach: as swgjoint.maps.friction has it
+_NO_LOAD = 1e-3  # of rated torque, below which |T| is rounded in the smooth law
+
+
+def casadi() -> Any:
+    """The CasADi module.
+
+    Raises:
+        MissingExtraError: If it is not installed.
+    """
+    try:
+        return import_module("casadi")
+    except ImportError as error:
+        raise MissingExtraError(
+            "a symbolic joint needs casadi: pip install 'swgjoint[control]'"
+        ) from error
+
+
+def torsion(drive: DriveMap, theta: Any, psi: Any) -> Any:
+    """Torsion theta/i + e0 - psi of CasADi angles [rad]."""
+    ca = casadi()
+    cos, sin = _waves(drive, theta, psi)
+    a, b = drive.kinematic_error.T
+    return theta / drive.ratio + ca.dot(a, cos) + ca.dot(b, sin) - psi
+
+
+def potential(drive: DriveMap, x: Any, theta: Any, psi: Any) -> Any:
+    """V of a CasADi torsion and CasADi angles [J]."""
+    ca = casadi()
+    waves = ca.vertcat(*_waves(drive, theta, psi))
+    origins, table = _pieces(drive)
+    above = [x >= knot for knot in drive.torsion_knots]
+    # one for the piece that holds the torsion, zero for all others
+    here = ca.vertcat(1 - above[0], *(a - b for a, b in pairwise(above)), above[-1])
+    d = x - ca.dot(origins, here)
+    pieces = ca.reshape(ca.mtimes(ca.DM(table), waves), 5, len(origins))
+    c = ca.mtimes(pieces, here)
+    return c[0] + d * (c[1] + d * (c[2] + d * (c[3] + d * c[4])))
+
+
+def joint_forces(drive: DriveMap, *, damping: float) -> Any:
+    """Function of all torques of the drive, those with a history included.
+
+    Args:
+        drive: The map.
+        damping: Torque per torsion rate, C [N·m·s/rad].
+
+    Returns:
+        ``forces(q, v, history) -> (force, torsion)`` with q = (theta, psi), v its rate
+        and force = (on the rotor, on the link) [N·m]; the history has the elements'
+        relaxed torsions [rad] and, with friction, beta where the bristle is relaxed.
+    """
+    ca = casadi()
+    q, v, past = _symbols(drive)
+    rests, relaxed = past[: len(drive.hysteresis)], past[len(drive.hysteresis) :]
+    x, slope, elastic, force = _conservative(drive, q)
+    slipping = sum(
+        e.stiffness * _clip(x - rests[k], e.yield_torsion)
+        for k, e in enumerate(drive.hysteresis)
+    )
+    force = force - slope.T * (slipping + damping * ca.mtimes(slope, v))
+    law = drive.friction
+    if law is not None:
+        b = ca.DM(drive.friction_direction)
+        speed, turned = ca.dot(b, v), ca.dot(b, q) - relaxed[0]
+        reach = _reach(drive, speed, elastic + slipping)
+        onward = (ca.fabs(turned) >= _SLIPS * reach) * (turned * speed > 0)
+        rubs = law.stiffness * _clip(turned, reach) + law.viscous * speed
+        force = force - b * (rubs + law.damping * speed * (1 - onward))
+    return ca.Function(
+        "forces", [q, v, past], [force, x], ["q", "v", "history"], ["force", "torsion"]
+    )
+
+
+def joint_history(drive: DriveMap) -> Any:
+    """Function ``history(q, v, history) -> next`` at the end of a step."""
+    ca = casadi()
+    q, v, past = _symbols(drive)
+    x, _, elastic, _ = _conservative(drive, q)
+    slipping, after = 0.0, []
+    for k, e in enumerate(drive.hysteresis):
+        after.append(x - _clip(x - past[k], e.yield_torsion))
+        slipping += e.stiffness * (x - after[-1])
+    if drive.friction is not None:
+        b = ca.DM(drive.friction_direction)
+        reach = _reach(drive, ca.dot(b, v), elastic + slipping)
+        beta = ca.dot(b, q)
+        after.append(beta - _clip(beta - past[-1], reach))
+    return ca.Function("history", [q, v, past], [ca.vertcat(*after)])
+
+
+def relaxed_history(drive: DriveMap, theta: float, psi: float) -> Array:
+    """History of a joint that begins here: elements at zero torsion, bristle here."""
+    b = np.array(drive.friction_direction, float) @ [theta, psi]
+    rests = [0.0] * len(drive.hysteresis)
+    return np.array(rests if drive.friction is None else [*rests, b], dtype=float)
+
+
+def joint_step(
+    drive: DriveMap,
+    *,
+    damping: float,
+    rotor_inertia: float,
+    link_inertia: float,
+    timestep: float,
+) -> Any:
+    """One step of classical Runge-Kutta, as the engine's RK4 takes it.
+
+    The history stands still during the step and moves at its end.
+
+    Args:
+        drive: The map.
+        damping: C [N·m·s/rad].
+        rotor_inertia: [kg·m²].
+        link_inertia: [kg·m²].
+        timestep: h [s].
+
+    Returns:
+        Function ``(q, v, history, applied) -> (q, v, history)``, with the torques
+        applied to rotor and link [N·m].
+    """
+    ca = casadi()
+    forces, history = joint_forces(drive, damping=damping), joint_history(drive)
+    q, v, past = _symbols(drive)
+    applied = type(q).sym("applied", 2)
+    inertia = ca.DM([rotor_inertia, link_inertia])
+
+    def acceleration(q: Any, v: Any) -> Any:
+        return (forces(q, v, past)[0] + applied) / inertia
+
+    h = timestep
+    a1 = acceleration(q, v)
+    v2 = v + 0.5 * h * a1
+    a2 = acceleration(q + 0.5 * h * v, v2)
+    v3 = v + 0.5 * h * a2
+    a3 = acceleration(q + 0.5 * h * v2, v3)
+    v4 = v + h * a3
+    a4 = acceleration(q + h * v3, v4)
+    q_end = q + h / 6 * (v + 2 * v2 + 2 * v3 + v4)
+    v_end = v + h / 6 * (a1 + 2 * a2 + 2 * a3 + a4)
+    return ca.Function(
+        "step", [q, v, past, applied], [q_end, v_end, history(q_end, v_end, past)]
+    )
+
+
+def smooth_forces(drive: DriveMap, *, damping: float, creep_speed: float = 0.1) -> Any:
+    """Function ``forces(q, v) -> (force, torsion)`` without corners or history.
+
+    Friction is f tanh(nu/nu_0) + eta nu; a joint at rest under load creeps at a
+    fraction of nu_0 where a real one sticks.
+
+    Args:
+        drive: The map; its hysteresis is left out.
+        damping: C [N·m·s/rad].
+        creep_speed: nu_0, relative speed at the input [rad/s].
+    """
+    ca = casadi()
+    q, v, _ = _symbols(drive)
+    x, slope, elastic, force = _conservative(drive, q)
+    force = force - slope.T * (damping * ca.mtimes(slope, v))
+    law = drive.friction
+    if law is not None:
+        b = ca.DM(drive.friction_direction)
+        speed = ca.dot(b, v)
+        load = ca.sqrt(elastic**2 + (_NO_LOAD * drive.ratings.rated_torque) ** 2)
+        slip = law.stiffness * _reach(drive, speed, load)
+        force = force - b * (slip * ca.tanh(speed / creep_speed) + law.viscous * speed)
+    return ca.Function("forces", [q, v], [force, x], ["q", "v"], ["force", "torsion"])
+
+
+def _symbols(drive: DriveMap) -> tuple[Any, Any, Any]:
+    """Angles, rates and history; of scalars where the map is small."""
+    ca = casadi()
+    kind = ca.MX if drive.potential.size > LARGE else ca.SX
+    states = len(drive.hysteresis) + (drive.friction is not None)
+    return kind.sym("q", 2), kind.sym("v", 2), kind.sym("history", states)
+
+
+def _conservative(drive: DriveMap, q: Any) -> tuple[Any, Any, Any, Any]:
+    """Torsion, its slope (1, 2), torque along it at held angles, and -dV/dq (2, 1)."""
+    ca = casadi()
+    x, held = torsion(drive, q[0], q[1]), type(q).sym("x")
+    energy = potential(drive, held, q[0], q[1])
+    along, angles = ca.substitute(
+        [ca.gradient(energy, held), ca.gradient(energy, q)], [held], [x]
+    )
+    slope = ca.jacobian(x, q)
+    return x, slope, along, -(slope.T * along + angles)
+
+
+def _reach(drive: DriveMap, speed: Any, along: Any) -> Any:
+    """Largest stretch of the bristle [rad] at a torque along the torsion."""
+    law, ca = drive.friction, casadi()
+    assert law is not None
+    more = (law.static - law.coulomb) * ca.exp(-((speed / law.stribeck_speed) ** 2))
+    load = law.load / abs(drive.ratio) * ca.fabs(along)
+    return (law.bending + law.coulomb + more + load) / law.stiffness
+
+
+def _clip(value: Any, reach: Any) -> Any:
+    ca = casadi()
+    return ca.fmin(ca.fmax(value, -reach), reach)
+
+
+def _waves(drive: DriveMap, theta: Any, psi: Any) -> tuple[Any, Any]:
+    """Cosine and sine of every phase. Shapes (n_harmonics, 1)."""
+    ca = casadi()
+    phases = ca.mtimes(ca.DM(drive.angle_orders.astype(float)), ca.vertcat(theta, psi))
+    return ca.cos(phases), ca.sin(phases)
+
+
+def _pieces(drive: DriveMap) -> tuple[Array, Array]:
+    """Where each polynomial counts from (n + 2,), and all (5 (n + 2), 2 n_harmonics).
+
+    The parabola below the knots, n intervals, the parabola above.
+    """
+    knots = drive.torsion_knots
+    origins = np.concatenate([knots[:1], knots])
+    inner = np.moveaxis(drive.potential, 2, 0)  # (n, n_harmonics, 2, 5)
+    ends = []
+    for knot, stiffness in zip(
+        knots[[0, -1]], np.moveaxis(drive.end_stiffness, 2, 0), strict=True
+    ):
+        end = np.zeros((*stiffness.shape, 5))
+        end[..., 0] = drive.coefficients(knot)
+        end[..., 1] = drive.coefficients(knot, 1)
+        end[..., 2] = 0.5 * stiffness
+        ends.append(end)
+    table = np.concatenate([ends[:1], inner, ends[1:]])
+    return origins, table.transpose(0, 3, 2, 1).reshape(5 * len(origins), -1)

@@ -1,0 +1,240 @@
+r"""Dynamics of a tree of hinges as CasADi expressions, numbers from an MjModel.
+
+The recursive Newton-Euler algorithm in the world frame: out along the tree the motion
+of every body, back along it the force and moment that move it,
+
+.. math::
+    \tau_j = z_j \cdot \sum_{b \succeq j} \left[ I_b\dot\omega_b
+        + \omega_b \times I_b\omega_b + (c_b - p_j) \times m_b (\ddot c_b - g) \right]
+        + a_j\,\ddot q_j,
+
+with :math:`a_j` the armature. Rotors of attached drives are bodies of the tree like
+any other. Joint damping is in; contacts, joint limits, friction loss, springs and
+tendons are not: the tendons of drives are replaced by their symbolic law.
+
+Source:
+    Luh, Walker, Paul (1980), "On-line computational scheme for mechanical
+    manipulators", J. Dyn. Sys. Meas. Control 102, 69-76.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.control.symbolic import casadi, smooth_forces
+from swgjoint.errors import InputError
+from swgjoint.joint.drive import JointDrive
+
+_HINGE = int(mujoco.mjtJoint.mjJNT_HINGE)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SymbolicArm:
+    """CasADi functions of a compiled arm with drives; q, v, a in the model's order."""
+
+    inverse_dynamics: Any
+    """``(q, v, a) -> tau``: inertia, gyroscopic, weight and damping torques [N·m]."""
+    drive_forces: Any
+    """``(q, v) -> (tau, torsion)``: what all drives exert on the joints of the model,
+    and their torsions, without corners or history [N·m], [rad]."""
+    rotors: NDArray[np.intp]
+    """Places of the rotors in q. Shape (n_joints,)."""
+    links: NDArray[np.intp]
+
+    @property
+    def forward_dynamics(self) -> Any:
+        """``(q, v, motor_torque) -> a`` with the drives [rad/s²]."""
+        ca = casadi()
+        n = self.inverse_dynamics.size1_in(0)
+        q, v, motor = (
+            ca.SX.sym("q", n),
+            ca.SX.sym("v", n),
+            ca.SX.sym("u", len(self.links)),
+        )
+        inertia = inertia_of(self.inverse_dynamics)(q)
+        force, _ = self.drive_forces(q, v)
+        force[self.rotors.tolist()] += motor
+        a = ca.solve(inertia, force - self.inverse_dynamics(q, v, ca.SX(n, 1)))
+        return ca.Function("forward_dynamics", [q, v, motor], [a])
+
+
+def symbolic_arm(
+    model: mujoco.MjModel, drives: Sequence[JointDrive], *, creep_speed: float = 0.1
+) -> SymbolicArm:
+    """An arm with drives of level ``full``.
+
+    Args:
+        model: Compiled, hinges only.
+        drives: As :func:`~swgjoint.joint.attach.attach` returned them.
+        creep_speed: See :func:`~swgjoint.control.symbolic.smooth_forces` [rad/s].
+
+    Raises:
+        InputError: If a joint is no hinge, or a drive has no rotor.
+    """
+    ca = casadi()
+    for drive in drives:
+        if drive.level != "full":
+            raise InputError(
+                f"joint {drive.joint!r} is {drive.level}; accepted in a symbolic arm:"
+                " full"
+            )
+    rotors = [int(model.joint(d.rotor).dofadr[0]) for d in drives]
+    links = [int(model.joint(d.joint).dofadr[0]) for d in drives]
+    q, v = ca.SX.sym("q", model.nv), ca.SX.sym("v", model.nv)
+    torque, torsions = ca.SX(model.nv, 1), []
+    for drive, r, k in zip(drives, rotors, links, strict=True):
+        law = smooth_forces(drive.drive, damping=drive.damping, creep_speed=creep_speed)
+        force, torsion = law(q[[r, k]], v[[r, k]])
+        torque[r] += force[0]
+        torque[k] += force[1]
+        torsions.append(torsion)
+    return SymbolicArm(
+        inverse_dynamics=inverse_dynamics(model),
+        drive_forces=ca.Function("drives", [q, v], [torque, ca.vertcat(*torsions)]),
+        rotors=np.array(rotors, dtype=np.intp),
+        links=np.array(links, dtype=np.intp),
+    )
+
+
+def inverse_dynamics(model: mujoco.MjModel) -> Any:
+    """Function ``(q, v, a) -> tau`` of a tree of hinges, without its drives [N·m].
+
+    Raises:
+        InputError: If a joint is no hinge.
+    """
+    ca = casadi()
+    for j in range(model.njnt):
+        if model.jnt_type[j] != _HINGE:
+            raise InputError(
+                f"joint {model.joint(j).name!r} is no hinge; a symbolic arm has hinges"
+                " only"
+            )
+    n = model.nv
+    q, v, a = (ca.SX.sym(name, n) for name in "qva")
+    bodies = [_Body.world(ca)]
+    axes, anchors = [], []
+    for b in range(1, model.nbody):
+        body = bodies[model.body_parentid[b]].carried(
+            model.body_pos[b], ca.DM(_matrix(model.body_quat[b]))
+        )
+        first = int(model.body_jntadr[b])
+        for j in range(first, first + int(model.body_jntnum[b])):
+            turn = q[j] - model.qpos0[j]
+            body, axis, anchor = body.turned(
+                model.jnt_axis[j], model.jnt_pos[j], turn, v[j], a[j]
+            )
+            axes.append(axis)
+            anchors.append(anchor)
+        bodies.append(body)
+    tau = ca.DM(model.dof_damping) * v + ca.DM(model.dof_armature) * a
+    force = [ca.SX(3, 1) for _ in bodies]
+    moment = [ca.SX(3, 1) for _ in bodies]  # about the origin of the world
+    for b in range(model.nbody - 1, 0, -1):
+        centre, f, about = bodies[b].needs(
+            float(model.body_mass[b]),
+            model.body_ipos[b],
+            _matrix(model.body_iquat[b]),
+            model.body_inertia[b],
+            model.opt.gravity,
+        )
+        force[b] += f
+        moment[b] += about + ca.cross(centre, f)
+        parent = int(model.body_parentid[b])
+        force[parent] += force[b]
+        moment[parent] += moment[b]
+        first = int(model.body_jntadr[b])
+        for j in range(first, first + int(model.body_jntnum[b])):
+            tau[j] += ca.dot(axes[j], moment[b] - ca.cross(anchors[j], force[b]))
+    return ca.Function("inverse_dynamics", [q, v, a], [tau])
+
+
+def inertia_of(dynamics: Any) -> Any:
+    """Function ``q -> M`` of an inverse dynamics, armature included [kg·m²]."""
+    ca = casadi()
+    n = dynamics.size1_in(0)
+    q, a = ca.SX.sym("q", n), ca.SX.sym("a", n)
+    tau = dynamics(q, ca.SX(n, 1), a)
+    return ca.Function("inertia", [q], [ca.jacobian(tau, a)])
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Body:
+    """Frame of a body in the world and its motion."""
+
+    place: Any
+    turn: Any
+    rate: Any
+    """Angular velocity."""
+    spin: Any
+    """Angular acceleration."""
+    push: Any
+    """Acceleration of the origin of the frame."""
+
+    @classmethod
+    def world(cls, ca: Any) -> _Body:
+        zero = ca.SX(3, 1)
+        return cls(place=zero, turn=ca.SX.eye(3), rate=zero, spin=zero, push=zero)
+
+    def at(self, arm: Any) -> Any:
+        """Acceleration at a vector from the origin, world axes."""
+        ca = casadi()
+        return (
+            self.push
+            + ca.cross(self.spin, arm)
+            + ca.cross(self.rate, ca.cross(self.rate, arm))
+        )
+
+    def carried(self, position: Any, rotation: Any) -> _Body:
+        """A frame fixed in this one."""
+        arm = self.turn @ casadi().DM(position)
+        return _Body(
+            place=self.place + arm,
+            turn=self.turn @ rotation,
+            rate=self.rate,
+            spin=self.spin,
+            push=self.at(arm),
+        )
+
+    def turned(
+        self, axis: Any, anchor: Any, angle: Any, speed: Any, acceleration: Any
+    ) -> tuple[_Body, Any, Any]:
+        """The frame behind a hinge, and axis and anchor in the world."""
+        ca = casadi()
+        z, arm = self.turn @ ca.DM(axis), self.turn @ ca.DM(anchor)
+        pivot, push = self.place + arm, self.at(arm)
+        turn = self.turn @ _about(ca.DM(axis), angle)
+        rate = self.rate + z * speed
+        spin = self.spin + z * acceleration + ca.cross(self.rate, z) * speed
+        at_pivot = _Body(place=pivot, turn=turn, rate=rate, spin=spin, push=push)
+        return at_pivot.carried(-np.asarray(anchor), ca.DM.eye(3)), z, pivot
+
+    def needs(
+        self, mass: float, centre: Any, turn: Any, inertia: Any, gravity: Any
+    ) -> tuple[Any, Any, Any]:
+        """Centre of mass, force and moment about it that this motion needs."""
+        ca = casadi()
+        arm = self.turn @ ca.DM(centre)
+        axes = self.turn @ ca.DM(turn)
+        tensor = axes @ ca.diag(ca.DM(inertia)) @ axes.T
+        force = mass * (self.at(arm) - ca.DM(gravity))
+        moment = tensor @ self.spin + ca.cross(self.rate, tensor @ self.rate)
+        return self.place + arm, force, moment
+
+
+def _about(axis: Any, angle: Any) -> Any:
+    """Rotation about a unit axis, Rodrigues."""
+    ca = casadi()
+    K = ca.skew(axis)
+    return ca.DM.eye(3) + ca.sin(angle) * K + (1 - ca.cos(angle)) * (K @ K)
+
+
+def _matrix(quaternion: Any) -> Any:
+    out = np.empty(9)
+    mujoco.mju_quat2Mat(out, np.asarray(quaternion, float))
+    return out.reshape(3, 3)
