@@ -1,0 +1,212 @@
+r"""Feed-forward through the elastic drive: the motor's motion from the link's.
+
+The link shall follow :math:`\psi(t)`, for which the arm asks the torque T(t) of its
+drive. Behind a map the motor then stands where
+
+.. math:: F_\psi(\theta, \psi) - C\,\dot\Delta\,\partial_\psi\Delta = T,
+
+its speed and acceleration follow from that motion, and its torque is
+
+.. math:: \tau = J_m \ddot\theta - F_\theta(\theta, \psi)
+    + C\,\dot\Delta\,\partial_\theta\Delta + f(\dot\theta, T/i).
+
+Torsion, its stiffness curve and the kinematic error of the map are all inside; with a
+constant stiffness and without error it is the feed-forward of Spong (1987), with T and
+its derivatives written out.
+
+Source:
+    Spong (1987), "Modeling and control of elastic joint robots", J. Dyn. Sys. Meas.
+    Control 109, 310-319; De Luca (2000), "Feedforward/feedback laws for the control of
+    flexible robots", IEEE ICRA, 233-240.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import make_interp_spline
+
+from swgjoint.control.motor_side import MotorPlan, known_friction
+from swgjoint.errors import ComputationError
+from swgjoint.maps.drive_map import DriveMap
+from swgjoint.sim.controller import Task
+
+Array = NDArray[np.float64]
+
+RTOL = 1e-9
+"""Torque left over rated torque at which a motor angle is accepted."""
+ROUNDS = 3
+"""Passes that settle the damping, whose torque is a few percent of a change of T."""
+_CHUNK = 2048  # samples at once: the coefficient table of a chunk stays in the cache
+_DEGREE = 5
+
+
+def flexible_plan(task: Task) -> MotorPlan:
+    """Motor motion and torque that make the known drives move the link as commanded.
+
+    Derivatives along the motion are those of a quintic spline through the samples of
+    the torsion and error; the ideal part of the motion is differentiated exactly. The
+    speed that the plan asks for is the change of the angle over the last period, as an
+    encoder tells it and as the integrator ``discrete`` has it: half a period old, which
+    would be an error of first order in the period. A motion whose torque jumps needs
+    an impulse of the motor: ramps of scenes are smooth enough, steps and trapezoids
+    are not.
+
+    Raises:
+        ComputationError: If a torque of the motion is not reached by the map.
+    """
+    joints = task.joints
+    i, count = joints.ratio, len(task.position)
+    # (n, motions side by side, joints)
+    psi, psi_rate, torque = (
+        x.reshape(count, -1, i.size)
+        for x in (task.position, task.velocity, task.link_torque)
+    )
+    angle = np.stack(
+        [
+            np.stack(
+                [
+                    _motor_angle(
+                        drive,
+                        psi[:, m, j],
+                        psi_rate[:, m, j],
+                        torque[:, m, j],
+                        damping=float(joints.damping[..., j].reshape(-1)[0]),
+                        period=task.period,
+                    )
+                    for m in range(psi.shape[1])
+                ],
+                axis=-1,
+            )
+            for j, drive in enumerate(joints.drives)
+        ],
+        axis=-1,
+    ).reshape(task.position.shape)
+    _, ahead_rate, ahead_bend = _derivatives(angle - i * task.position, task.period)
+    speed = i * task.velocity + ahead_rate
+    bend = i * task.acceleration + ahead_bend
+    read = np.vstack([speed[:1], np.diff(angle, axis=0) / task.period])
+    on_motor = np.empty_like(angle)
+    for j, drive in enumerate(joints.drives):
+        on_motor[..., j] = _input_torque(
+            drive,
+            angle[..., j],
+            task.position[..., j],
+            speed[..., j],
+            task.velocity[..., j],
+            damping=joints.damping[..., j],
+        )
+    wanted = joints.rotor_inertia * bend + on_motor
+    wanted += known_friction(joints, speed, task.velocity, task.link_torque)
+    return MotorPlan(angle=angle, speed=read, torque=wanted)
+
+
+def motor_angle(drive: DriveMap, psi: Array, torque: Array) -> Array:
+    """Motor angles at which the potential of a drive exerts torques on the output.
+
+    Args:
+        drive: Map.
+        psi: Output angles [rad]. Shape (n,).
+        torque: [N·m]. Shape (n,).
+
+    Returns:
+        [rad]. Shape (n,).
+
+    Raises:
+        ComputationError: If the angles are not found.
+    """
+    pieces = [
+        _solve(drive, psi[k : k + _CHUNK], torque[k : k + _CHUNK])
+        for k in range(0, psi.size, _CHUNK)
+    ]
+    return np.concatenate(pieces)
+
+
+def _solve(drive: DriveMap, psi: Array, torque: Array) -> Array:
+    """Newton iterations from the mean curve, all samples together."""
+    i, rated = drive.ratio, drive.ratings.rated_torque
+    span = np.linspace(torque.min(), torque.max(), 33)
+    try:
+        curve = [drive.mean_torsion(t) for t in span]
+    except ValueError as failure:
+        raise ComputationError(f"drive {drive.name!r}: {failure}") from None
+    mean = np.interp(torque, span, curve)
+    theta = i * (psi + mean - drive.error_at(drive.phases(i * psi, psi))[0])
+    softest = 1e-3 * drive.mean_stiffness / i**2
+    nudge = 1e-7 * abs(i)  # 1e-7 rad of the output
+    for _ in range(50):
+        residual = drive.law(theta, psi).output_force - torque
+        if np.abs(residual).max() <= RTOL * rated:
+            return np.asarray(theta)
+        ahead = drive.law(theta + nudge, psi).output_force
+        behind = drive.law(theta - nudge, psi).output_force
+        # of the torque by the output-side angle, times i: never of the wrong sign
+        slope = (ahead - behind) / (2.0 * nudge) * np.sign(i)
+        theta = theta - np.sign(i) * residual / np.maximum(slope, softest * abs(i))
+    worst = int(np.abs(residual).argmax())
+    raise ComputationError(
+        f"drive {drive.name!r}: no motor angle for {torque[worst]:.4g} N·m at the"
+        f" output (left: {residual[worst]:.2g} N·m); lower acceleration or load"
+    )
+
+
+def _motor_angle(
+    drive: DriveMap,
+    psi: Array,
+    psi_rate: Array,
+    torque: Array,
+    *,
+    damping: float,
+    period: float,
+) -> Array:
+    """Motor angles of one joint along a motion, damping included. Shape (n,)."""
+    theta = motor_angle(drive, psi, torque)
+    for _ in range(ROUNDS if damping else 0):
+        theta_rate = (
+            drive.ratio * psi_rate + _derivatives(theta - drive.ratio * psi, period)[1]
+        )
+        rate, _, by_psi = _torsion_rate(drive, theta, psi, theta_rate, psi_rate)
+        theta = motor_angle(drive, psi, torque + damping * rate * by_psi)
+    return theta
+
+
+def _input_torque(
+    drive: DriveMap,
+    theta: Array,
+    psi: Array,
+    theta_rate: Array,
+    psi_rate: Array,
+    *,
+    damping: Array | float,
+) -> Array:
+    """What the drive asks of the motor, potential and damping [N·m]."""
+    shape = theta.shape
+    flat = [x.reshape(-1) for x in (theta, psi, theta_rate, psi_rate)]
+    out = np.concatenate(
+        [
+            -drive.law(a[k : k + _CHUNK], b[k : k + _CHUNK]).input_force
+            for a, b in [flat[:2]]
+            for k in range(0, flat[0].size, _CHUNK)
+        ]
+    ).reshape(shape)
+    rate, by_theta, _ = _torsion_rate(drive, theta, psi, theta_rate, psi_rate)
+    return np.asarray(out + damping * rate * by_theta)
+
+
+def _torsion_rate(
+    drive: DriveMap, theta: Array, psi: Array, theta_rate: Array, psi_rate: Array
+) -> tuple[Array, Array, Array]:
+    """Rate of the torsion [rad/s] and its derivatives by theta and psi [-]."""
+    _, e_theta, e_psi = drive.error_at(drive.phases(theta, psi))
+    by_theta, by_psi = 1.0 / drive.ratio + e_theta, -1.0 + e_psi
+    return by_theta * theta_rate + by_psi * psi_rate, by_theta, by_psi
+
+
+def _derivatives(values: Array, period: float) -> tuple[Array, Array, Array]:
+    """Values, first and second derivative in time of a quintic spline, along axis 0."""
+    count = len(values)
+    if count <= _DEGREE:
+        return values, np.zeros_like(values), np.zeros_like(values)
+    time = period * np.arange(count)
+    spline = make_interp_spline(time, values, k=_DEGREE)
+    return values, spline(time, 1), spline(time, 2)
