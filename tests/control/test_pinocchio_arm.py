@@ -20,6 +20,7 @@ def test_torques_agree_with_the_engine(name):
     arm = RigidArm(name)
     rng = np.random.default_rng(3)
     arm.model.dof_armature[:] = rng.uniform(0.0, 0.5, len(arm.joints))
+    mujoco.mj_setConst(arm.model, mujoco.MjData(arm.model))
     other = PinocchioArm(arm.model)
     motion = rng.uniform(-2.0, 2.0, (3, 20, len(arm.joints)))
     limited = arm.model.jnt_limited.astype(bool)  # beyond, the engine's limits push
