@@ -1,0 +1,160 @@
+"""The two interfaces of gymnasium in front of the episodes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium
+import numpy as np
+from gymnasium.spaces import Box
+from gymnasium.utils import seeding
+from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector.utils import batch_space
+from numpy.typing import NDArray
+
+from swgjoint.envs.core import Core, Entry
+from swgjoint.errors import InputError
+from swgjoint.sim.controller import Measured, Task
+
+Array = NDArray[np.float64]
+
+
+def _box(entries: tuple[Entry, ...]) -> Any:
+    low, high = np.array([(e.low, e.high) for e in entries]).T
+    return Box(low, high, dtype=np.float64)
+
+
+class SingleEnv(gymnasium.Env[Array, Array]):
+    """One episode at a time."""
+
+    metadata = {"render_modes": []}  # noqa: RUF012  (gymnasium's own declaration)
+
+    def __init__(self, core: Core) -> None:
+        """Put the interface in front of one episode."""
+        self.core = core
+        self.observation_space = _box(core.observation_entries)
+        self.action_space = _box(core.action_entries)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Array, dict[str, Any]]:
+        """Begin an episode; ``options`` has no keys."""
+        super().reset(seed=seed)
+        self.core.restart([0], [self.np_random])
+        return self.core.observation()[0], self._info(0)
+
+    def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
+        """Hold an action over one control period."""
+        core = self.core
+        core.step(np.asarray(action)[None], None)
+        broken = int(core.broken()[0])
+        return (
+            core.observation()[0],
+            float(core.reward()[0]),
+            broken > 0,
+            bool(core.over[0]),
+            self._info(broken),
+        )
+
+    def _info(self, broken: int) -> dict[str, Any]:
+        got = {
+            key: float(value[0]) if value.ndim == 1 else value[0]
+            for key, value in self.core.info().items()
+        }
+        return got | {"broken_limit": broken}
+
+    @property
+    def task(self) -> Task:
+        """The commanded motion of the episode, known since its reset."""
+        task = self.core.task
+        return Task(
+            period=task.period,
+            position=task.position[:, 0],
+            velocity=task.velocity[:, 0],
+            acceleration=task.acceleration[:, 0],
+            link_torque=task.link_torque[:, 0],
+            joints=task.joints,
+        )
+
+    def measured(self, observation: Array) -> Measured:
+        """What a controller reads from an observation; shapes (n_joints,)."""
+        return self.core.measured(observation)
+
+
+class BatchEnv(VectorEnv[Array, Array, Array]):
+    """Many episodes on the threads of the engine.
+
+    An episode that has ended begins anew in the next step, whose action it ignores
+    (``AutoresetMode.NEXT_STEP``), as in gymnasium's own vector environments, with which
+    this one agrees to the last bit.
+    """
+
+    def __init__(self, core: Core, metadata: dict[str, Any]) -> None:
+        """Put the interface in front of all episodes of a core."""
+        self.core, self.num_envs = core, core.plant.batch.nsim
+        self.metadata = {**metadata, "autoreset_mode": AutoresetMode.NEXT_STEP}
+        self.single_observation_space = _box(core.observation_entries)
+        self.single_action_space = _box(core.action_entries)
+        self.observation_space = batch_space(
+            self.single_observation_space, self.num_envs
+        )
+        self.action_space = batch_space(self.single_action_space, self.num_envs)
+        self._rngs: list[np.random.Generator] = []
+        self._ended = np.zeros(self.num_envs, dtype=bool)
+        self._all = np.ones(self.num_envs, dtype=bool)
+
+    def reset(
+        self,
+        *,
+        seed: int | list[int | None] | None = None,
+        options: dict[str, Any] | None = None,
+    ) -> tuple[Array, dict[str, Any]]:
+        """Begin all episodes, number k with ``seed + k``.
+
+        Args:
+            seed: The first, or one each; None goes on with the generators.
+            options: No keys.
+        """
+        n = self.num_envs
+        if isinstance(seed, int):
+            seed = [seed + k for k in range(n)]
+        seeds: list[int | None] = [None] * n if seed is None else list(seed)
+        if len(seeds) != n:
+            raise InputError(f"{len(seeds)} seeds; accepted: {n}, one per episode")
+        old = self._rngs
+        self._rngs = [
+            old[k] if old and one is None else seeding.np_random(one)[0]
+            for k, one in enumerate(seeds)
+        ]
+        self._ended = np.zeros(n, dtype=bool)
+        self.core.restart(range(n), self._rngs)
+        return self.core.observation(), self._info(np.zeros(n, dtype=np.int64))
+
+    def step(self, actions: Array) -> tuple[Array, Array, Any, Any, dict[str, Any]]:
+        """Hold actions over one control period. Shapes (n, ...)."""
+        core, ended = self.core, self._ended
+        if not ended.any():
+            core.step(actions, None)
+            reward, broken, over = core.reward(), core.broken(), core.over
+        else:
+            core.step(actions, ~ended)
+            reward, broken, over = core.reward(), core.broken(), core.over
+            rows = np.flatnonzero(ended)
+            core.restart(rows.tolist(), [self._rngs[k] for k in rows])
+            reward[ended], broken[ended], over[ended] = 0.0, 0, False
+        terminated = broken > 0
+        self._ended = terminated | over
+        return core.observation(), reward, terminated, over, self._info(broken)
+
+    def _info(self, broken: NDArray[np.int64]) -> dict[str, Any]:
+        got: dict[str, Any] = self.core.info() | {"broken_limit": broken}
+        return got | {f"_{key}": self._all for key in got}
+
+    @property
+    def task(self) -> Task:
+        """The commanded motions, the episodes in front of the joints."""
+        return self.core.task
+
+    def measured(self, observation: Array) -> Measured:
+        """What a controller reads from observations; shapes (n, n_joints)."""
+        return self.core.measured(observation)

@@ -1,0 +1,233 @@
+"""The joint test bench as many simulations: one drive, its motor, a load."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.envs.core import Core, Entry, Limits, ceiling
+from swgjoint.envs.plant import Plant, specimen
+from swgjoint.envs.sensors import Sensors
+from swgjoint.envs.specimen import Tolerances, tolerances_of, with_assumed_error
+from swgjoint.errors import InputError
+from swgjoint.joint.attach import attach
+from swgjoint.joint.region import check_region
+from swgjoint.maps.drive_map import DriveMap
+from swgjoint.sim.controller import KnownJoints
+from swgjoint.sim.drives import load_drive
+from swgjoint.sim.rigid_arm import RigidArm, compile_spec
+from swgjoint.units import arcmin
+
+Array = NDArray[np.float64]
+
+LEVELS = ("full", "linear")
+MAX_SUB_STEPS = 16
+JOINT, BODY = "joint", "load"
+REACH = 0.5
+"""Of the bench's bar, at whose end a payload sits [m]."""
+
+load_drive_once = cache(load_drive)
+"""Maps by reference: environments are made by the hundred."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class BenchSettings:
+    """Arguments that all environments on the bench share."""
+
+    drive: str | DriveMap = "CSG-25-100"
+    level: str = "full"
+    rotor_inertia_kgm2: float = 1e-4
+    load_inertia_kgm2: float = 1.0
+    payload_kg: float = 0.0
+    friction: bool = True
+    kinematic_error_arcmin: float | None = None
+    torque_limit_Nm: float | None = None
+    max_speed_rad_s: float = 0.6
+    max_angle_rad: float = 1.0
+    period_s: float = 1e-3
+    episode_s: float = 2.0
+    load_of_rated: float = 0.5
+    sensors: Mapping[str, float] | Sensors | None = None
+    randomise: bool | Mapping[str, float] | Tolerances = False
+
+    def __post_init__(self) -> None:
+        for key, unit in (
+            ("rotor_inertia_kgm2", "kg·m²"),
+            ("load_inertia_kgm2", "kg·m²"),
+            ("max_speed_rad_s", "rad/s"),
+            ("max_angle_rad", "rad"),
+            ("period_s", "s"),
+            ("episode_s", "s"),
+        ):
+            self._check(key, unit, zero=False)
+        for key, unit in (("payload_kg", "kg"), ("load_of_rated", "")):
+            self._check(key, unit, zero=True)
+        if self.torque_limit_Nm is not None:
+            self._check("torque_limit_Nm", "N·m", zero=False)
+        if self.level not in LEVELS:
+            raise InputError(
+                f"level {self.level!r} of an environment; accepted: {', '.join(LEVELS)}"
+            )
+        if not 0.5 <= self.episode_s <= 600.0 or self.steps > 10**6:
+            raise InputError(
+                f"episode_s {self.episode_s} s with a period of {self.period_s} s;"
+                " accepted: 0.5 to 600 s and at most 1e6 periods"
+            )
+
+    def _check(self, key: str, unit: str, *, zero: bool) -> None:
+        value = getattr(self, key)
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        if not (number and np.isfinite(value) and (value > 0 or (zero and value == 0))):
+            raise InputError(
+                f"{key} {value} {unit}; accepted: a number {'>=' if zero else '>'} 0"
+            )
+
+    @property
+    def steps(self) -> int:
+        """Control periods of an episode."""
+        return round(self.episode_s / self.period_s)
+
+    @property
+    def link_inertia(self) -> float:
+        """Of load and payload about the joint, nominal [kg·m²]."""
+        return self.load_inertia_kgm2 + self.payload_kg * REACH**2
+
+
+class BenchCore(Core):
+    """Episodes of the bench joint."""
+
+    def __init__(self, count: int, threads: int, settings: BenchSettings) -> None:
+        """Build the model once, then ``count`` simulations of it."""
+        self.settings = s = settings
+        tolerances = tolerances_of(s.randomise)
+        drive = s.drive
+        if isinstance(drive, str):
+            drive = load_drive_once(drive)
+        error = s.kinematic_error_arcmin
+        drive = with_assumed_error(drive, None if error is None else error * arcmin)
+        ratio, ratings = drive.ratio, drive.ratings
+        top_speed = 2.0 * s.max_speed_rad_s * abs(ratio)
+        spec = RigidArm("bench").spec()
+        spec.option.timestep = s.period_s
+        spec.option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
+        body = spec.body(BODY)
+        body.inertia = np.array([*body.inertia[:2], s.link_inertia])
+        # the engine wants the largest of three inertias below the sum of the others
+        body.inertia[:2] = max(body.inertia[0], 0.6 * s.link_inertia)
+        attached = attach(
+            spec,
+            joint=JOINT,
+            drive=drive,
+            level=s.level,
+            rotor_inertia=s.rotor_inertia_kgm2,
+            friction=s.friction,
+            variable=tolerances is not None,
+            max_input_speed=top_speed,
+        )
+        kinds = [attached]
+        if tolerances is not None and s.level == "full":
+            kinds += [specimen(attached, v) for v in tolerances.extremes()]
+        sub_steps = max(
+            check_region(
+                kind,
+                timestep=s.period_s,
+                max_input_speed=top_speed,
+                max_torque=ratings.momentary_peak,
+            ).require(MAX_SUB_STEPS)
+            for kind in kinds
+        )
+        spec.option.timestep = s.period_s / sub_steps
+        motor = spec.add_actuator(name="motor", target=attached.rotor)
+        motor.trntype = mujoco.mjtTrn.mjTRN_JOINT
+        motor.gear[0] = 1.0
+        model = compile_spec(spec, where="environment on the bench")
+        plant = Plant(
+            model,
+            [attached],
+            count,
+            sub_steps=sub_steps,
+            threads=threads,
+            variable=tolerances is not None and s.level == "full",
+        )
+        self._body = int(model.body(BODY).id)
+        self._inertia = None
+        if tolerances is not None and tolerances.load_inertia:
+            self._inertia = plant.batch.expand("body_inertia")
+        limit = s.torque_limit_Nm or ratings.repeated_peak / abs(ratio)
+        one = np.ones(1)
+        self.joint = attached
+        super().__init__(
+            plant,
+            joints=KnownJoints(
+                names=(JOINT,),
+                drives=(attached.drive,),
+                rotor_inertia=s.rotor_inertia_kgm2 * one,
+                link_inertia=s.link_inertia * one,
+                damping=attached.damping * one,
+                torque_limit=limit * one,
+            ),
+            limits=Limits(
+                angle=(2.0 * s.max_angle_rad + 1.0) * one,
+                centre=np.zeros(1),
+                motor_speed=top_speed * one,
+                momentary_peak=ratings.momentary_peak * one,
+                ratcheting=(ratings.ratcheting_torque or np.inf) * one,
+                motor_torque=limit * one,
+            ),
+            sensors=Sensors.of(s.sensors),
+            tolerances=tolerances,
+            period=s.period_s,
+            steps=s.steps,
+        )
+
+    def vary_load(self, index: int, shares: Array) -> None:
+        """Give one simulation a load of its own."""
+        if self._inertia is not None:
+            inertia = (1.0 + float(shares[0])) * self.settings.link_inertia
+            self._inertia[index, self._body, 2] = inertia
+
+    def motor_entries(self) -> tuple[Entry, ...]:
+        """Motor angle and speed as they are read."""
+        ratio, limits = abs(self.joint.ratio), self.limits
+        angle = ceiling(1.01 * ratio * float(limits.angle[0]))
+        speed = ceiling(1.5 * float(limits.motor_speed[0]))
+        return (
+            Entry(meaning="motor angle, read", unit="rad", low=-angle, high=angle),
+            Entry(
+                meaning="motor speed, change of the reading",
+                unit="rad/s",
+                low=-speed,
+                high=speed,
+            ),
+        )
+
+    def sensor_entries(self) -> tuple[Entry, ...]:
+        """Further sensors, where they are."""
+        limits, got = self.limits, []
+        if self.sensors.link_encoder:
+            angle = ceiling(1.01 * float(limits.angle[0]))
+            got.append(
+                Entry(meaning="link angle, read", unit="rad", low=-angle, high=angle)
+            )
+        if self.sensors.torque_sensor:
+            top = ceiling(1.1 * float(limits.momentary_peak[0]))
+            got.append(
+                Entry(meaning="output torque, read", unit="N·m", low=-top, high=top)
+            )
+        return tuple(got)
+
+
+def bench_settings(kind: type[BenchSettings], arguments: dict[str, Any]) -> Any:
+    """Settings from keyword arguments, with an unknown one as a clear line."""
+    known = kind.__dataclass_fields__
+    if unknown := sorted(set(arguments) - set(known)):
+        raise InputError(
+            f"argument {unknown[0]!r} of an environment; accepted: {', '.join(known)}"
+        )
+    return kind(**arguments)

@@ -1,0 +1,303 @@
+"""What all environments share: episodes of driven joints, n of them side by side.
+
+Every number is made here, on arrays that begin with the episodes, so that a single
+environment (n = 1) and a batch agree to the last bit. :mod:`swgjoint.envs.api` puts the
+two interfaces of gymnasium in front.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import floor, log10
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.envs.plant import Plant
+from swgjoint.envs.sensors import Readout, Sensors
+from swgjoint.envs.specimen import Tolerances
+from swgjoint.joint.variation import Variation
+from swgjoint.maps.drive_map import DriveMap
+from swgjoint.sim.controller import KnownJoints, Measured, Task
+from swgjoint.units import arcmin
+
+Array = NDArray[np.float64]
+Rows = NDArray[np.intp]
+
+LIMITS = ("none", "angle", "speed", "momentary_peak", "ratcheting")
+"""What ``info["broken_limit"]`` counts."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Entry:
+    """One number of an observation or an action."""
+
+    meaning: str
+    unit: str
+    low: float
+    high: float
+
+
+def table(entries: Sequence[Entry]) -> str:
+    """The entries as the table of a docstring."""
+    rows = [("index", "meaning", "unit", "range")] + [
+        (str(k), e.meaning, e.unit, f"{e.low:.5g} to {e.high:.5g}")
+        for k, e in enumerate(entries)
+    ]
+    widths = [max(len(row[c]) for row in rows) for c in range(4)]
+    line = "  ".join("=" * w for w in widths)
+    text = ["  ".join(x.ljust(w) for x, w in zip(r, widths, strict=True)) for r in rows]
+    return "\n".join(t.rstrip() for t in [line, text[0], line, *text[1:], line])
+
+
+def ceiling(value: float) -> float:
+    """A value rounded up to two digits: bounds that a table can state."""
+    digit = 10.0 ** (floor(log10(value)) - 1)
+    return float(f"{np.ceil(value / digit * (1.0 - 1e-9)) * digit:.6g}")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Limits:
+    """What ends an episode; arrays of shape (n_joints,)."""
+
+    angle: Array
+    """Of the links about ``centre`` [rad]."""
+    centre: Array
+    """[rad]."""
+    motor_speed: Array
+    """[rad/s]."""
+    momentary_peak: Array
+    """Torque of the drives [N·m]."""
+    ratcheting: Array
+    """Torque at which teeth skip [N·m], inf where it is not known."""
+    motor_torque: Array
+    """Of the motors, which hold it themselves [N·m]."""
+
+
+class Core(ABC):
+    """Episodes on a :class:`~swgjoint.envs.plant.Plant`."""
+
+    def __init__(
+        self,
+        plant: Plant,
+        *,
+        joints: KnownJoints,
+        limits: Limits,
+        sensors: Sensors,
+        tolerances: Tolerances | None,
+        period: float,
+        steps: int,
+    ) -> None:
+        """Prepare episodes.
+
+        Args:
+            plant: The simulations.
+            joints: Nominal data, for the task.
+            limits: Of angle, speed and torque.
+            sensors: Of every joint.
+            tolerances: Of the drives; None: all are nominal.
+            period: Of the control [s].
+            steps: Control periods of an episode.
+        """
+        self.plant, self.joints, self.limits = plant, joints, limits
+        self.sensors, self.tolerances = sensors, tolerances
+        self.period, self.steps = period, steps
+        count, n = plant.batch.nsim, len(joints.names)
+        rated = np.array([d.ratings.rated_torque for d in joints.drives])
+        self._readout = Readout(sensors, count, rated, period)
+        self._rows = np.arange(count)
+        self.instant = np.zeros(count, dtype=np.intp)
+        """Control periods since the start. Shape (n,)."""
+        # position, velocity, acceleration, load, known torque of the links
+        self._plan = np.zeros((count, steps + 1, 5, n))
+        self._normal = np.zeros((count, steps + 1, self._readout.channels))
+        self.variations: list[tuple[Variation, ...]] = [(Variation(),) * n] * count
+        """Deviations of every simulation's drives from the nominal ones."""
+        self.observation_entries, self.action_entries = self.entries()
+        self.action = np.zeros((count, len(self.action_entries)))
+        """The last one, limited."""
+        self.motor_torque = np.zeros((count, n))
+        """The last one [N·m]."""
+        self.output_torque = np.zeros((count, n))
+        """Of the drives [N·m]; 0 at a start."""
+        self._low = np.array([e.low for e in self.observation_entries])
+        self._high = np.array([e.high for e in self.observation_entries])
+
+    # -- what an environment adds ---------------------------------------------
+
+    @abstractmethod
+    def entries(self) -> tuple[tuple[Entry, ...], tuple[Entry, ...]]:
+        """Of observation and action."""
+
+    @abstractmethod
+    def draw(self, index: int, rng: np.random.Generator) -> Array:
+        """The plan of one episode, shape (steps + 1, 5, n_joints).
+
+        Position, velocity, acceleration, load and known torque of the links, inertia
+        included.
+        """
+
+    @abstractmethod
+    def torque_of(self, action: Array) -> Array:
+        """Motor torque of a limited action, not limited itself [N·m]. (n, n_joints)."""
+
+    @abstractmethod
+    def columns(self) -> list[Array]:
+        """The observation, part by part, shapes (n, 1) or (n, n_joints).
+
+        First the motor angles and speeds that are read, last :meth:`readings`.
+        """
+
+    @abstractmethod
+    def reward(self) -> Array:
+        """Of the step that was taken. Shape (n,)."""
+
+    @abstractmethod
+    def vary_load(self, index: int, shares: Array) -> None:
+        """Let the load's inertia of one simulation differ; shares of (n_joints,)."""
+
+    # -- episodes -------------------------------------------------------------
+
+    def restart(self, rows: Sequence[int], rngs: Sequence[np.random.Generator]) -> None:
+        """Begin episodes of some simulations, each with its own generator."""
+        for k, rng in zip(rows, rngs, strict=True):
+            maps: tuple[DriveMap, ...] = tuple(d.drive for d in self.plant.drives)
+            if self.tolerances is not None:
+                drawn = [self.tolerances.draw(rng) for _ in maps]
+                self.vary_load(k, np.array([share for _, share in drawn]))
+                if self.plant.variable:
+                    self.variations[k] = specimens = tuple(v for v, _ in drawn)
+                    self.plant.vary(k, specimens)
+                    maps = tuple(v.of(m) for v, m in zip(specimens, maps, strict=True))
+            self._plan[k] = self.draw(k, rng)
+            self._normal[k] = rng.standard_normal(self._normal.shape[1:])
+            self.plant.place(k, self._plan[k, 0, 0], maps)
+        index = np.asarray(rows, dtype=np.intp)
+        self.instant[index] = 0
+        # new arrays: what was returned of the last step must not change
+        self.action, self.motor_torque, self.output_torque = (
+            _without(values, index)
+            for values in (self.action, self.motor_torque, self.output_torque)
+        )
+        self._look()
+        self._readout.start(index, self._true()[index], self._normal[index, 0])
+        self._error()
+
+    def step(self, action: Array, active: NDArray[np.bool_] | None) -> None:
+        """Take one control period.
+
+        Args:
+            action: Shape (n, n_actions); beyond its range it is limited.
+            active: Episodes that go on; None: all. Shape (n,).
+        """
+        limit = self.limits.motor_torque
+        self.action = np.clip(np.asarray(action, float), -1.0, 1.0)
+        self.motor_torque = np.clip(self.torque_of(self.action), -limit, limit)
+        self.plant.step(self.motor_torque, self.now[:, 3], active)
+        self.instant += 1 if active is None else active
+        self._look()
+        self.output_torque = self.plant.output_torque()
+        self._readout.read(self._true(), self._normal[self._rows, self._here])
+        self._error()
+
+    def _look(self) -> None:
+        """Take in where the simulations stand."""
+        plant = self.plant
+        self._here = np.minimum(self.instant, self.steps)
+        self.now = self._plan[self._rows, self._here]
+        """Plan at this instant. Shape (n, 5, n_joints)."""
+        self.motor_angle, self.link_angle = plant.motor_angle, plant.link_angle
+
+    def _error(self) -> None:
+        self.link_error = self.link_angle - self.now[:, 0]
+        """Link minus reference [rad]. Shape (n, n_joints)."""
+
+    def _true(self) -> Array:
+        parts = [self.motor_angle]
+        if self.sensors.link_encoder:
+            parts.append(self.link_angle)
+        if self.sensors.torque_sensor:
+            parts.append(self.output_torque)
+        return np.concatenate(parts, axis=1)
+
+    def observation(self) -> Array:
+        """What the sensors read and what is known, limited. Shape (n, n_entries)."""
+        return np.clip(np.concatenate(self.columns(), axis=1), self._low, self._high)
+
+    def readings(self) -> list[Array]:
+        """Of link encoder and torque sensor, where they are. Shapes (n, n_joints)."""
+        n, value = len(self.joints.names), self._readout.value
+        return [value[:, k : k + n] for k in range(n, value.shape[1], n)]
+
+    def broken(self) -> NDArray[np.int64]:
+        """Number of the limit that is broken, see :data:`LIMITS`. Shape (n,)."""
+        limits, torque = self.limits, np.abs(self.output_torque)
+        got = np.zeros(len(torque), dtype=np.int64)
+        # what is not a number breaks every limit; the worst is named
+        for number, inside in (
+            (1, np.abs(self.link_angle - limits.centre) <= limits.angle),
+            (2, np.abs(self.plant.motor_speed) <= limits.motor_speed),
+            (3, torque <= limits.momentary_peak),
+            (4, torque <= limits.ratcheting),
+        ):
+            got[~inside.all(axis=1)] = number
+        return got
+
+    @property
+    def over(self) -> NDArray[np.bool_]:
+        """Whether episodes have reached their length. Shape (n,)."""
+        return self.instant >= self.steps
+
+    def info(self) -> dict[str, Array]:
+        """True values behind the observation, per joint where there are several."""
+        error = self.link_angle - self.motor_angle / self.plant.ratio
+        got = {
+            "link_error_arcmin": self.link_error / arcmin,
+            "transmission_error_arcmin": error / arcmin,
+            "output_torque_Nm": self.output_torque,
+            "motor_torque_Nm": self.motor_torque,
+            "load_torque_Nm": self.now[:, 3],
+            "link_angle_rad": self.link_angle,
+            "motor_angle_rad": self.motor_angle,
+        }
+        if len(self.joints.names) == 1:
+            got = {key: value[:, 0] for key, value in got.items()}
+        return got | {"time_s": self.instant * self.period}
+
+    # -- for controllers ------------------------------------------------------
+
+    @property
+    def task(self) -> Task:
+        """The motions of all episodes, episodes in front of the joints."""
+        plan = np.moveaxis(self._plan, 0, 2)  # (steps + 1, 5, n, n_joints)
+        return Task(
+            period=self.period,
+            position=plan[:, 0],
+            velocity=plan[:, 1],
+            acceleration=plan[:, 2],
+            link_torque=plan[:, 4],
+            joints=self.joints,
+        )
+
+    def measured(self, observation: Array) -> Measured:
+        """What a controller reads from observations of any leading axes."""
+        n, last = len(self.joints.names), observation.shape[-1]
+        torque = last - n if self.sensors.torque_sensor else None
+        link = (torque or last) - n if self.sensors.link_encoder else None
+
+        def part(first: int | None) -> Array | None:
+            return None if first is None else observation[..., first : first + n]
+
+        got = Measured(
+            motor_angle=observation[..., :n], motor_speed=observation[..., n : 2 * n]
+        )
+        return replace(got, link_angle=part(link), output_torque=part(torque))
+
+
+def _without(values: Array, rows: Rows) -> Array:
+    """A copy with zeros in some rows."""
+    got = values.copy()
+    got[rows] = 0.0
+    return got

@@ -1,0 +1,108 @@
+r"""Seeded smooth motions of one joint, with rest at the start.
+
+All are four times continuously differentiable, what the feed-forward of a flexible
+joint needs (Spong 1987), and pass through the smooth step
+
+.. math:: s(x) = x^5\,(126 - 420 x + 540 x^2 - 315 x^3 + 70 x^4), \quad 0 \le x \le 1,
+
+whose first four derivatives vanish at both ends.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Motion = tuple[Array, Array, Array]
+"""Position [rad], velocity [rad/s], acceleration [rad/s²]; shapes (n,)."""
+
+RAMP = 0.4
+"""Time over which an oscillation grows from rest [s]."""
+HOLD = 0.05
+"""Rest before and after a move from point to point [s]."""
+FREQUENCIES = (0.3, 2.0)
+"""Range of the oscillations [Hz]: below the first mode of any joint of an arm."""
+PARTS = 5
+"""Oscillations of a multisine."""
+
+_STEP = np.polynomial.Polynomial([0, 0, 0, 0, 0, 126, -420, 540, -315, 70])
+_STEP_1, _STEP_2 = _STEP.deriv(), _STEP.deriv(2)
+
+
+def smooth_step(time: Array, duration: float) -> Motion:
+    """The step from 0 to 1 over a duration from time 0 on, and two derivatives."""
+    x = np.clip(np.asarray(time) / duration, 0.0, 1.0)
+    return _STEP(x), _STEP_1(x) / duration, _STEP_2(x) / duration**2
+
+
+def _oscillation(time: Array, frequency: Array, phase: Array, weight: Array) -> Motion:
+    """Sum of sines that grows from rest, from 0 on."""
+    omega = 2.0 * np.pi * frequency
+    angle = omega * time[:, None] + phase
+    sin, cos = weight * np.sin(angle), weight * np.cos(angle)
+    # the offset makes the motion begin at 0 with the step's own zeros
+    y = sin.sum(axis=1) - sin[0].sum()
+    y_1, y_2 = (omega * cos).sum(axis=1), (-(omega**2) * sin).sum(axis=1)
+    w, w_1, w_2 = smooth_step(time, RAMP)
+    return w * y, w_1 * y + w * y_1, w_2 * y + 2.0 * w_1 * y_1 + w * y_2
+
+
+def sinusoid(time: Array, rng: np.random.Generator) -> Motion:
+    """One oscillation."""
+    frequency = rng.uniform(*FREQUENCIES, 1)
+    return _oscillation(time, frequency, rng.uniform(0, 2 * np.pi, 1), np.ones(1))
+
+
+def multisine(time: Array, rng: np.random.Generator) -> Motion:
+    """Oscillations of random frequencies and phases with equal speeds."""
+    low, high = map(float, np.log(FREQUENCIES))
+    frequency = np.exp(rng.uniform(low, high, PARTS))
+    phase = rng.uniform(0, 2 * np.pi, PARTS)
+    return _oscillation(time, frequency, phase, 1.0 / frequency)
+
+
+def point_to_point(time: Array, rng: np.random.Generator) -> Motion:
+    """A move and half of it back, with rests before, between and after."""
+    first = rng.uniform(0.3, 0.6) * time[-1]
+    second = time[-1] - first
+    there = smooth_step(time - HOLD, first - 2.0 * HOLD)
+    back = smooth_step(time - first - HOLD, second - 2.0 * HOLD)
+    a, b, c = (x - 0.5 * y for x, y in zip(there, back, strict=True))
+    return a, b, c
+
+
+KINDS: dict[str, Callable[[Array, np.random.Generator], Motion]] = {
+    "sinusoid": sinusoid,
+    "multisine": multisine,
+    "point_to_point": point_to_point,
+}
+
+
+def draw_motion(
+    time: Array,
+    rng: np.random.Generator,
+    *,
+    kinds: tuple[str, ...],
+    max_speed: float,
+    max_angle: float,
+) -> Motion:
+    """A motion of one of the kinds, with 40 to 100 % of what the limits allow.
+
+    Args:
+        time: From 0 on [s]. Shape (n,).
+        rng: Source of all that is random.
+        kinds: Names of :data:`KINDS`, one of which is drawn.
+        max_speed: Limit of the speed [rad/s].
+        max_angle: Limit of the distance from the start [rad].
+    """
+    kind = kinds[int(rng.integers(len(kinds)))]
+    position, velocity, acceleration = KINDS[kind](time, rng)
+    size = min(
+        max_speed / float(np.abs(velocity).max()),
+        max_angle / float(np.abs(position).max()),
+    )
+    size *= float(rng.uniform(0.4, 1.0) * rng.choice([-1.0, 1.0]))
+    return size * position, size * velocity, size * acceleration

@@ -1,0 +1,135 @@
+"""Drives of simulated joints: the error that a catalogue bounds, and their spread."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.errors import InputError
+from swgjoint.joint.variation import Variation
+from swgjoint.maps.drive_map import DriveMap
+from swgjoint.units import arcmin
+
+Array = NDArray[np.float64]
+
+ORDERS = ((2, 0), (0, 2), (4, 0), (0, 4))
+"""Cycles per turn of the wave generator against circular spline and flexspline: where
+position errors of teeth show when two opposite lobes average them."""
+SHARES = (0.3, 0.3, 0.2, 0.2)
+"""Amplitudes: the first even order the larger, both members alike; assumed."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tolerances:
+    """Within what a drive and its load may differ from the nominal ones; ± shares."""
+
+    stiffness: float = 0.15
+    kinematic_error: float = 0.5
+    """Of its amplitude."""
+    losses: float = 0.3
+    """Of hysteresis and friction."""
+    load_inertia: float = 0.2
+    phase: bool = True
+    """Whether the angle functions begin anywhere in their cycle."""
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if field.name != "phase" and not 0.0 <= value < 1.0:
+                raise InputError(
+                    f"tolerance {field.name} {value}; accepted: 0 to 1, 1 excluded"
+                )
+
+    def draw(self, rng: np.random.Generator) -> tuple[Variation, float]:
+        """A specimen of the drive, and by what share the load's inertia differs."""
+        share, turn = rng.uniform(-1.0, 1.0, 4), rng.uniform(0.0, 2.0 * np.pi, 2)
+        variation = Variation(
+            stiffness=float(self.stiffness * share[0]),
+            kinematic_error=float(self.kinematic_error * share[1]),
+            losses=float(self.losses * share[2]),
+            theta=float(self.phase * turn[0]),
+            psi=float(self.phase * turn[1]),
+        )
+        return variation, float(self.load_inertia * share[3])
+
+    def extremes(self) -> tuple[Variation, Variation]:
+        """The softest and the stiffest specimen, with the largest error."""
+        return tuple(  # type: ignore[return-value]
+            Variation(
+                stiffness=sign * self.stiffness, kinematic_error=self.kinematic_error
+            )
+            for sign in (-1.0, 1.0)
+        )
+
+
+def tolerances_of(
+    argument: bool | Mapping[str, float] | Tolerances,
+) -> Tolerances | None:
+    """What the argument ``randomise`` of an environment means; None: off."""
+    if isinstance(argument, bool):
+        return Tolerances() if argument else None
+    if isinstance(argument, Tolerances):
+        return argument
+    known = {field.name for field in fields(Tolerances)}
+    if unknown := sorted(set(argument) - known):
+        raise InputError(
+            f"randomise {unknown[0]!r}; accepted: True, False or a mapping with"
+            f" {', '.join(sorted(known))}"
+        )
+    return Tolerances(**argument)  # type: ignore[arg-type]
+
+
+def with_assumed_error(drive: DriveMap, peak_to_peak: float | None = None) -> DriveMap:
+    """A drive without kinematic error, given one of :data:`ORDERS`.
+
+    A map that has an error keeps it, unless a value is given for one that has none.
+
+    Args:
+        drive: Map.
+        peak_to_peak: Of the error over one output turn [rad]; None: the transmission
+            accuracy that the catalogue states for the drive, an upper bound, and
+            nothing where it states none. 0 leaves the map as it is.
+
+    Raises:
+        InputError: If the map has an error of its own and another one is asked for.
+    """
+    has_own = bool(drive.kinematic_error[1:].any())
+    if peak_to_peak is None:
+        stated = drive.info.get("stated", {}).get("transmission_accuracy_arcmin")
+        peak_to_peak = 0.0 if has_own or stated is None else stated * arcmin
+    elif has_own and peak_to_peak > 0.0:
+        raise InputError(
+            f"kinematic_error_arcmin {peak_to_peak / arcmin:g} for map {drive.name!r},"
+            " which has its own; accepted: None"
+        )
+    if not (np.isfinite(peak_to_peak) and peak_to_peak >= 0.0):
+        raise InputError(
+            f"kinematic_error_arcmin {peak_to_peak / arcmin}; accepted: >= 0"
+        )
+    if peak_to_peak == 0.0:
+        return drive
+    count = len(ORDERS)
+    # phases of the four harmonics: one drive among many, always the same
+    phase = np.arange(1.0, 1.0 + count)
+    error = np.array(SHARES)[:, None] * np.stack([np.cos(phase), np.sin(phase)], 1)
+
+    def padded(values: Array) -> Array:
+        return np.concatenate([values, np.zeros((count, *values.shape[1:]))])
+
+    # beside harmonics that the map may have without any error, the new ones
+    got = replace(
+        drive,
+        orders=np.concatenate([drive.orders, np.array(ORDERS)]),
+        potential=padded(drive.potential),
+        end_stiffness=padded(drive.end_stiffness),
+        kinematic_error=np.concatenate([drive.kinematic_error, error]),
+    )
+    psi = np.linspace(0.0, 2.0 * np.pi, 40 * 4 * int(abs(drive.ratio)))
+    found = got.error_at(got.phases(drive.ratio * psi, psi))[0]
+    size = peak_to_peak / float(np.ptp(found))
+    return replace(
+        got, kinematic_error=np.concatenate([drive.kinematic_error, size * error])
+    )

@@ -1,0 +1,293 @@
+"""JointTracking-v0: interface, determinism, physics, limits."""
+
+from __future__ import annotations
+
+import inspect
+import subprocess
+import sys
+from dataclasses import replace
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
+
+from swgjoint.envs.core import LIMITS, table
+from swgjoint.envs.joint_tracking import JointTrackingEnv, JointTrackingVectorEnv
+from swgjoint.envs.sensors import Sensors
+from swgjoint.errors import InputError
+from swgjoint.maps.drive_map import DriveMap
+from swgjoint.units import arcmin
+
+NAME = "swgjoint.envs:swgjoint/JointTracking-v0"
+ALL = {"link_encoder": True, "torque_sensor": True}
+EXACT = {
+    "motor_counts": 0,
+    "motor_noise_rad": 0.0,
+    "link_counts": 0,
+    "link_noise_rad": 0.0,
+    "torque_noise_of_rated": 0.0,
+    "delay_periods": 0,
+}
+
+
+def pd(env, observation, k, frequency=8.0):
+    """Action of motor-side PD with known torque; broadcasts over a batch."""
+    task, got = env.unwrapped.task, env.unwrapped.measured(observation)
+    ratio, rotor = task.joints.ratio, task.joints.rotor_inertia
+    inertia = rotor + task.joints.link_inertia / ratio**2
+    omega = 2.0 * np.pi * frequency
+    torque = inertia * omega**2 * (ratio * task.position[k] - got.motor_angle)
+    torque += 2.0 * inertia * omega * (ratio * task.velocity[k] - got.motor_speed)
+    torque += task.link_torque[k] / ratio + ratio * rotor * task.acceleration[k]
+    return np.clip(torque / task.joints.torque_limit, -1.0, 1.0)
+
+
+def episode(env, seed, steps=None):
+    """Observations, rewards and infos of one episode under PD."""
+    observation, info = env.reset(seed=seed)
+    rows = [(observation, 0.0, info)]
+    for k in range(steps or env.unwrapped.core.steps):
+        observation, reward, terminated, truncated, info = env.step(
+            pd(env, observation, k)
+        )
+        rows.append((observation, reward, info))
+        if terminated or truncated:
+            break
+    return rows, terminated, truncated
+
+
+@pytest.mark.parametrize("randomise", [False, True])
+def test_check_env(randomise):
+    """Gymnasium's own checks raise no warning."""
+    env = gymnasium.make(NAME, drive="CSG-25-100", randomise=randomise)
+    check_env(env.unwrapped)
+
+
+def test_tables_are_those_of_the_code():
+    """The docstring's tables are made by the code."""
+    env = JointTrackingEnv(sensors=ALL)
+    text = inspect.cleandoc(JointTrackingEnv.__doc__)
+    blocks = inspect.cleandoc(text).split("\n\n")
+    assert table(env.core.action_entries) in blocks
+    assert table(env.core.observation_entries) in blocks
+    assert env.observation_space.shape == (11,)
+    assert JointTrackingEnv().observation_space.shape == (9,)
+
+
+def test_one_seed_gives_one_run():
+    """Two episodes of one seed are equal, of two seeds not."""
+    env = gymnasium.make(NAME, randomise=True, sensors=ALL, episode_s=0.5)
+    first, again, other = (episode(env, seed)[0] for seed in (3, 3, 4))
+    for a, b in zip(first, again, strict=True):
+        np.testing.assert_array_equal(a[0], b[0])
+        assert a[1:] == b[1:]
+    assert np.abs(first[9][0] - other[9][0]).max() > 0.0
+
+
+@pytest.mark.parametrize("level", ["full", "linear"])
+def test_batch_equals_single_environments(level):
+    """1,000 steps with restarts, specimens, sensors and delay agree to the last bit."""
+    keys = {
+        "level": level,
+        "randomise": True,
+        "episode_s": 0.5,
+        "load_of_rated": 0.05,
+        "sensors": {**ALL, "delay_periods": 2},
+    }
+    count = 7
+    sync = SyncVectorEnv([lambda: JointTrackingEnv(**keys)] * count)
+    batch = gymnasium.make_vec(NAME, num_envs=count, threads=2, **keys)
+    assert isinstance(batch, JointTrackingVectorEnv)
+    assert batch.metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
+    rng, ended, broken = np.random.default_rng(0), 0, 0
+    got, want = batch.reset(seed=11), sync.reset(seed=11)
+    for _ in range(1000):
+        np.testing.assert_array_equal(got[0], want[0])
+        assert got[-1].keys() == want[-1].keys()
+        for key in got[-1]:
+            np.testing.assert_array_equal(got[-1][key], want[-1][key], err_msg=key)
+        for a, b in zip(got[1:-1], want[1:-1], strict=True):
+            np.testing.assert_array_equal(a, b)
+        # some wander until a limit breaks, some stay until the end
+        actions = (
+            rng.uniform(-0.9, 0.9, (count, 1)) * np.linspace(0.02, 1, count)[:, None]
+        )
+        got, want = batch.step(actions), sync.step(actions)
+        ended += int(got[3].sum())
+        broken += int(got[2].sum())
+    assert ended >= 4 and broken >= 1
+
+
+def test_the_joint_follows_and_its_error_is_explained():
+    """At rest under load the link is off by torsion and error of its drive."""
+    env = JointTrackingEnv(
+        reference="point_to_point", sensors={**ALL, **EXACT}, friction=False
+    )
+    rows, terminated, truncated = episode(env, seed=2)
+    assert truncated and not terminated and len(rows) == env.core.steps + 1
+    info, task = rows[-1][2], env.task
+    load = float(task.link_torque[-1, 0])
+    assert info["output_torque_Nm"] == pytest.approx(load, rel=0.02)
+    drive = task.joints.drives[0]
+    theta, psi = info["motor_angle_rad"], info["link_angle_rad"]
+    assert float(drive.forces(theta, psi)[1]) == pytest.approx(load, rel=0.02)
+    error = (psi - theta / drive.ratio) / arcmin
+    assert info["transmission_error_arcmin"] == pytest.approx(error, abs=1e-9)
+    assert info["link_error_arcmin"] == pytest.approx(
+        (psi - task.position[-1, 0]) / arcmin, abs=1e-9
+    )
+    # torsion under load dominates, and the drive is as stiff as its catalogue says
+    assert abs(load) > 5.0
+    assert -error * arcmin == pytest.approx(
+        drive.mean_torsion(load), abs=1.01 * 0.5 * arcmin
+    )
+
+
+def test_reward_is_what_the_docstring_says():
+    """Reward of every step from the true error and the torque."""
+    env = JointTrackingEnv(error_scale_arcmin=2.0, effort_weight=0.3, episode_s=0.5)
+    for _, reward, info in episode(env, seed=5)[0][1:]:
+        error = info["link_error_arcmin"] / 2.0
+        effort = info["motor_torque_Nm"] / float(env.core.limits.motor_torque[0])
+        assert reward == pytest.approx(1.0 / (1.0 + error**2) - 0.3 * effort**2)
+
+
+def test_sensors_have_resolution_and_delay():
+    """Without noise a reading is the rounded angle of as many periods ago."""
+    counts = 4096
+    keys = {**EXACT, "motor_counts": counts, "delay_periods": 3}
+    env = JointTrackingEnv(sensors={**keys, "link_encoder": True})
+    rows, _, _ = episode(env, seed=1, steps=300)
+    count = 2.0 * np.pi / counts
+    read = np.array([env.measured(o).motor_angle[0] for o, _, _ in rows])
+    speed = np.array([env.measured(o).motor_speed[0] for o, _, _ in rows])
+    link = np.array([env.measured(o).link_angle[0] for o, _, _ in rows])
+    true = np.array([i["motor_angle_rad"] for _, _, i in rows])
+    np.testing.assert_array_equal(read[3:], np.floor(true[:-3] / count) * count)
+    np.testing.assert_allclose(speed[1:], np.diff(read) / 1e-3, atol=1e-9)
+    np.testing.assert_array_equal(
+        link[3:], [i["link_angle_rad"] for _, _, i in rows][:-3]
+    )
+    assert np.ptp(true[:4]) == 0.0 or read[0] == np.floor(true[0] / count) * count
+
+
+def test_noise_has_the_stated_deviation():
+    """Readings of a joint at rest scatter as their sensors say."""
+    noise = {"motor_counts": 0, "motor_noise_rad": 1e-3, "torque_sensor": True}
+    env = JointTrackingEnv(sensors=noise, load_of_rated=0.0, friction=False)
+    before, rows = [env.reset(seed=1)], []
+    for _ in range(95):
+        rows.append((before[-1][-1], env.step(np.zeros(1))))
+        before.append(rows[-1][1])
+    off = [
+        env.measured(after[0]).motor_angle[0] - info["motor_angle_rad"]
+        for info, after in rows
+    ]
+    assert np.std(off) == pytest.approx(1e-3, rel=0.3)
+    rated = env.task.joints.drives[0].ratings.rated_torque
+    torque = [
+        env.measured(after[0]).output_torque[0] - info["output_torque_Nm"]
+        for info, after in rows
+    ]
+    assert np.std(torque) == pytest.approx(1e-3 * rated, rel=0.3)
+
+
+def test_specimens_differ_within_their_tolerances():
+    """Every episode has a drive of its own; the task knows the nominal one."""
+    tolerances = {"stiffness": 0.1, "kinematic_error": 0.3, "losses": 0.2}
+    batch = JointTrackingVectorEnv(40, randomise={**tolerances, "load_inertia": 0.05})
+    batch.reset(seed=0)
+    drawn = [v[0] for v in batch.core.variations]
+    for key, top in tolerances.items():
+        values = np.array([getattr(v, key) for v in drawn])
+        assert 0.8 * top < np.abs(values).max() <= top
+    inertia = batch.core.plant.batch.expanded("body_inertia")
+    loads = inertia[:, batch.core.plant.model.body("load").id, 2]
+    assert 0.04 < np.abs(loads - 1.0).max() <= 0.05
+    assert batch.task.joints.link_inertia[0] == 1.0
+    nominal = JointTrackingEnv().task.joints.drives[0]
+    np.testing.assert_array_equal(
+        batch.task.joints.drives[0].kinematic_error, nominal.kinematic_error
+    )
+    plain = JointTrackingEnv().core.plant
+    assert plain.model.nuser_tendon == 0
+    assert plain.batch.expanded("body_inertia") is None
+
+
+@pytest.mark.parametrize(
+    ("number", "action", "keys"),
+    [
+        (1, 0.1, {"max_angle_rad": 0.01, "max_speed_rad_s": 3.0, "episode_s": 3.0}),
+        (2, 1.0, {}),
+        (3, 1.0, {"torque_limit_Nm": 5.0, "load_inertia_kgm2": 200.0}),
+        (4, 1.0, {"torque_limit_Nm": 5.0, "load_inertia_kgm2": 200.0}),
+    ],
+)
+def test_broken_limits_end_an_episode(number, action, keys):
+    """A constant torque breaks the limit that is nearest, and that is named."""
+    drive = DriveMap.from_catalogue("CSG-25-100")
+    if number == 4:  # teeth that skip early
+        drive = replace(drive, ratings=replace(drive.ratings, ratcheting_torque=150.0))
+    env = JointTrackingEnv(
+        drive=drive, load_of_rated=0.0, rotor_inertia_kgm2=1e-3, **keys
+    )
+    env.reset(seed=0)
+    for _ in range(env.core.steps):
+        _, _, terminated, _, info = env.step(np.array([action]))
+        if terminated:
+            break
+    assert terminated
+    assert LIMITS[info["broken_limit"]] == LIMITS[number]
+
+
+def test_a_controller_sees_all_episodes_of_a_batch():
+    """The same PD, broadcast over a batch, follows all references."""
+    batch = gymnasium.make_vec(NAME, num_envs=8, randomise=True)
+    observation, _ = batch.reset(seed=1)
+    errors = []
+    for k in range(2000):
+        observation, _, terminated, truncated, info = batch.step(
+            pd(batch, observation, k)
+        )
+        errors.append(info["link_error_arcmin"])
+        assert not terminated.any()
+    assert truncated.all()
+    rms = np.sqrt(np.mean(np.square(errors), axis=0))
+    assert (rms > 0.2).all() and (rms < 15.0).all()
+
+
+@pytest.mark.parametrize(
+    ("keys", "match"),
+    [
+        ({"drives": "x"}, "argument 'drives'.*accepted: drive"),
+        ({"level": "rigid"}, "level 'rigid'.*accepted: full, linear"),
+        ({"reference": "step"}, "reference .*step.*accepted: sinusoid"),
+        ({"payload_kg": -1.0}, "payload_kg -1.0 kg; accepted: a number >= 0"),
+        ({"sensors": {"noise": 1.0}}, "sensor 'noise'; accepted: delay_periods"),
+        ({"sensors": {"motor_counts": 0.5}}, "motor_counts 0.5; accepted: an integer"),
+        ({"randomise": {"mass": 0.1}}, "randomise 'mass'; accepted"),
+        (
+            {"randomise": {"stiffness": 1.5}},
+            "tolerance stiffness 1.5; accepted: 0 to 1",
+        ),
+        ({"episode_s": 0.1}, "episode_s 0.1 s"),
+        ({"drive": "CSG-25"}, "nearest: CSG-25-100"),
+    ],
+)
+def test_bad_arguments_give_one_line(keys, match):
+    """What, the value, and what is accepted."""
+    with pytest.raises(InputError, match=match):
+        JointTrackingEnv(**keys)
+    assert Sensors.of(None) == Sensors()
+
+
+def test_missing_gymnasium_names_the_command():
+    """Without the extra the import says how to install it."""
+    code = "import sys; sys.modules['gymnasium'] = None; import swgjoint.envs"
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 1
+    assert "pip install 'swgjoint[envs]'" in done.stderr

@@ -1,0 +1,62 @@
+"""Motions are smooth, begin at rest and stay within their limits; errors are sized."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from swgjoint.envs.references import KINDS, draw_motion
+from swgjoint.envs.specimen import with_assumed_error
+from swgjoint.errors import InputError
+from swgjoint.maps.drive_map import DriveMap
+from swgjoint.units import arcmin
+
+TIME = np.arange(2001) * 1e-3
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("seed", range(5))
+def test_motions_are_their_own_derivatives(kind, seed):
+    """Speed and acceleration are those of the angle; limits hold; rest at the start."""
+    q, v, a = draw_motion(
+        TIME, np.random.default_rng(seed), kinds=(kind,), max_speed=0.6, max_angle=0.4
+    )
+    slope = np.gradient(q, TIME, edge_order=2)
+    np.testing.assert_allclose(slope, v, atol=2e-4 * np.abs(v).max())
+    bend = np.gradient(v, TIME, edge_order=2)
+    np.testing.assert_allclose(bend, a, atol=2e-3 * np.abs(a).max())
+    assert np.abs(v).max() <= 0.6 * (1 + 1e-12) and np.abs(q).max() <= 0.4 * (1 + 1e-12)
+    assert max(np.abs(v).max() / 0.6, np.abs(q).max() / 0.4) >= 0.4
+    np.testing.assert_allclose([q[0], v[0], a[0]], 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_fourth_derivative_is_continuous(kind):
+    """Second differences of the acceleration change little from step to step."""
+    rng = np.random.default_rng(0)
+    time = np.arange(20001) * 1e-4
+    _, _, a = draw_motion(time, rng, kinds=(kind,), max_speed=0.6, max_angle=0.4)
+    snap = np.diff(a, 2) / 1e-8
+    # a jump would stay as large at any step; a slope shrinks with the step
+    assert np.abs(np.diff(snap)).max() < 0.02 * np.abs(snap).max()
+
+
+def test_assumed_error_is_what_the_catalogue_states():
+    """Peak to peak over one output turn, as the spec sheet measures it."""
+    plain = DriveMap.from_catalogue("CSG-25-100")
+    for wanted, drive in (
+        (
+            plain.info["stated"]["transmission_accuracy_arcmin"],
+            with_assumed_error(plain),
+        ),
+        (2.5, with_assumed_error(plain, 2.5 * arcmin)),
+    ):
+        got = drive.spec_sheet(only=["transmission_accuracy_arcmin"])
+        assert got["transmission_accuracy_arcmin"] == pytest.approx(wanted, rel=0.01)
+        np.testing.assert_array_equal(
+            drive.coefficients(1e-3, 1)[0], plain.coefficients(1e-3, 1)[0]
+        )
+    assert with_assumed_error(plain, 0.0) is plain
+    with pytest.raises(InputError, match="which has its own"):
+        with_assumed_error(drive, 1.0 * arcmin)
+    assert with_assumed_error(drive) is drive
