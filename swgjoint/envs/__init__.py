@@ -16,7 +16,10 @@ except ImportError as error:
         "environments need gymnasium: pip install 'swgjoint[envs]'"
     ) from error
 
-ENVIRONMENTS = {"swgjoint/JointTracking-v0": "joint_tracking:JointTracking"}
+ENVIRONMENTS = {
+    "swgjoint/JointTracking-v0": "joint_tracking:JointTracking",
+    "swgjoint/RippleSuppression-v0": "ripple_suppression:RippleSuppression",
+}
 """Module and the first part of the classes' names, by id."""
 
 for _name, _place in ENVIRONMENTS.items():

@@ -11,6 +11,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import floor, log10
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -112,6 +113,7 @@ class Core(ABC):
         """Control periods since the start. Shape (n,)."""
         # position, velocity, acceleration, load, known torque of the links
         self._plan = np.zeros((count, steps + 1, 5, n))
+        self._task: Task | None = None
         self._normal = np.zeros((count, steps + 1, self._readout.channels))
         self.variations: list[tuple[Variation, ...]] = [(Variation(),) * n] * count
         """Deviations of every simulation's drives from the nominal ones."""
@@ -174,6 +176,7 @@ class Core(ABC):
             self._plan[k] = self.draw(k, rng)
             self._normal[k] = rng.standard_normal(self._normal.shape[1:])
             self.plant.place(k, self._plan[k, 0, 0], maps)
+        self._task = None
         index = np.asarray(rows, dtype=np.intp)
         self.instant[index] = 0
         # new arrays: what was returned of the last step must not change
@@ -183,7 +186,8 @@ class Core(ABC):
         )
         self._look()
         self._readout.start(index, self._true()[index], self._normal[index, 0])
-        self._error()
+        self.judge()
+        self.forget(index)
 
     def step(self, action: Array, active: NDArray[np.bool_] | None) -> None:
         """Take one control period.
@@ -200,7 +204,8 @@ class Core(ABC):
         self._look()
         self.output_torque = self.plant.output_torque()
         self._readout.read(self._true(), self._normal[self._rows, self._here])
-        self._error()
+        self.judge()
+        self.remember()
 
     def _look(self) -> None:
         """Take in where the simulations stand."""
@@ -210,9 +215,16 @@ class Core(ABC):
         """Plan at this instant. Shape (n, 5, n_joints)."""
         self.motor_angle, self.link_angle = plant.motor_angle, plant.link_angle
 
-    def _error(self) -> None:
+    def judge(self) -> None:
+        """Set what reward and info need of the state alone."""
         self.link_error = self.link_angle - self.now[:, 0]
         """Link minus reference [rad]. Shape (n, n_joints)."""
+
+    def remember(self) -> None:  # noqa: B027  (most have nothing to remember)
+        """After a step: carry on what reward and info need of the past."""
+
+    def forget(self, rows: Rows) -> None:  # noqa: B027
+        """At the start of episodes: begin anew with that."""
 
     def _true(self) -> Array:
         parts = [self.motor_angle]
@@ -250,10 +262,10 @@ class Core(ABC):
         """Whether episodes have reached their length. Shape (n,)."""
         return self.instant >= self.steps
 
-    def info(self) -> dict[str, Array]:
+    def info(self) -> dict[str, NDArray[Any]]:
         """True values behind the observation, per joint where there are several."""
         error = self.link_angle - self.motor_angle / self.plant.ratio
-        got = {
+        got: dict[str, NDArray[Any]] = {
             "link_error_arcmin": self.link_error / arcmin,
             "transmission_error_arcmin": error / arcmin,
             "output_torque_Nm": self.output_torque,
@@ -271,15 +283,18 @@ class Core(ABC):
     @property
     def task(self) -> Task:
         """The motions of all episodes, episodes in front of the joints."""
-        plan = np.moveaxis(self._plan, 0, 2)  # (steps + 1, 5, n, n_joints)
-        return Task(
-            period=self.period,
-            position=plan[:, 0],
-            velocity=plan[:, 1],
-            acceleration=plan[:, 2],
-            link_torque=plan[:, 4],
-            joints=self.joints,
-        )
+        if self._task is None:
+            # (5, steps + 1, n, n_joints); a copy, which the next episodes leave alone
+            plan = self._plan.transpose(2, 1, 0, 3).copy()
+            self._task = Task(
+                period=self.period,
+                position=plan[0],
+                velocity=plan[1],
+                acceleration=plan[2],
+                link_torque=plan[4],
+                joints=self.joints,
+            )
+        return self._task
 
     def measured(self, observation: Array) -> Measured:
         """What a controller reads from observations of any leading axes."""

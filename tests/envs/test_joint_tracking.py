@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 import subprocess
 import sys
 from dataclasses import replace
@@ -10,10 +9,8 @@ from dataclasses import replace
 import gymnasium
 import numpy as np
 import pytest
-from gymnasium.utils.env_checker import check_env
-from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
-from swgjoint.envs.core import LIMITS, table
+from swgjoint.envs.core import LIMITS
 from swgjoint.envs.joint_tracking import JointTrackingEnv, JointTrackingVectorEnv
 from swgjoint.envs.sensors import Sensors
 from swgjoint.errors import InputError
@@ -56,68 +53,6 @@ def episode(env, seed, steps=None):
         if terminated or truncated:
             break
     return rows, terminated, truncated
-
-
-@pytest.mark.parametrize("randomise", [False, True])
-def test_check_env(randomise):
-    """Gymnasium's own checks raise no warning."""
-    env = gymnasium.make(NAME, drive="CSG-25-100", randomise=randomise)
-    check_env(env.unwrapped)
-
-
-def test_tables_are_those_of_the_code():
-    """The docstring's tables are made by the code."""
-    env = JointTrackingEnv(sensors=ALL)
-    text = inspect.cleandoc(JointTrackingEnv.__doc__)
-    blocks = inspect.cleandoc(text).split("\n\n")
-    assert table(env.core.action_entries) in blocks
-    assert table(env.core.observation_entries) in blocks
-    assert env.observation_space.shape == (11,)
-    assert JointTrackingEnv().observation_space.shape == (9,)
-
-
-def test_one_seed_gives_one_run():
-    """Two episodes of one seed are equal, of two seeds not."""
-    env = gymnasium.make(NAME, randomise=True, sensors=ALL, episode_s=0.5)
-    first, again, other = (episode(env, seed)[0] for seed in (3, 3, 4))
-    for a, b in zip(first, again, strict=True):
-        np.testing.assert_array_equal(a[0], b[0])
-        assert a[1:] == b[1:]
-    assert np.abs(first[9][0] - other[9][0]).max() > 0.0
-
-
-@pytest.mark.parametrize("level", ["full", "linear"])
-def test_batch_equals_single_environments(level):
-    """1,000 steps with restarts, specimens, sensors and delay agree to the last bit."""
-    keys = {
-        "level": level,
-        "randomise": True,
-        "episode_s": 0.5,
-        "load_of_rated": 0.05,
-        "sensors": {**ALL, "delay_periods": 2},
-    }
-    count = 7
-    sync = SyncVectorEnv([lambda: JointTrackingEnv(**keys)] * count)
-    batch = gymnasium.make_vec(NAME, num_envs=count, threads=2, **keys)
-    assert isinstance(batch, JointTrackingVectorEnv)
-    assert batch.metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
-    rng, ended, broken = np.random.default_rng(0), 0, 0
-    got, want = batch.reset(seed=11), sync.reset(seed=11)
-    for _ in range(1000):
-        np.testing.assert_array_equal(got[0], want[0])
-        assert got[-1].keys() == want[-1].keys()
-        for key in got[-1]:
-            np.testing.assert_array_equal(got[-1][key], want[-1][key], err_msg=key)
-        for a, b in zip(got[1:-1], want[1:-1], strict=True):
-            np.testing.assert_array_equal(a, b)
-        # some wander until a limit breaks, some stay until the end
-        actions = (
-            rng.uniform(-0.9, 0.9, (count, 1)) * np.linspace(0.02, 1, count)[:, None]
-        )
-        got, want = batch.step(actions), sync.step(actions)
-        ended += int(got[3].sum())
-        broken += int(got[2].sum())
-    assert ended >= 4 and broken >= 1
 
 
 def test_the_joint_follows_and_its_error_is_explained():

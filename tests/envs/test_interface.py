@@ -1,0 +1,116 @@
+"""What gymnasium asks of every environment, and that batches equal single ones."""
+
+from __future__ import annotations
+
+import inspect
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+from gymnasium.vector import AutoresetMode, SyncVectorEnv
+
+from swgjoint.envs import ENVIRONMENTS
+from swgjoint.envs.core import table
+
+ALL = {"link_encoder": True, "torque_sensor": True}
+SHORT = {
+    "swgjoint/JointTracking-v0": {"episode_s": 0.5, "load_of_rated": 0.05},
+    "swgjoint/RippleSuppression-v0": {"episode_s": 1.6},
+}
+"""Arguments with which episodes end within the tests."""
+NAMES = pytest.mark.parametrize("name", ENVIRONMENTS)
+
+
+def make(name, **keys):
+    return gymnasium.make(f"swgjoint.envs:{name}", **keys)
+
+
+def same(got, want):
+    """Two results of ``step`` or ``reset`` of vector environments, bit by bit."""
+    assert got[-1].keys() == want[-1].keys()
+    for key in got[-1]:
+        np.testing.assert_array_equal(got[-1][key], want[-1][key], err_msg=key)
+    for a, b in zip(got[:-1], want[:-1], strict=True):
+        np.testing.assert_array_equal(a, b)
+
+
+@NAMES
+@pytest.mark.parametrize("randomise", [False, True])
+def test_check_env(name, randomise):
+    """Gymnasium's own checks raise no warning."""
+    check_env(make(name, randomise=randomise).unwrapped)
+
+
+@NAMES
+def test_tables_are_those_of_the_code(name):
+    """The docstring's tables are made by the code."""
+    env = make(name, sensors=ALL).unwrapped
+    blocks = inspect.cleandoc(type(env).__doc__).split("\n\n")
+    assert table(env.core.action_entries) in blocks
+    assert table(env.core.observation_entries) in blocks
+    joints = len(env.task.joints.names)
+    plain = make(name).unwrapped.observation_space.shape[0]
+    assert env.observation_space.shape == (plain + 2 * joints,)
+
+
+@NAMES
+def test_one_seed_gives_one_run(name):
+    """Two episodes of one seed are equal, of two seeds not."""
+    env = make(name, randomise=True, sensors=ALL)
+    runs = []
+    for seed in (3, 3, 4):
+        run = [env.reset(seed=seed)]
+        rng = np.random.default_rng(0)
+        size = env.action_space.shape
+        run += [env.step(rng.uniform(-0.05, 0.05, size)) for _ in range(200)]
+        runs.append(run)
+    for a, b in zip(*runs[:2], strict=True):
+        np.testing.assert_array_equal(a[0], b[0])
+        assert a[1:-1] == b[1:-1]
+        for key in a[-1]:
+            np.testing.assert_array_equal(a[-1][key], b[-1][key])
+    assert np.abs(runs[0][9][0] - runs[2][9][0]).max() > 0.0
+
+
+@pytest.mark.parametrize(
+    ("name", "level"),
+    [*((name, "full") for name in ENVIRONMENTS), (next(iter(ENVIRONMENTS)), "linear")],
+)
+def test_batch_equals_single_environments(name, level):
+    """1,000 steps with restarts, specimens, sensors and delay agree to the last bit."""
+    keys = {
+        **SHORT[name],
+        "level": level,
+        "randomise": True,
+        "sensors": {**ALL, "delay_periods": 2},
+    }
+    count = 7
+    sync = SyncVectorEnv([lambda: make(name, **keys).unwrapped] * count)
+    batch = gymnasium.make_vec(name, num_envs=count, threads=2, **keys)
+    assert batch.metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
+    rng, ended, broken = np.random.default_rng(0), 0, 0
+    got, want = batch.reset(seed=11), sync.reset(seed=11)
+    same(got, want)
+    # some wander until a limit breaks, some stay until the end
+    size = np.linspace(0.02, 1.0, count)[:, None]
+    for _ in range(1000):
+        actions = size * rng.uniform(-0.9, 0.9, batch.action_space.shape)
+        got, want = batch.step(actions), sync.step(actions)
+        same(got, want)
+        ended += int(got[3].sum())
+        broken += int(got[2].sum())
+    if name.endswith("JointTracking-v0"):
+        assert ended >= 4 and broken >= 1
+
+
+@NAMES
+def test_seeds_of_a_batch(name):
+    """A list seeds every episode; without one the generators go on."""
+    batch = gymnasium.make_vec(f"swgjoint.envs:{name}", num_envs=3, randomise=True)
+    first, _ = batch.reset(seed=5)
+    again, _ = batch.reset(seed=[5, 6, 7])
+    np.testing.assert_array_equal(first, again)
+    motion = batch.task.position
+    batch.reset()
+    assert np.abs(batch.task.position - motion).max() > 0.0

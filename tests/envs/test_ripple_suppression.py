@@ -1,0 +1,99 @@
+"""RippleSuppression-v0: where the ripple comes from and what the reward counts."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from swgjoint.envs.ripple_suppression import RippleSuppressionEnv
+from swgjoint.errors import InputError
+
+QUIET = {
+    "motor_counts": 0,
+    "motor_noise_rad": 0.0,
+    "delay_periods": 0,
+}
+
+
+def turn(env, seed=1, action=0.0):
+    """Infos and rewards of an episode with a constant action."""
+    env.reset(seed=seed)
+    rows = []
+    for _ in range(env.core.steps):
+        _, reward, terminated, truncated, info = env.step(np.array([action]))
+        rows.append((reward, info))
+        if terminated or truncated:
+            break
+    assert truncated and not terminated
+    return rows
+
+
+def steady(rows, key):
+    """One figure of the part that counts."""
+    return np.array([info[key] for _, info in rows if info["steady"]])
+
+
+def test_a_perfect_drive_has_no_ripple():
+    """Without kinematic error torque and speed are even, and the reward is full."""
+    env = RippleSuppressionEnv(
+        kinematic_error_arcmin=0.0, sensors=QUIET, friction=False
+    )
+    rows = turn(env)
+    assert np.abs(steady(rows, "torque_ripple_Nm")).max() < 0.05
+    assert np.abs(steady(rows, "transmission_error_ripple_arcmin")).max() < 0.01
+    rewards = [reward for reward, info in rows if info["steady"]]
+    assert min(rewards) > 0.98
+    assert {reward for reward, info in rows if not info["steady"]} == {0.0}
+
+
+def test_ripple_has_the_orders_of_the_error():
+    """Twice and four times per turn of the wave generator, in proportion."""
+    sizes = []
+    for error in (0.5, 1.0):
+        env = RippleSuppressionEnv(
+            kinematic_error_arcmin=error, sensors=QUIET, friction=False, slowest=1.0
+        )
+        rows = turn(env)
+        ripple = steady(rows, "transmission_error_ripple_arcmin")
+        theta = steady(rows, "motor_angle_rad")
+        even = np.linspace(*np.sort(theta[[0, -1]]), theta.size)
+        order = np.argsort(theta)
+        signal = np.interp(even, theta[order], ripple[order])
+        signal = signal * np.hanning(signal.size)
+        power = np.abs(np.fft.rfft(signal)) ** 2
+        orders = np.arange(power.size) * 2.0 * np.pi / np.ptp(even)
+        near = (np.abs(orders - 2.0) < 0.2) | (np.abs(orders - 4.0) < 0.2)
+        assert power[near].sum() > 0.98 * power.sum()
+        sizes.append(ripple.std())
+    assert sizes[1] / sizes[0] == pytest.approx(2.0, rel=0.05)
+
+
+def test_reward_and_observation_are_what_the_docstring_says():
+    """Reward from ripple, error and action; sine and cosine of the angle read."""
+    env = RippleSuppressionEnv(authority_of_rated=0.01)
+    rated = env.task.joints.drives[0].ratings.rated_torque
+    for reward, info in turn(env, action=0.5):
+        a = info["torque_ripple_Nm"] / (0.01 * rated)
+        b = info["transmission_error_ripple_arcmin"] / 0.1
+        want = 1.0 / (1.0 + a**2 + b**2) - 0.1 * 0.25
+        assert reward == pytest.approx(want * info["steady"])
+    observation, _ = env.reset(seed=3)
+    for _ in range(300):
+        observation, *_ = env.step(np.zeros(1))
+    angle = env.measured(observation).motor_angle[0]
+    np.testing.assert_allclose(observation[4:6], [np.sin(angle), np.cos(angle)])
+    assert abs(angle) > 1.0
+
+
+@pytest.mark.parametrize(
+    ("keys", "match"),
+    [
+        ({"episode_s": 1.5}, "episode_s 1.5 s; accepted: above 1.5 s"),
+        ({"max_angle_rad": 1.0}, "max_angle_rad 1.0 rad; needed: at least 2.4 rad"),
+        ({"slowest": 2.0}, "slowest 2.0; accepted: > 0 to 1"),
+    ],
+)
+def test_bad_arguments_give_one_line(keys, match):
+    """What, the value, and what is accepted."""
+    with pytest.raises(InputError, match=match):
+        RippleSuppressionEnv(**keys)
