@@ -156,26 +156,35 @@ class DriveFields:
             between(self.wave_generator_force),
         )
 
+    def repeats(self, teeth: int) -> int:
+        """Equal parts of a turn in which a flexspline of so many teeth looks alike."""
+        parts = round(2.0 * pi / self.period)
+        whole = abs(parts * self.period - 2.0 * pi) < 1e-9
+        return parts if whole and teeth % parts == 0 else 1
+
     def flexspline(
         self,
         teeth: int,
         rotation: float | Array,
         wave_generator_angle: float | Array,
         torque: float | Array,
+        *,
+        parts: int = 1,
     ) -> FlexsplineShape:
-        """The whole flexspline at one position or several, of any shape (...).
+        """The flexspline at one position or several, of any shape (...).
 
         Args:
             teeth: Of the flexspline.
             rotation: Of the flexspline (...) [rad].
             wave_generator_angle: (...) [rad].
             torque: T (...) [N·m].
+            parts: Only the first of so many equal parts, see :meth:`repeats`.
         """
         turn, passed, load = (
             np.asarray(value, dtype=float)[..., None]
             for value in (rotation, wave_generator_angle, torque)
         )
-        angle = 2.0 * pi / teeth * np.arange(teeth, dtype=float) + turn
+        angle = 2.0 * pi / teeth * np.arange(teeth // parts, dtype=float) + turn
         u, stress, tooth, bore = self.at(
             angle - passed, np.broadcast_to(load, angle.shape)
         )

@@ -39,8 +39,8 @@ def blueprint_of(runs: Mapping[str, Run], joints: list[str] | None = None) -> An
     flexible = [label for label, run in runs.items() if not is_rigid(run)] or list(runs)
 
     def plot(joint: str, title: str, signal: str, labels: Iterable[str]) -> Any:
-        paths = [f"{prefixes[label]}joint/{joint}/{signal}" for label in labels]
-        return _plot(title, paths)
+        paths = [f"{prefixes[label]}joint/{joint}" for label in labels]
+        return _plot(title, paths, signal)
 
     bounds = rrb.VisualBounds2D(
         x_range=[-1.2 * WIDTH, 1.35 * WIDTH], y_range=[-1.2, 1.2]
@@ -143,13 +143,33 @@ def joints_by_interest(runs: Mapping[str, Run]) -> list[str]:
     return [first.joints[j] for j in sorted(range(len(first.joints)), key=key)]
 
 
-def _plot(title: str, contents: list[str]) -> Any:
-    import rerun.blueprint as rrb
+def _plot(title: str, paths: list[str], signal: str | None = None) -> Any:
+    """Lines over time.
 
+    Args:
+        title: Of the view.
+        paths: One for each line.
+        signal: Component that is drawn; None for ``Scalars``.
+    """
+    import rerun as rr
+    import rerun.blueprint as rrb
+    from rerun.blueprint.encodings import (
+        ComponentSourceKind,
+        VisualizerComponentMapping,
+    )
+
+    drawn = {}
+    if signal is not None:
+        source = VisualizerComponentMapping(
+            "Scalars:scalars",
+            ComponentSourceKind.SourceComponent,
+            source_component=signal,
+        )
+        drawn = {p: rr.SeriesLines().visualizer(mappings=[source]) for p in paths}
     return rrb.TimeSeriesView(
         name=title,
-        contents=[f"+ {path}" for path in contents],
-        plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.RightTop),
+        contents=[f"+ {path}" for path in paths],
+        overrides=drawn,
         axis_x=rrb.TimeAxis(link=rrb.components.LinkAxis.LinkToGlobal),
     )
 

@@ -12,6 +12,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from swgjoint.view.columns import Column
 from swgjoint.view.geometry import quaternion_xyzw
 
 if TYPE_CHECKING:
@@ -71,8 +72,9 @@ def send_loads(
     for j, path in enumerate(_paths(prefix, run)):
         peak = run.assembly.transmissions[j].drive.ratings.repeated_peak
         share = np.abs(run.output_torque[rows, j]) / peak
-        columns = rr.Cylinders3D.columns(colors=load_color(share))
-        stream.send_columns(path, indexes=[time], columns=columns)
+        colors = load_color(share)
+        column = Column(rr.Cylinders3D.descriptor_colors(), colors, np.uint32)
+        stream.send_columns(path, indexes=[time], columns=[column])
 
 
 def _paths(prefix: str, run: Run) -> list[str]:

@@ -23,9 +23,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from swgjoint.maps.fields import DriveFields, FlexsplineShape
+from swgjoint.maps.fields import DriveFields, FlexsplineShape, Table
 from swgjoint.units import MPa
-from swgjoint.view.geometry import quaternion_xyzw
+from swgjoint.view.columns import Column
 
 if TYPE_CHECKING:
     from swgjoint.sim.run import Run
@@ -35,7 +35,7 @@ Array = NDArray[np.float64]
 FRAMES = 100
 """Most of one drive in a recording."""
 BYTES = 6_000_000
-"""Of one drive in a recording, about."""
+"""Of one drive in a recording, about; half of them where its lobes are alike."""
 ARROW = 0.2
 """Length of the largest force in radii of the flexspline."""
 LIFT = 0.004
@@ -106,12 +106,15 @@ def log_drive(stream: Any, path: str, run: Run, joint: str) -> None:
     drive = run.assembly.transmissions[run.joints.index(joint)].drive
     fields = drive.fields
     assert fields is not None
-    teeth, n = drive.teeth_flexspline, len(fields.points)
+    parts, n = fields.repeats(drive.teeth_flexspline), len(fields.points)
+    turns = 2.0 * np.pi / parts * np.arange(parts, dtype=float)
+    teeth = drive.teeth_flexspline // parts
     triangles = (fields.triangles + n * np.arange(teeth)[:, None, None]).reshape(-1, 3)
     z = in_front(fields)
     stream.log(
         f"{path}/flexspline",
         rr.Mesh3D.from_fields(triangle_indices=triangles.astype(np.uint32)),
+        rr.InstancePoses3D(quaternions=about_z(turns)),
         static=True,
     )
     top = float(fields.von_mises.max()) / MPa
@@ -129,6 +132,12 @@ def log_drive(stream: Any, path: str, run: Run, joint: str) -> None:
     count = drive.teeth_circular_spline
     around = 2.0 * np.pi * (np.arange(count) + 0.5) / count
     ring = np.concatenate([turned(fields.circular_spline, a) for a in around])
+    white = 0xFFFFFFFF
+    tooth = rr.Points3D.from_fields(radii=[0.015 * radius(fields)], colors=[white])
+    stream.log(f"{path}/tooth", tooth, static=True)
+    for name, arrow in (("tooth_forces", 0xFFC832FF), ("bore_forces", 0x50DCA0FF)):
+        style = rr.Arrows3D.from_fields(colors=[arrow])
+        stream.log(f"{path}/{name}", style, static=True)
     for name, outline, color in (
         ("circular_spline", ring, (110, 150, 230)),
         ("wave_generator", fields.wave_generator, (230, 230, 230)),
@@ -169,41 +178,38 @@ def send_drive(
     theta, psi = run.motor_position[rows, j], run.position[rows, j]
     flexspline, circular, wave = angles(drive.layout, theta, psi)
     torque = run.output_torque[rows, j]
-    shape = fields.flexspline(drive.teeth_flexspline, flexspline, wave, torque)
-    count = len(rows)
-    points = shape.points.reshape(count, -1, 3)
-    colors = stress_color(shape.von_mises / float(fields.von_mises.max()))
-    each = np.full(count, points.shape[1])
+    parts = fields.repeats(drive.teeth_flexspline)
+    shape = fields.flexspline(
+        drive.teeth_flexspline, flexspline, wave, torque, parts=parts
+    )
+    colors = stress_color(shape.von_mises / np.float32(fields.von_mises.max()))
+    each = colors[0].size
+    positions = rr.Mesh3D.descriptor_vertex_positions()
     stream.send_columns(
         f"{path}/flexspline",
         indexes=[time],
         columns=[
-            *rr.Mesh3D.columns(
-                vertex_positions=points.reshape(-1, 3).astype(np.float32),
-                vertex_colors=colors.ravel(),
-            ).partition(each)
+            Column(positions, shape.points.reshape(-1, 3), np.float32, each=each),
+            Column(
+                rr.Mesh3D.descriptor_vertex_colors(),
+                colors.ravel(),
+                np.uint32,
+                each=each,
+            ),
         ],
     )
     # the tip of the tooth that stood on +y
     tip = int(np.hypot(*fields.points[:, :2].T).argmax())
-    stream.send_columns(
-        f"{path}/tooth",
-        indexes=[time],
-        columns=rr.Points3D.columns(
-            positions=points[:, tip],
-            radii=[0.015 * radius(fields)] * count,
-            colors=[0xFFFFFFFF] * count,
-        ),
+    place = Column(
+        rr.Points3D.descriptor_positions(), shape.points[:, 0, tip], np.float32
     )
+    stream.send_columns(f"{path}/tooth", indexes=[time], columns=[place])
     for name, turn in (("circular_spline", circular), ("wave_generator", wave)):
-        half = 0.5 * turn
-        wxyz = np.stack([np.cos(half), 0 * half, 0 * half, np.sin(half)], axis=-1)
-        stream.send_columns(
-            f"{path}/{name}",
-            indexes=[time],
-            columns=rr.Transform3D.columns(quaternion=quaternion_xyzw(wxyz)),
+        column = Column(
+            rr.Transform3D.descriptor_quaternion(), about_z(turn), np.float32
         )
-    _send_forces(stream, path, fields, shape, time)
+        stream.send_columns(f"{path}/{name}", indexes=[time], columns=[column])
+    _send_forces(stream, path, fields, shape, time, parts)
 
 
 def _send_forces(
@@ -212,6 +218,7 @@ def _send_forces(
     fields: DriveFields,
     shape: FlexsplineShape,
     time: Any,
+    parts: int,
 ) -> None:
     """Arrows at the tips of the teeth and at the bore, one scale for both."""
     import rerun as rr
@@ -225,25 +232,25 @@ def _send_forces(
     edge = fields.points[:, 2] == fields.points[:, 2].min()
     outer = np.where(edge, distance, -np.inf).argmax()
     inner = np.where(edge, distance, np.inf).argmin()
-    for name, node, color, forces in (
-        ("tooth_forces", outer, 0xFFC832FF, shape.tooth_force),
-        ("bore_forces", inner, 0x50DCA0FF, shape.wave_generator_force),
+    for name, node, forces in (
+        ("tooth_forces", outer, shape.tooth_force),
+        ("bore_forces", inner, shape.wave_generator_force),
     ):
-        vectors = scale * forces
+        vectors = all_around(np.float32(scale) * forces, parts)
         vectors[..., 2] = 0.0
         # arrows end where they push
-        tips = shape.points[:, :, node].copy()
-        tips[..., 2] = z
-        count, teeth, _ = vectors.shape
+        origins = all_around(shape.points[:, :, node], parts) - vectors
+        origins[..., 2] = z
+        teeth = vectors.shape[1]
         stream.send_columns(
             f"{path}/{name}",
             indexes=[time],
             columns=[
-                *rr.Arrows3D.columns(
-                    origins=(tips - vectors).reshape(-1, 3),
-                    vectors=vectors.reshape(-1, 3),
-                ).partition(np.full(count, teeth)),
-                *rr.Arrows3D.columns(colors=[color] * count),
+                Column(descriptor, values.reshape(-1, 3), np.float32, each=teeth)
+                for descriptor, values in (
+                    (rr.Arrows3D.descriptor_origins(), origins),
+                    (rr.Arrows3D.descriptor_vectors(), vectors),
+                )
             ],
         )
 
@@ -284,11 +291,26 @@ def turned(points: Array, angle: float) -> Array:
     return np.asarray(points @ np.array([[c, s], [-s, c]]))
 
 
+def all_around(vectors: Table, parts: int) -> Table:
+    """Those of the other parts, too, that look like the first (n, n_teeth, 3)."""
+    turns = 2.0 * np.pi / parts * np.arange(parts, dtype=float)
+    around = [vectors.copy() for _ in turns]
+    for part, angle in zip(around, turns, strict=True):
+        part[..., :2] = turned(part[..., :2].astype(float), angle)
+    return np.concatenate(around, axis=1)
+
+
+def about_z(angle: Array) -> Array:
+    """Quaternions x, y, z, w of turns about the axis (n, 4)."""
+    half, still = 0.5 * angle, np.zeros_like(angle)
+    return np.stack([still, still, np.sin(half), np.cos(half)], axis=-1)
+
+
 def stress_color(share: NDArray[np.floating[Any]]) -> NDArray[np.uint32]:
     """Colours of the stress over its largest, 0xRRGGBBAA, shape of the share."""
     from matplotlib import colormaps
 
-    rgba = colormaps["turbo"](np.clip(share, 0.0, 1.0), bytes=True).astype(np.uint32)
-    return np.asarray(
-        (rgba[..., 0] << 24) | (rgba[..., 1] << 16) | (rgba[..., 2] << 8) | 255
-    )
+    steps = np.arange(256) / 255.0
+    rgba = colormaps["turbo"](steps, bytes=True).astype(np.uint32)
+    table = (rgba[:, 0] << 24) | (rgba[:, 1] << 16) | (rgba[:, 2] << 8) | 255
+    return np.asarray(table[np.clip(256.0 * share, 0.0, 255.0).astype(np.uint8)])

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from swgjoint.sim.metrics import highest_resolved_order, torque_ripple
 from swgjoint.units import arcmin
+from swgjoint.view.columns import Column
 
 if TYPE_CHECKING:
     from swgjoint.sim.run import Run
@@ -64,10 +65,22 @@ def phase_scales(runs: Mapping[str, Run], j: int) -> tuple[float, float] | None:
     return (torsion / arcmin, torque) if torsion > 0.0 and torque > 0.0 else None
 
 
-def phase_points(run: Run, j: int, scales: tuple[float, float]) -> Array:
-    """Torsion to the right, torque upwards, in the units of the picture. (n, 2)."""
-    x = WIDTH * run.torsion[:, j] / (scales[0] * arcmin)
-    return np.column_stack([x, -run.output_torque[:, j] / scales[1]])
+def phase_points(
+    run: Run,
+    j: int,
+    scales: tuple[float, float],
+    rows: slice | NDArray[np.intp] = slice(None),
+) -> Array:
+    """Torsion to the right, torque upwards, in the units of the picture. (n, 2).
+
+    Args:
+        run: The run.
+        j: Number of the joint.
+        scales: Of :func:`phase_scales`.
+        rows: Samples, all by default.
+    """
+    x = WIDTH * run.torsion[rows, j] / (scales[0] * arcmin)
+    return np.column_stack([x, -run.output_torque[rows, j] / scales[1]])
 
 
 def log_phase_frame(stream: Any, joint: str, scales: tuple[float, float]) -> None:
@@ -79,10 +92,6 @@ def log_phase_frame(stream: Any, joint: str, scales: tuple[float, float]) -> Non
     stream.log(
         f"phase/{joint}/axes",
         rr.LineStrips2D(axes, colors=[_FRAME], radii=[0.004]),
-        static=True,
-    )
-    stream.log(
-        f"phase/{joint}/ends",
         rr.Points2D(
             [[WIDTH, 0.0], [0.0, -1.0]],
             labels=[f"{torsion:.3g} arcmin", f"{torque:.3g} N·m"],
@@ -100,13 +109,19 @@ def phase_path(joint: str, label: str) -> str:
 
 
 def log_phase_path(
-    stream: Any, path: str, points: Array, color: tuple[int, int, int]
+    stream: Any,
+    path: str,
+    run: Run,
+    j: int,
+    scales: tuple[float, float],
+    color: tuple[int, int, int],
 ) -> None:
     """Torque against torsion of one run, and the look of the point that moves."""
     import rerun as rr
 
-    stride = -(-len(points) // _POINTS)
-    line = rr.LineStrips2D([points[::stride]], colors=[color], radii=[0.004])
+    thinned = slice(None, None, -(-run.time.size // _POINTS))
+    points = phase_points(run, j, scales, thinned)
+    line = rr.LineStrips2D([points], colors=[color], radii=[0.004])
     stream.log(f"{path}/path", line, static=True)
     point = rr.Points2D.from_fields(radii=[0.03], colors=[color])
     stream.log(f"{path}/now", point, static=True)
@@ -116,5 +131,5 @@ def send_phase(stream: Any, path: str, points: Array, time: Any) -> None:
     """Where the run is at some samples. Points of shape (n, 2)."""
     import rerun as rr
 
-    columns = rr.Points2D.columns(positions=points)
-    stream.send_columns(f"{path}/now", indexes=[time], columns=columns)
+    column = Column(rr.Points2D.descriptor_positions(), points, np.float32)
+    stream.send_columns(f"{path}/now", indexes=[time], columns=[column])

@@ -7,13 +7,14 @@ Entity paths, below ``<run>/`` where a recording holds several runs:
 ``arm/<body>/<geom>``                  shape, once
 ``arm/<body>/drive/<joint>``           disc, coloured by the use of the rating
 ``tool/path``                          commanded path of the tool, once
-``joint/<joint>/output_torque_Nm``     torque of the drive on the link
-``joint/<joint>/torque_deviation_Nm``  the same less that of the rigid arm
-``joint/<joint>/motor_torque_Nm``
-``joint/<joint>/torsion_arcmin``
-``joint/<joint>/transmission_error_arcmin``
-``joint/<joint>/position_deg``         link
-``joint/<joint>/reference_deg``        commanded
+``joint/<joint>``                      signals of the joint, a component each:
+  ``output_torque_Nm``                 torque of the drive on the link
+  ``torque_deviation_Nm``              the same less that of the rigid arm
+  ``motor_torque_Nm``
+  ``torsion_arcmin``
+  ``transmission_error_arcmin``
+  ``position_deg``                     link
+  ``reference_deg``                    commanded
 ``joint/<joint>/ripple_orders``        bars over the order per input turn, once
 ``tool/error_mm``                      distance from the commanded path, or from the
                                        rigid arm where the recording holds its run
@@ -39,6 +40,7 @@ from numpy.typing import NDArray
 from swgjoint.sim.metrics import torque_deviation
 from swgjoint.units import arcmin, deg, mm
 from swgjoint.view.blueprint import SPACING, blueprint_of, joints_by_interest
+from swgjoint.view.columns import Column
 from swgjoint.view.drive_markers import log_drives, send_loads
 from swgjoint.view.drive_view import (
     drive_path,
@@ -136,6 +138,13 @@ def signals_of(run: Run, j: int) -> dict[str, Array]:
     }
 
 
+def signal(name: str) -> Any:
+    """Component of a joint that holds one of the :data:`SIGNALS`."""
+    import rerun as rr
+
+    return rr.ComponentDescriptor(name, component_type="rerun.components.Scalar")
+
+
 def log_still(
     stream: Any, runs: Mapping[str, Run], *, drives: Mapping[str, str]
 ) -> None:
@@ -155,7 +164,6 @@ def log_still(
             log_phase_frame(stream, joint, of_joint)
     for k, (label, run) in enumerate(runs.items()):
         prefix, color = prefix_of(label), color_of_run(k)
-        styles = {name: _style(label or name, color) for name in (*SIGNALS, "error_mm")}
         if len(runs) > 1:
             # side by side: their differences are far below what an overlay could show
             place = [0.0, SPACING * (0.5 * (len(runs) - 1) - k), 0.0]
@@ -173,9 +181,8 @@ def log_still(
             )
         _log_shapes(stream, prefix, run, color)
         for j, joint in enumerate(run.joints):
-            for name in SIGNALS:
-                path = f"{prefix}joint/{joint}/{name}"
-                stream.log(path, styles[name], static=True)
+            style = _style(label or joint, color)
+            stream.log(f"{prefix}joint/{joint}", style, static=True)
             bars = ripple_bars(run, j)
             if bars is not None:
                 stream.log(
@@ -185,9 +192,10 @@ def log_still(
                 )
             if (of_joint := scales[joint]) is not None:
                 path = phase_path(joint, label)
-                log_phase_path(stream, path, phase_points(run, j, of_joint), color)
+                log_phase_path(stream, path, run, j, of_joint, color)
         if run.tool_position.shape[1]:
-            stream.log(f"{prefix}tool/error_mm", styles["error_mm"], static=True)
+            style = _style(label or "tool", color)
+            stream.log(f"{prefix}tool/error_mm", style, static=True)
     for label, joint in drives.items():
         log_drive(stream, drive_path(joint, label), runs[label], joint)
 
@@ -223,17 +231,23 @@ def log_moving(
             _send_poses(stream, prefix, run, at_rows, rows)
             send_loads(stream, prefix, run, at_rows, rows)
         for j, joint in enumerate(run.joints):
-            for name, values in signals_of(run, j).items():
-                _send_scalars(
-                    stream, f"{prefix}joint/{joint}/{name}", time, values[part]
-                )
+            columns = [
+                Column(signal(name), values[part], np.float64)
+                for name, values in signals_of(run, j).items()
+            ]
+            stream.send_columns(
+                f"{prefix}joint/{joint}", indexes=[time], columns=columns
+            )
             scales = phase_scales(runs, j)
             if scales is not None and rows.size:
-                points = phase_points(run, j, scales)[rows]
+                points = phase_points(run, j, scales, rows)
                 send_phase(stream, phase_path(joint, label), points, at_rows)
         if run.tool_position.shape[1]:
             error = run.tool_error(rigid)[part] / mm
-            _send_scalars(stream, f"{prefix}tool/error_mm", time, error)
+            column = Column(rr.Scalars.descriptor_scalars(), error, np.float64)
+            stream.send_columns(
+                f"{prefix}tool/error_mm", indexes=[time], columns=[column]
+            )
     for label, joint in drives.items():
         run = runs[label]
         drawn = np.intersect1d(frames_of(run, joint, pose_rows(run)), rows)
@@ -263,13 +277,6 @@ def _style(name: str, color: tuple[int, int, int]) -> Any:
         # zoomed out, a mean of neighbours would hide the ripple
         aggregation_policy=rr.components.AggregationPolicy.MinMax,
     )
-
-
-def _send_scalars(stream: Any, path: str, time: Any, values: Array) -> None:
-    import rerun as rr
-
-    columns = rr.Scalars.columns(scalars=values)
-    stream.send_columns(path, indexes=[time], columns=columns)
 
 
 def _log_shapes(
@@ -315,7 +322,10 @@ def _send_poses(
             pose = rr.Transform3D(translation=place[0], quaternion=turn[0])
             stream.log(path, pose, static=True)
             continue
-        columns = rr.Transform3D.columns(translation=place, quaternion=turn)
+        columns = [
+            Column(rr.Transform3D.descriptor_translation(), place, np.float32),
+            Column(rr.Transform3D.descriptor_quaternion(), turn, np.float32),
+        ]
         stream.send_columns(path, indexes=[time], columns=columns)
 
 

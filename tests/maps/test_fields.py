@@ -109,6 +109,19 @@ def test_unsound_fields_are_refused(shown, key, change, says):
         replace(shown, **{key: change(getattr(shown, key))})
 
 
+def test_half_of_an_even_flexspline_is_enough(shown):
+    """Turned by half a turn it is the other half; not with odd teeth or one lobe."""
+    assert shown.repeats(TEETH) == 2
+    assert shown.repeats(TEETH + 1) == 1
+    assert replace(shown, period=2.0 * np.pi).repeats(TEETH) == 1
+    whole = shown.flexspline(TEETH, 0.2, 0.5, 5.0)
+    half = shown.flexspline(TEETH, 0.2, 0.5, 5.0, parts=2)
+    turned = np.concatenate([half.points, half.points * np.float32([-1, -1, 1])])
+    np.testing.assert_allclose(whole.points, turned, atol=1e-7)  # float32
+    stress = np.concatenate([half.von_mises, half.von_mises])
+    np.testing.assert_allclose(whole.von_mises, stress, rtol=1e-4)
+
+
 def test_a_file_keeps_them(synthetic_map, shown, tmp_path):
     """Bit for bit; a map without has none."""
     drive = replace(synthetic_map, fields=shown)

@@ -70,10 +70,16 @@ def test_the_flexspline_follows_the_recorded_angles(run, tmp_path):
     path = run.to_rerun(tmp_path / "run.rrd")
     rows = frames_of(run, "joint", pose_rows(run))
     at = "/drive/joint/flexspline"
-    frames = np.array(values(path, at, "Mesh3D:vertex_positions"))
-    assert frames.shape == (rows.size, 360, 3)
+    half = np.array(values(path, at, "Mesh3D:vertex_positions"))
+    assert half.shape == (rows.size, 180, 3)
+    # both lobes are alike: the same mesh once more, turned
+    (poses,) = values(path, at, "InstancePoses3D:quaternions")
+    frames = np.concatenate([half, half * [-1.0, -1.0, 1.0]], axis=1)
+    assert np.array(poses) == pytest.approx(
+        np.array([[0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 1.0, 0.0]]), abs=1e-7
+    )
     (triangles,) = values(path, at, "Mesh3D:triangle_indices")
-    assert np.array(triangles).shape == (120, 3)
+    assert np.array(triangles).shape == (60, 3)
     theta, psi = run.motor_position[rows, 0], run.position[rows, 0]
     bottom = frames[:, 2::3]
     radius = np.hypot(bottom[..., 0], bottom[..., 1])
@@ -86,7 +92,7 @@ def test_the_flexspline_follows_the_recorded_angles(run, tmp_path):
     first = polar[:, 0]
     assert first == pytest.approx(psi, abs=1e-6)
     colors = np.array(values(path, at, "Mesh3D:vertex_colors"))
-    assert colors.shape == (rows.size, 360)
+    assert colors.shape == (rows.size, 180)
     assert len(np.unique(colors)) > 50
 
 

@@ -33,8 +33,8 @@ def server(tmp_path):
     STARTED.clear()
 
 
-def received(process, path, entity: str) -> tuple[np.ndarray, np.ndarray]:
-    """Times [s] and scalars of one entity, when the server has written all."""
+def received(process, path, name: str) -> tuple[np.ndarray, np.ndarray]:
+    """Times [s] and values of a signal of the joint, when the server wrote all."""
     size, end = -1, time.monotonic() + 30.0
     while time.monotonic() < end and size != (size := path.stat().st_size):
         time.sleep(1.0)
@@ -44,10 +44,10 @@ def received(process, path, entity: str) -> tuple[np.ndarray, np.ndarray]:
     with pytest.warns(Warning, match="footer"):  # the server was interrupted
         reader = RrdReader(path)
     for chunk in reader.stream():
-        if chunk.entity_path == entity and not chunk.is_static:
+        if chunk.entity_path == "/joint/joint" and not chunk.is_static:
             batch = chunk.to_record_batch()
             times += (batch.column("time").cast("int64").to_numpy() * 1e-9).tolist()
-            column = batch.column("Scalars:scalars").to_pylist()
+            column = batch.column(name).to_pylist()
             values += [item[0] for item in column]
     order = np.argsort(times)
     return np.array(times)[order], np.array(values)[order]
@@ -57,7 +57,7 @@ def test_a_stream_arrives_whole(run, server):
     """Torsion comes back bit by bit at every step."""
     process, url, path = server
     assert stream_runs({"": run}, url=url) == url
-    time_of, values = received(process, path, "/joint/joint/torsion_arcmin")
+    time_of, values = received(process, path, "torsion_arcmin")
     np.testing.assert_allclose(time_of, run.time, atol=1e-9)
     np.testing.assert_array_equal(values, signals_of(run, 0)["torsion_arcmin"])
 
@@ -68,7 +68,7 @@ def test_a_paced_stream_takes_its_time_and_loses_nothing(run, server):
     begin = time.monotonic()
     stream_runs({"": run}, url=url, pace=2.0)
     assert time.monotonic() - begin > 0.45
-    _, values = received(process, path, "/joint/joint/output_torque_Nm")
+    _, values = received(process, path, "output_torque_Nm")
     np.testing.assert_array_equal(values, run.output_torque[:, 0])
 
 

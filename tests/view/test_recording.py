@@ -42,7 +42,7 @@ def test_the_recording_holds_what_the_metrics_were_computed_from(run, tmp_path):
     """Every signal of every joint comes back bit by bit, at every step."""
     path = run.to_rerun(tmp_path / "run.rrd")
     for name, expected in signals_of(run, 0).items():
-        time, values = columns(path, f"/joint/joint/{name}", "Scalars:scalars")
+        time, values = columns(path, "/joint/joint", name)
         np.testing.assert_allclose(time, run.time, atol=1e-9)
         np.testing.assert_array_equal(values, expected)
     _, error = columns(path, "/tool/error_mm", "Scalars:scalars")
@@ -84,8 +84,8 @@ def test_several_runs_share_one_recording(run, synthetic_map, tmp_path):
     path = write_recording(
         {"soft": run, "rigid": rigid}, tmp_path / "both.rrd", rigid=rigid
     )
-    _, soft = columns(path, "/soft/joint/joint/torsion_arcmin", "Scalars:scalars")
-    _, none = columns(path, "/rigid/joint/joint/torsion_arcmin", "Scalars:scalars")
+    _, soft = columns(path, "/soft/joint/joint", "torsion_arcmin")
+    _, none = columns(path, "/rigid/joint/joint", "torsion_arcmin")
     assert soft.min() > 1.0
     assert not none.any()
     _, error = columns(path, "/soft/tool/error_mm", "Scalars:scalars")
@@ -119,7 +119,7 @@ def test_the_picture_compares_the_runs(run, tmp_path):
 def test_figures_can_be_recomputed_from_the_recording(run, tmp_path):
     """Torsion figures of the JSON output follow from the recorded samples."""
     path = run.to_rerun(tmp_path / "run.rrd")
-    _, torsion = columns(path, "/joint/joint/torsion_arcmin", "Scalars:scalars")
+    _, torsion = columns(path, "/joint/joint", "torsion_arcmin")
     window = torsion[run.steady]
     figures = run.metrics()["joints"]["joint"]["torsion_arcmin"]
     assert figures["mean"] == pytest.approx(window.mean(), rel=1e-12)

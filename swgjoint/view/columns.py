@@ -1,0 +1,49 @@
+"""Columns of a recording, handed to the encoder as they are.
+
+The ``columns`` methods of rerun's archetypes convert, copy and partition what they are
+given, which takes longer than encoding it.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class Column:
+    """Values of one component at the rows of a ``send_columns``."""
+
+    def __init__(
+        self, descriptor: Any, values: NDArray[Any], dtype: Any, *, each: int = 1
+    ) -> None:
+        """Keep the values in the type of the component.
+
+        Args:
+            descriptor: Of the component, such as ``rr.Scalars.descriptor_scalars()``.
+            values: Numbers (n_rows * each,), or vectors (n_rows * each, size).
+            dtype: Of the component's numbers.
+            each: Values in every row.
+        """
+        self._descriptor = descriptor
+        self._values = np.ascontiguousarray(values, dtype=dtype)
+        self._each = each
+
+    def component_descriptor(self) -> Any:
+        """Which component it is, as rerun asks for it."""
+        return self._descriptor
+
+    def as_arrow_array(self) -> Any:
+        """One list a row, as rerun asks for it."""
+        import pyarrow as pa
+
+        array = pa.array(self._values.ravel())
+        if self._values.ndim == 2:
+            item = pa.field("item", array.type, nullable=False)
+            size = self._values.shape[1]
+            array = pa.FixedSizeListArray.from_arrays(
+                array, type=pa.list_(item, list_size=size)
+            )
+        starts = np.arange(0, len(array) + 1, self._each, dtype=np.int32)
+        return pa.ListArray.from_arrays(starts, array)
