@@ -1,0 +1,220 @@
+r"""Learning compensation in the angles of the wave generator.
+
+At constant speed the errors of a drive move its link by :math:`\text{Re} \sum_k d_k
+e^{j\varphi_k}`, :math:`\varphi_k = p_k \alpha + q_k \beta`, turn after turn. The
+compensation adds a motion :math:`q = \text{Re} \sum_k c_k e^{j\varphi_k}` of the link
+to the command, by motor angle and torque through the nominal two masses,
+
+.. math:: \theta/i = \left(1 - \frac{\omega^2 J_l}{K + j\omega C}\right) q, \quad
+    \tau = i J_m \ddot\theta/i + J_l \ddot q / i,
+
+and learns :math:`c_k` from blocks of a few turns: least squares finds the harmonics
+:math:`s_k` of what is left of the link's error (or of the output torque, over
+:math:`-\omega^2 J_l`),
+
+.. math:: c_k \leftarrow (1 - \rho)\,c_k - \mu s_k .
+
+*Convergence.* The link answers to c with :math:`s = (1 + \epsilon) c + d`, where
+:math:`\epsilon(\omega)` is what the nominal masses, stiffness and gains miss. A block
+multiplies the distance from the fixed point by :math:`1 - \rho - \mu(1 + \epsilon)`: it
+contracts for :math:`|\epsilon| < 1` and every :math:`\mu (1 + |\epsilon|) + \rho < 1`,
+for a phase of the model below 90 degrees with small enough rates in any case, and
+leaves :math:`\rho/(\rho + \mu(1+\epsilon))` of d. Orders of alpha and beta that a block
+cannot tell apart (2 alpha and 2 beta differ by two waves in a turn of the output) share
+their sum by a ridge; blocks of other phases sort them (Kaczmarz), the faster the more
+the phases differ: hence blocks of a quarter turn of the output. The *robustness
+filter* is the short list of orders: nothing else is ever fed back, above all nothing
+near the resonance that is not asked for; blocks whose commanded speed changes are not
+learned from.
+
+Source:
+    Bodson, Sacks, Khosla (1994), "Harmonic generation in adaptive feedforward
+    cancellation schemes", IEEE Trans. Autom. Control 39, 1939-1944, for the harmonic
+    form; Bristow, Tharayil, Alleyne (2006), "A survey of iterative learning control",
+    IEEE Control Systems 26(3), 96-114, for forgetting and the Q-filter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.errors import InputError
+from swgjoint.gear.kinematics import angle_coefficients
+from swgjoint.sim.controller import Controller, Measured, Task
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+LEARNED: tuple[tuple[int, int], ...] = ((2, 0), (0, 2), (1, 1), (4, 0), (0, 4))
+"""2 and 4 per turn against either member, and 2 per turn of an eccentric wave
+generator: what errors of pitch and roundness leave."""
+RIDGE = 1e-2
+"""Against the mean square of a wave, 0.5."""
+
+
+class LearningCompensation:
+    """Another controller, and learned motions of the link beside its command."""
+
+    def __init__(
+        self,
+        inner: Controller,
+        *,
+        orders: Sequence[tuple[int, int]] = LEARNED,
+        signal: Literal["link_angle", "output_torque"] = "link_angle",
+        rate: float = 0.5,
+        forgetting: float = 0.0,
+        turns: float | None = None,
+        delay: float = 0.0,
+        limit: float = 3e-3,
+    ) -> None:
+        """Learn beside a controller; it sees the motor without the learned motion.
+
+        Args:
+            inner: Gives the torques without the compensation.
+            orders: (p, q) of p alpha + q beta, the robustness filter.
+            signal: Sensor that the harmonics are learned from.
+            rate: mu, share of what is left that a block takes off, in (0, 1].
+            forgetting: rho, share of what was learned that a block forgets, in [0, 1).
+            turns: Of the wave generator in a block; None: a quarter turn of the output.
+            delay: Age of the signal's readings [s].
+            limit: Largest amplitude of a learned harmonic [rad].
+
+        Raises:
+            InputError: If a rate or the signal is not accepted.
+        """
+        if signal not in ("link_angle", "output_torque"):
+            raise InputError(f"signal {signal!r}; accepted: link_angle, output_torque")
+        few = turns is not None and not turns >= 1.0
+        if few or not (0.0 < rate <= 1.0 and 0.0 <= forgetting < 1.0):
+            raise InputError(
+                f"learning rate {rate:g}, forgetting {forgetting:g}, {turns} turns;"
+                " accepted: 0 < rate <= 1, 0 <= forgetting < 1, turns >= 1 or None"
+            )
+        self.inner, self.orders = inner, np.array(orders, dtype=np.int64)
+        self.signal, self.rate, self.forgetting = signal, rate, forgetting
+        self.turns, self.delay, self.limit = turns, delay, limit
+
+    def start(self, task: Task, learned: Complex | None = None) -> None:
+        """Prepare a motion; start from what was learned on another one, if given.
+
+        Args:
+            task: The motion.
+            learned: c of another motion at the same speed [rad].
+        """
+        joints, i = task.joints, task.joints.ratio
+        self._task = task
+        # waves per turn of the link, (n_joints, n_orders); below (n, ..., both of them)
+        layouts = [np.array(angle_coefficients(d.layout)) for d in joints.drives]
+        by = np.array([self.orders @ layout for layout in layouts])
+        per_link = by[:, :, 0] * i[:, None] + by[:, :, 1]
+        self._phase = task.position[..., None] * per_link
+        self._omega = task.velocity[..., None] * per_link
+        stiffness = np.array([d.mean_stiffness for d in joints.drives])
+        inertia, omega = joints.link_inertia[..., None], self._omega
+        spring = stiffness[:, None] + 1j * omega * joints.damping[..., None]
+        # unit waves of the link, of the motor at the output side, and of its speed,
+        # half a period old as encoders tell it
+        self._link = np.exp(1j * self._phase)
+        self._motor = (1.0 - omega**2 * inertia / spring) * self._link
+        late = np.exp(-0.5j * omega * task.period)
+        self._speed = 1j * omega * late * self._motor
+        rotor = i[:, None] * joints.rotor_inertia[..., None]
+        on_motor = rotor * self._motor + inertia / i[:, None] * self._link
+        self._torque = -(omega**2) * on_motor
+        shape = (*task.position.shape[1:], len(self.orders))
+        self.learned: Complex = np.zeros(shape, complex)
+        """c [rad]. Complex, shape (..., n_joints, n_orders)."""
+        if learned is not None:
+            self.learned = np.broadcast_to(learned, shape).astype(complex)
+        self.blocks = 0
+        """That were learned from."""
+        self._signal = np.zeros_like(task.position)
+        self._ends = self._blocks(task)
+        self._begin = 0
+        self.inner.start(task)
+
+    def torque(self, k: int, measured: Measured) -> Array:
+        """See :class:`swgjoint.sim.controller.Controller`."""
+        self._read(k, measured)
+        if k in self._ends:
+            self._learn(slice(self._begin, k))
+            self._begin = k
+        c, i = self.learned, self._task.joints.ratio
+        seen = replace(
+            measured,
+            motor_angle=measured.motor_angle - i * _sum(c, self._motor[k]),
+            motor_speed=measured.motor_speed - i * _sum(c, self._speed[k]),
+            link_angle=None
+            if measured.link_angle is None
+            else measured.link_angle - _sum(c, self._link[k]),
+        )
+        return np.asarray(self.inner.torque(k, seen) + _sum(c, self._torque[k]))
+
+    def _read(self, k: int, measured: Measured) -> None:
+        reading = getattr(measured, self.signal)
+        if reading is None:
+            raise InputError(
+                f"learning from {self.signal} without its sensor; accepted: a scene"
+                " with controller.feedback = 'link' or sensors.torque"
+            )
+        task = self._task
+        known = task.position if self.signal == "link_angle" else task.link_torque
+        self._signal[k] = reading - known[k]
+
+    def _blocks(self, task: Task) -> frozenset[int]:
+        """Instants that end a block: the slowest of the joints that move counts."""
+        ratio = np.abs(task.joints.ratio)
+        each = 0.25 * ratio if self.turns is None else np.full(ratio.size, self.turns)
+        way = np.abs(task.velocity) * task.period * ratio / (2.0 * np.pi * each)
+        blocks = np.cumsum(way.reshape(len(way), -1), axis=0)
+        moves = blocks[-1] >= 1.0
+        if not moves.any():
+            return frozenset()
+        slowest = blocks[:, moves].min(axis=1)
+        ends = np.arange(1.0, slowest[-1] + 1e-9)
+        return frozenset(np.searchsorted(slowest, ends - 1e-9).tolist())
+
+    def _learn(self, block: slice) -> None:
+        """One step of the iteration from the readings of a block."""
+        velocity = self._task.velocity[block]
+        steady = np.ptp(velocity, axis=0) <= 1e-9 * np.abs(velocity).max(axis=0)
+        moving = steady & (velocity[0] != 0.0)
+        if not moving.any():
+            return
+        omega = self._omega[block]
+        turned = self._phase[block] - omega * self.delay
+        count, orders = len(turned), len(self.orders)
+        line = np.linspace(-1.0, 1.0, count).reshape(-1, *(1,) * (turned.ndim - 1))
+        basis = np.concatenate(
+            [
+                np.ones_like(turned[..., :1]),
+                np.broadcast_to(line, turned[..., :1].shape),
+                np.cos(turned),
+                np.sin(turned),
+            ],
+            axis=-1,
+        )
+        square = np.einsum("n...a,n...b->...ab", basis, basis) / count
+        right = np.einsum("n...a,n...->...a", basis, self._signal[block]) / count
+        square += RIDGE * np.diag([0.0, 0.0, *np.ones(2 * orders)])
+        found = np.linalg.solve(square, right[..., None])[..., 0][..., 2:]
+        left = found[..., :orders] - 1j * found[..., orders:]
+        if self.signal == "output_torque":
+            inertia = self._task.joints.link_inertia[..., None]
+            with np.errstate(divide="ignore", invalid="ignore"):
+                left = left / (-(omega[0] ** 2) * inertia)
+        new = (1.0 - self.forgetting) * self.learned - self.rate * left
+        new = new * np.minimum(1.0, self.limit / np.maximum(np.abs(new), 1e-300))
+        self.learned = np.where(moving[..., None], new, self.learned)
+        self.blocks += 1
+
+
+def _sum(amplitudes: Complex, waves: Complex) -> Array:
+    """Real part of amplitudes times unit waves, over the orders."""
+    # einsum costs a third of a product and a sum of these few numbers
+    return np.asarray(np.einsum("...k,...k->...", amplitudes, waves).real)
