@@ -29,6 +29,7 @@ COMMANDS = {
     "profile": "tooth profile of both members: report and picture",
     "meshing": "simulation of meshing with finite elements",
     "map": "build the map of a drive and save it",
+    "identify": "parameters and map of a drive from the log of a test bench",
     "spec": "catalogue-style sheet of a design, a map or a catalogue drive",
     "run": "simulate an arm with its drives",
     "compare": "drives or levels side by side in one scene, against a spec",
