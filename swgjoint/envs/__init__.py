@@ -19,6 +19,7 @@ except ImportError as error:
 ENVIRONMENTS = {
     "swgjoint/JointTracking-v0": "joint_tracking:JointTracking",
     "swgjoint/RippleSuppression-v0": "ripple_suppression:RippleSuppression",
+    "swgjoint/ArmTracking-v0": "arm_tracking:ArmTracking",
 }
 """Module and the first part of the classes' names, by id."""
 

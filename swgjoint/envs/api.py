@@ -12,7 +12,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from swgjoint.envs.core import Core, Entry
+from swgjoint.envs.core import Core, Entry, bounds
 from swgjoint.errors import InputError
 from swgjoint.sim.controller import Measured, Task
 
@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 
 def _box(entries: tuple[Entry, ...]) -> Any:
-    low, high = np.array([(e.low, e.high) for e in entries]).T
+    low, high = bounds(entries)
     return Box(low, high, dtype=np.float64)
 
 

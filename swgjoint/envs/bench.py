@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.envs.core import Core, Entry, Limits, ceiling
+from swgjoint.envs.loop import MotorLoop
 from swgjoint.envs.plant import Plant, specimen
 from swgjoint.envs.sensors import Sensors
 from swgjoint.envs.specimen import Tolerances, tolerances_of, with_assumed_error
@@ -81,12 +82,7 @@ class BenchSettings:
             )
 
     def _check(self, key: str, unit: str, *, zero: bool) -> None:
-        value = getattr(self, key)
-        number = isinstance(value, int | float) and not isinstance(value, bool)
-        if not (number and np.isfinite(value) and (value > 0 or (zero and value == 0))):
-            raise InputError(
-                f"{key} {value} {unit}; accepted: a number {'>=' if zero else '>'} 0"
-            )
+        check_number(key, getattr(self, key), unit, zero=zero)
 
     @property
     def steps(self) -> int:
@@ -102,8 +98,24 @@ class BenchSettings:
 class BenchCore(Core):
     """Episodes of the bench joint."""
 
-    def __init__(self, count: int, threads: int, settings: BenchSettings) -> None:
-        """Build the model once, then ``count`` simulations of it."""
+    def __init__(
+        self,
+        count: int,
+        threads: int,
+        settings: BenchSettings,
+        *,
+        loop_Hz: float | None = None,
+        loop_damping_ratio: float = 1.0,
+    ) -> None:
+        """Build the model once, then ``count`` simulations of it.
+
+        Args:
+            count: Of the episodes.
+            threads: Of the engine.
+            settings: Arguments of the environment.
+            loop_Hz: Natural frequency of the motor's own loop; None: it has none.
+            loop_damping_ratio: Of that loop.
+        """
         self.settings = s = settings
         tolerances = tolerances_of(s.randomise)
         drive = s.drive
@@ -143,9 +155,29 @@ class BenchCore(Core):
             for kind in kinds
         )
         spec.option.timestep = s.period_s / sub_steps
+        one = np.ones(1)
+        limit = s.torque_limit_Nm or ratings.repeated_peak / abs(ratio)
+        joints = KnownJoints(
+            names=(JOINT,),
+            drives=(attached.drive,),
+            rotor_inertia=s.rotor_inertia_kgm2 * one,
+            link_inertia=s.link_inertia * one,
+            damping=attached.damping * one,
+            torque_limit=limit * one,
+        )
+        loop = MotorLoop.none(joints.ratio)
+        if loop_Hz is not None:
+            loop = MotorLoop.of(
+                joints, frequency=loop_Hz, damping_ratio=loop_damping_ratio
+            )
         motor = spec.add_actuator(name="motor", target=attached.rotor)
         motor.trntype = mujoco.mjtTrn.mjTRN_JOINT
         motor.gear[0] = 1.0
+        motor.forcelimited = mujoco.mjtLimited.mjLIMITED_TRUE
+        motor.forcerange = [-limit, limit]
+        if loop_Hz is not None:
+            motor.biastype = mujoco.mjtBias.mjBIAS_AFFINE
+            motor.biasprm[:3] = [0.0, -loop.stiffness[0], -loop.damping[0]]
         model = compile_spec(spec, where="environment on the bench")
         plant = Plant(
             model,
@@ -159,19 +191,11 @@ class BenchCore(Core):
         self._inertia = None
         if tolerances is not None and tolerances.load_inertia:
             self._inertia = plant.batch.expand("body_inertia")
-        limit = s.torque_limit_Nm or ratings.repeated_peak / abs(ratio)
-        one = np.ones(1)
         self.joint = attached
         super().__init__(
             plant,
-            joints=KnownJoints(
-                names=(JOINT,),
-                drives=(attached.drive,),
-                rotor_inertia=s.rotor_inertia_kgm2 * one,
-                link_inertia=s.link_inertia * one,
-                damping=attached.damping * one,
-                torque_limit=limit * one,
-            ),
+            joints=joints,
+            loop=loop,
             limits=Limits(
                 angle=(2.0 * s.max_angle_rad + 1.0) * one,
                 centre=np.zeros(1),
@@ -223,7 +247,16 @@ class BenchCore(Core):
         return tuple(got)
 
 
-def bench_settings(kind: type[BenchSettings], arguments: dict[str, Any]) -> Any:
+def check_number(key: str, value: Any, unit: str, *, zero: bool) -> None:
+    """Refuse what is no positive number; ``zero`` is accepted where it says so."""
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    if not (number and np.isfinite(value) and (value > 0 or (zero and value == 0))):
+        raise InputError(
+            f"{key} {value} {unit}; accepted: a number {'>=' if zero else '>'} 0"
+        )
+
+
+def settings_of(kind: type[Any], arguments: dict[str, Any]) -> Any:
     """Settings from keyword arguments, with an unknown one as a clear line."""
     known = kind.__dataclass_fields__
     if unknown := sorted(set(arguments) - set(known)):

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from swgjoint.envs.loop import MotorLoop
 from swgjoint.envs.plant import Plant
 from swgjoint.envs.sensors import Readout, Sensors
 from swgjoint.envs.specimen import Tolerances
@@ -39,18 +40,27 @@ class Entry:
     unit: str
     low: float
     high: float
+    count: int = 1
+    """So many numbers of the kind, one per joint."""
 
 
 def table(entries: Sequence[Entry]) -> str:
     """The entries as the table of a docstring."""
-    rows = [("index", "meaning", "unit", "range")] + [
-        (str(k), e.meaning, e.unit, f"{e.low:.5g} to {e.high:.5g}")
-        for k, e in enumerate(entries)
-    ]
+    rows, first = [("index", "meaning", "unit", "range")], 0
+    for e in entries:
+        index = str(first) if e.count == 1 else f"{first}-{first + e.count - 1}"
+        rows.append((index, e.meaning, e.unit, f"{e.low:.5g} to {e.high:.5g}"))
+        first += e.count
     widths = [max(len(row[c]) for row in rows) for c in range(4)]
     line = "  ".join("=" * w for w in widths)
     text = ["  ".join(x.ljust(w) for x, w in zip(r, widths, strict=True)) for r in rows]
     return "\n".join(t.rstrip() for t in [line, text[0], line, *text[1:], line])
+
+
+def bounds(entries: Sequence[Entry]) -> tuple[Array, Array]:
+    """Of every number, low and high."""
+    low, high = np.array([(e.low, e.high) for e in entries for _ in range(e.count)]).T
+    return low, high
 
 
 def ceiling(value: float) -> float:
@@ -85,25 +95,29 @@ class Core(ABC):
         plant: Plant,
         *,
         joints: KnownJoints,
+        loop: MotorLoop,
         limits: Limits,
         sensors: Sensors,
         tolerances: Tolerances | None,
         period: float,
         steps: int,
+        shared: bool = False,
     ) -> None:
         """Prepare episodes.
 
         Args:
             plant: The simulations.
             joints: Nominal data, for the task.
+            loop: That the motors have in the engine.
             limits: Of angle, speed and torque.
             sensors: Of every joint.
             tolerances: Of the drives; None: all are nominal.
             period: Of the control [s].
             steps: Control periods of an episode.
+            shared: Whether all episodes have one plan.
         """
         self.plant, self.joints, self.limits = plant, joints, limits
-        self.sensors, self.tolerances = sensors, tolerances
+        self.sensors, self.tolerances, self.loop = sensors, tolerances, loop
         self.period, self.steps = period, steps
         count, n = plant.batch.nsim, len(joints.names)
         rated = np.array([d.ratings.rated_torque for d in joints.drives])
@@ -112,20 +126,21 @@ class Core(ABC):
         self.instant = np.zeros(count, dtype=np.intp)
         """Control periods since the start. Shape (n,)."""
         # position, velocity, acceleration, load, known torque of the links
-        self._plan = np.zeros((count, steps + 1, 5, n))
+        own = np.arange(1 if shared else count)
+        self._plan = np.zeros((own.size, steps + 1, 5, n))
+        self._planned = np.broadcast_to(own, count) if shared else own
         self._task: Task | None = None
         self._normal = np.zeros((count, steps + 1, self._readout.channels))
         self.variations: list[tuple[Variation, ...]] = [(Variation(),) * n] * count
         """Deviations of every simulation's drives from the nominal ones."""
         self.observation_entries, self.action_entries = self.entries()
-        self.action = np.zeros((count, len(self.action_entries)))
+        self.action = np.zeros((count, sum(e.count for e in self.action_entries)))
         """The last one, limited."""
         self.motor_torque = np.zeros((count, n))
         """The last one [N·m]."""
         self.output_torque = np.zeros((count, n))
         """Of the drives [N·m]; 0 at a start."""
-        self._low = np.array([e.low for e in self.observation_entries])
-        self._high = np.array([e.high for e in self.observation_entries])
+        self._low, self._high = bounds(self.observation_entries)
 
     # -- what an environment adds ---------------------------------------------
 
@@ -134,7 +149,7 @@ class Core(ABC):
         """Of observation and action."""
 
     @abstractmethod
-    def draw(self, index: int, rng: np.random.Generator) -> Array:
+    def draw(self, rng: np.random.Generator) -> Array:
         """The plan of one episode, shape (steps + 1, 5, n_joints).
 
         Position, velocity, acceleration, load and known torque of the links, inertia
@@ -142,8 +157,16 @@ class Core(ABC):
         """
 
     @abstractmethod
-    def torque_of(self, action: Array) -> Array:
-        """Motor torque of a limited action, not limited itself [N·m]. (n, n_joints)."""
+    def command(self, action: Array) -> Array:
+        """Input of the motors for a limited action [N·m]. Shape (n, n_joints)."""
+
+    def start(self, plan: Array) -> tuple[Array, Array]:
+        """Motor angles [rad], on the reference, and torques of the drives [N·m].
+
+        Args:
+            plan: Of the episode that begins.
+        """
+        return self.joints.ratio * plan[0, 0], plan[0, 4]
 
     @abstractmethod
     def columns(self) -> list[Array]:
@@ -173,9 +196,9 @@ class Core(ABC):
                     self.variations[k] = specimens = tuple(v for v, _ in drawn)
                     self.plant.vary(k, specimens)
                     maps = tuple(v.of(m) for v, m in zip(specimens, maps, strict=True))
-            self._plan[k] = self.draw(k, rng)
+            self._plan[self._planned[k]] = plan = self.draw(rng)
             self._normal[k] = rng.standard_normal(self._normal.shape[1:])
-            self.plant.place(k, self._plan[k, 0, 0], maps)
+            self.plant.place(k, *self.start(plan), maps)
         self._task = None
         index = np.asarray(rows, dtype=np.intp)
         self.instant[index] = 0
@@ -196,22 +219,29 @@ class Core(ABC):
             action: Shape (n, n_actions); beyond its range it is limited.
             active: Episodes that go on; None: all. Shape (n,).
         """
-        limit = self.limits.motor_torque
+        plant, limit = self.plant, self.limits.motor_torque
         self.action = np.clip(np.asarray(action, float), -1.0, 1.0)
-        self.motor_torque = np.clip(self.torque_of(self.action), -limit, limit)
-        self.plant.step(self.motor_torque, self.now[:, 3], active)
+        command = self.command(self.action)
+        plant.step(command, self.now[:, 3], active)
         self.instant += 1 if active is None else active
         self._look()
+        wanted = self.loop.torque(command, self.motor_angle, plant.motor_speed)
+        self.motor_torque = np.clip(wanted, -limit, limit)
         self.output_torque = self.plant.output_torque()
         self._readout.read(self._true(), self._normal[self._rows, self._here])
         self.judge()
         self.remember()
 
+    def coming(self) -> Array:
+        """Plan at the end of the step that begins. Shape (n, 5, n_joints)."""
+        after = np.minimum(self.instant + 1, self.steps)
+        return np.asarray(self._plan[self._planned, after])
+
     def _look(self) -> None:
         """Take in where the simulations stand."""
         plant = self.plant
         self._here = np.minimum(self.instant, self.steps)
-        self.now = self._plan[self._rows, self._here]
+        self.now = self._plan[self._planned, self._here]
         """Plan at this instant. Shape (n, 5, n_joints)."""
         self.motor_angle, self.link_angle = plant.motor_angle, plant.link_angle
 
@@ -285,7 +315,7 @@ class Core(ABC):
         """The motions of all episodes, episodes in front of the joints."""
         if self._task is None:
             # (5, steps + 1, n, n_joints); a copy, which the next episodes leave alone
-            plan = self._plan.transpose(2, 1, 0, 3).copy()
+            plan = self._plan[self._planned].transpose(2, 1, 0, 3).copy()
             self._task = Task(
                 period=self.period,
                 position=plan[0],

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.envs.api import BatchEnv, SingleEnv
-from swgjoint.envs.bench import BenchCore, BenchSettings, bench_settings
+from swgjoint.envs.bench import BenchCore, BenchSettings, settings_of
 from swgjoint.envs.core import Entry, ceiling
 from swgjoint.envs.references import KINDS, draw_motion, smooth_step
 from swgjoint.errors import InputError
@@ -74,7 +74,7 @@ class TrackingCore(BenchCore):
             *self.sensor_entries(),
         ), (share,)
 
-    def draw(self, index: int, rng: np.random.Generator) -> Array:
+    def draw(self, rng: np.random.Generator) -> Array:
         """A reference of one of the kinds, and a load that grows to its value."""
         s = self.settings
         time = np.asarray(np.arange(s.steps + 1) * s.period_s, float)
@@ -93,7 +93,7 @@ class TrackingCore(BenchCore):
         known = load + s.link_inertia * motion[2]
         return np.stack([*motion, load, known], axis=1)[:, :, None]
 
-    def torque_of(self, action: Array) -> Array:
+    def command(self, action: Array) -> Array:
         """The share of the limit."""
         return np.asarray(action * self.limits.motor_torque)
 
@@ -168,7 +168,7 @@ class JointTrackingEnv(SingleEnv):
 
         1/(1 + (e/error_scale)^2) - effort_weight u^2
 
-    Start: at rest at 0, without torsion; the load grows over 0.3 s, the motion begins
+    Start: motor at rest at 0, no load; the load grows over 0.3 s, the motion begins
     at 0.1 s. ``truncated`` after ``episode_s``. ``terminated`` when a limit is broken,
     which ``info["broken_limit"]`` names by its number in
     :data:`swgjoint.envs.core.LIMITS`: angle of the link (1 + 2 max_angle), motor speed
@@ -211,7 +211,7 @@ class JointTrackingEnv(SingleEnv):
 
     def __init__(self, **arguments: Any) -> None:
         """See the class."""
-        settings = bench_settings(TrackingSettings, arguments)
+        settings = settings_of(TrackingSettings, arguments)
         super().__init__(TrackingCore(1, 1, settings))
 
 
@@ -226,6 +226,6 @@ class JointTrackingVectorEnv(BatchEnv):
 
     def __init__(self, num_envs: int = 1, threads: int = 0, **arguments: Any) -> None:
         """See :class:`JointTrackingEnv` for the other arguments."""
-        settings = bench_settings(TrackingSettings, arguments)
+        settings = settings_of(TrackingSettings, arguments)
         core = TrackingCore(num_envs, threads, settings)
         super().__init__(core, JointTrackingEnv.metadata)

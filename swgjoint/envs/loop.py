@@ -1,4 +1,4 @@
-"""The motor-side loop on which a residual action acts."""
+"""The loop of a servo drive, to which an action is added."""
 
 from __future__ import annotations
 
@@ -15,12 +15,14 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MotorLoop:
-    r"""PD on the motor angle with known torques fed forward.
+    r"""PD on the motor angle, inside the engine's step.
 
-    .. math:: u = k_p (i\,q_d - \theta) + k_d (i\,\dot q_d - \dot\theta)
-        + \tau_d/i + i J \ddot q_d
+    .. math:: u = c - k_p \theta - k_d \dot\theta, \quad
+        c = k_p\,i\,q_d + k_d\,i\,\dot q_d + u_\mathrm{ff}
 
-    Arrays of shape (n_joints,).
+    It stands for the loop that a servo drive runs itself, many times per control
+    period on its own encoder: without the sensors' resolution, noise and delay. Arrays
+    of shape (n_joints,).
     """
 
     stiffness: Array
@@ -28,7 +30,11 @@ class MotorLoop:
     damping: Array
     """k_d [N·m·s/rad]."""
     ratio: Array
-    rotor_inertia: Array
+
+    @classmethod
+    def none(cls, ratio: Array) -> Self:
+        """Motors that only take torques."""
+        return cls(stiffness=0.0 * ratio, damping=0.0 * ratio, ratio=ratio)
 
     @classmethod
     def of(cls, joints: KnownJoints, *, frequency: float, damping_ratio: float) -> Self:
@@ -45,23 +51,15 @@ class MotorLoop:
             stiffness=inertia * omega**2,
             damping=2.0 * damping_ratio * omega * inertia,
             ratio=ratio,
-            rotor_inertia=rotor,
         )
 
-    def torque(self, plan: Array, angle: Array, speed: Array, shift: Array) -> Array:
-        """Motor torques [N·m]. Shape (n, n_joints).
-
-        Args:
-            plan: Position, velocity, acceleration, load and known torque of the links.
-                Shape (n, 5, n_joints).
-            angle: Motor angles that are read [rad]. Shape (n, n_joints).
-            speed: Motor speeds that are read [rad/s]. Same shape.
-            shift: Of the link's set-point [rad]. Same shape.
-        """
+    def command(self, position: Array, velocity: Array) -> Array:
+        """C without feed-forward [N·m], of the reference of the links."""
         i = self.ratio
         return np.asarray(
-            self.stiffness * (i * (plan[:, 0] + shift) - angle)
-            + self.damping * (i * plan[:, 1] - speed)
-            + plan[:, 4] / i
-            + i * self.rotor_inertia * plan[:, 2]
+            self.stiffness * (i * position) + self.damping * (i * velocity)
         )
+
+    def torque(self, command: Array, angle: Array, speed: Array) -> Array:
+        """Torque of the motors over the step that led to a state [N·m]."""
+        return np.asarray(command - self.stiffness * angle - self.damping * speed)

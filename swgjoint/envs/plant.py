@@ -66,6 +66,7 @@ class Plant:
                 mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_PLUGIN, d.plugin)
                 for d in drives
             ]
+            # of every joint: acceleration of the rotor, then of the link
             others = [int(model.plugin_stateadr[k]) + 1 for k in instances]
             self._others = state, np.array(others)
             self._qacc, self._weight = batch.bind("qacc"), batch.bind("qLDiagInv")
@@ -121,20 +122,45 @@ class Plant:
         self._load[:, self._link_v] = -load
         self.batch.step(active, nstep=self.sub_steps)
 
-    def place(self, index: int, link_angle: Array, maps: Sequence[DriveMap]) -> None:
-        """Let one simulation begin at rest, without torsion.
+    def place(
+        self,
+        index: int,
+        motor_angle: Array,
+        torque: Array,
+        maps: Sequence[DriveMap],
+    ) -> None:
+        """Let one simulation begin at rest, its drives carrying given torques.
 
         Args:
             index: Of the simulation.
-            link_angle: [rad]. Shape (n_joints,).
+            motor_angle: [rad]. Shape (n_joints,).
+            torque: Of the drives on the links [N·m]. Same shape.
             maps: Of its joints.
         """
-        self.batch.reset([index], stage=mujoco.mjtStage.mjSTAGE_NONE.value)
-        self._qpos[index, self._link_q] = link_angle
-        self._qpos[index, self._rotor_q] = [
-            _untwisted(drive, float(psi))
-            for drive, psi in zip(maps, link_angle, strict=True)
-        ]
+        batch, links = self.batch, np.empty(len(maps))
+        forces = np.zeros((len(maps), 2))
+        for j, (attached, drive) in enumerate(zip(self.drives, maps, strict=True)):
+            theta, wanted = float(motor_angle[j]), float(torque[j])
+            if attached.level == "linear":
+                links[j] = theta / drive.ratio - wanted / attached.stiffness
+            else:
+                links[j], forces[j] = _balance(drive, theta, wanted)
+        batch.reset([index], stage=mujoco.mjtStage.mjSTAGE_NONE.value)
+        self._qpos[index, self._link_q] = links
+        self._qpos[index, self._rotor_q] = motor_angle
+        if self._others is None:
+            return
+        # what the plugin remembers of the step before, as if in balance: accelerations
+        # by all other forces cancel those by the drive, hysteresis is relaxed here
+        batch.forward([index])
+        state, others = self._others
+        weight = self._weight[index]
+        state[index, others - 1] = -weight[self._rotor_v] * forces[:, 0]
+        state[index, others] = -weight[self._link_v] * forces[:, 1]
+        for j, drive in enumerate(maps):
+            first = others[j] + 1
+            torsion = float(drive.torsion(motor_angle[j], links[j]))
+            state[index, first : first + len(drive.hysteresis)] = torsion
 
     def vary(self, index: int, variations: Sequence[Variation]) -> None:
         """Give one simulation drives of its own."""
@@ -160,17 +186,16 @@ def _addresses(joints: Sequence[object]) -> tuple[Index, Index]:
     )
 
 
-def _untwisted(drive: DriveMap, psi: float) -> float:
-    """Motor angle without torsion at a link angle [rad], by Newton's method."""
-    theta = drive.ratio * psi
-    if not drive.kinematic_error.any():
-        return theta
-    for _ in range(20):
-        e0, slope, _ = drive.error_at(drive.phases(theta, psi))
-        change = (psi - theta / drive.ratio - float(e0)) / (
-            1.0 / drive.ratio + float(slope)
-        )
-        theta += change
-        if abs(change) < 1e-12 * abs(drive.ratio):
+def _balance(
+    drive: DriveMap, theta: float, torque: float
+) -> tuple[float, tuple[float, float]]:
+    """Link angle at which the potential gives a torque, and its forces there."""
+    psi = theta / drive.ratio
+    for _ in range(50):
+        on_input, on_output = (float(f) for f in drive.forces(theta, psi))
+        missing = torque - on_output
+        if abs(missing) < 1e-9 * drive.ratings.rated_torque:
             break
-    return theta
+        torsion = drive.torsion(theta, psi)
+        psi -= missing / float(drive.stiffness(torsion, theta, psi))
+    return psi, (on_input, on_output)

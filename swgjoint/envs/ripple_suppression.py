@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.envs.api import BatchEnv, SingleEnv
-from swgjoint.envs.bench import BenchCore, BenchSettings, bench_settings
+from swgjoint.envs.bench import BenchCore, BenchSettings, settings_of
 from swgjoint.envs.core import Entry, Rows, ceiling
-from swgjoint.envs.loop import MotorLoop
 from swgjoint.envs.references import smooth_step
 from swgjoint.errors import InputError
 from swgjoint.gear.kinematics import angle_coefficients
@@ -75,10 +74,13 @@ class RippleCore(BenchCore):
 
     def __init__(self, count: int, threads: int, settings: RippleSettings) -> None:
         """See :class:`RippleSuppressionEnv`."""
-        super().__init__(count, threads, settings)
         s = settings
-        self.loop = MotorLoop.of(
-            self.joints, frequency=s.loop_Hz, damping_ratio=s.loop_damping_ratio
+        super().__init__(
+            count,
+            threads,
+            s,
+            loop_Hz=s.loop_Hz,
+            loop_damping_ratio=s.loop_damping_ratio,
         )
         rated = self.joint.drive.ratings.rated_torque
         self._authority = s.authority_of_rated * rated / abs(self.joint.ratio)
@@ -110,7 +112,7 @@ class RippleCore(BenchCore):
             *self.sensor_entries(),
         ), (known("added motor torque, of its authority", "1", 1.0),)
 
-    def draw(self, index: int, rng: np.random.Generator) -> Array:
+    def draw(self, rng: np.random.Generator) -> Array:
         """Speed and load, each either way, that grow and then stay."""
         s = self.settings
         time = np.asarray(np.arange(s.steps + 1) * s.period_s, float)
@@ -130,12 +132,13 @@ class RippleCore(BenchCore):
         plan = np.stack([position, velocity, acceleration, load, known], axis=1)
         return plan[:, :, None]
 
-    def torque_of(self, action: Array) -> Array:
-        """The loop's torque and a share of the authority."""
-        read = self._readout
-        angle = read.value[:, :1]
-        own = self.loop.torque(self.now, angle, read.motor_speed, np.zeros_like(angle))
-        return np.asarray(own + action * self._authority)
+    def command(self, action: Array) -> Array:
+        """The reference of the loop, known torques and a share of the authority."""
+        plan, ratio = self.coming(), self.joint.ratio
+        rotor = self.settings.rotor_inertia_kgm2
+        known = plan[:, 4] / ratio + ratio * rotor * plan[:, 2]
+        own = self.loop.command(plan[:, 0], plan[:, 1])
+        return np.asarray(own + known + action * self._authority)
 
     def columns(self) -> list[Array]:
         """See the table of :class:`RippleSuppressionEnv`."""
@@ -197,11 +200,11 @@ class RippleCore(BenchCore):
 class RippleSuppressionEnv(SingleEnv):
     """A joint turns at constant speed under load; torque is added to its motor's loop.
 
-    The loop is PD on the motor's angle, ``loop_Hz`` and ``loop_damping_ratio`` for
-    motor and link on a rigid drive, with load and acceleration fed forward; it reads
-    what the observation shows. Kinematic error and the torque that goes with it come at
-    even orders of the wave generator's angle, of which the observation has sine and
-    cosine.
+    The loop is the servo drive's own (:class:`swgjoint.envs.loop.MotorLoop`): PD on the
+    motor's angle, ``loop_Hz`` and ``loop_damping_ratio`` for motor and link on a rigid
+    drive, load and acceleration fed forward. Kinematic error and the torque that goes
+    with it come at even orders of the wave generator's angle, of which the observation
+    has sine and cosine.
 
     Action, held over one control period; the authority is ``authority_of_rated`` times
     rated torque over ratio:
@@ -237,7 +240,7 @@ class RippleSuppressionEnv(SingleEnv):
 
         1/(1 + (r/ripple_scale)^2 + (e/error_scale)^2) - effort_weight a^2
 
-    Start: at rest at 0, without torsion; speed and load, drawn in size and sign, grow
+    Start: motor at rest at 0, no load; speed and load, drawn in size and sign, grow
     over 0.5 s. ``truncated`` after ``episode_s``; ``terminated`` as in
     :class:`~swgjoint.envs.joint_tracking.JointTrackingEnv`, whose ``info`` and whose
     arguments of bench, drive, sensors and ``randomise`` are those of this one, too.
@@ -262,7 +265,7 @@ class RippleSuppressionEnv(SingleEnv):
 
     def __init__(self, **arguments: Any) -> None:
         """See the class."""
-        settings = bench_settings(RippleSettings, arguments)
+        settings = settings_of(RippleSettings, arguments)
         super().__init__(RippleCore(1, 1, settings))
 
 
@@ -273,6 +276,6 @@ class RippleSuppressionVectorEnv(BatchEnv):
 
     def __init__(self, num_envs: int = 1, threads: int = 0, **arguments: Any) -> None:
         """See :class:`RippleSuppressionEnv` for the other arguments."""
-        settings = bench_settings(RippleSettings, arguments)
+        settings = settings_of(RippleSettings, arguments)
         core = RippleCore(num_envs, threads, settings)
         super().__init__(core, RippleSuppressionEnv.metadata)

@@ -106,6 +106,7 @@ def assemble(
     *,
     drives: Mapping[str, DriveMap] | None = None,
     controlled_by: str | None = None,
+    variable: bool = False,
     progress: Progress = silent,
 ) -> Assembly:
     """Build the model of a scene.
@@ -116,6 +117,8 @@ def assemble(
             or built.
         controlled_by: Name of a controller from outside, whose motors only take
             torques; None for the scene's own.
+        variable: Whether drives at ``full`` can deviate from their maps, see
+            :mod:`swgjoint.joint.variation`.
         progress: Called while maps are built.
 
     Raises:
@@ -178,6 +181,7 @@ def assemble(
             damping_ratio=section.damping_ratio,
             friction=bool(section.friction),
             rotor=section.rotor or "gyroscopic",
+            variable=variable,
             # a joint at rest carries every order
             max_input_speed=float(abs(drive.ratio) * speed) or None,
         )

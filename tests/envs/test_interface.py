@@ -17,6 +17,7 @@ ALL = {"link_encoder": True, "torque_sensor": True}
 SHORT = {
     "swgjoint/JointTracking-v0": {"episode_s": 0.5, "load_of_rated": 0.05},
     "swgjoint/RippleSuppression-v0": {"episode_s": 1.6},
+    "swgjoint/ArmTracking-v0": {"episode_s": 0.4},
 }
 """Arguments with which episodes end within the tests."""
 NAMES = pytest.mark.parametrize("name", ENVIRONMENTS)
@@ -85,7 +86,7 @@ def test_batch_equals_single_environments(name, level):
         "randomise": True,
         "sensors": {**ALL, "delay_periods": 2},
     }
-    count = 7
+    count = 3 if name.endswith("ArmTracking-v0") else 7
     sync = SyncVectorEnv([lambda: make(name, **keys).unwrapped] * count)
     batch = gymnasium.make_vec(name, num_envs=count, threads=2, **keys)
     assert batch.metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
@@ -111,6 +112,5 @@ def test_seeds_of_a_batch(name):
     first, _ = batch.reset(seed=5)
     again, _ = batch.reset(seed=[5, 6, 7])
     np.testing.assert_array_equal(first, again)
-    motion = batch.task.position
-    batch.reset()
-    assert np.abs(batch.task.position - motion).max() > 0.0
+    others, _ = batch.reset()
+    assert np.abs(others - first).max() > 0.0

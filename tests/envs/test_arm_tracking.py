@@ -1,0 +1,114 @@
+"""ArmTracking-v0 is the scene of its name, with an action added to its loops."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from swgjoint.envs.arm_tracking import ArmTrackingEnv
+from swgjoint.envs.specimen import with_assumed_error
+from swgjoint.errors import InputError
+from swgjoint.maps.drive_map import DriveMap
+from swgjoint.models_path import models_path
+from swgjoint.sim.run import run_scene
+from swgjoint.units import arcmin
+
+NAMES = ("CSG-25-100", "CSG-14-100")
+
+
+def run(env, action):
+    """Infos of an episode with one action."""
+    _, info = env.reset(seed=0)
+    rows = [info]
+    for _ in range(env.core.steps):
+        _, _, terminated, truncated, info = env.step(action)
+        rows.append(info)
+        if terminated or truncated:
+            break
+    assert truncated and not terminated
+    return {key: np.array([row[key] for row in rows]) for key in rows[0]}
+
+
+@pytest.mark.parametrize("scene", ["ur5e-circle", "ur5e-catalogue"])
+def test_without_action_it_is_the_scene(scene):
+    """Links, motors, torques and tool of ``run_scene`` on the same drives."""
+    env = ArmTrackingEnv(scene=scene, episode_s=1.0, friction=False)
+    got = run(env, np.zeros(6))
+    drives = {name: with_assumed_error(DriveMap.from_catalogue(name)) for name in NAMES}
+    want = run_scene(scene, drives=drives)
+    n = len(got["time_s"])
+    np.testing.assert_allclose(got["time_s"], want.time[:n], atol=1e-12)
+    # the start is the scene's to the tolerance of its equilibrium
+    np.testing.assert_allclose(got["link_angle_rad"], want.position[:n], atol=1e-8)
+    np.testing.assert_allclose(
+        got["motor_angle_rad"], want.motor_position[:n], atol=1e-6
+    )
+    np.testing.assert_allclose(
+        got["motor_torque_Nm"][1:], want.motor_torque[1:n], atol=1e-5
+    )
+    np.testing.assert_allclose(
+        got["link_error_arcmin"],
+        (want.position - want.reference)[:n] / arcmin,
+        atol=1e-4,
+    )
+    # the distance is linearised about the reference
+    np.testing.assert_allclose(
+        got["tool_error_mm"], 1e3 * want.tool_error()[:n], atol=2e-2, rtol=1e-2
+    )
+    assert got["tool_error_mm"].max() > 0.2
+
+
+def test_a_set_point_moves_links_by_what_it_says():
+    """A steady shift turns every link by the shift, weight and drive the same."""
+    env = ArmTrackingEnv(
+        scene="ur5e-catalogue",
+        action="setpoint",
+        shift_arcmin=10.0,
+        episode_s=0.24,  # the path rests that long
+        friction=False,
+    )
+    still, moved = run(env, np.zeros(6)), run(env, np.full(6, 0.5))
+    change = moved["link_error_arcmin"][-1] - still["link_error_arcmin"][-1]
+    np.testing.assert_allclose(change, 5.0, rtol=0.1)
+
+
+def test_a_torque_is_added_to_the_motors():
+    """In the first step the motors give what the loop gives, and the action."""
+    torques = []
+    for action in (0.0, 0.1, 0.2):
+        env = ArmTrackingEnv(friction=False)
+        env.reset(seed=0)
+        torques.append(env.step(np.full(6, action))[-1]["motor_torque_Nm"])
+    rated = np.array([d.ratings.rated_torque / 100.0 for d in env.task.joints.drives])
+    share = (torques[1] - torques[0]) / (0.2 * 0.1 * rated)
+    # less what the loop takes back within the step
+    assert (share > 0.7).all() and (share < 1.0).all()
+    np.testing.assert_allclose(
+        torques[2] - torques[0], 2.0 * (torques[1] - torques[0]), rtol=0.01
+    )
+
+
+@pytest.mark.parametrize(
+    ("keys", "match"),
+    [
+        ({"scene": "ur5e-payload-step"}, "has disturbances"),
+        ({"scene": "bench-chirp"}, "controller 'computed_torque'"),
+        ({"scene": "nothing"}, "neither a file nor in models/scenes"),
+        ({"action": "speed"}, "action 'speed'; accepted: torque, setpoint"),
+        ({"error_scale_mm": 0.0}, "error_scale_mm 0.0 mm; accepted: a number > 0"),
+        ({"loop": 1}, "argument 'loop' of an environment; accepted: scene"),
+    ],
+)
+def test_what_cannot_be_an_episode_gives_one_line(keys, match):
+    """What, where, and what is accepted."""
+    with pytest.raises(InputError, match=match):
+        ArmTrackingEnv(**keys)
+
+
+def test_a_path_that_starts_moving_is_refused(tmp_path):
+    """An episode starts at rest; the scene of the bench does not."""
+    text = (models_path() / "scenes" / "bench.toml").read_text(encoding="utf-8")
+    path = tmp_path / "moving.toml"
+    path.write_text(text.replace('"reference-2d"', '"CSG-25-100"'), encoding="utf-8")
+    with pytest.raises(InputError, match="starts moving; accepted: a path that starts"):
+        ArmTrackingEnv(scene=str(path))
