@@ -13,6 +13,7 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from swgjoint.envs.core import Core, Entry, bounds
+from swgjoint.envs.picture import Picture
 from swgjoint.errors import InputError
 from swgjoint.sim.controller import Measured, Task
 
@@ -27,11 +28,20 @@ def _box(entries: tuple[Entry, ...]) -> Any:
 class SingleEnv(gymnasium.Env[Array, Array]):
     """One episode at a time."""
 
-    metadata = {"render_modes": []}  # noqa: RUF012  (gymnasium's own declaration)
+    metadata = {  # noqa: RUF012  (gymnasium's own declaration)
+        "render_modes": ["rgb_array"],
+        "render_fps": 50,
+    }
 
-    def __init__(self, core: Core) -> None:
+    def __init__(self, core: Core, render_mode: str | None) -> None:
         """Put the interface in front of one episode."""
-        self.core = core
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            raise InputError(
+                f"render_mode {render_mode!r}; accepted: None, 'rgb_array'; for the"
+                " rerun viewer swgjoint.envs.recording.EpisodeRecorder"
+            )
+        self.core, self.render_mode = core, render_mode
+        self._picture: Picture | None = None
         self.observation_space = _box(core.observation_entries)
         self.action_space = _box(core.action_entries)
 
@@ -55,6 +65,21 @@ class SingleEnv(gymnasium.Env[Array, Array]):
             bool(core.over[0]),
             self._info(broken),
         )
+
+    def render(self) -> Any:
+        """A picture where ``render_mode`` is ``rgb_array``; (480, 640, 3) of uint8."""
+        if self.render_mode is None:
+            return None
+        plant = self.core.plant
+        if self._picture is None:
+            self._picture = Picture(plant.model)
+        return self._picture.draw(plant.batch.get_data(0))
+
+    def close(self) -> None:
+        """Give back what pictures need."""
+        if self._picture is not None:
+            self._picture.close()
+            self._picture = None
 
     def _info(self, broken: int) -> dict[str, Any]:
         got = {

@@ -390,10 +390,10 @@ class ArmTrackingEnv(SingleEnv):
 
     core: ArmCore
 
-    def __init__(self, **arguments: Any) -> None:
+    def __init__(self, render_mode: str | None = None, **arguments: Any) -> None:
         """See the class."""
         settings = settings_of(ArmSettings, arguments)
-        super().__init__(ArmCore(1, 1, settings))
+        super().__init__(ArmCore(1, 1, settings), render_mode)
 
 
 class ArmTrackingVectorEnv(BatchEnv):

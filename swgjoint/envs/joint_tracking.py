@@ -209,10 +209,10 @@ class JointTrackingEnv(SingleEnv):
 
     core: TrackingCore
 
-    def __init__(self, **arguments: Any) -> None:
+    def __init__(self, render_mode: str | None = None, **arguments: Any) -> None:
         """See the class."""
         settings = settings_of(TrackingSettings, arguments)
-        super().__init__(TrackingCore(1, 1, settings))
+        super().__init__(TrackingCore(1, 1, settings), render_mode)
 
 
 class JointTrackingVectorEnv(BatchEnv):

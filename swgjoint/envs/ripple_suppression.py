@@ -263,10 +263,10 @@ class RippleSuppressionEnv(SingleEnv):
 
     core: RippleCore
 
-    def __init__(self, **arguments: Any) -> None:
+    def __init__(self, render_mode: str | None = None, **arguments: Any) -> None:
         """See the class."""
         settings = settings_of(RippleSettings, arguments)
-        super().__init__(RippleCore(1, 1, settings))
+        super().__init__(RippleCore(1, 1, settings), render_mode)
 
 
 class RippleSuppressionVectorEnv(BatchEnv):

@@ -1,0 +1,181 @@
+"""Episodes as recordings for the rerun viewer.
+
+Entity paths: ``arm/<body>`` poses at 50 Hz with their shapes, ``<figure>/<joint>`` the
+figures of ``info`` at every step (``<figure>`` alone where there is one for all),
+``reward``; on the timeline ``time``.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.envs.api import SingleEnv
+from swgjoint.errors import InputError
+from swgjoint.view.columns import Column
+from swgjoint.view.geometry import quaternion_xyzw, shape_of
+
+Array = NDArray[np.float64]
+
+POSE_RATE = 50.0
+"""Poses per second [Hz]."""
+
+
+class EpisodeRecorder(gymnasium.Wrapper[Any, Any, Any, Any]):
+    """Writes every episode of an environment as ``episode-<number>.rrd``.
+
+    ::
+
+        env = EpisodeRecorder(gymnasium.make("swgjoint/JointTracking-v0"), "episodes")
+
+    Written whole when the episode ends, is reset or the environment is closed;
+    ``files`` lists what was written.
+    """
+
+    def __init__(self, env: gymnasium.Env[Any, Any], folder: str | Path) -> None:
+        """Record an environment of this package into a folder, which is made."""
+        super().__init__(env)
+        if not isinstance(env.unwrapped, SingleEnv):
+            raise InputError(
+                f"EpisodeRecorder of {type(env.unwrapped).__name__}; accepted: a single"
+                " environment of swgjoint.envs"
+            )
+        self._plant = env.unwrapped.core.plant
+        self._joints = env.unwrapped.core.joints.names
+        self.folder = Path(folder)
+        self.folder.mkdir(parents=True, exist_ok=True)
+        self.files: list[Path] = []
+        self._rows: list[tuple[Array, float, dict[str, Any]]] = []
+
+    def reset(self, **keys: Any) -> tuple[Any, dict[str, Any]]:
+        """Begin an episode and its recording."""
+        self._write()
+        observation, info = super().reset(**keys)
+        self._take(0.0, info)
+        return observation, info
+
+    def step(self, action: Any) -> tuple[Any, Any, bool, bool, dict[str, Any]]:
+        """Take a step and record where it led."""
+        got = super().step(action)
+        self._take(float(got[1]), got[-1])
+        if got[2] or got[3]:
+            self._write()
+        return got
+
+    def close(self) -> None:
+        """Write what is left."""
+        self._write()
+        super().close()
+
+    def _take(self, reward: float, info: dict[str, Any]) -> None:
+        self._rows.append((self._plant.batch.qpos[0].copy(), reward, info))
+
+    def _write(self) -> None:
+        rows, self._rows = self._rows, []
+        if len(rows) < 2:
+            return
+        path = self.folder / f"episode-{len(self.files)}.rrd"
+        positions = np.array([row[0] for row in rows])
+        figures = {"reward": np.array([row[1] for row in rows])}
+        for key in rows[0][2]:
+            values = np.array([row[2][key] for row in rows], float)
+            if values.ndim == 1:
+                figures[key] = values
+            else:
+                for name, column in zip(self._joints, values.T, strict=True):
+                    figures[f"{key}/{name}"] = column
+        time = figures.pop("time_s")
+        write_episode(path, self._plant.model, time, positions, figures)
+        self.files.append(path)
+
+
+def write_episode(
+    path: Path,
+    model: mujoco.MjModel,
+    time: Array,
+    positions: Array,
+    figures: dict[str, Array],
+) -> None:
+    """Write one recording, whole or not at all.
+
+    Args:
+        path: File.
+        model: Of the simulation.
+        time: [s]. Shape (n,).
+        positions: qpos. Shape (n, nq).
+        figures: By entity path. Shapes (n,).
+    """
+    import rerun as rr
+    import rerun.blueprint as rrb
+
+    handle, name = tempfile.mkstemp(dir=path.parent, suffix=".rrd.part")
+    os.close(handle)
+    beside = Path(name)
+    curves = list(dict.fromkeys(key.split("/")[0] for key in figures))
+    plots = [rrb.TimeSeriesView(origin=key, name=key) for key in curves]
+    layout = rrb.Horizontal(
+        rrb.Spatial3DView(origin="arm"), rrb.Vertical(*plots), column_shares=[2, 3]
+    )
+    try:
+        stream = rr.RecordingStream("swgjoint episode")
+        stream.save(
+            beside, default_blueprint=rrb.Blueprint(layout, collapse_panels=True)
+        )
+        _log_arm(stream, model, time, positions)
+        at = rr.TimeColumn("time", duration=time)
+        for key, values in figures.items():
+            column = Column(rr.Scalars.descriptor_scalars(), values, np.float64)
+            stream.send_columns(key, indexes=[at], columns=[column])
+        stream.flush()
+        stream.disconnect()
+        beside.chmod(0o644)
+        os.replace(beside, path)
+    finally:
+        with contextlib.suppress(FileNotFoundError):
+            beside.unlink()
+
+
+def _log_arm(stream: Any, model: mujoco.MjModel, time: Array, positions: Array) -> None:
+    """Shapes once, poses of the bodies that have some."""
+    import rerun as rr
+
+    bodies = set()
+    for geom in range(model.ngeom):
+        shape, body = shape_of(model, geom), int(model.geom_bodyid[geom])
+        if shape is None:
+            continue
+        bodies.add(body)
+        place = rr.Transform3D(
+            translation=model.geom_pos[geom],
+            quaternion=quaternion_xyzw(model.geom_quat[geom]),
+        )
+        path = f"arm/{model.body(body).name}/{model.geom(geom).name or geom}"
+        stream.log(path, shape, place, static=True)
+    taken = np.unique(np.searchsorted(time, np.arange(0.0, time[-1], 1.0 / POSE_RATE)))
+    data = mujoco.MjData(model)
+    places = np.empty((taken.size, model.nbody, 3))
+    turns = np.empty((taken.size, model.nbody, 4))
+    for k, row in enumerate(taken):
+        data.qpos[:] = positions[row]
+        mujoco.mj_kinematics(model, data)
+        places[k], turns[k] = data.xpos, data.xquat
+    at = rr.TimeColumn("time", duration=time[taken])
+    for body in sorted(bodies):
+        turn = quaternion_xyzw(turns[:, body])
+        columns = [
+            Column(
+                rr.Transform3D.descriptor_translation(), places[:, body], np.float32
+            ),
+            Column(rr.Transform3D.descriptor_quaternion(), turn, np.float32),
+        ]
+        stream.send_columns(
+            f"arm/{model.body(body).name}", indexes=[at], columns=columns
+        )
