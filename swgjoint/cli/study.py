@@ -28,6 +28,10 @@ STUDIES = {
         "swgjoint.study.response:run_response",
         "two-mass frequency response of a joint beside its closed form",
     ),
+    "control": (
+        "swgjoint.study.control_ladder:run_control",
+        "controllers of one joint from PD to learning, on ten specimens of a drive",
+    ),
 }
 """Name -> function that takes a StudyOptions and returns a StudyResult, and what it
 compares; imported only when chosen."""
@@ -42,7 +46,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--only",
         metavar="PART,...",
-        help="run these sections or tables of the source; response: these drives",
+        help="run these sections or tables of the source; response and control:"
+        " these drives",
     )
     parser.add_argument(
         "--model", choices=("2d", "3d"), help="fidelity; default: that of the study"

@@ -114,7 +114,7 @@ class LearningCompensation:
         per_link = by[:, :, 0] * i[:, None] + by[:, :, 1]
         self._phase = task.position[..., None] * per_link
         self._omega = task.velocity[..., None] * per_link
-        stiffness = np.array([d.mean_stiffness for d in joints.drives])
+        stiffness = _stiffness(task)
         inertia, omega = joints.link_inertia[..., None], self._omega
         spring = stiffness[:, None] + 1j * omega * joints.damping[..., None]
         # unit waves of the link, of the motor at the output side, and of its speed,
@@ -212,6 +212,15 @@ class LearningCompensation:
         new = new * np.minimum(1.0, self.limit / np.maximum(np.abs(new), 1e-300))
         self.learned = np.where(moving[..., None], new, self.learned)
         self.blocks += 1
+
+
+def _stiffness(task: Task) -> Array:
+    """Tangent of the known drives at the mean torque of the motion [N·m/rad]."""
+    found = []
+    for j, drive in enumerate(task.joints.drives):
+        torsion = drive.mean_torsion(float(task.link_torque[..., j].mean()))
+        found.append(float(drive.coefficients(torsion, 2)[0, 0]))
+    return np.array(found)
 
 
 def _sum(amplitudes: Complex, waves: Complex) -> Array:

@@ -1,0 +1,121 @@
+"""The ladder of controllers: specimens, the command, and what each rung is for."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from swgjoint.cli.main import main
+from swgjoint.maps.drive_map import DriveMap
+from swgjoint.study import control_ladder as study
+from swgjoint.study.control_ladder import RUNGS, UNITS, climb, ladder_claims
+from swgjoint.study.control_specimens import SYSTEMATIC, accuracy, specimen
+from swgjoint.units import arcmin
+
+CSG = DriveMap.from_catalogue("CSG-25-100")
+
+
+def harmonics(drive):
+    return {tuple(pq): pair for pq, pair in zip(drive.orders.tolist(),
+            drive.kinematic_error, strict=True)}  # fmt: skip
+
+
+def test_a_specimen_has_the_stated_accuracy():
+    """1 arcmin over one output turn, friction within a fifth, one seed one drive."""
+    one, two = specimen(CSG, 1), specimen(CSG, 2)
+    for drive in (one, two):
+        assert accuracy(drive) == pytest.approx(1.0 * arcmin, rel=1e-9)
+        share = drive.friction.coulomb / CSG.friction.coulomb
+        assert abs(share - 1.0) <= 0.2 and share != 1.0
+    np.testing.assert_array_equal(specimen(CSG, 1).kinematic_error, one.kinematic_error)
+    assert np.abs(one.kinematic_error - two.kinematic_error).max() > 0.1 * arcmin
+
+
+def test_the_random_part_has_a_seed_of_its_own():
+    """Another one leaves phases and ratios of the systematic part as they are."""
+    one, other = (harmonics(specimen(CSG, 1, random_seed=k)) for k in (0, 1))
+    scale = np.hypot(*other[(2, 0)]) / np.hypot(*one[(2, 0)])
+    assert scale == pytest.approx(1.0, abs=0.1)  # both fill the stated accuracy
+    for pq in SYSTEMATIC:
+        np.testing.assert_allclose(other[pq], scale * one[pq], rtol=1e-9)
+    assert not np.allclose(other[(7, 0)], scale * one[(7, 0)], rtol=0.1)
+
+
+def test_a_map_with_errors_keeps_their_size(synthetic_map):
+    """Phases are drawn, amplitudes of error and potential stay."""
+    drive = specimen(synthetic_map, 3)
+    for key in ("kinematic_error", "potential"):
+        sizes = [np.hypot(getattr(d, key)[:, 0], getattr(d, key)[:, 1])
+                 for d in (drive, synthetic_map)]  # fmt: skip
+        np.testing.assert_allclose(*sizes, rtol=1e-12, atol=1e-15)
+    assert not np.allclose(drive.kinematic_error, synthetic_map.kinematic_error)
+    np.testing.assert_array_equal(drive.potential[0], synthetic_map.potential[0])
+
+
+def test_each_rung_but_the_first_says_what_it_is_made_for():
+    """A figure of the table, over a rung that stands below it."""
+    names = [rung.name for rung in RUNGS]
+    assert RUNGS[0].made_for is None
+    for k, rung in enumerate(RUNGS[1:], start=1):
+        assert rung.made_for in UNITS and rung.over in names[:k]
+
+
+@pytest.fixture
+def short(monkeypatch):
+    """Two specimens and motions that are too short to tell much."""
+    fast = {
+        "kind": "constant_speed",
+        "speed_deg_s": {"joint": 80.0},
+        "settle_s": 0.5,
+    }
+    monkeypatch.setitem(study.MOTIONS, "slow", {
+        "trajectory": fast, "simulation": {"duration_s": 5.2}})  # fmt: skip
+    monkeypatch.setitem(study.MOTIONS, "even", {
+        "trajectory": fast, "simulation": {"duration_s": 1.0}})  # fmt: skip
+    monkeypatch.setattr(study, "SEEDS", 2)
+    monkeypatch.setattr(study, "climb", lambda drive, **keys: climb(
+        drive, seeds=2, rungs=("PD", "+ feed-forward"), **keys))  # fmt: skip
+
+
+def test_command_writes_table_picture_and_values(short, tmp_path, capsys):
+    """Rows for every rung and figure, values by seed, one line for each claim."""
+    arguments = ["--json", "--jobs", "1", "--out", str(tmp_path)]
+    assert main(["study", "control", *arguments]) == 0
+    out, err = capsys.readouterr()
+    found = json.loads(out)
+    assert len(found["rows"]) == 2 * len(UNITS)
+    made = [r for r in found["rows"] if r["reason"]]
+    assert [r["case"] for r in made] == ["CSG-25-100, + feed-forward"]
+    values = found["values"]["CSG-25-100"]["PD"]["tracking_rms"]
+    row = found["rows"][0]
+    assert row["ours"] == pytest.approx(np.mean(values))
+    assert row["spread"] == pytest.approx(np.std(values, ddof=1))
+    assert "better on 2 of 2" in found["summary"][-1]
+    assert sorted(p.name for p in tmp_path.iterdir()) == [
+        "control-CSG-25-100.png",
+        "control.json",
+    ]
+    assert "specimens" in err
+
+
+def test_ladder_of_a_drive_without_friction_or_errors(short):
+    """A linear map is drawn errors of the default accuracy; the rungs still run."""
+    linear = replace(CSG, friction=None)
+    found = study.climb(linear)
+    assert found.improvement(RUNGS[1])[1] == 2
+    assert len(ladder_claims(found)) == 1
+
+
+@pytest.mark.slow
+def test_each_rung_improves_what_it_is_made_for():
+    """On two specimens each; the issue's thirty percent and ten times included."""
+    found = climb(CSG, seeds=2, jobs=2)
+    for rung in RUNGS[1:]:
+        share, better = found.improvement(rung)
+        assert better == 2, (rung.name, share)
+    by = {rung.name: found.improvement(rung)[0] for rung in RUNGS[1:]}
+    assert by["+ kinematic error"] < 0.7
+    assert by["flexible joint, learning"] < 0.1
