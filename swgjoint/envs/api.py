@@ -110,14 +110,23 @@ class BatchEnv(VectorEnv[Array, Array, Array]):
     """Many episodes on the threads of the engine.
 
     An episode that has ended begins anew in the next step, whose action it ignores
-    (``AutoresetMode.NEXT_STEP``), as in gymnasium's own vector environments, with which
-    this one agrees to the last bit.
+    (``autoreset_mode`` ``NextStep``), or at once, its last observation in
+    ``info["final_obs"]`` (``SameStep``): as in gymnasium's own vector environments,
+    with which this one agrees to the last bit.
     """
 
-    def __init__(self, core: Core, metadata: dict[str, Any]) -> None:
+    def __init__(self, core: Core, autoreset_mode: str | AutoresetMode) -> None:
         """Put the interface in front of all episodes of a core."""
+        modes = (AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP)
+        if autoreset_mode not in (*modes, *(mode.value for mode in modes)):
+            raise InputError(
+                f"autoreset_mode {autoreset_mode!r}; accepted:"
+                f" {', '.join(mode.value for mode in modes)}"
+            )
+        mode = AutoresetMode(autoreset_mode)
+        self._same_step = mode is AutoresetMode.SAME_STEP
         self.core, self.num_envs = core, core.plant.batch.nsim
-        self.metadata = {**metadata, "autoreset_mode": AutoresetMode.NEXT_STEP}
+        self.metadata = {"render_modes": [], "autoreset_mode": mode}
         self.single_observation_space = _box(core.observation_entries)
         self.single_action_space = _box(core.action_entries)
         self.observation_space = batch_space(
@@ -158,18 +167,46 @@ class BatchEnv(VectorEnv[Array, Array, Array]):
     def step(self, actions: Array) -> tuple[Array, Array, Any, Any, dict[str, Any]]:
         """Hold actions over one control period. Shapes (n, ...)."""
         core, ended = self.core, self._ended
-        if not ended.any():
-            core.step(actions, None)
-            reward, broken, over = core.reward(), core.broken(), core.over
-        else:
-            core.step(actions, ~ended)
-            reward, broken, over = core.reward(), core.broken(), core.over
-            rows = np.flatnonzero(ended)
-            core.restart(rows.tolist(), [self._rngs[k] for k in rows])
+        some = bool(ended.any())
+        core.step(actions, ~ended if some else None)
+        reward, broken, over = core.reward(), core.broken(), core.over
+        if some:
+            self._restart(ended)
             reward[ended], broken[ended], over[ended] = 0.0, 0, False
         terminated = broken > 0
-        self._ended = terminated | over
-        return core.observation(), reward, terminated, over, self._info(broken)
+        done, further = terminated | over, {}
+        if not self._same_step:
+            self._ended = done
+        elif done.any():
+            further = self._final(done, self._info(broken))
+            self._restart(done)
+            broken = np.where(done, 0, broken)
+        info = further | self._info(broken)
+        return core.observation(), reward, terminated, over, info
+
+    def _final(self, done: NDArray[np.bool_], info: dict[str, Any]) -> dict[str, Any]:
+        """Last observations and infos of episodes that end, as gymnasium has them."""
+        last = self.core.observation()
+        final = np.full(self.num_envs, None, dtype=object)
+        for k in np.flatnonzero(done):
+            final[k] = last[k]
+        among = {
+            key: np.where(done.reshape(-1, *[1] * (value.ndim - 1)), value, 0)
+            for key, value in info.items()
+        }
+        for key in info:
+            if key.startswith("_"):
+                among[key] = done
+        return {
+            "final_obs": final,
+            "final_info": among,
+            "_final_obs": done,
+            "_final_info": done,
+        }
+
+    def _restart(self, ended: NDArray[np.bool_]) -> None:
+        rows = np.flatnonzero(ended)
+        self.core.restart(rows.tolist(), [self._rngs[k] for k in rows])
 
     def _info(self, broken: NDArray[np.int64]) -> dict[str, Any]:
         got: dict[str, Any] = self.core.info() | {"broken_limit": broken}

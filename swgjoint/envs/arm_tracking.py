@@ -8,6 +8,7 @@ from typing import Any
 
 import mujoco
 import numpy as np
+from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from swgjoint.envs.api import BatchEnv, SingleEnv
@@ -401,8 +402,13 @@ class ArmTrackingVectorEnv(BatchEnv):
 
     core: ArmCore
 
-    def __init__(self, num_envs: int = 1, threads: int = 0, **arguments: Any) -> None:
+    def __init__(
+        self,
+        num_envs: int = 1,
+        threads: int = 0,
+        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+        **arguments: Any,
+    ) -> None:
         """See :class:`ArmTrackingEnv` for the other arguments."""
         settings = settings_of(ArmSettings, arguments)
-        core = ArmCore(num_envs, threads, settings)
-        super().__init__(core, ArmTrackingEnv.metadata)
+        super().__init__(ArmCore(num_envs, threads, settings), autoreset_mode)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from swgjoint.envs.api import BatchEnv, SingleEnv
@@ -224,8 +225,13 @@ class JointTrackingVectorEnv(BatchEnv):
 
     core: TrackingCore
 
-    def __init__(self, num_envs: int = 1, threads: int = 0, **arguments: Any) -> None:
+    def __init__(
+        self,
+        num_envs: int = 1,
+        threads: int = 0,
+        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+        **arguments: Any,
+    ) -> None:
         """See :class:`JointTrackingEnv` for the other arguments."""
         settings = settings_of(TrackingSettings, arguments)
-        core = TrackingCore(num_envs, threads, settings)
-        super().__init__(core, JointTrackingEnv.metadata)
+        super().__init__(TrackingCore(num_envs, threads, settings), autoreset_mode)

@@ -25,6 +25,15 @@ from swgjoint.view.geometry import quaternion_xyzw, shape_of
 
 Array = NDArray[np.float64]
 
+SHOWN = (
+    "reward",
+    "tool_error_mm",
+    "link_error_arcmin",
+    "transmission_error_arcmin",
+    "output_torque_Nm",
+    "motor_torque_Nm",
+)
+"""Figures with a plot when a recording is opened; all others are in it, too."""
 POSE_RATE = 50.0
 """Poses per second [Hz]."""
 
@@ -119,7 +128,7 @@ def write_episode(
     handle, name = tempfile.mkstemp(dir=path.parent, suffix=".rrd.part")
     os.close(handle)
     beside = Path(name)
-    curves = list(dict.fromkeys(key.split("/")[0] for key in figures))
+    curves = [c for c in SHOWN if any(key.split("/")[0] == c for key in figures)]
     plots = [rrb.TimeSeriesView(origin=key, name=key) for key in curves]
     layout = rrb.Horizontal(
         rrb.Spatial3DView(origin="arm"), rrb.Vertical(*plots), column_shares=[2, 3]

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from swgjoint.envs.api import BatchEnv, SingleEnv
@@ -274,8 +275,13 @@ class RippleSuppressionVectorEnv(BatchEnv):
 
     core: RippleCore
 
-    def __init__(self, num_envs: int = 1, threads: int = 0, **arguments: Any) -> None:
+    def __init__(
+        self,
+        num_envs: int = 1,
+        threads: int = 0,
+        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+        **arguments: Any,
+    ) -> None:
         """See :class:`RippleSuppressionEnv` for the other arguments."""
         settings = settings_of(RippleSettings, arguments)
-        core = RippleCore(num_envs, threads, settings)
-        super().__init__(core, RippleSuppressionEnv.metadata)
+        super().__init__(RippleCore(num_envs, threads, settings), autoreset_mode)

@@ -12,6 +12,7 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv
 
 from swgjoint.envs import ENVIRONMENTS
 from swgjoint.envs.core import table
+from swgjoint.errors import InputError
 
 ALL = {"link_encoder": True, "torque_sensor": True}
 SHORT = {
@@ -30,8 +31,14 @@ def make(name, **keys):
 def same(got, want):
     """Two results of ``step`` or ``reset`` of vector environments, bit by bit."""
     assert got[-1].keys() == want[-1].keys()
-    for key in got[-1]:
-        np.testing.assert_array_equal(got[-1][key], want[-1][key], err_msg=key)
+    for key, value in got[-1].items():
+        if key == "final_info":
+            same((value,), (want[-1][key],))
+        elif key == "final_obs":
+            for a, b in zip(value, want[-1][key], strict=True):
+                np.testing.assert_array_equal(a, b)
+        else:
+            np.testing.assert_array_equal(value, want[-1][key], err_msg=key)
     for a, b in zip(got[:-1], want[:-1], strict=True):
         np.testing.assert_array_equal(a, b)
 
@@ -103,6 +110,28 @@ def test_batch_equals_single_environments(name, level):
         broken += int(got[2].sum())
     if name.endswith("JointTracking-v0"):
         assert ended >= 4 and broken >= 1
+
+
+def test_episodes_that_restart_at_once():
+    """In the other mode, too, the batch is gymnasium's, last observations included."""
+    name, count = "swgjoint/JointTracking-v0", 5
+    keys = {**SHORT[name], "randomise": True}
+    sync = SyncVectorEnv(
+        [lambda: make(name, **keys).unwrapped] * count,
+        autoreset_mode=AutoresetMode.SAME_STEP,
+    )
+    batch = gymnasium.make_vec(name, count, autoreset_mode="SameStep", **keys)
+    assert batch.metadata["autoreset_mode"] is AutoresetMode.SAME_STEP
+    batch.reset(seed=1), sync.reset(seed=1)
+    rng, size, ended = np.random.default_rng(0), np.linspace(0.02, 1.0, count), 0
+    for _ in range(600):
+        actions = size[:, None] * rng.uniform(-0.9, 0.9, (count, 1))
+        got, want = batch.step(actions), sync.step(actions)
+        same(got, want)
+        ended += int((got[2] | got[3]).sum())
+    assert ended >= 3
+    with pytest.raises(InputError, match="autoreset_mode 'Disabled'; accepted"):
+        gymnasium.make_vec(name, 1, autoreset_mode="Disabled")
 
 
 @NAMES
