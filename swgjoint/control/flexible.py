@@ -55,33 +55,18 @@ def flexible_plan(task: Task) -> MotorPlan:
     Raises:
         ComputationError: If a torque of the motion is not reached by the map.
     """
-    joints = task.joints
-    i, count = joints.ratio, len(task.position)
-    # (n, motions side by side, joints)
-    psi, psi_rate, torque = (
-        x.reshape(count, -1, i.size)
-        for x in (task.position, task.velocity, task.link_torque)
-    )
-    angle = np.stack(
-        [
-            np.stack(
-                [
-                    _motor_angle(
-                        drive,
-                        psi[:, m, j],
-                        psi_rate[:, m, j],
-                        torque[:, m, j],
-                        damping=float(joints.damping[..., j].reshape(-1)[0]),
-                        period=task.period,
-                    )
-                    for m in range(psi.shape[1])
-                ],
-                axis=-1,
-            )
-            for j, drive in enumerate(joints.drives)
-        ],
-        axis=-1,
-    ).reshape(task.position.shape)
+    joints, i = task.joints, task.joints.ratio
+    damping = np.broadcast_to(joints.damping, task.position.shape[1:])
+    angle = np.empty_like(task.position)
+    for j, drive in enumerate(joints.drives):
+        angle[..., j] = _motor_angle(
+            drive,
+            task.position[..., j],
+            task.velocity[..., j],
+            task.link_torque[..., j],
+            damping=damping[..., j],
+            period=task.period,
+        )
     _, ahead_rate, ahead_bend = _derivatives(angle - i * task.position, task.period)
     speed = i * task.velocity + ahead_rate
     bend = i * task.acceleration + ahead_bend
@@ -94,7 +79,7 @@ def flexible_plan(task: Task) -> MotorPlan:
             task.position[..., j],
             speed[..., j],
             task.velocity[..., j],
-            damping=joints.damping[..., j],
+            damping=damping[..., j],
         )
     wanted = joints.rotor_inertia * bend + on_motor
     wanted += known_friction(joints, speed, task.velocity, task.link_torque)
@@ -106,20 +91,21 @@ def motor_angle(drive: DriveMap, psi: Array, torque: Array) -> Array:
 
     Args:
         drive: Map.
-        psi: Output angles [rad]. Shape (n,).
-        torque: [N·m]. Shape (n,).
+        psi: Output angles [rad].
+        torque: [N·m]. Same shape.
 
     Returns:
-        [rad]. Shape (n,).
+        [rad]. Same shape.
 
     Raises:
         ComputationError: If the angles are not found.
     """
+    at, wanted = psi.reshape(-1), torque.reshape(-1)
     pieces = [
-        _solve(drive, psi[k : k + _CHUNK], torque[k : k + _CHUNK])
-        for k in range(0, psi.size, _CHUNK)
+        _solve(drive, at[k : k + _CHUNK], wanted[k : k + _CHUNK])
+        for k in range(0, at.size, _CHUNK)
     ]
-    return np.concatenate(pieces)
+    return np.concatenate(pieces).reshape(psi.shape)
 
 
 def _solve(drive: DriveMap, psi: Array, torque: Array) -> Array:
@@ -156,12 +142,12 @@ def _motor_angle(
     psi_rate: Array,
     torque: Array,
     *,
-    damping: float,
+    damping: Array,
     period: float,
 ) -> Array:
-    """Motor angles of one joint along a motion, damping included. Shape (n,)."""
+    """Motor angles of one joint along motions, damping included. Shape (n, ...)."""
     theta = motor_angle(drive, psi, torque)
-    for _ in range(ROUNDS if damping else 0):
+    for _ in range(ROUNDS if damping.any() else 0):
         theta_rate = (
             drive.ratio * psi_rate + _derivatives(theta - drive.ratio * psi, period)[1]
         )
@@ -177,7 +163,7 @@ def _input_torque(
     theta_rate: Array,
     psi_rate: Array,
     *,
-    damping: Array | float,
+    damping: Array,
 ) -> Array:
     """What the drive asks of the motor, potential and damping [N·m]."""
     shape = theta.shape
