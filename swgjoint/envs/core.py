@@ -20,6 +20,7 @@ from swgjoint.envs.loop import MotorLoop
 from swgjoint.envs.plant import Plant
 from swgjoint.envs.sensors import Readout, Sensors
 from swgjoint.envs.specimen import Tolerances
+from swgjoint.errors import InputError
 from swgjoint.joint.variation import Variation
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.controller import KnownJoints, Measured, Task
@@ -139,7 +140,7 @@ class Core(ABC):
         self.motor_torque = np.zeros((count, n))
         """The last one [N·m]."""
         self.output_torque = np.zeros((count, n))
-        """Of the drives [N·m]; 0 at a start."""
+        """Of the drives [N·m]."""
         self._low, self._high = bounds(self.observation_entries)
 
     # -- what an environment adds ---------------------------------------------
@@ -187,6 +188,8 @@ class Core(ABC):
 
     def restart(self, rows: Sequence[int], rngs: Sequence[np.random.Generator]) -> None:
         """Begin episodes of some simulations, each with its own generator."""
+        # new arrays: what was returned of the last step must not change
+        torque = self.output_torque.copy()
         for k, rng in zip(rows, rngs, strict=True):
             maps: tuple[DriveMap, ...] = tuple(d.drive for d in self.plant.drives)
             if self.tolerances is not None:
@@ -198,15 +201,14 @@ class Core(ABC):
                     maps = tuple(v.of(m) for v, m in zip(specimens, maps, strict=True))
             self._plan[self._planned[k]] = plan = self.draw(rng)
             self._normal[k] = rng.standard_normal(self._normal.shape[1:])
-            self.plant.place(k, *self.start(plan), maps)
+            angle, torque[k] = self.start(plan)
+            self.plant.place(k, angle, torque[k], maps)
         self._task = None
         index = np.asarray(rows, dtype=np.intp)
         self.instant[index] = 0
-        # new arrays: what was returned of the last step must not change
-        self.action, self.motor_torque, self.output_torque = (
-            _without(values, index)
-            for values in (self.action, self.motor_torque, self.output_torque)
-        )
+        self.output_torque = torque
+        self.action = _without(self.action, index)
+        self.motor_torque = _without(self.motor_torque, index)
         self._look()
         self._readout.start(index, self._true()[index], self._normal[index, 0])
         self.judge()
@@ -218,9 +220,19 @@ class Core(ABC):
         Args:
             action: Shape (n, n_actions); beyond its range it is limited.
             active: Episodes that go on; None: all. Shape (n,).
+
+        Raises:
+            InputError: If the action has another shape or is not finite.
         """
         plant, limit = self.plant, self.limits.motor_torque
-        self.action = np.clip(np.asarray(action, float), -1.0, 1.0)
+        action = np.asarray(action, float)
+        if action.shape != self.action.shape or not np.isfinite(action).all():
+            what = "not finite" if action.shape == self.action.shape else action.shape
+            raise InputError(
+                f"action: {what}; accepted: {self.action.shape[1]} finite numbers for"
+                f" each of {len(self.action)} episodes"
+            )
+        self.action = np.clip(action, -1.0, 1.0)
         command = self.command(self.action)
         plant.step(command, self.now[:, 3], active)
         self.instant += 1 if active is None else active

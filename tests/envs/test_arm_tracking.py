@@ -88,6 +88,19 @@ def test_a_torque_is_added_to_the_motors():
     )
 
 
+def test_sensors_know_the_load_from_the_first_instant():
+    """Torque sensors read the weight at the start, link encoders the sag."""
+    env = ArmTrackingEnv(sensors={"torque_sensor": True, "link_encoder": True})
+    observation, info = env.reset(seed=0)
+    read = env.measured(observation)
+    weight = env.task.link_torque[0]
+    np.testing.assert_allclose(info["output_torque_Nm"], weight, rtol=1e-3, atol=1e-4)
+    # noise of a thousandth of the rated torque, five of its deviations
+    np.testing.assert_allclose(read.output_torque, weight, atol=5.0 * 0.09)
+    assert np.abs(weight).max() > 10.0
+    np.testing.assert_allclose(read.link_angle, info["link_angle_rad"], atol=5e-5)
+
+
 @pytest.mark.parametrize(
     ("keys", "match"),
     [

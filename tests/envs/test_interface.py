@@ -112,6 +112,21 @@ def test_batch_equals_single_environments(name, level):
         assert ended >= 4 and broken >= 1
 
 
+@pytest.mark.parametrize(
+    ("action", "match"),
+    [
+        (np.array([np.nan]), "action: not finite; accepted: 1 finite numbers"),
+        (np.zeros(2), r"action: \(1, 2\); accepted: 1 finite numbers"),
+    ],
+)
+def test_an_action_that_is_none_is_refused(action, match):
+    """Neither the engine nor broadcasting makes something of it."""
+    env = make("swgjoint/JointTracking-v0").unwrapped
+    env.reset(seed=0)
+    with pytest.raises(InputError, match=match):
+        env.step(action)
+
+
 def test_episodes_that_restart_at_once():
     """In the other mode, too, the batch is gymnasium's, last observations included."""
     name, count = "swgjoint/JointTracking-v0", 5
