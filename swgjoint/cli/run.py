@@ -87,10 +87,11 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     from swgjoint.sim.run import run_scene
 
     scene, of_arm = _scene(args)
-    result = run_scene(scene, progress=args.progress)
+    recording = folder / "run.rrd" if folder is not None else None
+    result = run_scene(scene, recording=recording, progress=args.progress)
     files = []
     if folder is not None:
-        files.append(str(result.to_rerun(folder / "run.rrd")))
+        files.append(str(recording))
         if of_arm:
             from swgjoint.sim.scene_toml import scene_toml
 

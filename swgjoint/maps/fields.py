@@ -123,7 +123,7 @@ class DriveFields:
             Shapes (..., n_nodes, 3), (..., n_nodes), (..., 3), (..., 3), in the frames
             of the teeth.
         """
-        t = np.asarray(torque, dtype=float)
+        t = np.broadcast_to(np.asarray(torque, dtype=float), np.shape(place))
         j = np.clip(
             np.searchsorted(self.torque, t) - 1, 0, max(len(self.torque) - 2, 0)
         )
@@ -131,23 +131,24 @@ class DriveFields:
         step = self.torque[k] - self.torque[j]
         share = np.clip((t - self.torque[j]) / np.where(k > j, step, 1.0), 0.0, 1.0)
         count = self.displacement.shape[1]
-        corners: list[tuple[NDArray[np.int64], NDArray[np.int64], Table]] = []
+        corners: list[tuple[NDArray[np.int64], Table]] = []
         for row, weight in ((j, 1.0 - share), (k, share)):
             x = (np.asarray(place) - self.first_place[row]) / self.period * count
             low = np.floor(x)
             part, low = x - low, low.astype(np.int64) % count
             for at, w in ((low, 1.0 - part), ((low + 1) % count, part)):
-                corners.append((row, at, (weight * w).astype(np.float32)))
+                corners.append((row * count + at, (weight * w).astype(np.float32)))
 
         def between(table: Table) -> Table:
-            more = (1,) * (table.ndim - 2)
-            found: Table | None = None
-            for row, at, w in corners:
-                one = table[row, at]
-                one *= w.reshape(*w.shape, *more)
-                found = one if found is None else np.add(found, one, out=found)
-            assert found is not None
-            return found
+            samples = table.reshape(len(self.torque) * count, -1)
+            # fresh memory costs more than the sums: one more array for all corners
+            found = np.zeros((*t.shape, samples.shape[1]), dtype=np.float32)
+            one = np.empty_like(found)
+            for at, w in corners:
+                np.take(samples, at, axis=0, out=one, mode="clip")
+                one *= w[..., None]
+                found += one
+            return found.reshape(*t.shape, *table.shape[2:])
 
         return (
             between(self.displacement),
@@ -201,7 +202,8 @@ def _turned(vectors: Table, angle: Array) -> Table:
     """Vectors (..., 3) turned about z by angles (...) [rad]."""
     c, s = (f(angle).astype(np.float32) for f in (np.cos, np.sin))
     x, y = vectors[..., 0], vectors[..., 1]
-    turned = vectors.copy()
+    turned = np.empty_like(vectors)
     turned[..., 0] = c * x - s * y
     turned[..., 1] = s * x + c * y
+    turned[..., 2] = vectors[..., 2]
     return turned

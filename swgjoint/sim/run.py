@@ -128,6 +128,7 @@ def run_scene(
     controller: Controller | None = None,
     known_drives: Mapping[str, DriveMap] | None = None,
     name: str | None = None,
+    recording: str | Path | None = None,
     progress: Progress = silent,
 ) -> Run:
     """Simulate a scene from an equilibrium to its end.
@@ -148,6 +149,8 @@ def run_scene(
         known_drives: What that controller takes the drives of some joints for; others
             are told as they are simulated.
         name: What recordings and progress call the run; default: the scene's name.
+        recording: File that receives the recording for the viewer, like
+            :meth:`Run.to_rerun` but begun while the steps are taken.
         progress: Called with the steps done.
 
     Raises:
@@ -169,7 +172,20 @@ def run_scene(
         loop = GivenLoop(assembly, controller, task_of(assembly, known_drives))
     elif known_drives:
         raise InputError("known_drives without controller; accepted: both or none")
-    return simulate(assembly, name=name or scene.name, loop=loop, progress=progress)
+    name = name or scene.name
+    if recording is None:
+        return simulate(assembly, name=name, loop=loop, progress=progress)
+    from swgjoint.view.recording import Recorder
+
+    with Recorder(assembly, recording) as recorder:
+
+        def going(label: str, done: int, total: int) -> None:
+            recorder.begin()
+            progress(label, done, total)
+
+        run = simulate(assembly, name=name, loop=loop, progress=going)
+        recorder.finish(run)
+    return run
 
 
 def simulate(

@@ -7,36 +7,34 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from swgjoint.sim.metrics import (
-    highest_resolved_order,
-    strongest_left_out,
-    torque_deviation,
-)
+from swgjoint.sim.metrics import strongest_left_out, torque_deviation
 from swgjoint.view.drive_view import drive_path, drives_shown, eye, fields_of
-from swgjoint.view.joint_pictures import WIDTH, phase_scales
+from swgjoint.view.joint_pictures import WIDTH
 
 if TYPE_CHECKING:
+    from swgjoint.sim.assembly import Assembly
     from swgjoint.sim.run import Run
+    from swgjoint.sim.transmission import Transmission
 
 BACKGROUND = (30, 33, 38)
 SPACING = 0.75
 """Distance between the arms of several runs [m]."""
 
 
-def blueprint_of(runs: Mapping[str, Run], joints: list[str] | None = None) -> Any:
+def blueprint_of(scenes: Mapping[str, Assembly], joints: list[str]) -> Any:
     """Layout for runs of one motion, see :func:`swgjoint.view.recording`.
 
     Args:
-        runs: Runs by name.
-        joints: In the order of their tabs; that of :func:`joints_by_interest` if None.
+        scenes: What was or will be run, by the name of the run.
+        joints: In the order of their tabs.
     """
     import rerun.blueprint as rrb
 
-    joints = joints_by_interest(runs) if joints is None else joints
-    first = next(iter(runs.values()))
-    prefixes = {label: f"/{label}/" if label else "/" for label in runs}
+    first = next(iter(scenes.values()))
+    prefixes = {label: f"/{label}/" if label else "/" for label in scenes}
     # torsion and error of a rigid arm are a line at zero that would set the scale
-    flexible = [label for label, run in runs.items() if not is_rigid(run)] or list(runs)
+    flexible = [k for k, scene in scenes.items() if not all_rigid(scene)]
+    flexible = flexible or list(scenes)
 
     def plot(joint: str, title: str, signal: str, labels: Iterable[str]) -> Any:
         paths = [f"{prefixes[label]}joint/{joint}" for label in labels]
@@ -49,7 +47,7 @@ def blueprint_of(runs: Mapping[str, Run], joints: list[str] | None = None) -> An
     for joint in joints:
         j = first.joints.index(joint)
         pictures = []
-        if any(highest_resolved_order(run, j) for run in runs.values()):
+        if any(scene.trajectory.steady_velocity[j] for scene in scenes.values()):
             bars = [
                 f"{prefixes[label]}joint/{joint}/ripple_orders" for label in flexible
             ]
@@ -58,10 +56,10 @@ def blueprint_of(runs: Mapping[str, Run], joints: list[str] | None = None) -> An
                 rrb.BarChartView(
                     name=title,
                     contents=[f"+ {path}" for path in bars],
-                    plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.LeftTop),
+                    plot_legend=_legend(bars, rrb.Corner2D.LeftTop),
                 )
             )
-        if phase_scales(runs, j) is not None:
+        if any(has_torsion(scene.transmissions[j]) for scene in scenes.values()):
             pictures.append(
                 rrb.Spatial2DView(
                     name="torque against torsion",
@@ -75,32 +73,32 @@ def blueprint_of(runs: Mapping[str, Run], joints: list[str] | None = None) -> An
         views = [
             plot(joint, "torsion [arcmin]", "torsion_arcmin", flexible),
             plot(joint, error, "transmission_error_arcmin", flexible),
-            plot(joint, "output torque [N·m]", "output_torque_Nm", runs),
+            plot(joint, "output torque [N·m]", "output_torque_Nm", scenes),
             plot(joint, rest, "torque_deviation_Nm", flexible),
             *pictures,
         ]
         name = joint.removesuffix("_joint")
         tabs.append(rrb.Grid(*views, grid_columns=2, name=name))
     right: list[Any] = [rrb.Tabs(*tabs, active_tab=0)]
-    if first.tool_position.shape[1]:
+    if first.arm.tool >= 0:
         paths = [f"{prefixes[label]}tool/error_mm" for label in flexible]
         right.append(_plot("tool error [mm]", paths))
     left: list[Any] = [
         rrb.Spatial3DView(
-            name=f"{first.assembly.scene.name}",
+            name=first.scene.name,
             contents=[
                 *(f"+ {p}**" for p in prefixes.values()),
                 "- /drive/**",
                 "- /phase/**",
             ],
-            eye_controls=_eye(runs),
+            eye_controls=_eye(scenes),
             line_grid=True,
             background=BACKGROUND,
         )
     ]
     drives = [
-        _drive(runs[label], joint, label)
-        for label, joint in drives_shown(runs, joints).items()
+        _drive(scenes[label], joint, label)
+        for label, joint in drives_shown(scenes, joints).items()
     ]
     if drives:
         left.append(rrb.Tabs(*drives, active_tab=0))
@@ -119,8 +117,39 @@ def blueprint_of(runs: Mapping[str, Run], joints: list[str] | None = None) -> An
 
 
 def is_rigid(run: Run) -> bool:
-    """Whether no joint of a run has torsion."""
-    return all(t.level == "rigid" for t in run.assembly.transmissions)
+    """Whether every joint of a run is rigid."""
+    return all_rigid(run.assembly)
+
+
+def all_rigid(assembly: Assembly) -> bool:
+    """Whether every joint of a scene is rigid."""
+    return all(t.level == "rigid" for t in assembly.transmissions)
+
+
+def has_torsion(transmission: Transmission) -> bool:
+    """Whether there is a spring between motor and link."""
+    return transmission.law is not None
+
+
+def joints_by_load(scenes: Mapping[str, Assembly]) -> list[str]:
+    """Joints, the one first whose drive is loaded most on the commanded motion.
+
+    The load is the largest torque of the rigid arm over the rated torque. A joint whose
+    strongest order is left out comes after those that show theirs. All of this is known
+    before a run.
+    """
+    first = next(iter(scenes.values()))
+
+    def key(j: int) -> tuple[bool, float]:
+        drives = [scene.transmissions[j] for scene in scenes.values()]
+        load = max(
+            float(np.abs(scene.link_torque[:, j]).max())
+            / scene.transmissions[j].drive.ratings.rated_torque
+            for scene in scenes.values()
+        )
+        return any(strongest_left_out(drive) for drive in drives), -load
+
+    return [first.joints[j] for j in sorted(range(len(first.joints)), key=key)]
 
 
 def joints_by_interest(runs: Mapping[str, Run]) -> list[str]:
@@ -170,15 +199,23 @@ def _plot(title: str, paths: list[str], signal: str | None = None) -> Any:
         name=title,
         contents=[f"+ {path}" for path in paths],
         overrides=drawn,
+        plot_legend=_legend(paths, rrb.Corner2D.RightTop),
         axis_x=rrb.TimeAxis(link=rrb.components.LinkAxis.LinkToGlobal),
     )
 
 
-def _drive(run: Run, joint: str, label: str) -> Any:
+def _legend(paths: list[str], corner: Any) -> Any:
+    """Where the legend is put; as it comes where there is one line only."""
+    import rerun.blueprint as rrb
+
+    return rrb.PlotLegend(corner=corner) if len(paths) > 1 else None
+
+
+def _drive(assembly: Assembly, joint: str, label: str) -> Any:
     """The drive of a joint, seen along its axis."""
     import rerun.blueprint as rrb
 
-    fields = fields_of(run, joint)
+    fields = fields_of(assembly, joint)
     assert fields is not None
     name = f"drive of {joint.removesuffix('_joint')}"
     return rrb.Spatial3DView(
@@ -191,14 +228,13 @@ def _drive(run: Run, joint: str, label: str) -> Any:
     )
 
 
-def _eye(runs: Mapping[str, Run]) -> Any:
+def _eye(scenes: Mapping[str, Assembly]) -> Any:
     """Camera that sees all arms: from the front, a little to the side and above."""
     import rerun.blueprint as rrb
 
-    first = next(iter(runs.values()))
-    model = first.assembly.arm.model
+    model = next(iter(scenes.values())).arm.model
     reach = max(0.4, float(model.stat.extent))
-    distance = 1.1 * reach + 0.42 * SPACING * (len(runs) - 1)
+    distance = 1.1 * reach + 0.42 * SPACING * (len(scenes) - 1)
     target = [0.25 * reach, 0.0, 0.28 * reach]
     return rrb.EyeControls3D(
         position=[

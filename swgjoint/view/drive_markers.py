@@ -16,6 +16,7 @@ from swgjoint.view.columns import Column
 from swgjoint.view.geometry import quaternion_xyzw
 
 if TYPE_CHECKING:
+    from swgjoint.sim.assembly import Assembly
     from swgjoint.sim.run import Run
 
 RADIUS = 0.03
@@ -27,20 +28,20 @@ WIDTH = 0.35
 _SCALE = np.array([[44, 160, 44], [240, 200, 30], [214, 39, 40]], dtype=float)
 
 
-def log_drives(stream: Any, prefix: str, run: Run) -> None:
+def log_drives(stream: Any, prefix: str, assembly: Assembly) -> None:
     """A collar for every driven joint, on the body that the joint moves.
 
     Args:
         stream: The recording.
         prefix: Path of the run, with a slash at its end or empty.
-        run: The run.
+        assembly: Of the run.
     """
     import rerun as rr
 
-    model = run.assembly.arm.model
+    model = assembly.arm.model
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    for name, path in zip(run.joints, _paths(prefix, run), strict=True):
+    for name, path in zip(assembly.joints, _paths(prefix, assembly), strict=True):
         joint = model.joint(name).id
         radius = PROUD * housing_radius(model, data, joint)
         disc = rr.Cylinders3D(
@@ -58,7 +59,7 @@ def log_drives(stream: Any, prefix: str, run: Run) -> None:
 def send_loads(
     stream: Any, prefix: str, run: Run, time: Any, rows: NDArray[np.intp]
 ) -> None:
-    """Colours of the collars at some samples; arguments as for :func:`log_drives`.
+    """Colours of the collars at some samples.
 
     Args:
         stream: The recording.
@@ -69,7 +70,7 @@ def send_loads(
     """
     import rerun as rr
 
-    for j, path in enumerate(_paths(prefix, run)):
+    for j, path in enumerate(_paths(prefix, run.assembly)):
         peak = run.assembly.transmissions[j].drive.ratings.repeated_peak
         share = np.abs(run.output_torque[rows, j]) / peak
         colors = load_color(share)
@@ -77,11 +78,11 @@ def send_loads(
         stream.send_columns(path, indexes=[time], columns=[column])
 
 
-def _paths(prefix: str, run: Run) -> list[str]:
-    model = run.assembly.arm.model
+def _paths(prefix: str, assembly: Assembly) -> list[str]:
+    model = assembly.arm.model
     return [
         f"{prefix}arm/{model.body(model.joint(name).bodyid[0]).name}/drive/{name}"
-        for name in run.joints
+        for name in assembly.joints
     ]
 
 

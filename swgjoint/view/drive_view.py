@@ -28,6 +28,7 @@ from swgjoint.units import MPa
 from swgjoint.view.columns import Column
 
 if TYPE_CHECKING:
+    from swgjoint.sim.assembly import Assembly
     from swgjoint.sim.run import Run
 
 Array = NDArray[np.float64]
@@ -47,22 +48,22 @@ def drive_path(joint: str, label: str) -> str:
     return f"drive/{joint}/{label}" if label else f"drive/{joint}"
 
 
-def drives_shown(runs: Mapping[str, Run], joints: list[str]) -> dict[str, str]:
+def drives_shown(scenes: Mapping[str, Assembly], joints: list[str]) -> dict[str, str]:
     """The joint whose drive is drawn, by run: the first of these that has fields."""
     for joint in joints:
         found = {
             label: joint
-            for label, run in runs.items()
-            if fields_of(run, joint) is not None
+            for label, assembly in scenes.items()
+            if fields_of(assembly, joint) is not None
         }
         if found:
             return found
     return {}
 
 
-def fields_of(run: Run, joint: str) -> DriveFields | None:
+def fields_of(assembly: Assembly, joint: str) -> DriveFields | None:
     """Fields of the drive of a joint; None where its map has none, or it is rigid."""
-    transmission = run.assembly.transmissions[run.joints.index(joint)]
+    transmission = assembly.transmissions[assembly.joints.index(joint)]
     return None if transmission.level == "rigid" else transmission.drive.fields
 
 
@@ -74,7 +75,7 @@ def frames_of(run: Run, joint: str, rows: NDArray[np.intp]) -> NDArray[np.intp]:
         joint: One whose drive has fields.
         rows: Samples at which the arm is drawn.
     """
-    fields = fields_of(run, joint)
+    fields = fields_of(run.assembly, joint)
     assert fields is not None
     teeth = run.assembly.transmissions[run.joints.index(joint)].drive.teeth_flexspline
     each = teeth * (16 * len(fields.points) + 48)
@@ -99,11 +100,11 @@ def angles(layout: str, theta: Array, psi: Array) -> tuple[Array, Array, Array]:
     }[layout]
 
 
-def log_drive(stream: Any, path: str, run: Run, joint: str) -> None:
+def log_drive(stream: Any, path: str, assembly: Assembly, joint: str) -> None:
     """What of a drive does not change; arguments as for :func:`send_drive`."""
     import rerun as rr
 
-    drive = run.assembly.transmissions[run.joints.index(joint)].drive
+    drive = assembly.transmissions[assembly.joints.index(joint)].drive
     fields = drive.fields
     assert fields is not None
     parts, n = fields.repeats(drive.teeth_flexspline), len(fields.points)

@@ -83,15 +83,22 @@ def phase_points(
     return np.column_stack([x, -run.output_torque[rows, j] / scales[1]])
 
 
-def log_phase_frame(stream: Any, joint: str, scales: tuple[float, float]) -> None:
-    """Axes of the picture of one joint, with the values at their ends."""
+def log_phase_axes(stream: Any, joint: str) -> None:
+    """Axes of the picture of one joint."""
+    import rerun as rr
+
+    axes = [[[-WIDTH, 0.0], [WIDTH, 0.0]], [[0.0, 1.0], [0.0, -1.0]]]
+    strips = rr.LineStrips2D(axes, colors=[_FRAME], radii=[0.004])
+    stream.log(f"phase/{joint}/axes", strips, static=True)
+
+
+def log_phase_ends(stream: Any, joint: str, scales: tuple[float, float]) -> None:
+    """Values at the ends of the axes."""
     import rerun as rr
 
     torsion, torque = scales
-    axes = [[[-WIDTH, 0.0], [WIDTH, 0.0]], [[0.0, 1.0], [0.0, -1.0]]]
     stream.log(
-        f"phase/{joint}/axes",
-        rr.LineStrips2D(axes, colors=[_FRAME], radii=[0.004]),
+        f"phase/{joint}/ends",
         rr.Points2D(
             [[WIDTH, 0.0], [0.0, -1.0]],
             labels=[f"{torsion:.3g} arcmin", f"{torque:.3g} N·m"],
@@ -116,13 +123,19 @@ def log_phase_path(
     scales: tuple[float, float],
     color: tuple[int, int, int],
 ) -> None:
-    """Torque against torsion of one run, and the look of the point that moves."""
+    """Torque against torsion of one run."""
     import rerun as rr
 
     thinned = slice(None, None, -(-run.time.size // _POINTS))
     points = phase_points(run, j, scales, thinned)
     line = rr.LineStrips2D([points], colors=[color], radii=[0.004])
     stream.log(f"{path}/path", line, static=True)
+
+
+def log_phase_point(stream: Any, path: str, color: tuple[int, int, int]) -> None:
+    """Look of the point that moves."""
+    import rerun as rr
+
     point = rr.Points2D.from_fields(radii=[0.03], colors=[color])
     stream.log(f"{path}/now", point, static=True)
 

@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.errors import InputError
-from swgjoint.view.blueprint import blueprint_of, joints_by_interest
+from swgjoint.view.blueprint import blueprint_of, joints_by_load
 from swgjoint.view.drive_view import drives_shown
-from swgjoint.view.recording import log_moving, log_still, stream_name
+from swgjoint.view.recording import log_known, log_measured, log_moving, stream_name
 from swgjoint.view.viewer import LOOPBACK, start_viewer, wait_for
 
 if TYPE_CHECKING:
@@ -63,11 +63,13 @@ def stream_runs(
     if url is None:
         process, url = start_viewer()
     wait_for(loopback_port(url), process)
-    stream = rr.RecordingStream(stream_name(runs))
-    joints = joints_by_interest(runs)
-    stream.connect_grpc(url, default_blueprint=blueprint_of(runs, joints))
-    drives = drives_shown(runs, joints)
-    log_still(stream, runs, drives=drives)
+    scenes = {label: run.assembly for label, run in runs.items()}
+    stream = rr.RecordingStream(stream_name(scenes))
+    joints = joints_by_load(scenes)
+    stream.connect_grpc(url, default_blueprint=blueprint_of(scenes, joints))
+    drives = drives_shown(scenes, joints)
+    log_known(stream, scenes, drives=drives)
+    log_measured(stream, runs)
     time_of = next(iter(runs.values())).time
     begin = time.monotonic()
     for part in _parcels(time_of, None if pace is None else pace * PART_S):

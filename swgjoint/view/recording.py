@@ -30,7 +30,8 @@ from __future__ import annotations
 import contextlib
 import os
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -39,7 +40,7 @@ from numpy.typing import NDArray
 
 from swgjoint.sim.metrics import torque_deviation
 from swgjoint.units import arcmin, deg, mm
-from swgjoint.view.blueprint import SPACING, blueprint_of, joints_by_interest
+from swgjoint.view.blueprint import SPACING, blueprint_of, has_torsion, joints_by_load
 from swgjoint.view.columns import Column
 from swgjoint.view.drive_markers import log_drives, send_loads
 from swgjoint.view.drive_view import (
@@ -51,8 +52,10 @@ from swgjoint.view.drive_view import (
 )
 from swgjoint.view.geometry import quaternion_xyzw, shape_of
 from swgjoint.view.joint_pictures import (
-    log_phase_frame,
+    log_phase_axes,
+    log_phase_ends,
     log_phase_path,
+    log_phase_point,
     phase_path,
     phase_points,
     phase_scales,
@@ -61,6 +64,7 @@ from swgjoint.view.joint_pictures import (
 )
 
 if TYPE_CHECKING:
+    from swgjoint.sim.assembly import Assembly
     from swgjoint.sim.run import Run
 
 Array = NDArray[np.float64]
@@ -94,35 +98,94 @@ def write_recording(
     Returns:
         The path.
     """
-    import rerun as rr
+    with _whole(Path(path)) as beside:
+        scenes = {label: run.assembly for label, run in runs.items()}
+        stream, drives = _begin(beside, scenes)
+        log_moving(stream, runs, rigid=rigid, drives=drives)
+        log_measured(stream, runs)
+        stream.flush()
+        stream.disconnect()
+    return Path(path)
 
-    path = Path(path)
+
+class Recorder:
+    """A recording of one run that begins while the run goes on.
+
+    Layout and shapes are known before: they are sent beside the steps, which the engine
+    takes without Python. Used as a context, the file is there whole after it, or not at
+    all.
+    """
+
+    def __init__(self, assembly: Assembly, path: str | Path) -> None:
+        """Nothing is written yet.
+
+        Args:
+            assembly: The scene that is going to be run.
+            path: File to write; its folder is made.
+        """
+        self._scenes = {"": assembly}
+        self._stack = contextlib.ExitStack()
+        self._path = Path(path)
+
+    def __enter__(self) -> Recorder:
+        """Make the file."""
+        self._beside = self._stack.enter_context(_whole(self._path))
+        self._begun: Future[tuple[Any, dict[str, str]]] | None = None
+        self._thread = self._stack.enter_context(ThreadPoolExecutor(1))
+        return self
+
+    def begin(self) -> None:
+        """Start to send what is known; once, however often it is called."""
+        if self._begun is None:
+            self._begun = self._thread.submit(_begin, self._beside, self._scenes)
+
+    def finish(self, run: Run) -> None:
+        """Send the rest when the run is done."""
+        self.begin()
+        assert self._begun is not None
+        stream, drives = self._begun.result()
+        runs = {"": run}
+        log_moving(stream, runs, drives=drives)
+        log_measured(stream, runs)
+        stream.flush()
+        stream.disconnect()
+
+    def __exit__(self, *failure: Any) -> bool | None:
+        """Put the file in its place, or remove it after a failure."""
+        return self._stack.__exit__(*failure)
+
+
+@contextlib.contextmanager
+def _whole(path: Path) -> Iterator[Path]:
+    """A file beside the path that takes its place at the end if nothing fails."""
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, name = tempfile.mkstemp(dir=path.parent, suffix=".rrd.part")
     os.close(handle)
     beside = Path(name)
     try:
-        stream = rr.RecordingStream(stream_name(runs))
-        joints = joints_by_interest(runs)
-        stream.save(beside, default_blueprint=blueprint_of(runs, joints))
-        # the bulk first: rerun encodes it while the rest is put together
-        drives = drives_shown(runs, joints)
-        log_moving(stream, runs, rigid=rigid, drives=drives)
-        log_still(stream, runs, drives=drives)
-        stream.flush()
-        stream.disconnect()
+        yield beside
         beside.chmod(0o644)
         os.replace(beside, path)
     finally:
         with contextlib.suppress(FileNotFoundError):
             beside.unlink()
-    return path
 
 
-def stream_name(runs: Mapping[str, Run]) -> str:
-    """What the viewer calls a recording of these runs."""
-    first = next(iter(runs.values()))
-    return f"swgjoint {first.assembly.scene.name}"
+def _begin(path: Path, scenes: Mapping[str, Assembly]) -> tuple[Any, dict[str, str]]:
+    """The recording with what is known before the runs, and the drives it shows."""
+    import rerun as rr
+
+    stream = rr.RecordingStream(stream_name(scenes))
+    joints = joints_by_load(scenes)
+    stream.save(path, default_blueprint=blueprint_of(scenes, joints))
+    drives = drives_shown(scenes, joints)
+    log_known(stream, scenes, drives=drives)
+    return stream, drives
+
+
+def stream_name(scenes: Mapping[str, Assembly]) -> str:
+    """What the viewer calls a recording of these scenes."""
+    return f"swgjoint {next(iter(scenes.values())).scene.name}"
 
 
 def signals_of(run: Run, j: int) -> dict[str, Array]:
@@ -145,28 +208,23 @@ def signal(name: str) -> Any:
     return rr.ComponentDescriptor(name, component_type="rerun.components.Scalar")
 
 
-def log_still(
-    stream: Any, runs: Mapping[str, Run], *, drives: Mapping[str, str]
+def log_known(
+    stream: Any, scenes: Mapping[str, Assembly], *, drives: Mapping[str, str]
 ) -> None:
-    """What does not change: shapes, paths, spectra, style of the lines.
+    """What is known before the runs: shapes, style of the lines.
 
     Args:
         stream: The recording.
-        runs: Runs by name.
+        scenes: By the name of the run.
         drives: Of :func:`swgjoint.view.drive_view.drives_shown`.
     """
     import rerun as rr
 
-    first = next(iter(runs.values()))
-    scales = {name: phase_scales(runs, j) for j, name in enumerate(first.joints)}
-    for joint, of_joint in scales.items():
-        if of_joint is not None:
-            log_phase_frame(stream, joint, of_joint)
-    for k, (label, run) in enumerate(runs.items()):
+    for k, (label, assembly) in enumerate(scenes.items()):
         prefix, color = prefix_of(label), color_of_run(k)
-        if len(runs) > 1:
+        if len(scenes) > 1:
             # side by side: their differences are far below what an overlay could show
-            place = [0.0, SPACING * (0.5 * (len(runs) - 1) - k), 0.0]
+            place = [0.0, SPACING * (0.5 * (len(scenes) - 1) - k), 0.0]
             stream.log(label, rr.Transform3D(translation=place), static=True)
             stream.log(
                 f"{prefix}label",
@@ -179,10 +237,43 @@ def log_still(
                 ),
                 static=True,
             )
-        _log_shapes(stream, prefix, run, color)
-        for j, joint in enumerate(run.joints):
+        _log_shapes(stream, prefix, assembly)
+        for joint, transmission in zip(
+            assembly.joints, assembly.transmissions, strict=True
+        ):
             style = _style(label or joint, color)
             stream.log(f"{prefix}joint/{joint}", style, static=True)
+            if has_torsion(transmission):
+                log_phase_axes(stream, joint)
+                log_phase_point(stream, phase_path(joint, label), color)
+        if assembly.arm.tool >= 0:
+            style = _style(label or "tool", color)
+            stream.log(f"{prefix}tool/error_mm", style, static=True)
+    for label, joint in drives.items():
+        log_drive(stream, drive_path(joint, label), scenes[label], joint)
+
+
+def log_measured(stream: Any, runs: Mapping[str, Run]) -> None:
+    """What does not change and follows from the runs: paths and spectra.
+
+    Args:
+        stream: The recording.
+        runs: Runs by name.
+    """
+    import rerun as rr
+
+    first = next(iter(runs.values()))
+    scales = {name: phase_scales(runs, j) for j, name in enumerate(first.joints)}
+    for joint, of_joint in scales.items():
+        if of_joint is not None:
+            log_phase_ends(stream, joint, of_joint)
+    for k, (label, run) in enumerate(runs.items()):
+        prefix, color = prefix_of(label), color_of_run(k)
+        if run.tool_reference.shape[1]:
+            commanded = run.tool_reference[pose_rows(run)]
+            strip = rr.LineStrips3D([commanded], colors=[color], radii=[0.0025])
+            stream.log(f"{prefix}tool/path", strip, static=True)
+        for j, joint in enumerate(run.joints):
             bars = ripple_bars(run, j)
             if bars is not None:
                 stream.log(
@@ -193,11 +284,6 @@ def log_still(
             if (of_joint := scales[joint]) is not None:
                 path = phase_path(joint, label)
                 log_phase_path(stream, path, run, j, of_joint, color)
-        if run.tool_position.shape[1]:
-            style = _style(label or "tool", color)
-            stream.log(f"{prefix}tool/error_mm", style, static=True)
-    for label, joint in drives.items():
-        log_drive(stream, drive_path(joint, label), runs[label], joint)
 
 
 def log_moving(
@@ -225,6 +311,14 @@ def log_moving(
     inside[part] = True
     rows = np.array([row for row in pose_rows(first) if inside[row]], dtype=np.intp)
     at_rows = rr.TimeColumn(TIMELINE, duration=first.time[rows])
+    # the bulk first: rerun encodes it while the rest is put together
+    for label, joint in drives.items():
+        run = runs[label]
+        drawn = np.intersect1d(frames_of(run, joint, pose_rows(run)), rows)
+        if drawn.size:
+            at_drawn = rr.TimeColumn(TIMELINE, duration=run.time[drawn])
+            path = drive_path(joint, label)
+            send_drive(stream, path, run, joint, at_drawn, drawn)
     for label, run in runs.items():
         prefix = prefix_of(label)
         if rows.size:
@@ -248,13 +342,6 @@ def log_moving(
             stream.send_columns(
                 f"{prefix}tool/error_mm", indexes=[time], columns=[column]
             )
-    for label, joint in drives.items():
-        run = runs[label]
-        drawn = np.intersect1d(frames_of(run, joint, pose_rows(run)), rows)
-        if drawn.size:
-            at_drawn = rr.TimeColumn(TIMELINE, duration=run.time[drawn])
-            path = drive_path(joint, label)
-            send_drive(stream, path, run, joint, at_drawn, drawn)
 
 
 def prefix_of(label: str) -> str:
@@ -279,13 +366,11 @@ def _style(name: str, color: tuple[int, int, int]) -> Any:
     )
 
 
-def _log_shapes(
-    stream: Any, prefix: str, run: Run, color: tuple[int, int, int]
-) -> None:
-    """Shapes of the arm and its drives, path of the tool."""
+def _log_shapes(stream: Any, prefix: str, assembly: Assembly) -> None:
+    """Shapes of the arm and its drives."""
     import rerun as rr
 
-    model = run.assembly.arm.model
+    model = assembly.arm.model
     for geom in range(model.ngeom):
         shape = shape_of(model, geom)
         if shape is None:
@@ -297,14 +382,7 @@ def _log_shapes(
             quaternion=quaternion_xyzw(model.geom_quat[geom]),
         )
         stream.log(path, shape, place, static=True)
-    log_drives(stream, prefix, run)
-    if run.tool_reference.shape[1]:
-        commanded = run.tool_reference[pose_rows(run)]
-        stream.log(
-            f"{prefix}tool/path",
-            rr.LineStrips3D([commanded], colors=[color], radii=[0.0025]),
-            static=True,
-        )
+    log_drives(stream, prefix, assembly)
 
 
 def _send_poses(

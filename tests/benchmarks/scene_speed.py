@@ -1,8 +1,10 @@
 """Speed of whole scenes against real time: python tests/benchmarks/scene_speed.py.
 
 Assembly, start, steps, signals and the recording that is written, with the maps at hand
-and all modules imported; CPU time of the process on one core, the median of some runs.
-Not a test: nothing is asserted.
+and all modules imported; medians of some runs. What a recording adds is told as a share
+of the run without one: CPU time of the process, and wall time where the recording is
+begun during the run (``run_scene(recording=...)``), which takes a second core if there
+is one (``taskset -c 0`` denies it). Not a test: nothing is asserted.
 """
 
 from __future__ import annotations
@@ -27,9 +29,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("scenes", nargs="*", default=DEFAULT)
     parser.add_argument("--runs", type=int, default=5)
+    parser.add_argument("--duration", type=float, help="of every scene [s]")
     parser.add_argument("--json", action="store_true")
     args = parser.parse_args()
-    rows = [measure(name, args.runs) for name in args.scenes]
+    rows = [measure(name, args.runs, args.duration) for name in args.scenes]
     if args.json:
         print(json.dumps(rows))
         return
@@ -39,28 +42,35 @@ def main() -> None:
             f" {row['with_recording']:5.1f} times real time with its recording"
             f" ({row['file_MB']:.1f} MB), {row['without']:5.1f} without,"
             f" {row['metrics_s']:.2f} s for the metrics,"
-            f" {row['steps_per_s']:.3g} steps/s"
+            f" {row['steps_per_s']:.3g} steps/s; the recording adds"
+            f" {100 * row['recording_cpu_share']:.0f} % of CPU time,"
+            f" {100 * row['recording_wall_share']:.0f} % of wall time beside the run"
         )
 
 
-def measure(name: str, runs: int) -> dict[str, float | str]:
-    """CPU times of one scene."""
-    scene = Scene.load_file(name)
+def measure(name: str, runs: int, duration: float | None) -> dict[str, float | str]:
+    """Times of one scene, with and without its recording in turn."""
+    changes = {} if duration is None else {"simulation.duration_s": duration}
+    scene = Scene.load_file(name, changes)
     named = {section.drive for section in (scene.defaults, *scene.joints.values())}
     drives = {drive: load_drive(drive) for drive in named if drive}
-    times, speeds = [], []
+    times, shares, speeds = [], [], []
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "run.rrd"
         for k in range(runs + 1):
-            begin = time.process_time()
+            wall = time.perf_counter()
+            run_scene(scene, drives=drives, recording=path)
+            beside = time.perf_counter() - wall
+            begin, wall = time.process_time(), time.perf_counter()
             run = run_scene(scene, drives=drives)
-            ran = time.process_time()
+            ran, alone = time.process_time(), time.perf_counter() - wall
             run.to_rerun(path)
             written = time.process_time()
             run.metrics()
             done = time.process_time()
             if k:  # the first one imports
                 times.append((ran - begin, written - begin, done - written))
+                shares.append(((written - ran) / (ran - begin), beside / alone - 1.0))
                 speeds.append(run.steps_per_second)
         size = path.stat().st_size / 1e6
     ran, written, figures = np.median(times, axis=0)
@@ -70,6 +80,8 @@ def measure(name: str, runs: int) -> dict[str, float | str]:
         "simulated_s": simulated,
         "with_recording": simulated / written,
         "without": simulated / ran,
+        "recording_cpu_share": float(np.median(shares, axis=0)[0]),
+        "recording_wall_share": float(np.median(shares, axis=0)[1]),
         "metrics_s": float(figures),
         "file_MB": size,
         "steps_per_s": float(np.median(speeds)),

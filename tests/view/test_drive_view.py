@@ -132,7 +132,7 @@ def test_a_drive_without_fields_or_torsion_is_not_drawn(
         overrides=SHORT | {"defaults.level": level},
         drives={"reference-2d": shown},
     )
-    assert drives_shown({"": run}, list(run.joints)) == {}
+    assert drives_shown({"": run.assembly}, list(run.joints)) == {}
     path = run.to_rerun(tmp_path / "run.rrd")
     entities = {chunk.entity_path for chunk in RrdReader(path).stream()}
     assert not [entity for entity in entities if entity.startswith("/drive")]

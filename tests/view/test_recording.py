@@ -8,7 +8,7 @@ import pytest
 from rerun.chunk import RrdReader
 
 from swgjoint.cli.main import main
-from swgjoint.errors import InputError
+from swgjoint.errors import ComputationError, InputError
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.run import Run, run_scene
 from swgjoint.units import mm
@@ -101,6 +101,52 @@ def test_a_recording_is_written_whole_or_not_at_all(run, tmp_path, monkeypatch):
     monkeypatch.setattr("swgjoint.view.recording._send_poses", fail)
     with pytest.raises(RuntimeError, match="no pose"):
         run.to_rerun(tmp_path / "run.rrd")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_recording_begun_during_the_run_is_the_same(run, synthetic_map, tmp_path):
+    """It holds the same components at as many rows, and the same torsion."""
+    after, beside = tmp_path / "after.rrd", tmp_path / "new" / "beside.rrd"
+    run.to_rerun(after)
+    again = run_scene(
+        "bench",
+        overrides=SHORT,
+        drives={"reference-2d": synthetic_map},
+        recording=beside,
+    )
+    np.testing.assert_array_equal(again.torsion, run.torsion)
+    np.testing.assert_array_equal(
+        columns(beside, "/joint/joint", "torsion_arcmin")[1],
+        columns(after, "/joint/joint", "torsion_arcmin")[1],
+    )
+    assert contents(beside) == contents(after)
+    assert [path.name for path in beside.parent.iterdir()] == ["beside.rrd"]
+
+
+def contents(path) -> set[tuple[str, int, tuple[str, ...]]]:
+    """Entities, rows and components of a recording."""
+    chunks = [c for c in RrdReader(path).stream() if "propert" not in c.entity_path]
+    return {
+        (c.entity_path, c.num_rows, tuple(sorted(c.to_record_batch().schema.names)))
+        for c in chunks
+    }
+
+
+def test_a_run_that_fails_leaves_no_recording(synthetic_map, tmp_path, monkeypatch):
+    """Nothing is left of what was sent while it went on."""
+
+    def fail(*_: object, **__: object) -> None:
+        assert [path.suffix for path in tmp_path.iterdir()] == [".part"]
+        raise ComputationError("diverged")
+
+    monkeypatch.setattr("swgjoint.sim.run._recorded", fail)
+    with pytest.raises(ComputationError, match="diverged"):
+        run_scene(
+            "bench",
+            overrides=SHORT,
+            drives={"reference-2d": synthetic_map},
+            recording=tmp_path / "run.rrd",
+        )
     assert list(tmp_path.iterdir()) == []
 
 
