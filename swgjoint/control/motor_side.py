@@ -68,8 +68,11 @@ def known_friction(
 ) -> Array:
     r"""Motor torque against the friction of the known drives, slipping [N·m].
 
-    :math:`f\tanh(\nu/\nu_0) + \eta\nu` with :math:`\nu` the speed of the wave
-    generator against the flexspline; see :mod:`swgjoint.maps.friction`.
+    :math:`F = f\tanh(\nu/\nu_0) + \eta\nu` with :math:`\nu` the speed of the wave
+    generator against the flexspline, see :mod:`swgjoint.maps.friction`. Where the
+    flexspline is the output F also pushes that, which comes back through the gear:
+    :math:`F\,\partial\nu/\partial\dot\theta` with :math:`\dot\psi =
+    \dot\theta/i`.
 
     Args:
         joints: Drives, some of which have friction.
@@ -86,7 +89,7 @@ def known_friction(
         nu = by_theta * motor_speed[..., j] + by_psi * link_speed[..., j]
         slip = law.yield_torque(nu, link_torque[..., j] / drive.ratio)
         rubs = slip * np.tanh(nu / SLOW) + law.viscous * nu
-        out[..., j] = by_theta * rubs
+        out[..., j] = (by_theta + by_psi / drive.ratio) * rubs
     return out
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ import pytest
 from swgjoint.control.motor_side import MotorPID, ideal_plan, rigid_plan
 from swgjoint.errors import ComputationError, InputError
 from swgjoint.maps.drive_map import DriveMap
+from swgjoint.maps.friction import Friction
 from swgjoint.sim.run import run_scene
 from swgjoint.sim.scene import Scene
 
@@ -107,14 +109,16 @@ def test_the_task_is_the_motion_at_the_instants_of_the_control():
 
 def test_an_unknown_payload_is_not_in_the_known_torque():
     """The controller is told the arm that it knows; the scene moves the other one."""
-    spy, keys = Spy(), {"arm": "two-link", "trajectory": {"kind": "step", "at_s": 0.1,
-                        "step_deg": {"elbow": 1.0}}, "load": {}}  # fmt: skip
+    spy = Spy()
+    step = {"kind": "step", "at_s": 0.1, "step_deg": {"elbow": 1.0}}
+    load = {"elbow": {"torque_Nm": 5.0}}
+    keys = {"arm": "two-link", "trajectory": step, "load": load}
     payload = {"payload": {"mass_kg": 2.0, "known": False}}
     scene = Scene.from_data(SCENE, overrides={**keys, **payload})
     run_scene(scene, drives={"map": LINEAR}, controller=spy)
     hidden = spy.task.link_torque
     run(changes=keys, controller=spy)
-    np.testing.assert_array_equal(hidden, spy.task.link_torque)
+    np.testing.assert_allclose(hidden, spy.task.link_torque, rtol=0, atol=1e-12)
     run(changes={**keys, "payload": {"mass_kg": 2.0}}, controller=spy)
     assert np.abs(hidden - spy.task.link_torque).max() > 1.0
 
@@ -172,6 +176,26 @@ def test_motors_keep_their_limits():
               controller=MotorPID(ideal_plan, frequency=30.0))  # fmt: skip
     assert np.abs(got.motor_torque).max() <= 0.3
     assert got.metrics()["joints"]["joint"]["motor"]["at_limit_s"] > 0.0
+
+
+@pytest.mark.parametrize("layout", ["circular_spline_fixed", "flexspline_fixed"])
+def test_friction_of_the_known_drive_is_carried(layout):
+    """At constant speed either way the motor gives what slipping takes: no error."""
+    law = Friction(stiffness=50.0, coulomb=0.05, static=0.05, viscous=1e-3, load=0.05)
+    drive = replace(
+        DriveMap.linear(2e4, layout=layout, teeth_flexspline=120,
+                        teeth_circular_spline=122), friction=law)  # fmt: skip
+    for speed in (20.0, -20.0):
+        keys = {
+            "trajectory": {"kind": "constant_speed", "speed_deg_s": {"joint": speed}},
+            "defaults.friction": True,
+        }
+        got = run(drive, keys, controller=MotorPID(rigid_plan))
+        off = (drive.ratio * got.reference - got.motor_position)[-1, 0]
+        # without it: friction over the gain
+        friction = abs(got.friction_torque[-1, 0])
+        assert friction > 0.05
+        assert abs(off) < 0.01 * friction / got.assembly.loops.stiffness[0]
 
 
 def test_a_batch_of_motions_is_controlled_at_once():
