@@ -24,8 +24,6 @@ JOINT_HEADER = (
     "strongest orders (%)",
     "unresolved",
 )
-FAST = 1.5
-"""Phase of an order in a step, over what a step carries, at which a run says so."""
 JOINT_UNITS = ("", "", "arcmin", "arcmin", "arcmin", "arcmin", "%", "%", "", "")
 
 
@@ -205,41 +203,14 @@ def fixed(value: float, digits: int = 3) -> str:
 
 def notes(joints: dict[str, Any]) -> list[str]:
     """What marks in the table mean, and warnings about the validity of figures."""
-    from swgjoint.sim.metrics import PHASE_STEP
+    from swgjoint.view.validity import warnings_of
 
-    lines = []
+    lines = warnings_of(joints)
     if any(not line["drive_order"] for j in joints.values() for line in j["orders"]):
-        lines.append(
-            "* no order of this joint's drive: vibration, modulation or another joint"
+        lines.insert(
+            0,
+            "* no order of this joint's drive: vibration, modulation or another joint",
         )
-    for name, joint in joints.items():
-        if joint["phase_step_rad"] > FAST * PHASE_STEP:
-            lines.append(
-                f"{name}: its rotor turned faster than commanded, the highest order of"
-                f" its drive by {joint['phase_step_rad']:.2g} rad a step; up to"
-                f" {PHASE_STEP:g} rad is carried: use a smaller simulation.step_s"
-            )
-        ratings = joint["ratings"]
-        if not ratings["within_map"]:
-            low, high = ratings["map_range_Nm"]
-            lines.append(
-                f"{name}: torque up to {ratings['peak_Nm']:.3g} N·m leaves the map"
-                f" ({low:.3g} to {high:.3g} N·m), which continues linearly there"
-            )
-        if ratings["ratcheting"]:
-            lines.append(
-                f"{name}: teeth would skip at {ratings['ratcheting']['time_s']:.4g} s"
-                f" with {ratings['ratcheting']['torque_Nm']:.4g} N·m, above the"
-                f" ratcheting torque {ratings['ratcheting_Nm']:.4g} N·m; the run goes"
-                " on elastic"
-            )
-        if not ratings["within"]:
-            lines.append(
-                f"{name}: above its ratings: cubed mean"
-                f" {ratings['cubed_mean_Nm']:.3g} of {ratings['rated_Nm']:.3g} N·m,"
-                f" peak {ratings['peak_Nm']:.3g}"
-                f" of {ratings['repeated_peak_Nm']:.3g} N·m"
-            )
     return lines
 
 

@@ -197,7 +197,7 @@ def _label(label: str, run: Run, step: dict[str, Any] | None) -> dict[str, Any]:
     """What limits the figures of one run, and their change at half the step."""
     simulation = run.assembly.scene.simulation
     metrics = run.metrics()
-    lines = [Cell(text, "bad") for text in warnings_of(run)]
+    lines = [Cell(text, "bad") for text in warnings_of(metrics["joints"])]
     lines.append(
         Cell(
             f"{simulation.integrator} at {1e3 * run.assembly.step:g} ms; figures from"

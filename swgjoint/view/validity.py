@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from swgjoint.errors import SwgError
+from swgjoint.sim.metrics import PHASE_STEP
 from swgjoint.sim.run import run_scene
 from swgjoint.sim.scene import Scene
 from swgjoint.units import arcmin
@@ -28,6 +29,8 @@ STEP_KEYS = {
     "torsion_arcmin": ("torsion_arcmin", "mean"),
 }
 """Figures whose change is given, by their place in the metrics of a joint."""
+FAST = 1.5
+"""Phase of an order in a step, over what a step carries, at which a run says so."""
 MAX_STEPS = 400_000
 """Of the finer run: some seconds."""
 
@@ -112,27 +115,40 @@ def map_error(drive: DriveMap) -> list[str]:
     return lines
 
 
-def warnings_of(run: Run) -> list[str]:
-    """What a reader of the figures must know, one line each."""
+def warnings_of(joints: Mapping[str, Any]) -> list[str]:
+    """What a reader of the figures must know, one line each.
+
+    Args:
+        joints: Figures of the joints, see :meth:`swgjoint.sim.run.Run.metrics`.
+    """
     lines = []
-    for joint, figures in run.metrics()["joints"].items():
-        ratings = figures["ratings"]
+    for name, joint in joints.items():
+        if joint["phase_step_rad"] > FAST * PHASE_STEP:
+            lines.append(
+                f"{name}: its rotor turned faster than commanded, the highest order of"
+                f" its drive by {joint['phase_step_rad']:.2g} rad a step; up to"
+                f" {PHASE_STEP:g} rad is carried: use a smaller simulation.step_s"
+            )
+        ratings = joint["ratings"]
         if not ratings["within_map"]:
             low, high = ratings["map_range_Nm"]
             lines.append(
-                f"{joint}: {ratings['peak_Nm']:.3g} N·m leave the map"
+                f"{name}: torque up to {ratings['peak_Nm']:.3g} N·m leaves the map"
                 f" ({low:.3g} to {high:.3g} N·m), which continues linearly there"
             )
         if ratings["ratcheting"]:
             lines.append(
-                f"{joint}: teeth would skip at {ratings['ratcheting']['time_s']:.4g} s;"
-                " the run goes on elastic"
+                f"{name}: teeth would skip at {ratings['ratcheting']['time_s']:.4g} s"
+                f" with {ratings['ratcheting']['torque_Nm']:.4g} N·m, above the"
+                f" ratcheting torque {ratings['ratcheting_Nm']:.4g} N·m; the run goes"
+                " on elastic"
             )
         if not ratings["within"]:
             lines.append(
-                f"{joint}: above its ratings, cubed mean {ratings['cubed_mean_Nm']:.3g}"
-                f" of {ratings['rated_Nm']:.3g} N·m, peak {ratings['peak_Nm']:.3g} of"
-                f" {ratings['repeated_peak_Nm']:.3g} N·m"
+                f"{name}: above its ratings: cubed mean"
+                f" {ratings['cubed_mean_Nm']:.3g} of {ratings['rated_Nm']:.3g} N·m,"
+                f" peak {ratings['peak_Nm']:.3g}"
+                f" of {ratings['repeated_peak_Nm']:.3g} N·m"
             )
     return lines
 
