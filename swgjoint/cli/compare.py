@@ -39,7 +39,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="TOML file with a table [spec] of limits; exit status 1 if one is missed",
     )
     parser.add_argument(
-        "--out", metavar="DIR", help="write compare.json, a picture and the report"
+        "--out",
+        metavar="DIR",
+        help="write compare.json, a picture, the report and a recording of all runs",
     )
 
 
@@ -88,8 +90,9 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 def _write(
     folder: Path, result: dict[str, Any], rows: Any, spec: Any, progress: Any
 ) -> list[str]:
-    """Picture, figures and report."""
+    """Picture, figures, report and recording."""
     from swgjoint.study.compare_shown import comparison_picture, comparison_table
+    from swgjoint.view.recording import write_recording
     from swgjoint.view.report import write_report
 
     folder.mkdir(parents=True, exist_ok=True)
@@ -109,6 +112,7 @@ def _write(
         write_whole(folder / "compare.png", picture),
         write_whole(folder / "compare.json", json_text(result) + "\n"),
         report,
+        write_recording(runs, folder / "run.rrd"),
     ]
     return [str(path) for path in files]
 

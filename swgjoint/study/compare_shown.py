@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from swgjoint.study.compare import LOWER, Compared
-from swgjoint.view.recording import COLORS
+from swgjoint.view.entities import COLORS
 from swgjoint.view.report import Cell, Table
 from swgjoint.view.words import shown
 

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from swgjoint.sim.metrics import strongest_left_out, torque_deviation
-from swgjoint.view.drive_view import drive_path, drives_shown, eye, fields_of
+from swgjoint.view.drive_view import drives_shown, eye, fields_of
 from swgjoint.view.joint_pictures import WIDTH
+from swgjoint.view.paths import drive_path, prefix_of
 
 if TYPE_CHECKING:
     from swgjoint.sim.assembly import Assembly
@@ -22,7 +23,7 @@ SPACING = 0.75
 
 
 def blueprint_of(scenes: Mapping[str, Assembly], joints: list[str]) -> Any:
-    """Layout for runs of one motion, see :func:`swgjoint.view.recording`.
+    """Layout for runs of one motion, see :mod:`swgjoint.view.entities`.
 
     Args:
         scenes: What was or will be run, by the name of the run.
@@ -31,7 +32,7 @@ def blueprint_of(scenes: Mapping[str, Assembly], joints: list[str]) -> Any:
     import rerun.blueprint as rrb
 
     first = next(iter(scenes.values()))
-    prefixes = {label: f"/{label}/" if label else "/" for label in scenes}
+    prefixes = {label: f"/{prefix_of(label)}" for label in scenes}
     # torsion and error of a rigid arm are a line at zero that would set the scale
     flexible = [k for k, scene in scenes.items() if not all_rigid(scene)]
     flexible = flexible or list(scenes)

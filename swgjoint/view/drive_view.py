@@ -43,11 +43,6 @@ LIFT = 0.004
 """How far in front of the flexspline outlines and forces are drawn, in radii."""
 
 
-def drive_path(joint: str, label: str) -> str:
-    """Where the drive of a joint is drawn."""
-    return f"drive/{joint}/{label}" if label else f"drive/{joint}"
-
-
 def drives_shown(scenes: Mapping[str, Assembly], joints: list[str]) -> dict[str, str]:
     """The joint whose drive is drawn, by run: the first of these that has fields."""
     for joint in joints:

@@ -110,11 +110,6 @@ def log_phase_ends(stream: Any, joint: str, scales: tuple[float, float]) -> None
     )
 
 
-def phase_path(joint: str, label: str) -> str:
-    """Where the curve of one run lies."""
-    return f"phase/{joint}/{label or 'run'}"
-
-
 def log_phase_path(
     stream: Any,
     path: str,

@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 from swgjoint.errors import InputError
 from swgjoint.view.blueprint import blueprint_of, joints_by_load
 from swgjoint.view.drive_view import drives_shown
-from swgjoint.view.recording import log_known, log_measured, log_moving, stream_name
+from swgjoint.view.entities import log_known, log_measured, log_moving
+from swgjoint.view.recording import stream_name
 from swgjoint.view.viewer import LOOPBACK, start_viewer, wait_for
 
 if TYPE_CHECKING:

@@ -19,7 +19,7 @@ from swgjoint.sim.metrics import (
 from swgjoint.sim.orders import order_spectrum
 from swgjoint.units import arcmin, mm
 from swgjoint.view.blueprint import is_rigid, joints_by_interest
-from swgjoint.view.recording import COLORS
+from swgjoint.view.entities import COLORS
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

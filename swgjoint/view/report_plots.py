@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from swgjoint.units import arcmin
 from swgjoint.view.blueprint import is_rigid
+from swgjoint.view.entities import COLORS
 from swgjoint.view.plots import draw_ripple
-from swgjoint.view.recording import COLORS
 from swgjoint.view.words import short
 
 if TYPE_CHECKING:

@@ -6,6 +6,7 @@ import json
 import re
 
 import pytest
+from rerun.chunk import RrdReader
 
 from swgjoint.cli.main import main
 from swgjoint.study.compare import LOWER, UPPER
@@ -84,8 +85,11 @@ def test_the_picture_and_the_report_show_every_argument(tmp_path, capsys):
     text = capsys.readouterr().out
     assert re.search(f"^{SOFT}: K1_Nm_rad 47.., limit 10000$", text, re.MULTILINE)
     assert text.count("MISSED") == 2 and text.count("kept") == 1
-    names = ["compare.json", "compare.png", "report.html"]
+    names = ["compare.json", "compare.png", "report.html", "run.rrd"]
     assert sorted(p.name for p in out.iterdir()) == names
+    entities = {chunk.entity_path for chunk in RrdReader(out / "run.rrd").stream()}
+    again = SOFT + r"\ \(again\ 1\)"
+    assert {f"/{run}/joint/joint" for run in (SOFT, STIFF, again)} <= entities
     page = (out / "report.html").read_text(encoding="utf-8")
     assert f"{SOFT} (again 1)" in page
     assert page.count('class="bad">missed') == 2
@@ -147,7 +151,7 @@ def test_design_has_a_stress_and_a_picture(tmp_path, capsys, monkeypatch):
     (row,) = result["rows"]
     # 321 MPa at 20 N·m on the mesh of the thesis
     assert 280.0 < row["von_mises_MPa"] < 360.0
-    names = ["compare.json", "compare.png", "report.html"]
+    names = ["compare.json", "compare.png", "report.html", "run.rrd"]
     assert sorted(p.name for p in out.iterdir()) == names
 
 

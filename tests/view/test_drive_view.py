@@ -17,7 +17,7 @@ from swgjoint.view.drive_view import (
     frames_of,
     stress_color,
 )
-from swgjoint.view.recording import pose_rows
+from swgjoint.view.entities import pose_rows
 
 SHORT = {"simulation.duration_s": 1.0, "trajectory.settle_s": 0.2}
 PLACES = 120

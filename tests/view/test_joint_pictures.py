@@ -11,6 +11,7 @@ from swgjoint.sim.metrics import torque_ripple
 from swgjoint.sim.run import Run, run_scene
 from swgjoint.units import arcmin
 from swgjoint.view.drive_markers import RADIUS, housing_radius, load_color, turned_to
+from swgjoint.view.entities import pose_rows
 from swgjoint.view.joint_pictures import (
     BARS,
     WIDTH,
@@ -18,7 +19,6 @@ from swgjoint.view.joint_pictures import (
     phase_scales,
     ripple_bars,
 )
-from swgjoint.view.recording import pose_rows
 
 SHORT = {"simulation.duration_s": 2.0, "trajectory.settle_s": 0.5}
 

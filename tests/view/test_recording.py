@@ -12,8 +12,9 @@ from swgjoint.errors import ComputationError, InputError
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.run import Run, run_scene
 from swgjoint.units import mm
+from swgjoint.view.entities import pose_rows, signals_of
 from swgjoint.view.plots import comparison_png
-from swgjoint.view.recording import pose_rows, signals_of, write_recording
+from swgjoint.view.recording import write_recording
 from swgjoint.view.viewer import STARTED
 
 SHORT = {"simulation.duration_s": 1.0, "trajectory.settle_s": 0.2}
@@ -98,7 +99,7 @@ def test_a_recording_is_written_whole_or_not_at_all(run, tmp_path, monkeypatch):
     def fail(*_: object) -> None:
         raise RuntimeError("no pose")
 
-    monkeypatch.setattr("swgjoint.view.recording._send_poses", fail)
+    monkeypatch.setattr("swgjoint.view.entities._send_poses", fail)
     with pytest.raises(RuntimeError, match="no pose"):
         run.to_rerun(tmp_path / "run.rrd")
     assert list(tmp_path.iterdir()) == []
