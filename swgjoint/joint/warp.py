@@ -170,6 +170,12 @@ def _place(model: mujoco.MjModel, drive: JointDrive) -> Any:
             f"joint {drive.joint!r}: its drive is not in the model: {error}; accepted:"
             " the model of without_plugin(spec)"
         ) from error
+    if model.tendon_user[tendon].any():
+        raise InputError(
+            f"joint {drive.joint!r}: its drive deviates from its map by numbers in the"
+            " model, which MuJoCo Warp does not read; accepted: attach the map of"
+            " Variation.of"
+        )
     one = Drive()
     one.tendon = tendon
     one.q_rotor, one.q_link = int(rotor.qposadr[0]), int(link.qposadr[0])

@@ -11,6 +11,7 @@ import pytest
 from mujoco.batch import Batch
 
 from swgjoint.errors import InputError
+from swgjoint.joint.attach import attach
 from swgjoint.joint.reference import gradient_force, scheme_force
 from swgjoint.joint.variation import SIZE, Variation
 from swgjoint.maps.friction import Friction
@@ -151,6 +152,28 @@ def test_specimens_of_a_batch_equal_models_of_their_own(bench, lossy):
         np.testing.assert_array_equal(got, end)
         ends.append(end[:4])
     assert np.ptp(ends, axis=0).min() > 0.0
+
+
+def test_a_model_may_have_user_data_of_its_own(synthetic_map):
+    """Room for a drive grows beside what the model holds for its own tendons."""
+    text = """
+    <mujoco><option timestep="0.001"/><size nuser_tendon="2"/><worldbody>
+      <body><joint name="j" axis="0 0 1"/>
+        <inertial pos="0 0 0" mass="1" diaginertia=".4 .4 .4"/></body>
+      <body><joint name="k" axis="0 0 1"/>
+        <inertial pos="0 0 0" mass="1" diaginertia=".4 .4 .4"/></body>
+    </worldbody><tendon><fixed name="own" user="7 8"><joint joint="k" coef="1"/></fixed>
+    </tendon></mujoco>"""
+    for variable, size in ((False, 2), (True, SIZE)):
+        spec = mujoco.MjSpec.from_string(text)
+        got = attach(
+            spec, joint="j", drive=synthetic_map, rotor_inertia=4e-5, variable=variable
+        )
+        model = spec.compile()
+        assert model.nuser_tendon == size
+        own, ours = (model.tendon(name).id for name in ("own", got.tendon))
+        assert model.tendon_user[own, :2].tolist() == [7.0, 8.0]
+        assert not model.tendon_user[ours].any()
 
 
 @pytest.mark.parametrize("key", ["stiffness", "kinematic_error", "losses"])

@@ -297,3 +297,8 @@ def test_what_is_not_held_is_refused(synthetic_map):
     both = Both(PAIR, synthetic_map)
     with pytest.raises(InputError, match="callback already"):
         warp.install(both.m, both.d, both.plain, both.drives)
+    one = Both(PAIR, synthetic_map, variable=True)
+    one.m.callback.passive = None
+    one.plain.tendon_user[one.plain.tendon("j_drive").id, 0] = 0.1
+    with pytest.raises(InputError, match="deviates from its map"):
+        warp.install(one.m, one.d, one.plain, one.drives)
