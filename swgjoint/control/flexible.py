@@ -101,22 +101,21 @@ def motor_angle(drive: DriveMap, psi: Array, torque: Array) -> Array:
         ComputationError: If the angles are not found.
     """
     at, wanted = psi.reshape(-1), torque.reshape(-1)
-    pieces = [
-        _solve(drive, at[k : k + _CHUNK], wanted[k : k + _CHUNK])
-        for k in range(0, at.size, _CHUNK)
-    ]
+    try:
+        low, high = (drive.mean_torsion(float(f(wanted))) for f in (np.min, np.max))
+    except ValueError as failure:
+        raise ComputationError(f"drive {drive.name!r}: {failure}") from None
+    torsion = np.linspace(low, high, 65)
+    curve = drive.coefficients(torsion, 1)[:, 0, 0]
+    mean = np.interp(wanted, curve, torsion)
+    parts = [slice(k, k + _CHUNK) for k in range(0, at.size, _CHUNK)]
+    pieces = [_solve(drive, at[k], wanted[k], mean[k]) for k in parts]
     return np.concatenate(pieces).reshape(psi.shape)
 
 
-def _solve(drive: DriveMap, psi: Array, torque: Array) -> Array:
-    """Newton iterations from the mean curve, all samples together."""
+def _solve(drive: DriveMap, psi: Array, torque: Array, mean: Array) -> Array:
+    """Newton iterations from torsions of the mean curve, all samples together."""
     i, rated = drive.ratio, drive.ratings.rated_torque
-    span = np.linspace(torque.min(), torque.max(), 33)
-    try:
-        curve = [drive.mean_torsion(t) for t in span]
-    except ValueError as failure:
-        raise ComputationError(f"drive {drive.name!r}: {failure}") from None
-    mean = np.interp(torque, span, curve)
     theta = i * (psi + mean - drive.error_at(drive.phases(i * psi, psi))[0])
     softest = 1e-3 * drive.mean_stiffness / i**2
     nudge = 1e-7 * abs(i)  # 1e-7 rad of the output
