@@ -37,7 +37,7 @@ class Spy:
 def test_every_block_multiplies_the_distance(turn, rate, forgetting):
     """On a link that answers as the model says: by 1 - rho - mu, to rho/(rho + mu)."""
     spy = Spy()
-    turn(LINEAR, LINEAR, spy, speed=30.0, duration=24.0)
+    turn(LINEAR, LINEAR, spy, speed=30.0, duration=24.0, step=2e-3)
     learning = LearningCompensation(
         spy, orders=[(2, 0), (0, 2)], rate=rate, forgetting=forgetting, turns=15.0
     )
@@ -48,7 +48,7 @@ def test_every_block_multiplies_the_distance(turn, rate, forgetting):
     waves = np.exp(1j * task.position * np.array([-120.0, -122.0]))
     fixed = -rate / (rate + forgetting) * d
     off, blocks = [np.abs(learning.learned - fixed).max()], 0
-    last = len(task.position) - 50
+    last = len(task.position) - 25
     for k in range(last + 1):
         link = task.position[k] + ((learning.learned + d) * waves[k]).real.sum(axis=-1)
         learning.torque(
@@ -92,11 +92,11 @@ def test_the_ripple_of_two_per_turn_falls_tenfold(turn, signal):
         controller = MotorPID(flexible_plan, frequency=20.0)
         if learns:
             controller = LearningCompensation(
-                controller, orders=orders, signal=signal, rate=0.8, turns=2.0
+                controller, orders=orders, signal=signal, rate=0.8, turns=1.0
             )
-        run = turn(plant.on(LINEAR), LINEAR, controller, speed=30.0, duration=4.0,
+        run = turn(plant.on(LINEAR), LINEAR, controller, speed=30.0, duration=1.8,
                    **keys)  # fmt: skip
-        found.append(ripple(run, orders, 1500)[0])
+        found.append(ripple(run, orders, 600)[0])
     assert found[0] > 0.1  # N·m
     assert found[1] < 0.1 * found[0]
 

@@ -198,6 +198,12 @@ def test_friction_of_the_known_drive_is_carried(layout):
         assert abs(off) < 0.01 * friction / got.assembly.loops.stiffness[0]
 
 
+def test_a_run_of_a_controller_is_recorded(tmp_path):
+    """The viewer's file is written as for any run."""
+    got = run(changes={"simulation.duration_s": 0.55}, controller=MotorPID())
+    assert got.to_rerun(tmp_path / "run.rrd").stat().st_size > 10_000
+
+
 def test_a_batch_of_motions_is_controlled_at_once():
     """Leading axes are motions side by side, gains may differ from one to the next."""
     spy = Spy()
