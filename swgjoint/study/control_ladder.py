@@ -27,6 +27,7 @@ from swgjoint.control.kinematic_error import (
 )
 from swgjoint.control.learning import LearningCompensation
 from swgjoint.control.motor_side import MotorPID, ideal_plan, rigid_plan
+from swgjoint.control.mpc import PredictiveController
 from swgjoint.files import write_whole
 from swgjoint.json_text import json_text
 from swgjoint.maps.drive_map import DriveMap
@@ -35,7 +36,7 @@ from swgjoint.sim.controller import Controller
 from swgjoint.sim.drives import load_drive
 from swgjoint.sim.run import Run, run_scene
 from swgjoint.sim.scene import Scene
-from swgjoint.study.control_specimens import specimen
+from swgjoint.study.control_specimens import nominal, specimen
 from swgjoint.study.pool import run_all
 from swgjoint.study.rows import Row, StudyOptions, StudyResult
 from swgjoint.units import arcmin
@@ -118,6 +119,10 @@ def _compensated(table: KinematicErrorTable) -> Controller:
     return MotorPID(compensated([table]), frequency=FREQUENCY)
 
 
+def _predictive(table: KinematicErrorTable) -> Controller:
+    return PredictiveController(compensated([table]))
+
+
 def _learning(inner: Build, table: KinematicErrorTable) -> Controller:
     return LearningCompensation(inner(table), orders=LEARNED, rate=0.7)
 
@@ -146,6 +151,12 @@ RUNGS = (
         name="+ learning",
         build=partial(_learning, _compensated),
         made_for="ripple_rms",
+        over="+ kinematic error",
+    ),
+    Rung(
+        name="MPC",
+        build=_predictive,
+        made_for="tracking_peak",
         over="+ kinematic error",
     ),
     Rung(
@@ -188,7 +199,7 @@ def climb(
     """Run the rungs on specimens of a drive.
 
     Args:
-        drive: Nominal drive, which is what the controllers know.
+        drive: Of which specimens are drawn; the controllers know its mean curve.
         seeds: Specimens.
         jobs: Processes.
         rungs: Names of those that are run.
@@ -211,7 +222,7 @@ def _one_seed(
 ) -> tuple[dict[str, dict[str, float]], dict[str, dict[str, Array]]]:
     """Figures and shown signals of all rungs on one specimen."""
     drive, seed, names = task
-    table = identify_kinematic_error(record_turn(drive, seed), drive)
+    table = identify_kinematic_error(record_turn(drive, seed), nominal(drive))
     plant = specimen(drive, seed)
     figures, shown = {}, {}
     for rung in RUNGS:
@@ -277,7 +288,7 @@ def run_motion(
     return run_scene(
         scene,
         drives={"specimen": plant},
-        known_drives={"joint": drive},
+        known_drives={"joint": nominal(drive)},
         controller=controller,
     )
 
@@ -339,6 +350,8 @@ def run_control(options: StudyOptions) -> StudyResult:
     """
     from swgjoint.study.control_ladder_shown import ladder_picture, ladder_table
 
+    if options.folder is not None:
+        options.folder.mkdir(parents=True, exist_ok=True)
     references = options.only or (DRIVE,)
     drives = {name: load_drive(name, model=options.model) for name in references}
     rows: list[Row] = []

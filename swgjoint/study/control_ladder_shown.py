@@ -8,7 +8,7 @@ import numpy as np
 
 from swgjoint.study.control_ladder import RUNGS, UNITS, Ladder
 
-COLORS = ("0.6", "C1", "C0", "C2", "C3", "C4")
+COLORS = ("0.6", "C1", "C0", "C2", "C3", "C5", "C4")
 
 
 def ladder_table(found: Ladder) -> list[str]:

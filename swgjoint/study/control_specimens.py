@@ -71,6 +71,11 @@ def specimen(base: DriveMap, seed: int, *, random_seed: int = 0) -> DriveMap:
     return replace(drive, friction=replace(law, **parts))
 
 
+def nominal(base: DriveMap) -> DriveMap:
+    """What is known of every specimen of a drive: its mean curve and friction."""
+    return base.with_harmonics(np.zeros(len(base.orders), dtype=bool))
+
+
 def _drawn(
     base: DriveMap, systematic: np.random.Generator, random: np.random.Generator
 ) -> DriveMap:

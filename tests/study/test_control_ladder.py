@@ -12,7 +12,7 @@ from swgjoint.cli.main import main
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.study import control_ladder as study
 from swgjoint.study.control_ladder import RUNGS, UNITS, climb, ladder_claims
-from swgjoint.study.control_specimens import SYSTEMATIC, accuracy, specimen
+from swgjoint.study.control_specimens import SYSTEMATIC, accuracy, nominal, specimen
 from swgjoint.units import arcmin
 
 CSG = DriveMap.from_catalogue("CSG-25-100")
@@ -55,6 +55,13 @@ def test_a_map_with_errors_keeps_their_size(synthetic_map):
     np.testing.assert_array_equal(drive.potential[0], synthetic_map.potential[0])
 
 
+def test_what_is_known_has_no_angles(synthetic_map):
+    """The mean curve alone: no error, no harmonic of the torque."""
+    known = nominal(specimen(synthetic_map, 3))
+    assert len(known.orders) == 1 and not known.kinematic_error.any()
+    np.testing.assert_array_equal(known.potential[0], synthetic_map.potential[0])
+
+
 def test_each_rung_but_the_first_says_what_it_is_made_for():
     """A figure of the table, over a rung that stands below it."""
     names = [rung.name for rung in RUNGS]
@@ -82,7 +89,7 @@ def short(monkeypatch):
 
 def test_command_writes_table_picture_and_values(short, tmp_path, capsys):
     """Rows for every rung and figure, values by seed, one line for each claim."""
-    arguments = ["--json", "--jobs", "1", "--out", str(tmp_path)]
+    arguments = ["--json", "--jobs", "1", "--out", str(tmp_path / "new")]
     assert main(["study", "control", *arguments]) == 0
     out, err = capsys.readouterr()
     found = json.loads(out)
@@ -94,7 +101,7 @@ def test_command_writes_table_picture_and_values(short, tmp_path, capsys):
     assert row["ours"] == pytest.approx(np.mean(values))
     assert row["spread"] == pytest.approx(np.std(values, ddof=1))
     assert "better on 2 of 2" in found["summary"][-1]
-    assert sorted(p.name for p in tmp_path.iterdir()) == [
+    assert sorted(p.name for p in (tmp_path / "new").iterdir()) == [
         "control-CSG-25-100.png",
         "control.json",
     ]
