@@ -24,7 +24,7 @@ RAMP = 0.5
 SETTLE = 1.0
 """Time after that until the reward counts the motion [s]."""
 MEMORY = 0.15
-"""Time constant of the mean that is taken out of the transmission error [s]."""
+"""Time constant of the mean that is taken out of errors [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,7 +87,7 @@ class RippleCore(BenchCore):
         self._authority = s.authority_of_rated * rated / abs(self.joint.ratio)
         self._ripple_scale = s.ripple_scale_of_rated * rated
         self._alpha = angle_coefficients(self.joint.drive.layout)[0]
-        self._mean = np.zeros(count)
+        self._mean = np.zeros((2, count))
         self._first = round((RAMP + SETTLE) / s.period_s)
 
     def entries(self) -> tuple[tuple[Entry, ...], tuple[Entry, ...]]:
@@ -161,38 +161,40 @@ class RippleCore(BenchCore):
         ]
 
     def judge(self) -> None:
-        """Ripple of the torque; transmission error."""
+        """Ripple of the torque; errors that have a mean."""
         super().judge()
         now, inertia = self.now[:, :, 0], self.settings.link_inertia
         self.ripple = self.output_torque[:, 0] - now[:, 3] - inertia * now[:, 2]
         turned = self.motor_angle[:, 0] / self.joint.ratio
-        self._error = self.link_angle[:, 0] - turned
+        error = self.link_angle[:, 0] - turned
+        self._errors = np.stack([self.link_error[:, 0], error])
 
     def remember(self) -> None:
-        """Follow the mean of the transmission error."""
+        """Follow the means of the errors."""
         share = self.period / MEMORY
-        self._mean = self._mean + share * (self._error - self._mean)
-        self.error_ripple = self._error - self._mean
+        self._mean = self._mean + share * (self._errors - self._mean)
+        self.link_ripple, self.error_ripple = self._errors - self._mean
 
     def forget(self, rows: Rows) -> None:
-        """Begin with what the error is."""
+        """Begin with what the errors are."""
         self._mean = self._mean.copy()
-        self._mean[rows] = self._error[rows]
-        self.error_ripple = self._error - self._mean
+        self._mean[:, rows] = self._errors[:, rows]
+        self.link_ripple, self.error_ripple = self._errors - self._mean
 
     def reward(self) -> Array:
         """See :class:`RippleSuppressionEnv`."""
         s = self.settings
         a = self.ripple / self._ripple_scale
-        b = self.error_ripple / (s.error_scale_arcmin * arcmin)
+        b = self.link_ripple / (s.error_scale_arcmin * arcmin)
         effort = self.action[:, 0]
         got = 1.0 / (1.0 + a * a + b * b) - s.effort_weight * (effort * effort)
         return np.where(self.instant > self._first, got, 0.0)
 
     def info(self) -> dict[str, NDArray[Any]]:
-        """With ripple of torque and transmission error, and whether it counts."""
+        """With ripple of torque, link and transmission error, and whether it counts."""
         return super().info() | {
             "torque_ripple_Nm": self.ripple,
+            "link_error_ripple_arcmin": self.link_ripple / arcmin,
             "transmission_error_ripple_arcmin": self.error_ripple / arcmin,
             "steady": self.instant > self._first,
         }
@@ -236,8 +238,8 @@ class RippleSuppressionEnv(SingleEnv):
     =====  ==========================================  =====  ===========
 
     Reward of a step, from 1.5 s on (before: 0), with the ripple r of the torque, that
-    of the drive less load and inertia of the link on the reference, the transmission
-    error e less its running mean (time constant 0.15 s), and the action a:
+    of the drive less load and inertia of the link on the reference, the error e of the
+    link less its running mean (time constant 0.15 s), and the action a:
 
         1/(1 + (r/ripple_scale)^2 + (e/error_scale)^2) - effort_weight a^2
 
@@ -245,8 +247,11 @@ class RippleSuppressionEnv(SingleEnv):
     over 0.5 s. ``truncated`` after ``episode_s``; ``terminated`` as in
     :class:`~swgjoint.envs.joint_tracking.JointTrackingEnv`, whose ``info`` and whose
     arguments of bench, drive, sensors and ``randomise`` are those of this one, too.
-    ``info`` also has ``torque_ripple_Nm``, ``transmission_error_ripple_arcmin`` and
-    ``steady``, whether the reward counts.
+    ``info`` also has ``torque_ripple_Nm``, ``link_error_ripple_arcmin`` and
+    ``transmission_error_ripple_arcmin``, both less their running means, and ``steady``,
+    whether the reward counts. As long as the motor turns evenly the two are one; an
+    added torque that evens the motion of the link takes the first away and leaves the
+    second, for the motor then runs against the kinematic error.
 
     Further args:
         max_angle_rad: At least the way of the fastest motion; 3.
