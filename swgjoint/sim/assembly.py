@@ -137,6 +137,7 @@ def assemble(
         {
             "joints": set(scene.joints),
             "load": set(scene.load),
+            "recording.joints": set(scene.recording.joints),
             **{
                 f"disturbance[{k}].joint": {d.joint}
                 for k, d in enumerate(scene.disturbance)

@@ -16,7 +16,19 @@ Integrator = Literal["discrete", "RK4"]
 FeedForward = Literal["none", "gravity", "gravity_inertia"]
 ControlKind = Literal["pd", "pid", "computed_torque"]
 
+Signal = Literal[
+    "output_torque_Nm",
+    "torque_deviation_Nm",
+    "motor_torque_Nm",
+    "torsion_arcmin",
+    "transmission_error_arcmin",
+    "position_deg",
+    "reference_deg",
+]
+"""Of a joint in a recording."""
+
 Positive = Annotated[float, Field(gt=0)]
+Several = Field(strict=False)
 
 
 class LinearDrive(Section):
@@ -161,10 +173,23 @@ class Simulation(Section):
 
 
 class Recording(Section):
-    """What goes into the recording; joint signals are kept at every step."""
+    """What goes into the recording and its layout.
+
+    The signals of every joint are kept at every step, whatever is drawn.
+    """
 
     pose_rate_Hz: Annotated[float, Field(gt=0, le=10_000)] = 50.0
     """Rate of the body poses that the viewer shows."""
+    joints: Annotated[tuple[str, ...], Several] = ()
+    """Joints that have a tab, in this order; none named: all, the most loaded first.
+    The drive that is drawn is that of the first one whose map has fields."""
+    plots: Annotated[tuple[Signal, ...], Several] = (
+        "torsion_arcmin",
+        "transmission_error_arcmin",
+        "output_torque_Nm",
+        "torque_deviation_Nm",
+    )
+    """Signals that every tab draws over time."""
 
 
 class Metrics(Section):

@@ -18,6 +18,18 @@ if TYPE_CHECKING:
     from swgjoint.sim.transmission import Transmission
 
 BACKGROUND = (30, 33, 38)
+TITLES = {
+    "torsion_arcmin": "torsion [arcmin]",
+    "transmission_error_arcmin": "transmission error [arcmin]",
+    "output_torque_Nm": "output torque [N·m]",
+    "torque_deviation_Nm": "torque less that of the rigid arm [N·m]",
+    "motor_torque_Nm": "motor torque [N·m]",
+    "position_deg": "link angle [deg]",
+    "reference_deg": "commanded angle [deg]",
+}
+"""Of the plots, by signal."""
+ZERO = ("torsion_arcmin", "transmission_error_arcmin", "torque_deviation_Nm")
+"""Signals that are a line at zero for a rigid arm, which would set the scale."""
 SPACING = 0.75
 """Distance between the arms of several runs [m]."""
 
@@ -33,7 +45,6 @@ def blueprint_of(scenes: Mapping[str, Assembly], joints: list[str]) -> Any:
 
     first = next(iter(scenes.values()))
     prefixes = {label: f"/{prefix_of(label)}" for label in scenes}
-    # torsion and error of a rigid arm are a line at zero that would set the scale
     flexible = [k for k, scene in scenes.items() if not all_rigid(scene)]
     flexible = flexible or list(scenes)
 
@@ -69,17 +80,12 @@ def blueprint_of(scenes: Mapping[str, Assembly], joints: list[str]) -> Any:
                     visual_bounds=bounds,
                 )
             )
-        error = "transmission error [arcmin]"
-        rest = "torque less that of the rigid arm [N·m]"
         views = [
-            plot(joint, "torsion [arcmin]", "torsion_arcmin", flexible),
-            plot(joint, error, "transmission_error_arcmin", flexible),
-            plot(joint, "output torque [N·m]", "output_torque_Nm", scenes),
-            plot(joint, rest, "torque_deviation_Nm", flexible),
-            *pictures,
+            plot(joint, TITLES[signal], signal, flexible if signal in ZERO else scenes)
+            for signal in first.scene.recording.plots
         ]
         name = joint.removesuffix("_joint")
-        tabs.append(rrb.Grid(*views, grid_columns=2, name=name))
+        tabs.append(rrb.Grid(*views, *pictures, grid_columns=2, name=name))
     right: list[Any] = [rrb.Tabs(*tabs, active_tab=0)]
     if first.arm.tool >= 0:
         paths = [f"{prefixes[label]}tool/error_mm" for label in flexible]
@@ -132,14 +138,16 @@ def has_torsion(transmission: Transmission) -> bool:
     return transmission.law is not None
 
 
-def joints_by_load(scenes: Mapping[str, Assembly]) -> list[str]:
-    """Joints, the one first whose drive is loaded most on the commanded motion.
+def joints_shown(scenes: Mapping[str, Assembly]) -> list[str]:
+    """Joints of the scene's layout; else all, the one most loaded first.
 
-    The load is the largest torque of the rigid arm over the rated torque. A joint whose
-    strongest order is left out comes after those that show theirs. All of this is known
-    before a run.
+    The load is the largest torque of the rigid arm on the commanded motion over the
+    rated torque. A joint whose strongest order is left out comes after those that show
+    theirs. All of this is known before a run.
     """
     first = next(iter(scenes.values()))
+    if first.scene.recording.joints:
+        return list(first.scene.recording.joints)
 
     def key(j: int) -> tuple[bool, float]:
         drives = [scene.transmissions[j] for scene in scenes.values()]

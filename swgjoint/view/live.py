@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.errors import InputError
-from swgjoint.view.blueprint import blueprint_of, joints_by_load
+from swgjoint.view.blueprint import blueprint_of, joints_shown
 from swgjoint.view.drive_view import drives_shown
 from swgjoint.view.entities import log_known, log_measured, log_moving
 from swgjoint.view.recording import stream_name
@@ -66,7 +66,7 @@ def stream_runs(
     wait_for(loopback_port(url), process)
     scenes = {label: run.assembly for label, run in runs.items()}
     stream = rr.RecordingStream(stream_name(scenes))
-    joints = joints_by_load(scenes)
+    joints = joints_shown(scenes)
     stream.connect_grpc(url, default_blueprint=blueprint_of(scenes, joints))
     drives = drives_shown(scenes, joints)
     log_known(stream, scenes, drives=drives)

@@ -10,7 +10,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from swgjoint.view.blueprint import blueprint_of, joints_by_load
+from swgjoint.view.blueprint import blueprint_of, joints_shown
 from swgjoint.view.drive_view import drives_shown
 from swgjoint.view.entities import log_known, log_measured, log_moving
 
@@ -110,7 +110,7 @@ def _begin(path: Path, scenes: Mapping[str, Assembly]) -> tuple[Any, dict[str, s
     import rerun as rr
 
     stream = rr.RecordingStream(stream_name(scenes))
-    joints = joints_by_load(scenes)
+    joints = joints_shown(scenes)
     stream.save(path, default_blueprint=blueprint_of(scenes, joints))
     drives = drives_shown(scenes, joints)
     log_known(stream, scenes, drives=drives)

@@ -12,6 +12,7 @@ from swgjoint.errors import ComputationError, InputError
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.run import Run, run_scene
 from swgjoint.units import mm
+from swgjoint.view.blueprint import joints_shown
 from swgjoint.view.entities import pose_rows, signals_of
 from swgjoint.view.plots import comparison_png
 from swgjoint.view.recording import write_recording
@@ -73,6 +74,72 @@ def test_the_recording_carries_geometry_and_a_layout(run, tmp_path):
     static = {c.entity_path for c in reader.stream() if c.is_static}
     shapes = {"/arm/stand/foot", "/arm/stand/housing", "/arm/load/flange"}
     assert shapes | {"/arm/load/bar", "/tool/path"} <= static
+
+
+def names_in_layout(path) -> tuple[list[str], list[str]]:
+    """Names of the tabs and of the plots over time of a recording, sorted."""
+    reader = RrdReader(path)
+    tabs, plots = [], []
+    for chunk in reader.stream(store=reader.blueprints()[0]):
+        batch = chunk.to_record_batch()
+
+        def value(key, batch=batch):
+            return batch.column(key).to_pylist()[0] if key in batch.schema.names else []
+
+        if chunk.entity_path.startswith("/container/"):
+            tabs += value("ContainerBlueprint:display_name")
+        elif value("ViewBlueprint:class_identifier") == ["TimeSeries"]:
+            plots += value("ViewBlueprint:display_name")
+    return sorted(tabs), sorted(plots)
+
+
+def test_a_scene_says_which_joints_and_signals_have_a_place(synthetic_map, tmp_path):
+    """All joints, the most loaded first, or those named; their signals stay whole."""
+    short = {
+        "simulation.duration_s": 0.4,
+        "trajectory.hold_s": 0.05,
+        "trajectory.ramp_s": 0.1,
+        "trajectory.settle_s": 0.05,
+    }
+    drives = {"reference-2d": synthetic_map}
+    path = tmp_path / "run.rrd"
+    run = run_scene("ur5e-sweep", overrides=short, drives=drives, recording=path)
+    tabs, plots = names_in_layout(path)
+    assert len(tabs) == 6 and len(plots) == 6 * 4 + 1
+    weight = np.abs(run.assembly.link_torque).max(axis=0)
+    # in so short a time all joints are too fast for the strongest order of their drive
+    assert run.joints[weight.argmax()] == joints_shown({"": run.assembly})[0]
+    layout = {
+        "recording.joints": ["wrist_2_joint", "elbow_joint"],
+        "recording.plots": ["position_deg"],
+    }
+    again = run_scene(
+        "ur5e-sweep", overrides=short | layout, drives=drives, recording=path
+    )
+    assert joints_shown({"": again.assembly}) == layout["recording.joints"]
+    tabs, plots = names_in_layout(path)
+    assert tabs == ["elbow", "wrist_2"]
+    assert plots == 2 * ["link angle [deg]"] + ["tool error [mm]"]
+    _, torsion = columns(path, "/joint/shoulder_lift_joint", "torsion_arcmin")
+    lift = run.joints.index("shoulder_lift_joint")
+    np.testing.assert_array_equal(torsion, signals_of(run, lift)["torsion_arcmin"])
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "message"),
+    [
+        ("joints", ["hip"], "recording.joints.hip: no such joint in arm 'bench'"),
+        ("plots", ["torque"], "recording.plots"),
+    ],
+)
+def test_a_layout_of_what_is_not_there_is_refused(synthetic_map, key, value, message):
+    """One line with the key."""
+    with pytest.raises(InputError, match=message):
+        run_scene(
+            "bench",
+            overrides={**SHORT, f"recording.{key}": value},
+            drives={"reference-2d": synthetic_map},
+        )
 
 
 def test_several_runs_share_one_recording(run, synthetic_map, tmp_path):
