@@ -31,13 +31,13 @@ from swgjoint.control.kinematic_error import compensated, identify_kinematic_err
 from swgjoint.control.learning import LearningCompensation
 from swgjoint.control.motor_side import MotorPID, ideal_plan, rigid_plan
 from swgjoint.maps.drive_map import DriveMap
-from swgjoint.study.control_ladder import (
+from swgjoint.study.control_bench import (
     FREQUENCY,
-    LEARNED,
     record_turn,
     run_motion,
     two_per_turn,
 )
+from swgjoint.study.control_ladder import LEARNED
 from swgjoint.study.control_specimens import accuracy, specimen
 from swgjoint.units import arcmin
 

@@ -6,7 +6,8 @@ import io
 
 import numpy as np
 
-from swgjoint.study.control_ladder import RUNGS, UNITS, Ladder
+from swgjoint.study.control_bench import UNITS
+from swgjoint.study.control_ladder import RUNGS, Ladder
 
 COLORS = ("0.6", "C1", "C0", "C2", "C3", "C5", "C4")
 

@@ -11,7 +11,8 @@ import pytest
 from swgjoint.cli.main import main
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.study import control_ladder as study
-from swgjoint.study.control_ladder import RUNGS, UNITS, climb, ladder_claims
+from swgjoint.study.control_bench import MOTIONS, UNITS
+from swgjoint.study.control_ladder import RUNGS, climb, ladder_claims
 from swgjoint.study.control_specimens import SYSTEMATIC, accuracy, nominal, specimen
 from swgjoint.units import arcmin
 
@@ -78,9 +79,9 @@ def short(monkeypatch):
         "speed_deg_s": {"joint": 80.0},
         "settle_s": 0.5,
     }
-    monkeypatch.setitem(study.MOTIONS, "slow", {
+    monkeypatch.setitem(MOTIONS, "slow", {
         "trajectory": fast, "simulation": {"duration_s": 5.2}})  # fmt: skip
-    monkeypatch.setitem(study.MOTIONS, "even", {
+    monkeypatch.setitem(MOTIONS, "even", {
         "trajectory": fast, "simulation": {"duration_s": 1.0}})  # fmt: skip
     monkeypatch.setattr(study, "SEEDS", 2)
     monkeypatch.setattr(study, "climb", lambda drive, **keys: climb(
