@@ -75,6 +75,19 @@ def test_pid_from_outside_is_the_scenes_own(synthetic_map, kind, changes):
     )
 
 
+def test_sub_steps_lie_within_a_control_period():
+    """A stiff joint under RK4 is cut into parts; the controller is asked as before."""
+    stiff = DriveMap.linear(3e6, teeth_flexspline=120, teeth_circular_spline=122)
+    changes = {"simulation.integrator": "RK4", "simulation.duration_s": 0.55}
+    own, spy = run(stiff, changes), Spy()
+    assert own.assembly.sub_steps > 1
+    given = run(stiff, changes, controller=MotorPID(rigid_plan))
+    np.testing.assert_allclose(given.position, own.position, rtol=1e-10, atol=1e-12)
+    got = run(stiff, changes, controller=spy)
+    assert [k for k, _ in spy.read] == list(range(550))
+    np.testing.assert_array_equal(spy.task.position, got.reference)
+
+
 def test_gains_and_period_follow_the_scene(synthetic_map):
     """At another period, with gains given outright, it is the scene's law as well."""
     changes = {
