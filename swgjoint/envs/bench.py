@@ -18,6 +18,7 @@ from swgjoint.envs.sensors import Sensors
 from swgjoint.envs.specimen import Tolerances, tolerances_of, with_assumed_error
 from swgjoint.errors import InputError
 from swgjoint.joint.attach import attach
+from swgjoint.joint.drive import JointDrive
 from swgjoint.joint.region import check_region
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.controller import KnownJoints
@@ -125,25 +126,10 @@ class BenchCore(Core):
         drive = with_assumed_error(drive, None if error is None else error * arcmin)
         ratio, ratings = drive.ratio, drive.ratings
         top_speed = 2.0 * s.max_speed_rad_s * abs(ratio)
-        spec = RigidArm("bench").spec()
-        spec.option.timestep = s.period_s
-        spec.option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
-        body = spec.body(BODY)
-        body.inertia = np.array([*body.inertia[:2], s.link_inertia])
-        # the engine wants the largest of three inertias below the sum of the others
-        body.inertia[:2] = max(body.inertia[0], 0.6 * s.link_inertia)
-        attached = attach(
-            spec,
-            joint=JOINT,
-            drive=drive,
-            level=s.level,
-            rotor_inertia=s.rotor_inertia_kgm2,
-            friction=s.friction,
-            variable=tolerances is not None,
-            max_input_speed=top_speed,
-        )
+        variable = tolerances is not None and s.level == "full"
+        spec, attached = _bench(s, drive, variable=variable, top_speed=top_speed)
         kinds = [attached]
-        if tolerances is not None and s.level == "full":
+        if tolerances is not None and variable:
             kinds += [specimen(attached, v) for v in tolerances.extremes()]
         sub_steps = max(
             check_region(
@@ -185,7 +171,7 @@ class BenchCore(Core):
             count,
             sub_steps=sub_steps,
             threads=threads,
-            variable=tolerances is not None and s.level == "full",
+            variable=variable,
         )
         self._body = int(model.body(BODY).id)
         self._inertia = None
@@ -245,6 +231,30 @@ class BenchCore(Core):
                 Entry(meaning="output torque, read", unit="N·m", low=-top, high=top)
             )
         return tuple(got)
+
+
+def _bench(
+    settings: BenchSettings, drive: DriveMap, *, variable: bool, top_speed: float
+) -> tuple[mujoco.MjSpec, JointDrive]:
+    """The bench with its load and its drive, without a motor."""
+    s, spec = settings, RigidArm("bench").spec()
+    spec.option.timestep = s.period_s
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
+    body = spec.body(BODY)
+    # the engine wants the largest of three inertias below the sum of the others
+    across = max(float(body.inertia[0]), 0.6 * s.link_inertia)
+    body.inertia = np.array([across, across, s.link_inertia])
+    attached = attach(
+        spec,
+        joint=JOINT,
+        drive=drive,
+        level=s.level,
+        rotor_inertia=s.rotor_inertia_kgm2,
+        friction=s.friction,
+        variable=variable,
+        max_input_speed=top_speed,
+    )
+    return spec, attached
 
 
 def check_number(key: str, value: Any, unit: str, *, zero: bool) -> None:

@@ -57,11 +57,10 @@ class Tolerances:
 
     def extremes(self) -> tuple[Variation, Variation]:
         """The softest and the stiffest specimen, with the largest error."""
-        return tuple(  # type: ignore[return-value]
-            Variation(
-                stiffness=sign * self.stiffness, kinematic_error=self.kinematic_error
-            )
-            for sign in (-1.0, 1.0)
+        error = self.kinematic_error
+        return (
+            Variation(stiffness=-self.stiffness, kinematic_error=error),
+            Variation(stiffness=self.stiffness, kinematic_error=error),
         )
 
 
