@@ -68,7 +68,7 @@ def blueprint_of(scenes: Mapping[str, Assembly], joints: list[str]) -> Any:
                 rrb.BarChartView(
                     name=title,
                     contents=[f"+ {path}" for path in bars],
-                    plot_legend=_legend(bars, rrb.Corner2D.LeftTop),
+                    plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.LeftTop),
                 )
             )
         if any(has_torsion(scene.transmissions[j]) for scene in scenes.values()):
@@ -204,20 +204,15 @@ def _plot(title: str, paths: list[str], signal: str | None = None) -> Any:
             source_component=signal,
         )
         drawn = {p: rr.SeriesLines().visualizer(mappings=[source]) for p in paths}
+    # where it comes by default if there is one line: what it says is in the title
+    legend = rrb.PlotLegend(corner=rrb.Corner2D.RightTop) if len(paths) > 1 else None
     return rrb.TimeSeriesView(
         name=title,
         contents=[f"+ {path}" for path in paths],
         overrides=drawn,
-        plot_legend=_legend(paths, rrb.Corner2D.RightTop),
+        plot_legend=legend,
         axis_x=rrb.TimeAxis(link=rrb.components.LinkAxis.LinkToGlobal),
     )
-
-
-def _legend(paths: list[str], corner: Any) -> Any:
-    """Where the legend is put; as it comes where there is one line only."""
-    import rerun.blueprint as rrb
-
-    return rrb.PlotLegend(corner=corner) if len(paths) > 1 else None
 
 
 def _drive(assembly: Assembly, joint: str, label: str) -> Any:
