@@ -209,6 +209,12 @@ def smooth_forces(drive: DriveMap, *, damping: float, creep_speed: float = 0.1) 
     return ca.Function("forces", [q, v], [force, x], ["q", "v"], ["force", "torsion"])
 
 
+def elastic_torque(drive: DriveMap) -> Any:
+    """Function ``q -> T``, dV/d(torsion) at held angles [N·m]."""
+    q, _, _ = _symbols(drive)
+    return casadi().Function("elastic", [q], [_conservative(drive, q)[2]])
+
+
 def _symbols(drive: DriveMap) -> tuple[Any, Any, Any]:
     """Angles, rates and history; of scalars where the map is small."""
     ca = casadi()

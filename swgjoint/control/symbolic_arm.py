@@ -27,7 +27,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from swgjoint.control.symbolic import casadi, smooth_forces
+from swgjoint.control.symbolic import casadi, elastic_torque, smooth_forces
 from swgjoint.errors import InputError
 from swgjoint.joint.drive import JointDrive
 
@@ -43,6 +43,8 @@ class SymbolicArm:
     drive_forces: Any
     """``(q, v) -> (tau, torsion)``: what all drives exert on the joints of the model,
     and their torsions, without corners or history [N·m], [rad]."""
+    elastic: Any
+    """``q -> T``: elastic torques along the torsions [N·m]."""
     rotors: NDArray[np.intp]
     """Places of the rotors in q. Shape (n_joints,)."""
     links: NDArray[np.intp]
@@ -87,16 +89,18 @@ def symbolic_arm(
     rotors = [int(model.joint(d.rotor).dofadr[0]) for d in drives]
     links = [int(model.joint(d.joint).dofadr[0]) for d in drives]
     q, v = ca.SX.sym("q", model.nv), ca.SX.sym("v", model.nv)
-    torque, torsions = ca.SX(model.nv, 1), []
+    torque, torsions, elastic = ca.SX(model.nv, 1), [], []
     for drive, r, k in zip(drives, rotors, links, strict=True):
         law = smooth_forces(drive.drive, damping=drive.damping, creep_speed=creep_speed)
         force, torsion = law(q[[r, k]], v[[r, k]])
         torque[r] += force[0]
         torque[k] += force[1]
         torsions.append(torsion)
+        elastic.append(elastic_torque(drive.drive)(q[[r, k]]))
     return SymbolicArm(
         inverse_dynamics=inverse_dynamics(model),
         drive_forces=ca.Function("drives", [q, v], [torque, ca.vertcat(*torsions)]),
+        elastic=ca.Function("elastic", [q], [ca.vertcat(*elastic)]),
         rotors=np.array(rotors, dtype=np.intp),
         links=np.array(links, dtype=np.intp),
     )
