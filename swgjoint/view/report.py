@@ -76,7 +76,6 @@ def write_report(
         check_step: Whether every run is repeated at half its step.
         progress: Called with what is done.
     """
-    template = _template()
     runs = {label or run.name: run for label, run in runs.items()}
     first = next(iter(runs.values()))
     scene = first.assembly.scene
@@ -108,16 +107,12 @@ def write_report(
     for drive in drives:
         sheets.append(_sheet(drive))
         count()
-    page = template.render(
+    return _write_page(
+        path,
         title=f"Scene {scene.name}",
         description=scene.description,
-        version=__version__,
-        date=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
         summary=summary or summary_table(runs),
-        pictures=[
-            {"title": title, "data": _inline(data)}
-            for title, data in (pictures or {}).items()
-        ],
+        pictures=pictures or {},
         labels=labels,
         joints=panels,
         sheets=sheets,
@@ -134,8 +129,53 @@ def write_report(
             {"title": f"Model of {label}", "text": json_text(run.contains)}
             for label, run in runs.items()
         ],
-        versions=_versions(),
         provenance=_provenance(drives),
+    )
+
+
+def write_tables(
+    path: str | Path,
+    *,
+    title: str,
+    description: str,
+    tables: Sequence[Table],
+    pictures: Mapping[str, bytes],
+    settings: Mapping[str, str],
+) -> Path:
+    """Write results that are no runs of a scene as a page of the same kind.
+
+    Args:
+        path: File to write; its folder must exist.
+        title: Of the page.
+        description: Below the title.
+        tables: The first is the summary, the others follow the pictures.
+        pictures: PNG by title.
+        settings: Texts by title.
+    """
+    return _write_page(
+        path,
+        title=title,
+        description=description,
+        summary=tables[0],
+        tables=tables[1:],
+        pictures=pictures,
+        settings=[{"title": name, "text": text} for name, text in settings.items()],
+    )
+
+
+def _write_page(
+    path: str | Path, *, pictures: Mapping[str, bytes], **sections: Any
+) -> Path:
+    """Fill the template; sections that are not given are left out."""
+    none: dict[str, Any] = dict.fromkeys(("tables", "labels", "joints", "sheets"), ())
+    page = _template().render(
+        **(none | {"provenance": None} | sections),
+        version=__version__,
+        date=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
+        pictures=[
+            {"title": title, "data": _inline(data)} for title, data in pictures.items()
+        ],
+        versions=_versions(),
     )
     return write_whole(path, page)
 
