@@ -33,6 +33,7 @@ COMMANDS = {
     "spec": "catalogue-style sheet of a design, a map or a catalogue drive",
     "run": "simulate an arm with its drives",
     "compare": "drives or levels side by side in one scene, against a spec",
+    "tune": "gains of a controller in an environment, against a textbook rule",
     "study": "our values beside those of a source",
     "bench": "error against run time",
     "stability": "stiff and extreme joints: run, cut into sub-steps, or refused",

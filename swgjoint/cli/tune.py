@@ -1,0 +1,115 @@
+"""``swgjoint tune``: gains of a controller, against a textbook rule."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from swgjoint.cli.text import table
+from swgjoint.files import output_folder
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Environment, controller, optimiser, budget and where results go."""
+    parser.add_argument(
+        "environment", metavar="ENV", help="environment: JointTracking-v0"
+    )
+    parser.add_argument(
+        "--controller",
+        metavar="NAME",
+        default="pd-flexible",
+        help="pd, pd-feedforward or pd-flexible (default)",
+    )
+    parser.add_argument(
+        "--optimiser",
+        metavar="NAME",
+        default="de",
+        help="de: differential evolution (default); cma: CMA-ES; optuna: TPE",
+    )
+    parser.add_argument(
+        "--minutes", type=float, metavar="M", help="wall time; default 3"
+    )
+    parser.add_argument(
+        "--evaluations",
+        type=int,
+        metavar="N",
+        help="candidates instead of minutes: the same result on every machine",
+    )
+    parser.add_argument(
+        "--seed", type=int, default=0, metavar="S", help="of all that is random; 0"
+    )
+    parser.add_argument(
+        "--set",
+        metavar="KEY=VALUE",
+        action="append",
+        default=[],
+        dest="overrides",
+        help="an argument of the environment, e.g. drive=CSG-20-100 or"
+        " randomise=false; repeatable",
+    )
+    parser.add_argument(
+        "--out",
+        metavar="DIR",
+        help="write report.html, tune.png, tune.json there, and tune.npz after every"
+        " generation",
+    )
+    parser.add_argument(
+        "--resume", action="store_true", help="go on with the tune.npz of --out"
+    )
+
+
+def run(args: argparse.Namespace) -> dict[str, Any]:
+    """Tune.
+
+    Returns:
+        ``best`` and ``baseline`` (``parameters``, ``gains``, ``held_out_cost_arcmin``
+        and more), ``evaluations``, ``improvement_percent``, ``candidates`` (also PD
+        with its gains alone tuned, and the controller without tuning), ``summary``,
+        ``seeds``, ``bounds``, ``files``, ``wall_s`` and the settings.
+    """
+    folder = output_folder(args.out) if args.out else None
+    from swgjoint.sim.scene import parse_override
+    from swgjoint.study.tune import TuneSettings, tune
+    from swgjoint.study.tune_shown import claims, write_files
+
+    settings = TuneSettings(
+        environment=args.environment,
+        controller=args.controller,
+        optimiser=args.optimiser,
+        minutes=args.minutes,
+        evaluations=args.evaluations,
+        seed=args.seed,
+        arguments=dict(map(parse_override, args.overrides)),
+    )
+    found = tune(settings, folder=folder, resume=args.resume, progress=args.progress)
+    files = write_files(found, folder) if folder is not None else []
+    return found.to_json() | {"summary": claims(found), "files": files}
+
+
+def report(result: dict[str, Any]) -> str:
+    """The candidates, their gains, and what they add up to."""
+    rows = [
+        (
+            one["name"],
+            one["held_out_cost_arcmin"],
+            one["held_out_spread_arcmin"],
+            one["training_cost_arcmin"],
+            one["improvement_percent"],
+        )
+        for one in result["candidates"]
+    ]
+    header = ("", "held-out [arcmin]", "spread", "training [arcmin]", "less [%]")
+    best = result["best"]
+    gains = [*best["parameters"].items(), *best["gains"].items()]
+    lines = [
+        f"{result['controller']} in {result['environment']}",
+        table(rows, header=header),
+        "",
+        table(gains),
+        "",
+        *result["summary"],
+        *(f"wrote {name}" for name in result["files"]),
+    ]
+    return "\n".join(
+        [*lines, f"{result['evaluations']} candidates, {result['wall_s']:.0f} s"]
+    )

@@ -1,0 +1,416 @@
+"""``swgjoint tune``: gains of a named controller, held against a textbook rule.
+
+Four controllers are told apart on seeds that no search has seen, so that what feed-
+forward brings is not taken for what tuning brings: PD by the rule, the same PD with its
+two gains tuned, the named controller with gains by the rule, and that one tuned.
+"""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.errors import InputError
+from swgjoint.json_text import plain
+from swgjoint.progress import Progress, silent
+from swgjoint.study.tune_cost import Trace, Trials, environment_named
+from swgjoint.study.tune_gains import (
+    CONTROLLERS,
+    Parameter,
+    Tunable,
+    anti_resonance,
+    controller_named,
+    gains_of,
+    parameters_of,
+)
+from swgjoint.study.tune_search import (
+    JOURNAL,
+    OPTIMISERS,
+    Search,
+    read_journal,
+    run_search,
+    write_journal,
+)
+from swgjoint.units import arcmin
+
+Array = NDArray[np.float64]
+
+MINUTES = 3.0
+PD_SHARE = 0.2
+"""Of the budget, for the two gains of plain PD."""
+RESERVE = 15.0
+"""Of the minutes, for the held-out seeds and the report [s]."""
+_PD, _NAMED = "pd", "named"
+
+
+@dataclass(frozen=True, kw_only=True)
+class TuneSettings:
+    """What is tuned, and how long."""
+
+    environment: str
+    controller: str = "pd-flexible"
+    optimiser: str = "de"
+    minutes: float | None = None
+    """Wall time; None: :data:`MINUTES`, unless ``evaluations`` are given."""
+    evaluations: int | None = None
+    """Candidates of both searches instead: the same result on every machine."""
+    seed: int = 0
+    arguments: Mapping[str, Any] = field(default_factory=dict)
+    """Of the environment; drives and loads differ within tolerances unless it says
+    ``randomise`` false."""
+    population: int = 16
+    """Candidates of a generation."""
+    training: int = 8
+    """Seeds that the searches see."""
+    held_out: int = 16
+    """Seeds that they do not see."""
+
+    def __post_init__(self) -> None:
+        if self.optimiser not in OPTIMISERS:
+            raise InputError(
+                f"optimiser {self.optimiser!r}; accepted: {', '.join(OPTIMISERS)}"
+            )
+        if self.minutes is not None and self.evaluations is not None:
+            raise InputError("minutes and evaluations given; accepted: one of them")
+        if self.minutes is not None and not 0.0 < self.minutes <= 1440.0:
+            raise InputError(f"minutes {self.minutes:g}; accepted: > 0 and <= 1440")
+        least = 2 * self.population
+        if self.evaluations is not None and self.evaluations < least:
+            raise InputError(
+                f"evaluations {self.evaluations}; accepted: at least {least}, a"
+                f" generation of {self.population} for each of two searches"
+            )
+        if not 0 <= self.seed < 10**6:
+            raise InputError(f"seed {self.seed}; accepted: 0 to 999999")
+
+    @property
+    def seeds(self) -> tuple[tuple[int, ...], tuple[int, ...]]:
+        """Of the episodes: those of the searches, and those kept from them."""
+        first = 1000 * self.seed
+        return (
+            tuple(range(first, first + self.training)),
+            tuple(range(first + 500, first + 500 + self.held_out)),
+        )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Candidate:
+    """A controller with its values and what it costs."""
+
+    name: str
+    controller: str
+    values: dict[str, float]
+    """Of its parameters."""
+    gains: dict[str, float]
+    """On the motor, in SI units."""
+    training: Array
+    """Cost by seed [rad]."""
+    held_out: Array
+    """Cost by seed that no search has seen [rad]."""
+    trace: Trace
+    """Of the held-out episodes."""
+
+    def to_json(self) -> dict[str, Any]:
+        """Figures of the candidate."""
+        got: dict[str, Any] = {
+            "name": self.name,
+            "controller": self.controller,
+            "parameters": self.values,
+            "gains": self.gains,
+        }
+        for key, costs in (("training", self.training), ("held_out", self.held_out)):
+            got[f"{key}_cost_arcmin"] = float(costs.mean() / arcmin)
+            got[f"{key}_spread_arcmin"] = float(costs.std(ddof=1) / arcmin)
+            got[f"{key}_costs_arcmin"] = (costs / arcmin).tolist()
+        error = self.trace.error
+        broken = ~np.isfinite(error).all(axis=0)
+        got["broken_limits"] = int(broken.sum())
+        return got
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Tuned:
+    """Result of a tuning run."""
+
+    settings: TuneSettings
+    environment: str
+    candidates: tuple[Candidate, ...]
+    """First the textbook's PD, last the tuned controller."""
+    searches: dict[str, Search]
+    parameters: tuple[Parameter, ...]
+    """Of the named controller."""
+    anti_resonance: float
+    """Of the nominal plant [Hz]."""
+    error_scale: float
+    effort_weight: float
+    worst: float
+    """Largest possible cost [rad]."""
+    wall: float
+    """With what was spent before an interruption [s]."""
+
+    @property
+    def baseline(self) -> Candidate:
+        """PD by the textbook rule."""
+        return self.candidates[0]
+
+    @property
+    def best(self) -> Candidate:
+        """The tuned controller."""
+        return self.candidates[-1]
+
+    def improvement(self, candidate: Candidate) -> float:
+        """Share of the baseline's held-out cost that a candidate saves."""
+        return float(1.0 - candidate.held_out.mean() / self.baseline.held_out.mean())
+
+    def to_json(self) -> dict[str, Any]:
+        """The JSON object, without files."""
+        rows = [
+            one.to_json() | {"improvement_percent": 100.0 * self.improvement(one)}
+            for one in self.candidates
+        ]
+        training, held_out = self.settings.seeds
+        return {
+            "best": rows[-1],
+            "baseline": rows[0],
+            "evaluations": sum(s.evaluations for s in self.searches.values()),
+            "improvement_percent": rows[-1]["improvement_percent"],
+            "candidates": rows,
+            "environment": self.environment,
+            "arguments": arguments_of(self.settings),
+            "controller": self.settings.controller,
+            "optimiser": self.settings.optimiser,
+            "seed": self.settings.seed,
+            "seeds": {"training": list(training), "held_out": list(held_out)},
+            "bounds": {p.key: [p.low, p.high] for p in self.parameters},
+            "anti_resonance_Hz": self.anti_resonance,
+            "cost": "sqrt(mean(e^2) + s^2 w mean(u^2)), e link error, u motor torque"
+            " over its limit",
+            "error_scale_arcmin": self.error_scale / arcmin,
+            "effort_weight": self.effort_weight,
+            "worst_cost_arcmin": self.worst / arcmin,
+            "wall_s": self.wall,
+        }
+
+
+def arguments_of(settings: TuneSettings) -> dict[str, Any]:
+    """Arguments of the environment."""
+    return {"randomise": True, **settings.arguments}
+
+
+def tune(
+    settings: TuneSettings,
+    *,
+    folder: Path | None = None,
+    resume: bool = False,
+    progress: Progress = silent,
+) -> Tuned:
+    """Tune a controller, and plain PD beside it.
+
+    Args:
+        settings: What, and how long. With ``evaluations`` the same settings give the
+            same result to the last bit; minutes end a search sooner or later.
+        folder: Receives the journal after every generation; None: none is kept.
+        resume: Go on with the journal of the folder.
+        progress: Called with the search, the candidates (or seconds) done and all.
+
+    Raises:
+        InputError: If a name, an argument or the journal is not accepted.
+        MissingExtraError: If gymnasium or the optimiser is not installed.
+    """
+    began = time.perf_counter()
+    environment = environment_named(settings.environment)
+    named, arguments = controller_named(settings.controller), arguments_of(settings)
+    header = _header(settings, environment, arguments)
+    tunables = {_PD: CONTROLLERS["pd"]}
+    if named.name != "pd":
+        tunables[_NAMED] = named
+    searches = {name: Search() for name in tunables}
+    if folder is not None:
+        if resume:
+            searches = read_journal(folder, header, tuple(tunables))
+        elif (folder / JOURNAL).exists():
+            raise InputError(
+                f"{folder / JOURNAL} exists; accepted: --resume to go on with it, or"
+                " another --out"
+            )
+        folder.mkdir(parents=True, exist_ok=True)
+    elif resume:
+        raise InputError("resume without a folder; accepted: --out of the run")
+    before = sum(sum(s.seconds) for s in searches.values())
+
+    def elapsed() -> float:
+        return time.perf_counter() - began + before
+
+    training, held_out = settings.seeds
+    trials = Trials(
+        environment, arguments, seeds=training, candidates=settings.population
+    )
+    for name, tunable in tunables.items():
+        search = searches[name]
+        parameters = parameters_of(tunable, trials.joints)
+        share = PD_SHARE if name == _PD and len(tunables) > 1 else 1.0
+        budget = _Budget(settings, searches, search, share, elapsed)
+
+        def after(budget: _Budget = budget, tunable: Tunable = tunable) -> None:
+            if folder is not None:
+                write_journal(folder, header, searches)
+            progress(f"tuning {tunable.name}", *budget.shown())
+
+        run_search(
+            settings.optimiser,
+            search,
+            costs=partial(_costs, trials, tunable, parameters),
+            more=budget.more,
+            start=np.array([p.start for p in parameters]),
+            size=settings.population,
+            seed=settings.seed,
+            clock=time.perf_counter,
+            after=after,
+        )
+    trials.close()
+    last = Trials(environment, arguments, seeds=training + held_out, candidates=1)
+    joints = last.joints
+    candidates: list[Candidate] = []
+    for name, tunable in tunables.items():
+        parameters = parameters_of(tunable, joints)
+        neutral = {p.key: np.array([p.neutral]) for p in parameters}
+        best = _values(parameters, searches[name].best()[None])
+        for label, values in (("by rule", neutral), ("tuned", best)):
+            progress("held-out seeds", len(candidates), 2 * len(tunables))
+            costs, trace = last.traced(tunable, values)
+            candidates.append(
+                _candidate(
+                    label,
+                    tunable,
+                    values,
+                    costs[0],
+                    trace,
+                    last,
+                    settings,
+                )
+            )
+    progress("held-out seeds", len(candidates), len(candidates))
+    last.close()
+    return Tuned(
+        settings=settings,
+        environment=environment,
+        candidates=tuple(candidates),
+        searches=searches,
+        parameters=parameters_of(named, joints),
+        anti_resonance=anti_resonance(joints),
+        error_scale=last.error_scale,
+        effort_weight=last.effort_weight,
+        worst=last.worst,
+        wall=elapsed(),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Budget:
+    """When a search has to end: after so many candidates, or in time."""
+
+    settings: TuneSettings
+    searches: Mapping[str, Search]
+    search: Search
+    share: float
+    elapsed: Any
+
+    @property
+    def _candidates(self) -> int:
+        """Of this search; the second has what the first left over."""
+        s = self.settings
+        assert s.evaluations is not None
+        if self.share < 1.0:
+            return max(s.population, int(self.share * s.evaluations))
+        others = sum(one.evaluations for one in self.searches.values())
+        return s.evaluations - (others - self.search.evaluations)
+
+    @property
+    def _seconds(self) -> float:
+        return 60.0 * (self.settings.minutes or MINUTES) - RESERVE
+
+    def more(self) -> bool:
+        """Whether another generation is allowed; the first always is."""
+        if not self.search.places:
+            return True
+        if self.settings.evaluations is not None:
+            return self.search.evaluations + self.settings.population <= (
+                self._candidates
+            )
+        one = float(np.median(self.search.seconds))
+        spent = sum(self.search.seconds) if self.share < 1.0 else self.elapsed()
+        return bool(spent + one <= self.share * self._seconds)
+
+    def shown(self) -> tuple[int, int]:
+        """Done and all: candidates, or seconds."""
+        if self.settings.evaluations is not None:
+            return self.search.evaluations, self._candidates
+        done = sum(self.search.seconds) if self.share < 1.0 else self.elapsed()
+        return int(done), int(max(done + 1, self.share * self._seconds))
+
+
+def _header(
+    settings: TuneSettings, environment: str, arguments: Mapping[str, Any]
+) -> dict[str, Any]:
+    """What a journal must agree in with the run that goes on with it."""
+    text: dict[str, Any] = json.loads(
+        json.dumps(
+            {
+                "environment": environment,
+                "arguments": plain(arguments),
+                "controller": settings.controller,
+                "optimiser": settings.optimiser,
+                "seed": settings.seed,
+                "population": settings.population,
+                "training": settings.training,
+            }
+        )
+    )
+    return text
+
+
+def _values(parameters: tuple[Parameter, ...], places: Array) -> dict[str, Array]:
+    return {p.key: p.value(places[:, k]) for k, p in enumerate(parameters)}
+
+
+def _costs(
+    trials: Trials,
+    tunable: Tunable,
+    parameters: tuple[Parameter, ...],
+    places: Array,
+) -> Array:
+    return trials.costs(tunable, _values(parameters, places))
+
+
+def _candidate(
+    label: str,
+    tunable: Tunable,
+    values: Mapping[str, Array],
+    costs: Array,
+    trace: Trace,
+    trials: Trials,
+    settings: TuneSettings,
+) -> Candidate:
+    first = settings.training
+    return Candidate(
+        name=f"{tunable.name} {label}",
+        controller=tunable.name,
+        values={key: float(x[0]) for key, x in values.items()},
+        gains={key: float(x[0]) for key, x in gains_of(values, trials.joints).items()},
+        training=costs[:first],
+        held_out=costs[first:],
+        trace=Trace(
+            time=trace.time,
+            reference=trace.reference[:, first:],
+            error=trace.error[:, first:],
+            torque=trace.torque[:, first:],
+        ),
+    )

@@ -1,0 +1,226 @@
+r"""Controllers whose gains are tuned, and the textbook rule that they are held against.
+
+Motor and link behave like one inertia :math:`J = J_m + J_l/i^2` at the motor while the
+drive is stiff enough, so that PD with
+
+.. math:: k_p = J\omega^2, \quad k_d = 2\zeta J\omega
+
+has the natural frequency :math:`\omega` and the damping ratio :math:`\zeta`. The drive
+bounds what that can be: with its motor held, the link swings on the stiffness K of the
+drive at the anti-resonance :math:`\omega_a = \sqrt{K/J_l}`, where the motor no longer
+moves the link. The rule of this file is :math:`\omega = \omega_a/3`, :math:`\zeta =
+0.7`, with nominal inertias and the mean stiffness of the map up to rated torque.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.control.flexible import flexible_plan
+from swgjoint.control.motor_side import (
+    MotorPID,
+    MotorPlan,
+    Planner,
+    ideal_plan,
+    known_friction,
+    rigid_plan,
+)
+from swgjoint.errors import InputError
+from swgjoint.sim.controller import KnownJoints, Task
+
+Array = NDArray[np.float64]
+
+BANDWIDTH, DAMPING = 1.0 / 3.0, 0.7
+"""Of the textbook rule: over the anti-resonance, and ratio."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Parameter:
+    """One number that is tuned, on a logarithmic scale between two bounds."""
+
+    key: str
+    low: float
+    high: float
+    neutral: float
+    """Without tuning: by the rule, shares of 1, no integral, readings of now."""
+
+    def value(self, place: Array) -> Array:
+        """Values at places from 0 to 1 between the bounds."""
+        return np.asarray(self.low * (self.high / self.low) ** place)
+
+    @property
+    def start(self) -> float:
+        """Place of the neutral value, or of the bound next to it."""
+        inside = min(max(self.neutral, self.low), self.high)
+        return float(np.log(inside / self.low) / np.log(self.high / self.low))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tunable:
+    """A named controller and what is tuned of it."""
+
+    name: str
+    text: str
+    plan: Planner
+    keys: tuple[str, ...]
+
+
+CONTROLLERS = {
+    one.name: one
+    for one in (
+        Tunable(
+            name="pd",
+            text="PD on the motor angle",
+            plan=ideal_plan,
+            keys=("frequency_Hz", "damping_ratio"),
+        ),
+        Tunable(
+            name="pd-feedforward",
+            text="PID with torque and friction of a rigid drive fed forward",
+            plan=rigid_plan,
+            keys=(
+                "frequency_Hz",
+                "damping_ratio",
+                "integral_time_s",
+                "torque_share",
+                "friction_share",
+                "reading_age_s",
+            ),
+        ),
+        Tunable(
+            name="pd-flexible",
+            text="PID with torque, friction and torsion of the map fed forward",
+            plan=flexible_plan,
+            keys=(
+                "frequency_Hz",
+                "damping_ratio",
+                "integral_time_s",
+                "torque_share",
+                "friction_share",
+                "reading_age_s",
+                "torsion_share",
+            ),
+        ),
+    )
+}
+
+
+def controller_named(name: str) -> Tunable:
+    """One of :data:`CONTROLLERS`.
+
+    Raises:
+        InputError: If there is none of the name.
+    """
+    if name not in CONTROLLERS:
+        raise InputError(
+            f"controller {name!r}; accepted: "
+            + "; ".join(f"{one.name} ({one.text})" for one in CONTROLLERS.values())
+        )
+    return CONTROLLERS[name]
+
+
+def anti_resonance(joints: KnownJoints) -> float:
+    """Frequency of the first joint's link on its drive, motor held [Hz]."""
+    stiffness = joints.drives[0].mean_stiffness
+    return float(np.sqrt(stiffness / joints.link_inertia[0]) / (2.0 * np.pi))
+
+
+def parameters_of(tunable: Tunable, joints: KnownJoints) -> tuple[Parameter, ...]:
+    """What is tuned of a controller, with bounds for a joint."""
+    high = anti_resonance(joints)
+    known = (
+        # a tenth to twice the anti-resonance: softer is useless, stiffer rings
+        Parameter(
+            key="frequency_Hz",
+            low=0.1 * high,
+            high=2.0 * high,
+            neutral=BANDWIDTH * high,
+        ),
+        Parameter(key="damping_ratio", low=0.2, high=3.0, neutral=DAMPING),
+        Parameter(key="integral_time_s", low=0.01, high=10.0, neutral=np.inf),
+        Parameter(key="torque_share", low=0.5, high=2.0, neutral=1.0),
+        Parameter(key="friction_share", low=0.3, high=3.0, neutral=1.0),
+        Parameter(key="torsion_share", low=0.5, high=2.0, neutral=1.0),
+        # a reading of t - age is held against the plan of then
+        Parameter(key="reading_age_s", low=1e-4, high=4e-3, neutral=0.0),
+    )
+    return tuple(p for key in tunable.keys for p in known if p.key == key)
+
+
+def textbook(joints: KnownJoints) -> dict[str, Array]:
+    """Values of plain PD by the rule, for one candidate."""
+    pd = parameters_of(CONTROLLERS["pd"], joints)
+    return {p.key: np.array([p.neutral]) for p in pd}
+
+
+def gains_of(values: Mapping[str, Array], joints: KnownJoints) -> dict[str, Array]:
+    """Gains on the motor of the first joint, in SI units. Shapes as those given."""
+    ratio, rotor = joints.ratio[0], joints.rotor_inertia[0]
+    inertia = rotor + joints.link_inertia[0] / ratio**2
+    omega = 2.0 * np.pi * values["frequency_Hz"]
+    stiffness = inertia * omega**2
+    gains = {
+        "stiffness_Nm_rad": stiffness,
+        "damping_Nms_rad": 2.0 * values["damping_ratio"] * omega * inertia,
+    }
+    if "integral_time_s" in values:
+        gains["integral_Nm_rads"] = stiffness / values["integral_time_s"]
+    return gains
+
+
+def weighted(
+    plan: MotorPlan, task: Task, values: Mapping[str, Array], repeats: int = 1
+) -> MotorPlan:
+    """A plan with shares of its parts.
+
+    Args:
+        plan: Of the task, all shares 1.
+        task: Motions, of which the episodes are the second axis.
+        values: Shares, those that are missing are 1. Shape (n_motions, 1) each.
+        repeats: So many times the motions of the task, one after the other.
+    """
+    joints, i = task.joints, task.joints.ratio
+
+    def tiled(x: Array) -> Array:
+        return np.tile(x, (1, repeats, 1))
+
+    torsion = values.get("torsion_share", np.ones(1))
+    angle, speed = tiled(i * task.position), tiled(i * task.velocity)
+    angle = angle + torsion * (tiled(plan.angle) - angle)
+    speed = speed + torsion * (tiled(plan.speed) - speed)
+    if "reading_age_s" in values:
+        change = np.gradient(plan.speed, task.period, axis=0)
+        angle = angle - values["reading_age_s"] * speed
+        speed = speed - values["reading_age_s"] * tiled(change)
+    friction = np.zeros_like(plan.torque)
+    if "friction_share" in values:
+        friction = known_friction(joints, plan.speed, task.velocity, task.link_torque)
+    return MotorPlan(
+        angle=angle,
+        speed=speed,
+        torque=values.get("torque_share", np.ones(1)) * tiled(plan.torque - friction)
+        + values.get("friction_share", np.ones(1)) * tiled(friction),
+    )
+
+
+def build(
+    plan: MotorPlan, values: Mapping[str, Array], torque_limit: Array
+) -> MotorPID:
+    """The controller of motions side by side.
+
+    Args:
+        plan: Weighted, of all motions.
+        values: Of every motion. Shape (n_motions, 1) each.
+        torque_limit: Of the motors, which also bounds the integral [N·m].
+    """
+    return MotorPID(
+        lambda task: plan,
+        frequency=values["frequency_Hz"],
+        damping_ratio=values["damping_ratio"],
+        integral_time=values.get("integral_time_s"),  # type: ignore[arg-type]
+        integral_limit=torque_limit,
+    )

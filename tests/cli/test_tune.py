@@ -1,0 +1,68 @@
+"""``swgjoint tune``: the keys of the contract, files, bad input, missing extras."""
+
+from __future__ import annotations
+
+import json
+import sys
+
+import pytest
+
+from swgjoint.cli.main import main
+
+QUICK = ("--controller", "pd", "--evaluations", "32", "--set", "episode_s=0.5")
+
+
+def test_json_of_the_contract(tmp_path, capsys):
+    """One object on stdout with what was found, what it is held against, and files."""
+    folder = tmp_path / "out"
+    arguments = ["tune", "JointTracking-v0", *QUICK, "--out", str(folder), "--json"]
+    assert main(arguments) == 0
+    out, err = capsys.readouterr()
+    result = json.loads(out)
+    assert set(result) >= {"best", "baseline", "evaluations", "wall_s", "summary"}
+    assert result["evaluations"] == 32 and "tuning pd" in err
+    best, baseline = result["best"], result["baseline"]
+    assert baseline["parameters"]["damping_ratio"] == 0.7
+    assert best["gains"]["stiffness_Nm_rad"] > 0.0
+    saved = 1.0 - best["held_out_cost_arcmin"] / baseline["held_out_cost_arcmin"]
+    assert result["improvement_percent"] == pytest.approx(100.0 * saved)
+    assert len(best["held_out_costs_arcmin"]) == len(result["seeds"]["held_out"])
+    names = {"tune.npz", "tune.json", "tune.png", "report.html"}
+    assert {path.name for path in folder.iterdir()} == names
+    # a run that is over is resumed at once
+    assert main([*arguments, "--resume"]) == 0
+    again = json.loads(capsys.readouterr()[0])
+    assert again["best"] == best
+    assert main(arguments[:-1]) == 2
+    assert "--resume" in capsys.readouterr()[1]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (["JointTracking-v1"], "did you mean JointTracking-v0"),
+        (["ArmTracking-v0"], "accepted: JointTracking-v0"),
+        (["JointTracking-v0", "--controller", "pid"], "accepted: pd "),
+        (["JointTracking-v0", "--optimiser", "sgd"], "accepted: de, cma, optuna"),
+        (["JointTracking-v0", "--evaluations", "3"], "at least 32"),
+        (["JointTracking-v0", "--minutes", "-1"], "minutes -1"),
+        (["JointTracking-v0", "--resume"], "accepted: --out"),
+        (["JointTracking-v0", "--set", "drive=CSG-1-1"], "CSG-1-1"),
+        (["JointTracking-v0", "--set", "error_scale_arcmin=0"], "error_scale_arcmin 0"),
+    ],
+)
+def test_bad_input_is_one_line(arguments, text, capsys):
+    """What is not accepted, and what is; exit status 2, no traceback."""
+    assert main(["tune", *arguments]) == 2
+    out, err = capsys.readouterr()
+    assert text in err and "Traceback" not in err and not out
+    assert len(err.strip().splitlines()) == 1
+
+
+@pytest.mark.parametrize("name", ["cma", "optuna"])
+def test_missing_optimiser_says_what_installs_it(name, monkeypatch, capsys):
+    """Before any search, with the command."""
+    monkeypatch.setitem(sys.modules, name, None)
+    assert main(["tune", "JointTracking-v0", *QUICK, "--optimiser", name]) == 1
+    err = capsys.readouterr()[1]
+    assert "pip install 'swgjoint[tune]'" in err
