@@ -22,8 +22,11 @@
 #
 # The policy is small, two layers of 32 tanh units, and was trained by PPO (Schulman et
 # al. 2017, arXiv:1707.06347) in `training/train_ripple_policy.py`, which needs torch,
-# in about 6 minutes of one core, always on the same drive.
-# Here its stored numbers are replayed with numpy alone.
+# in about 6 minutes of one core, always on the same drive and with one seed. It is the
+# third run: two before it, with another reward and without the harmonics of the gear's
+# angles among the inputs, learned little (ripple 1.05 to 0.72 %), and led to both. What
+# is stored is the best point of the curve below. Here its numbers are replayed with
+# numpy alone.
 
 # %%
 import csv
