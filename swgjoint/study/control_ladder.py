@@ -2,11 +2,12 @@
 
 Specimens of a drive on the bench joint, ten by default: phases of the errors, friction,
 load and sensor noise are drawn. Every controller adds one thing to the one before it
-and is made for one figure, named in :data:`RUNGS` before any run. Three motions tell
-the figures: a fast move (tracking), one slow turn of the output in one direction
-(positioning), a turn at constant speed after learning (ripple). All loops read the
-motor alone, but for learning and predictive control, which read the link's encoder,
-too; the table was recorded with it.
+and is made for one figure, named in :data:`RUNGS` before any run; that of predictive
+control after a trial on two specimens. Three motions tell the figures: a fast move
+(tracking), one slow turn of the output in one direction (positioning), a turn at
+constant speed after learning (ripple). All loops read the motor alone, but for learning
+and predictive control, which read the link's encoder, too; the table was recorded with
+it.
 """
 
 from __future__ import annotations
