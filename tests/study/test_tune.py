@@ -187,6 +187,19 @@ def test_seeds_differ():
     assert best[0] != best[1]
 
 
+def test_minutes_end_a_search():
+    """Time that is too short for more is one generation each, and the figures."""
+    found = tune(settings(evaluations=None, minutes=0.01))
+    assert {k: s.evaluations for k, s in found.searches.items()} == {
+        "pd": 6,
+        "named": 6,
+    }
+    # the start is among them, but for what no logarithmic scale reaches: integral time
+    # without end and readings of now
+    _, _, ruled, best = (one.training.mean() for one in found.candidates)
+    assert best <= 1.02 * ruled
+
+
 def test_resumption_asks_for_its_own_journal(tmp_path):
     """Another seed, a missing or a damaged journal, or one in the way: one line."""
     chosen = settings(controller="pd", evaluations=12)
