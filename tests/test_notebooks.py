@@ -17,6 +17,9 @@ STORIES = {
     "micro-geometry",
     "spec-check",
     "error-against-time",
+    "control",
+    "identification",
+    "reinforcement-learning",
 }
 MOST_S = 180.0
 """Time of one core that a notebook may take."""
