@@ -172,6 +172,10 @@ def test_same_seed_same_result_and_resumed_runs_too(optimiser, tmp_path):
         figures.pop("wall_s")
         texts.append(json_text(figures))
     assert texts[0] == texts[1]
+    for name, search in whole.searches.items():
+        other = resumed.searches[name]
+        np.testing.assert_array_equal(search.places, other.places)
+        np.testing.assert_array_equal(search.costs, other.costs)
     assert figures["evaluations"] == 24
     assert {k: s.evaluations for k, s in whole.searches.items()} == {
         "pd": 6,
