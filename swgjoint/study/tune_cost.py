@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from swgjoint.control.motor_side import MotorPlan
 from swgjoint.errors import InputError
 from swgjoint.sim.controller import KnownJoints, Task
-from swgjoint.study.tune_gains import Tunable, build, weighted
+from swgjoint.study.tune_gains import Tunable, build, parts_of, weighted
 from swgjoint.units import arcmin
 
 Array = NDArray[np.float64]
@@ -110,7 +110,7 @@ class Trials:
         self._limit = float(limits.angle[0])
         self.worst = float(np.hypot(self._limit, self._full_torque))
         """Cost of an episode that breaks a limit at once [rad]."""
-        self._plans: dict[str, MotorPlan] = {}
+        self._plans: dict[str, tuple[MotorPlan, MotorPlan]] = {}
 
     @property
     def _full_torque(self) -> float:
@@ -191,5 +191,5 @@ class Trials:
             link_torque=task.link_torque[:, :count],
         )
         if tunable.name not in self._plans:
-            self._plans[tunable.name] = tunable.plan(few)
+            self._plans[tunable.name] = parts_of(tunable, few)
         return weighted(self._plans[tunable.name], few, each, repeats=self.candidates)

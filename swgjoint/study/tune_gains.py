@@ -15,7 +15,7 @@ moves the link. The rule of this file is :math:`\omega = \omega_a/3`, :math:`\ze
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -103,6 +103,7 @@ CONTROLLERS = {
                 "friction_share",
                 "reading_age_s",
                 "torsion_share",
+                "error_share",
             ),
         ),
     )
@@ -145,6 +146,8 @@ def parameters_of(tunable: Tunable, joints: KnownJoints) -> tuple[Parameter, ...
         Parameter(key="torque_share", low=0.5, high=2.0, neutral=1.0),
         Parameter(key="friction_share", low=0.3, high=3.0, neutral=1.0),
         Parameter(key="torsion_share", low=0.5, high=2.0, neutral=1.0),
+        # of the nominal drive's kinematic error, whose phase specimens do not share
+        Parameter(key="error_share", low=0.02, high=2.0, neutral=1.0),
         # a reading of t - age is held against the plan of then
         Parameter(key="reading_age_s", low=1e-4, high=4e-3, neutral=0.0),
     )
@@ -172,38 +175,68 @@ def gains_of(values: Mapping[str, Array], joints: KnownJoints) -> dict[str, Arra
     return gains
 
 
+def parts_of(tunable: Tunable, task: Task) -> tuple[MotorPlan, MotorPlan]:
+    """The plan of a controller, and what of it the drive's angle functions make.
+
+    The first is the plan for the mean curve of the drives, without kinematic error; the
+    second, which is added to it, is zero where a controller has no share of that.
+    """
+    plan = tunable.plan(task)
+    if "error_share" not in tunable.keys:
+        zero = np.zeros_like(plan.angle)
+        return plan, MotorPlan(angle=zero, speed=zero, torque=zero)
+    drives = tuple(
+        drive.with_harmonics(np.zeros(len(drive.orders), dtype=bool))
+        for drive in task.joints.drives
+    )
+    even = tunable.plan(replace(task, joints=replace(task.joints, drives=drives)))
+    return even, MotorPlan(
+        angle=plan.angle - even.angle,
+        speed=plan.speed - even.speed,
+        torque=plan.torque - even.torque,
+    )
+
+
 def weighted(
-    plan: MotorPlan, task: Task, values: Mapping[str, Array], repeats: int = 1
+    parts: tuple[MotorPlan, MotorPlan],
+    task: Task,
+    values: Mapping[str, Array],
+    repeats: int = 1,
 ) -> MotorPlan:
     """A plan with shares of its parts.
 
     Args:
-        plan: Of the task, all shares 1.
+        parts: Of the task, see :func:`parts_of`.
         task: Motions, of which the episodes are the second axis.
         values: Shares, those that are missing are 1. Shape (n_motions, 1) each.
         repeats: So many times the motions of the task, one after the other.
     """
-    joints, i = task.joints, task.joints.ratio
+    (even, uneven), joints, i = parts, task.joints, task.joints.ratio
+    one = np.ones(1)
+    torsion, error, torque, rubs = (
+        values.get(f"{key}_share", one)
+        for key in ("torsion", "error", "torque", "friction")
+    )
 
     def tiled(x: Array) -> Array:
         return np.tile(x, (1, repeats, 1))
 
-    torsion = values.get("torsion_share", np.ones(1))
     angle, speed = tiled(i * task.position), tiled(i * task.velocity)
-    angle = angle + torsion * (tiled(plan.angle) - angle)
-    speed = speed + torsion * (tiled(plan.speed) - speed)
+    angle = angle + torsion * (tiled(even.angle) - angle) + error * tiled(uneven.angle)
+    speed = speed + torsion * (tiled(even.speed) - speed) + error * tiled(uneven.speed)
     if "reading_age_s" in values:
-        change = np.gradient(plan.speed, task.period, axis=0)
+        change = np.gradient(even.speed + uneven.speed, task.period, axis=0)
         angle = angle - values["reading_age_s"] * speed
         speed = speed - values["reading_age_s"] * tiled(change)
-    friction = np.zeros_like(plan.torque)
+    friction = np.zeros_like(even.torque)
     if "friction_share" in values:
-        friction = known_friction(joints, plan.speed, task.velocity, task.link_torque)
+        friction = known_friction(joints, even.speed, task.velocity, task.link_torque)
     return MotorPlan(
         angle=angle,
         speed=speed,
-        torque=values.get("torque_share", np.ones(1)) * tiled(plan.torque - friction)
-        + values.get("friction_share", np.ones(1)) * tiled(friction),
+        torque=torque * tiled(even.torque - friction)
+        + rubs * tiled(friction)
+        + error * tiled(uneven.torque),
     )
 
 

@@ -18,6 +18,7 @@ from swgjoint.study.tune_gains import (
     anti_resonance,
     gains_of,
     parameters_of,
+    parts_of,
     textbook,
     weighted,
 )
@@ -140,13 +141,15 @@ def test_old_readings_are_held_against_the_plan_of_then(trials):
     trials.env.reset(seed=[4, 9] * 3)
     task = trials.env.task
     plan = FLEXIBLE.plan(task)
-    got = weighted(plan, task, {"reading_age_s": np.full((6, 1), task.period)})
+    got = weighted(
+        parts_of(FLEXIBLE, task), task, {"reading_age_s": np.full((6, 1), task.period)}
+    )
     # second order: a share of a period over the time that the motion takes to change
     for name, share in (("angle", 0.05), ("speed", 0.1)):
         now, then = getattr(plan, name)[1:], getattr(plan, name)[:-1]
         off, moved = getattr(got, name)[1:] - then, now - then
         assert np.abs(off).max() < share * np.abs(moved).max()
-    np.testing.assert_array_equal(got.torque, plan.torque)
+    np.testing.assert_allclose(got.torque, plan.torque, rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize("optimiser", ["de", "cma", "optuna"])
@@ -181,6 +184,17 @@ def test_same_seed_same_result_and_resumed_runs_too(optimiser, tmp_path):
         "pd": 6,
         "named": 18,
     }
+
+
+def test_the_error_has_a_share_of_its_own(trials):
+    """Without kinematic error, the plan is that of the mean curve alone."""
+    trials.env.reset(seed=[4, 9] * 3)
+    task = trials.env.task
+    even, uneven = parts_of(FLEXIBLE, task)
+    got = weighted((even, uneven), task, {"error_share": np.zeros((6, 1))})
+    np.testing.assert_allclose(got.angle, even.angle, rtol=0, atol=1e-12)
+    assert np.abs(uneven.angle).max() > 1e-3
+    assert not parts_of(PD, task)[1].angle.any()
 
 
 def test_seeds_differ():
