@@ -236,8 +236,17 @@ def read_journal(
         raise InputError(
             f"{path}: nothing to resume; accepted: --out of an interrupted run"
         ) from None
-    except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile) as fault:
-        raise InputError(f"{path}: no journal of a tuning run ({fault})") from None
+    except (
+        OSError,
+        LookupError,
+        ValueError,
+        TypeError,
+        EOFError,
+        zipfile.BadZipFile,
+    ):
+        raise InputError(
+            f"{path}: damaged, or no journal of a tuning run; accepted: another --out"
+        ) from None
     for key, value in header.items():
         if kept.get(key) != value:
             raise InputError(
@@ -253,8 +262,8 @@ def _search(arrays: Mapping[str, Array], name: str) -> Search:
     places, costs, seconds = (
         arrays[f"{name}.{key}"] for key in ("places", "costs_rad", "seconds")
     )
-    whole = len(places) == len(costs) == len(seconds)
-    if not (whole and places.ndim == 3 and np.isfinite(costs).all()):
+    whole = places.shape[:2] == costs.shape[:2] and seconds.shape == places.shape[:1]
+    if not (whole and places.ndim == costs.ndim == 3 and np.isfinite(costs).all()):
         raise ValueError(f"{name}: generations and costs do not match")
     return Search(
         places=list(places), costs=list(costs), seconds=[float(s) for s in seconds]

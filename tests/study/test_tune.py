@@ -230,9 +230,11 @@ def test_resumption_asks_for_its_own_journal(tmp_path):
     with pytest.raises(InputError, match="is of seed 0, not 1"):
         tune(changed, folder=tmp_path, resume=True)
     journal = tmp_path / JOURNAL
-    journal.write_bytes(journal.read_bytes()[:300])
-    with pytest.raises(InputError, match="no journal"):
-        tune(chosen, folder=tmp_path, resume=True)
+    whole = journal.read_bytes()
+    for damaged in (whole[:300], b"", b"x", whole.replace(b"costs", b"coins")):
+        journal.write_bytes(damaged)
+        with pytest.raises(InputError, match="damaged, or no journal"):
+            tune(chosen, folder=tmp_path, resume=True)
 
 
 def test_report_states_what_feed_forward_alone_brings(tmp_path):
