@@ -69,7 +69,8 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     """
     folder = output_folder(args.out) if args.out else None
     from swgjoint.sim.scene import parse_override
-    from swgjoint.study.tune import TuneSettings, tune
+    from swgjoint.study.tune import tune
+    from swgjoint.study.tune_result import TuneSettings
     from swgjoint.study.tune_shown import claims, write_files
 
     settings = TuneSettings(

@@ -10,7 +10,7 @@ import numpy as np
 
 from swgjoint.files import write_whole
 from swgjoint.json_text import json_text
-from swgjoint.study.tune import Candidate, Tuned
+from swgjoint.study.tune_result import Candidate, Tuned
 from swgjoint.units import arcmin
 from swgjoint.view.report import Cell, Table, write_tables
 from swgjoint.view.words import shown

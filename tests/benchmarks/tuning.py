@@ -13,7 +13,8 @@ import argparse
 import json
 from typing import Any
 
-from swgjoint.study.tune import TuneSettings, tune
+from swgjoint.study.tune import tune
+from swgjoint.study.tune_result import TuneSettings
 from swgjoint.units import arcmin
 
 

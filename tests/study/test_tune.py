@@ -11,7 +11,7 @@ from swgjoint.control.motor_side import MotorPID, ideal_plan
 from swgjoint.errors import InputError
 from swgjoint.json_text import json_text
 from swgjoint.study import tune_cost
-from swgjoint.study.tune import TuneSettings, tune
+from swgjoint.study.tune import tune
 from swgjoint.study.tune_cost import Trials, environment_named
 from swgjoint.study.tune_gains import (
     CONTROLLERS,
@@ -22,6 +22,7 @@ from swgjoint.study.tune_gains import (
     textbook,
     weighted,
 )
+from swgjoint.study.tune_result import TuneSettings
 from swgjoint.study.tune_search import JOURNAL
 from swgjoint.study.tune_shown import claims, write_files
 from swgjoint.units import arcmin
