@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import re
 import tempfile
 from pathlib import Path
 from typing import Any
@@ -46,7 +47,8 @@ class EpisodeRecorder(gymnasium.Wrapper[Any, Any, Any, Any]):
         env = EpisodeRecorder(gymnasium.make("swgjoint/JointTracking-v0"), "episodes")
 
     Written whole when the episode ends, is reset or the environment is closed;
-    ``files`` lists what was written.
+    ``files`` lists what was written. Numbers go on from those in the folder, whose
+    files stay.
     """
 
     def __init__(self, env: gymnasium.Env[Any, Any], folder: str | Path) -> None:
@@ -87,11 +89,17 @@ class EpisodeRecorder(gymnasium.Wrapper[Any, Any, Any, Any]):
     def _take(self, reward: float, info: dict[str, Any]) -> None:
         self._rows.append((self._plant.batch.qpos[0].copy(), reward, info))
 
+    def _free_number(self) -> int:
+        """After those of all recordings in the folder."""
+        there = [file.name for file in self.folder.iterdir()]
+        found = [re.fullmatch(r"episode-(\d+)\.rrd", name) for name in there]
+        return max((int(one[1]) + 1 for one in found if one), default=0)
+
     def _write(self) -> None:
         rows, self._rows = self._rows, []
         if len(rows) < 2:
             return
-        path = self.folder / f"episode-{len(self.files)}.rrd"
+        path = self.folder / f"episode-{self._free_number()}.rrd"
         positions = np.array([row[0] for row in rows])
         figures = {"reward": np.array([row[1] for row in rows])}
         for key in rows[0][2]:

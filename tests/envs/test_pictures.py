@@ -93,9 +93,7 @@ def columns(path, entity):
 RECORDED = ("swgjoint/JointTracking-v0", "swgjoint/ArmTracking-v0")
 
 
-@pytest.mark.parametrize(
-    "name", ["swgjoint/JointTracking-v0", "swgjoint/ArmTracking-v0"]
-)
+@pytest.mark.parametrize("name", RECORDED)
 def test_a_recording_reads_back_what_info_said(name, tmp_path):
     """Every episode is a file of its own, whole, with the figures bit by bit."""
     env = EpisodeRecorder(make(name, episode_s=0.5), tmp_path)
@@ -117,6 +115,22 @@ def test_a_recording_reads_back_what_info_said(name, tmp_path):
             entity = f"link_error_arcmin/{joint}" if several else "link_error_arcmin"
             got = columns(file, entity)
             np.testing.assert_array_equal(got, want[:, j] if several else want)
+
+
+def test_recordings_in_the_folder_stay(tmp_path):
+    """Another recorder goes on counting after the last file, gaps or not."""
+    (tmp_path / "episode-7.rrd").write_bytes(b"of another day")
+    (tmp_path / "episode-x.rrd").write_bytes(b"not counted")
+    names = []
+    for _ in range(2):
+        env = EpisodeRecorder(make(RECORDED[0]), tmp_path)
+        for _ in range(2):
+            env.reset(seed=0)
+            env.step(np.zeros(1))
+        env.close()
+        names += [f.name for f in env.files]
+    assert names == [f"episode-{k}.rrd" for k in (8, 9, 10, 11)]
+    assert (tmp_path / "episode-7.rrd").read_bytes() == b"of another day"
 
 
 def test_only_environments_of_the_package_are_recorded(tmp_path):
