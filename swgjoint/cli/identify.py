@@ -120,6 +120,8 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 def result_of(found: Identified) -> dict[str, Any]:
     """The JSON object of an identification, without files."""
+    from swgjoint.control.identify import rms
+
     measured = found.model.measured()
     drive = found.drive
     return {
@@ -137,8 +139,8 @@ def result_of(found: Identified) -> dict[str, Any]:
         ],
         "residuals": {
             key: {
-                "rms_Nm": float(rest.std()),
-                "share": float(rest.std() / measured[key].std()),
+                "rms_Nm": rms(rest),
+                "share": rms(rest) / rms(measured[key]),
             }
             for key, rest in found.residuals.items()
         },

@@ -99,6 +99,11 @@ class BenchLog:
             raise InputError(f"window {window:g} s; accepted: > 0 s")
         # a little early, so that round-off of the time moves no sample
         step = float(np.median(np.diff(self.time))) if len(self.time) > 1 else 1.0
+        if window < 0.5 * step:
+            raise InputError(
+                f"window {window:g} s; accepted: at least the {step:g} s from sample to"
+                f" sample of {self.where}"
+            )
         bins = np.floor((self.time - self.time[0] + 0.5 * step) / window).astype(int)
         gap = np.diff(bins).max(initial=0)
         if gap > 1:

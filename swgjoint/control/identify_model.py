@@ -34,6 +34,8 @@ SPRINGS = {
 SLIDES = 10.0 * PRESLIDING
 """Rotation since rest or reversal from which friction is taken to slip [rad]."""
 _MOVES = 0.05  # of the largest speed, below which the wave generator may stick
+_ROUND_OFF = 1e-12  # of the largest
+_LEAST = 1e-6  # of the scales, stiffness and yield torque of an element
 _SOFTEST = 1e-3  # of the mean stiffness: slopes stay positive on the way to the fit
 
 
@@ -47,6 +49,8 @@ class Parameter:
     """Where the search begins."""
     scale: float
     """A change of it that changes the torques about as much as others do."""
+    least: float = -np.inf
+    """Lower bound."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -112,6 +116,19 @@ class Model:
             assert samples.motor_torque is not None
             torque = i * samples.motor_torque
         torsion = theta / i - psi
+        for what, x, unit in (
+            ("torsion theta/i - psi", torsion, "rad"),
+            ("output torque", samples.output_torque, "N·m"),
+            ("motor torque", samples.motor_torque, "N·m"),
+        ):
+            if x is None:
+                continue
+            largest = np.abs(psi if x is torsion else x).max()
+            if np.ptp(x) <= _ROUND_OFF * largest:
+                raise InputError(
+                    f"{log.where}: the {what} is {x[0] + 0.0:.3g} {unit} all along;"
+                    " accepted: one that changes"
+                )
         slope = float(np.polyfit(torsion, torque, 1)[0])
         if not slope > 0.0:
             raise InputError(
@@ -185,7 +202,7 @@ class Model:
         elastic = self._spring(p, torsion)
         if self.hysteresis:
             k, f = p["hysteresis_stiffness"], p["hysteresis_yield_torque"]
-            elastic = elastic + k * stretches(torsion - torsion[0], abs(f / k))
+            elastic = elastic + k * stretches(torsion - torsion[0], f / k)
         elastic = elastic + p["damping"] * mean_rate(torsion, self.step)
         rubs = 0.0
         if s.motor_torque is not None:
@@ -253,12 +270,21 @@ def _unknowns(model: Model) -> list[Parameter]:
         Parameter(name="damping", unit="N·m·s/rad", start=0.0, scale=T / rate),
     ]
     if model.hysteresis:
+        # an element is f/k wide: -k and -f would do as well as k and f
         found += [
             Parameter(
-                name="hysteresis_stiffness", unit="N·m/rad", start=0.5 * K, scale=K
+                name="hysteresis_stiffness",
+                unit="N·m/rad",
+                start=0.5 * K,
+                scale=K,
+                least=_LEAST * K,
             ),
             Parameter(
-                name="hysteresis_yield_torque", unit="N·m", start=0.02 * T, scale=T
+                name="hysteresis_yield_torque",
+                unit="N·m",
+                start=0.02 * T,
+                scale=T,
+                least=_LEAST * T,
             ),
         ]
     found += [

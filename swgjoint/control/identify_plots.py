@@ -42,7 +42,9 @@ def picture(found: Identified) -> Figure:
         row[0].set_ylabel(f"{_LABELS[key]} [N·m]")
         row[0].legend(loc="upper right")
         _line(row[1], time, left, "", color="tab:red", lw=0.6)
-        row[1].set_ylabel(f"measured less model, {left.std():.2g} N·m rms")
+        row[1].set_ylabel(
+            f"measured less model, {np.sqrt(np.mean(left**2)):.2g} N·m rms"
+        )
         for ax in row:
             ax.set_xlabel("time [s]")
     _loop(axes[-1, 0], found)

@@ -9,8 +9,9 @@ import mujoco
 import numpy as np
 import pytest
 
+from swgjoint.cli.identify import result_of
 from swgjoint.cli.main import main
-from swgjoint.control.identify import identify
+from swgjoint.control.identify import identify, rms
 from swgjoint.control.identify_log import (
     BenchLog,
     mean_acceleration,
@@ -176,6 +177,103 @@ def test_intervals_cover_the_truth(bench):
     assert sum(inside.values()) < 0.98 * 100 * len(truth)
 
 
+def with_element(stiffness: float, yield_torque: float):
+    """Another drive on the bench: itself, samples, truth."""
+    element = Jenkin(stiffness=stiffness, yield_torque=yield_torque)
+    drive = replace(true_drive(), hysteresis=(element,))
+    drive = drive.with_harmonics([True, True, True, False])
+    rows, damping = simulated(drive, 8.0, 0.35)
+    return drive, rows, truth_of(drive, damping)
+
+
+@pytest.mark.parametrize(
+    ("stiffness", "yield_torque"),
+    [(1.2e4, 0.3), (1.2e4, 1.0), (3e3, 1.0), (3e3, 3.0), (5e4, 1.0), (2e4, 6.0)],
+)
+def test_elements_of_many_drives_are_found(stiffness, yield_torque):
+    """Soft and stiff, weak and strong: 2 % from a log without noise, else in noise."""
+    drive, rows, truth = with_element(stiffness, yield_torque)
+    options = settings(drive)
+    found = identify(log_of(rows), **options)
+    names = ("hysteresis_stiffness", "hysteresis_yield_torque")
+    for name in names:
+        assert found.estimates[name].value == pytest.approx(truth[name], rel=0.02)
+    found = identify(log_of(rows, np.random.default_rng(1)), **options)
+    for name in names:
+        e = found.estimates[name]
+        assert abs(e.value - truth[name]) < 3.0 * e.deviation
+        assert e.deviation < 0.08 * truth[name]
+    assert found.notes == ()
+    assert rms(found.residuals["output_torque"]) < 1.05 * NOISE["output"] / np.sqrt(5)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("stiffness", "yield_torque"), [(3e3, 3.0), (1.2e4, 0.3)], ids=["soft", "weak"]
+)
+def test_intervals_cover_the_truth_of_other_drives(stiffness, yield_torque):
+    """Of 60 repeats 50 at least for every parameter, 93 % of all."""
+    drive, rows, truth = with_element(stiffness, yield_torque)
+    inside = dict.fromkeys(truth, 0)
+    for seed in range(60):
+        found = identify(log_of(rows, np.random.default_rng(seed)), **settings(drive))
+        for name, value in truth.items():
+            e = found.estimates[name]
+            inside[name] += int(e.low <= value <= e.high)
+    assert min(inside.values()) >= 50, inside
+    assert 0.93 < sum(inside.values()) / (60 * len(truth)) < 0.98
+
+
+@pytest.mark.parametrize("seed", [1, 13])
+def test_no_hysteresis_is_said(bench, seed):
+    """A drive without it: a note and no element, whichever way noise pulls the fit."""
+    drive = replace(bench[0], hysteresis=())
+    rows, _ = simulated(drive, 8.0, 0.35)
+    found = identify(log_of(rows, np.random.default_rng(seed)), **settings(drive))
+    (note,) = found.notes
+    assert note.startswith("no hysteresis: ")
+    assert found.drive.hysteresis == ()
+    assert "hysteresis_yield_torque" not in found.estimates
+
+
+@pytest.mark.parametrize(("column", "offset"), [(3, 5.0), (4, 0.05)])
+def test_offset_of_a_sensor_counts_and_is_said(bench, column, offset):
+    """The mean is part of rms and weight; one note, and none where there is none."""
+    drive, rows, _ = bench
+    rows = rows.copy()
+    rows[:, column] += offset
+    found = identify(log_of(rows, np.random.default_rng(1)), **settings(drive))
+    (note,) = found.notes
+    assert "offset of a sensor?" in note
+    told = result_of(found)["residuals"]
+    for key, rest in found.residuals.items():
+        assert abs(rest.mean()) > rest.std()
+        size = np.hypot(rest.mean(), rest.std())
+        assert told[key]["rms_Nm"] == pytest.approx(size)
+    # at the minimum the pulls of both torques at the zero, with these weights, balance
+    model = found.model
+    values = np.array([e.value for e in found.estimates.values()])
+    step = 1e-7 * (np.array(list(found.estimates)) == "zero")
+    ahead, behind = model.torques(values + step), model.torques(values - step)
+    pulls = [
+        np.mean((ahead[key] - behind[key]) * rest) / told[key]["rms_Nm"] ** 2
+        for key, rest in found.residuals.items()
+    ]
+    assert abs(sum(pulls)) < 0.15 * np.abs(pulls).sum()
+
+
+@pytest.mark.parametrize("factor", [np.pi / 180.0, 180.0 / np.pi])
+def test_angles_in_a_wrong_unit_are_doubted(bench, factor):
+    """Radians for degrees and degrees for radians: a note with the torsion."""
+    drive, rows, _ = bench
+    rows = rows * np.array([1.0, factor, factor, 1.0, 1.0])
+    found = identify(log_of(rows), **settings(drive))
+    assert any(
+        "arcmin; plausible: 0.3 to 60 arcmin" in note and "see the units" in note
+        for note in found.notes
+    )
+
+
 def test_the_map_moves_as_the_drive(bench):
     """The found map gives the torques of the true one at new torsions and angles."""
     drive, rows, _ = bench
@@ -328,6 +426,7 @@ def test_command(bench, csv_file, tmp_path, capsys):
         ({"--orders": "2:0,2:0"}, "orders 2:0, 2:0; accepted: each once, not 0:0"),
         ({"--window": "0"}, "window 0 s; accepted: > 0 s"),
         ({"--window": "1"}, "accepted: at least 200"),
+        ({"--window": "1e-300"}, "window 1e-300 s; accepted: at least the 0.001 s"),
         ({"--rotor-inertia": "-1"}, "rotor inertia -1 kg·m²; accepted: > 0"),
     ],
 )
@@ -354,6 +453,24 @@ def test_what_a_log_cannot_tell_is_named():
     still = replace(log, motor_torque=-2e2 * x)
     with pytest.raises(InputError, match=r"turns in 0 of .* leave motor_torque_Nm out"):
         identify(still, **options, orders=[])
+
+
+@pytest.mark.parametrize(
+    ("columns", "line"),
+    [
+        ([1, 2], "the torsion theta/i - psi is 0 rad all along; accepted: one that"),
+        ([3], "the output torque is 0 N·m all along; accepted: one that changes"),
+        ([4], "the motor torque is 0 N·m all along; accepted: one that changes"),
+        ([3, 4], "the output torque is 0 N·m all along; accepted: one that changes"),
+    ],
+)
+def test_constant_channels_are_one_line(bench, columns, line):
+    """Angles or a torque that say nothing."""
+    drive, rows, _ = bench
+    rows = rows.copy()
+    rows[:, columns] = 0.0
+    with pytest.raises(InputError, match=line):
+        identify(log_of(rows), **settings(drive))
 
 
 def test_bad_logs_are_one_line(tmp_path):
