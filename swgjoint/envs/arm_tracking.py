@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import mujoco
@@ -12,7 +13,8 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from swgjoint.envs.api import BatchEnv, SingleEnv
-from swgjoint.envs.bench import check_number, load_drive_once, settings_of
+from swgjoint.envs.arguments import check_flag, check_number, shown
+from swgjoint.envs.bench import load_drive_once, settings_of
 from swgjoint.envs.core import Core, Entry, Limits, ceiling
 from swgjoint.envs.loop import MotorLoop
 from swgjoint.envs.plant import Plant, specimen
@@ -40,7 +42,7 @@ SPEED_MARGIN = 20.0
 class ArmSettings:
     """Arguments of ``ArmTracking-v0``."""
 
-    scene: str = "ur5e-circle"
+    scene: str | Path = "ur5e-circle"
     level: str = "full"
     friction: bool = True
     kinematic_error_arcmin: float | None = None
@@ -62,6 +64,15 @@ class ArmSettings:
         ):
             check_number(key, getattr(self, key), unit, zero=False)
         check_number("effort_weight", self.effort_weight, "", zero=True)
+        error = self.kinematic_error_arcmin
+        if error is not None:
+            check_number("kinematic_error_arcmin", error, "arcmin", zero=True)
+        check_flag("friction", self.friction)
+        if not isinstance(self.scene, str | Path):
+            raise InputError(
+                f"scene {shown(self.scene)}; accepted: name or path of a scene, or an"
+                " arm"
+            )
         if self.action not in ACTIONS:
             raise InputError(f"action {self.action!r}; accepted: {', '.join(ACTIONS)}")
         if self.level not in ("full", "linear"):
@@ -76,7 +87,7 @@ class ArmCore(Core):
     def __init__(self, count: int, threads: int, settings: ArmSettings) -> None:
         """Assemble the scene once, then ``count`` simulations of it."""
         self.settings = s = settings
-        tolerances = tolerances_of(s.randomise)
+        tolerances = tolerances_of(s.randomise, s.level)
         variable = tolerances is not None and s.level == "full"
         scene = _scene(s)
         assembly = assemble(
@@ -259,10 +270,9 @@ class ArmCore(Core):
 
 def _scene(settings: ArmSettings) -> Scene:
     """The scene at the level and with the friction that are asked for."""
-    changes = {"defaults.friction": settings.friction} if settings.friction else {}
-    name = settings.scene
+    name = str(settings.scene)
     scene = scene_of_arm(name) if is_arm(name) else Scene.load_file(name)
-    return (scene.with_changes(changes) if changes else scene).with_level(
+    return scene.with_friction(bool(settings.friction)).with_level(
         settings.level  # type: ignore[arg-type]
     )
 
@@ -375,14 +385,16 @@ class ArmTrackingEnv(SingleEnv):
         scene: Name or path of a scene that starts at rest, or of an arm, which then
             sweeps its joints; ``ur5e-circle``.
         level: ``full`` or ``linear``.
-        friction: Whether drives have the friction of their maps; True.
+        friction: Whether drives have the friction of their maps, whatever the scene
+            says; True.
         kinematic_error_arcmin: As in ``JointTracking-v0``.
         action: ``torque`` or ``setpoint``.
         authority_of_rated: 0.2.
         shift_arcmin: 10.
         episode_s: 2.
         sensors: As in ``JointTracking-v0``.
-        randomise: Likewise; ``load_inertia`` has no effect, the payload is the scene's.
+        randomise: Likewise, but ``load_inertia`` has no effect, the payload is the
+            scene's; so at ``linear`` True draws nothing.
         error_scale_mm: Of the reward; 1.
         effort_weight: Of the reward; 0.1.
 

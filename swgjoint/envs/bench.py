@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from swgjoint.envs.arguments import check_flag, check_number, shown
 from swgjoint.envs.core import Core, Entry, Limits, ceiling
 from swgjoint.envs.loop import MotorLoop
 from swgjoint.envs.plant import Plant, specimen
@@ -30,6 +31,8 @@ Array = NDArray[np.float64]
 
 LEVELS = ("full", "linear")
 MAX_SUB_STEPS = 16
+MAX_PERIOD = 0.05
+"""Of the control, above which references fall between its instants [s]."""
 JOINT, BODY = "joint", "load"
 REACH = 0.5
 """Of the bench's bar, at whose end a payload sits [m]."""
@@ -72,9 +75,22 @@ class BenchSettings:
             self._check(key, unit, zero=True)
         if self.torque_limit_Nm is not None:
             self._check("torque_limit_Nm", "N·m", zero=False)
+        if self.kinematic_error_arcmin is not None:
+            self._check("kinematic_error_arcmin", "arcmin", zero=True)
+        check_flag("friction", self.friction)
+        if not isinstance(self.drive, str | DriveMap):
+            raise InputError(
+                f"drive {shown(self.drive)}; accepted: a catalogue name, a map or"
+                " design file, or a DriveMap"
+            )
         if self.level not in LEVELS:
             raise InputError(
                 f"level {self.level!r} of an environment; accepted: {', '.join(LEVELS)}"
+            )
+        if self.period_s > MAX_PERIOD:
+            raise InputError(
+                f"period_s {self.period_s} s; accepted: a number > 0, up to"
+                f" {MAX_PERIOD:g}"
             )
         if not 0.5 <= self.episode_s <= 600.0 or self.steps > 10**6:
             raise InputError(
@@ -118,7 +134,7 @@ class BenchCore(Core):
             loop_damping_ratio: Of that loop.
         """
         self.settings = s = settings
-        tolerances = tolerances_of(s.randomise)
+        tolerances = tolerances_of(s.randomise, s.level)
         drive = s.drive
         if isinstance(drive, str):
             drive = load_drive_once(drive)
@@ -255,15 +271,6 @@ def _bench(
         max_input_speed=top_speed,
     )
     return spec, attached
-
-
-def check_number(key: str, value: Any, unit: str, *, zero: bool) -> None:
-    """Refuse what is no positive number; ``zero`` is accepted where it says so."""
-    number = isinstance(value, int | float) and not isinstance(value, bool)
-    if not (number and np.isfinite(value) and (value > 0 or (zero and value == 0))):
-        raise InputError(
-            f"{key} {value} {unit}; accepted: a number {'>=' if zero else '>'} 0"
-        )
 
 
 def settings_of(kind: type[Any], arguments: dict[str, Any]) -> Any:

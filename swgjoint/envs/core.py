@@ -23,7 +23,7 @@ from swgjoint.envs.specimen import Tolerances
 from swgjoint.errors import InputError
 from swgjoint.joint.variation import Variation
 from swgjoint.maps.drive_map import DriveMap
-from swgjoint.sim.controller import KnownJoints, Measured, Task
+from swgjoint.sim.controller import KnownJoints, Measured, ReadingAge, Task
 from swgjoint.units import arcmin
 
 Array = NDArray[np.float64]
@@ -67,7 +67,7 @@ def bounds(entries: Sequence[Entry]) -> tuple[Array, Array]:
 def ceiling(value: float) -> float:
     """A value rounded up to two digits: bounds that a table can state."""
     digit = 10.0 ** (floor(log10(value)) - 1)
-    return float(f"{np.ceil(value / digit * (1.0 - 1e-9)) * digit:.6g}")
+    return max(value, float(f"{np.ceil(value / digit * (1.0 - 1e-9)) * digit:.6g}"))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -120,6 +120,11 @@ class Core(ABC):
         self.plant, self.joints, self.limits = plant, joints, limits
         self.sensors, self.tolerances, self.loop = sensors, tolerances, loop
         self.period, self.steps = period, steps
+        if sensors.delay_periods > steps:
+            raise InputError(
+                f"sensor delay_periods {sensors.delay_periods}; accepted: at most the"
+                f" {steps} periods of an episode"
+            )
         count, n = plant.batch.nsim, len(joints.names)
         rated = np.array([d.ratings.rated_torque for d in joints.drives])
         self._readout = Readout(sensors, count, rated, period)

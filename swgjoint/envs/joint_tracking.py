@@ -10,6 +10,7 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from swgjoint.envs.api import BatchEnv, SingleEnv
+from swgjoint.envs.arguments import shown
 from swgjoint.envs.bench import BenchCore, BenchSettings, settings_of
 from swgjoint.envs.core import Entry, ceiling
 from swgjoint.envs.references import KINDS, draw_motion, smooth_step
@@ -22,6 +23,9 @@ LOAD_RAMP = 0.3
 """Time over which the load grows [s]."""
 MOTION_START = 0.1
 """Rest before the motion [s]."""
+SHORTEST = 0.012
+"""In which the fastest reference would reach its speed at its largest acceleration [s]:
+only moves of episodes below 0.7 s would be shorter."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,14 +40,25 @@ class TrackingSettings(BenchSettings):
         super().__post_init__()
         self._check("error_scale_arcmin", "arcmin", zero=False)
         self._check("effort_weight", "", zero=True)
-        if wrong := sorted(set(self.kinds) - set(KINDS)) or not self.kinds:
-            raise InputError(f"reference {wrong}; accepted: {', '.join(KINDS)}")
+        several = isinstance(self.reference, tuple | list) and self.reference
+        given = self.reference if several else [self.reference]
+        for one in given:
+            if not (isinstance(one, str) and one in KINDS):
+                raise InputError(
+                    f"reference {shown(one)}; accepted: one or several of"
+                    f" {', '.join(KINDS)}"
+                )
 
     @property
     def kinds(self) -> tuple[str, ...]:
         """Kinds of references that are drawn."""
-        one = isinstance(self.reference, str)
-        return (self.reference,) if one else tuple(self.reference)  # type: ignore
+        given = self.reference
+        return (given,) if isinstance(given, str) else tuple(given)
+
+    @property
+    def max_acceleration(self) -> float:
+        """Of references [rad/s²]."""
+        return self.max_speed_rad_s / SHORTEST
 
 
 class TrackingCore(BenchCore):
@@ -55,7 +70,7 @@ class TrackingCore(BenchCore):
         """Of observation and action."""
         s, joint = self.settings, self.joint
         angle, speed = self.motor_entries()
-        reach = ceiling(s.max_angle_rad)
+        reach, bend = ceiling(s.max_angle_rad), ceiling(s.max_acceleration)
         load = ceiling(max(s.load_of_rated, 0.01) * joint.drive.ratings.rated_torque)
 
         def known(what: str, unit: str, top: float) -> Entry:
@@ -69,7 +84,7 @@ class TrackingCore(BenchCore):
             known("motor speed, ratio * reference - read", "rad/s", speed.high),
             known("reference angle of the link", "rad", reach),
             known("reference speed of the link", "rad/s", ceiling(s.max_speed_rad_s)),
-            known("reference acceleration of the link", "rad/s^2", 50.0),
+            known("reference acceleration of the link", "rad/s^2", bend),
             known("load torque against the link", "N·m", load),
             known("last action", "1", 1.0),
             *self.sensor_entries(),
@@ -87,6 +102,7 @@ class TrackingCore(BenchCore):
             kinds=s.kinds,
             max_speed=s.max_speed_rad_s,
             max_angle=s.max_angle_rad,
+            max_acceleration=s.max_acceleration,
         )
         rated = self.joint.drive.ratings.rated_torque
         top = float(rng.uniform(-1.0, 1.0)) * s.load_of_rated * rated
@@ -183,7 +199,7 @@ class JointTrackingEnv(SingleEnv):
 
     Args (all by keyword):
         drive: Catalogue name, map file, design or DriveMap; ``CSG-25-100``.
-        level: ``full`` or ``linear``.
+        level: ``full`` or ``linear``, one constant spring.
         rotor_inertia_kgm2: Motor rotor and wave generator; 1e-4.
         load_inertia_kgm2: About the joint; 1.0.
         payload_kg: At the end of the 0.5 m bar; 0.
@@ -191,7 +207,8 @@ class JointTrackingEnv(SingleEnv):
         kinematic_error_arcmin: Peak to peak over one output turn, for a map without
             error; None takes the transmission accuracy that its catalogue states.
         torque_limit_Nm: Of the motor; None: repeated peak torque over the ratio.
-        max_speed_rad_s: Of references, at the link; 0.6.
+        max_speed_rad_s: Of references, at the link; 0.6. Their acceleration is at most
+            that speed in 12 ms.
         max_angle_rad: Of references; 1.0.
         period_s: Of the control; 1e-3. The engine steps as often, or, where the drive
             is too stiff for that, in equal parts of it.
@@ -200,7 +217,8 @@ class JointTrackingEnv(SingleEnv):
         sensors: Mapping with fields of :class:`~swgjoint.envs.sensors.Sensors`.
         randomise: True, or a mapping with fields of
             :class:`~swgjoint.envs.specimen.Tolerances`: every episode has a drive and
-            a load of its own. ``task`` keeps the nominal ones. False.
+            a load of its own. ``task`` keeps the nominal ones. At ``linear`` True draws
+            the load's inertia alone, and tolerances of the drive are refused. False.
         reference: One or several of ``sinusoid``, ``multisine``, ``point_to_point``.
         error_scale_arcmin: Of the reward; 3.
         effort_weight: Of the reward; 0.1.

@@ -10,6 +10,7 @@ import numpy as np
 from mujoco.batch import Batch
 from numpy.typing import NDArray
 
+from swgjoint.envs.arguments import check_count
 from swgjoint.errors import InputError
 from swgjoint.joint.drive import JointDrive
 from swgjoint.joint.variation import SIZE, Variation
@@ -46,6 +47,8 @@ class Plant:
             threads: Of the engine; 0: one per core.
             variable: Whether drives differ between simulations.
         """
+        check_count("num_envs", count, 1)
+        check_count("threads", threads, 0)
         self.model, self.drives, self.sub_steps = model, tuple(drives), sub_steps
         self.batch = Batch(model, count, nthread=threads)
         self.ratio: Array = np.array([d.ratio for d in drives])

@@ -88,6 +88,7 @@ def draw_motion(
     kinds: tuple[str, ...],
     max_speed: float,
     max_angle: float,
+    max_acceleration: float,
 ) -> Motion:
     """A motion of one of the kinds, with 40 to 100 % of what the limits allow.
 
@@ -97,12 +98,14 @@ def draw_motion(
         kinds: Names of :data:`KINDS`, one of which is drawn.
         max_speed: Limit of the speed [rad/s].
         max_angle: Limit of the distance from the start [rad].
+        max_acceleration: Limit of the acceleration [rad/s²].
     """
     kind = kinds[int(rng.integers(len(kinds)))]
     position, velocity, acceleration = KINDS[kind](time, rng)
     size = min(
         max_speed / float(np.abs(velocity).max()),
         max_angle / float(np.abs(position).max()),
+        max_acceleration / float(np.abs(acceleration).max()),
     )
     size *= float(rng.uniform(0.4, 1.0) * rng.choice([-1.0, 1.0]))
     return size * position, size * velocity, size * acceleration

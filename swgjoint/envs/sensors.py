@@ -8,6 +8,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
+from swgjoint.envs.arguments import is_flag, is_number, is_whole, shown
 from swgjoint.errors import InputError
 from swgjoint.units import arcsec
 
@@ -37,11 +38,18 @@ class Sensors:
 
     def __post_init__(self) -> None:
         for field in fields(self):
-            value, integer = getattr(self, field.name), field.type == "int"
-            whole = not integer or float(value) == int(value)
-            if not (np.isfinite(value) and value >= 0 and whole):
-                kind = "an integer" if integer else "a finite number"
-                raise InputError(f"sensor {field.name} {value}; accepted: {kind} >= 0")
+            value, kind = getattr(self, field.name), str(field.type)
+            fits, accepted = {
+                "int": (is_whole, "an integer >= 0"),
+                "float": (is_number, "a finite number >= 0"),
+                "bool": (is_flag, "True, False"),
+            }[kind]
+            if not (fits(value) and value >= 0):
+                raise InputError(
+                    f"sensor {field.name} {shown(value)}; accepted: {accepted}"
+                )
+            if kind == "int":  # what a file or a division may have as 2.0
+                object.__setattr__(self, field.name, int(value))
 
     @classmethod
     def of(cls, argument: Mapping[str, float] | Sensors | None) -> Sensors:
@@ -49,9 +57,14 @@ class Sensors:
         if argument is None or isinstance(argument, Sensors):
             return argument or cls()
         known = {field.name for field in fields(cls)}
-        if unknown := sorted(set(argument) - known):
+        if not isinstance(argument, Mapping):
             raise InputError(
-                f"sensor {unknown[0]!r}; accepted: {', '.join(sorted(known))}"
+                f"sensors {shown(argument)}; accepted: None or a mapping with"
+                f" {', '.join(sorted(known))}"
+            )
+        if unknown := [key for key in argument if key not in known]:
+            raise InputError(
+                f"sensor {shown(unknown[0])}; accepted: {', '.join(sorted(known))}"
             )
         return cls(**argument)  # type: ignore[arg-type]
 

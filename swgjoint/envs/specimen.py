@@ -8,6 +8,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from swgjoint.envs.arguments import is_flag, is_number, shown
 from swgjoint.errors import InputError
 from swgjoint.joint.variation import Variation
 from swgjoint.maps.drive_map import DriveMap
@@ -24,7 +25,11 @@ SHARES = (0.3, 0.3, 0.2, 0.2)
 
 @dataclass(frozen=True, kw_only=True)
 class Tolerances:
-    """Within what a drive and its load may differ from the nominal ones; ± shares."""
+    """Within what a drive and its load may differ from the nominal ones; ± shares.
+
+    At ``linear`` a drive is one constant spring, and ``load_inertia`` is all there is:
+    the others are then 0, and refused where they are not.
+    """
 
     stiffness: float = 0.15
     kinematic_error: float = 0.5
@@ -37,10 +42,12 @@ class Tolerances:
 
     def __post_init__(self) -> None:
         for field in fields(self):
-            value = getattr(self, field.name)
-            if field.name != "phase" and not 0.0 <= value < 1.0:
+            value, flag = getattr(self, field.name), field.name == "phase"
+            good = is_flag(value) if flag else is_number(value) and 0.0 <= value < 1.0
+            if not good:
+                accepted = "True, False" if flag else "0 to 1, 1 excluded"
                 raise InputError(
-                    f"tolerance {field.name} {value}; accepted: 0 to 1, 1 excluded"
+                    f"tolerance {field.name} {shown(value)}; accepted: {accepted}"
                 )
 
     def draw(self, rng: np.random.Generator) -> tuple[Variation, float]:
@@ -65,20 +72,42 @@ class Tolerances:
 
 
 def tolerances_of(
-    argument: bool | Mapping[str, float] | Tolerances,
+    argument: bool | Mapping[str, float] | Tolerances, level: str
 ) -> Tolerances | None:
-    """What the argument ``randomise`` of an environment means; None: off."""
-    if isinstance(argument, bool):
-        return Tolerances() if argument else None
-    if isinstance(argument, Tolerances):
-        return argument
+    """What the argument ``randomise`` of an environment means; None: off.
+
+    Args:
+        argument: As given.
+        level: Of the drives; ``linear`` carries what the load has alone.
+
+    Raises:
+        InputError: If it is of another kind, or says what the level cannot carry.
+    """
     known = {field.name for field in fields(Tolerances)}
-    if unknown := sorted(set(argument) - known):
+    if argument is False:
+        return None
+    if isinstance(argument, Mapping):
+        unknown = [shown(key) for key in argument if key not in known]
+    else:
+        unknown = [shown(argument)]
+    if unknown and argument is not True and not isinstance(argument, Tolerances):
         raise InputError(
-            f"randomise {unknown[0]!r}; accepted: True, False or a mapping with"
+            f"randomise {unknown[0]}; accepted: True, False or a mapping with"
             f" {', '.join(sorted(known))}"
         )
-    return Tolerances(**argument)  # type: ignore[arg-type]
+    absent = dict.fromkeys(known - {"load_inertia"}, 0) if level == "linear" else {}
+    if isinstance(argument, Tolerances):
+        got = argument
+    else:
+        given = argument if isinstance(argument, Mapping) else {}
+        got = Tolerances(**{**absent, **given})  # type: ignore[arg-type]
+    for key in sorted(absent):
+        if value := getattr(got, key):
+            raise InputError(
+                f"tolerance {key} {value} at level linear, whose drives are all alike;"
+                " accepted: load_inertia alone, or level full"
+            )
+    return got
 
 
 def with_assumed_error(drive: DriveMap, peak_to_peak: float | None = None) -> DriveMap:

@@ -209,6 +209,10 @@ class Scene(Section):
         """A copy in which every joint has this level."""
         return self._with_all(level=level)
 
+    def with_friction(self, friction: bool) -> Self:
+        """A copy in which every joint has the friction of its drive, or none has."""
+        return self._with_all(friction=friction)
+
     def _with_all(self, **values: Any) -> Self:
         defaults = self.defaults.model_copy(update=values)
         joints = {

@@ -101,9 +101,69 @@ def test_sensors_know_the_load_from_the_first_instant():
     np.testing.assert_allclose(read.link_angle, info["link_angle_rad"], atol=5e-5)
 
 
+def test_delayed_readings_begin_where_the_arm_stands():
+    """Until they are as old as the delay, readings are those of the start."""
+    env = ArmTrackingEnv(
+        sensors={
+            "motor_counts": 0,
+            "motor_noise_rad": 0.0,
+            "link_counts": 0,
+            "link_noise_rad": 0.0,
+            "torque_noise_of_rated": 0.0,
+            "link_encoder": True,
+            "torque_sensor": True,
+            "delay_periods": 3,
+        }
+    )
+    keys = ("motor_angle_rad", "link_angle_rad", "output_torque_Nm")
+    # the second time the ring of readings is not where it began
+    for steps in (5, 8):
+        observation, info = env.reset(seed=0)
+        read, true = [env.measured(observation)], [info]
+        for _ in range(steps):
+            observation, *_, info = env.step(np.full(6, 0.5))
+            read.append(env.measured(observation))
+            true.append(info)
+        # all but the last joint of the path stand away from 0
+        assert (np.abs(true[0]["motor_angle_rad"][:-1]) > 10.0).all()
+        for k in range(steps + 1):
+            of = true[max(k - 3, 0)]
+            angle, link, torque = (of[key] for key in keys)
+            np.testing.assert_array_equal(read[k].motor_angle, angle)
+            np.testing.assert_array_equal(read[k].link_angle, link)
+            np.testing.assert_array_equal(read[k].output_torque, torque)
+            assert k > 3 or not read[k].motor_speed.any()
+        assert (true[1]["motor_angle_rad"] != true[0]["motor_angle_rad"]).all()
+
+
+@pytest.mark.parametrize("own", [True, False])
+def test_friction_is_what_the_argument_says(own, tmp_path):
+    """A scene and a joint with friction of their own say less than the argument."""
+    text = (models_path() / "scenes" / "ur5e-catalogue.toml").read_text("utf-8")
+    said = f"friction = {str(own).lower()}\n"
+    for table in ("[defaults]\n", "[joints.elbow_joint]\n"):
+        text = text.replace(table, table + said)
+    path = tmp_path / "scene.toml"
+    path.write_text(text, encoding="utf-8")
+    for friction in (True, False):
+        env = ArmTrackingEnv(scene=str(path), friction=friction)
+        model = env.core.plant.model
+        names = [model.tendon(k).name for k in range(model.ntendon)]
+        found = [name for name in names if name.endswith("_friction")]
+        assert len(found) == (6 if friction else 0)
+
+
 @pytest.mark.parametrize(
     ("keys", "match"),
     [
+        ({"scene": 5}, "scene 5; accepted: name or path"),
+        ({"friction": "no"}, "friction 'no'; accepted: True, False"),
+        ({"kinematic_error_arcmin": "1"}, "kinematic_error_arcmin '1' arcmin"),
+        ({"sensors": {"delay_periods": 10**9}}, "at most the 2000 periods"),
+        (
+            {"level": "linear", "randomise": {"losses": 0.1}},
+            "tolerance losses 0.1 at level linear",
+        ),
         ({"scene": "ur5e-payload-step"}, "has disturbances"),
         ({"scene": "bench-chirp"}, "controller 'computed_torque'"),
         ({"scene": "nothing"}, "neither a file nor in models/scenes"),

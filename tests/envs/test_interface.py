@@ -17,7 +17,7 @@ from swgjoint.errors import InputError
 ALL = {"link_encoder": True, "torque_sensor": True}
 SHORT = {
     "swgjoint/JointTracking-v0": {"episode_s": 0.5, "load_of_rated": 0.05},
-    "swgjoint/RippleSuppression-v0": {"episode_s": 1.6},
+    "swgjoint/RippleSuppression-v0": {"episode_s": 1.6, "period_s": 2e-3},
     "swgjoint/ArmTracking-v0": {"episode_s": 0.4},
 }
 """Arguments with which episodes end within the tests."""
@@ -97,7 +97,7 @@ def test_batch_equals_single_environments(name, level):
     sync = SyncVectorEnv([lambda: make(name, **keys).unwrapped] * count)
     batch = gymnasium.make_vec(name, num_envs=count, threads=2, **keys)
     assert batch.metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
-    rng, ended, broken = np.random.default_rng(0), 0, 0
+    rng, ended, broken = np.random.default_rng(0), np.zeros(count), np.zeros(count)
     got, want = batch.reset(seed=11), sync.reset(seed=11)
     same(got, want)
     # some wander until a limit breaks, some stay until the end
@@ -106,10 +106,28 @@ def test_batch_equals_single_environments(name, level):
         actions = size * rng.uniform(-0.9, 0.9, batch.action_space.shape)
         got, want = batch.step(actions), sync.step(actions)
         same(got, want)
-        ended += int(got[3].sum())
-        broken += int(got[2].sum())
+        ended += got[3]
+        broken += got[2]
+    # every episode began anew, and not in the last step
+    assert (ended + broken >= 1).all() and (batch.unwrapped.core.instant > 0).all()
     if name.endswith("JointTracking-v0"):
-        assert ended >= 4 and broken >= 1
+        assert ended.sum() >= 4 and broken.sum() >= 1
+
+
+@NAMES
+@pytest.mark.parametrize(
+    ("keys", "match"),
+    [
+        ({"num_envs": 0}, "num_envs 0; accepted: an integer >= 1"),
+        ({"num_envs": 2.5}, "num_envs 2.5; accepted: an integer >= 1"),
+        ({"threads": -3}, "threads -3; accepted: an integer >= 0"),
+        ({"threads": "2"}, "threads '2'; accepted: an integer >= 0"),
+    ],
+)
+def test_a_batch_of_no_size_is_refused(name, keys, match):
+    """In one line of the package, not the engine's."""
+    with pytest.raises(InputError, match=match):
+        gymnasium.make_vec(f"swgjoint.envs:{name}", **{"num_envs": 2, **keys})
 
 
 @pytest.mark.parametrize(

@@ -9,11 +9,16 @@ from dataclasses import replace
 import gymnasium
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from swgjoint.envs.core import LIMITS
 from swgjoint.envs.joint_tracking import JointTrackingEnv, JointTrackingVectorEnv
+from swgjoint.envs.references import KINDS
 from swgjoint.envs.sensors import Sensors
+from swgjoint.envs.specimen import Tolerances
 from swgjoint.errors import InputError
+from swgjoint.joint.variation import Variation
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.units import arcmin
 
@@ -105,7 +110,6 @@ def test_sensors_have_resolution_and_delay():
     np.testing.assert_array_equal(
         link[3:], [i["link_angle_rad"] for _, _, i in rows][:-3]
     )
-    assert np.ptp(true[:4]) == 0.0 or read[0] == np.floor(true[0] / count) * count
 
 
 def test_noise_has_the_stated_deviation():
@@ -198,7 +202,10 @@ def test_a_controller_sees_all_episodes_of_a_batch():
     [
         ({"drives": "x"}, "argument 'drives'.*accepted: drive"),
         ({"level": "rigid"}, "level 'rigid'.*accepted: full, linear"),
-        ({"reference": "step"}, "reference .*step.*accepted: sinusoid"),
+        (
+            {"reference": "step"},
+            "reference 'step'; accepted: one or several",
+        ),
         ({"payload_kg": -1.0}, "payload_kg -1.0 kg; accepted: a number >= 0"),
         ({"sensors": {"noise": 1.0}}, "sensor 'noise'; accepted: delay_periods"),
         ({"sensors": {"motor_counts": 0.5}}, "motor_counts 0.5; accepted: an integer"),
@@ -208,6 +215,33 @@ def test_a_controller_sees_all_episodes_of_a_batch():
             "tolerance stiffness 1.5; accepted: 0 to 1",
         ),
         ({"episode_s": 0.1}, "episode_s 0.1 s"),
+        ({"period_s": 1.0, "level": "linear"}, "period_s 1.0 s; accepted: .* 0.05"),
+        ({"drive": 5}, "drive 5; accepted: a catalogue name"),
+        ({"reference": 5}, "reference 5; accepted: one or several of sinusoid"),
+        ({"reference": ()}, r"reference \(\); accepted: one or several"),
+        ({"reference": ("sinusoid", 5)}, "reference 5; accepted: one or several"),
+        ({"randomise": 3}, "randomise 3; accepted: True, False or a mapping"),
+        ({"randomise": None}, "randomise None; accepted: True, False or a mapping"),
+        ({"randomise": "yes"}, "randomise 'yes'; accepted: True, False or a mapping"),
+        ({"randomise": {"losses": "0.1"}}, "tolerance losses '0.1'; accepted: 0 to 1"),
+        ({"randomise": {"phase": "no"}}, "tolerance phase 'no'; accepted: True, False"),
+        ({"sensors": 5}, "sensors 5; accepted: None or a mapping with delay_periods"),
+        ({"sensors": {5: 1}}, "sensor 5; accepted: delay_periods"),
+        ({"sensors": {"motor_counts": "x"}}, "motor_counts 'x'; accepted: an integer"),
+        ({"sensors": {"link_encoder": "no"}}, "link_encoder 'no'; accepted: True"),
+        ({"sensors": {"delay_periods": np.nan}}, "delay_periods nan; accepted: an int"),
+        ({"sensors": {"delay_periods": 1.5}}, "delay_periods 1.5; accepted: an int"),
+        (
+            {"sensors": {"delay_periods": 10**9}},
+            "delay_periods 1000000000; accepted: at most the 2000 periods",
+        ),
+        (
+            {"kinematic_error_arcmin": "1"},
+            "kinematic_error_arcmin '1' arcmin",
+        ),
+        ({"friction": "no"}, "friction 'no'; accepted: True, False"),
+        ({"max_speed_rad_s": "1"}, "max_speed_rad_s '1' rad/s; accepted: a number > 0"),
+        ({"episode_s": 10**400}, "episode_s 1000.* s; accepted: a number > 0"),
         ({"drive": "CSG-25"}, "nearest: CSG-25-100"),
     ],
 )
@@ -216,6 +250,78 @@ def test_bad_arguments_give_one_line(keys, match):
     with pytest.raises(InputError, match=match):
         JointTrackingEnv(**keys)
     assert Sensors.of(None) == Sensors()
+
+
+def test_whole_numbers_of_any_type_are_integers():
+    """A delay of 1.0 periods is one of 1."""
+    runs = []
+    for delay in (2, 2.0, np.int64(2)):
+        env = JointTrackingEnv(sensors={"delay_periods": delay, "motor_counts": 4096.0})
+        env.reset(seed=3)
+        runs.append([env.step(np.full(1, 0.05))[0] for _ in range(20)])
+    np.testing.assert_array_equal(runs[0], runs[1])
+    np.testing.assert_array_equal(runs[0], runs[2])
+
+
+@pytest.mark.parametrize("key", ["stiffness", "kinematic_error", "losses", "phase"])
+def test_linear_drives_have_no_tolerances(key):
+    """What one constant spring cannot carry is refused, in whatever form it comes."""
+    value = True if key == "phase" else 0.1
+    for said in ({key: value}, Tolerances(**{key: value})):
+        with pytest.raises(InputError, match=r"at level linear.*load_inertia alone"):
+            JointTrackingEnv(level="linear", randomise=said)
+    JointTrackingEnv(level="linear", randomise={key: 0})
+
+
+@pytest.mark.parametrize("said", [True, {"load_inertia": 0.2}, {"stiffness": 0.0}])
+def test_linear_joints_draw_the_load_alone(said):
+    """Loads differ within their tolerance; drives are all nominal."""
+    batch = JointTrackingVectorEnv(20, level="linear", randomise=said)
+    batch.reset(seed=0)
+    inertia = batch.core.plant.batch.expanded("body_inertia")
+    loads = inertia[:, batch.core.plant.model.body("load").id, 2]
+    assert 0.1 < np.abs(loads - 1.0).max() <= 0.2
+    assert {v for (v,) in batch.core.variations} == {Variation()}
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    episode_s=st.one_of(st.just(0.5), st.floats(0.5, 3.0)),
+    speed=st.floats(0.01, 5.0),
+    angle=st.floats(0.01, 10.0),
+    period_s=st.sampled_from([5e-4, 1e-3, 3e-3, 1e-2]),
+    kind=st.sampled_from([*KINDS]),
+    load=st.floats(0.0, 3.0),
+    seed=st.integers(0, 2**32 - 1),
+)
+def test_no_reference_is_clipped(episode_s, speed, angle, period_s, kind, load, seed):
+    """Whatever arguments are accepted, the bounds hold all that is commanded."""
+    env = JointTrackingEnv(
+        level="linear",
+        episode_s=episode_s,
+        max_speed_rad_s=speed,
+        max_angle_rad=angle,
+        period_s=period_s,
+        reference=kind,
+        load_of_rated=load,
+    )
+    high = env.observation_space.high[4:8]
+    for k in range(5):
+        plan = env.core.draw(np.random.default_rng([seed, k]))[:, :4, 0]
+        assert np.isfinite(plan).all()
+        # round-off of scaling a motion to its limit
+        assert (np.abs(plan) <= high * (1.0 + 1e-12)).all()
+    # the observation is that plan, unclipped
+    env.reset(seed=seed)
+    task = env.task
+    for k in range(0, env.core.steps + 1, 50):
+        env.core.instant[:] = k
+        env.core._look()
+        np.testing.assert_allclose(
+            env.core.observation()[0, 4:7],
+            [task.position[k, 0], task.velocity[k, 0], task.acceleration[k, 0]],
+            rtol=1e-12,
+        )
 
 
 def test_missing_gymnasium_names_the_command():

@@ -16,17 +16,24 @@ TIME = np.arange(2001) * 1e-3
 
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("seed", range(5))
-def test_motions_are_their_own_derivatives(kind, seed):
+@pytest.mark.parametrize("top", [0.5, 50.0])
+def test_motions_are_their_own_derivatives(kind, seed, top):
     """Speed and acceleration are those of the angle; limits hold; rest at the start."""
     q, v, a = draw_motion(
-        TIME, np.random.default_rng(seed), kinds=(kind,), max_speed=0.6, max_angle=0.4
+        TIME,
+        np.random.default_rng(seed),
+        kinds=(kind,),
+        max_speed=0.6,
+        max_angle=0.4,
+        max_acceleration=top,
     )
     slope = np.gradient(q, TIME, edge_order=2)
     np.testing.assert_allclose(slope, v, atol=2e-4 * np.abs(v).max())
     bend = np.gradient(v, TIME, edge_order=2)
     np.testing.assert_allclose(bend, a, atol=2e-3 * np.abs(a).max())
-    assert np.abs(v).max() <= 0.6 * (1 + 1e-12) and np.abs(q).max() <= 0.4 * (1 + 1e-12)
-    assert max(np.abs(v).max() / 0.6, np.abs(q).max() / 0.4) >= 0.4
+    shares = np.abs([q, v, a]).max(axis=1) / [0.4, 0.6, top]
+    assert 0.4 <= shares.max() <= 1.0 + 1e-12
+    assert (shares.argmax() == 2) == (top < 2.0)
     np.testing.assert_allclose([q[0], v[0], a[0]], 0.0, atol=1e-12)
 
 
@@ -35,7 +42,9 @@ def test_fourth_derivative_is_continuous(kind):
     """Second differences of the acceleration change little from step to step."""
     rng = np.random.default_rng(0)
     time = np.arange(20001) * 1e-4
-    _, _, a = draw_motion(time, rng, kinds=(kind,), max_speed=0.6, max_angle=0.4)
+    _, _, a = draw_motion(
+        time, rng, kinds=(kind,), max_speed=0.6, max_angle=0.4, max_acceleration=50.0
+    )
     snap = np.diff(a, 2) / 1e-8
     # a jump would stay as large at any step; a slope shrinks with the step
     assert np.abs(np.diff(snap)).max() < 0.02 * np.abs(snap).max()
