@@ -23,7 +23,7 @@ from swgjoint.envs.specimen import Tolerances
 from swgjoint.errors import InputError
 from swgjoint.joint.variation import Variation
 from swgjoint.maps.drive_map import DriveMap
-from swgjoint.sim.controller import KnownJoints, Measured, ReadingAge, Task
+from swgjoint.sim.controller import KnownJoints, Measured, Task
 from swgjoint.units import arcmin
 
 Array = NDArray[np.float64]
