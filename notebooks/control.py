@@ -21,6 +21,8 @@
 # The drive is a CSG-25-100 by its catalogue: stiffness, ratings, friction. What the
 # controllers are *not* told is the specimen: a kinematic error with the peak to peak
 # that the catalogue allows, friction that is up to a fifth off, a tenth of the load.
+# Encoders round, are noisy, and tell what was 1 ms ago: the delay is known, so that a
+# reading is held against the plan of the instant at which it was taken.
 
 # %%
 import matplotlib.pyplot as plt

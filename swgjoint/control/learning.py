@@ -69,7 +69,7 @@ class LearningCompensation:
         rate: float = 0.5,
         forgetting: float = 0.0,
         turns: float | None = None,
-        delay: float = 0.0,
+        delay: float | None = None,
         limit: float = 3e-3,
     ) -> None:
         """Learn beside a controller; it sees the motor without the learned motion.
@@ -81,7 +81,7 @@ class LearningCompensation:
             rate: mu, share of what is left that a block takes off, in (0, 1].
             forgetting: rho, share of what was learned that a block forgets, in [0, 1).
             turns: Of the wave generator in a block; None: a quarter turn of the output.
-            delay: Age of the signal's readings [s].
+            delay: Age of the signal's readings [s]; None: that of the task.
             limit: Largest amplitude of a learned harmonic [rad].
 
         Raises:
@@ -126,6 +126,17 @@ class LearningCompensation:
         rotor = i[:, None] * joints.rotor_inertia[..., None]
         on_motor = rotor * self._motor + inertia / i[:, None] * self._link
         self._torque = -(omega**2) * on_motor
+        # as they are read
+        self._link = task.as_read(self._link, "link")
+        self._motor = task.as_read(self._motor, "motor")
+        self._speed = task.as_read(self._speed, "motor")
+        if self.signal == "link_angle":
+            self._known = task.as_read(task.position, "link")
+            age = task.reading_age.link
+        else:
+            self._known = task.as_read(task.link_torque, "torque")
+            age = task.reading_age.torque
+        self._age = age if self.delay is None else self.delay
         shape = (*task.position.shape[1:], len(self.orders))
         self.learned: Complex = np.zeros(shape, complex)
         """c [rad]. Complex, shape (..., n_joints, n_orders)."""
@@ -162,9 +173,7 @@ class LearningCompensation:
                 f"learning from {self.signal} without its sensor; accepted: a scene"
                 " with controller.feedback = 'link' or sensors.torque"
             )
-        task = self._task
-        known = task.position if self.signal == "link_angle" else task.link_torque
-        self._signal[k] = reading - known[k]
+        self._signal[k] = reading - self._known[k]
 
     def _blocks(self, task: Task) -> frozenset[int]:
         """Instants that end a block: the slowest of the joints that move counts."""
@@ -187,7 +196,7 @@ class LearningCompensation:
         if not moving.any():
             return
         omega = self._omega[block]
-        turned = self._phase[block] - omega * self.delay
+        turned = self._phase[block] - omega * self._age
         count, orders = len(turned), len(self.orders)
         line = np.linspace(-1.0, 1.0, count).reshape(-1, *(1,) * (turned.ndim - 1))
         basis = np.concatenate(

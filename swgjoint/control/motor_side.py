@@ -3,7 +3,10 @@ r"""Position control on the motor's own encoder, with a plan made before the mot
 A *plan* says where the motor shall be and what torque takes it there,
 
 .. math:: \tau = \tau_r + k_p e + k_d \dot e + k_i \int e\,dt, \quad e = \theta_r -
-    \theta.
+    \theta,
+
+where a reading of the motor is held against the plan of the instant at which it was
+taken, which is what the age of the readings in the task is for.
 
 Plans know the link's motion and more or less of the drive: :func:`ideal_plan` a rigid
 gear, :func:`rigid_plan` its torque and friction, too, and
@@ -143,18 +146,19 @@ class MotorPID:
         )
         """Gain on the motor speed [N·m·s/rad]."""
         self.planned = self.plan(task)
+        self._angle = task.as_read(self.planned.angle, "motor")
+        self._speed = task.as_read(self.planned.speed, "motor")
         self._period = task.period
         self._integral: Array = np.zeros(task.position.shape[1:])
 
     def torque(self, k: int, measured: Measured) -> Array:
         """See :class:`swgjoint.sim.controller.Controller`."""
-        plan = self.planned
-        error = plan.angle[k] - measured.motor_angle
+        error = self._angle[k] - measured.motor_angle
         wanted = (
             self.stiffness * error
-            + self.damping * (plan.speed[k] - measured.motor_speed)
+            + self.damping * (self._speed[k] - measured.motor_speed)
             + self._integral
-            + plan.torque[k]
+            + self.planned.torque[k]
         )
         if self._integral_time is not None:
             gain = self._period / self._integral_time * self.stiffness

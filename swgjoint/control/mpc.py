@@ -25,6 +25,10 @@ in reach within the horizon the optimum is a linear feedback, one product. Else 
 dense quadratic programme of the N torques is solved by ADMM, all joints and motions
 side by side at once.
 
+Readings that are old are held against the plan of then and correct the state of then,
+from which the model is taken to now with the torques that were given since; the oldest
+of the readings counts for all.
+
 Coupling of an arm's joints is in the plan; what is left of it is a disturbance to each,
 and a drive feels less than the inertia about its joint, as the others give way. With
 the defaults shoulder and elbow of a UR5e diverge. With :func:`free_inertia`, 10 Hz
@@ -38,6 +42,7 @@ Source:
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import replace
 
 import mujoco
@@ -130,27 +135,26 @@ class PredictiveController:
         self._unit = UNIT * rated / np.abs(joints.ratio[self._joint])
         self._rated, self._limit = rated, limit
         self._peak = self.peak * largest[self._joint]
+        self._angle = task.as_read(self.planned.angle, "motor")
+        self._link = task.as_read(task.position, "link")
+        self._drive = task.as_read(task.link_torque, "torque")
         self.limited = 0
         """Motors and instants at which a limit was within the horizon."""
 
     def torque(self, k: int, measured: Measured) -> Array:
         """See :class:`swgjoint.sim.controller.Controller`."""
         task, plan = self._task, self.planned
-        seen = [(measured.motor_angle - plan.angle[k]) / task.joints.ratio]
-        if measured.link_angle is not None:
-            seen.append(measured.link_angle - task.position[k])
-        if measured.output_torque is not None:
-            seen.append(measured.output_torque - task.link_torque[k])
-        readings = np.stack([np.reshape(x, -1) for x in seen], axis=-1)
-        if self._design is None:
-            self._begin(readings, measured)
+        readings = self._off_plan(k, measured)
         assert self._design is not None
         if self._parts is None or (self._level[k] != self._level[k - 1]).any():
             self._parts = self._design.at((self._joint, self._level[k]))
         parts = self._parts
 
         x = self._state
-        x = x + _times(parts.gain, readings - _times(parts.reads, x))
+        corrected = x + _times(parts.gain, readings - _times(parts.reads, x))
+        x = corrected
+        for push in self._given:  # since the readings
+            x = _times(parts.transition, x) + parts.by_torque * push
         off = x[:, :4] - _times(parts.target, x[:, 4:])
         steady = np.einsum("ij,ij->i", parts.steady, x[:, 4:])
         ahead = _times(parts.ahead, off)
@@ -171,14 +175,36 @@ class PredictiveController:
             )[:, 0]
         planned = plan.torque[k].reshape(-1)
         wanted = np.clip(planned + steady + u * self._unit, -self._limit, self._limit)
+        self._given.append((wanted - planned)[:, None])
         self._state = (
-            _times(parts.transition, x) + parts.by_torque * (wanted - planned)[:, None]
+            _times(parts.transition, corrected)
+            + parts.by_torque * self._given.popleft()
         )
         return np.asarray(wanted.reshape(task.position.shape[1:]))
 
-    def _begin(self, readings: Array, measured: Measured) -> None:
+    def _off_plan(self, k: int, measured: Measured) -> Array:
+        """Readings off the plan of one instant, the newest that all sensors tell."""
+        ratio = self._task.joints.ratio
+        seen = {"motor": (measured.motor_angle - self._angle[k]) / ratio}
+        if measured.link_angle is not None:
+            seen["link"] = measured.link_angle - self._link[k]
+        if measured.output_torque is not None:
+            seen["torque"] = measured.output_torque - self._drive[k]
+        now = {key: np.reshape(x, -1) for key, x in seen.items()}
+        if self._design is None:
+            self._begin(now, measured)
+        for key, x in now.items():
+            self._seen[key].append(x)
+        return np.stack([self._seen[key].popleft() for key in now], axis=-1)
+
+    def _begin(self, now: dict[str, Array], measured: Measured) -> None:
         """Feedback for the sensors that there are; the joint begins at rest."""
         task = self._task
+        readings = np.stack(list(now.values()), axis=-1)
+        old = {key: task.periods_old(key) for key in now}  # type: ignore[arg-type]
+        oldest = max(old.values())
+        self._seen = {key: deque([x] * (oldest - old[key])) for key, x in now.items()}
+        self._given = deque([np.zeros((len(readings), 1))] * oldest)
         self._state = np.zeros((len(readings), 6))
         self._state[:, 0] = readings[:, 0]
         reads_link = measured.link_angle is not None

@@ -9,7 +9,8 @@ has :math:`\dot{\hat d} = L (d - \hat d)`: it follows friction and unknown load,
 a low-pass of bandwidth L, without accelerations. It is taken off the motor's torque.
 n is :math:`T/i` with T of the torque sensor where there is one, else that of the known
 arm on the motion; what a drive swings against that is then taken for a disturbance, so
-that the bandwidth must stay below the joint's resonance.
+that the bandwidth must stay below the joint's resonance. Speeds that are old are held
+against the torques of then; d is as old.
 
 Source:
     De Luca, Mattone (2003), "Actuator failure detection and isolation using generalized
@@ -17,6 +18,8 @@ Source:
 """
 
 from __future__ import annotations
+
+from collections import deque
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,7 +59,9 @@ class DisturbanceObserver:
             )
         self._task = task
         self._sum: Array | None = None
-        self._applied = np.zeros(task.position.shape[1:])
+        self._known = task.as_read(task.link_torque, "motor")
+        self._late = task.periods_old("motor")
+        self._applied: deque[Array] = deque(maxlen=self._late + 1)
         self.estimate: Array = np.zeros(task.position.shape[1:])
         """Disturbance that acts along the motors' rotation [N·m]. (..., n_joints)."""
         self.inner.start(task)
@@ -65,18 +70,19 @@ class DisturbanceObserver:
         """See :class:`swgjoint.sim.controller.Controller`."""
         joints, period = self._task.joints, self._task.period
         momentum = joints.rotor_inertia * measured.motor_speed
-        if self._sum is None:
+        if self._sum is None or k <= self._late:  # the first reading, still
             self._sum = momentum
         else:
             if measured.output_torque is None:
-                known = self._task.link_torque[k - 1]
+                known = self._known[k - 1]
             else:
                 known = measured.output_torque
             self._sum = self._sum + period * (
-                self._applied - known / joints.ratio + self.estimate
+                self._applied[0] - known / joints.ratio + self.estimate
             )
         self.estimate = self._gain * (momentum - self._sum)
         taken = np.clip(self.estimate, -self.limit, self.limit)
         wanted = self.inner.torque(k, measured) - taken
-        self._applied = np.clip(wanted, -joints.torque_limit, joints.torque_limit)
+        applied = np.clip(wanted, -joints.torque_limit, joints.torque_limit)
+        self._applied.append(applied)
         return np.asarray(wanted)

@@ -99,6 +99,7 @@ class SingleEnv(gymnasium.Env[Array, Array]):
             acceleration=task.acceleration[:, 0],
             link_torque=task.link_torque[:, 0],
             joints=task.joints,
+            reading_age=task.reading_age,
         )
 
     def measured(self, observation: Array) -> Measured:

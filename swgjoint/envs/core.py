@@ -23,7 +23,7 @@ from swgjoint.envs.specimen import Tolerances
 from swgjoint.errors import InputError
 from swgjoint.joint.variation import Variation
 from swgjoint.maps.drive_map import DriveMap
-from swgjoint.sim.controller import KnownJoints, Measured, Task
+from swgjoint.sim.controller import KnownJoints, Measured, ReadingAge, Task
 from swgjoint.units import arcmin
 
 Array = NDArray[np.float64]
@@ -333,6 +333,7 @@ class Core(ABC):
         if self._task is None:
             # (5, steps + 1, n, n_joints); a copy, which the next episodes leave alone
             plan = self._plan[self._planned].transpose(2, 1, 0, 3).copy()
+            age = self.sensors.delay_periods * self.period
             self._task = Task(
                 period=self.period,
                 position=plan[0],
@@ -340,6 +341,7 @@ class Core(ABC):
                 acceleration=plan[2],
                 link_torque=plan[4],
                 joints=self.joints,
+                reading_age=ReadingAge(motor=age, link=age, torque=age),
             )
         return self._task
 

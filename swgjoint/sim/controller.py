@@ -7,7 +7,7 @@ that one controller drives a single joint, an arm or a batch of either.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Literal, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from swgjoint.maps.drive_map import DriveMap
 
 Array = NDArray[np.float64]
+Number = TypeVar("Number", np.float64, np.complex128)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -39,6 +40,20 @@ class KnownJoints:
         return np.array([drive.ratio for drive in self.drives])
 
 
+@dataclass(frozen=True, kw_only=True)
+class ReadingAge:
+    """How old the readings of the sensors are when the controller gets them [s].
+
+    A nominal datum of the sensors: what their delay is stated to be. Before the motion
+    sensors read its beginning. The speed of a motor from a difference of its angles is
+    half a period older than these.
+    """
+
+    motor: float = 0.0
+    link: float = 0.0
+    torque: float = 0.0
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Task:
     """A commanded motion of the links at the instants of the control, n of them."""
@@ -55,11 +70,43 @@ class Task:
     """That the known arm, its weight and the known load ask of the drives on this
     motion, inertia of the links included [N·m]. Same shape."""
     joints: KnownJoints
+    reading_age: ReadingAge = ReadingAge()
+
+    def as_read(
+        self, values: NDArray[Number], sensor: Literal["motor", "link", "torque"]
+    ) -> NDArray[Number]:
+        """What a sensor would read at the instants if values were what it measures.
+
+        Those of an instant before, as old as the readings are, between two instants on
+        the line; at the beginning the first ones.
+
+        Args:
+            values: At the instants. Shape (n, ...).
+            sensor: Whose readings.
+        """
+        age: float = getattr(self.reading_age, sensor) / self.period
+        if age == 0.0:
+            return values
+        whole = int(age + 1e-6)
+        part = max(age - whole, 0.0)
+        at = np.maximum(np.arange(len(values)) - whole, 0)
+        if part < 1e-6:
+            return values[at]
+        before = values[np.maximum(at - 1, 0)]
+        return np.asarray((1.0 - part) * values[at] + part * before)
+
+    def periods_old(self, sensor: Literal["motor", "link", "torque"]) -> int:
+        """Age of the readings of a sensor in periods, the nearest whole number."""
+        age: float = getattr(self.reading_age, sensor)
+        return round(age / self.period)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Measured:
-    """Readings of the sensors at one instant; shapes (..., n_joints)."""
+    """Readings of the sensors that are there at one instant; shapes (..., n_joints).
+
+    They were taken :attr:`Task.reading_age` before.
+    """
 
     motor_angle: Array
     """[rad]."""

@@ -9,7 +9,7 @@ import numpy as np
 from swgjoint.errors import InputError
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.assembly import Assembly
-from swgjoint.sim.controller import KnownJoints, Task
+from swgjoint.sim.controller import KnownJoints, ReadingAge, Task
 from swgjoint.sim.feature_sections import MotorLimits
 from swgjoint.sim.sampled_loop import control_period
 
@@ -51,6 +51,7 @@ def task_of(
         velocity=path.velocity,
         acceleration=path.acceleration,
         link_torque=link_torque,
+        reading_age=_reading_age(assembly),
         joints=KnownJoints(
             names=assembly.joints,
             drives=tuple(
@@ -62,6 +63,15 @@ def task_of(
             torque_limit=np.array([_limit(one) for one in assembly.loops.limits]),
         ),
     )
+
+
+def _reading_age(assembly: Assembly) -> ReadingAge:
+    """Delays of the scene's sensors."""
+    sensors = assembly.scene.sensors
+    if sensors is None:
+        return ReadingAge()
+    each = {"motor": sensors.motor, "link": sensors.link, "torque": sensors.torque}
+    return ReadingAge(**{key: one.delay_s for key, one in each.items() if one})
 
 
 def _limit(limits: MotorLimits | None) -> float:

@@ -2,7 +2,8 @@
 
 A fast move (tracking), one slow turn of the output in one direction (positioning), a
 turn at constant speed after some turns of learning (ripple), each of one specimen of a
-drive under a load that the controllers know but for a part, read by noisy encoders.
+drive under a load that the controllers know but for a part, read by noisy encoders
+whose readings are a control period old.
 """
 
 from __future__ import annotations
@@ -33,8 +34,9 @@ LOAD, RECORD_LOAD = 0.3, 0.6
 """Known load of the motions and of the record, over the rated torque."""
 UNKNOWN = 0.1
 """Largest part of the load that the controllers do not know."""
-MOTOR_COUNTS, LINK_NOISE = 2**17, 2.0
-"""Counts of the motor's encoder; noise of the link's [arcsec]."""
+MOTOR_COUNTS, LINK_NOISE, DELAY = 2**17, 2.0, 1e-3
+"""Counts of the motor's encoder; noise of the link's [arcsec]; age of the readings of
+both [s], one period, which the controllers know."""
 TWO_PER_TURN = ((2, 0), (0, 2), (1, 1))
 
 UNITS = {
@@ -92,8 +94,9 @@ def run_motion(
     motion: str,
     seed: int,
     load: float = LOAD,
+    delay: float = DELAY,
 ) -> Run:
-    """One motion of a specimen under an unknown share of the load and noise."""
+    """One motion of a specimen under an unknown share of the load, delay and noise."""
     torque = load * drive.ratings.rated_torque
     more = UNKNOWN * torque * np.random.default_rng([seed, 2]).uniform(-1.0, 1.0)
     scene = Scene.from_data(
@@ -118,8 +121,8 @@ def run_motion(
             ],
             "controller": {"feedback": "link"},
             "sensors": {
-                "motor": {"counts_per_turn": MOTOR_COUNTS},
-                "link": {"noise_arcsec": LINK_NOISE},
+                "motor": {"counts_per_turn": MOTOR_COUNTS, "delay_s": delay},
+                "link": {"noise_arcsec": LINK_NOISE, "delay_s": delay},
                 "seed": seed,
             },
             **MOTIONS[motion],

@@ -7,7 +7,8 @@ control after a trial on two specimens. Three motions tell the figures: a fast m
 (tracking), one slow turn of the output in one direction (positioning), a turn at
 constant speed after learning (ripple). All loops read the motor alone, but for learning
 and predictive control, which read the link's encoder, too; the table was recorded with
-it.
+it. Readings are one control period of 1 ms old, as in the environments, and the
+controllers know it: they hold a reading against the plan of the instant it was taken.
 """
 
 from __future__ import annotations
@@ -36,6 +37,7 @@ from swgjoint.progress import Progress, silent
 from swgjoint.sim.controller import Controller
 from swgjoint.sim.drives import load_drive
 from swgjoint.study.control_bench import (
+    DELAY,
     FREQUENCY,
     MOTIONS,
     UNITS,
@@ -214,7 +216,10 @@ def run_control(options: StudyOptions) -> StudyResult:
     for name, drive in drives.items():
         found = climb(drive, jobs=options.jobs, progress=options.progress)
         rows += ladder_rows(name, found)
-        summary += [f"{name}, {SEEDS} specimens, mean ± standard deviation:"]
+        summary += [
+            f"{name}, {SEEDS} specimens, readings {1e3 * DELAY:g} ms old,"
+            " mean ± standard deviation:"
+        ]
         summary += [*ladder_table(found), *ladder_claims(found)]
         more[name] = {
             rung: {key: values.tolist() for key, values in figures.items()}

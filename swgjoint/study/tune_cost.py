@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from swgjoint.control.motor_side import MotorPlan
 from swgjoint.errors import InputError
-from swgjoint.sim.controller import KnownJoints, Task
+from swgjoint.sim.controller import KnownJoints, ReadingAge, Task
 from swgjoint.study.tune_gains import Tunable, build, parts_of, weighted
 from swgjoint.units import arcmin
 
@@ -156,7 +156,8 @@ class Trials:
         each = {key: np.repeat(x, count)[:, None] for key, x in values.items()}
         limit = self.joints.torque_limit
         controller = build(self._plan(tunable, task, each), each, limit)
-        controller.start(task)
+        # the age of the readings is tuned, not told
+        controller.start(replace(task, reading_age=ReadingAge()))
         squares = np.zeros((2, env.num_envs))
         alive = np.ones(env.num_envs, dtype=bool)
         steps = len(task.position) - 1

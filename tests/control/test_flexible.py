@@ -81,7 +81,7 @@ def test_a_torque_that_the_map_cannot_give_is_refused():
         motor_angle(weak, np.zeros(1), np.array([300.0]))
 
 
-def follow(drive, plan, step, **keys):
+def follow(drive, plan, step, delay=0.0, **keys):
     scene = Scene.from_data(
         {
             "name": "follow",
@@ -95,6 +95,7 @@ def follow(drive, plan, step, **keys):
             },
             "load": {"joint": {"torque_Nm": LOAD}},
             "controller": {"feedback": "link"},
+            "sensors": {"motor": {"delay_s": delay}},
             "simulation": {"duration_s": 1.4, "step_s": step, **keys},
         }
     )
@@ -114,6 +115,15 @@ def test_the_link_follows_and_the_error_falls_with_the_square_of_the_step(
         assert rigid > 3.5
         assert coarse < 1e-3
         assert fine < 0.35 * coarse
+
+
+@pytest.mark.parametrize("periods", [1, 2])
+def test_a_known_delay_is_no_error(synthetic_map, periods):
+    """Readings held against the plan of then: the link follows as without delay."""
+    smooth = synthetic_map.with_harmonics(synthetic_map.orders[:, 0] < 100)
+    for drive in (LINEAR, smooth):
+        late = follow(drive, flexible_plan, 1e-3, delay=1e-3 * periods)
+        assert late < 1.2 * follow(drive, flexible_plan, 1e-3)
 
 
 def test_another_integrator_leaves_the_first_order(synthetic_map):

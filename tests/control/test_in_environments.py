@@ -58,6 +58,20 @@ def test_one_controller_serves_one_episode_and_many(wrap):
     assert np.abs(got[1][:, 1] - got[1][:, 0]).max() > 1e-3
 
 
+def test_the_delay_of_the_sensors_is_told():
+    """With readings two periods old a motor follows its plan as with those of now."""
+    rms = []
+    for periods in (0, 2):
+        keys = {**KEYS, "sensors": {"link_encoder": True, "delay_periods": periods}}
+        many = gymnasium.make_vec(NAME, num_envs=2, **keys)
+        errors, _ = episode(many, MotorPID(flexible_plan, frequency=8.0), 799)
+        age = many.unwrapped.task.reading_age
+        assert age.motor == age.link == age.torque == periods * 1e-3
+        many.close()
+        rms.append(np.sqrt(np.mean(errors**2)))
+    assert rms[1] < 1.1 * rms[0]
+
+
 def test_plans_that_know_more_track_better():
     """From nothing over the rigid arm to the map: less error of the link."""
     many = gymnasium.make_vec(NAME, num_envs=4, **KEYS)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -11,7 +13,7 @@ from swgjoint.control.learning import LearningCompensation
 from swgjoint.control.motor_side import MotorPID
 from swgjoint.errors import InputError
 from swgjoint.maps.drive_map import DriveMap
-from swgjoint.sim.controller import Measured
+from swgjoint.sim.controller import Measured, ReadingAge
 from swgjoint.units import arcmin
 
 LINEAR = DriveMap.linear(2e4, teeth_flexspline=120, teeth_circular_spline=122)
@@ -33,15 +35,21 @@ class Spy:
         return np.zeros_like(measured.motor_angle)
 
 
-@pytest.mark.parametrize(("rate", "forgetting"), [(0.5, 0.0), (0.8, 0.0), (0.3, 0.1)])
-def test_every_block_multiplies_the_distance(turn, rate, forgetting):
-    """On a link that answers as the model says: by 1 - rho - mu, to rho/(rho + mu)."""
+@pytest.mark.parametrize(
+    ("rate", "forgetting", "late"),
+    [(0.5, 0.0, 0), (0.8, 0.0, 0), (0.3, 0.1, 0), (0.8, 0.0, 3)],
+)
+def test_every_block_multiplies_the_distance(turn, rate, forgetting, late):
+    """On a link that answers as the model says: by 1 - rho - mu, to rho/(rho + mu).
+
+    Of readings that are three periods old as well, a fifth of a wave.
+    """
     spy = Spy()
     turn(LINEAR, LINEAR, spy, speed=30.0, duration=24.0, step=2e-3)
     learning = LearningCompensation(
         spy, orders=[(2, 0), (0, 2)], rate=rate, forgetting=forgetting, turns=15.0
     )
-    task = spy.task
+    task = replace(spy.task, reading_age=ReadingAge(link=2e-3 * late))
     learning.start(task)
     # a quarter of an output turn: 2 alpha and 2 beta are half a wave apart
     d = np.array([2e-5 + 1e-5j, -1e-5 + 3e-5j])
@@ -50,7 +58,9 @@ def test_every_block_multiplies_the_distance(turn, rate, forgetting):
     off, blocks = [np.abs(learning.learned - fixed).max()], 0
     last = len(task.position) - 25
     for k in range(last + 1):
-        link = task.position[k] + ((learning.learned + d) * waves[k]).real.sum(axis=-1)
+        then = max(k - late, 0)
+        wave = ((learning.learned + d) * waves[then]).real.sum(axis=-1)
+        link = task.position[then] + wave
         learning.torque(
             k, Measured(motor_angle=link, motor_speed=link, link_angle=link)
         )
@@ -63,8 +73,8 @@ def test_every_block_multiplies_the_distance(turn, rate, forgetting):
     np.testing.assert_allclose(ratios[:2], 1.0 - rate - forgetting, atol=0.06)
     assert off[-1] < 2.0 * (1.0 - rate - forgetting) ** 7 * off[0] + 0.01 * off[0]
     # the inner controller sees the link without the learned motion
-    seen = spy.seen[-1].link_angle - task.position[last]
-    np.testing.assert_allclose(seen, (d * waves[last]).real.sum(), atol=1e-12)
+    seen = spy.seen[-1].link_angle - task.position[last - late]
+    np.testing.assert_allclose(seen, (d * waves[last - late]).real.sum(), atol=1e-12)
 
 
 def ripple(run, orders, window):

@@ -12,6 +12,7 @@ from swgjoint.control.motor_side import MotorPID, ideal_plan, rigid_plan
 from swgjoint.errors import ComputationError, InputError
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.friction import Friction
+from swgjoint.sim.controller import ReadingAge
 from swgjoint.sim.run import run_scene
 from swgjoint.sim.scene import Scene
 
@@ -55,14 +56,19 @@ class Spy:
 @pytest.mark.parametrize("kind", ["pd", "pid"])
 @pytest.mark.parametrize("changes", [{}, SENSORS, {"defaults.level": "rigid"}])
 def test_pid_from_outside_is_the_scenes_own(synthetic_map, kind, changes):
-    """Same gains, plan and sensors: the same run to round-off, sensors included."""
+    """Same gains, plan and sensors: the same run to round-off, sensors included.
+
+    The scene's own law does not know how old its readings are, so the other is not
+    told.
+    """
     changes = {"controller.kind": kind, **changes}
     own = run(synthetic_map, changes)
     loops = own.assembly.loops
     time = None if kind == "pd" else float((loops.stiffness / loops.integral)[0])
-    given = run(
-        synthetic_map, changes, controller=MotorPID(rigid_plan, integral_time=time)
-    )
+    pid = MotorPID(rigid_plan, integral_time=time)
+    start = pid.start
+    pid.start = lambda task: start(replace(task, reading_age=ReadingAge()))
+    given = run(synthetic_map, changes, controller=pid)
     for key in ("position", "motor_position", "motor_torque", "wanted_torque"):
         np.testing.assert_allclose(
             getattr(given, key), getattr(own, key), rtol=1e-10, atol=1e-12
@@ -120,6 +126,27 @@ def test_the_task_is_the_motion_at_the_instants_of_the_control():
     assert [k for k, _ in spy.read] == list(range(300))
 
 
+@pytest.mark.parametrize("delay", [0.001, 0.002, 0.003])
+def test_values_of_the_task_are_as_old_as_readings(delay):
+    """What an exact sensor reads of the motor is the motor's motion as it is read.
+
+    Instants that lie between two of the control by the straight line.
+    """
+    spy = Spy()
+    changes = {"controller.control_period_s": 0.002, "sensors.motor.delay_s": delay}
+    got = run(changes=changes, controller=spy)
+    read = np.array([measured.motor_angle for _, measured in spy.read])
+    true = got.motor_position[::2]
+    late = spy.task.as_read(true, "motor")[: len(read)]
+    # an eighth of the second difference
+    between = 0.0 if delay == 0.002 else np.abs(np.diff(true, 2, axis=0)).max() / 7.0
+    np.testing.assert_allclose(late, read, rtol=0, atol=between)
+    assert np.abs(true[: len(read)] - read).max() > 10.0 * np.abs(late - read).max()
+    waves = np.exp(1j * true)
+    np.testing.assert_array_equal(spy.task.as_read(waves, "motor")[0], waves[0])
+    assert spy.task.as_read(true, "link") is true  # to the last bit
+
+
 def test_an_unknown_payload_is_not_in_the_known_torque():
     """The controller is told the arm that it knows; the scene moves the other one."""
     spy = Spy()
@@ -147,7 +174,9 @@ def test_readings_are_the_sensors(synthetic_map):
         "sensors.link.delay_s": 0.002,
         "sensors.torque.delay_s": 0.003,
     }
+    assert spy.task.reading_age == ReadingAge()
     got = run(synthetic_map, late, controller=spy)
+    assert spy.task.reading_age == ReadingAge(link=0.002, torque=0.003)
     read = spy.read[400][1]
     np.testing.assert_array_equal(read.link_angle, got.position[398])
     np.testing.assert_allclose(read.output_torque, got.output_torque[397], rtol=1e-9)

@@ -172,6 +172,17 @@ def test_period_of_two_milliseconds():
     assert link_error(PredictiveController(), scene, true_drive(1.0)) < 0.2
 
 
+@pytest.mark.parametrize(
+    ("motor", "link"), [(1e-3, 1e-3), (2e-3, 2e-3), (0.0, 2e-3), (2e-3, 0.0)]
+)
+def test_old_readings(motor, link):
+    """The model goes on from them; one of them may be older than the other."""
+    scene = bench(sensors__motor__delay_s=motor, sensors__link__delay_s=link)
+    got = link_error(PredictiveController(), scene, true_drive(1.0))
+    now = link_error(PredictiveController(), bench(), true_drive(1.0))
+    assert got < 1.1 * now
+
+
 def test_limits_of_motor_and_drive_are_kept():
     """Somebody pushes the link: the motor stays within its limit, the drive near its.
 

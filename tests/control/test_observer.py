@@ -12,7 +12,7 @@ from swgjoint.control.motor_side import MotorPID
 from swgjoint.control.observer import DisturbanceObserver
 from swgjoint.errors import InputError
 from swgjoint.maps.drive_map import DriveMap
-from swgjoint.sim.controller import Measured
+from swgjoint.sim.controller import Measured, ReadingAge
 
 LINEAR = DriveMap.linear(2e4, teeth_flexspline=120, teeth_circular_spline=122)
 
@@ -36,25 +36,34 @@ def told(turn):
     return spy.task
 
 
+@pytest.mark.parametrize("late", [0, 1, 2])
 @pytest.mark.parametrize("sensed", [False, True])
-def test_the_estimate_is_a_low_pass_of_the_disturbance(turn, sensed):
-    """A free rotor under a constant torque: d (1 - exp(-L t)), two motions at once."""
+def test_the_estimate_is_a_low_pass_of_the_disturbance(turn, sensed, late):
+    """A free rotor under a constant torque: d (1 - exp(-L t)), two motions at once.
+
+    Of readings that are some periods old that of then, as long as nothing is taken
+    off.
+    """
     task, d = told(turn), np.array([[0.1], [-0.3]])
-    task = replace(task, position=np.repeat(task.position[:, None], 2, axis=1))
+    age = ReadingAge(motor=1e-3 * late)
+    position = np.repeat(task.position[:, None], 2, axis=1)
+    task = replace(task, position=position, reading_age=age)
     observer = DisturbanceObserver(Still(), bandwidth=5.0)
     observer.start(task)
     load = task.link_torque[0] / task.joints.ratio
     speed = np.zeros((2, 1))
+    speeds = [speed] * (late + 1)
     for k in range(200):
         read = Measured(
             motor_angle=0.0 * speed,
-            motor_speed=speed,
+            motor_speed=speeds[k],
             output_torque=task.link_torque[0] if sensed else None,
         )
         torque = observer.torque(k, read)
-        expected = d * (1.0 - np.exp(-2.0 * np.pi * 5.0 * 1e-3 * k))
+        expected = d * (1.0 - np.exp(-2.0 * np.pi * 5.0 * 1e-3 * max(k - late, 0)))
         assert (np.abs(observer.estimate - expected) <= 0.01 * np.abs(d)).all()
         speed = speed + 1e-3 * (torque + d - load) / task.joints.rotor_inertia
+        speeds.append(speed)
 
 
 def test_an_unknown_load_no_longer_moves_the_motor(turn):

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from swgjoint.cli.main import main
+from swgjoint.control.kinematic_error import KinematicErrorTable
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.study import control_ladder as study
-from swgjoint.study.control_bench import MOTIONS, UNITS
+from swgjoint.study.control_bench import DELAY, MOTIONS, UNITS, run_motion
 from swgjoint.study.control_ladder import RUNGS, climb, ladder_claims
 from swgjoint.study.control_specimens import SYSTEMATIC, accuracy, nominal, specimen
 from swgjoint.units import arcmin
@@ -69,6 +70,23 @@ def test_each_rung_but_the_first_says_what_it_is_made_for():
     assert RUNGS[0].made_for is None
     for k, rung in enumerate(RUNGS[1:], start=1):
         assert rung.made_for in UNITS and rung.over in names[:k]
+
+
+def test_the_ranking_of_the_move_survives_old_readings():
+    """Of one period: each rung leaves what it leaves with readings of now."""
+    plant = specimen(CSG, 0)
+    table = KinematicErrorTable(orders=plant.orders, amplitudes=plant.kinematic_error)
+    rms = {}
+    for delay in (0.0, DELAY):
+        for rung in RUNGS:
+            if rung.name not in ("PD", "+ feed-forward", "+ flexible joint", "MPC"):
+                continue
+            run = run_motion(CSG, plant, rung.build(table), "move", 0, delay=delay)
+            off = (run.position - run.reference)[300:]
+            rms.setdefault(rung.name, []).append(float(np.sqrt(np.mean(off**2))))
+    now, late = np.array(list(rms.values())).T
+    np.testing.assert_allclose(late, now, rtol=0.2)
+    assert (late[1:] < 0.4 * late[:-1]).all()
 
 
 @pytest.fixture
