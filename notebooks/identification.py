@@ -113,8 +113,10 @@ columns = {
 #
 # The torques at which the stiffness changes are those of the catalogue, as are the
 # teeth; all else comes from the log. The intervals tell what noise does, not what the
-# model of the log leaves out, such as what happens between two samples: hysteresis,
-# viscous friction and inertia lie 2 to 3 % off here, just outside theirs.
+# averages leave out: this motor turns at up to 107 rad/s, its error of 4 per turn by
+# 2 rad in the 5 ms that are the default window, which puts hysteresis, viscous friction
+# and inertia 2 to 3 % off, outside their intervals (a note says so). A window of 1 ms
+# leaves 0.6 % at most, in narrower intervals.
 
 # %%
 with TemporaryDirectory() as folder:
@@ -127,6 +129,7 @@ with TemporaryDirectory() as folder:
         teeth_circular_spline=202,
         ratings=catalogue.ratings,
         orders=[(2, 0), (4, 0)],
+        window=0.001,
     )
 stated, law = catalogue.info["stated"], catalogue.friction
 truth = {f"K{k}": stated[f"K{k}_Nm_rad"] for k in (1, 2, 3)} | {
@@ -141,7 +144,7 @@ truth = {f"K{k}": stated[f"K{k}_Nm_rad"] for k in (1, 2, 3)} | {
 for name, true in truth.items():
     e = found.estimates[name]
     print(f"{name:24s} {e.value:10.4g} [{e.low:.4g}, {e.high:.4g}]  true {true:.4g}")
-    assert abs(e.value / true - 1.0) < 0.05
+    assert abs(e.value / true - 1.0) < 0.02
 
 # %%
 image = BytesIO()

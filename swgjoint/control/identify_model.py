@@ -220,6 +220,14 @@ class Model:
             )[self.kept]
         return found
 
+    @property
+    def phase_step(self) -> float:
+        """Largest change of a harmonic's phase from window to window [rad]."""
+        alpha, b = angle_coefficients(self.layout)
+        n = self.orders @ np.array([alpha, b])
+        angles = np.stack([self.samples.motor_angle, self.samples.link_angle])
+        return float(np.abs(n @ np.diff(angles)).max(initial=0.0))
+
     @cached_property
     def unknowns(self) -> tuple[Parameter, ...]:
         """Parameters in the order of all arrays of values."""

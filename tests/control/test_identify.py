@@ -274,6 +274,18 @@ def test_angles_in_a_wrong_unit_are_doubted(bench, factor):
     )
 
 
+def test_windows_too_long_for_the_kinematic_error_are_doubted(bench):
+    """Three times the window turns its phase by three times as much: a note."""
+    drive, rows, _ = bench
+    options = settings(drive)
+    assert identify(log_of(rows), **options).notes == ()
+    found = identify(log_of(rows), **{**options, "window": 3.0 * WINDOW})
+    (note,) = found.notes
+    fastest = np.abs(np.gradient(rows[:, 1], rows[:, 0])).max()
+    assert found.model.phase_step == pytest.approx(12.0 * WINDOW * fastest, rel=0.1)
+    assert "in a window of 0.015 s" in note and "--window 0.00" in note
+
+
 def test_the_map_moves_as_the_drive(bench):
     """The found map gives the torques of the true one at new torsions and angles."""
     drive, rows, _ = bench
