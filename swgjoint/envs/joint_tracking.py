@@ -210,8 +210,8 @@ class JointTrackingEnv(SingleEnv):
         max_speed_rad_s: Of references, at the link; 0.6. Their acceleration is at most
             that speed in 12 ms.
         max_angle_rad: Of references; 1.0.
-        period_s: Of the control; 1e-3. The engine steps as often, or, where the drive
-            is too stiff for that, in equal parts of it.
+        period_s: Of the control, up to 0.05; 1e-3. The engine steps as often, or, where
+            the drive is too stiff for that, in equal parts of it.
         episode_s: 2.0.
         load_of_rated: Largest load torque, as part of the rated torque; 0.5.
         sensors: Mapping with fields of :class:`~swgjoint.envs.sensors.Sensors`.

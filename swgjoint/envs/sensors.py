@@ -34,7 +34,8 @@ class Sensors:
     torque_noise_of_rated: float = 1e-3
     """Standard deviation, as part of the rated torque."""
     delay_periods: int = 1
-    """Age of every reading when the controller gets it, in control periods."""
+    """Age of every reading when the controller gets it, in control periods; at most
+    those of an episode."""
 
     def __post_init__(self) -> None:
         for field in fields(self):
