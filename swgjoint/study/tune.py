@@ -7,10 +7,11 @@ two gains tuned, the named controller with gains by the rule, and that one tuned
 
 from __future__ import annotations
 
+import hashlib
 import json
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.errors import InputError
-from swgjoint.json_text import plain
+from swgjoint.json_text import json_text, plain
+from swgjoint.maps.drive_map import DriveMap
 from swgjoint.progress import Progress, silent
 from swgjoint.study.tune_cost import Trace, Trials, environment_named
 from swgjoint.study.tune_gains import (
@@ -78,31 +80,31 @@ def tune(
     began = time.perf_counter()
     environment = environment_named(settings.environment)
     named, arguments = controller_named(settings.controller), arguments_of(settings)
-    header = _header(settings, environment, arguments)
     tunables = {_PD: CONTROLLERS["pd"]}
     if named.name != "pd":
         tunables[_NAMED] = named
     searches = {name: Search() for name in tunables}
+    if folder is None and resume:
+        raise InputError("resume without a folder; accepted: --out of the run")
+    if folder is not None and not resume and (folder / JOURNAL).exists():
+        raise InputError(
+            f"{folder / JOURNAL} exists; accepted: --resume to go on with it, or"
+            " another --out"
+        )
+    training, held_out = settings.seeds
+    trials = Trials(
+        environment, arguments, seeds=training, candidates=settings.population
+    )
+    header = _header(settings, environment, arguments, trials.joints.drives[0])
     if folder is not None:
         if resume:
             searches = read_journal(folder, header, tuple(tunables))
-        elif (folder / JOURNAL).exists():
-            raise InputError(
-                f"{folder / JOURNAL} exists; accepted: --resume to go on with it, or"
-                " another --out"
-            )
         folder.mkdir(parents=True, exist_ok=True)
-    elif resume:
-        raise InputError("resume without a folder; accepted: --out of the run")
     before = sum(sum(s.seconds) for s in searches.values())
 
     def elapsed() -> float:
         return time.perf_counter() - began + before
 
-    training, held_out = settings.seeds
-    trials = Trials(
-        environment, arguments, seeds=training, candidates=settings.population
-    )
     for name, tunable in tunables.items():
         search = searches[name]
         parameters = parameters_of(tunable, trials.joints)
@@ -208,14 +210,20 @@ class _Budget:
 
 
 def _header(
-    settings: TuneSettings, environment: str, arguments: Mapping[str, Any]
+    settings: TuneSettings,
+    environment: str,
+    arguments: Mapping[str, Any],
+    drive: DriveMap,
 ) -> dict[str, Any]:
     """What a journal must agree in with the run that goes on with it."""
+    # a file of the same path may have changed; provenance does not move the joint
+    moved = json_text(replace(drive, info={}, fields=None), indent=None)
     text: dict[str, Any] = json.loads(
         json.dumps(
             {
                 "environment": environment,
                 "arguments": plain(arguments),
+                "drive_content": hashlib.sha256(moved.encode()).hexdigest()[:16],
                 "controller": settings.controller,
                 "optimiser": settings.optimiser,
                 "seed": settings.seed,

@@ -91,9 +91,17 @@ class Trials:
             arguments: Of the environment.
             seeds: Of the episodes of every candidate.
             candidates: How many run side by side.
+
+        Raises:
+            InputError: If an argument is none of the environment's settings.
         """
         import gymnasium
 
+        from swgjoint.envs.bench import settings_of
+        from swgjoint.envs.joint_tracking import TrackingSettings
+
+        # what gymnasium itself takes, such as the mode of restarts, is not for tuning
+        settings_of(TrackingSettings, dict(arguments))
         self.seeds, self.candidates = tuple(seeds), candidates
         env = gymnasium.make_vec(
             f"swgjoint.envs:{environment}",

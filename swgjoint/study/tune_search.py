@@ -37,6 +37,14 @@ class Spent(Exception):
     """The budget of a search is used up."""
 
 
+class _Failed(Exception):
+    """Carries an error of the cost through an optimiser unchanged."""
+
+    def __init__(self, error: Exception) -> None:
+        super().__init__(error)
+        self.error = error
+
+
 @dataclass(kw_only=True, eq=False)
 class Search:
     """Generations of one search."""
@@ -114,10 +122,19 @@ def run_search(
         done += 1
         return np.asarray(search.costs[done - 1].mean(axis=1))
 
+    def guarded(places: Array) -> Array:
+        try:
+            return evaluate(places)
+        # scipy would make another error of these, InputError among them
+        except (TypeError, ValueError) as error:
+            raise _Failed(error) from None
+
     try:
-        OPTIMISERS[optimiser](evaluate, start, size, seed)
+        OPTIMISERS[optimiser](guarded, start, size, seed)
     except Spent:
         pass
+    except _Failed as failed:
+        raise failed.error from None
 
 
 def _differential_evolution(
@@ -231,6 +248,8 @@ def read_journal(
         with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as file:
             arrays = {key: file[key] for key in file.files}
         kept = json.loads(str(arrays["header"]))
+        if not isinstance(kept, dict):
+            raise ValueError("the header is no object")
         found = {name: _search(arrays, name) for name in names}
     except FileNotFoundError:
         raise InputError(
@@ -251,7 +270,7 @@ def read_journal(
         if kept.get(key) != value:
             raise InputError(
                 f"{path} is of {key} {kept.get(key)!r}, not {value!r}; accepted: the"
-                " same settings, or another --out"
+                " same settings and files, or another --out"
             )
     return found
 

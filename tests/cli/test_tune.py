@@ -49,6 +49,10 @@ def test_json_of_the_contract(tmp_path, capsys):
         (["JointTracking-v0", "--resume"], "accepted: --out"),
         (["JointTracking-v0", "--set", "drive=CSG-1-1"], "CSG-1-1"),
         (["JointTracking-v0", "--set", "error_scale_arcmin=0"], "error_scale_arcmin 0"),
+        (["JointTracking-v0", "--set", "num_envs=3"], "'num_envs' of an env"),
+        (["JointTracking-v0", "--set", "threads=1"], "accepted: drive, level"),
+        (["JointTracking-v0", "--set", "vectorization_mode=sync"], "'vectorization"),
+        (["JointTracking-v0", "--set", "autoreset_mode=SameStep"], "'autoreset_mode'"),
     ],
 )
 def test_bad_input_is_one_line(arguments, text, capsys):

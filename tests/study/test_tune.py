@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import gymnasium
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ import swgjoint.envs  # noqa: F401
 from swgjoint.control.motor_side import MotorPID, ideal_plan
 from swgjoint.errors import InputError
 from swgjoint.json_text import json_text
+from swgjoint.sim.controller import ReadingAge
 from swgjoint.study import tune_cost
 from swgjoint.study.tune import tune
 from swgjoint.study.tune_cost import Trials, environment_named
@@ -81,7 +84,8 @@ def test_cost_is_that_of_the_single_environment(trials):
     observation, _ = env.reset(seed=9)
     task, terms = env.task, []
     controller = MotorPID(ideal_plan, frequency=14.0, damping_ratio=0.7)
-    controller.start(task)
+    # nobody tells a tuned controller how old its readings are
+    controller.start(replace(task, reading_age=ReadingAge()))
     for k in range(500):
         torque = controller.torque(k, env.measured(observation))
         action = torque / task.joints.torque_limit
@@ -217,25 +221,6 @@ def test_minutes_end_a_search():
     # without end and readings of now
     _, _, ruled, best = (one.training.mean() for one in found.candidates)
     assert best <= 1.02 * ruled
-
-
-def test_resumption_asks_for_its_own_journal(tmp_path):
-    """Another seed, a missing or a damaged journal, or one in the way: one line."""
-    chosen = settings(controller="pd", evaluations=12)
-    with pytest.raises(InputError, match="nothing to resume"):
-        tune(chosen, folder=tmp_path, resume=True)
-    tune(chosen, folder=tmp_path)
-    with pytest.raises(InputError, match="exists; accepted: --resume"):
-        tune(chosen, folder=tmp_path)
-    changed = settings(controller="pd", evaluations=12, seed=1)
-    with pytest.raises(InputError, match="is of seed 0, not 1"):
-        tune(changed, folder=tmp_path, resume=True)
-    journal = tmp_path / JOURNAL
-    whole = journal.read_bytes()
-    for damaged in (whole[:300], b"", b"x", whole.replace(b"costs", b"coins")):
-        journal.write_bytes(damaged)
-        with pytest.raises(InputError, match="damaged, or no journal"):
-            tune(chosen, folder=tmp_path, resume=True)
 
 
 def test_report_states_what_feed_forward_alone_brings(tmp_path):

@@ -1,0 +1,146 @@
+"""Journals of tuning: refused in one line when they are damaged or of another run."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from swgjoint.envs.bench import load_drive_once
+from swgjoint.errors import InputError
+from swgjoint.maps.drive_map import DriveMap
+from swgjoint.study.tune import tune
+from swgjoint.study.tune_result import TuneSettings
+from swgjoint.study.tune_search import JOURNAL, Search, run_search, write_journal
+
+
+def settings(**changes):
+    """Two generations of plain PD."""
+    keys = {
+        "environment": "JointTracking-v0",
+        "controller": "pd",
+        "evaluations": 12,
+        "arguments": {"episode_s": 0.5, "max_speed_rad_s": 0.3},
+        "population": 6,
+        "training": 2,
+        "held_out": 2,
+    }
+    return TuneSettings(**(keys | changes))
+
+
+@pytest.fixture
+def search():
+    """One of two parameters and two generations, by differential evolution."""
+    made = Search()
+    go_on(made)
+    return made
+
+
+def go_on(search, *, optimiser="de", generations=2, costs=None, after=lambda: None):
+    """Run a search to so many generations of a bowl."""
+    run_search(
+        optimiser,
+        search,
+        costs=costs or (lambda x: np.square(x - 0.3).sum(axis=1, keepdims=True)),
+        more=lambda: len(search.places) < generations,
+        start=np.array([0.5, 0.5]),
+        size=6,
+        seed=3,
+        clock=lambda: 0.0,
+        after=after,
+    )
+
+
+def test_resumption_asks_for_its_own_journal(tmp_path):
+    """Another seed, a missing or a damaged journal, or one in the way: one line."""
+    chosen = settings()
+    with pytest.raises(InputError, match="nothing to resume"):
+        tune(chosen, folder=tmp_path, resume=True)
+    tune(chosen, folder=tmp_path)
+    with pytest.raises(InputError, match="exists; accepted: --resume"):
+        tune(chosen, folder=tmp_path)
+    with pytest.raises(InputError, match="is of seed 0, not 1"):
+        tune(settings(seed=1), folder=tmp_path, resume=True)
+    journal = tmp_path / JOURNAL
+    whole = journal.read_bytes()
+    for damaged in (whole[:300], b"", b"x", whole.replace(b"costs", b"coins")):
+        journal.write_bytes(damaged)
+        with pytest.raises(InputError, match="damaged, or no journal"):
+            tune(chosen, folder=tmp_path, resume=True)
+
+
+@pytest.mark.parametrize("header", [[], ["seed"], 3, None, "seed", True])
+def test_a_header_is_an_object(header, tmp_path, search):
+    """Any other JSON value is a damaged journal, not a traceback."""
+    write_journal(tmp_path, header, {"pd": search})
+    with np.load(tmp_path / JOURNAL) as file:
+        assert json.loads(str(file["header"])) == header
+    with pytest.raises(InputError, match="damaged, or no journal"):
+        tune(settings(), folder=tmp_path, resume=True)
+
+
+@pytest.mark.parametrize("optimiser", ["de", "cma", "optuna"])
+def test_a_journal_of_other_places_is_refused(optimiser):
+    """Every optimiser lets the line through, also one that catches value errors."""
+    if optimiser != "de":
+        pytest.importorskip(optimiser)
+    search = Search()
+    go_on(search, optimiser=optimiser)
+    search.places[1][0, 0] += 1e-9
+    with pytest.raises(InputError, match=r"of another search \(generation 2 differs"):
+        go_on(search, optimiser=optimiser, generations=3)
+
+
+def test_errors_of_costs_and_journals_are_kept():
+    """What goes wrong in a generation arrives as what it was."""
+
+    def full():
+        raise InputError("cannot write tune.npz: No space left on device")
+
+    def broken(places):
+        raise TypeError("of the environment")
+
+    with pytest.raises(InputError, match="No space left"):
+        go_on(Search(), after=full)
+    with pytest.raises(TypeError, match="of the environment"):
+        go_on(Search(), costs=broken)
+
+
+def test_a_changed_drive_is_another_run(tmp_path):
+    """The path alone does not tell: the file may hold another drive by now."""
+
+    def written(error):
+        drive = DriveMap.linear(
+            16e3,
+            teeth_flexspline=200,
+            teeth_circular_spline=202,
+            rated_torque=40.0,
+        )
+        shape = np.zeros((2, 2))
+        shape[1, 0] = error
+        potential, ends = (
+            np.concatenate([x, np.zeros_like(x)])
+            for x in (drive.potential, drive.end_stiffness)
+        )
+        replace(
+            drive,
+            orders=[[0, 0], [2, 0]],
+            potential=potential,
+            end_stiffness=ends,
+            kinematic_error=shape,
+        ).save(path)
+        load_drive_once.cache_clear()  # as in another process
+
+    path = tmp_path / "own.swg"
+    arguments = settings().arguments | {"drive": str(path)}
+    chosen, folder = settings(arguments=arguments), tmp_path / "out"
+    written(1e-4)
+    tune(chosen, folder=folder)
+    written(2e-4)
+    with pytest.raises(InputError, match=r"is of drive_content '\w+', not '\w+'"):
+        tune(chosen, folder=folder, resume=True)
+    written(1e-4)
+    assert tune(chosen, folder=folder, resume=True).best.values
+    load_drive_once.cache_clear()
