@@ -324,11 +324,15 @@ def test_no_reference_is_clipped(episode_s, speed, angle, period_s, kind, load, 
         )
 
 
-def test_missing_gymnasium_names_the_command():
+def test_missing_gymnasium_names_the_command(tmp_path):
     """Without the extra the import says how to install it."""
     code = "import sys; sys.modules['gymnasium'] = None; import swgjoint.envs"
     done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=False
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=tmp_path,
     )
     assert done.returncode == 1
     assert "pip install 'swgjoint[envs]'" in done.stderr

@@ -53,7 +53,7 @@ def test_pictures_show_that_the_arm_moves(name):
     env.close()
 
 
-def test_without_opengl_one_line_says_what_to_do():
+def test_without_opengl_one_line_says_what_to_do(tmp_path):
     """A kind of context that does not exist is named with what can be installed."""
     code = (
         "import gymnasium, swgjoint.envs\n"
@@ -66,6 +66,7 @@ def test_without_opengl_one_line_says_what_to_do():
         text=True,
         check=False,
         env={**os.environ, "MUJOCO_GL": "disabled"},
+        cwd=tmp_path,  # the installed package, not the sources beside the tests
     )
     assert done.returncode == 1
     assert "no OpenGL off screen with MUJOCO_GL=disabled" in done.stderr

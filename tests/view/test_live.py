@@ -38,7 +38,7 @@ def received(process, path, name: str) -> tuple[np.ndarray, np.ndarray]:
     size, end = -1, time.monotonic() + 30.0
     while time.monotonic() < end and size != (size := path.stat().st_size):
         time.sleep(1.0)
-    process.send_signal(signal.SIGINT)
+    process.send_signal(signal.SIGTERM)  # a job in the background ignores SIGINT
     process.wait(timeout=20)
     times, values = [], []
     with pytest.warns(Warning, match="footer"):  # the server was interrupted
