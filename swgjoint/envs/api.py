@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 import gymnasium
 import numpy as np
@@ -12,6 +12,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from swgjoint.envs.bench import settings_of
 from swgjoint.envs.core import Core, Entry, bounds
 from swgjoint.envs.picture import Picture
 from swgjoint.errors import InputError
@@ -33,13 +34,19 @@ class SingleEnv(gymnasium.Env[Array, Array]):
         "render_fps": 50,
     }
 
-    def __init__(self, core: Core, render_mode: str | None) -> None:
-        """Put the interface in front of one episode."""
+    core_of: ClassVar[type[Any]]
+    """Made from a number of episodes, threads of the engine and settings."""
+    settings_type: ClassVar[type[Any]]
+
+    def __init__(self, render_mode: str | None = None, **arguments: Any) -> None:
+        """Arguments are those of the class's docstring."""
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise InputError(
                 f"render_mode {render_mode!r}; accepted: None, 'rgb_array'; for the"
                 " rerun viewer swgjoint.envs.recording.EpisodeRecorder"
             )
+        settings = settings_of(self.settings_type, arguments)
+        core: Core = self.core_of(1, 1, settings)
         self.core, self.render_mode = core, render_mode
         self._picture: Picture | None = None
         self.observation_space = _box(core.observation_entries)
@@ -116,8 +123,16 @@ class BatchEnv(VectorEnv[Array, Array, Array]):
     with which this one agrees to the last bit.
     """
 
-    def __init__(self, core: Core, autoreset_mode: str | AutoresetMode) -> None:
-        """Put the interface in front of all episodes of a core."""
+    single: ClassVar[type[SingleEnv]]
+
+    def __init__(
+        self,
+        num_envs: int = 1,
+        threads: int = 0,
+        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
+        **arguments: Any,
+    ) -> None:
+        """Threads of the engine, 0 for one per core; the rest as the single one's."""
         modes = (AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP)
         if autoreset_mode not in (*modes, *(mode.value for mode in modes)):
             raise InputError(
@@ -126,6 +141,8 @@ class BatchEnv(VectorEnv[Array, Array, Array]):
             )
         mode = AutoresetMode(autoreset_mode)
         self._same_step = mode is AutoresetMode.SAME_STEP
+        settings = settings_of(self.single.settings_type, arguments)
+        core: Core = self.single.core_of(num_envs, threads, settings)
         self.core, self.num_envs = core, core.plant.batch.nsim
         self.metadata = {"render_modes": [], "autoreset_mode": mode}
         self.single_observation_space = _box(core.observation_entries)

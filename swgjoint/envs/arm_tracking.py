@@ -9,12 +9,11 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from swgjoint.envs.api import BatchEnv, SingleEnv
 from swgjoint.envs.arguments import check_flag, check_number, shown
-from swgjoint.envs.bench import load_drive_once, settings_of
+from swgjoint.envs.bench import load_drive_once
 from swgjoint.envs.core import Core, Entry, Limits, ceiling
 from swgjoint.envs.loop import MotorLoop
 from swgjoint.envs.plant import Plant, specimen
@@ -401,26 +400,11 @@ class ArmTrackingEnv(SingleEnv):
     Versions: v0, the first.
     """
 
-    core: ArmCore
-
-    def __init__(self, render_mode: str | None = None, **arguments: Any) -> None:
-        """See the class."""
-        settings = settings_of(ArmSettings, arguments)
-        super().__init__(ArmCore(1, 1, settings), render_mode)
+    core_of = ArmCore
+    settings_type = ArmSettings
 
 
 class ArmTrackingVectorEnv(BatchEnv):
     """Many episodes of :class:`ArmTrackingEnv` on the threads of the engine."""
 
-    core: ArmCore
-
-    def __init__(
-        self,
-        num_envs: int = 1,
-        threads: int = 0,
-        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
-        **arguments: Any,
-    ) -> None:
-        """See :class:`ArmTrackingEnv` for the other arguments."""
-        settings = settings_of(ArmSettings, arguments)
-        super().__init__(ArmCore(num_envs, threads, settings), autoreset_mode)
+    single = ArmTrackingEnv

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from swgjoint.envs.api import BatchEnv, SingleEnv
 from swgjoint.envs.arguments import shown
-from swgjoint.envs.bench import BenchCore, BenchSettings, settings_of
+from swgjoint.envs.bench import BenchCore, BenchSettings
 from swgjoint.envs.core import Entry, ceiling
 from swgjoint.envs.references import KINDS, draw_motion, smooth_step
 from swgjoint.errors import InputError
@@ -226,12 +224,8 @@ class JointTrackingEnv(SingleEnv):
     Versions: v0, the first.
     """
 
-    core: TrackingCore
-
-    def __init__(self, render_mode: str | None = None, **arguments: Any) -> None:
-        """See the class."""
-        settings = settings_of(TrackingSettings, arguments)
-        super().__init__(TrackingCore(1, 1, settings), render_mode)
+    core_of = TrackingCore
+    settings_type = TrackingSettings
 
 
 class JointTrackingVectorEnv(BatchEnv):
@@ -241,15 +235,4 @@ class JointTrackingVectorEnv(BatchEnv):
     the engine, 0 for one per core.
     """
 
-    core: TrackingCore
-
-    def __init__(
-        self,
-        num_envs: int = 1,
-        threads: int = 0,
-        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
-        **arguments: Any,
-    ) -> None:
-        """See :class:`JointTrackingEnv` for the other arguments."""
-        settings = settings_of(TrackingSettings, arguments)
-        super().__init__(TrackingCore(num_envs, threads, settings), autoreset_mode)
+    single = JointTrackingEnv

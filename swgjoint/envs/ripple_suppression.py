@@ -6,11 +6,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 
 from swgjoint.envs.api import BatchEnv, SingleEnv
-from swgjoint.envs.bench import BenchCore, BenchSettings, settings_of
+from swgjoint.envs.bench import BenchCore, BenchSettings
 from swgjoint.envs.core import Entry, Rows, ceiling
 from swgjoint.envs.references import smooth_step
 from swgjoint.errors import InputError
@@ -267,26 +266,11 @@ class RippleSuppressionEnv(SingleEnv):
     Versions: v0, the first.
     """
 
-    core: RippleCore
-
-    def __init__(self, render_mode: str | None = None, **arguments: Any) -> None:
-        """See the class."""
-        settings = settings_of(RippleSettings, arguments)
-        super().__init__(RippleCore(1, 1, settings), render_mode)
+    core_of = RippleCore
+    settings_type = RippleSettings
 
 
 class RippleSuppressionVectorEnv(BatchEnv):
     """Many episodes of :class:`RippleSuppressionEnv` on the threads of the engine."""
 
-    core: RippleCore
-
-    def __init__(
-        self,
-        num_envs: int = 1,
-        threads: int = 0,
-        autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
-        **arguments: Any,
-    ) -> None:
-        """See :class:`RippleSuppressionEnv` for the other arguments."""
-        settings = settings_of(RippleSettings, arguments)
-        super().__init__(RippleCore(num_envs, threads, settings), autoreset_mode)
+    single = RippleSuppressionEnv
