@@ -56,8 +56,9 @@ def rigid_plan(task: Task) -> MotorPlan:
 
     .. math:: \tau_r = T/i + i J_m \ddot q + f(i \dot q, T/i)
 
-    with T the known torque of the arm on the motion, weight and inertia included, and f
-    the friction that the known drives have.
+    with T the known torque of the arm on the motion, weight and inertia included, from
+    the engine or from :mod:`swgjoint.control.pinocchio_arm`, and f the friction that
+    the known drives have.
     """
     joints, i = task.joints, task.joints.ratio
     plan = ideal_plan(task)

@@ -1,7 +1,10 @@
-"""The rigid arm in Pinocchio: torques on a motion for feed-forward, and its inertia.
+"""The rigid arm in Pinocchio: what a controller's feed-forward takes the arm for.
 
-The tree is built from the compiled MuJoCo model number by number, since MuJoCo writes
-MJCF with six digits; it holds hinges, one a body, and what is fixed to them.
+Given to :func:`swgjoint.sim.run.run_scene` as ``known_arm`` it makes the torque of the
+links, weight and inertia, that every plan starts from, in place of the engine's inverse
+dynamics. From a compiled MuJoCo model the tree is built number by number, since MuJoCo
+writes MJCF with six digits; an arm that is known to Pinocchio by a URDF, or from an
+identification, comes as it is. Damping, springs and friction of joints are not in it.
 """
 
 from __future__ import annotations
@@ -18,51 +21,57 @@ Array = NDArray[np.float64]
 
 
 class PinocchioArm:
-    """Inverse dynamics of an arm of hinges; arrays end with its joints."""
+    """Inverse dynamics of an arm of hinges; arrays end with its joints.
 
-    def __init__(self, model: mujoco.MjModel) -> None:
+    Attributes:
+        model: The ``pinocchio.Model``.
+        joints: Names of its joints, in the order of all arrays.
+    """
+
+    def __init__(self, model: Any) -> None:
         """Take over tree, inertias, gravity and armature.
 
         Args:
-            model: For instance :attr:`swgjoint.sim.rigid_arm.RigidArm.model`.
+            model: Of MuJoCo, for instance ``swgjoint.sim.rigid_arm.RigidArm("ur5e")
+                .model``, or of Pinocchio.
 
         Raises:
             InputError: If a joint is not a hinge or a body has several.
             MissingExtraError: If Pinocchio is not installed.
         """
         self._pin = _pinocchio()
-        self.model: Any = _tree(self._pin, model)
+        own = isinstance(model, mujoco.MjModel)
+        self.model: Any = _tree(self._pin, model) if own else model
+        self.joints: tuple[str, ...] = tuple(self.model.names)[1:]  # 0: the universe
+        if self.model.nv != len(self.joints):
+            raise InputError(
+                "arm with joints that are no hinges; accepted: hinges alone"
+            )
         self._data = self.model.createData()
+        self._zero = self._pin.neutral(self.model)
 
     def torques(self, position: Array, velocity: Array, acceleration: Array) -> Array:
         """Joint torques that the motion needs, gravity included [N·m].
 
         Args:
-            position: [rad]. Shape (..., n_joints).
+            position: [rad]. Shape (n, n_joints).
             velocity: [rad/s]. Same shape.
             acceleration: [rad/s²]. Same shape.
         """
-        count = position.shape[-1]
-        flat = [np.reshape(x, (-1, count)) for x in (position, velocity, acceleration)]
-        out = np.empty_like(flat[0])
+        out = np.empty_like(position)
         rnea, model, data = self._pin.rnea, self.model, self._data
-        for row, q, v, a in zip(out, *flat, strict=True):
-            row[:] = rnea(model, data, q, v, a)
-        return out.reshape(position.shape)
-
-    def gravity(self, position: Array) -> Array:
-        """Joint torques that carry the weight at rest [N·m]. (..., n_joints)."""
-        zero = np.zeros_like(position)
-        return self.torques(position, zero, zero)
+        for row, q, v, a in zip(out, position, velocity, acceleration, strict=True):
+            row[:] = rnea(model, data, self._place(q), v, a)
+        return out
 
     def inertia(self, position: Array) -> Array:
-        """Mass matrix [kg·m²]. Shape (..., n_joints, n_joints)."""
-        count = position.shape[-1]
-        out = []
-        for q in np.reshape(position, (-1, count)):
-            upper = np.triu(self._pin.crba(self.model, self._data, q))
-            out.append(upper + np.triu(upper, 1).T)
-        return np.array(out).reshape(*position.shape, count)
+        """Inertia about every joint, the others locked [kg·m²]. Shape (n_joints,)."""
+        full = self._pin.crba(self.model, self._data, self._place(position))
+        return np.diag(full).copy()
+
+    def _place(self, angles: Array) -> Array:
+        """Configuration: joints without limits have cosine and sine there."""
+        return np.asarray(self._pin.integrate(self.model, self._zero, angles))
 
 
 def _tree(pin: Any, model: mujoco.MjModel) -> Any:

@@ -40,6 +40,24 @@ class KnownJoints:
         return np.array([drive.ratio for drive in self.drives])
 
 
+class KnownArm(Protocol):
+    """What a controller takes the arm for, without drives.
+
+    :class:`swgjoint.sim.rigid_arm.RigidArm` is one, and
+    :class:`swgjoint.control.pinocchio_arm.PinocchioArm`.
+    """
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names, in the order of all arrays."""
+
+    def torques(self, position: Array, velocity: Array, acceleration: Array) -> Array:
+        """Joint torques that a motion needs [N·m]. All shapes (n, n_joints)."""
+
+    def inertia(self, position: Array) -> Array:
+        """About every joint, the others locked [kg·m²]. Shapes (n_joints,)."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class ReadingAge:
     """How old the readings of the sensors are when the controller gets them [s].

@@ -21,7 +21,7 @@ from swgjoint.progress import Progress, silent
 from swgjoint.sim.actuators import control_inputs, limited, wanted_torque
 from swgjoint.sim.assembly import Assembly, assemble
 from swgjoint.sim.contains import contents
-from swgjoint.sim.controller import Controller
+from swgjoint.sim.controller import Controller, KnownArm
 from swgjoint.sim.equilibrium import set_start
 from swgjoint.sim.metrics import run_metrics
 from swgjoint.sim.sampled_loop import GivenLoop, Loop, SampledLoop, run_sampled
@@ -127,6 +127,7 @@ def run_scene(
     drives: Mapping[str, DriveMap] | None = None,
     controller: Controller | None = None,
     known_drives: Mapping[str, DriveMap] | None = None,
+    known_arm: KnownArm | None = None,
     name: str | None = None,
     recording: str | Path | None = None,
     progress: Progress = silent,
@@ -148,6 +149,9 @@ def run_scene(
             ``sensors.torque`` is there.
         known_drives: What that controller takes the drives of some joints for; others
             are told as they are simulated.
+        known_arm: What it takes the arm for, for instance
+            :class:`swgjoint.control.pinocchio_arm.PinocchioArm`, whose torques its
+            feed-forward then has; None: the scene's arm, with its payload if known.
         name: What recordings and progress call the run; default: the scene's name.
         recording: File that receives the recording for the viewer, like
             :meth:`Run.to_rerun` but begun while the steps are taken.
@@ -169,9 +173,12 @@ def run_scene(
     )
     loop = None
     if controller is not None:
-        loop = GivenLoop(assembly, controller, task_of(assembly, known_drives))
-    elif known_drives:
-        raise InputError("known_drives without controller; accepted: both or none")
+        loop = GivenLoop(
+            assembly, controller, task_of(assembly, known_drives, known_arm)
+        )
+    elif known_drives or known_arm is not None:
+        what = "known_drives" if known_drives else "known_arm"
+        raise InputError(f"{what} without controller; accepted: both or none")
     name = name or scene.name
     if recording is None:
         return simulate(assembly, name=name, loop=loop, progress=progress)

@@ -9,13 +9,15 @@ import numpy as np
 from swgjoint.errors import InputError
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.assembly import Assembly
-from swgjoint.sim.controller import KnownJoints, ReadingAge, Task
+from swgjoint.sim.controller import KnownArm, KnownJoints, ReadingAge, Task
 from swgjoint.sim.feature_sections import MotorLimits
 from swgjoint.sim.sampled_loop import control_period
 
 
 def task_of(
-    assembly: Assembly, known_drives: Mapping[str, DriveMap] | None = None
+    assembly: Assembly,
+    known_drives: Mapping[str, DriveMap] | None = None,
+    known_arm: KnownArm | None = None,
 ) -> Task:
     """The commanded motion at the instants of the control, and the nominal joints.
 
@@ -26,9 +28,12 @@ def task_of(
     Args:
         assembly: The scene.
         known_drives: Of some joints, what the controller takes them for.
+        known_arm: What it takes the arm for; None: the scene's, without a payload that
+            is not known.
 
     Raises:
-        InputError: If a joint of ``known_drives`` is not one of the scene's.
+        InputError: If a joint of ``known_drives`` is not one of the scene's, or those
+            of ``known_arm`` are not these.
     """
     known = dict(known_drives or {})
     unknown = sorted(set(known) - set(assembly.joints))
@@ -39,12 +44,19 @@ def task_of(
         )
     period, every = control_period(assembly)
     path = assembly.trajectory.every(every)
-    if assembly.known_arm is assembly.arm:
+    arm, link_inertia = known_arm or assembly.known_arm, assembly.link_inertia
+    if known_arm is not None:
+        if known_arm.joints != assembly.joints:
+            raise InputError(
+                f"known_arm with joints {', '.join(known_arm.joints)}; accepted:"
+                f" {', '.join(assembly.joints)}"
+            )
+        link_inertia = known_arm.inertia(path.position[0])
+    if arm is assembly.arm:
         link_torque = assembly.link_torque[::every]
     else:
-        link_torque = assembly.load + assembly.known_arm.torques(
-            path.position, path.velocity, path.acceleration
-        )
+        motion = path.position, path.velocity, path.acceleration
+        link_torque = assembly.load + arm.torques(*motion)
     return Task(
         period=period,
         position=path.position,
@@ -58,7 +70,7 @@ def task_of(
                 known.get(t.joint, t.law or t.drive) for t in assembly.transmissions
             ),
             rotor_inertia=assembly.rotor_inertia,
-            link_inertia=assembly.link_inertia,
+            link_inertia=link_inertia,
             damping=np.array([t.attached.damping for t in assembly.transmissions]),
             torque_limit=np.array([_limit(one) for one in assembly.loops.limits]),
         ),

@@ -1,4 +1,4 @@
-"""The arm in Pinocchio against that in MuJoCo."""
+"""The arm in Pinocchio against that in MuJoCo, and in the feed-forward of a run."""
 
 from __future__ import annotations
 
@@ -6,43 +6,124 @@ import builtins
 
 import mujoco
 import numpy as np
+import pinocchio
 import pytest
 
+from swgjoint.control.motor_side import MotorPID
 from swgjoint.control.pinocchio_arm import PinocchioArm
 from swgjoint.errors import InputError, MissingExtraError
+from swgjoint.maps.drive_map import DriveMap
 from swgjoint.models_path import bundled_names
 from swgjoint.sim.rigid_arm import RigidArm
+from swgjoint.sim.run import run_scene
+from swgjoint.sim.scene import Scene
+
+SCENE = {
+    "name": "known",
+    "arm": "two-link",
+    "payload": {"mass_kg": 3.0},
+    "defaults": {"drive": "map", "level": "linear", "rotor_inertia_kgm2": 1e-4},
+    "trajectory": {
+        "kind": "sweep",
+        "hold_s": 0.05,
+        "ramp_s": 0.1,
+        "end_deg": {"shoulder": 10.0, "elbow": -8.0},
+    },
+    "simulation": {"duration_s": 0.5},
+}
+DRIVE = DriveMap.linear(2e4, teeth_flexspline=120, teeth_circular_spline=122)
+URDF = """<robot name="two">
+  <link name="base"/>
+  <joint name="one" type="continuous"><parent link="base"/><child link="upper"/>
+    <axis xyz="0 1 0"/></joint>
+  <link name="upper"><inertial><origin xyz="0.1 0 0.2"/><mass value="2"/>
+    <inertia ixx="0.02" iyy="0.03" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
+  </link>
+  <joint name="two" type="revolute"><parent link="upper"/><child link="lower"/>
+    <origin xyz="0 0 0.5" rpy="0.3 0 0"/><axis xyz="1 0 0"/>
+    <limit lower="-3" upper="3" effort="9" velocity="9"/></joint>
+  <link name="lower"><inertial><origin xyz="0 0.1 0.1"/><mass value="1"/>
+    <inertia ixx="0.01" iyy="0.02" izz="0.02" ixy="0" ixz="0" iyz="0"/></inertial>
+  </link>
+</robot>"""
 
 
 @pytest.mark.parametrize("name", bundled_names("arms", ".xml"))
 def test_torques_agree_with_the_engine(name):
-    """Inverse dynamics of random motions to 1e-9, weight and inertia too."""
+    """Inverse dynamics of random motions to 1e-9, inertia to 1e-10."""
     arm = RigidArm(name)
     rng = np.random.default_rng(3)
     arm.model.dof_armature[:] = rng.uniform(0.0, 0.5, len(arm.joints))
     mujoco.mj_setConst(arm.model, mujoco.MjData(arm.model))
     other = PinocchioArm(arm.model)
+    assert other.joints == arm.joints
     motion = rng.uniform(-2.0, 2.0, (3, 20, len(arm.joints)))
     limited = arm.model.jnt_limited.astype(bool)  # beyond, the engine's limits push
     low, high = arm.model.jnt_range[limited].T
     motion[0][:, limited] = rng.uniform(low, high, (20, low.size))
     expected = arm.torques(*motion)
     np.testing.assert_allclose(other.torques(*motion), expected, rtol=0, atol=1e-9)
+    for q in motion[0]:
+        np.testing.assert_allclose(other.inertia(q), arm.inertia(q), rtol=0, atol=1e-10)
+
+
+class Spy(MotorPID):
+    """The controller of the scene, which keeps its task."""
+
+    def start(self, task):
+        """Keep the task."""
+        self.task = task
+        super().start(task)
+
+
+def driven(known_arm=None, **changes):
+    scene = Scene.from_data(SCENE, overrides=changes)
+    spy = Spy(frequency=8.0)
+    run = run_scene(scene, drives={"map": DRIVE}, controller=spy, known_arm=known_arm)
+    return run, spy
+
+
+def test_the_feed_forward_of_a_run_is_that_of_the_known_arm():
+    """The loaded arm in Pinocchio drives as the engine's, the bare one as if unknown.
+
+    Torques of the plan to 1e-9 N·m, and the motion of the loaded one with them.
+    """
+    scene = Scene.from_data(SCENE)
+    loaded, unaware = driven(), driven(**{"payload.known": False})
+    same = driven(PinocchioArm(loaded[0].assembly.arm.model))
+    bare = driven(PinocchioArm(RigidArm(scene.arm).model))
+    for (_, spy), (_, expected) in ((same, loaded), (bare, unaware)):
+        for got, torque in (
+            (spy.task.link_torque, expected.task.link_torque),
+            (spy.planned.torque, expected.planned.torque),
+        ):
+            np.testing.assert_allclose(got, torque, rtol=0, atol=1e-9)
+        np.testing.assert_allclose(spy.stiffness, expected.stiffness, rtol=1e-9)
+    place = loaded[0].position
+    np.testing.assert_allclose(same[0].position, place, rtol=0, atol=1e-9)
+    assert np.abs(bare[0].position - place).max() > 1e-3
+
+
+def test_an_arm_that_pinocchio_read_is_taken_as_it_is(tmp_path):
+    """A URDF with a joint without limits, whose place is its cosine and sine."""
+    path = tmp_path / "two.urdf"
+    path.write_text(URDF)
+    arm, known = RigidArm(str(path)), pinocchio.buildModelFromUrdf(str(path))
+    assert known.nq == 3
+    other = PinocchioArm(known)
+    motion = np.random.default_rng(4).uniform(-2.0, 2.0, (3, 20, 2))
     np.testing.assert_allclose(
-        other.gravity(motion[0]), arm.gravity(motion[0]), rtol=0, atol=1e-9
+        other.torques(*motion), arm.torques(*motion), rtol=0, atol=1e-9
     )
-    diagonal = np.diagonal(other.inertia(motion[0]), axis1=-2, axis2=-1)
-    for q, row in zip(motion[0], diagonal, strict=True):
-        np.testing.assert_allclose(row, arm.inertia(q), rtol=0, atol=1e-10)
 
 
-def test_motions_side_by_side_keep_their_places():
-    """Leading axes go through."""
-    arm = RigidArm("two-link")
-    other = PinocchioArm(arm.model)
-    motion = np.random.default_rng(4).uniform(-1.0, 1.0, (3, 5, 4, 2))
-    got = other.torques(*motion)
-    np.testing.assert_array_equal(got[3, 1], other.torques(*motion[:, 3, 1]))
+def test_an_arm_of_other_joints_is_refused():
+    """Names, in the order of the scene; and without a controller nobody asks it."""
+    other = PinocchioArm(RigidArm("bench").model)
+    with pytest.raises(InputError, match=r"joint; accepted: shoulder, elbow"):
+        driven(other)
+    with pytest.raises(InputError, match="known_arm without controller"):
+        run_scene(Scene.from_data(SCENE), drives={"map": DRIVE}, known_arm=other)
 
 
 @pytest.mark.parametrize(
@@ -55,6 +136,13 @@ def test_other_trees_are_refused(joints, message):
     text = f"<mujoco><worldbody>{body}</worldbody></mujoco>"
     with pytest.raises(InputError, match=message):
         PinocchioArm(mujoco.MjModel.from_xml_string(text))
+
+
+def test_a_floating_arm_is_refused():
+    """A joint of Pinocchio with six degrees of freedom."""
+    model = pinocchio.buildModelFromXML(URDF, pinocchio.JointModelFreeFlyer())
+    with pytest.raises(InputError, match="no hinges"):
+        PinocchioArm(model)
 
 
 def test_a_missing_extra_says_how_to_get_it(monkeypatch):
