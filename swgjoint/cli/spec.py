@@ -12,6 +12,7 @@ from swgjoint.json_text import json_text
 from swgjoint.view.words import words
 
 if TYPE_CHECKING:
+    from swgjoint.maps.overlay import Overlay
     from swgjoint.maps.spec_sheet import SpecSheet
 
 FEW_ANGLES = 3
@@ -42,7 +43,15 @@ def configure(parser: argparse.ArgumentParser) -> None:
         " space",
     )
     parser.add_argument(
-        "--out", metavar="DIR", help="write spec.json and spec.png there"
+        "--measured",
+        metavar="LOOP.csv",
+        help="lay a measured torque-torsion loop, input locked, over the prediction:"
+        " columns torque_Nm and torsion_arcmin or torsion_rad",
+    )
+    parser.add_argument(
+        "--out",
+        metavar="DIR",
+        help="write spec.json and spec.png there, with --measured measured.png, too",
     )
 
 
@@ -53,7 +62,8 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         Every key of :data:`swgjoint.maps.spec_sheet.KEYS` (or those of ``--only``),
         None where the source cannot tell, with the reason in ``missing``; ``design``,
         ``validity``, ``files``, ``wall_s``; ``radial_stiffness`` and ``fatigue`` with
-        what stands behind these two figures, where they were computed.
+        what stands behind these two figures, where they were computed; ``measured``
+        with --measured, see :meth:`swgjoint.maps.overlay.Overlay.as_dict`.
     """
     start = time.perf_counter()
     folder = output_folder(args.out) if args.out else None
@@ -61,7 +71,12 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
     only = [] if args.only is None else [k.strip() for k in args.only.split(",")]
     keys = check_keys(only)
-    drive, ratings, name = _drive(args, keys)
+    loop = None
+    if args.measured is not None:
+        from swgjoint.maps.measurement import read_loop
+
+        loop = read_loop(args.measured)
+    drive, ratings, name = _drive(args, keys, always=loop is not None)
     values, reasons, details = _solid(args, keys, ratings)
     sheet = measure_spec(
         drive, ratings=ratings, only=keys, known=values, unknown=reasons
@@ -77,21 +92,29 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         result["stated"] = stated if isinstance(stated, dict) else None
     else:
         result["validity"] = {"level": "design", "ratings": ratings.source}
+    laid = None
+    if loop is not None:
+        from swgjoint.maps.overlay import overlay
+
+        laid = overlay(drive, loop)
+        result["measured"] = {"file": args.measured, **laid.as_dict()}
     result["files"] = []
     if folder is not None:
-        _write(folder, result, sheet, start)
+        _write(folder, result, sheet, laid, start)
     result["wall_s"] = time.perf_counter() - start
     return result
 
 
-def _drive(args: argparse.Namespace, keys: tuple[str, ...]) -> tuple[Any, Any, str]:
-    """Map (None where ratings suffice), ratings and name."""
+def _drive(
+    args: argparse.Namespace, keys: tuple[str, ...], *, always: bool
+) -> tuple[Any, Any, str]:
+    """Map (None where ratings suffice, unless always), ratings and name."""
     from swgjoint.maps.catalogue import ratings_of
     from swgjoint.maps.drive_map import DriveMap
     from swgjoint.maps.spec_sheet import needs_map, needs_turn
     from swgjoint.sim.drives import find_drive, load_drive
 
-    if not needs_map(keys):
+    if not needs_map(keys) and not always:
         source = find_drive(args.drive)
         if not isinstance(source, DriveMap):
             return None, ratings_of(source), source.drive.name
@@ -129,15 +152,26 @@ def _solid(
     return found.values, found.missing, found.details
 
 
-def _write(folder: Any, result: dict[str, Any], sheet: SpecSheet, start: float) -> None:
+def _write(
+    folder: Any,
+    result: dict[str, Any],
+    sheet: SpecSheet,
+    laid: Overlay | None,
+    start: float,
+) -> None:
     from swgjoint.view.spec_plots import spec_picture
 
-    picture = spec_picture(result["design"], sheet)
+    pictures = {"spec.png": spec_picture(result["design"], sheet)}
+    if laid is not None:
+        from swgjoint.view.overlay_plots import overlay_picture
+
+        pictures["measured.png"] = overlay_picture(result["design"], laid)
     folder.mkdir(parents=True, exist_ok=True)
-    result["files"] = [str(folder / f"spec.{end}") for end in ("json", "png")]
+    result["files"] = [str(folder / name) for name in ("spec.json", *pictures)]
     content = result | {"wall_s": time.perf_counter() - start}
     write_whole(folder / "spec.json", json_text(content) + "\n")
-    write_whole(folder / "spec.png", picture)
+    for name, picture in pictures.items():
+        write_whole(folder / name, picture)
 
 
 def report(result: dict[str, Any]) -> str:
@@ -181,6 +215,8 @@ def report(result: dict[str, Any]) -> str:
             f" {friction}"
         )
     lines += _details(result)
+    if "measured" in result:
+        lines += _laid(result["measured"])
     reasons: dict[str, list[str]] = {}
     for key, reason in result["missing"].items():
         reasons.setdefault(reason, []).append(words(key)[0])
@@ -215,6 +251,42 @@ def _details(result: dict[str, Any]) -> list[str]:
             f" shell theory {found['shell_theory']['S']:.3g}"
         )
     return lines
+
+
+def _laid(found: dict[str, Any]) -> list[str]:
+    """The measured loop beside the prediction."""
+    low, high = found["torque_range_Nm"]
+    beyond = "; it leaves the torques of the map" if found["beyond_range"] else ""
+    rows = [
+        (
+            f"{row['segment']}, {row['from_Nm']:.4g} to {row['to_Nm']:.4g} N·m",
+            row["K_measured_Nm_rad"],
+            row["K_predicted_Nm_rad"],
+            row["rms_arcmin"],
+            row["largest_arcmin"],
+        )
+        for row in found["segments"]
+    ]
+    lines = [
+        f"measured loop {found['file']}: {found['samples']} samples, {low:.4g} to"
+        f" {high:.4g} N·m{beyond}; drive {found['history']}; residual rms"
+        f" {found['rms_arcmin']:.3g}, largest {found['largest_arcmin']:.3g} arcmin",
+        table(
+            rows,
+            header=(
+                "",
+                "K measured [N·m/rad]",
+                "K predicted",
+                "residual rms [arcmin]",
+                "largest",
+            ),
+        ),
+    ]
+    pairs = [
+        (words(key)[0], *(found[key][which] for which in ("measured", "predicted")))
+        for key in ("hysteresis_loss_arcmin", "lost_motion_arcmin")
+    ]
+    return [*lines, table(pairs, header=("arcmin", "measured", "predicted"))]
 
 
 def _source(result: dict[str, Any]) -> str:

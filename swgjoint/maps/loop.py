@@ -25,8 +25,10 @@ LOST_MOTION_TORQUE = 0.04
 """Part of the rated torque at which lost motion is read."""
 _TURNS_AT = 0.02
 """A torque path turns where it comes back by this part of its range: not for noise."""
-_REST = 1e-9
+REST = 1e-9
 """Torque left at zero, of rated: a free output rests where the load left it."""
+NO_WIDTH = 1e-7
+"""A loop narrower than this part of its travel has no hysteresis [-]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -46,12 +48,8 @@ class TorqueLoop:
         object.__setattr__(self, "torque", torque)
         object.__setattr__(self, "torsion", torsion)
 
-    def legs(self) -> list[tuple[bool, Array, Array]]:
-        """Parts of one direction of the torque: rising, torque and torsion.
-
-        Torque increases strictly in every part, also in a falling one; samples of the
-        same torque are averaged.
-        """
+    def turns(self) -> list[tuple[int, int]]:
+        """First and last sample of every part of one direction of the torque."""
         band = _TURNS_AT * float(np.ptp(self.torque))
         turns, extreme, rising = [0], 0, None
         for k, value in enumerate(self.torque):
@@ -65,8 +63,16 @@ class TorqueLoop:
                 turns.append(extreme)
                 rising, extreme = not rising, k
         turns.append(self.torque.size - 1)
+        return list(pairwise(turns))
+
+    def legs(self) -> list[tuple[bool, Array, Array]]:
+        """Parts of one direction of the torque: rising, torque and torsion.
+
+        Torque increases strictly in every part, also in a falling one; samples of the
+        same torque are averaged.
+        """
         found = []
-        for a, b in pairwise(turns):
+        for a, b in self.turns():
             part = slice(a, b + 1)
             torque, place = np.unique(self.torque[part], return_inverse=True)
             counts = np.bincount(place)
@@ -145,7 +151,7 @@ def torque_loop(drive: DriveMap, *, theta: float = 0.0) -> TorqueLoop:
     named = [r.T1, r.T2, LOST_MOTION_TORQUE * r.rated_torque]
     up = np.unique(np.concatenate([np.linspace(0.0, top, POINTS), named]))
     # at rest on the side from which the load left; the start is the middle
-    side = _REST * r.rated_torque
+    side = REST * r.rated_torque
     legs = [
         up,
         np.concatenate([up[-2:0:-1], [side], -up[1:]]),

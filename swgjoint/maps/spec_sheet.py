@@ -22,7 +22,12 @@ from swgjoint.maps.friction_running import (
     no_load_running_torque,
     starting_torque,
 )
-from swgjoint.maps.loop import TorqueLoop, largest_torque, torque_loop
+from swgjoint.maps.loop import (
+    NO_WIDTH,
+    TorqueLoop,
+    largest_torque,
+    torque_loop,
+)
 from swgjoint.maps.turn import Turn, error_turn, ripple_turn, strongest_orders
 from swgjoint.units import arcmin, rpm
 
@@ -68,8 +73,6 @@ KEYS = (*RATING_KEYS, *LOOP_KEYS, *TURN_KEYS, *LOSS_KEYS, *ABSENT_KEYS)
 
 _CURVE = 64
 """Samples of the period for a point of the efficiency curve."""
-_WIDTH = 1e-7
-"""A loop narrower than this part of its travel has no hysteresis [-]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -212,7 +215,7 @@ def _loop_figures(
         missing[f"K{k}_Nm_rad"] = f"the loop does not reach {high:g} N·m"
     width = loop.hysteresis_loss()
     travel = float(loop.torsion.max() - loop.torsion.min())
-    if abs(width) > _WIDTH * travel:
+    if abs(width) > NO_WIDTH * travel:
         values["hysteresis_loss_arcmin"] = width / arcmin
     else:
         missing["hysteresis_loss_arcmin"] = (

@@ -18,7 +18,9 @@ from swgjoint.gear.shell_theory import (
 )
 from swgjoint.gear.tolerances import has_errors
 from swgjoint.maps.drive_map import DriveMap
+from swgjoint.maps.loop import torque_loop
 from swgjoint.sim.drives import load_drive
+from swgjoint.units import arcmin
 
 CONTRACT = (
     "K1_Nm_rad K2_Nm_rad K3_Nm_rad T1_Nm T2_Nm hysteresis_loss_arcmin"
@@ -300,3 +302,59 @@ def test_scenes_resolve_the_same_references(tmp_path, monkeypatch, synthetic_map
     (tmp_path / "CSG-25-100").write_text(text)
     assert load_drive("CSG-25-100").name == "linear"
     assert isinstance(seen[0], Design)
+
+
+def loop_file(path, drive, *, factor=1.0):
+    """A loop as a rig would write it."""
+    loop = torque_loop(drive)
+    rows = [
+        f"{torque:.17g},{factor * x / arcmin:.17g}"
+        for torque, x in zip(loop.torque, loop.torsion, strict=True)
+    ]
+    path.write_text("\n".join(["torque_Nm,torsion_arcmin", *rows]) + "\n")
+    return str(path)
+
+
+def test_a_measured_loop_over_a_map(capsys, tmp_path, synthetic_map):
+    """Residual by segment, both K, a picture; nothing is left of the map's own loop."""
+    synthetic_map.save(tmp_path / "a.swg")
+    own = loop_file(tmp_path / "own.csv", synthetic_map)
+    drive, out = str(tmp_path / "a.swg"), str(tmp_path / "out")
+    result = spec(capsys, drive, "--only", "T1_Nm", "--measured", own, "--out", out)
+    found = result["measured"]
+    assert found["largest_arcmin"] < 1e-8
+    assert [row["segment"] for row in found["segments"]] == ["K1", "K2", "K3"]
+    assert [row["to_Nm"] for row in found["segments"]] == pytest.approx([10, 30, 100])
+    assert result["files"][-1] == f"{out}/measured.png"
+    assert (tmp_path / "out/measured.png").read_bytes().startswith(b"\x89PNG")
+    soft = loop_file(tmp_path / "soft.csv", synthetic_map, factor=1.25)
+    found = spec(capsys, drive, "--measured", soft)["measured"]
+    for row in found["segments"]:
+        ratio = row["K_predicted_Nm_rad"] / row["K_measured_Nm_rad"]
+        assert ratio == pytest.approx(1.25, rel=1e-6)
+    assert main(["spec", drive, "--measured", soft]) == 0
+    assert "residual rms" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (None, "cannot be read"),
+        ("torque_Nm,twist\n1,2\n", "no column torsion_arcmin or torsion_rad"),
+        ("torque_Nm,torsion_rad\n" + "1,2\n" * 9, "both signs"),
+        ("torque_Nm,torsion_rad\n1,x\n", "accepted: a finite number"),
+    ],
+)
+def test_a_bad_loop_is_one_line(capsys, tmp_path, text, words):
+    """Exit status 2 before anything is computed, no folder left behind."""
+    path = tmp_path / "a.csv"
+    if text is not None:
+        path.write_text(text)
+    out = tmp_path / "out"
+    # a design: finite elements would take minutes
+    arguments = ["spec", "size-25-100", "--measured", str(path), "--out", str(out)]
+    assert main(arguments) == 2
+    said = capsys.readouterr().err
+    assert words in said
+    assert said.count("\n") == 1
+    assert not out.exists()
