@@ -175,12 +175,21 @@ class CircularSplineMember(Member):
 
 
 class Bearing(Section):
-    """Thin-race ball bearing between wave generator and flexspline."""
+    """Thin-race ball bearing between wave generator and flexspline.
+
+    Absent optional keys take what :class:`swgjoint.gear.ball_bearing.BallBearing` says.
+    """
 
     balls: Annotated[int, Field(ge=3, le=200)]
     ball_diameter_mm: Millimetre
     race_thickness_mm: Millimetre
     clearance_um: Micrometre = 0.0
+    race_width_mm: Millimetre | None = None
+    groove_inertia_factor: Reduction | None = None
+    groove_conformity: Annotated[float, Field(gt=0.5, le=1)] | None = None
+    fit_clearance_um: Micrometre | None = None
+    youngs_modulus_GPa: Annotated[float, Field(gt=0, le=2_000)] | None = None
+    poisson_ratio: Annotated[float, Field(ge=0, lt=0.5)] | None = None
 
 
 class WaveGeneratorBase(Section):

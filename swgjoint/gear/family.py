@@ -18,14 +18,18 @@ SIZES = (8, 100)
 RATIOS = (30, 200)
 """Smallest and largest of the rule; the tooth count is twice the ratio."""
 
-# multiples of the pitch diameter d; thesis lengths are over its 120 mm
-FACE = 0.20  # proportions of a study of catalogue component sets, a "hard" cup
+# Multiples of the pitch diameter d; thesis lengths are over its 120 mm. FACE to GROOVE
+# are proportions of a study of catalogue component sets, a "hard" cup: assumed there, no
+# drawing of a cup or of a flexible bearing was at hand.
+FACE = 0.20
 RIM = 0.0125
 WALL_OVER_RIM = 0.0095 / 0.0125
 SMOOTH_CUP = 0.60 - FACE  # of the whole length 0.60 d, behind the teeth
 BORE_RADIUS = 0.58 * 0.5
 BALL = 0.083
 RACE = 0.021
+RACE_WIDTH = 0.145
+GROOVE = 0.8  # second moment of the race's section over that of its rectangle
 BALLS = 23  # odd: the lobes do not pass balls in phase
 BEARING_BORE = 0.71
 RING_RIM = 2.0 / 120.0  # thesis Table 4.1
@@ -130,6 +134,8 @@ def family_design(size: int, ratio: int) -> dict[str, Any]:
                 "ball_diameter_mm": _figure(BALL * d),
                 "race_thickness_mm": _figure(RACE * d),
                 "clearance_um": 0.5 * sum(clearance),
+                "race_width_mm": _figure(RACE_WIDTH * d),
+                "groove_inertia_factor": GROOVE,
             },
         },
         "cup": {
