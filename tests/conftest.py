@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from swgjoint.maps.drive_map import DriveMap, Ratings
+from swgjoint.maps.friction import Friction
 
 
 def make_synthetic_map(
@@ -61,3 +62,18 @@ def make_synthetic_map(
 @pytest.fixture
 def synthetic_map() -> DriveMap:
     return make_synthetic_map()
+
+
+@pytest.fixture
+def friction_law() -> Friction:
+    """Every term of the law, none of them small."""
+    return Friction(
+        stiffness=70.0,
+        coulomb=0.04,
+        static=0.07,
+        stribeck_speed=3.0,
+        viscous=6e-4,
+        load=0.1,
+        bending=0.005,
+        damping=0.05,
+    )

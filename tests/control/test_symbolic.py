@@ -22,20 +22,9 @@ from swgjoint.errors import MissingExtraError
 from swgjoint.joint.attach import attach
 from swgjoint.joint.reference import Motion, gradient_force
 from swgjoint.maps.drive_map import DriveMap
-from swgjoint.maps.friction import Friction
 from swgjoint.maps.hysteresis import Jenkin
 
 LAYOUTS = ["circular_spline_fixed", "flexspline_fixed", "wave_generator_fixed"]
-FRICTION = Friction(
-    stiffness=70.0,
-    coulomb=0.04,
-    static=0.07,
-    stribeck_speed=3.0,
-    viscous=6e-4,
-    load=0.1,
-    bending=0.005,
-    damping=0.05,
-)
 ELEMENTS = (
     Jenkin(stiffness=2e4, yield_torque=2.0),
     Jenkin(stiffness=5e3, yield_torque=4.0),
@@ -59,8 +48,15 @@ def conservative(request, synthetic_map) -> DriveMap:
     return replace(DriveMap.from_catalogue("CSG-25-100"), friction=None, hysteresis=())
 
 
-def lossy(drive: DriveMap, layout: str) -> DriveMap:
-    return replace(drive, layout=layout, friction=FRICTION, hysteresis=ELEMENTS)
+@pytest.fixture
+def lossy(friction_law):
+    """Gives a drive a layout, friction and elements."""
+
+    def with_losses(drive: DriveMap, layout: str) -> DriveMap:
+        changes = {"friction": friction_law, "hysteresis": ELEMENTS}
+        return replace(drive, layout=layout, **changes)
+
+    return with_losses
 
 
 def bench(drive: DriveMap):
@@ -120,12 +116,12 @@ def assert_forces_agree(drive: DriveMap, states: int) -> None:
 
 
 @pytest.mark.parametrize("layout", LAYOUTS)
-def test_forces_equal_twin_and_plugin(conservative, layout):
+def test_forces_equal_twin_and_plugin(conservative, layout, lossy):
     """Forces on rotor and link within 1e-9 N·m of both, beyond the knots, too."""
     assert_forces_agree(lossy(conservative, layout), 100)
 
 
-def test_forces_of_a_large_map(monkeypatch, synthetic_map):
+def test_forces_of_a_large_map(monkeypatch, synthetic_map, lossy):
     """What is computed by matrices, for maps of many harmonics, is the same."""
     monkeypatch.setattr(symbolic, "LARGE", 0)
     drive = lossy(synthetic_map, LAYOUTS[0])
@@ -136,7 +132,7 @@ def test_forces_of_a_large_map(monkeypatch, synthetic_map):
 @pytest.mark.fe
 @pytest.mark.slow
 @pytest.mark.parametrize("layout", LAYOUTS)
-def test_forces_of_a_map_of_finite_elements(toleranced_map, layout):
+def test_forces_of_a_map_of_finite_elements(toleranced_map, layout, lossy):
     """Kinematic error, cogging and ripple as finite elements give them: 1e-9 N·m."""
     assert len(toleranced_map.orders) > 5
     assert_forces_agree(lossy(toleranced_map, layout), 50)
@@ -187,7 +183,7 @@ def assert_trajectory_agrees(drive: DriveMap, chunks: int) -> None:
 
 
 @pytest.mark.parametrize("losses", [False, True])
-def test_trajectory_equals_plugin(conservative, losses):
+def test_trajectory_equals_plugin(conservative, losses, lossy):
     """Within 1e-6 rad over 0.1 s, with elements that slip and bristles that stick."""
     drive = lossy(conservative, LAYOUTS[0]) if losses else conservative
     assert_trajectory_agrees(drive, 10)
@@ -225,13 +221,13 @@ def test_hessian_is_symmetric_and_the_slope_of_the_forces(synthetic_map):
             )
 
 
-def test_smooth_law_is_the_whole_law_at_speed(synthetic_map):
+def test_smooth_law_is_the_whole_law_at_speed(synthetic_map, friction_law):
     """Without elements, and where the bristle slips, both laws are one to 0.1 %.
 
     Static and sliding friction differ in the smooth law as in the other; at rest the
     smooth law has none.
     """
-    drive = replace(synthetic_map, friction=FRICTION)
+    drive = replace(synthetic_map, friction=friction_law)
     whole = joint_forces(drive, damping=2.0)
     smooth = smooth_forces(drive, damping=2.0)
     bare = joint_forces(synthetic_map, damping=2.0)

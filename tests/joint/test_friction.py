@@ -26,24 +26,14 @@ from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.friction import Friction
 from swgjoint.maps.hysteresis import Jenkin
 
-FRICTION = Friction(
-    stiffness=70.0,
-    coulomb=0.04,
-    static=0.07,
-    stribeck_speed=3.0,
-    viscous=6e-4,
-    load=0.1,
-    bending=0.005,
-    damping=0.05,
-)
 COULOMB = Friction(stiffness=100.0, coulomb=0.1, static=0.1)
 
 
 @pytest.fixture
-def rubbing(any_layout: DriveMap) -> DriveMap:
+def rubbing(any_layout: DriveMap, friction_law) -> DriveMap:
     """The synthetic map in each layout, with friction and one element."""
     element = Jenkin(stiffness=2e4, yield_torque=2.0)
-    return replace(any_layout, friction=FRICTION, hysteresis=(element,))
+    return replace(any_layout, friction=friction_law, hysteresis=(element,))
 
 
 def random_motion(b, rng) -> Motion:
@@ -276,11 +266,11 @@ def test_true_stiction(bench):
             assert abs(change) < 1e-8
 
 
-def test_full_equals_rk4(bench, rubbing):
+def test_full_equals_rk4(bench, rubbing, friction_law):
     """With a short step the scheme goes the same way as RK4."""
     rotor = 0.144 / rubbing.ratio**2
     # explicit integrators leave out the creep of a reach that grows
-    rubbing = replace(rubbing, friction=replace(FRICTION, damping=0.0))
+    rubbing = replace(rubbing, friction=replace(friction_law, damping=0.0))
     ends = []
     for integrator in ("discrete", "RK4"):
         b = bench(rubbing, integrator=integrator, step=1e-5, rotor_inertia=rotor)
@@ -298,10 +288,10 @@ def full_state(b, data, kind=mujoco.mjtState.mjSTATE_INTEGRATION):
 
 
 @pytest.mark.parametrize("integrator", ["RK4", "discrete"])
-def test_copies_continue_bitwise(bench, synthetic_map, integrator):
+def test_copies_continue_bitwise(bench, synthetic_map, integrator, friction_law):
     """A copy and a set state go on with the same bits; a reset forgets the bristle."""
     b = bench(
-        replace(synthetic_map, friction=FRICTION), integrator=integrator, step=1e-4
+        replace(synthetic_map, friction=friction_law), integrator=integrator, step=1e-4
     )
     b.place(0.1, -3e-3, 3.0, 0.05)
     mujoco.mj_step(b.model, b.data, 50)
@@ -316,30 +306,32 @@ def test_copies_continue_bitwise(bench, synthetic_map, integrator):
     assert not b.data.plugin_state.any()
 
 
-def test_absent_unless_asked_for(bench, synthetic_map):
+def test_absent_unless_asked_for(bench, synthetic_map, friction_law):
     """No tendon, no state, no attribute unless the map has it and it is asked for."""
     b = bench(synthetic_map)
     assert (b.model.ntendon, b.model.npluginstate) == (1, 2)
     assert "friction" not in plugin.config(synthetic_map, damping=0.0)
-    b = bench(replace(synthetic_map, friction=FRICTION))
+    b = bench(replace(synthetic_map, friction=friction_law))
     assert (b.model.ntendon, b.model.npluginstate) == (2, 4)
-    b = bench(replace(synthetic_map, friction=FRICTION), friction=False)
+    b = bench(replace(synthetic_map, friction=friction_law), friction=False)
     assert (b.model.ntendon, b.model.npluginstate) == (1, 2)
-    b = bench(replace(synthetic_map, friction=FRICTION), friction=False, level="native")
+    b = bench(
+        replace(synthetic_map, friction=friction_law), friction=False, level="native"
+    )
     assert not b.model.dof_frictionloss.any() and not b.model.dof_damping.any()
     for level, tendons in (("linear", 1), ("native", 1)):
-        b = bench(replace(synthetic_map, friction=FRICTION), level=level)
+        b = bench(replace(synthetic_map, friction=friction_law), level=level)
         assert b.model.ntendon == tendons
 
 
-def test_native_has_friction_without_load(bench, synthetic_map):
+def test_native_has_friction_without_load(bench, synthetic_map, friction_law):
     """Frictionloss of the rotor is Coulomb and bending, damping the viscous part."""
-    b = bench(replace(synthetic_map, friction=FRICTION), level="native")
+    b = bench(replace(synthetic_map, friction=friction_law), level="native")
     np.testing.assert_allclose(b.model.dof_frictionloss[b.v], [0.045, 0.0])
     np.testing.assert_allclose(b.model.dof_damping[b.v], [6e-4, 0.0])
     assert b.drive.native.friction == pytest.approx(0.045)
     assert "load" in b.drive.native.friction_note
-    constant = replace(FRICTION, load=0.0, static=0.04)
+    constant = replace(friction_law, load=0.0, static=0.04)
     b = bench(replace(synthetic_map, friction=constant), level="native")
     assert not b.drive.native.friction_note
 
@@ -372,13 +364,13 @@ def test_bad_attribute_is_rejected(text):
         spec.compile()
 
 
-def test_a_prefix_and_suffix_leave_the_friction_in_place(synthetic_map):
+def test_a_prefix_and_suffix_leave_the_friction_in_place(synthetic_map, friction_law):
     """A model attached to another finds its friction tendon under any name."""
     arm = mujoco.MjSpec.from_string(
         '<mujoco><worldbody><body name="b"><joint name="j"/><geom size=".1"/></body>'
         "</worldbody></mujoco>"
     )
-    drive = replace(synthetic_map, friction=FRICTION)
+    drive = replace(synthetic_map, friction=friction_law)
     attach(arm, joint="j", drive=drive, rotor_inertia=4e-5, friction=True)
     parent = mujoco.MjSpec()
     parent.option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
@@ -399,10 +391,10 @@ def test_a_prefix_and_suffix_leave_the_friction_in_place(synthetic_map):
         ({"coulomb": True}, "friction coulomb True"),
     ],
 )
-def test_bad_friction_is_refused(change, says):
+def test_bad_friction_is_refused(change, says, friction_law):
     """Parameters that no friction has are named with what is accepted."""
     with pytest.raises(InputError, match=says):
-        replace(FRICTION, **change)
+        replace(friction_law, **change)
 
 
 def test_the_joint_runs_as_its_spec_sheet_says(bench):

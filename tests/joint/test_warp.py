@@ -15,7 +15,6 @@ from swgjoint.errors import InputError
 from swgjoint.joint.attach import attach
 from swgjoint.joint.reference import Motion, scheme_force
 from swgjoint.maps.drive_map import DriveMap
-from swgjoint.maps.friction import Friction
 from swgjoint.maps.hysteresis import Jenkin
 
 mjw = pytest.importorskip(
@@ -27,16 +26,6 @@ warp = pytest.importorskip("swgjoint.joint.warp")
 ELEMENTS = (
     Jenkin(stiffness=1e4, yield_torque=3.0),
     Jenkin(stiffness=3e3, yield_torque=6.0),
-)
-FRICTION = Friction(
-    stiffness=70.0,
-    coulomb=0.04,
-    static=0.07,
-    stribeck_speed=3.0,
-    viscous=6e-4,
-    load=0.1,
-    bending=0.005,
-    damping=0.05,
 )
 PAIR = """
 <mujoco>
@@ -105,12 +94,12 @@ class Both:
 
 
 @pytest.fixture(params=["conservative", "slipping", "rubbing"])
-def drive(request, synthetic_map: DriveMap) -> DriveMap:
+def drive(request, synthetic_map: DriveMap, friction_law) -> DriveMap:
     """The synthetic map with side bands, without and with losses, in two layouts."""
     if request.param == "conservative":
         return synthetic_map
     ring = replace(synthetic_map, layout="flexspline_fixed", hysteresis=ELEMENTS)
-    return ring if request.param == "slipping" else replace(ring, friction=FRICTION)
+    return ring if request.param == "slipping" else replace(ring, friction=friction_law)
 
 
 def test_force_direction_and_stiffness_equal_reference(drive):
