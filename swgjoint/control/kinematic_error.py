@@ -21,6 +21,7 @@ from swgjoint.errors import InputError
 from swgjoint.gear.kinematics import angle_coefficients
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.error_fit import ORDERS
+from swgjoint.maps.error_spectrum import peak_to_peak
 from swgjoint.sim.controller import Controller, Measured, Task
 from swgjoint.units import deg
 
@@ -84,6 +85,11 @@ class KinematicErrorTable:
             potential=potential,
             end_stiffness=ends,
         )
+
+    def sized(self, drive: DriveMap, wanted: float) -> KinematicErrorTable:
+        """The same in proportion: on a drive its peak to peak is that wanted [rad]."""
+        sized = self.amplitudes * wanted / peak_to_peak(self.on(drive))
+        return replace(self, amplitudes=sized)
 
 
 def identify_kinematic_error(

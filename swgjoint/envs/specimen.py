@@ -3,24 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 
 import numpy as np
-from numpy.typing import NDArray
 
+from swgjoint.control.kinematic_error import KinematicErrorTable
 from swgjoint.envs.arguments import is_flag, is_number, shown
 from swgjoint.errors import InputError
 from swgjoint.joint.variation import Variation
 from swgjoint.maps.drive_map import DriveMap
+from swgjoint.maps.error_spectrum import AMPLITUDES, EVEN
 from swgjoint.units import arcmin
-
-Array = NDArray[np.float64]
-
-ORDERS = ((2, 0), (0, 2), (4, 0), (0, 4))
-"""Cycles per turn of the wave generator against circular spline and flexspline: where
-position errors of teeth show when two opposite lobes average them."""
-SHARES = (0.3, 0.3, 0.2, 0.2)
-"""Amplitudes: the first even order the larger, both members alike; assumed."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -111,9 +104,10 @@ def tolerances_of(
 
 
 def with_assumed_error(drive: DriveMap, peak_to_peak: float | None = None) -> DriveMap:
-    """A drive without kinematic error, given one of :data:`ORDERS`.
+    """A drive without kinematic error, given one of 2 and 4 cycles per turn.
 
     A map that has an error keeps it, unless a value is given for one that has none.
+    Amplitudes are in proportion to :data:`swgjoint.maps.error_spectrum.AMPLITUDES`.
 
     Args:
         drive: Map.
@@ -139,25 +133,11 @@ def with_assumed_error(drive: DriveMap, peak_to_peak: float | None = None) -> Dr
         )
     if peak_to_peak == 0.0:
         return drive
-    count = len(ORDERS)
     # phases of the four harmonics: one drive among many, always the same
-    phase = np.arange(1.0, 1.0 + count)
-    error = np.array(SHARES)[:, None] * np.stack([np.cos(phase), np.sin(phase)], 1)
-
-    def padded(values: Array) -> Array:
-        return np.concatenate([values, np.zeros((count, *values.shape[1:]))])
-
-    # beside harmonics that the map may have without any error, the new ones
-    got = replace(
-        drive,
-        orders=np.concatenate([drive.orders, np.array(ORDERS)]),
-        potential=padded(drive.potential),
-        end_stiffness=padded(drive.end_stiffness),
-        kinematic_error=np.concatenate([drive.kinematic_error, error]),
+    phase = np.arange(1.0, 1.0 + len(EVEN))
+    size = np.array([[AMPLITUDES[pq]] for pq in EVEN])
+    table = KinematicErrorTable(
+        orders=np.array(EVEN),
+        amplitudes=size * np.stack([np.cos(phase), np.sin(phase)], axis=1),
     )
-    psi = np.linspace(0.0, 2.0 * np.pi, 40 * 4 * int(abs(drive.ratio)))
-    found = got.error_at(got.phases(drive.ratio * psi, psi))[0]
-    size = peak_to_peak / float(np.ptp(found))
-    return replace(
-        got, kinematic_error=np.concatenate([drive.kinematic_error, size * error])
-    )
+    return table.sized(drive, peak_to_peak).on(drive)

@@ -1,10 +1,11 @@
 """Specimens of one drive: what a maker's tolerances leave different between two.
 
 The errors of a drive are drawn, not built: amplitudes are those of finite elements of a
-drive at the limits of its tolerances, phases come from a seed. The *systematic* part,
-low orders of cumulative pitch, roundness and centring, belongs to the specimen; the
-*random* part, higher orders of single pitches, is drawn from a seed of its own, so that
-a record may be taken on a drive that differs from the one that is compensated.
+drive at the limits of its tolerances (:mod:`swgjoint.maps.error_spectrum`), phases come
+from a seed. The *systematic* part, low orders of cumulative pitch, roundness and
+centring, belongs to the specimen; the *random* part, higher orders of single pitches,
+is drawn from a seed of its own, so that a record may be taken on a drive that differs
+from the one that is compensated.
 """
 
 from __future__ import annotations
@@ -16,24 +17,14 @@ from numpy.typing import NDArray
 
 from swgjoint.control.kinematic_error import KinematicErrorTable
 from swgjoint.maps.drive_map import DriveMap
+from swgjoint.maps.error_spectrum import AMPLITUDES
 from swgjoint.units import arcmin
 
 Array = NDArray[np.float64]
 
-SYSTEMATIC: dict[tuple[int, int], float] = {
-    (2, 0): 1.0,
-    (0, 2): 0.98,
-    (4, 0): 0.46,
-    (0, 4): 0.48,
-    (-1, 1): 0.18,
-    (1, 1): 0.18,
-    (1, 0): 0.15,
-    (0, 1): 0.07,
-}
-"""Amplitudes of e0 over that of 2 alpha, of the map of ``reference-2d-tolerances``
-(0.138 arcmin there)."""
 RANDOM = 0.07
-"""Of the same, what single pitches leave in every order of :data:`RANDOM_ORDERS`."""
+"""Over the amplitude of 2 alpha: what single pitches leave in every order of
+:data:`RANDOM_ORDERS`."""
 RANDOM_ORDERS = (*((p, 0) for p in range(5, 13)), *((0, q) for q in range(5, 13)))
 LOW = 4
 """Orders of a map up to this belong to its systematic part."""
@@ -47,8 +38,9 @@ def specimen(base: DriveMap, seed: int, *, random_seed: int = 0) -> DriveMap:
     """One specimen of a drive.
 
     A map with kinematic error keeps its amplitudes and gets other phases, potential and
-    error alike; others get :data:`SYSTEMATIC` and the random orders, with a peak to
-    peak over one turn that is the transmission accuracy which the catalogue states.
+    error alike; others get the orders of :mod:`swgjoint.maps.error_spectrum` and the
+    random ones, with a peak to peak over one turn that is the transmission accuracy
+    which the catalogue states.
 
     Args:
         base: Nominal drive.
@@ -79,14 +71,14 @@ def nominal(base: DriveMap) -> DriveMap:
 def _drawn(
     base: DriveMap, systematic: np.random.Generator, random: np.random.Generator
 ) -> DriveMap:
-    orders = np.array([*SYSTEMATIC, *RANDOM_ORDERS])
-    size = [*SYSTEMATIC.values(), *np.full(len(RANDOM_ORDERS), RANDOM)]
+    orders = np.array([*AMPLITUDES, *RANDOM_ORDERS])
+    size = [*AMPLITUDES.values(), *np.full(len(RANDOM_ORDERS), RANDOM)]
     phase = (
         2.0
         * np.pi
         * np.concatenate(
             [
-                systematic.uniform(size=len(SYSTEMATIC)),
+                systematic.uniform(size=len(AMPLITUDES)),
                 random.uniform(size=len(RANDOM_ORDERS)),
             ]
         )
@@ -94,9 +86,8 @@ def _drawn(
     pairs = np.array(size)[:, None] * np.stack([np.cos(phase), np.sin(phase)], axis=-1)
     stated = (base.info.get("stated") or {}).get("transmission_accuracy_arcmin")
     wanted = (stated or ACCURACY) * arcmin
-    drive = KinematicErrorTable(orders=orders, amplitudes=pairs).on(base)
-    pairs = pairs * wanted / accuracy(drive)
-    return KinematicErrorTable(orders=orders, amplitudes=pairs).on(base)
+    table = KinematicErrorTable(orders=orders, amplitudes=pairs)
+    return table.sized(base, wanted).on(base)
 
 
 def _turned(
@@ -116,10 +107,3 @@ def _turned(
         potential=np.einsum("abk,kbmc->kamc", turn, base.potential),
         end_stiffness=np.einsum("abk,kbe->kae", turn, base.end_stiffness),
     )
-
-
-def accuracy(drive: DriveMap) -> float:
-    """Peak to peak of e0 over one turn of the output [rad]."""
-    psi = np.linspace(0.0, 2.0 * np.pi, 40 * round(abs(drive.ratio)) + 1)
-    phases = drive.phases(drive.ratio * psi, psi)
-    return float(np.ptp(drive.error_at(phases)[0]))

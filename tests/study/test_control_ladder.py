@@ -10,11 +10,13 @@ import pytest
 
 from swgjoint.cli.main import main
 from swgjoint.control.kinematic_error import KinematicErrorTable
+from swgjoint.envs.specimen import with_assumed_error
 from swgjoint.maps.drive_map import DriveMap
+from swgjoint.maps.error_spectrum import AMPLITUDES, EVEN, peak_to_peak
 from swgjoint.study import control_ladder as study
 from swgjoint.study.control_bench import DELAY, MOTIONS, UNITS, run_motion
 from swgjoint.study.control_ladder import RUNGS, climb, ladder_claims
-from swgjoint.study.control_specimens import SYSTEMATIC, accuracy, nominal, specimen
+from swgjoint.study.control_specimens import nominal, specimen
 from swgjoint.units import arcmin
 
 CSG = DriveMap.from_catalogue("CSG-25-100")
@@ -29,11 +31,29 @@ def test_a_specimen_has_the_stated_accuracy():
     """1 arcmin over one output turn, friction within a fifth, one seed one drive."""
     one, two = specimen(CSG, 1), specimen(CSG, 2)
     for drive in (one, two):
-        assert accuracy(drive) == pytest.approx(1.0 * arcmin, rel=1e-9)
+        assert peak_to_peak(drive) == pytest.approx(1.0 * arcmin, rel=1e-9)
         share = drive.friction.coulomb / CSG.friction.coulomb
         assert abs(share - 1.0) <= 0.2 and share != 1.0
     np.testing.assert_array_equal(specimen(CSG, 1).kinematic_error, one.kinematic_error)
     assert np.abs(one.kinematic_error - two.kinematic_error).max() > 0.1 * arcmin
+
+
+def test_environments_and_study_have_one_spectrum():
+    """Amplitudes over that of 2 alpha, of one specimen and of the environments' drive.
+
+    The latter has the even orders alone.
+    """
+    for drive, orders in (
+        (specimen(CSG, 1), AMPLITUDES),
+        (with_assumed_error(CSG), EVEN),
+    ):
+        found = harmonics(drive)
+        first = np.hypot(*found[(2, 0)])
+        assert first > 0.05 * arcmin
+        for pq in orders:
+            share = np.hypot(*found[pq]) / first
+            assert share == pytest.approx(AMPLITUDES[pq], rel=1e-9)
+    assert set(found) == {(0, 0), *EVEN}
 
 
 def test_the_random_part_has_a_seed_of_its_own():
@@ -41,7 +61,7 @@ def test_the_random_part_has_a_seed_of_its_own():
     one, other = (harmonics(specimen(CSG, 1, random_seed=k)) for k in (0, 1))
     scale = np.hypot(*other[(2, 0)]) / np.hypot(*one[(2, 0)])
     assert scale == pytest.approx(1.0, abs=0.1)  # both fill the stated accuracy
-    for pq in SYSTEMATIC:
+    for pq in AMPLITUDES:
         np.testing.assert_allclose(other[pq], scale * one[pq], rtol=1e-9)
     assert not np.allclose(other[(7, 0)], scale * one[(7, 0)], rtol=0.1)
 
