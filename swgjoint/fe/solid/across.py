@@ -119,7 +119,10 @@ def vertices(gap: Array, flat: Array) -> Vertices:
     root = np.sqrt(np.maximum(a * a - 3.0 * b * d0, 0.0))
     t = np.clip(-d0 / np.where(a + root > 0.0, a + root, 1.0), 0.0, 1.0)
     bend = 2.0 * a + 6.0 * b * t
-    good = np.flatnonzero((bend > flat[index]) & (d0 <= 0.0) & (d1 >= 0.0))
+    # a gap that is hollow on both sides of a plane has two vertices, of which the lower
+    # one would change: the bodies have flattened each other there, too
+    convex = (a > 0.0) & (a + 3.0 * b > 0.0)
+    good = np.flatnonzero(convex & (bend > flat[index]) & (d0 <= 0.0) & (d1 >= 0.0))
     index, cell, t = index[good], cell[good], t[good]
     here, there = np.eye(planes)[cell], np.eye(planes)[cell + 1]
     rise, drop = splined[cell], splined[cell + 1]

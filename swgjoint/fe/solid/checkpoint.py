@@ -19,7 +19,7 @@ from swgjoint.files import write_whole
 from swgjoint.json_text import json_text
 
 RUN = "run.json"
-SCHEMA = 4
+SCHEMA = 5
 
 
 @dataclass(frozen=True, kw_only=True)

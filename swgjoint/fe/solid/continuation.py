@@ -139,6 +139,7 @@ class SolidContinuation(Follower[SolidState]):
             inside=x[:, size:],
             pressure=np.clip(travelled(state.pressure, shift), 0.0, None),
             touching=np.roll(state.touching, round(shift), axis=0),
+            shared=np.roll(state.shared, round(shift), axis=0),
             bore_force=travelled(state.bore_force, shift),
             flank_force=travelled(state.flank_force, shift),
             ring_force=travelled(

@@ -24,6 +24,9 @@ from swgjoint.fe.solid.teeth import ToothRows
 
 Array = NDArray[np.float64]
 
+RELEASES = 6
+"""How often planes may give up a contact that they share; some would for ever."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class SolidLoad:
@@ -70,12 +73,14 @@ class SolidSolver:
         """
         state, history = start, list[float]()
         tried: set[bytes] = set()
-        settled = False
+        settled, thorough = False, False
+        released = np.zeros(start.shared.shape, int)
         try:
             for iteration in range(self.max_iterations):
-                linear = linearise(ring, state)
+                linear = linearise(ring, state, kept=released >= RELEASES)
                 reach = (0.02 if iteration > 2 else 0.1) * ring.lobe_height
-                thorough = bool(history) and history[-1] < self.thorough_below
+                # from then on: what only that search finds would come and go for ever
+                thorough |= bool(history) and history[-1] < self.thorough_below
                 step = _solve_linear(ring, state, linear, load, reach, thorough)
                 history.append(step.largest)
                 if not step.largest < self.largest_step:
@@ -86,9 +91,11 @@ class SolidSolver:
                 # a set that comes back would come back for ever
                 repeats = state.touching.tobytes() in tried
                 tried.add(state.touching.tobytes())
+                shared = state.shared
                 state, settled = _advance(
                     ring, state, linear, step, damping, one_at_a_time=repeats
                 )
+                released += shared & ~state.shared
                 small = step.largest < self.step_tolerance and damping == 1.0
                 if settled and small and (thorough or not load.teeth):
                     free = load.torque is not None and load.teeth
@@ -348,6 +355,11 @@ def _advance(
     bad = bore.present & (wrong > 1e-15)
     if bad.any() and one_at_a_time:
         bad &= wrong == wrong[bad].max()
+    touching = bore.active ^ bad
+    # without a vertex, or with contact far from it, too
+    nodes, lines = bore.normal.shape[1], bore.found.shape[1]
+    apart = (touching & bore.present)[:, :nodes].reshape(len(touching), -1, lines)
+    shared = ~bore.found | apart.any(axis=1)
     size, last = masters.face_size, masters.size - masters.face_size
     moved = damping * step.increment
     x = ring.masters(state) + moved.reshape(len(moved), -1, 3)
@@ -365,7 +377,8 @@ def _advance(
         inside=x[:, size:last],
         pressure=step.pressure,
         bore_force=bore.nodal_force(step.pressure),
-        touching=bore.active ^ bad,
+        touching=touching,
+        shared=shared,
         flank_force=flank_force,
         ring_force=ring_force,
         held=kept,
@@ -376,7 +389,7 @@ def _advance(
         holding_torque=step.holding_torque,
         compliance=step.compliance,
     )
-    return new, not bool(bad.any())
+    return new, not bool(bad.any() or (shared ^ state.shared).any())
 
 
 def _finished(

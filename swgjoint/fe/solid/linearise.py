@@ -51,6 +51,8 @@ class BoreContact:
     """Gradient of the gap at the nodes in the frames of the teeth (N, b, 3)."""
     vertex: Array
     """Vertices and slopes there by the nodes (N, p - b, b)."""
+    found: Mask
+    """Which lines have a vertex (N, L)."""
     present: Mask
     """Which points can open and close (N, p)."""
     active: Mask
@@ -90,13 +92,22 @@ class Linearised:
     bore: BoreContact
 
 
-def linearise(ring: SolidRing, state: SolidState) -> Linearised:
-    """Linearise a ring."""
+def linearise(
+    ring: SolidRing, state: SolidState, *, kept: Mask | None = None
+) -> Linearised:
+    """Linearise a ring.
+
+    Args:
+        ring: The ring.
+        state: At which.
+        kept: Lines that stay shared if they are, see :class:`SolidState`, its shape;
+            all without it.
+    """
     frames = ring.frames(state)
     n = 3 * ring.strip.masters.size
     gradient, pushed = np.zeros((2, ring.sectors, n))
     hessian = np.zeros((ring.sectors, n, n))
-    bore = bore_contact(ring, state, frames[0])
+    bore = bore_contact(ring, state, frames[0], kept=kept)
     loads = ring.loads(state)
     for number, (segment, frame) in enumerate(
         zip(ring.strip.segments, frames, strict=True)
@@ -118,8 +129,10 @@ def linearise(ring: SolidRing, state: SolidState) -> Linearised:
     )
 
 
-def bore_contact(ring: SolidRing, state: SolidState, frame: Frames) -> BoreContact:
-    """Contact points of all sectors."""
+def bore_contact(
+    ring: SolidRing, state: SolidState, frame: Frames, *, kept: Mask | None = None
+) -> BoreContact:
+    """Contact points of all sectors; see :func:`linearise`."""
     teeth, first = ring.strip.teeth, ring.strip.flank_dofs
     n, p = state.touching.shape
     b = len(ring.strip.bore)
@@ -130,7 +143,7 @@ def bore_contact(ring: SolidRing, state: SolidState, frame: Frames) -> BoreConta
     )
     gap = gap.reshape(n, b)
     normal = np.einsum("sji,spj->spi", frame.turn, normal.reshape(n, b, 3))
-    vertex, found, bend, covered = _vertices(ring, gap, state.touching[:, :b])
+    vertex, found, bend, covered = _vertices(ring, gap, state, kept)
     # by masters in the frame: carried by the teeth, and turned with the frame
     carry = teeth.loaded_from_masters[first:].reshape(b, 3, -1)
     carried = np.einsum("spi,pim->spm", normal, carry)
@@ -173,6 +186,7 @@ def bore_contact(ring: SolidRing, state: SolidState, frame: Frames) -> BoreConta
         gap=with_vertices(gap[..., None])[..., 0],
         normal=normal,
         vertex=vertex,
+        found=found,
         present=present,
         active=active,
         rows=with_vertices(rows),
@@ -183,9 +197,9 @@ def bore_contact(ring: SolidRing, state: SolidState, frame: Frames) -> BoreConta
 
 
 def _vertices(
-    ring: SolidRing, gap: Array, touching: Mask
+    ring: SolidRing, gap: Array, state: SolidState, kept: Mask | None
 ) -> tuple[Array, Mask, Array, Mask]:
-    """Vertices of the gap along the axis, given which of the bore nodes touch.
+    """Vertices of the gap along the axis.
 
     Returns:
         Weights of the bore nodes, of the vertices and of the slopes there (N, 2 L, b);
@@ -200,11 +214,11 @@ def _vertices(
     def over(nodal: NDArray[Any]) -> NDArray[Any]:
         return nodal.reshape(n, planes, lines).transpose(1, 0, 2).reshape(planes, -1)
 
+    flat = np.full(n * lines, crown * FLAT if crown else inf)
     # planes that share a contact keep it until it is clearly bent
-    wide = over(touching).sum(axis=0) > 1
-    flat = (
-        crown * FLAT * np.where(wide, WIDE, 1.0) if crown else np.full(len(wide), inf)
-    )
+    shared = state.shared.ravel()
+    flat[shared] *= WIDE
+    flat[shared & (True if kept is None else kept.ravel())] = inf
     seen = vertices(over(gap), flat)
     means = np.zeros((n, 2, lines, planes, lines))
     line = np.arange(lines)

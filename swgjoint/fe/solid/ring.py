@@ -126,6 +126,7 @@ class SolidRing:
             inside=moved[:, size:last],
             pressure=np.zeros((self.sectors, points)),
             touching=np.zeros((self.sectors, points), bool),
+            shared=np.zeros((self.sectors, n_bore // strip.planes), bool),
             bore_force=np.zeros((self.sectors, 3 * n_bore)),
             flank_force=np.zeros((self.sectors, strip.flank_dofs)),
             ring_force=np.zeros((self.teeth.ring_teeth, self.teeth.ring_dofs)),

@@ -28,6 +28,9 @@ class SolidState:
     (N, n_bore + 2 n_lines) [N]."""
     touching: Mask
     """Which of these points touch it, shape of ``pressure``."""
+    shared: Mask
+    """Lines of bore nodes along the axis whose contact the planes of the mesh share,
+    instead of a vertex of the gap (N, n_lines)."""
     bore_force: Array
     """The same as nodal forces in the frames of the teeth (N, 3 n_bore) [N]."""
     flank_force: Array

@@ -42,6 +42,16 @@ def test_edges_and_flat_gaps_have_no_vertex(gap):
     assert not vertices(gap[:, None], np.full(1, 1e-9)).found.any()
 
 
+def test_hollow_gap_has_no_vertex():
+    """Two of them, beside a plane that stands out: a small tilt would change which."""
+    gap = crowned(np.zeros(1))
+    dent = np.zeros_like(gap)
+    dent[len(Z) // 2] = crown_bend(HEIGHT, Z)
+    for tilt in (-1e-9, 1e-9):
+        seen = vertices(gap + dent + tilt * Z[:, None] / Z[-1], np.full(1, 1e-9))
+        assert not seen.found.any()
+
+
 def test_weights_are_derivatives_of_the_least_gap():
     """Change of the interpolated minimum by every plane's gap, by differences."""
     gap = crowned(np.array([0.37e-3]))
