@@ -58,7 +58,9 @@ class Sensor(Section):
     """Resolution; None reads the angle itself. Speed is then its change over a control
     period."""
     delay_s: Seconds = 0.0
-    """Age of a reading when the controller uses it; a multiple of ``step_s``."""
+    """Age of a reading when the controller uses it, which knows it: it holds a reading
+    against the command of the instant at which that was taken. A multiple of
+    ``step_s``."""
     noise_arcsec: Annotated[float, Field(ge=0, le=1e5)] = 0.0
     """Standard deviation of every reading, normal, before it is counted. Speed is then
     the change of the angle over a control period, too."""

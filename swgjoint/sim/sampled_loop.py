@@ -39,8 +39,8 @@ class Readings:
             period: Between two readings [s].
         """
         sensors = assembly.scene.sensors
-        self._motor = (sensors.motor if sensors else None) or Sensor()
-        self._link = (sensors.link if sensors else None) or Sensor()
+        self.encoder = (sensors.motor if sensors else None) or Sensor()
+        self.link_encoder = (sensors.link if sensors else None) or Sensor()
         self._torque = (sensors.torque if sensors else None) or TorqueSensor()
         self._noise = np.random.default_rng(sensors.seed if sensors else 0)
         self._period, self._step = period, assembly.step
@@ -49,9 +49,9 @@ class Readings:
 
     def motor(self, k: int, theta: Array, rate: Array) -> tuple[Array, Array]:
         """Motor angles and speeds at sample k [rad], [rad/s]. Shapes (n_joints,)."""
-        angle = self._read(self._motor, theta, k)
-        if self._motor.counts_per_turn is None and not self._motor.noise_arcsec:
-            return angle, rate[self._age(self._motor, k)]
+        angle = self._read(self.encoder, theta, k)
+        if self.encoder.counts_per_turn is None and not self.encoder.noise_arcsec:
+            return angle, rate[self.taken(self.encoder, k)]
         last, self._last = self._last, angle
         if last is None:
             return angle, self._first_speed
@@ -59,14 +59,14 @@ class Readings:
 
     def link(self, k: int, psi: Array) -> Array:
         """Link angles at sample k [rad]. Shape (n_joints,)."""
-        return self._read(self._link, psi, k)
+        return self._read(self.link_encoder, psi, k)
 
     def torque(self, k: int, torque: Array) -> Array:
         """Output torques at sample k [N·m]. Shape (n_joints,)."""
-        return self._noisy(torque[self._age(self._torque, k)], self._torque.noise_Nm)
+        return self._noisy(torque[self.taken(self._torque, k)], self._torque.noise_Nm)
 
     def _read(self, sensor: Sensor, angle: Array, k: int) -> Array:
-        got = self._noisy(angle[self._age(sensor, k)], sensor.noise_arcsec * arcsec)
+        got = self._noisy(angle[self.taken(sensor, k)], sensor.noise_arcsec * arcsec)
         if sensor.counts_per_turn is None:
             return np.asarray(got)
         count = 2.0 * np.pi / sensor.counts_per_turn
@@ -77,8 +77,8 @@ class Readings:
             return exact
         return exact + deviation * self._noise.standard_normal(exact.shape)
 
-    def _age(self, sensor: Sensor | TorqueSensor, k: int) -> int:
-        """Sample of a reading that is used at sample k; before the first, the first."""
+    def taken(self, sensor: Sensor | TorqueSensor, k: int) -> int:
+        """Sample at which a reading was taken that is used at sample k, 0 at least."""
         return max(k - round(sensor.delay_s / self._step), 0)
 
 
@@ -128,15 +128,20 @@ class SampledLoop:
         """See :class:`Loop`."""
         whole, path = self.assembly, self.assembly.trajectory
         ratio, loops = whole.ratio, whole.loops
-        angle, speed = self._readings.motor(k, theta, theta_rate)
+        readings = self._readings
+        angle, speed = readings.motor(k, theta, theta_rate)
+        # a reading is held against the command of the sample at which it was taken
+        then = moved = readings.taken(readings.encoder, k)
         if self._by_link:
-            angle = ratio * self._readings.link(k, psi)
-        error = ratio * path.position[k] - angle
+            angle = ratio * readings.link(k, psi)
+            then = readings.taken(readings.link_encoder, k)
+        error = ratio * path.position[then] - angle
+        velocity = path.velocity[moved]
         if self.controller.kind == "computed_torque":
             slow = speed / ratio
             wanted = (
                 path.acceleration[k]
-                + self._kd * (path.velocity[k] - slow)
+                + self._kd * (velocity - slow)
                 + self._kp * error / ratio
             )
             arm = whole.known_arm
@@ -146,7 +151,7 @@ class SampledLoop:
             )
         wanted = (
             loops.stiffness * error
-            + loops.damping * (ratio * path.velocity[k] - speed)
+            + loops.damping * (ratio * velocity - speed)
             + loops.integral * self._integral
             + whole.feedforward[k]
         )

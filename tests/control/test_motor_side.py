@@ -56,18 +56,12 @@ class Spy:
 @pytest.mark.parametrize("kind", ["pd", "pid"])
 @pytest.mark.parametrize("changes", [{}, SENSORS, {"defaults.level": "rigid"}])
 def test_pid_from_outside_is_the_scenes_own(synthetic_map, kind, changes):
-    """Same gains, plan and sensors: the same run to round-off, sensors included.
-
-    The scene's own law does not know how old its readings are, so the other is not
-    told.
-    """
+    """Same gains, plan and sensors, old readings included: the same to round-off."""
     changes = {"controller.kind": kind, **changes}
     own = run(synthetic_map, changes)
     loops = own.assembly.loops
     time = None if kind == "pd" else float((loops.stiffness / loops.integral)[0])
     pid = MotorPID(rigid_plan, integral_time=time)
-    start = pid.start
-    pid.start = lambda task: start(replace(task, reading_age=ReadingAge()))
     given = run(synthetic_map, changes, controller=pid)
     for key in ("position", "motor_position", "motor_torque", "wanted_torque"):
         np.testing.assert_allclose(
