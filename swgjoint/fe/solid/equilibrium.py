@@ -74,6 +74,7 @@ class SolidSolver:
         state, history = start, list[float]()
         tried: set[bytes] = set()
         settled, thorough = False, False
+        last: Array | None = None
         released = np.zeros(start.shared.shape, int)
         try:
             for iteration in range(self.max_iterations):
@@ -87,7 +88,9 @@ class SolidSolver:
                     return replace(
                         state, outcome=Outcome.DIVERGED, history=tuple(history)
                     )
-                damping = min(1.0, self.stride * ring.lobe_height / step.largest)
+                longest = 0.5 if _takes_back(step.increment, last) else 1.0
+                damping = min(longest, self.stride * ring.lobe_height / step.largest)
+                last = step.increment
                 # a set that comes back would come back for ever
                 repeats = state.touching.tobytes() in tried
                 tried.add(state.touching.tobytes())
@@ -110,6 +113,17 @@ class SolidSolver:
             return replace(start, outcome=Outcome.SINGULAR, history=tuple(history))
         outcome = Outcome.MAX_ITERATIONS if settled else Outcome.ACTIVE_SET_CYCLES
         return _finished(ring, state, outcome, history)
+
+
+def _takes_back(increment: Array, last: Array | None) -> bool:
+    """Whether an increment takes back most of the last one.
+
+    A flexspline that rocks on a crowned wave generator may change between two sets of
+    contacts for ever, each of which asks for the other.
+    """
+    if last is None:
+        return False
+    return bool(np.vdot(increment, last) < -0.5 * np.vdot(last, last))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
