@@ -107,7 +107,7 @@ def ring_model(
             flanks[name] = tooth_profile(design, name)
     ring = CircularSpline(profile=flanks["circular_spline"])
     if elastic_circular_spline:
-        element = _sector(design, "circular_spline", ring.profile)
+        element = sector(design, "circular_spline", ring.profile)
         free = design.circular_spline.outer_rim == "free"
         ring = replace(ring, compliance=ring_compliance(element, free_rim=free))
     coefficient = design.friction.tooth_coefficient if friction else 0.0
@@ -137,7 +137,7 @@ def ring_model(
     return RingModel(
         **shifts,
         friction=law,
-        element=_sector(design, "flexspline", flanks["flexspline"]),
+        element=sector(design, "flexspline", flanks["flexspline"]),
         wave_generator=flawed_wave_generator(design),
         circular_spline=ring,
         lobe_height=lobe_height(design),
@@ -146,7 +146,8 @@ def ring_model(
     )
 
 
-def _sector(design: Design, member: MemberName, profile: ToothProfile) -> Superelement:
+def sector(design: Design, member: MemberName, profile: ToothProfile) -> Superelement:
+    """Condensed sector of one tooth of a member."""
     material = design.material_of(member)
     rim = getattr(design, member).rim_mm * mm
     return condense(

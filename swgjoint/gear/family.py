@@ -19,8 +19,8 @@ RATIOS = (30, 200)
 """Smallest and largest of the rule; the tooth count is twice the ratio."""
 
 # Multiples of the pitch diameter d; thesis lengths are over its 120 mm. FACE to GROOVE
-# are proportions of a study of catalogue component sets, a "hard" cup: assumed there, no
-# drawing of a cup or of a flexible bearing was at hand.
+# are proportions of a study of catalogue component sets, a "hard" cup: assumed there,
+# no drawing of a cup or of a flexible bearing was at hand.
 FACE = 0.20
 RIM = 0.0125
 WALL_OVER_RIM = 0.0095 / 0.0125

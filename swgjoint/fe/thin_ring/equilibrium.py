@@ -1,0 +1,338 @@
+r"""Equilibrium of the thin rings: Newton's method on the potential.
+
+.. math:: \Pi = U_{rim} + U_{race} + \sum_j \tfrac25 K\langle -g_j\rangle^{5/2}
+    + \sum_p \tfrac12 k_p\langle -g_p\rangle^2 + \sum_t \tfrac12 k_t\langle
+    -g_t\rangle^2 + T\psi
+
+over balls j, points p between bore and race, and tooth contacts t; g is a gap and
+:math:`\langle\cdot\rangle` its overlap. Every contact yields, so the conditions
+:math:`0 \le F \perp g + F/k \ge 0` are in the potential and Newton's method with the
+tangent of the overlapping contacts is their primal-dual active set. psi is the best-fit
+rotation of the rim. The race could turn in its place: one of its nodes is kept from
+that, with a force that vanishes because nothing rubs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_matrix, diags_array
+from scipy.sparse.linalg import splu
+
+from swgjoint.errors import Outcome
+from swgjoint.fe.corotation import rotate, turned
+from swgjoint.fe.thin_ring.facing import Facing, facing
+from swgjoint.fe.thin_ring.model import ThinRing
+from swgjoint.fe.tooth_contact import Contacts
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RingState:
+    """One equilibrium, or the start of the search for one."""
+
+    q: Array
+    """Coordinates of rim and race (size,) [m]."""
+    ball_feet: Array
+    """Places of the balls on the race."""
+    bore_feet: Array
+    """Places of the bore's points on the race."""
+    alpha: float
+    """Wave-generator angle [rad]."""
+    phase: float = 0.0
+    """Angle of ball 0 from the major axis at alpha = 0 [rad]."""
+    torque: float = 0.0
+    """T that the flexspline exerts on its load [N·m]."""
+    rotation: float = 0.0
+    """psi, of the rim [rad]."""
+    ball_force: Array | None = None
+    """[N]. Shape (balls,)."""
+    tooth_force: Array | None = None
+    """Of every tooth contact [N]."""
+    contacts: Contacts | None = None
+    tooth_moment: float = 0.0
+    """Moment of the tooth forces on the flexspline [N·m]."""
+    ball_moment: float = 0.0
+    """Moment of the ball forces on the race [N·m]."""
+    wave_generator_torque: float = 0.0
+    """External torque on the wave generator, what drives the cage included [N·m]."""
+    energy: float = 0.0
+    """Strain energy, contacts included [J]."""
+    compliance: float = 0.0
+    """-d psi / dT [rad/(N·m)]."""
+    outcome: Outcome = Outcome.CONVERGED
+    history: tuple[float, ...] = ()
+    """Largest displacement increment of every iteration [m]."""
+
+
+def at_rest(model: ThinRing, alpha: float, phase: float = 0.0) -> RingState:
+    """Start of a search: both rings inextensionally deflected by the lobes."""
+    parts = []
+    for ring in (model.rim, model.race):
+        count, r, w0 = ring.elements, ring.radius, model.lobe_height
+        phi = 2.0 * np.pi / count * np.arange(count)
+        wave = 2.0 * (phi - alpha)
+        outward = np.stack([-np.sin(phi), np.cos(phi)], -1)
+        along = turned(outward)
+        w, v = w0 * np.cos(wave)[:, None], -0.5 * w0 * np.sin(wave)[:, None]
+        place = (r + w) * outward + v * along
+        # d/dphi: w' - v outwards, r + w + v' along
+        dw, dv = -2.0 * w0 * np.sin(wave)[:, None], -w0 * np.cos(wave)[:, None]
+        slope = (r + w + dv) * along + (dw - v) * outward
+        parts.append(np.stack([place, slope * (2.0 * np.pi / count)], axis=1).ravel())
+    centres, _ = model.balls(alpha, phase)
+    share = model.race.elements / (2.0 * np.pi)
+    feet = np.mod(np.arctan2(-centres[:, 0], centres[:, 1]), 2.0 * np.pi) * share
+    return RingState(
+        q=np.concatenate(parts),
+        ball_feet=feet,
+        bore_feet=model.bore.place.copy(),
+        alpha=alpha,
+        phase=phase,
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class RingSolver:
+    """Settings of the iteration."""
+
+    max_iterations: int = 80
+    shortest: float = 1e-3
+    """Part of a Newton step down to which it is halved while the potential rises."""
+    step_tolerance: float = 1e-13
+    """Increment, relative to the radius of the rim, at which the iteration ends."""
+    stride: float = 0.1
+    """Longest move of one iteration, in lobe heights."""
+    anchor: float = 1e-9
+    """Part of the rim's stiffness that holds back, in every step, an output that no
+    tooth holds; it does not shift an equilibrium."""
+
+    def __call__(
+        self,
+        model: ThinRing,
+        start: RingState,
+        *,
+        torque: float | None = None,
+        rotation: float | None = None,
+        teeth: bool = True,
+    ) -> RingState:
+        """Equilibrium at the wave-generator angle of ``start``.
+
+        Args:
+            model: The rings.
+            start: Where to begin.
+            torque: T on the output [N·m]; else ``rotation`` is held [rad] and the
+                torque is what that takes.
+            rotation: psi of the rim.
+            teeth: Whether the teeth touch.
+        """
+        if (torque is None) == (rotation is None):
+            raise ValueError("give a torque or a rotation")
+        state, history = start, list[float]()
+        load = start.torque if torque is None else torque
+        step, part, last = np.zeros(model.size), 0.0, np.inf
+        for _ in range(self.max_iterations):
+            tried = replace(state, q=state.q + part * step)
+            tried, factor, gradient = _linearised(model, tried, teeth=teeth)
+            psi, turn = _rotation(model, tried.q)
+            potential = tried.energy + load * psi
+            rises = potential - last > 1e-12 * abs(last)
+            if torque is not None and rises and part > self.shortest:
+                part *= 0.5
+                continue
+            state, last = tried, potential
+            right = np.stack([-gradient - load * turn, turn], axis=1)
+            base, reach = factor(right, self.anchor).T
+            compliance, change = float(turn @ reach), 0.0
+            if rotation is not None:
+                change = (psi + float(turn @ base) - rotation) / compliance
+            step = base - change * reach
+            size = _moved(step)
+            history.append(size)
+            if not np.isfinite(size):
+                return replace(state, outcome=Outcome.DIVERGED, history=tuple(history))
+            part = min(1.0, self.stride * model.lobe_height / max(size, 1e-300))
+            load += part * change
+            state = replace(state, torque=load, compliance=compliance)
+            if size < self.step_tolerance * model.rim.radius:
+                state = replace(state, q=state.q + step)
+                return _finished(model, state, Outcome.CONVERGED, history, teeth=teeth)
+        return _finished(model, state, Outcome.MAX_ITERATIONS, history, teeth=teeth)
+
+
+def _moved(step: Array) -> float:
+    """Largest displacement of a node [m]."""
+    return float(np.abs(step.reshape(-1, 2, 2)[:, 0]).max())
+
+
+def _rotation(model: ThinRing, q: Array) -> tuple[float, Array]:
+    """Best-fit rotation of the rim's nodes and its gradient."""
+    x0 = model.rim.reference[:, 0]
+    x = q[: model.rim.size].reshape(-1, 2, 2)[:, 0]
+    sine, cosine = float(np.sum(turned(x0) * x)), float(np.sum(x0 * x))
+    gradient = np.zeros(model.size)
+    rows = gradient[: model.rim.size].reshape(-1, 2, 2)
+    rows[:, 0] = (cosine * turned(x0) - sine * x0) / (sine**2 + cosine**2)
+    return float(np.arctan2(sine, cosine)), gradient
+
+
+class _Sum:
+    """Energy, gradient and Hessian of many small parts."""
+
+    def __init__(self, size: int) -> None:
+        self.energy = 0.0
+        self.gradient = np.zeros(size)
+        self._parts: list[tuple[Index, Array]] = []
+
+    def add(self, dofs: Index, gradient: Array | None, hessian: Array) -> None:
+        """Parts with degrees of freedom (n, m), gradients (n, m), Hessians (n, m, m).
+
+        The gradient is None where it has been counted.
+        """
+        if gradient is not None:
+            np.add.at(self.gradient, dofs, gradient)
+        self._parts.append((dofs, hessian))
+
+    def solve(self, held: int, right: Array, anchor: float) -> Array:
+        """Solve with one coordinate held and a part of the diagonal added."""
+        rows, columns, values = [], [], []
+        for dofs, hessian in self._parts:
+            m = dofs.shape[1]
+            rows.append(np.repeat(dofs, m, axis=1).ravel())
+            columns.append(np.tile(dofs, (1, m)).ravel())
+            values.append(hessian.ravel())
+        size = len(self.gradient)
+        place = np.concatenate(rows), np.concatenate(columns)
+        matrix = coo_matrix((np.concatenate(values), place), (size, size)).tocsc()
+        diagonal = np.full(size, anchor * float(np.abs(matrix.diagonal()).max()))
+        # a spring far stiffer than anything else
+        diagonal[held] = 1e6 * float(np.abs(matrix.diagonal()).max())
+        matrix += diags_array(diagonal, format="csc")
+        factor = splu(
+            matrix, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}
+        )
+        return np.asarray(factor.solve(right))
+
+
+def _linearised(
+    model: ThinRing, state: RingState, *, teeth: bool
+) -> tuple[RingState, Callable[[Array, float], Array], Array]:
+    """Forces at the last positions, and the solver of the tangent there."""
+    total = _Sum(model.size)
+    first = model.rim.size
+    rim, race = state.q[:first], state.q[first:]
+    for ring, q, shift in ((model.rim, rim, 0), (model.race, race, first)):
+        gradient, hessian = ring.forces(q)
+        total.energy += ring.energy(q)
+        total.gradient[shift : shift + ring.size] += gradient
+        total.add(ring.dofs + shift, None, hessian)
+    state = _balls(model, state, race, total)
+    state = _bore(model, state, rim, race, total)
+    if teeth:
+        state = _teeth(model, state, rim, total)
+    else:
+        state = replace(state, contacts=None, tooth_force=None, tooth_moment=0.0)
+    # the tangential coordinate of race node 0, whichever axis it is nearer to
+    node = race.reshape(-1, 2, 2)[0, 0]
+    held = first + (0 if abs(node[1]) > abs(node[0]) else 1)
+    state = replace(state, energy=total.energy)
+    total.gradient[held] = 0.0
+    return state, partial(total.solve, held), total.gradient
+
+
+def _balls(model: ThinRing, state: RingState, race: Array, total: _Sum) -> RingState:
+    """Hertz contact of the balls, which sit on the cam, with the race."""
+    centre, d_centre = model.balls(state.alpha, state.phase)
+    seen = facing(model.race, race, centre, state.ball_feet, inside=True)
+    bearing = model.bearing
+    reach = 0.5 * (bearing.ball_diameter + bearing.race_thickness)
+    overlap = np.maximum(reach - seen.distance, 0.0)
+    force = model.ball_constant * overlap**1.5
+    on = np.flatnonzero(overlap > 0.0)
+    rows = seen.by_ring[on, 0]
+    slope = 1.5 * model.ball_constant * np.sqrt(overlap[on])
+    curved = seen.curved(seen.by_ring)[on]
+    hessian = slope[:, None, None] * rows[:, :, None] * rows[:, None, :]
+    hessian -= force[on, None, None] * curved
+    total.energy += 0.4 * float(force @ overlap)
+    total.add(seen.dofs[on] + model.rim.size, -force[on, None] * rows, hessian)
+    push = -force[:, None] * seen.normal  # on the race, outwards
+    foot = centre - seen.distance[:, None] * seen.normal
+    return replace(
+        state,
+        ball_feet=seen.place,
+        ball_force=force,
+        ball_moment=float(np.sum(turned(foot) * push)),
+        wave_generator_torque=float(np.sum(push * d_centre)),
+    )
+
+
+def _bore(
+    model: ThinRing, state: RingState, rim: Array, race: Array, total: _Sum
+) -> RingState:
+    """Unilateral contact of the rim's bore with the race."""
+    points = model.bore.points(rim)[0]
+    seen = facing(model.race, race, points, state.bore_feet, inside=False)
+    overlap = 0.5 * model.bearing.race_thickness - seen.distance
+    on = np.flatnonzero(overlap > 0.0)
+    dofs, rows, second = model.bore.rows(rim, seen, on)
+    both = np.concatenate([dofs, seen.dofs[on] + model.rim.size], axis=1)
+    rows = np.concatenate([rows, seen.by_ring[on]], axis=2)
+    on_line = _chosen(seen, on).curved(rows)
+    on_line[:, :8, :8] += second
+    k, normal = model.press_per_point, rows[:, 0]
+    force = k * overlap[on]
+    hessian = k * normal[:, :, None] * normal[:, None, :]
+    hessian -= force[:, None, None] * on_line
+    total.energy += 0.5 * float(force @ overlap[on])
+    total.add(both, -force[:, None] * normal, hessian)
+    return replace(state, bore_feet=seen.place)
+
+
+def _teeth(model: ThinRing, state: RingState, rim: Array, total: _Sum) -> RingState:
+    """Contact of the flanks."""
+    nodes = rim.reshape(-1, 2, 2)[:: model.nodes_per_tooth]
+    foot, slope = nodes[:, 0], nodes[:, 1]
+    contacts, angle = model.teeth.seen(foot, slope)
+    contacts = contacts.chosen(np.flatnonzero(contacts.gap < 0.0))
+    rows, _ = model.teeth.rows(contacts, foot, slope, angle)
+    k = model.teeth.stiffness
+    force = -k * contacts.gap
+    j = contacts.sector
+    dofs = 4 * model.nodes_per_tooth * j[:, None] + np.arange(4)
+    total.energy += -0.5 * float(force @ contacts.gap)
+    total.add(dofs, -force[:, None] * rows, k * rows[:, :, None] * rows[:, None, :])
+    point = rotate(contacts.point, angle[j])
+    push = force[:, None] * rotate(contacts.normal, angle[j])
+    return replace(
+        state,
+        contacts=contacts,
+        tooth_force=force,
+        tooth_moment=float(np.sum(turned(point) * push)),
+    )
+
+
+def _chosen(seen: Facing, on: Index) -> Facing:
+    return Facing(
+        **{key: getattr(seen, key)[on] for key in Facing.__dataclass_fields__}
+    )
+
+
+def _finished(
+    model: ThinRing,
+    state: RingState,
+    outcome: Outcome,
+    history: list[float],
+    *,
+    teeth: bool,
+) -> RingState:
+    """Forces and energy at the last positions."""
+    state, _, _ = _linearised(model, state, teeth=teeth)
+    psi, _ = _rotation(model, state.q)
+    return replace(state, rotation=psi, outcome=outcome, history=tuple(history))

@@ -1,0 +1,146 @@
+r"""Points that face the mean line of a ring: balls from inside, a bore from outside.
+
+The foot of the perpendicular from a point p moves with both. With n from the line to
+the side of the point, tangent :math:`\tau`, curvature :math:`\kappa = n\cdot
+r''/|r'|^2` and distance :math:`g = n\cdot(p - r)`,
+
+.. math:: dg = u_n, \quad
+    d^2g = -\frac{\kappa u_t^2 + 2u_t\beta + g\beta^2}{1 - g\kappa} + n\cdot d^2p,
+
+where :math:`u = dp - dr` at the foot and :math:`\beta = n\cdot dr'/|r'|`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.fe.thin_ring.hermite_ring import HermiteRing, hermite
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Facing:
+    """Distances of n points from a ring, and how they change."""
+
+    place: Array
+    """Feet on the ring (n,)."""
+    distance: Array
+    """g [m]. Shape (n,)."""
+    normal: Array
+    """From the ring to the points (n, 2)."""
+    tangent: Array
+    """Of the ring, counter-clockwise (n, 2)."""
+    dofs: Index
+    """Degrees of freedom of the ring at the feet (n, 8)."""
+    by_ring: Array
+    """Rows u_n, u_t, beta by these (n, 3, 8)."""
+    curvature: Array
+    """kappa [1/m]. Shape (n,)."""
+
+    def curved(self, rows: Array) -> Array:
+        """Second derivative of the distance but for n . d2p, (n, m, m).
+
+        Args:
+            rows: u_n, u_t, beta by m coordinates (n, 3, m).
+        """
+        t, b = rows[:, 1], rows[:, 2]
+        mixed = t[:, :, None] * b[:, None, :]
+        total = self.curvature[:, None, None] * t[:, :, None] * t[:, None, :]
+        total = total + mixed + np.swapaxes(mixed, 1, 2)
+        total += self.distance[:, None, None] * b[:, :, None] * b[:, None, :]
+        spread = 1.0 - self.distance * self.curvature
+        return np.asarray(-total / spread[:, None, None])
+
+
+def facing(
+    ring: HermiteRing, q: Array, points: Array, start: Array, *, inside: bool
+) -> Facing:
+    """Distances of points from the mean line of a ring.
+
+    Args:
+        ring: The ring.
+        q: Its coordinates.
+        points: Shape (n, 2) [m].
+        start: Places near the feet (n,).
+        inside: On which side of the line the points are.
+    """
+    place = ring.nearest(q, points, start)
+    element, xi = ring.split(place)
+    value, slope, _ = hermite(xi)
+    r, v, w = ring.at(q, place)
+    length = np.hypot(v[:, 0], v[:, 1])
+    tangent = v / length[:, None]
+    outward = np.stack([tangent[:, 1], -tangent[:, 0]], -1)
+    normal = -outward if inside else outward
+
+    def row(shape: Array, direction: Array) -> Array:
+        return np.asarray(shape[:, :, None] * direction[:, None, :]).reshape(-1, 8)
+
+    return Facing(
+        place=place,
+        distance=np.einsum("ni,ni->n", points - r, normal),
+        normal=normal,
+        tangent=tangent,
+        dofs=ring.dofs[element],
+        by_ring=np.stack(
+            [
+                -row(value, normal),
+                -row(value, tangent),
+                row(slope / length[:, None], normal),
+            ],
+            axis=1,
+        ),
+        curvature=np.einsum("ni,ni->n", normal, w) / length**2,
+    )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Surface:
+    """Points beside a ring at fixed places, carried along by its sections."""
+
+    ring: HermiteRing
+    place: Array
+    """Element number plus parameter (n,)."""
+    offset: float
+    """Outwards from the mean line [m]."""
+
+    def points(self, q: Array) -> tuple[Array, Array, Array, Array]:
+        """Points (n, 2), tangents, outward normals there, lengths of the derivative."""
+        r, v, _ = self.ring.at(q, self.place)
+        length = np.hypot(v[:, 0], v[:, 1])
+        tangent = v / length[:, None]
+        outward = np.stack([tangent[:, 1], -tangent[:, 0]], -1)
+        return r + self.offset * outward, tangent, outward, length
+
+    def rows(self, q: Array, seen: Facing, chosen: Index) -> tuple[Index, Array, Array]:
+        """Degrees of freedom of chosen points, rows u_n, u_t, 0, and n . d2p.
+
+        Args:
+            q: Coordinates of the ring.
+            seen: All points as the other ring sees them.
+            chosen: Which points (m,).
+
+        Returns:
+            (m, 8), (m, 3, 8) and (m, 8, 8).
+        """
+        element, xi = self.ring.split(self.place[chosen])
+        value, slope, _ = hermite(xi)
+        _, tangent, outward, length = (a[chosen] for a in self.points(q))
+        normal, along = seen.normal[chosen], seen.tangent[chosen]
+        # turn of the section: -N . dr'/|r'|; the outward normal moves along t with it
+        turn = -(slope / length[:, None])[:, :, None] * outward[:, None, :]
+        turn = turn.reshape(-1, 8)
+        lever = self.offset * tangent
+        rows = np.zeros((len(chosen), 3, 8))
+        for k, direction in enumerate((normal, along)):
+            moved = (value[:, :, None] * direction[:, None, :]).reshape(-1, 8)
+            arm = np.einsum("ni,ni->n", direction, lever)
+            rows[:, k] = moved + arm[:, None] * turn
+        bend = -self.offset * np.einsum("ni,ni->n", normal, outward)
+        second = bend[:, None, None] * turn[:, :, None] * turn[:, None, :]
+        return self.ring.dofs[element], rows, second

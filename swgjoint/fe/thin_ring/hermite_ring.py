@@ -1,0 +1,205 @@
+r"""A closed elastic ring of Hermite cubics, large rotations and small strains.
+
+Nodes carry their position and the derivative of the position by the element parameter,
+so that the mean line is smooth and a force may act anywhere on it:
+
+.. math:: U = \int \tfrac12 EA\,\varepsilon^2
+    + \tfrac12 EI\,(\vartheta' - \vartheta_0')^2\,ds, \quad
+    \varepsilon = |r'| - |r_0'|, \quad \vartheta' = \frac{r' \times r''}{|r'|^2},
+
+primes by the arc length of the undeformed ring, theta the angle of the tangent. Exact
+in the rotations; the strain of a section is linear in its distance from the mean line.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+_POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(3)
+GAUSS = 0.5 * (_POINTS + 1.0), 0.5 * _WEIGHTS
+"""Places and weights on an element, where bending is linear, stretch nearly even."""
+_EYE = np.eye(2)
+_CROSS = np.array([[0.0, 1.0], [-1.0, 0.0]])  # v x w = v . (_CROSS w)
+
+
+def hermite(xi: Array) -> tuple[Array, Array, Array]:
+    """Shape functions and their first two derivatives (n, 4) at parameters (n,)."""
+    x, one = xi, np.ones_like(xi)
+    value = [
+        1 - 3 * x**2 + 2 * x**3,
+        x - 2 * x**2 + x**3,
+        3 * x**2 - 2 * x**3,
+        x**3 - x**2,
+    ]
+    first = [
+        6 * x**2 - 6 * x,
+        1 - 4 * x + 3 * x**2,
+        6 * x - 6 * x**2,
+        3 * x**2 - 2 * x,
+    ]
+    second = [12 * x - 6 * one, 6 * x - 4 * one, 6 * one - 12 * x, 6 * x - 2 * one]
+    return np.stack(value, -1), np.stack(first, -1), np.stack(second, -1)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class HermiteRing:
+    """A ring about the origin; node 0 lies on +y, the others counter-clockwise.
+
+    Coordinates have the shape (elements, 2, 2): node, position or derivative, x and y.
+    """
+
+    radius: float
+    """Of the undeformed mean line [m]."""
+    elements: int
+    stretching: float
+    """E A [N]."""
+    bending: float
+    """E I [N m^2]."""
+
+    @property
+    def step(self) -> float:
+        """Arc length of an element [m]."""
+        return 2.0 * pi * self.radius / self.elements
+
+    @property
+    def size(self) -> int:
+        """Degrees of freedom."""
+        return 4 * self.elements
+
+    @cached_property
+    def reference(self) -> Array:
+        """Coordinates of the undeformed ring [m]."""
+        phi = 2.0 * pi / self.elements * np.arange(self.elements)
+        outward = np.stack([-np.sin(phi), np.cos(phi)], -1)
+        along = np.stack([-np.cos(phi), -np.sin(phi)], -1)
+        return np.stack([self.radius * outward, self.step * along], axis=1)
+
+    @cached_property
+    def dofs(self) -> Index:
+        """Degrees of freedom of every element (elements, 8)."""
+        first = 4 * np.arange(self.elements)[:, None] + np.arange(4)
+        return np.concatenate([first, np.roll(first, -1, axis=0)], axis=1)
+
+    def nodal(self, q: Array) -> Array:
+        """Coordinates by element (elements, 4, 2): both nodes."""
+        x = q.reshape(self.elements, 2, 2)
+        return np.concatenate([x, np.roll(x, -1, axis=0)], axis=1)
+
+    def at(self, q: Array, place: Array) -> tuple[Array, Array, Array]:
+        """Position and its first two derivatives by the element parameter, (n, 2) each.
+
+        Args:
+            q: Coordinates.
+            place: Element number plus parameter, from 0 to ``elements`` (n,).
+        """
+        element, xi = self.split(place)
+        local = self.nodal(q)[element]
+        value, first, second = (np.einsum("na,nai->ni", h, local) for h in hermite(xi))
+        return value, first, second
+
+    def split(self, place: Array) -> tuple[Index, Array]:
+        """Element numbers and parameters of places, any number of turns."""
+        whole = np.floor(place)
+        return np.mod(whole, self.elements).astype(np.int64), place - whole
+
+    @cached_property
+    def _shape(self) -> tuple[Array, Array]:
+        _, first, second = hermite(GAUSS[0])
+        return first, second
+
+    def _strains(self, q: Array) -> tuple[Array, ...]:
+        """Derivatives, length, stretch and rate of turning at all Gauss points."""
+        first, second = self._shape
+        local = self.nodal(q)
+        v = np.einsum("ga,eai->egi", first, local)
+        w = np.einsum("ga,eai->egi", second, local)
+        length = np.hypot(v[..., 0], v[..., 1])
+        cross = v[..., 0] * w[..., 1] - v[..., 1] * w[..., 0]
+        return v, w, length, length / self.step, cross / length**2 / self.step
+
+    @cached_property
+    def _unstrained(self) -> tuple[Array, Array]:
+        *_, stretch, turning = self._strains(self.reference)
+        return stretch, turning
+
+    def energy(self, q: Array) -> float:
+        """Strain energy [J]."""
+        *_, stretch, turning = self._strains(q)
+        stretch0, turning0 = self._unstrained
+        density = self.stretching * (stretch - stretch0) ** 2
+        density += self.bending * (turning - turning0) ** 2
+        return float(0.5 * self.step * (density @ GAUSS[1]).sum())
+
+    def forces(self, q: Array) -> tuple[Array, Array]:
+        """Gradient (size,) [N] and Hessians of the elements (elements, 8, 8) [N/m]."""
+        v, w, length, stretch, turning = self._strains(q)
+        stretch0, turning0 = self._unstrained
+        h = self.step
+        hoop = self.stretching * (stretch - stretch0)
+        moment = self.bending * (turning - turning0)
+        weight = h * GAUSS[1]
+
+        unit = v / length[..., None]
+        square = length**2
+        turn_w = w @ _CROSS.T  # derivative of v x w by v
+        turn_v = -v @ _CROSS.T  # and by w
+        cross = turning * square * h
+        d_v = (turn_w - (2.0 * cross / square)[..., None] * v) / square[..., None] / h
+        d_w = turn_v / square[..., None] / h
+        # gradients of stretch and turning by (v, w)
+        s = np.concatenate([unit / h, np.zeros_like(unit)], axis=-1)
+        k = np.concatenate([d_v, d_w], axis=-1)
+        grad = hoop[..., None] * s + moment[..., None] * k
+
+        def outer(a: Array, b: Array) -> Array:
+            return np.asarray(a[..., :, None] * b[..., None, :])
+
+        def scaled(matrix: Array, by: Array) -> Array:
+            return np.asarray(matrix * by[..., None, None])
+
+        hess = self.stretching * outer(s, s) + self.bending * outer(k, k)
+        eye = np.broadcast_to(_EYE, (*length.shape, 2, 2))
+        hess[..., :2, :2] += scaled(eye - outer(unit, unit), hoop / length / h)
+        mixed = outer(turn_w, v)
+        mixed = mixed + np.swapaxes(mixed, -1, -2)
+        vv = -scaled(mixed, 2.0 / square**2) - scaled(eye, 2.0 * cross / square**2)
+        vv += scaled(outer(v, v), 8.0 * cross / square**3)
+        vw = scaled(np.broadcast_to(_CROSS, eye.shape), 1.0 / square)
+        vw -= scaled(outer(v, turn_v), 2.0 / square**2)
+        hess[..., :2, :2] += scaled(vv, moment / h)
+        hess[..., :2, 2:] += scaled(vw, moment / h)
+        hess[..., 2:, :2] += np.swapaxes(scaled(vw, moment / h), -1, -2)
+
+        first, second = self._shape
+        both = np.stack([first, second], axis=1)  # (g, 2, 4)
+        grad = grad.reshape(*length.shape, 2, 2)
+        element = np.einsum("g,gpa,egpi->eai", weight, both, grad, optimize=True)
+        gradient = np.zeros(self.size)
+        np.add.at(gradient, self.dofs, element.reshape(self.elements, 8))
+        hess = hess.reshape(*length.shape, 2, 2, 2, 2)
+        matrix = np.einsum(
+            "g,gpa,egpiqj,gqb->eaibj", weight, both, hess, both, optimize=True
+        )
+        return gradient, matrix.reshape(self.elements, 8, 8)
+
+    def nearest(self, q: Array, points: Array, start: Array) -> Array:
+        """Places of the feet of perpendiculars from points, near given ones (n,)."""
+        place = start
+        for _ in range(6):
+            r, v, w = self.at(q, place)
+            rest = points - r
+            slope = np.einsum("ni,ni->n", rest, v)
+            gain = np.einsum("ni,ni->n", v, v) - np.einsum("ni,ni->n", rest, w)
+            step = slope / gain
+            place = place + np.clip(step, -2.0, 2.0)
+            if np.abs(step).max(initial=0.0) < 1e-10:
+                break
+        return place
