@@ -40,7 +40,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="compute no more than these keys need: ratings alone need no finite"
         " elements; stiffness, hysteresis loss and lost motion few positions and no"
         " manufacturing errors; radial stiffness and the fatigue safety factor those in"
-        " space",
+        " space; the ratcheting torque is computed only where it is named here",
     )
     parser.add_argument(
         "--measured",
@@ -62,7 +62,8 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         Every key of :data:`swgjoint.maps.spec_sheet.KEYS` (or those of ``--only``),
         None where the source cannot tell, with the reason in ``missing``; ``design``,
         ``validity``, ``files``, ``wall_s``; ``radial_stiffness`` and ``fatigue`` with
-        what stands behind these two figures, where they were computed; ``measured``
+        what stands behind these two figures, where they were computed; ``ratcheting``
+        with the path to the largest torque, or to where it ended; ``measured``
         with --measured, see :meth:`swgjoint.maps.overlay.Overlay.as_dict`.
     """
     start = time.perf_counter()
@@ -78,6 +79,8 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         loop = read_loop(args.measured)
     drive, ratings, name = _drive(args, keys, always=loop is not None)
     values, reasons, details = _solid(args, keys, ratings)
+    if only:
+        _ratcheting(args, keys, values, reasons, details)
     sheet = measure_spec(
         drive, ratings=ratings, only=keys, known=values, unknown=reasons
     )
@@ -150,6 +153,36 @@ def _solid(
 
     found = solid_figures(source, wanted, ratings.rated_torque, progress=args.progress)
     return found.values, found.missing, found.details
+
+
+def _ratcheting(
+    args: argparse.Namespace,
+    keys: tuple[str, ...],
+    values: dict[str, float],
+    reasons: dict[str, str],
+    details: dict[str, Any],
+) -> None:
+    """Add the ratcheting torque of a design, or the reason why there is none."""
+    from swgjoint.gear.design import Design
+    from swgjoint.maps.spec_sheet import RATCHETING_KEY
+    from swgjoint.sim.drives import find_drive
+
+    source = find_drive(args.drive) if RATCHETING_KEY in keys else None
+    if not isinstance(source, Design):
+        return
+    from swgjoint.fe.ratcheting import ratcheting_path
+
+    path = ratcheting_path(source, progress=args.progress)
+    details["ratcheting"] = path.as_dict()
+    if path.passed:
+        values[RATCHETING_KEY] = path.limit
+    else:
+        rim = source.circular_spline.outer_rim
+        reasons[RATCHETING_KEY] = (
+            f"more than {path.limit:.4g} N·m (a lower bound, where the search ended:"
+            f" {path.outcome.name.lower()}): the plane has a rigid wave generator, and"
+            f" the outside of the circular spline is {rim}"
+        )
 
 
 def _write(
@@ -239,6 +272,12 @@ def _details(result: dict[str, Any]) -> list[str]:
             f" {radial['finer_displacements_N_mm']:.4g}, half the elements"
             f" {radial['half_the_elements_N_mm']:.4g}, smooth shell"
             f" {radial['smooth_shell_N_mm']:.4g} N/mm"
+        )
+    if path := result.get("ratcheting"):
+        lines.append(
+            f"ratcheting: torque largest after {path['at_largest_pitches']:.3g} of a"
+            f" pitch with {path['pairs'][-1]} teeth in contact, wave generator rigid"
+            " and locked, in the plane"
         )
     if found := result.get("fatigue"):
         worst, middle = found["worst_section"], found["mid_face"]

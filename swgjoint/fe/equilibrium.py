@@ -74,6 +74,8 @@ class NewtonSolver:
     """Longest move of one iteration, in lobe heights: contact changes on the way."""
     largest_step: float = 0.1
     """Displacement increment beyond which the search has left the drive [m]."""
+    ring_range: float = RING_RANGE
+    """Displacement of the circular spline, in lobe heights, that is taken [-]."""
 
     def __call__(self, model: RingModel, start: State, load: Load) -> State:
         """Equilibrium at the wave-generator angle of ``start``.
@@ -114,7 +116,7 @@ class NewtonSolver:
                     free = load.torque is not None and load.teeth
                     free &= len(state.tooth_force) == 0
                     outcome = Outcome.SINGULAR if free else Outcome.CONVERGED
-                    return _finished(model, state, outcome, history)
+                    return _finished(model, state, outcome, history, self.ring_range)
         except ActiveSetError as error:
             singular = "singular" in str(error)
             outcome = Outcome.SINGULAR if singular else Outcome.ACTIVE_SET_CYCLES
@@ -122,7 +124,7 @@ class NewtonSolver:
         except SingularRingError:
             return replace(start, outcome=Outcome.SINGULAR, history=tuple(history))
         outcome = Outcome.MAX_ITERATIONS if settled else Outcome.ACTIVE_SET_CYCLES
-        return _finished(model, state, outcome, history)
+        return _finished(model, state, outcome, history, self.ring_range)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -353,7 +355,11 @@ def _advance(
 
 
 def _finished(
-    model: RingModel, state: State, outcome: Outcome, history: list[float]
+    model: RingModel,
+    state: State,
+    outcome: Outcome,
+    history: list[float],
+    ring_range: float,
 ) -> State:
     """Moments and energy of the whole drive at the last positions."""
     frames = model.frames(state)
@@ -372,7 +378,7 @@ def _finished(
     moved = model.ring_displacement(state)
     energy += 0.5 * float(np.sum(state.ring_force * moved))
     # the circular spline is linear: it must stay near its place
-    if outcome.ok and np.abs(moved).max(initial=0.0) > RING_RANGE * model.lobe_height:
+    if outcome.ok and np.abs(moved).max(initial=0.0) > ring_range * model.lobe_height:
         outcome = Outcome.DIVERGED
     work, law = 0.0, model.friction
     if law is not None and state.candidates is not None:

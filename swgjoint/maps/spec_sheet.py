@@ -60,7 +60,11 @@ TURN_KEYS = (
 _NO_FRICTION = "the map has no friction of bearing, seals and teeth at speed"
 SOLID_KEYS = ("fatigue_safety_factor", "radial_stiffness_N_mm")
 """From the finite elements of a design in space, of which a map knows nothing."""
+RATCHETING_KEY = "ratcheting_torque_Nm"
+"""From the finite elements of a design in the plane."""
 ABSENT_KEYS = {
+    RATCHETING_KEY: "needs the finite elements of a design in the plane, a minute or"
+    " more: name it in --only",
     "repeatability_arcmin": "the map has no random part: a repeated approach ends"
     " at the same position",
     "fatigue_safety_factor": "needs the stresses of the finite elements; a map holds"
@@ -154,7 +158,8 @@ def measure_spec(
         drive: The map; None where :func:`needs_map` says so.
         ratings: Needed without a map, else those of the map.
         only: Keys of the sheet; all for none.
-        known: Values that were found elsewhere, of :data:`SOLID_KEYS`.
+        known: Values that were found elsewhere, of :data:`SOLID_KEYS` and
+            :data:`RATCHETING_KEY`.
         unknown: Reasons why they were not.
 
     Raises:

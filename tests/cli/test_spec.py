@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import json
 
+import numpy as np
 import pytest
 
 from swgjoint.cli.main import main
+from swgjoint.errors import Outcome
 from swgjoint.fe import build_map as builder
+from swgjoint.fe import ratcheting
+from swgjoint.fe.ratcheting import RatchetingPath
 from swgjoint.fe.solid import spec_figures
 from swgjoint.fe.solid.fatigue import Fatigue, Limits, SectionFatigue
 from swgjoint.fe.solid.radial_stiffness import RadialStiffness
@@ -358,3 +362,29 @@ def test_a_bad_loop_is_one_line(capsys, tmp_path, text, words):
     assert words in said
     assert said.count("\n") == 1
     assert not out.exists()
+
+
+@pytest.mark.parametrize("passes", [True, False])
+def test_ratcheting_torque_of_a_design(capsys, monkeypatch, passes):
+    """The limit where it was passed, else null and the lower bound in the reason."""
+    torque = [0.0, 400.0, 500.0, 450.0] if passes else [0.0, 400.0, 500.0, 600.0]
+    path = RatchetingPath(
+        turned=np.arange(4) * 1e-3,
+        torque=np.array(torque),
+        energy=np.zeros(4),
+        pairs=np.arange(4),
+        pitch=1e-2,
+        outcome=Outcome.CONVERGED if passes else Outcome.ACTIVE_SET_CYCLES,
+    )
+    monkeypatch.setattr(ratcheting, "ratcheting_path", lambda design, **_: path)
+    key = "ratcheting_torque_Nm"
+    result = spec(capsys, "size-25-100", "--only", key)
+    if passes:
+        assert result[key] == pytest.approx(path.limit) and path.limit > 500.0
+        assert result["ratcheting"]["at_largest_pitches"] == pytest.approx(0.2)
+    else:
+        assert result[key] is None
+        assert "more than 600 N·m" in result["missing"][key]
+    assert key in spec(capsys, "CSG-25-100")["missing"]
+    assert main(["spec", "size-25-100", "--only", key]) == 0
+    assert "ratcheting" in capsys.readouterr().out
