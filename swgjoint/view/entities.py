@@ -41,12 +41,12 @@ from swgjoint.view.drive_markers import log_drives, send_loads
 from swgjoint.view.drive_view import frames_of, log_drive, send_drive
 from swgjoint.view.geometry import quaternion_xyzw, shape_of
 from swgjoint.view.joint_pictures import (
+    Scales,
     log_phase_axes,
     log_phase_ends,
     log_phase_path,
     log_phase_point,
     phase_points,
-    phase_scales,
     ripple_bars,
     send_phase,
 )
@@ -131,17 +131,16 @@ def log_known(
         log_drive(stream, drive_path(joint, label), scenes[label], joint)
 
 
-def log_measured(stream: Any, runs: Mapping[str, Run]) -> None:
+def log_measured(stream: Any, runs: Mapping[str, Run], scales: Scales) -> None:
     """What does not change and follows from the runs: paths and spectra.
 
     Args:
         stream: The recording.
         runs: Runs by name.
+        scales: Of :func:`swgjoint.view.joint_pictures.phase_scales`.
     """
     import rerun as rr
 
-    first = next(iter(runs.values()))
-    scales = {name: phase_scales(runs, j) for j, name in enumerate(first.joints)}
     for joint, of_joint in scales.items():
         if of_joint is not None:
             log_phase_ends(stream, joint, of_joint)
@@ -167,6 +166,7 @@ def log_measured(stream: Any, runs: Mapping[str, Run]) -> None:
 def log_moving(
     stream: Any,
     runs: Mapping[str, Run],
+    scales: Scales,
     *,
     drives: Mapping[str, str],
     rigid: Run | None = None,
@@ -177,6 +177,7 @@ def log_moving(
     Args:
         stream: The recording.
         runs: Runs by name.
+        scales: Of :func:`swgjoint.view.joint_pictures.phase_scales`.
         drives: Of :func:`swgjoint.view.drive_view.drives_shown`.
         rigid: See :func:`write_recording`.
         part: Samples that are sent, all by default.
@@ -187,9 +188,19 @@ def log_moving(
     time = rr.TimeColumn(TIMELINE, duration=first.time[part])
     inside = np.zeros(first.time.size, dtype=bool)
     inside[part] = True
-    rows = np.array([row for row in pose_rows(first) if inside[row]], dtype=np.intp)
+    rows = pose_rows(first)
+    rows = rows[inside[rows]]
     at_rows = rr.TimeColumn(TIMELINE, duration=first.time[rows])
     # the bulk first: rerun encodes it while the rest is put together
+    for label, run in runs.items():
+        for j, joint in enumerate(run.joints):
+            columns = [
+                Column(signal(name), values[part], np.float64)
+                for name, values in signals_of(run, j).items()
+            ]
+            stream.send_columns(
+                f"{prefix_of(label)}joint/{joint}", indexes=[time], columns=columns
+            )
     for label, joint in drives.items():
         run = runs[label]
         drawn = np.intersect1d(frames_of(run, joint, pose_rows(run)), rows)
@@ -202,18 +213,10 @@ def log_moving(
         if rows.size:
             _send_poses(stream, prefix, run, at_rows, rows)
             send_loads(stream, prefix, run, at_rows, rows)
-        for j, joint in enumerate(run.joints):
-            columns = [
-                Column(signal(name), values[part], np.float64)
-                for name, values in signals_of(run, j).items()
-            ]
-            stream.send_columns(
-                f"{prefix}joint/{joint}", indexes=[time], columns=columns
-            )
-            scales = phase_scales(runs, j)
-            if scales is not None and rows.size:
-                points = phase_points(run, j, scales, rows)
-                send_phase(stream, phase_path(joint, label), points, at_rows)
+            for j, joint in enumerate(run.joints):
+                if (of_joint := scales[joint]) is not None:
+                    points = phase_points(run, j, of_joint, rows)
+                    send_phase(stream, phase_path(joint, label), points, at_rows)
         if run.tool_position.shape[1]:
             error = run.tool_error(rigid)[part] / mm
             column = Column(rr.Scalars.descriptor_scalars(), error, np.float64)

@@ -21,6 +21,7 @@ BARS = 400
 """Bars of a spectrum at most; each is the largest amplitude of its part."""
 WIDTH = 1.6
 """Of the phase picture, its height from the middle is 1."""
+Scales = dict[str, tuple[float, float] | None]
 _POINTS = 2000
 _FRAME = (120, 120, 120)
 
@@ -58,11 +59,20 @@ def ripple_bars(run: Run, j: int) -> tuple[Array, Array] | None:
     return middle, np.maximum.reduceat(amplitude, starts)
 
 
-def phase_scales(runs: Mapping[str, Run], j: int) -> tuple[float, float] | None:
-    """Largest torsion [arcmin] and torque [N·m] of a joint; None without torsion."""
-    torsion = max(float(np.abs(run.torsion[:, j]).max()) for run in runs.values())
-    torque = max(float(np.abs(run.output_torque[:, j]).max()) for run in runs.values())
-    return (torsion / arcmin, torque) if torsion > 0.0 and torque > 0.0 else None
+def phase_scales(runs: Mapping[str, Run]) -> Scales:
+    """Largest torsion [arcmin] and torque [N·m] by joint; None without torsion."""
+    first = next(iter(runs.values()))
+    torsion, torque = (
+        np.max([np.abs(one).max(axis=0) for one in signals], axis=0)
+        for signals in (
+            [run.torsion for run in runs.values()],
+            [run.output_torque for run in runs.values()],
+        )
+    )
+    return {
+        joint: (float(x) / arcmin, float(y)) if x > 0.0 and y > 0.0 else None
+        for joint, x, y in zip(first.joints, torsion, torque, strict=True)
+    }
 
 
 def phase_points(

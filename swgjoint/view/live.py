@@ -21,6 +21,7 @@ from swgjoint.errors import InputError
 from swgjoint.view.blueprint import blueprint_of, joints_shown
 from swgjoint.view.drive_view import drives_shown
 from swgjoint.view.entities import log_known, log_measured, log_moving
+from swgjoint.view.joint_pictures import phase_scales
 from swgjoint.view.recording import stream_name
 from swgjoint.view.viewer import LOOPBACK, start_viewer, wait_for
 
@@ -70,14 +71,15 @@ def stream_runs(
     stream.connect_grpc(url, default_blueprint=blueprint_of(scenes, joints))
     drives = drives_shown(scenes, joints)
     log_known(stream, scenes, drives=drives)
-    log_measured(stream, runs)
+    scales = phase_scales(runs)
+    log_measured(stream, runs, scales)
     time_of = next(iter(runs.values())).time
     begin = time.monotonic()
     for part in _parcels(time_of, None if pace is None else pace * PART_S):
         if pace is not None:
             due = begin + float(time_of[part.stop - 1] - time_of[0]) / pace
             time.sleep(max(0.0, due - time.monotonic()))
-        log_moving(stream, runs, drives=drives, rigid=rigid, part=part)
+        log_moving(stream, runs, scales, drives=drives, rigid=rigid, part=part)
     stream.flush()
     stream.disconnect()
     return url

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from swgjoint.view.blueprint import blueprint_of, joints_shown
 from swgjoint.view.drive_view import drives_shown
 from swgjoint.view.entities import log_known, log_measured, log_moving
+from swgjoint.view.joint_pictures import phase_scales
 
 if TYPE_CHECKING:
     from swgjoint.sim.assembly import Assembly
@@ -35,10 +36,7 @@ def write_recording(
     with _whole(Path(path)) as beside:
         scenes = {label: run.assembly for label, run in runs.items()}
         stream, drives = _begin(beside, scenes)
-        log_moving(stream, runs, rigid=rigid, drives=drives)
-        log_measured(stream, runs)
-        stream.flush()
-        stream.disconnect()
+        _end(stream, runs, drives, rigid=rigid)
     return Path(path)
 
 
@@ -78,11 +76,7 @@ class Recorder:
         self.begin()
         assert self._begun is not None
         stream, drives = self._begun.result()
-        runs = {"": run}
-        log_moving(stream, runs, drives=drives)
-        log_measured(stream, runs)
-        stream.flush()
-        stream.disconnect()
+        _end(stream, {"": run}, drives)
 
     def __exit__(self, *failure: Any) -> bool | None:
         """Put the file in its place, or remove it after a failure."""
@@ -115,6 +109,20 @@ def _begin(path: Path, scenes: Mapping[str, Assembly]) -> tuple[Any, dict[str, s
     drives = drives_shown(scenes, joints)
     log_known(stream, scenes, drives=drives)
     return stream, drives
+
+
+def _end(
+    stream: Any,
+    runs: Mapping[str, Run],
+    drives: Mapping[str, str],
+    rigid: Run | None = None,
+) -> None:
+    """What follows from the runs, and the end of the file."""
+    scales = phase_scales(runs)
+    log_moving(stream, runs, scales, drives=drives, rigid=rigid)
+    log_measured(stream, runs, scales)
+    stream.flush()
+    stream.disconnect()
 
 
 def stream_name(scenes: Mapping[str, Assembly]) -> str:

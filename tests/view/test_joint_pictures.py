@@ -68,8 +68,8 @@ def test_the_phase_picture_is_torque_over_torsion(run, synthetic_map):
         overrides={**SHORT, "defaults.level": "rigid"},
         drives={"reference-2d": synthetic_map},
     )
-    assert phase_scales({"": rigid}, 0) is None
-    torsion, torque = scales = phase_scales({"a": run, "b": rigid}, 0)
+    assert phase_scales({"": rigid})["joint"] is None
+    torsion, torque = scales = phase_scales({"a": run, "b": rigid})["joint"]
     points = phase_points(run, 0, scales)
     assert points[:, 0].max() == pytest.approx(WIDTH)
     np.testing.assert_allclose(
@@ -99,7 +99,7 @@ def test_the_recording_shows_load_orders_and_phase(run, tmp_path):
     (places,) = component(path, entity, "BarChart:abscissa")
     np.testing.assert_array_equal(places[0]["buffer"], orders)
     now = component(path, "/phase/joint/run/now", "Points2D:positions")
-    points = phase_points(run, 0, phase_scales({"": run}, 0))[rows]
+    points = phase_points(run, 0, phase_scales({"": run})["joint"])[rows]
     np.testing.assert_allclose([p[0] for p in now], points, atol=1e-6)  # float32
 
 
