@@ -20,8 +20,7 @@ from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_matrix, diags_array
-from scipy.sparse.linalg import splu
+from scipy.linalg import solve_banded
 
 from swgjoint.errors import Outcome
 from swgjoint.fe.corotation import rotate, turned
@@ -165,6 +164,11 @@ class RingSolver:
                 return _finished(model, state, Outcome.CONVERGED, history, teeth=teeth)
         return _finished(model, state, Outcome.MAX_ITERATIONS, history, teeth=teeth)
 
+    def potential(self, model: ThinRing, state: RingState, torque: float) -> float:
+        """Pi with the teeth in place [J]."""
+        there, _, _ = _linearised(model, state, teeth=True)
+        return there.energy + torque * _rotation(model, state.q)[0]
+
 
 def _moved(step: Array) -> float:
     """Largest displacement of a node [m]."""
@@ -196,28 +200,41 @@ class _Sum:
         The gradient is None where it has been counted.
         """
         if gradient is not None:
-            np.add.at(self.gradient, dofs, gradient)
+            self.gradient += np.bincount(
+                dofs.ravel(), gradient.ravel(), len(self.gradient)
+            )
         self._parts.append((dofs, hessian))
 
-    def solve(self, held: int, right: Array, anchor: float) -> Array:
-        """Solve with one coordinate held and a part of the diagonal added."""
+    def solve(self, order: Index, held: int, right: Array, anchor: float) -> Array:
+        """Solve with one coordinate held and a part of the diagonal added.
+
+        Args:
+            order: Place of every coordinate in a narrow band.
+            held: The coordinate that is held.
+            right: Right-hand sides (size, n).
+            anchor: Part of the largest diagonal entry.
+        """
+        size = len(order)
         rows, columns, values = [], [], []
         for dofs, hessian in self._parts:
-            m = dofs.shape[1]
-            rows.append(np.repeat(dofs, m, axis=1).ravel())
-            columns.append(np.tile(dofs, (1, m)).ravel())
+            place, m = order[dofs], dofs.shape[1]
+            rows.append(np.repeat(place, m, axis=1).ravel())
+            columns.append(np.tile(place, (1, m)).ravel())
             values.append(hessian.ravel())
-        size = len(self.gradient)
-        place = np.concatenate(rows), np.concatenate(columns)
-        matrix = coo_matrix((np.concatenate(values), place), (size, size)).tocsc()
-        diagonal = np.full(size, anchor * float(np.abs(matrix.diagonal()).max()))
+        row, column = np.concatenate(rows), np.concatenate(columns)
+        band = int(np.abs(row - column).max())
+        flat = (band + row - column) * size + column
+        matrix = np.bincount(
+            flat, np.concatenate(values), (2 * band + 1) * size
+        ).reshape(2 * band + 1, size)
+        largest = float(np.abs(matrix[band]).max())
+        matrix[band] += anchor * largest
         # a spring far stiffer than anything else
-        diagonal[held] = 1e6 * float(np.abs(matrix.diagonal()).max())
-        matrix += diags_array(diagonal, format="csc")
-        factor = splu(
-            matrix, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}
-        )
-        return np.asarray(factor.solve(right))
+        matrix[band, order[held]] += 1e6 * largest
+        shuffled = np.empty_like(right)
+        shuffled[order] = right
+        solved = solve_banded((band, band), matrix, shuffled, check_finite=False)
+        return np.asarray(solved[order])
 
 
 def _linearised(
@@ -243,33 +260,64 @@ def _linearised(
     held = first + (0 if abs(node[1]) > abs(node[0]) else 1)
     state = replace(state, energy=total.energy)
     total.gradient[held] = 0.0
-    return state, partial(total.solve, held), total.gradient
+    return state, partial(total.solve, model.order, held), total.gradient
 
 
-def _balls(model: ThinRing, state: RingState, race: Array, total: _Sum) -> RingState:
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PressedBalls:
     """Hertz contact of the balls, which sit on the cam, with the race."""
+
+    seen: Facing
+    overlap: Array
+    """[m]. Shape (balls,)."""
+    force: Array
+    """Q (balls,) [N]."""
+    push: Array
+    """Forces on the race (balls, 2) [N]."""
+    moment: float
+    """On the race [N·m]."""
+    input_torque: float
+    """Power per speed of the wave generator that moves the balls [N·m]."""
+
+    @property
+    def resultant(self) -> Array:
+        """Force on the race (2,) [N]."""
+        return np.asarray(self.push.sum(axis=0))
+
+
+def race_on_balls(model: ThinRing, state: RingState, race: Array) -> PressedBalls:
+    """Balls of a state under a race with given coordinates."""
     centre, d_centre = model.balls(state.alpha, state.phase)
     seen = facing(model.race, race, centre, state.ball_feet, inside=True)
     bearing = model.bearing
     reach = 0.5 * (bearing.ball_diameter + bearing.race_thickness)
     overlap = np.maximum(reach - seen.distance, 0.0)
     force = model.ball_constant * overlap**1.5
-    on = np.flatnonzero(overlap > 0.0)
-    rows = seen.by_ring[on, 0]
-    slope = 1.5 * model.ball_constant * np.sqrt(overlap[on])
-    curved = seen.curved(seen.by_ring)[on]
-    hessian = slope[:, None, None] * rows[:, :, None] * rows[:, None, :]
-    hessian -= force[on, None, None] * curved
-    total.energy += 0.4 * float(force @ overlap)
-    total.add(seen.dofs[on] + model.rim.size, -force[on, None] * rows, hessian)
-    push = -force[:, None] * seen.normal  # on the race, outwards
+    push = -force[:, None] * seen.normal  # outwards
     foot = centre - seen.distance[:, None] * seen.normal
+    return PressedBalls(
+        seen=seen,
+        overlap=overlap,
+        force=force,
+        push=push,
+        moment=float(np.sum(turned(foot) * push)),
+        input_torque=float(np.sum(push * d_centre)),
+    )
+
+
+def _balls(model: ThinRing, state: RingState, race: Array, total: _Sum) -> RingState:
+    pressed = race_on_balls(model, state, race)
+    on = np.flatnonzero(pressed.overlap > 0.0)
+    near, overlap, force = pressed.seen.chosen(on), pressed.overlap, pressed.force
+    slope = 1.5 * model.ball_constant * np.sqrt(overlap[on])
+    total.energy += 0.4 * float(force @ overlap)
+    _press(total, near, near.by_ring, near.dofs + model.rim.size, force[on], slope)
     return replace(
         state,
-        ball_feet=seen.place,
+        ball_feet=pressed.seen.place,
         ball_force=force,
-        ball_moment=float(np.sum(turned(foot) * push)),
-        wave_generator_torque=float(np.sum(push * d_centre)),
+        ball_moment=pressed.moment,
+        wave_generator_torque=pressed.input_torque,
     )
 
 
@@ -281,17 +329,16 @@ def _bore(
     seen = facing(model.race, race, points, state.bore_feet, inside=False)
     overlap = 0.5 * model.bearing.race_thickness - seen.distance
     on = np.flatnonzero(overlap > 0.0)
-    dofs, rows, second = model.bore.rows(rim, seen, on)
-    both = np.concatenate([dofs, seen.dofs[on] + model.rim.size], axis=1)
-    rows = np.concatenate([rows, seen.by_ring[on]], axis=2)
-    on_line = _chosen(seen, on).curved(rows)
-    on_line[:, :8, :8] += second
-    k, normal = model.press_per_point, rows[:, 0]
+    near, k = seen.chosen(on), model.press_per_point
     force = k * overlap[on]
-    hessian = k * normal[:, :, None] * normal[:, None, :]
-    hessian -= force[:, None, None] * on_line
+    dofs, rows, bend = model.bore.chosen(on).rows(rim, near)
+    both = np.concatenate([dofs, near.dofs + model.rim.size], axis=1)
+    # the turn of the section has a row of its own
+    by_both = np.zeros((len(on), 4, 16))
+    by_both[:, :2, :8], by_both[:, 3, :8] = rows[:, :2], rows[:, 2]
+    by_both[:, :3, 8:] = near.by_ring
     total.energy += 0.5 * float(force @ overlap[on])
-    total.add(both, -force[:, None] * normal, hessian)
+    _press(total, near, by_both, both, force, np.full(len(on), k), bend)
     return replace(state, bore_feet=seen.place)
 
 
@@ -300,7 +347,6 @@ def _teeth(model: ThinRing, state: RingState, rim: Array, total: _Sum) -> RingSt
     nodes = rim.reshape(-1, 2, 2)[:: model.nodes_per_tooth]
     foot, slope = nodes[:, 0], nodes[:, 1]
     contacts, angle = model.teeth.seen(foot, slope)
-    contacts = contacts.chosen(np.flatnonzero(contacts.gap < 0.0))
     rows, _ = model.teeth.rows(contacts, foot, slope, angle)
     k = model.teeth.stiffness
     force = -k * contacts.gap
@@ -318,10 +364,36 @@ def _teeth(model: ThinRing, state: RingState, rim: Array, total: _Sum) -> RingSt
     )
 
 
-def _chosen(seen: Facing, on: Index) -> Facing:
-    return Facing(
-        **{key: getattr(seen, key)[on] for key in Facing.__dataclass_fields__}
-    )
+def _press(
+    total: _Sum,
+    seen: Facing,
+    rows: Array,
+    dofs: Index,
+    force: Array,
+    stiffness: Array,
+    bend: Array | None = None,
+) -> None:
+    r"""Add contacts of normal force F and tangent k.
+
+    Gradient :math:`-F\,dg`, Hessian :math:`k\,dg\,dg - F\,d^2g`.
+
+    Args:
+        total: Where to.
+        seen: The points.
+        rows: u_n, u_t, beta and perhaps a turn by the coordinates (n, 3 or 4, m).
+        dofs: These coordinates (n, m).
+        force: F (n,) [N].
+        stiffness: k (n,) [N/m].
+        bend: Factor of that turn squared in n . d2p (n,).
+    """
+    count = rows.shape[1]
+    form = np.zeros((len(force), count, count))
+    form[:, :3, :3] = -force[:, None, None] * seen.bends()
+    form[:, 0, 0] += stiffness
+    if bend is not None:
+        form[:, 3, 3] -= force * bend
+    hessian = np.swapaxes(rows, 1, 2) @ (form @ rows)
+    total.add(dofs, -force[:, None] * rows[:, 0], hessian)
 
 
 def _finished(

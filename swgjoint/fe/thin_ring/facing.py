@@ -42,19 +42,23 @@ class Facing:
     curvature: Array
     """kappa [1/m]. Shape (n,)."""
 
-    def curved(self, rows: Array) -> Array:
-        """Second derivative of the distance but for n . d2p, (n, m, m).
+    def bends(self) -> Array:
+        """Second derivative of the distance by u_n, u_t, beta (n, 3, 3).
 
-        Args:
-            rows: u_n, u_t, beta by m coordinates (n, 3, m).
+        That of the point, n . d2p, is left out.
         """
-        t, b = rows[:, 1], rows[:, 2]
-        mixed = t[:, :, None] * b[:, None, :]
-        total = self.curvature[:, None, None] * t[:, :, None] * t[:, None, :]
-        total = total + mixed + np.swapaxes(mixed, 1, 2)
-        total += self.distance[:, None, None] * b[:, :, None] * b[:, None, :]
+        form = np.zeros((len(self.distance), 3, 3))
+        form[:, 1, 1] = self.curvature
+        form[:, 1, 2] = form[:, 2, 1] = 1.0
+        form[:, 2, 2] = self.distance
         spread = 1.0 - self.distance * self.curvature
-        return np.asarray(-total / spread[:, None, None])
+        return np.asarray(-form / spread[:, None, None])
+
+    def chosen(self, index: Index) -> Facing:
+        """The points with the given indices."""
+        return Facing(
+            **{key: getattr(self, key)[index] for key in self.__dataclass_fields__}
+        )
 
 
 def facing(
@@ -117,30 +121,31 @@ class Surface:
         outward = np.stack([tangent[:, 1], -tangent[:, 0]], -1)
         return r + self.offset * outward, tangent, outward, length
 
-    def rows(self, q: Array, seen: Facing, chosen: Index) -> tuple[Index, Array, Array]:
-        """Degrees of freedom of chosen points, rows u_n, u_t, 0, and n . d2p.
+    def rows(self, q: Array, seen: Facing) -> tuple[Index, Array, Array]:
+        """Degrees of freedom, rows u_n, u_t, turn of the section, and n . d2p.
 
         Args:
             q: Coordinates of the ring.
             seen: All points as the other ring sees them.
-            chosen: Which points (m,).
 
         Returns:
-            (m, 8), (m, 3, 8) and (m, 8, 8).
+            (n, 8), (n, 3, 8) and the factor of the squared turn (n,).
         """
-        element, xi = self.ring.split(self.place[chosen])
+        element, xi = self.ring.split(self.place)
         value, slope, _ = hermite(xi)
-        _, tangent, outward, length = (a[chosen] for a in self.points(q))
-        normal, along = seen.normal[chosen], seen.tangent[chosen]
+        _, tangent, outward, length = self.points(q)
         # turn of the section: -N . dr'/|r'|; the outward normal moves along t with it
         turn = -(slope / length[:, None])[:, :, None] * outward[:, None, :]
         turn = turn.reshape(-1, 8)
-        lever = self.offset * tangent
-        rows = np.zeros((len(chosen), 3, 8))
-        for k, direction in enumerate((normal, along)):
+        rows = np.empty((len(element), 3, 8))
+        for k, direction in enumerate((seen.normal, seen.tangent)):
             moved = (value[:, :, None] * direction[:, None, :]).reshape(-1, 8)
-            arm = np.einsum("ni,ni->n", direction, lever)
+            arm = self.offset * np.einsum("ni,ni->n", direction, tangent)
             rows[:, k] = moved + arm[:, None] * turn
-        bend = -self.offset * np.einsum("ni,ni->n", normal, outward)
-        second = bend[:, None, None] * turn[:, :, None] * turn[:, None, :]
-        return self.ring.dofs[element], rows, second
+        rows[:, 2] = turn
+        bend = -self.offset * np.einsum("ni,ni->n", seen.normal, outward)
+        return self.ring.dofs[element], rows, bend
+
+    def chosen(self, index: Index) -> Surface:
+        """The points with the given indices."""
+        return Surface(ring=self.ring, place=self.place[index], offset=self.offset)

@@ -34,6 +34,7 @@ from swgjoint.gear.wave_generator import lobe_height
 from swgjoint.units import mm
 
 Array = NDArray[np.float64]
+Index = NDArray[np.int64]
 
 ELEMENTS = 190
 """Fewest elements of a ring: eight between neighbouring balls of 23."""
@@ -78,6 +79,19 @@ class ThinRing:
     def size(self) -> int:
         """Degrees of freedom of both rings."""
         return self.rim.size + self.race.size
+
+    @cached_property
+    def order(self) -> Index:
+        """Places of the coordinates in a narrow band.
+
+        Both rings together, from node 0 both ways at once: the band of a closed ring is
+        twice that of an open one. Shape (size,).
+        """
+        count = self.rim.elements
+        place = np.arange(count)
+        place = np.where(2 * place < count, 2 * place, 2 * (count - place) - 1)
+        both = 8 * place[:, None] + np.arange(8)
+        return np.concatenate([both[:, :4].ravel(), both[:, 4:].ravel()])
 
     def balls(self, alpha: float, phase: float) -> tuple[Array, Array]:
         """Ball centres on the cam (n, 2) and their derivative by alpha [m, m/rad].

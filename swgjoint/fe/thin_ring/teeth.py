@@ -21,10 +21,6 @@ from swgjoint.gear.profile import ToothProfile
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-REACH = 0.1
-"""Gaps beyond this part of the module are not followed."""
-
-
 NODES = 10
 """Of a flank; the search for minima of the gap begins at twice as many places."""
 
@@ -99,11 +95,8 @@ class Teeth:
             angle=angle,
             bearing=np.arctan2(-foot[:, 0], foot[:, 1]),
         )
-        module = 2.0 * self.flexspline.pitch_radius / self.flexspline.teeth
-        found = search.search(
-            np.tile(own, 2 * NODES), REACH * module, None, thorough=False
-        )
-        return found, angle
+        # only what overlaps is pressed, so nothing is followed before it touches
+        return search.search(np.tile(own, 2 * NODES), 0.0, None, thorough=False), angle
 
     def rows(
         self, contacts: Contacts, foot: Array, slope: Array, angle: Array

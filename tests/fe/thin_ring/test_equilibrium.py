@@ -1,0 +1,192 @@
+"""Laws of the thin-ring drive: balance, energy, symmetry, similarity, Stribeck."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from swgjoint.errors import DesignError
+from swgjoint.fe.thin_ring import torsion_curve
+from swgjoint.fe.thin_ring.equilibrium import RingSolver, at_rest, race_on_balls
+from swgjoint.fe.thin_ring.model import thin_ring
+from swgjoint.fe.thin_ring.torsion import loaded, positions, unloaded
+from swgjoint.gear.ball_bearing import stribeck_largest_load
+from swgjoint.gear.design import Design
+from swgjoint.gear.neutral_line import NeutralLine
+from swgjoint.gear.wave_generators.ellipse import Elliptical
+
+TORQUE = 67.0
+
+
+@pytest.fixture(scope="module")
+def model():
+    """Size 25, ratio 100."""
+    return thin_ring(Design.load("size-25-100"))
+
+
+@pytest.fixture(scope="module")
+def state(model):
+    """That drive under its rated torque at a general angle."""
+    return loaded(model, unloaded(model, 0.1), TORQUE)
+
+
+def test_potential_is_stationary(model, state):
+    """No displacement of either ring changes the potential to first order."""
+    rng = np.random.default_rng(0)
+    solver = RingSolver()
+    for _ in range(3):
+        d = rng.normal(size=model.size) * 1e-12  # contacts that begin bend Pi
+        up, down = (
+            solver.potential(model, replace(state, q=state.q + s * d), TORQUE)
+            for s in (1.0, -1.0)
+        )
+        # against the work of a newton over the same way
+        assert abs(up - down) < 1e-5 * np.abs(d).sum()
+
+
+def test_moments_balance(model, state):
+    """The teeth carry what load and balls leave: M_teeth + M_balls = T."""
+    assert state.outcome.ok
+    total = state.tooth_moment + state.ball_moment
+    assert total == pytest.approx(TORQUE, rel=1e-5)
+    # the teeth's share is T - T_wg to the ripple of ball passage
+    share = TORQUE * (1.0 - 1.0 / model.ratio)
+    assert state.tooth_moment == pytest.approx(share, rel=1e-3)
+
+
+def test_energy_of_a_slow_step(model, state):
+    """T_wg dtheta - T dpsi = dU over a small turn of the wave generator."""
+    step = 2e-4
+    ends = [
+        RingSolver()(model, replace(state, alpha=state.alpha + s * step), torque=TORQUE)
+        for s in (-1.0, 1.0)
+    ]
+    gain = ends[1].energy - ends[0].energy
+    turn = ends[1].rotation - ends[0].rotation
+    work = state.wave_generator_torque * 2 * step - TORQUE * turn
+    # the turn of the output alone does T/i times the step
+    assert work == pytest.approx(gain, abs=1e-4 * abs(TORQUE * turn))
+
+
+def test_input_torque_is_in_the_mean_the_torque_over_the_ratio(model):
+    """Averaged over the passage of a ball, T_wg = T/i."""
+    found = []
+    for alpha in positions(model, 6):
+        one = loaded(model, unloaded(model, float(alpha)), TORQUE)
+        assert one.outcome.ok
+        found.append(one.wave_generator_torque)
+    # the ripple of ball passage and teeth is 0.6 % of it
+    assert np.mean(found) == pytest.approx(TORQUE / model.ratio, rel=2e-3)
+
+
+def test_mirror(model):
+    """The opposite torque at the opposite angle is the mirror image."""
+    there = loaded(model, unloaded(model, 0.1), 30.0)
+    back = loaded(model, unloaded(model, -0.1), -30.0)
+    assert back.rotation == pytest.approx(-there.rotation, rel=1e-9)
+    assert back.energy == pytest.approx(there.energy, rel=1e-9)
+
+
+def test_compliance_is_the_slope(model, state):
+    """The tangent compliance agrees with a difference of two torques."""
+    near = RingSolver()(model, state, torque=TORQUE * (1 + 1e-5))
+    slope = -(near.rotation - state.rotation) / (1e-5 * TORQUE)
+    # the tangent has no sliding of curved flanks over each other
+    assert near.compliance == pytest.approx(slope, rel=2e-2)
+
+
+@pytest.mark.parametrize("clearance", [0.0, 5e-6])
+def test_rigid_race_after_stribeck(model, clearance):
+    """A round race moved over a round cam loads its balls as Stribeck says."""
+    bearing = replace(model.bearing, clearance=clearance)
+    inner, _ = bearing.raceways
+    centres = inner + 0.5 * bearing.ball_diameter
+    circle = Elliptical(major=centres, minor=centres)
+    round_ = replace(
+        model,
+        bearing=bearing,
+        cam=NeutralLine(outline=circle, lobes=2, radius=centres, offset=0.0),
+    )
+    moved = 10e-6
+    race = model.race.reference.copy()
+    race[:, 0, 1] -= moved
+    pressed = race_on_balls(round_, at_rest(round_, 0.0), race.ravel())
+    force = np.abs(pressed.resultant[1])
+    assert abs(pressed.resultant[0]) < 1e-9 * force
+    assert pressed.force[0] == pressed.force.max()  # the ball at the top
+    expected = stribeck_largest_load(force, bearing.balls, clearance=clearance > 0)
+    assert pressed.force.max() == pytest.approx(
+        expected, rel=0.05 if clearance else 0.01
+    )
+
+
+LENGTHS = ("_mm", "_um")
+
+
+def scaled(table, factor):
+    """The same tables with all lengths multiplied; a coefficient per length divided."""
+    found = {}
+    for key, value in table.items():
+        if isinstance(value, dict):
+            value = scaled(value, factor)
+        elif key.endswith(LENGTHS) and value is not None:
+            value = value * factor
+        found[key] = value
+    return found
+
+
+def test_stiffness_scales_with_the_cube_of_the_size():
+    """Twice the lengths, clearances included: eight times the torque, same torsion."""
+    small = Design.load("size-20-80").with_changes(
+        {"ratings.rated_torque_Nm": 40.0, "ratings.repeated_peak_Nm": 90.0}
+    )
+    data = small.model_dump(exclude_unset=True)
+    large = Design.model_validate(scaled(data, 2.0)).with_changes(
+        {"ratings.rated_torque_Nm": 320.0, "ratings.repeated_peak_Nm": 720.0}
+    )
+    torque = np.array([5.0, 20.0, 60.0])
+    one, two = (
+        torsion_curve(design, torque * by, angles=[0.05])
+        for design, by in ((small, 1.0), (large, 8.0))
+    )
+    assert one.outcome.ok
+    assert two.torsion == pytest.approx(one.torsion, rel=1e-6)
+    assert (two.balls == one.balls).all()
+
+
+def test_clearance_is_what_makes_the_stiffness_rise():
+    """Without it the curve is nearly straight, with it K rises; nothing is fitted."""
+    torque = np.array([7.0, 14.0, 48.0, 96.0])
+    rise, balls = [], []
+    for clearance in (0.0, 14.5):
+        design = Design.load("size-25-100").with_changes(
+            {"wave_generator.bearing.clearance_um": clearance}
+        )
+        found = torsion_curve(design, torque, angles=[0.1])
+        slope = np.diff(found.torque) / np.diff(found.torsion)
+        rise.append(slope[-1] / slope[0])
+        balls.append(found.balls[0])
+    assert rise[0] < 1.4
+    assert rise[1] > 1.8
+    # the arc of loaded balls grows from few with clearance, is there without
+    assert balls[0][0] >= 14
+    assert balls[1][0] <= 11 < 14 <= balls[1][-1]
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"wave_generator.bearing": None}, "wave_generator.bearing is absent"),
+        ({"drive.layout": "flexspline_fixed"}, "drive.layout = 'flexspline_fixed'"),
+        ({"friction.tooth_coefficient": 0.1}, "tooth_coefficient = 0.1"),
+        ({"tolerances.misalignment_arcmin": 1.0}, "misalignment_arcmin = 1"),
+        ({"wave_generator.bearing.ball_diameter_mm": 30.0}, "do not fit inside"),
+    ],
+)
+def test_what_the_model_lacks_is_refused(changes, message):
+    """One line that names the key."""
+    design = Design.load("size-25-100").with_changes(changes)
+    with pytest.raises(DesignError, match=message):
+        thin_ring(design)
