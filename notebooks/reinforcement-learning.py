@@ -26,7 +26,9 @@
 # third run: two before it, with another reward and without the harmonics of the gear's
 # angles among the inputs, learned little (ripple 1.05 to 0.72 %), and led to both. What
 # is stored is the best point of the curve below. Here its numbers are replayed with
-# numpy alone.
+# numpy alone. When it was trained, the drive's error had the phases and peak to peak of
+# today, but amplitudes as 3, 3, 2, 2 (today those of finite elements, as 1, 0.98, 0.46,
+# 0.48), and the loop alone left a ripple of 1.07 %.
 
 # %%
 import csv
