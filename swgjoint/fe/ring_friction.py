@@ -1,0 +1,223 @@
+r"""What rubs in a thin-ring drive under torque, the wave generator locked.
+
+The rim slides in the tooth spaces and on the race; the balls roll. Along the path of
+the drive without friction, contacts of normal force N that slide by :math:`d\sigma`
+take the work
+
+.. math:: dW = \mu \sum N\,|d\sigma| = R\,dx,
+
+so that a torque :math:`R = dW/dx` stands against any change of the torsion x: the loop
+is the curve T(x) without friction, R above it while x grows and R below it while x
+falls. This is the first order in mu. It takes every contact as sliding and none as
+sticking, so near the turns of a loop it is wrong, and what sticks makes it narrower.
+
+The race is free to creep in the bore: it turns so that the work is least.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from swgjoint.errors import Outcome
+from swgjoint.fe.corotation import rotate
+from swgjoint.fe.thin_ring.equilibrium import RingState
+from swgjoint.fe.thin_ring.facing import facing
+from swgjoint.fe.thin_ring.model import ThinRing, thin_ring
+from swgjoint.fe.thin_ring.torsion import SMALL, loaded, positions, unloaded
+from swgjoint.gear.design import Design
+from swgjoint.gear.mounting import series_compliance
+from swgjoint.maps.catalogue import ratings_of
+
+Array = NDArray[np.float64]
+
+POSITIONS = 2
+"""Wave-generator angles of a mean: torsion differs by 0.2 % between them."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RubbedPath:
+    """Torsion without friction, and the work of friction per mu, over the torque.
+
+    Means over the wave-generator angles; torsion is zero in the middle of the play.
+    """
+
+    torque: Array
+    """T, positive and increasing, the first takes up the play [N·m]. Shape (n,)."""
+    torsion: Array
+    """x, what is in series included [rad]. Shape (n,)."""
+    series: float
+    """Compliance of what is in series, mostly the cup [rad/(N·m)]."""
+    teeth_work: Array
+    """Sum of N |d sigma| of the teeth from torque to torque [J]. Shape (n - 1,)."""
+    race_work: Array
+    """The same of rim and race [J]. Shape (n - 1,)."""
+    balls: Array
+    """Balls that carry load. Shape (n,)."""
+    tooth_pairs: Array
+    """Tooth contacts that do. Shape (n,)."""
+    outcome: Outcome
+    """Of the first solve that failed; the path ends before it."""
+
+    @property
+    def torque_per_mu(self) -> Array:
+        """R/mu from torque to torque [N·m]. Shape (n - 1,)."""
+        return np.asarray((self.teeth_work + self.race_work) / np.diff(self.torsion))
+
+    def at(self, torque: float) -> float:
+        """Torsion at a torque, on a straight line below the second one [rad]."""
+        if torque <= self.torque[1]:
+            slope = np.diff(self.torsion[:2]) / np.diff(self.torque[:2])
+            return float(self.torsion[0] + slope[0] * (torque - self.torque[0]))
+        return float(np.interp(torque, self.torque, self.torsion))
+
+    def hysteresis_loss(self, mu: float) -> float:
+        """Width of the loop where the load is zero, the play included [rad].
+
+        The falling branch comes to rest where T(x) = R, the rising one where it is -R.
+        """
+        return 2.0 * self.at(mu * float(self.torque_per_mu[0]))
+
+    def widths(self, mu: float) -> Array:
+        """Width 2 R/K between the torques [rad]. Shape (n - 1,)."""
+        slope = np.diff(self.torsion) / np.diff(self.torque)
+        return np.asarray(2.0 * mu * self.torque_per_mu * slope)
+
+    def round_loss(self, mu: float) -> Array:
+        """Work of a round between plus and minus each torque [J]. Shape (n,)."""
+        work = self.teeth_work + self.race_work
+        return np.asarray(4.0 * mu * np.concatenate([[0.0], np.cumsum(work)]))
+
+
+def rubbed_path(
+    design: Design, torques: ArrayLike, *, angles: ArrayLike | None = None
+) -> RubbedPath:
+    """Load a drive with the wave generator locked and look at what slides.
+
+    Args:
+        design: The drive, with the bearing of its wave generator; its own coefficient
+            of friction must be absent.
+        torques: T, positive [N·m]; 1 % of the rated torque is put before them.
+        angles: Wave-generator angles [rad]; by default :data:`POSITIONS`.
+
+    Raises:
+        DesignError: If the design cannot be built or holds what is not modelled.
+    """
+    model = thin_ring(design)
+    small = SMALL * ratings_of(design).rated_torque
+    wanted = np.unique(np.append(np.asarray(torques, dtype=float).ravel(), small))
+    wanted = wanted[wanted >= small]
+    at = positions(model, POSITIONS) if angles is None else np.asarray(angles, float)
+    tables, outcome = [], Outcome.CONVERGED
+    for alpha in at.ravel():
+        rows, ended = _along(model, float(alpha), wanted)
+        tables.append(rows)
+        outcome = ended if outcome.ok else outcome
+    reached = min(len(rows) for rows in tables)
+    table = np.mean([rows[:reached] for rows in tables], axis=0)
+    table = table.reshape(reached, 5)
+    series = series_compliance(design, cup=True)
+    return RubbedPath(
+        torque=wanted[:reached],
+        torsion=table[:, 0] + series * wanted[:reached],
+        series=series,
+        teeth_work=table[1:, 1],
+        race_work=table[1:, 2],
+        balls=table[:, 3],
+        tooth_pairs=table[:, 4],
+        outcome=outcome,
+    )
+
+
+def _along(
+    model: ThinRing, alpha: float, torques: Array
+) -> tuple[list[list[float]], Outcome]:
+    """Torsion, works since the torque before, balls, tooth contacts, by torque."""
+    rest = unloaded(model, alpha)
+    if not rest.outcome.ok:
+        return [], rest.outcome
+    # the middle of the play between the smallest torque and its opposite
+    down = loaded(model, rest, -float(torques[0]))
+    if not down.outcome.ok:
+        return [], down.outcome
+    rows: list[list[float]] = []
+    state, middle = rest, 0.0
+    for torque in torques.tolist():
+        found = loaded(model, state, torque)
+        if not found.outcome.ok:
+            return rows, found.outcome
+        if not rows:
+            middle = 0.5 * (found.rotation + down.rotation)
+        work = rubbing(model, state, found) if rows else (0.0, 0.0)
+        assert found.ball_force is not None
+        assert found.tooth_force is not None
+        balls = float((found.ball_force > 0.0).sum())
+        rows.append(
+            [middle - found.rotation, *work, balls, float(found.tooth_force.size)]
+        )
+        state = found
+    return rows, Outcome.CONVERGED
+
+
+def rubbing(model: ThinRing, first: RingState, last: RingState) -> tuple[float, float]:
+    r"""Sums of N |sigma| between two equilibria, of the teeth and of the race [J].
+
+    The mean of the forces at both ends; teeth that come in or leave count half.
+    """
+    return (
+        0.5 * (_teeth(model, first, last) + _teeth(model, last, first)),
+        _race(model, first, last),
+    )
+
+
+def _teeth(model: ThinRing, state: RingState, other: RingState) -> float:
+    """Contacts of one state, slid as their steel moves to the other."""
+    contacts, force = state.contacts, state.tooth_force
+    if contacts is None or force is None or not len(force):
+        return 0.0
+    j = contacts.sector
+    feet, angles = zip(*(_tooth_frames(model, s) for s in (state, other)), strict=True)
+    point = rotate(contacts.point, angles[0][j])
+    turn = angles[1][j] - angles[0][j]
+    moved = feet[1][j] + rotate(point - feet[0][j], turn) - point
+    along = rotate(contacts.tangent, angles[0][j])
+    return float(force @ np.abs(np.einsum("ni,ni->n", moved, along)))
+
+
+def _tooth_frames(model: ThinRing, state: RingState) -> tuple[Array, Array]:
+    """Where the teeth stand (N, 2) and how they are turned (N,)."""
+    nodes = state.q[: model.rim.size].reshape(-1, 2, 2)[:: model.nodes_per_tooth]
+    slope = nodes[:, 1]
+    return nodes[:, 0], np.arctan2(-slope[:, 1], -slope[:, 0])
+
+
+def _race(model: ThinRing, first: RingState, last: RingState) -> float:
+    """Points of the bore on the race, which creeps so that the work is least."""
+    forces, places = zip(*(_pressed(model, s) for s in (first, last)), strict=True)
+    count = model.race.elements
+    slid = np.mod(places[1] - places[0] + 0.5 * count, count) - 0.5 * count
+    # from the mean line of the race to its outside, where the rim slides
+    outside = 1.0 + 0.5 * model.bearing.race_thickness / model.race.radius
+    slid *= model.race.step * outside
+    weight = 0.5 * (forces[0] + forces[1])
+    return float(weight @ np.abs(slid - weighted_median(slid, weight)))
+
+
+def _pressed(model: ThinRing, state: RingState) -> tuple[Array, Array]:
+    """Forces of the bore's points on the race [N], and their places on it."""
+    rim, race = np.split(state.q, [model.rim.size])
+    points = model.bore.points(rim)[0]
+    seen = facing(model.race, race, points, state.bore_feet, inside=False)
+    overlap = 0.5 * model.bearing.race_thickness - seen.distance
+    return model.press_per_point * np.maximum(overlap, 0.0), seen.place
+
+
+def weighted_median(values: Array, weight: Array) -> float:
+    """Where the weighted sum of distances is least; zero without weight."""
+    order = np.argsort(values)
+    total = np.cumsum(weight[order])
+    if not total[-1] > 0.0:
+        return 0.0
+    return float(values[order][np.searchsorted(total, 0.5 * total[-1])])

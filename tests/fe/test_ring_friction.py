@@ -1,0 +1,94 @@
+"""What rubs in a thin-ring drive: laws of the sliding work."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from swgjoint.errors import Outcome
+from swgjoint.fe.ring_friction import RubbedPath, rubbed_path, weighted_median
+from swgjoint.fe.thin_ring import torsion_curve
+from swgjoint.gear.design import Design
+
+ANGLES = [0.3]
+TORQUES = [20.0, 40.0, 80.0]
+
+
+@pytest.fixture(scope="module")
+def design():
+    """The coarsest of the family: 100 teeth."""
+    return Design.preset("size-25-50")
+
+
+@pytest.fixture(scope="module")
+def path(design):
+    """Along three torques at one wave-generator angle."""
+    return rubbed_path(design, TORQUES, angles=ANGLES)
+
+
+def test_torsion_is_that_of_the_torsion_curve(design, path):
+    """The path is the curve without friction, its zero in the middle of the play."""
+    assert path.outcome is Outcome.CONVERGED
+    curve = torsion_curve(design, TORQUES, angles=ANGLES)
+    assert path.torsion[1:] == pytest.approx(curve.torsion, rel=1e-6)
+
+
+def test_work_adds_up_along_the_path(design, path):
+    """Half way in between the same slides: 5 % of the work, as forces are not linear.
+
+    With mu = 1 it would still be less than what the torque puts in.
+    """
+    finer = rubbed_path(design, [20.0, 30.0, 40.0, 60.0, 80.0], angles=ANGLES)
+    for key in ("teeth_work", "race_work"):
+        coarse, fine = getattr(path, key), getattr(finer, key)
+        assert (coarse > 0.0).all()
+        sums = [fine[1:3].sum(), fine[3:].sum()]
+        assert sums == pytest.approx(coarse[1:], rel=0.05)
+    gain = np.trapezoid(path.torque, path.torsion)
+    assert (path.teeth_work + path.race_work).sum() < gain
+
+
+def test_similar_drives_rub_in_proportion(design, path):
+    """Twice all lengths, clearances too: eight times torque and work, same torsion."""
+    bearing = design.wave_generator.bearing
+    large = Design.preset("size-50-50").with_changes(
+        {"wave_generator.bearing.clearance_um": 2.0 * bearing.clearance_um}
+    )
+    found = rubbed_path(large, [8.0 * t for t in TORQUES], angles=ANGLES)
+    # 1e-4: profiles of the family are rounded to a nanometre
+    assert found.torsion[1:] == pytest.approx(path.torsion[1:], rel=1e-4)
+    assert found.race_work[1:] == pytest.approx(8.0 * path.race_work[1:], rel=1e-3)
+    assert found.teeth_work[1:] == pytest.approx(8.0 * path.teeth_work[1:], rel=1e-3)
+
+
+def test_a_loop_of_known_friction():
+    """R is 3 mu, K is 100: width 2 R/K, without load the play besides; round work."""
+    torsion = np.array([0.1, 0.2, 0.4])
+    made = RubbedPath(
+        torque=100.0 * (torsion - 0.05),
+        torsion=torsion,
+        series=0.0,
+        teeth_work=2.0 * np.diff(torsion),
+        race_work=1.0 * np.diff(torsion),
+        balls=np.ones(3),
+        tooth_pairs=np.ones(3),
+        outcome=Outcome.CONVERGED,
+    )
+    assert made.torque_per_mu == pytest.approx(3.0)
+    assert made.widths(0.1) == pytest.approx(2 * 0.3 / 100.0)
+    assert made.hysteresis_loss(0.1) == pytest.approx(2 * (0.05 + 0.3 / 100.0))
+    # four branches of the round: out and back to either side
+    assert made.round_loss(0.1) == pytest.approx(4 * 0.3 * (torsion - 0.1))
+
+
+def test_the_race_creeps_to_where_least_work_is():
+    """The weighted median is no worse than any other place."""
+    rng = np.random.default_rng(3)
+    values, weight = rng.normal(size=40), rng.uniform(size=40)
+    best = weighted_median(values, weight)
+
+    def work(place):
+        return float(weight @ np.abs(values - place))
+
+    assert work(best) <= min(work(v) for v in [*values, *np.linspace(-3, 3, 301)])
+    assert weighted_median(values, np.zeros(40)) == 0.0
