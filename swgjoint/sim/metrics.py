@@ -149,11 +149,14 @@ def torque_deviation(run: Run, j: int) -> Array:
 
 
 def torque_ripple(run: Run, j: int) -> Array:
-    """Ripple of one joint over the constant-speed part [N·m]. Shape (n_window,)."""
+    """Ripple of one joint over the constant-speed part [N·m]. Shape (n_window,).
+
+    Deviation of the torque less its mean and its straight line in time.
+    """
     rest = torque_deviation(run, j)[run.steady]
-    x = np.linspace(-1.0, 1.0, rest.size)
-    basis = np.polynomial.legendre.legvander(x, 1)
-    return np.asarray(rest - basis @ np.linalg.lstsq(basis, rest, rcond=None)[0])
+    rest = rest - rest.mean()
+    line = np.linspace(-1.0, 1.0, rest.size)  # its mean is zero
+    return np.asarray(rest - (line @ rest) / (line @ line) * line)
 
 
 def highest_resolved_order(run: Run, j: int) -> float | None:

@@ -132,13 +132,14 @@ class RigidArm:
         Returns:
             Shapes (n, n_bodies, 3) and (n, n_bodies, 4), the world body first.
         """
-        data, count = self._data, len(position)
-        places = np.empty((count, self.model.nbody, 3))
-        turns = np.empty((count, self.model.nbody, 4))
-        for place, turn, q in zip(places, turns, position, strict=True):
-            data.qpos[:] = q
-            mujoco.mj_kinematics(self.model, data)
-            place[:], turn[:] = data.xpos, data.xquat
+        model, data, count = self.model, self._data, len(position)
+        places = np.empty((count, model.nbody, 3))
+        turns = np.empty((count, model.nbody, 4))
+        qpos, xpos, xquat = data.qpos, data.xpos, data.xquat  # a lookup costs as much
+        for k, q in enumerate(position):
+            qpos[:] = q
+            mujoco.mj_kinematics(model, data)
+            places[k], turns[k] = xpos, xquat
         return places, turns
 
 

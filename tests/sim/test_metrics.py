@@ -1,5 +1,7 @@
 """Figures of a run."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -113,6 +115,17 @@ def test_weight_is_no_ripple():
     torque = run.output_torque[run.steady, lift]
     assert np.ptp(torque) > 5.0
     assert np.ptp(torque_ripple(run, lift)) < 2e-3 * np.ptp(torque)
+
+
+def test_the_ripple_is_what_a_straight_line_leaves(bench, synthetic_map):
+    """Residual of the least-squares line through the torque that drifts."""
+    run = bench(synthetic_map, simulation__duration_s=2.0)
+    drift = np.linspace(0.0, 5.0, run.time.size)[:, None]
+    run = replace(run, output_torque=run.output_torque + drift)
+    torque, time = run.output_torque[run.steady, 0], run.time[run.steady]
+    expected = torque - np.polynomial.Polynomial.fit(time, torque, 1)(time)
+    assert np.ptp(expected) > 0.1
+    np.testing.assert_allclose(torque_ripple(run, 0), expected, rtol=0, atol=1e-9)
 
 
 def test_the_rigid_arm_is_its_own_reference(bench, synthetic_map):
