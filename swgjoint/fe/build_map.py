@@ -9,6 +9,7 @@ from swgjoint.fe import drive2d
 from swgjoint.fe.friction_loop import friction_loops
 from swgjoint.fe.sampling import sample_map
 from swgjoint.fe.solid import drive3d
+from swgjoint.fe.thin_ring import sampling as thin_ring
 from swgjoint.gear.design import Design
 from swgjoint.maps.cache import cached
 from swgjoint.maps.drive_map import DriveMap
@@ -33,9 +34,12 @@ def build_map(
 
     Args:
         design: The drive.
-        model: Fidelity, ``2d`` or ``3d``; by default ``3d`` for a design with a cup.
-        angles: Wave-generator positions over one pitch of the fixed member; the
-            default of :func:`swgjoint.fe.sampling.sample_map` if None.
+        model: Fidelity, ``ring``, ``2d`` or ``3d``; by default ``3d`` for a design with
+            a cup, else ``2d``.
+        angles: Wave-generator positions over one pitch of the fixed member, with
+            ``ring`` positions of the balls over one passage; the default of
+            :func:`swgjoint.fe.sampling.sample_map` or
+            :func:`swgjoint.fe.thin_ring.sampling.sample_rings` if None.
         progress: Called with the stage, the solves done and their number.
         cache: Whether to look in the cache of maps, and to store there.
 
@@ -46,10 +50,15 @@ def build_map(
     model = model or ("3d" if design.cup is not None else "2d")
     if model == "3d":
         drive3d.check_modelled(design)
+    elif model == "ring":
+        thin_ring.check_modelled(design)
     else:
         drive2d.check_modelled(design, model)
 
     def build() -> DriveMap:
+        if model == "ring":
+            given = thin_ring.sample_rings(design, angles=angles, progress=progress)
+            return fit_map(given)
         drive = fit_map(
             sample_map(design, model=model, angles=angles, progress=progress)
         )

@@ -48,7 +48,7 @@ def check_modelled(design: Design, model: str) -> None:
     drive, tolerances = design.drive, design.tolerances
     faults = []
     if model != "2d":
-        faults.append(f"model {model!r} gives no map; available: '2d', '3d'")
+        faults.append(f"model {model!r} gives no map; available: 'ring', '2d', '3d'")
     if tolerances.misalignment_arcmin:
         faults.append(
             f"tolerances.misalignment_arcmin = {tolerances.misalignment_arcmin:g}: the"
@@ -62,8 +62,11 @@ def left_out(design: Design, model: str = "2d") -> str | None:
     """Parts of the design that the model cannot see, for the validity label."""
     shapes = design.micro_geometry.model_dump(exclude={"crowning_kind"})
     parts = {
-        "wave_generator.bearing": design.wave_generator.bearing is not None,
-        "micro_geometry": model == "2d" and any(shapes.values()),
+        "wave_generator.bearing": model != "ring"
+        and design.wave_generator.bearing is not None,
+        "micro_geometry": model != "3d" and any(shapes.values()),
+        "passage of teeth": model == "ring",
+        "rim of the circular spline": model == "ring",
     }
     return " and ".join(name for name, there in parts.items() if there) or None
 

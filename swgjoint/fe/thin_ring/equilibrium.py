@@ -69,6 +69,11 @@ class RingState:
     history: tuple[float, ...] = ()
     """Largest displacement increment of every iteration [m]."""
 
+    @property
+    def loaded_teeth(self) -> int:
+        """Tooth contacts that carry load."""
+        return 0 if self.tooth_force is None else len(self.tooth_force)
+
 
 def at_rest(model: ThinRing, alpha: float, phase: float = 0.0) -> RingState:
     """Start of a search: both rings inextensionally deflected by the lobes."""
@@ -85,7 +90,7 @@ def at_rest(model: ThinRing, alpha: float, phase: float = 0.0) -> RingState:
         dw, dv = -2.0 * w0 * np.sin(wave)[:, None], -w0 * np.cos(wave)[:, None]
         slope = (r + w + dv) * along + (dw - v) * outward
         parts.append(np.stack([place, slope * (2.0 * np.pi / count)], axis=1).ravel())
-    centres, _ = model.balls(alpha, phase)
+    centres, _, _ = model.balls(alpha, phase)
     share = model.race.elements / (2.0 * np.pi)
     feet = np.mod(np.arctan2(-centres[:, 0], centres[:, 1]), 2.0 * np.pi) * share
     return RingState(
@@ -278,6 +283,8 @@ class PressedBalls:
     """On the race [N·m]."""
     input_torque: float
     """Power per speed of the wave generator that moves the balls [N·m]."""
+    cage_torque: float
+    """Power per speed of the cage against the cam [N·m]."""
 
     @property
     def resultant(self) -> Array:
@@ -287,7 +294,7 @@ class PressedBalls:
 
 def race_on_balls(model: ThinRing, state: RingState, race: Array) -> PressedBalls:
     """Balls of a state under a race with given coordinates."""
-    centre, d_centre = model.balls(state.alpha, state.phase)
+    centre, d_centre, d_phase = model.balls(state.alpha, state.phase)
     seen = facing(model.race, race, centre, state.ball_feet, inside=True)
     bearing = model.bearing
     reach = 0.5 * (bearing.ball_diameter + bearing.race_thickness)
@@ -302,6 +309,7 @@ def race_on_balls(model: ThinRing, state: RingState, race: Array) -> PressedBall
         push=push,
         moment=float(np.sum(turned(foot) * push)),
         input_torque=float(np.sum(push * d_centre)),
+        cage_torque=float(np.sum(push * d_phase)),
     )
 
 

@@ -93,8 +93,8 @@ class ThinRing:
         both = 8 * place[:, None] + np.arange(8)
         return np.concatenate([both[:, :4].ravel(), both[:, 4:].ravel()])
 
-    def balls(self, alpha: float, phase: float) -> tuple[Array, Array]:
-        """Ball centres on the cam (n, 2) and their derivative by alpha [m, m/rad].
+    def balls(self, alpha: float, phase: float) -> tuple[Array, Array, Array]:
+        """Ball centres on the cam and their derivatives by alpha and by phase (n, 2).
 
         The cage lags behind the wave generator as rolling without slip has it; the race
         turns with the flexspline, at the ideal ratio.
@@ -107,7 +107,8 @@ class ThinRing:
         spacing = 2.0 * pi / self.bearing.balls * np.arange(self.bearing.balls)
         pose = self.cam.pose(phase + lag * alpha + spacing)
         centre = rotate(pose.point + self.cam_offset, alpha)
-        return centre, turned(centre) + lag * rotate(pose.d_point, alpha)
+        rolled = rotate(pose.d_point, alpha)
+        return centre, turned(centre) + lag * rolled, rolled
 
 
 def check_modelled(design: Design) -> None:

@@ -118,8 +118,7 @@ def loaded(model: ThinRing, state: RingState, torque: float) -> RingState:
         torque: T, not zero [N·m].
     """
     solver = RingSolver()
-    held = state.tooth_force is not None and len(state.tooth_force) > 0
-    begin = state.torque if held else 0.0
+    begin = state.torque if state.loaded_teeth else 0.0
     done, step, halved = 0.0, 1.0, 0
     while done < 1.0:
         goal = min(1.0, done + step)
@@ -165,10 +164,9 @@ def _one(
 
 def _row(state: RingState, psi0: float) -> list[float]:
     assert state.ball_force is not None
-    assert state.tooth_force is not None
     return [
         psi0 - state.rotation,
         float((state.ball_force > 0.0).sum()),
-        float(state.tooth_force.size),
+        float(state.loaded_teeth),
         float(state.ball_force.max()),
     ]

@@ -37,13 +37,14 @@ def test_potential_is_stationary(model, state):
     rng = np.random.default_rng(0)
     solver = RingSolver()
     for _ in range(3):
-        d = rng.normal(size=model.size) * 1e-12  # contacts that begin bend Pi
+        # smaller drowns in round-off, larger lets contacts begin, which bends Pi
+        d = rng.normal(size=model.size) * 3e-12
         up, down = (
             solver.potential(model, replace(state, q=state.q + s * d), TORQUE)
             for s in (1.0, -1.0)
         )
-        # against the work of a newton over the same way
-        assert abs(up - down) < 1e-5 * np.abs(d).sum()
+        # against the work of a newton over the same way; the balls press with 400 N
+        assert abs(up - down) < 3e-5 * np.abs(d).sum()
 
 
 def test_moments_balance(model, state):
