@@ -24,6 +24,10 @@ STUDIES = {
         "swgjoint.study.articles:run_articles",
         "force, deflection, stress and fatigue of three articles, with the 3D model",
     ),
+    "catalogue": (
+        "swgjoint.study.catalogue:run_catalogue",
+        "stiffness, losses and ratcheting of a family of drives beside a catalogue",
+    ),
     "response": (
         "swgjoint.study.response:run_response",
         "two-mass frequency response of a joint beside its closed form",

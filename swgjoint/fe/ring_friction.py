@@ -16,7 +16,7 @@ The race is free to creep in the bore: it turns so that the work is least.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -35,6 +35,8 @@ Array = NDArray[np.float64]
 
 POSITIONS = 2
 """Wave-generator angles of a mean: torsion differs by 0.2 % between them."""
+STIFF = 30.0
+"""Times that contacts are stiffer which shall hardly yield."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -92,7 +94,11 @@ class RubbedPath:
 
 
 def rubbed_path(
-    design: Design, torques: ArrayLike, *, angles: ArrayLike | None = None
+    design: Design,
+    torques: ArrayLike,
+    *,
+    angles: ArrayLike | None = None,
+    stiffened: str | None = None,
 ) -> RubbedPath:
     """Load a drive with the wave generator locked and look at what slides.
 
@@ -101,11 +107,20 @@ def rubbed_path(
             of friction must be absent.
         torques: T, positive [N·m]; 1 % of the rated torque is put before them.
         angles: Wave-generator angles [rad]; by default :data:`POSITIONS`.
+        stiffened: ``balls`` or ``teeth``: the contacts that hardly yield, to see what
+            their share in the compliance is.
 
     Raises:
         DesignError: If the design cannot be built or holds what is not modelled.
     """
     model = thin_ring(design)
+    if stiffened == "balls":
+        model = replace(model, ball_constant=STIFF * model.ball_constant)
+    elif stiffened == "teeth":
+        teeth = replace(model.teeth, stiffness=STIFF * model.teeth.stiffness)
+        model = replace(model, teeth=teeth)
+    elif stiffened is not None:
+        raise ValueError(f"stiffened {stiffened!r}: not balls or teeth")
     small = SMALL * ratings_of(design).rated_torque
     wanted = np.unique(np.append(np.asarray(torques, dtype=float).ravel(), small))
     wanted = wanted[wanted >= small]

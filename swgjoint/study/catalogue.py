@@ -1,0 +1,219 @@
+"""``swgjoint study catalogue``: the family of drives beside a catalogue.
+
+Parts: ``stiffness`` (K1, K2, K3, hysteresis loss and lost motion by the thin rings
+with the bearing of the wave generator, and the share of each mechanism),
+``individuals`` (gears with errors of their own), ``ratcheting`` and ``accuracy``
+(finite elements in the plane), ``losses``. What is run is stated in
+``models/studies/catalogue.toml``; where no source decides, variants are run: ``ours``
+is the middle of their bracket.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from swgjoint.errors import InputError
+from swgjoint.files import write_whole
+from swgjoint.gear.design import Design
+from swgjoint.json_text import json_text
+from swgjoint.maps.catalogue import CatalogueRow
+from swgjoint.maps.loop import LOST_MOTION_TORQUE
+from swgjoint.study.catalogue_file import CatalogueFile, variant_design
+from swgjoint.study.catalogue_rows import (
+    accuracy_rows,
+    catalogue_row,
+    loss_rows,
+    ratcheting_rows,
+    stiffness_rows,
+    summary,
+)
+from swgjoint.study.catalogue_runs import Found, Task, oval, run_task
+from swgjoint.study.catalogue_shares import individual_summary, scaling, shares
+from swgjoint.study.pool import run_all
+from swgjoint.study.rows import Row, StudyOptions, StudyResult
+
+PARTS = ("stiffness", "individuals", "ratcheting", "accuracy", "losses")
+REFERENCE = 25
+"""Size at which a computation stands for all, scaled."""
+CHECK = (14, 80)
+"""Size and ratio at which that is computed, too."""
+
+
+def run_catalogue(options: StudyOptions) -> StudyResult:
+    """Run the chosen parts, or all of them.
+
+    Raises:
+        InputError: If a part is unknown or a fidelity is given.
+    """
+    if options.model is not None:
+        raise InputError(
+            f"--model {options.model}: every quantity here has a level of its own"
+        )
+    unknown = [part for part in options.only if part not in PARTS]
+    if unknown:
+        raise InputError(
+            f"--only {','.join(unknown)}: no such part; accepted: {', '.join(PARTS)}"
+        )
+    parts = [part for part in PARTS if not options.only or part in options.only]
+    study = CatalogueFile.load()
+    tasks = [task for part in parts for task in tasks_of(study, part)]
+    ordered = sorted(tasks, key=lambda task: -task.work)
+    results = run_all(
+        run_task,
+        ordered,
+        jobs=options.jobs,
+        stage="computations",
+        progress=options.progress,
+    )
+    found = dict(zip((task.name for task in ordered), results, strict=True))
+    rows = [row for part in parts for row in rows_of(study, part, found)]
+    failed = {name: f["fault"] for name, f in found.items() if "fault" in f}
+    lines = summary(study, rows)
+    more: dict[str, Any] = {
+        "source": study.source,
+        "variants": [v.name for v in study.variants],
+        "computations": found,
+        "failed": sorted(failed),
+    }
+    if "stiffness" in parts:
+        more["scaling"] = scaling(study, found, REFERENCE)
+        more["shares"] = shares(study, found, REFERENCE)
+        lines += more["scaling"]["lines"] + more["shares"]["lines"]
+    if "individuals" in parts:
+        more["individuals"] = individual_summary(study, found)
+        lines += more["individuals"]["lines"]
+    lines += [f"failed: {name}: {fault}" for name, fault in failed.items()]
+    files = _write(options.folder, rows, lines)
+    return StudyResult(rows=tuple(rows), summary=tuple(lines), more=more, files=files)
+
+
+def torques_of(row: CatalogueRow) -> tuple[float, ...]:
+    """Torques of a path: lost motion, T1, T2, rated, the end of the standard loop."""
+    top = max(row.repeated_peak, 1.5 * row.T2)
+    wanted = (LOST_MOTION_TORQUE * row.rated_torque, row.T1, row.T2, row.rated_torque)
+    return tuple(sorted({*wanted, top}))
+
+
+def tasks_of(study: CatalogueFile, part: str) -> list[Task]:
+    """What a part computes."""
+    if part == "losses":
+        return []
+    flanks = {v.flank_deg: v for v in reversed(study.variants)}
+    if part == "stiffness":
+        tasks = [
+            _path(size, ratio, variant_design(size, ratio, variant), flank)
+            for flank, variant in flanks.items()
+            for ratio in study.ratios
+            for size in study.sizes
+        ]
+        first = study.variants[0]
+        for ratio in study.ratios:
+            design = variant_design(REFERENCE, ratio, first)
+            tight = design.with_changes({"wave_generator.bearing.clearance_um": 0.0})
+            tasks.append(_path(REFERENCE, ratio, tight, first.flank_deg, "clearance"))
+            tasks += [
+                _path(REFERENCE, ratio, design, first.flank_deg, part)
+                for part in ("balls", "teeth")
+            ]
+        return tasks
+    if part == "individuals":
+        own = study.individuals
+        torques = torques_of(catalogue_row(own.size, own.ratio))
+        return [
+            Task(
+                name=f"individual {seed}",
+                kind="path",
+                design=study.individual(seed),
+                torques=torques,
+                work=2,
+            )
+            for seed in own.seeds
+        ]
+    cases = [(REFERENCE, ratio) for ratio in study.ratios] + [CHECK]
+    if part == "accuracy":
+        changes = {**study.individuals.changes, "tolerances.seed": 1}
+        return [
+            Task(
+                name=f"accuracy {size} {ratio}",
+                kind="accuracy",
+                design=variant_design(size, ratio, study.variants[0]).with_changes(
+                    changes
+                ),
+                work=0.4 * ratio,
+            )
+            for size, ratio in cases
+        ]
+    tasks = []
+    for flank, variant in flanks.items():
+        for size, ratio in cases:
+            design = variant_design(size, ratio, variant)
+            if (size, ratio) == CHECK and variant is not study.variants[0]:
+                continue
+            name = f"ratcheting {size} {ratio} {flank:g}"
+            tasks.append(_teeth(name, oval(design), ratio))
+            if size == REFERENCE and variant is study.variants[0]:
+                tasks.append(_teeth(f"{name} fixed", design, 0.5 * ratio))
+    return tasks
+
+
+def _path(
+    size: int, ratio: int, design: Design, flank: float, without: str | None = None
+) -> Task:
+    row = catalogue_row(size, ratio)
+    stiffened = without if without in ("balls", "teeth") else None
+    end = f" without {without}" if without else ""
+    return Task(
+        name=f"path {size} {ratio} {flank:g}{end}",
+        kind="path",
+        design=design,
+        torques=torques_of(row),
+        stiffened=stiffened,
+        work=0.02 * ratio,
+    )
+
+
+def _teeth(name: str, design: Design, work: float) -> Task:
+    return Task(name=name, kind="ratcheting", design=design, work=work)
+
+
+def rows_of(study: CatalogueFile, part: str, found: Mapping[str, Found]) -> list[Row]:
+    """Rows of a part from what its tasks found."""
+    cases = [(size, ratio) for ratio in study.ratios for size in study.sizes]
+    build = {
+        "stiffness": lambda row: stiffness_rows(study, row, found),
+        "ratcheting": lambda row: ratcheting_rows(study, row, found, REFERENCE),
+        "accuracy": lambda row: accuracy_rows(row, found, REFERENCE),
+        "losses": loss_rows,
+    }
+    if part not in build:
+        return []
+    return [one for case in cases for one in build[part](catalogue_row(*case))]
+
+
+def _write(
+    folder: Path | None, rows: Sequence[Row], lines: Sequence[str]
+) -> tuple[str, ...]:
+    if folder is None:
+        return ()
+    from swgjoint.study.catalogue_plots import catalogue_picture
+
+    plain = [row.to_json() for row in rows]
+    text = io.StringIO()
+    writer = csv.DictWriter(text, fieldnames=list(plain[0]), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(plain)
+    folder.mkdir(parents=True, exist_ok=True)
+    files = [
+        write_whole(folder / "catalogue.csv", text.getvalue()),
+        write_whole(
+            folder / "catalogue.json", json_text({"rows": plain, "summary": lines})
+        ),
+    ]
+    picture = catalogue_picture(rows)
+    if picture is not None:
+        files.append(write_whole(folder / "catalogue.png", picture))
+    return tuple(str(path) for path in files)

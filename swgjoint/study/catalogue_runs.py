@@ -1,0 +1,160 @@
+"""Computations of the comparison with the catalogue, kept from run to run."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import logging
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from swgjoint.errors import ComputationError, DesignError, InputError
+from swgjoint.files import write_whole
+from swgjoint.gear.design import Design
+from swgjoint.json_text import json_text
+from swgjoint.maps.cache import cache_folder, key_of
+
+_log = logging.getLogger(__name__)
+
+Found = dict[str, Any]
+
+OUTSIDE = 1.37
+"""Outer diameter of the circular spline over the pitch diameter, for ratcheting: mean
+of 1.34 to 1.41 of component sets of sizes 14 to 32 (50, 60, 70, 85, 110 mm; dimension
+tables from memory, not checked)."""
+ANGLES = 24
+"""Input positions of the map of which the accuracy is read."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Task:
+    """One computation."""
+
+    name: str
+    kind: str
+    """Key of :data:`KINDS`."""
+    design: Design
+    torques: tuple[float, ...] = ()
+    """[N·m]."""
+    stiffened: str | None = None
+    work: float = 1.0
+    """Rough, to start long ones first."""
+
+
+def run_task(task: Task) -> Found:
+    """The result of a task, kept or computed; ``fault`` where it failed."""
+    folder = cache_folder()
+    path = None if folder is None else folder / "studies" / f"{_key(task)}.json"
+    found = None if path is None else _kept(path)
+    if found is not None:
+        return found
+    begin = time.perf_counter()
+    try:
+        found = KINDS[task.kind](task)
+    except (ComputationError, DesignError) as error:
+        found = {"fault": str(error).splitlines()[0]}
+    found["wall_s"] = time.perf_counter() - begin
+    if path is not None:
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            write_whole(path, json_text(found))
+        except (OSError, InputError) as error:
+            _log.warning("result not kept in the cache: %s", error)
+    return found
+
+
+def _key(task: Task) -> str:
+    return key_of(
+        {
+            "study": _own_version(),
+            "kind": task.kind,
+            "design": task.design.content_hash(),
+            "torques": task.torques,
+            "stiffened": task.stiffened,
+        }
+    )
+
+
+@lru_cache
+def _own_version() -> str:
+    return hashlib.sha256(Path(__file__).read_bytes()).hexdigest()
+
+
+def _kept(path: Path) -> Found | None:
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+        if isinstance(data, dict) and "wall_s" in data:
+            return data
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError):
+        pass
+    _log.warning("cache entry ignored and computed again: %s", path)
+    return None
+
+
+def _path(task: Task) -> Found:
+    """Torsion behind the cup [rad] and sliding work per mu [J] over the torque."""
+    from swgjoint.fe.ring_friction import rubbed_path
+
+    path = rubbed_path(task.design, task.torques, stiffened=task.stiffened)
+    if not path.outcome.ok:
+        reached = path.torque[-1] if path.torque.size else 0.0
+        raise ComputationError(
+            f"rings reach {reached:.4g} of {max(task.torques):.4g} N·m:"
+            f" {path.outcome.value}"
+        )
+    work = path.teeth_work + path.race_work
+    return {
+        "torque_Nm": path.torque.tolist(),
+        "ring_torsion_rad": (path.torsion - path.series * path.torque).tolist(),
+        "work_per_mu_J": work.tolist(),
+        "race_part": (path.race_work / np.maximum(work, 1e-300)).tolist(),
+        "balls": path.balls.tolist(),
+        "tooth_pairs": path.tooth_pairs.tolist(),
+    }
+
+
+def _ratcheting(task: Task) -> Found:
+    """Largest torque in the plane, with what the design's circular spline sits in."""
+    from swgjoint.fe.ratcheting import ratcheting_path
+
+    return ratcheting_path(task.design).as_dict()
+
+
+def _accuracy(task: Task) -> Found:
+    """Accuracy of the map in the plane with the design's manufacturing errors."""
+    from swgjoint.fe.build_map import build_map
+
+    drive = build_map(task.design, model="2d", angles=ANGLES)
+    key = "transmission_accuracy_arcmin"
+    return {key: drive.spec_sheet([key])[key]}
+
+
+KINDS: dict[str, Callable[[Task], Found]] = {
+    "path": _path,
+    "ratcheting": _ratcheting,
+    "accuracy": _accuracy,
+}
+
+
+def oval(design: Design) -> Design:
+    """The design with a circular spline as thick as those of component sets, free."""
+    drive = design.drive
+    own = design.circular_spline
+    root = drive.module_mm * (
+        drive.teeth_circular_spline + 2.0 * own.dedendum_coefficient
+    )
+    outside = OUTSIDE * drive.module_mm * drive.teeth_flexspline
+    return design.with_changes(
+        {
+            "circular_spline.outer_rim": "free",
+            "circular_spline.rim_mm": 0.5 * (outside - root),
+        }
+    )

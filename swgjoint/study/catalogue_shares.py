@@ -1,0 +1,114 @@
+"""What lies behind the stiffness: size, mechanisms, the scatter of single gears."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from swgjoint.study.catalogue_file import CatalogueFile, variant_design
+from swgjoint.study.catalogue_rows import (
+    STIFFNESS,
+    catalogue_row,
+    edges,
+    rubbed,
+    stiffnesses,
+)
+from swgjoint.study.catalogue_runs import Found
+
+
+def scaling(
+    study: CatalogueFile, found: Mapping[str, Found], size: int
+) -> dict[str, Any]:
+    """How far the cube of the size goes: K of every size over that scaled from one."""
+    rows, worst = [], 0.0
+    first = study.variants[0]
+    for ratio in study.ratios:
+        base = found[f"path {size} {ratio} {first.flank_deg:g}"]
+        if "fault" in base:
+            continue
+        here = rubbed(base, variant_design(size, ratio, first))
+        for other in study.sizes:
+            one = found[f"path {other} {ratio} {first.flank_deg:g}"]
+            if "fault" in one or other == size:
+                continue
+            row, scale = catalogue_row(other, ratio), (other / size) ** 3
+            own = stiffnesses(rubbed(one, variant_design(other, ratio, first)), row)
+            torques = edges(row)
+            x = [0.0, *(here.at(torque / scale) for torque in torques[1:])]
+            scaled = scale * np.diff(torques) / scale / np.diff(x)
+            ratios = (own / scaled).tolist()
+            worst = max(worst, *(abs(r - 1.0) for r in ratios))
+            rows.append({"size": other, "ratio": ratio, "K_over_scaled": ratios})
+    line = (
+        f"K computed at each size is within {100 * worst:.0f} % of that of size {size}"
+        " scaled by the cube: clearances do not scale"
+    )
+    return {"rows": rows, "lines": [line]}
+
+
+def shares(
+    study: CatalogueFile, found: Mapping[str, Found], size: int
+) -> dict[str, Any]:
+    """Part of the compliance on each segment that goes with each mechanism.
+
+    The cup is in series; the others are differences when one is taken away alone, so
+    that they need not add up to the whole: what is left is bending, ball spacing and
+    what mechanisms do together.
+    """
+    rows, lines = [], []
+    first = study.variants[0]
+    for ratio in study.ratios:
+        name = f"path {size} {ratio} {first.flank_deg:g}"
+        if "fault" in found[name]:
+            continue
+        row, design = catalogue_row(size, ratio), variant_design(size, ratio, first)
+        whole = rubbed(found[name], design)
+        compliance = 1.0 / stiffnesses(whole, row)
+        part = {f"cup ({first.cup})": whole.series / compliance}
+        for what in ("clearance", "balls", "teeth"):
+            one = found[f"{name} without {what}"]
+            if "fault" not in one:
+                less = 1.0 / stiffnesses(rubbed(one, design), row)
+                part[what] = (compliance - less) / compliance
+        left = 1.0 - np.sum(list(part.values()), axis=0)
+        part["bending, ball spacing, together"] = left
+        rows += [
+            {"size": size, "ratio": ratio, "mechanism": k, "share": v.tolist()}
+            for k, v in part.items()
+        ]
+        text = ", ".join(
+            f"{k} {'/'.join(f'{100 * share:.0f}' for share in v)}"
+            for k, v in part.items()
+        )
+        lines.append(f"share in 1/K1/1/K2/1/K3 [%], size {size}, ratio {ratio}: {text}")
+    return {"rows": rows, "lines": lines}
+
+
+def individual_summary(
+    study: CatalogueFile, found: Mapping[str, Found]
+) -> dict[str, Any]:
+    """Mean and scatter of K over the individual gears."""
+    own = study.individuals
+    row = catalogue_row(own.size, own.ratio)
+    values = [
+        stiffnesses(rubbed(one, study.individual(seed)), row)
+        for seed in own.seeds
+        if "fault" not in (one := found[f"individual {seed}"])
+    ]
+    if len(values) < 2:
+        return {"rows": [], "lines": ["fewer than two individual gears were solved"]}
+    table_ = np.array(values)
+    mean, scatter = table_.mean(axis=0), table_.std(axis=0, ddof=1)
+    percent = 100.0 * scatter / mean
+    line = (
+        f"{len(values)} individual gears, size {own.size}, ratio {own.ratio}: K1, K2,"
+        f" K3 scatter by {percent[0]:.1f}, {percent[1]:.1f}, {percent[2]:.1f} % (one"
+        " sigma)"
+    )
+    rows = [
+        {"quantity": key, "mean_Nm_rad": m, "sigma_Nm_rad": s}
+        for key, m, s in zip(STIFFNESS, mean.tolist(), scatter.tolist(), strict=True)
+    ]
+    return {"rows": rows, "lines": [line]}
