@@ -32,7 +32,12 @@ from swgjoint.study.catalogue_rows import (
     summary,
 )
 from swgjoint.study.catalogue_runs import Found, Task, oval, run_task
-from swgjoint.study.catalogue_shares import individual_summary, scaling, shares
+from swgjoint.study.catalogue_shares import (
+    friction,
+    individual_summary,
+    scaling,
+    shares,
+)
 from swgjoint.study.pool import run_all
 from swgjoint.study.rows import Row, StudyOptions, StudyResult
 
@@ -82,7 +87,9 @@ def run_catalogue(options: StudyOptions) -> StudyResult:
     if "stiffness" in parts:
         more["scaling"] = scaling(study, found, REFERENCE)
         more["shares"] = shares(study, found, REFERENCE)
-        lines += more["scaling"]["lines"] + more["shares"]["lines"]
+        more["friction"] = friction(study, found, REFERENCE)
+        for key in ("scaling", "shares", "friction"):
+            lines += more[key]["lines"]
     if "individuals" in parts:
         more["individuals"] = individual_summary(study, found)
         lines += more["individuals"]["lines"]

@@ -16,6 +16,7 @@ from swgjoint.study.catalogue_rows import (
     stiffnesses,
 )
 from swgjoint.study.catalogue_runs import Found
+from swgjoint.units import arcmin
 
 
 def scaling(
@@ -112,3 +113,42 @@ def individual_summary(
         for key, m, s in zip(STIFFNESS, mean.tolist(), scatter.tolist(), strict=True)
     ]
     return {"rows": rows, "lines": [line]}
+
+
+def friction(
+    study: CatalogueFile, found: Mapping[str, Found], size: int
+) -> dict[str, Any]:
+    """Loop by coefficient of friction and torque amplitude, at one size."""
+    rows, lines = [], []
+    first = study.variants[0]
+    for ratio in study.ratios:
+        one = found[f"path {size} {ratio} {first.flank_deg:g}"]
+        if "fault" in one:
+            continue
+        path = rubbed(one, variant_design(size, ratio, first))
+        torque = path.torque.tolist()
+        for mu in (0.0, *study.coefficients):
+            rows.append(
+                {
+                    "size": size,
+                    "ratio": ratio,
+                    "mu": mu,
+                    "hysteresis_loss_arcmin": path.hysteresis_loss(mu) / arcmin,
+                    "torque_Nm": torque,
+                    "width_arcmin": (path.widths(mu) / arcmin).tolist(),
+                    "round_loss_J": path.round_loss(mu).tolist(),
+                }
+            )
+        some = rows[-1 - len(study.coefficients) :]
+        loss = "/".join(f"{row['hysteresis_loss_arcmin']:.3f}" for row in some)
+        wide = "/".join(f"{width:.3f}" for width in some[-1]["width_arcmin"])
+        work = np.array(some[-1]["round_loss_J"])
+        grows = np.polyfit(np.log(torque[2:]), np.log(work[2:]), 1)[0]
+        mus = "/".join(f"{row['mu']:g}" for row in some)
+        lines.append(
+            f"friction, size {size}, ratio {ratio}: {loss} arcmin wide at no load with"
+            f" mu {mus} (play included); with mu {some[-1]['mu']:g} {wide} arcmin wide"
+            f" between {', '.join(f'{t:.3g}' for t in torque)} N·m; work of a round"
+            f" grows with torque to the {grows:.1f}"
+        )
+    return {"rows": rows, "lines": lines}

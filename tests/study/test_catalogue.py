@@ -132,6 +132,13 @@ def test_rows_hold_brackets_and_failures(computed):
     assert rows["size 25, ratio 100", "no-load running torque"].ours is None
     shares = [r for r in found.more["shares"]["rows"] if r["ratio"] == 100]
     assert np.sum([r["share"] for r in shares], axis=0) == pytest.approx(np.ones(3))
+    rubs = [r for r in found.more["friction"]["rows"] if r["ratio"] == 100]
+    assert [r["mu"] for r in rubs] == [0.0, 0.05, 0.1]
+    losses = np.array([r["hysteresis_loss_arcmin"] for r in rubs])
+    # linear in mu, the play at no friction
+    assert losses[0] == pytest.approx(0.1, rel=1e-6)
+    assert losses[2] - losses[0] == pytest.approx(2 * (losses[1] - losses[0]))
+    assert np.diff(rubs[-1]["round_loss_J"]).min() > 0.0
     assert "individual gears" in "".join(found.summary)
     json.dumps(found.more)
 
