@@ -8,6 +8,7 @@ from math import pi
 import numpy as np
 
 from swgjoint.errors import DesignError
+from swgjoint.gear.ball_bearing import BallBearing
 from swgjoint.gear.check import Check
 from swgjoint.gear.design import Design
 from swgjoint.gear.profile import TANGENCY_RAD, ToothProfile, tooth_profile
@@ -42,7 +43,7 @@ def design_checks(design: Design) -> list[Check]:
     if design.cup is not None:
         checks += _cup(design)
     if design.wave_generator.bearing is not None:
-        checks += _bearing(design)
+        checks += bearing_checks(design)
     return checks
 
 
@@ -166,8 +167,8 @@ def _cup(design: Design) -> list[Check]:
     ]
 
 
-def _bearing(design: Design) -> list[Check]:
-    """The balls fit on their circle."""
+def bearing_checks(design: Design) -> list[Check]:
+    """The balls fit on their circle, and race and balls inside the outline."""
     bearing = design.wave_generator.bearing
     assert bearing is not None
     bore = design.flexspline_inner_radius / mm
@@ -175,7 +176,9 @@ def _bearing(design: Design) -> list[Check]:
     # chord between neighbours on the undeformed circle
     pitch = 2.0 * circle * np.sin(pi / bearing.balls)
     clearance = float(pitch) - bearing.ball_diameter_mm
+    checks = _cam(design)
     return [
+        *checks,
         Check(
             name="bearing: clearance between balls, above",
             ok=clearance > 0.0,
@@ -185,5 +188,32 @@ def _bearing(design: Design) -> list[Check]:
             fault=f"{design.drive.name}: wave_generator.bearing.balls ="
             f" {bearing.balls}: balls of {bearing.ball_diameter_mm:g} mm overlap by"
             f" {-clearance:.4g} mm; accepted: fewer or smaller balls",
+        ),
+    ]
+
+
+def _cam(design: Design) -> list[Check]:
+    """The cam below race and balls is a curve without corners."""
+    bearing = BallBearing.of(design)
+    try:
+        outline = with_checks(design)[0]
+    except DesignError:
+        return []
+    inner, _ = bearing.raceways
+    depth = bearing.bore_radius - inner
+    stations = np.linspace(0.0, outline.perimeter, 721)
+    sharpest = 1.0 / float(outline.evaluate(stations)[2].max())
+    value = (sharpest - depth) / mm
+    return [
+        Check(
+            name="bearing: sharpest radius of the cam below it, above",
+            ok=value > 0.0,
+            value=value,
+            unit="mm",
+            limit=0.0,
+            fault=f"{design.drive.name}: wave_generator.bearing: race, balls and"
+            f" clearances of {depth / mm:.4g} mm do not fit inside the outline, whose"
+            f" radius of curvature falls to {sharpest / mm:.4g} mm; accepted: a smaller"
+            " ball_diameter_mm or race_thickness_mm",
         )
     ]

@@ -14,9 +14,8 @@ that, with a force that vanishes because nothing rubs.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
-from functools import partial
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,6 +64,11 @@ class RingState:
     """Strain energy, contacts included [J]."""
     compliance: float = 0.0
     """-d psi / dT [rad/(N·m)]."""
+    shares: Mapping[str, float] = field(default_factory=dict)
+    """Parts of the compliance: rim and race, balls, bore (pressed by the race), teeth.
+
+    Of the energy of a small twist, as a share of the whole; a contact that bends over
+    under its force may have a negative one."""
     outcome: Outcome = Outcome.CONVERGED
     history: tuple[float, ...] = ()
     """Largest displacement increment of every iteration [m]."""
@@ -109,11 +113,11 @@ class RingSolver:
     max_iterations: int = 80
     shortest: float = 1e-3
     """Part of a Newton step down to which it is halved while the potential rises."""
-    step_tolerance: float = 1e-13
+    step_tolerance: float = 3e-12
     """Increment, relative to the radius of the rim, at which the iteration ends."""
     stride: float = 0.1
     """Longest move of one iteration, in lobe heights."""
-    anchor: float = 1e-9
+    anchor: float = 1e-11
     """Part of the rim's stiffness that holds back, in every step, an output that no
     tooth holds; it does not shift an equilibrium."""
 
@@ -143,7 +147,7 @@ class RingSolver:
         step, part, last = np.zeros(model.size), 0.0, np.inf
         for _ in range(self.max_iterations):
             tried = replace(state, q=state.q + part * step)
-            tried, factor, gradient = _linearised(model, tried, teeth=teeth)
+            tried, total, held = _linearised(model, tried, teeth=teeth)
             psi, turn = _rotation(model, tried.q)
             potential = tried.energy + load * psi
             rises = potential - last > 1e-12 * abs(last)
@@ -151,8 +155,8 @@ class RingSolver:
                 part *= 0.5
                 continue
             state, last = tried, potential
-            right = np.stack([-gradient - load * turn, turn], axis=1)
-            base, reach = factor(right, self.anchor).T
+            right = np.stack([-total.gradient - load * turn, turn], axis=1)
+            base, reach = total.solve(model.order, held, right, self.anchor).T
             compliance, change = float(turn @ reach), 0.0
             if rotation is not None:
                 change = (psi + float(turn @ base) - rotation) / compliance
@@ -165,7 +169,12 @@ class RingSolver:
             load += part * change
             state = replace(state, torque=load, compliance=compliance)
             if size < self.step_tolerance * model.rim.radius:
-                state = replace(state, q=state.q + step)
+                parts = total.shares(reach)
+                state = replace(
+                    state,
+                    q=state.q + step,
+                    shares={k: value / compliance for k, value in parts.items()},
+                )
                 return _finished(model, state, Outcome.CONVERGED, history, teeth=teeth)
         return _finished(model, state, Outcome.MAX_ITERATIONS, history, teeth=teeth)
 
@@ -197,9 +206,11 @@ class _Sum:
     def __init__(self, size: int) -> None:
         self.energy = 0.0
         self.gradient = np.zeros(size)
-        self._parts: list[tuple[Index, Array]] = []
+        self._parts: list[tuple[str, Index, Array]] = []
 
-    def add(self, dofs: Index, gradient: Array | None, hessian: Array) -> None:
+    def add(
+        self, name: str, dofs: Index, gradient: Array | None, hessian: Array
+    ) -> None:
         """Parts with degrees of freedom (n, m), gradients (n, m), Hessians (n, m, m).
 
         The gradient is None where it has been counted.
@@ -208,7 +219,16 @@ class _Sum:
             self.gradient += np.bincount(
                 dofs.ravel(), gradient.ravel(), len(self.gradient)
             )
-        self._parts.append((dofs, hessian))
+        self._parts.append((name, dofs, hessian))
+
+    def shares(self, way: Array) -> dict[str, float]:
+        """Energy of the tangent along a displacement, twice, by part."""
+        found: dict[str, float] = {}
+        for name, dofs, hessian in self._parts:
+            moved = way[dofs]
+            value = float(np.einsum("ni,nij,nj->", moved, hessian, moved))
+            found[name] = found.get(name, 0.0) + value
+        return found
 
     def solve(self, order: Index, held: int, right: Array, anchor: float) -> Array:
         """Solve with one coordinate held and a part of the diagonal added.
@@ -221,7 +241,7 @@ class _Sum:
         """
         size = len(order)
         rows, columns, values = [], [], []
-        for dofs, hessian in self._parts:
+        for _, dofs, hessian in self._parts:
             place, m = order[dofs], dofs.shape[1]
             rows.append(np.repeat(place, m, axis=1).ravel())
             columns.append(np.tile(place, (1, m)).ravel())
@@ -244,16 +264,17 @@ class _Sum:
 
 def _linearised(
     model: ThinRing, state: RingState, *, teeth: bool
-) -> tuple[RingState, Callable[[Array, float], Array], Array]:
-    """Forces at the last positions, and the solver of the tangent there."""
+) -> tuple[RingState, _Sum, int]:
+    """Forces and tangent at the last positions, and the coordinate that is held."""
     total = _Sum(model.size)
     first = model.rim.size
     rim, race = state.q[:first], state.q[first:]
-    for ring, q, shift in ((model.rim, rim, 0), (model.race, race, first)):
+    both = (("rim", model.rim, rim, 0), ("race", model.race, race, first))
+    for name, ring, q, shift in both:
         gradient, hessian = ring.forces(q)
         total.energy += ring.energy(q)
         total.gradient[shift : shift + ring.size] += gradient
-        total.add(ring.dofs + shift, None, hessian)
+        total.add(name, ring.dofs + shift, None, hessian)
     state = _balls(model, state, race, total)
     state = _bore(model, state, rim, race, total)
     if teeth:
@@ -263,9 +284,8 @@ def _linearised(
     # the tangential coordinate of race node 0, whichever axis it is nearer to
     node = race.reshape(-1, 2, 2)[0, 0]
     held = first + (0 if abs(node[1]) > abs(node[0]) else 1)
-    state = replace(state, energy=total.energy)
     total.gradient[held] = 0.0
-    return state, partial(total.solve, model.order, held), total.gradient
+    return replace(state, energy=total.energy), total, held
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -319,7 +339,9 @@ def _balls(model: ThinRing, state: RingState, race: Array, total: _Sum) -> RingS
     near, overlap, force = pressed.seen.chosen(on), pressed.overlap, pressed.force
     slope = 1.5 * model.ball_constant * np.sqrt(overlap[on])
     total.energy += 0.4 * float(force @ overlap)
-    _press(total, near, near.by_ring, near.dofs + model.rim.size, force[on], slope)
+    _press(
+        total, "balls", near, near.by_ring, near.dofs + model.rim.size, force[on], slope
+    )
     return replace(
         state,
         ball_feet=pressed.seen.place,
@@ -346,7 +368,7 @@ def _bore(
     by_both[:, :2, :8], by_both[:, 3, :8] = rows[:, :2], rows[:, 2]
     by_both[:, :3, 8:] = near.by_ring
     total.energy += 0.5 * float(force @ overlap[on])
-    _press(total, near, by_both, both, force, np.full(len(on), k), bend)
+    _press(total, "bore", near, by_both, both, force, np.full(len(on), k), bend)
     return replace(state, bore_feet=seen.place)
 
 
@@ -355,13 +377,14 @@ def _teeth(model: ThinRing, state: RingState, rim: Array, total: _Sum) -> RingSt
     nodes = rim.reshape(-1, 2, 2)[:: model.nodes_per_tooth]
     foot, slope = nodes[:, 0], nodes[:, 1]
     contacts, angle = model.teeth.seen(foot, slope)
-    rows, _ = model.teeth.rows(contacts, foot, slope, angle)
+    rows, second = model.teeth.rows(contacts, foot, slope, angle)
     k = model.teeth.stiffness
     force = -k * contacts.gap
     j = contacts.sector
     dofs = 4 * model.nodes_per_tooth * j[:, None] + np.arange(4)
     total.energy += -0.5 * float(force @ contacts.gap)
-    total.add(dofs, -force[:, None] * rows, k * rows[:, :, None] * rows[:, None, :])
+    hessian = k * rows[:, :, None] * rows[:, None, :] - force[:, None, None] * second
+    total.add("teeth", dofs, -force[:, None] * rows, hessian)
     point = rotate(contacts.point, angle[j])
     push = force[:, None] * rotate(contacts.normal, angle[j])
     return replace(
@@ -374,6 +397,7 @@ def _teeth(model: ThinRing, state: RingState, rim: Array, total: _Sum) -> RingSt
 
 def _press(
     total: _Sum,
+    name: str,
     seen: Facing,
     rows: Array,
     dofs: Index,
@@ -387,6 +411,7 @@ def _press(
 
     Args:
         total: Where to.
+        name: Of the part.
         seen: The points.
         rows: u_n, u_t, beta and perhaps a turn by the coordinates (n, 3 or 4, m).
         dofs: These coordinates (n, m).
@@ -401,7 +426,7 @@ def _press(
     if bend is not None:
         form[:, 3, 3] -= force * bend
     hessian = np.swapaxes(rows, 1, 2) @ (form @ rows)
-    total.add(dofs, -force[:, None] * rows[:, 0], hessian)
+    total.add(name, dofs, -force[:, None] * rows[:, 0], hessian)
 
 
 def _finished(

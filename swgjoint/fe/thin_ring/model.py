@@ -22,7 +22,9 @@ from swgjoint.fe.thin_ring.hermite_ring import GAUSS, HermiteRing
 from swgjoint.fe.thin_ring.sections import rim_section, tooth_pair_stiffness
 from swgjoint.fe.thin_ring.teeth import Teeth
 from swgjoint.gear.ball_bearing import BallBearing
+from swgjoint.gear.check import raise_faults
 from swgjoint.gear.design import Design
+from swgjoint.gear.feasibility import bearing_checks
 from swgjoint.gear.neutral_line import NeutralLine
 from swgjoint.gear.profile import tooth_profile
 from swgjoint.gear.tolerances import (
@@ -155,6 +157,7 @@ def thin_ring(design: Design) -> ThinRing:
         DesignError: If the design cannot be built or holds what is not modelled.
     """
     check_modelled(design)
+    raise_faults(bearing_checks(design))
     bearing = BallBearing.of(design)
     flexspline = tooth_profile(design, "flexspline")
     circular_spline = tooth_profile(design, "circular_spline")
@@ -180,16 +183,6 @@ def thin_ring(design: Design) -> ThinRing:
         + bearing.race_thickness
     )
     outline = flawed_wave_generator(design)
-    # the curvature of the cam itself, another half ball below
-    stations = np.linspace(0.0, outline.perimeter, 721)
-    sharpest = 1.0 / float(outline.evaluate(stations)[2].max())
-    if sharpest <= inwards + 0.5 * bearing.ball_diameter:
-        depth = (inwards + 0.5 * bearing.ball_diameter) / mm
-        raise DesignError(
-            f"{design.drive.name}: wave_generator.bearing: race, balls and clearances"
-            f" of {depth:.4g} mm do not fit inside the outline, whose radius of"
-            f" curvature falls to {sharpest / mm:.4g} mm"
-        )
     length = outline.perimeter - 2.0 * pi * inwards
     thickness = design.flexspline.rim_mm * mm
     rim_steel = design.material_of("flexspline").youngs_modulus

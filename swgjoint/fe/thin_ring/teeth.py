@@ -101,20 +101,54 @@ class Teeth:
     def rows(
         self, contacts: Contacts, foot: Array, slope: Array, angle: Array
     ) -> tuple[Array, Array]:
-        r"""Rows of the gaps by the coordinates of the nodes that carry the teeth.
+        r"""How the gaps change with the coordinates of the nodes that carry the teeth.
 
-        .. math:: dg = n\cdot(dr + J(p - r)\,d\varphi), \quad
-            d\varphi = \frac{r' \times dr'}{|r'|^2}
+        With n out of the circular spline, t across it, the point p of contact moves by
+        :math:`dp = dr + J(p - r)\,d\varphi`, :math:`d\varphi = r' \times dr'/|r'|^2`;
+        flanks of curvatures :math:`\kappa` (flexspline) and :math:`\kappa_c` roll and
+        slide on each other:
+
+        .. math:: dg = n\cdot dp, \quad d^2g = \frac{\kappa\kappa_c\,(t\cdot dp)^2
+            - 2\kappa_c\,(t\cdot dp)\,d\varphi - d\varphi^2}{\kappa + \kappa_c}
+            - n\cdot(p - r)\,d\varphi^2
 
         Returns:
-            Rows by (r, r') (n, 4) and by the turn of the tooth (n, 4).
+            First (n, 4) and second (n, 4, 4) derivatives by (r, r').
         """
         j = contacts.sector
         normal = rotate(contacts.normal, angle[j])
-        arm = turned(rotate(contacts.point, angle[j]) - foot[j])
+        tangent = -turned(normal)
+        arm = rotate(contacts.point, angle[j]) - foot[j]
         square = np.einsum("ni,ni->n", slope[j], slope[j])
         turn = np.zeros((len(j), 4))
         turn[:, 2:] = turned(slope[j]) / square[:, None]
-        rows = np.einsum("ni,ni->n", normal, arm)[:, None] * turn
-        rows[:, :2] += normal
-        return rows, turn
+
+        def moved(direction: Array) -> Array:
+            row = np.einsum("ni,ni->n", direction, turned(arm))[:, None] * turn
+            row[:, :2] += direction
+            return row
+
+        across = moved(tangent)
+        _, _, own = self.flexspline.evaluate(contacts.station)
+        other = self.facing_curvature(contacts, arm + foot[j])
+        both = np.maximum(own + other, 1e-3 * np.abs(own))
+        form = np.empty((len(j), 2, 2))
+        form[:, 0, 0] = own * other / both
+        form[:, 0, 1] = form[:, 1, 0] = -other / both
+        form[:, 1, 1] = -1.0 / both - np.einsum("ni,ni->n", normal, arm)
+        pair = np.stack([across, turn], axis=1)
+        return moved(normal), np.swapaxes(pair, 1, 2) @ (form @ pair)
+
+    def facing_curvature(self, contacts: Contacts, points: Array) -> Array:
+        """Curvature of the circular spline's flank at contacts (n,) [1/m].
+
+        Args:
+            contacts: The contacts.
+            points: Where they are (n, 2) [m].
+        """
+        pitch = 2.0 * np.pi / self.circular_spline.teeth
+        place = np.asarray((contacts.tooth + 0.5) * pitch, dtype=np.float64)
+        local = rotate(points, -place)
+        # a right flank of the flexspline faces a left one, and flanks are right ones
+        local[:, 0] *= np.where(contacts.side == 0, -1.0, 1.0)
+        return np.asarray(self.circular_spline.signed_distance(local)[2])

@@ -22,6 +22,8 @@ POSITIONS = 4
 """Wave-generator angles of a mean."""
 SMALL = 0.01
 """Part of the rated torque that takes up a clearance of the teeth."""
+PARTS = ("rim", "race", "balls", "bore", "teeth")
+"""Of the compliance, in the plane."""
 GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 HALVINGS = 5
 """How often a step of the torque that fails is halved."""
@@ -49,6 +51,11 @@ class RingTorsion:
     """Tooth contacts that do (n_positions, n)."""
     largest_ball_force: Array
     """Shape (n_positions, n) [N]."""
+    compliance: Array
+    """Tangent, mean over the positions, what is in series included [rad/(N·m)]."""
+    shares: dict[str, Array]
+    """Of that compliance by part (n,): ``rim``, ``race``, ``balls``, ``bore`` (pressed
+    together with the race), ``teeth``, ``series`` (cup, boss, housing)."""
     outcome: Outcome
     """The first that is not converged, if any; its torques and those beyond are NaN."""
 
@@ -79,6 +86,9 @@ def torsion_curve(
     found, outcomes = (np.array([row[k] for row in rows]) for k in (0, 2))
     series = series_compliance(design, cup=True)
     torsion = found[:, 0] + series * wanted
+    plane = found[:, 4]
+    compliance = plane.mean(axis=0) + series
+    by_part = (found[:, 5:] * plane[:, None]).mean(axis=0) / compliance
     worst = [o for o in outcomes if not o.ok]
     return RingTorsion(
         torque=wanted,
@@ -89,6 +99,8 @@ def torsion_curve(
         balls=np.nan_to_num(found[:, 1]).astype(np.int64),
         tooth_pairs=np.nan_to_num(found[:, 2]).astype(np.int64),
         largest_ball_force=found[:, 3],
+        compliance=compliance,
+        shares=dict(zip(PARTS, by_part, strict=True)) | {"series": series / compliance},
         outcome=worst[0] if worst else Outcome.CONVERGED,
     )
 
@@ -114,7 +126,8 @@ def loaded(model: ThinRing, state: RingState, torque: float) -> RingState:
 
     Args:
         model: The rings.
-        state: Where to begin; one that holds no tooth counts as free of torque.
+        state: Where to begin; one that holds no tooth counts as free of torque, and
+            finds the teeth fastest under a small one.
         torque: T, not zero [N·m].
     """
     solver = RingSolver()
@@ -136,8 +149,11 @@ def loaded(model: ThinRing, state: RingState, torque: float) -> RingState:
 def _one(
     model: ThinRing, torques: Array, alpha: float, small: float
 ) -> tuple[Array, float, Outcome]:
-    """Torsion, loaded balls, tooth contacts, largest ball force; play; outcome."""
-    table = np.full((4, torques.size), np.nan)
+    """Torsion, loaded balls, tooth contacts, largest ball force, compliance, shares.
+
+    Also the play and the outcome.
+    """
+    table = np.full((5 + len(PARTS), torques.size), np.nan)
     rest = unloaded(model, alpha)
     if not rest.outcome.ok:
         return table, 0.0, rest.outcome
@@ -169,4 +185,6 @@ def _row(state: RingState, psi0: float) -> list[float]:
         float((state.ball_force > 0.0).sum()),
         float(state.loaded_teeth),
         float(state.ball_force.max()),
+        state.compliance,
+        *(state.shares.get(name, 0.0) for name in PARTS),
     ]

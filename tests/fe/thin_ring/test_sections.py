@@ -1,0 +1,77 @@
+"""The toothed rim as a line against its plane finite elements."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from swgjoint.fe.drive2d import ring_model, sector
+from swgjoint.fe.equilibrium import Load, NewtonSolver
+from swgjoint.fe.thin_ring.equilibrium import RingSolver, at_rest
+from swgjoint.fe.thin_ring.model import thin_ring
+from swgjoint.fe.thin_ring.sections import rim_section
+from swgjoint.gear.design import Design
+from swgjoint.gear.profile import tooth_profile
+
+
+def plain(design):
+    """E A and E I of the rim without teeth, and the radius of its middle."""
+    wall = design.flexspline.rim_mm * 1e-3
+    width = design.drive.face_width_mm * 1e-3
+    modulus = design.material_of("flexspline").youngs_modulus
+    middle = design.flexspline_inner_radius + 0.5 * wall
+    return modulus * width * wall, modulus * width * wall**3 / 12.0, middle
+
+
+@pytest.mark.parametrize("name", ["size-25-50", "size-25-100"])
+def test_teeth_stiffen_the_rim(name):
+    """Between the rim without teeth and a smooth one up to the tips."""
+    design = Design.load(name)
+    found = rim_section(
+        sector(design, "flexspline", tooth_profile(design, "flexspline"))
+    )
+    stretching, bending, middle = plain(design)
+    high = 1.4 * design.drive.module_mm / design.flexspline.rim_mm
+    assert 1.0 < found.stretching / stretching < 1.0 + high
+    assert 1.0 < found.bending / bending < (1.0 + high) ** 3
+    assert middle < found.neutral_radius < middle + design.drive.module_mm * 1e-3
+
+
+def test_section_scales_with_the_size():
+    """E A with the square, E I with the fourth power of all lengths."""
+    one, two = (
+        rim_section(sector(design, "flexspline", tooth_profile(design, "flexspline")))
+        for design in (Design.load("size-20-80"), Design.load("size-40-80"))
+    )
+    # the figures of the family are rounded to a nanometre
+    assert two.stretching == pytest.approx(4.0 * one.stretching, rel=1e-5)
+    assert two.bending == pytest.approx(16.0 * one.bending, rel=1e-5)
+
+
+@pytest.mark.fe
+@pytest.mark.parametrize(
+    ("name", "tolerance"), [("size-25-50", 0.03), ("size-25-100", 0.015)]
+)
+def test_deflected_rim_holds_the_energy_of_plane_elements(name, tolerance):
+    """On many stiff balls of a race that hardly bends, as on a rigid wave generator."""
+    design = Design.load(name)
+    plane = ring_model(design, half=True, elastic_circular_spline=False)
+    load = Load(rotation=0.0, teeth=False)
+    peer = NewtonSolver()(plane, plane.at_rest(), load)
+    assert peer.outcome.ok
+    model = thin_ring(
+        design.with_changes(
+            {
+                "wave_generator.bearing.clearance_um": 0.0,
+                "wave_generator.bearing.balls": 110,
+                "wave_generator.bearing.ball_diameter_mm": 1.2,
+                "wave_generator.bearing.race_thickness_mm": 0.1,
+            }
+        )
+    )
+    model = replace(model, ball_constant=4.0 * model.ball_constant)
+    state = RingSolver()(model, at_rest(model, 0.0), rotation=0.0, teeth=False)
+    assert state.outcome.ok
+    # without its teeth the rim would hold 21 and 38 % less
+    assert state.energy == pytest.approx(peer.energy, rel=tolerance)
