@@ -45,8 +45,11 @@ def catalogue_picture(rows: Sequence[Row]) -> bytes | None:
         axis.set_title(name)
         axis.set_xticks(range(len(ratios)), [f"{ratio}:1" for ratio in ratios])
         axis.set_xlabel("ratio")
-        axis.set_ylim(bottom=0.0)
         axis.grid(axis="y", alpha=0.3)
+    highest = max(
+        row.more["high_over_source"] for row in shown if row.quantity in panels
+    )
+    axes[0].set_ylim(0.0, 1.05 * max(highest, 1.4))
     for k, size in enumerate(sizes):
         colour = _COLOURS[k % len(_COLOURS)]
         axes[0].plot([], [], "o", color=colour, label=f"size {size}")

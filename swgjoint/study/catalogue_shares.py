@@ -83,7 +83,10 @@ def shares(
             f"{k} {'/'.join(f'{100 * share:.0f}' for share in v)}"
             for k, v in part.items()
         )
-        lines.append(f"share in 1/K1/1/K2/1/K3 [%], size {size}, ratio {ratio}: {text}")
+        lines.append(
+            f"share in the compliance on the segments of K1/K2/K3 [%], size {size},"
+            f" ratio {ratio}: {text}"
+        )
     return {"rows": rows, "lines": lines}
 
 
