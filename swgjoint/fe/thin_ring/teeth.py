@@ -126,7 +126,7 @@ class Teeth:
         def moved(direction: Array) -> Array:
             row = np.einsum("ni,ni->n", direction, turned(arm))[:, None] * turn
             row[:, :2] += direction
-            return row
+            return np.asarray(row)
 
         across = moved(tangent)
         _, _, own = self.flexspline.evaluate(contacts.station)

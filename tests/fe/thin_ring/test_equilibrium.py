@@ -97,6 +97,20 @@ def test_mirror(model):
     assert back.energy == pytest.approx(there.energy, rel=1e-9)
 
 
+@pytest.mark.parametrize("member", ["shift", "ring_shift"])
+def test_errors_of_all_teeth_turn_the_output(model, state, member):
+    """All teeth of a member moved along its pitch circle: the output turns by that."""
+    teeth = model.teeth
+    one = teeth.flexspline if member == "shift" else teeth.circular_spline
+    turn = 2e-5  # counter-clockwise, exact as a small rotation of the tooth frames
+    shift = np.tile([-turn * one.pitch_radius, 0.0], (one.teeth, 1))
+    moved = replace(model, teeth=replace(teeth, **{member: shift}))
+    found = RingSolver()(moved, state, torque=TORQUE)
+    assert found.outcome.ok
+    expected = -turn if member == "shift" else turn
+    assert found.rotation - state.rotation == pytest.approx(expected, rel=0.02)
+
+
 def test_compliance_is_the_slope(model, state):
     """The tangent compliance agrees with a difference of two torques."""
     near = RingSolver()(model, state, torque=TORQUE * (1 + 1e-5))
