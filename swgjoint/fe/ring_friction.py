@@ -16,7 +16,8 @@ The race is free to creep in the bore: it turns so that the work is least.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,7 +27,13 @@ from swgjoint.fe.corotation import rotate
 from swgjoint.fe.thin_ring.equilibrium import RingState
 from swgjoint.fe.thin_ring.facing import facing
 from swgjoint.fe.thin_ring.model import ThinRing, thin_ring
-from swgjoint.fe.thin_ring.torsion import SMALL, loaded, positions, unloaded
+from swgjoint.fe.thin_ring.torsion import (
+    PARTS,
+    SMALL,
+    loaded,
+    positions,
+    unloaded,
+)
 from swgjoint.gear.design import Design
 from swgjoint.gear.mounting import series_compliance
 from swgjoint.maps.catalogue import ratings_of
@@ -35,8 +42,6 @@ Array = NDArray[np.float64]
 
 POSITIONS = 2
 """Wave-generator angles of a mean: torsion differs by 0.2 % between them."""
-STIFF = 30.0
-"""Times that contacts are stiffer which shall hardly yield."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -56,6 +61,12 @@ class RubbedPath:
     """Sum of N |d sigma| of the teeth from torque to torque [J]. Shape (n - 1,)."""
     race_work: Array
     """The same of rim and race [J]. Shape (n - 1,)."""
+    compliance: Array
+    """Tangent at the torques, what is in series included [rad/(N·m)]. Shape (n,)."""
+    shares: Mapping[str, Array]
+    """Of that compliance by part of the rings, see
+    :attr:`swgjoint.fe.thin_ring.torsion.RingTorsion.shares`; the rest is in series.
+    Shapes (n,)."""
     balls: Array
     """Balls that carry load. Shape (n,)."""
     tooth_pairs: Array
@@ -98,7 +109,6 @@ def rubbed_path(
     torques: ArrayLike,
     *,
     angles: ArrayLike | None = None,
-    stiffened: str | None = None,
 ) -> RubbedPath:
     """Load a drive with the wave generator locked and look at what slides.
 
@@ -107,20 +117,11 @@ def rubbed_path(
             of friction must be absent.
         torques: T, positive [N·m]; 1 % of the rated torque is put before them.
         angles: Wave-generator angles [rad]; by default :data:`POSITIONS`.
-        stiffened: ``balls`` or ``teeth``: the contacts that hardly yield, to see what
-            their share in the compliance is.
 
     Raises:
         DesignError: If the design cannot be built or holds what is not modelled.
     """
     model = thin_ring(design)
-    if stiffened == "balls":
-        model = replace(model, ball_constant=STIFF * model.ball_constant)
-    elif stiffened == "teeth":
-        teeth = replace(model.teeth, stiffness=STIFF * model.teeth.stiffness)
-        model = replace(model, teeth=teeth)
-    elif stiffened is not None:
-        raise ValueError(f"stiffened {stiffened!r}: not balls or teeth")
     small = SMALL * ratings_of(design).rated_torque
     wanted = np.unique(np.append(np.asarray(torques, dtype=float).ravel(), small))
     wanted = wanted[wanted >= small]
@@ -132,7 +133,7 @@ def rubbed_path(
         outcome = ended if outcome.ok else outcome
     reached = min(len(rows) for rows in tables)
     table = np.mean([rows[:reached] for rows in tables], axis=0)
-    table = table.reshape(reached, 5)
+    table = table.reshape(reached, 6 + len(PARTS))
     series = series_compliance(design, cup=True)
     return RubbedPath(
         torque=wanted[:reached],
@@ -140,6 +141,11 @@ def rubbed_path(
         series=series,
         teeth_work=table[1:, 1],
         race_work=table[1:, 2],
+        compliance=table[:, 5] + series,
+        shares={
+            name: table[:, 6 + k] / (table[:, 5] + series)
+            for k, name in enumerate(PARTS)
+        },
         balls=table[:, 3],
         tooth_pairs=table[:, 4],
         outcome=outcome,
@@ -149,7 +155,10 @@ def rubbed_path(
 def _along(
     model: ThinRing, alpha: float, torques: Array
 ) -> tuple[list[list[float]], Outcome]:
-    """Torsion, works since the torque before, balls, tooth contacts, by torque."""
+    """Torsion, works, balls, tooth contacts, compliance and its parts, by torque.
+
+    Works since the torque before [J], compliance without what is in series.
+    """
     rest = unloaded(model, alpha)
     if not rest.outcome.ok:
         return [], rest.outcome
@@ -167,10 +176,17 @@ def _along(
             middle = 0.5 * (found.rotation + down.rotation)
         work = rubbing(model, state, found) if rows else (0.0, 0.0)
         assert found.ball_force is not None
-        assert found.tooth_force is not None
         balls = float((found.ball_force > 0.0).sum())
+        c = found.compliance
         rows.append(
-            [middle - found.rotation, *work, balls, float(found.tooth_force.size)]
+            [
+                middle - found.rotation,
+                *work,
+                balls,
+                float(found.loaded_teeth),
+                c,
+                *(c * found.shares.get(name, 0.0) for name in PARTS),
+            ]
         )
         state = found
     return rows, Outcome.CONVERGED

@@ -121,11 +121,7 @@ def tasks_of(study: CatalogueFile, part: str) -> list[Task]:
         for ratio in study.ratios:
             design = variant_design(REFERENCE, ratio, first)
             tight = design.with_changes({"wave_generator.bearing.clearance_um": 0.0})
-            tasks.append(_path(REFERENCE, ratio, tight, first.flank_deg, "clearance"))
-            tasks += [
-                _path(REFERENCE, ratio, design, first.flank_deg, part)
-                for part in ("balls", "teeth")
-            ]
+            tasks.append(_path(REFERENCE, ratio, tight, first.flank_deg, " tight"))
         return tasks
     if part == "individuals":
         own = study.individuals
@@ -167,18 +163,12 @@ def tasks_of(study: CatalogueFile, part: str) -> list[Task]:
     return tasks
 
 
-def _path(
-    size: int, ratio: int, design: Design, flank: float, without: str | None = None
-) -> Task:
-    row = catalogue_row(size, ratio)
-    stiffened = without if without in ("balls", "teeth") else None
-    end = f" without {without}" if without else ""
+def _path(size: int, ratio: int, design: Design, flank: float, end: str = "") -> Task:
     return Task(
         name=f"path {size} {ratio} {flank:g}{end}",
         kind="path",
         design=design,
-        torques=torques_of(row),
-        stiffened=stiffened,
+        torques=torques_of(catalogue_row(size, ratio)),
         work=0.02 * ratio,
     )
 

@@ -33,12 +33,18 @@ def rubbed(found: Found, design: Design) -> RubbedPath:
     series = series_compliance(design, cup=True)
     work = np.array(found["work_per_mu_J"])
     race = np.array(found["race_part"]) * work
+    ring = np.array(found["ring_compliance_rad_Nm"])
     return RubbedPath(
         torque=torque,
         torsion=np.array(found["ring_torsion_rad"]) + series * torque,
         series=series,
         teeth_work=work - race,
         race_work=race,
+        compliance=ring + series,
+        shares={
+            name: np.array(share) * ring / (ring + series)
+            for name, share in found["ring_shares"].items()
+        },
         balls=np.array(found["balls"]),
         tooth_pairs=np.array(found["tooth_pairs"]),
         outcome=Outcome.CONVERGED,

@@ -42,7 +42,6 @@ class Task:
     design: Design
     torques: tuple[float, ...] = ()
     """[N·m]."""
-    stiffened: str | None = None
     work: float = 1.0
     """Rough, to start long ones first."""
 
@@ -76,7 +75,6 @@ def _key(task: Task) -> str:
             "kind": task.kind,
             "design": task.design.content_hash(),
             "torques": task.torques,
-            "stiffened": task.stiffened,
         }
     )
 
@@ -103,7 +101,7 @@ def _path(task: Task) -> Found:
     """Torsion behind the cup [rad] and sliding work per mu [J] over the torque."""
     from swgjoint.fe.ring_friction import rubbed_path
 
-    path = rubbed_path(task.design, task.torques, stiffened=task.stiffened)
+    path = rubbed_path(task.design, task.torques)
     if not path.outcome.ok:
         reached = path.torque[-1] if path.torque.size else 0.0
         raise ComputationError(
@@ -116,6 +114,11 @@ def _path(task: Task) -> Found:
         "ring_torsion_rad": (path.torsion - path.series * path.torque).tolist(),
         "work_per_mu_J": work.tolist(),
         "race_part": (path.race_work / np.maximum(work, 1e-300)).tolist(),
+        "ring_compliance_rad_Nm": (path.compliance - path.series).tolist(),
+        "ring_shares": {
+            name: (share * path.compliance / (path.compliance - path.series)).tolist()
+            for name, share in path.shares.items()
+        },
         "balls": path.balls.tolist(),
         "tooth_pairs": path.tooth_pairs.tolist(),
     }

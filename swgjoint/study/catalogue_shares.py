@@ -52,11 +52,9 @@ def scaling(
 def shares(
     study: CatalogueFile, found: Mapping[str, Found], size: int
 ) -> dict[str, Any]:
-    """Part of the compliance on each segment that goes with each mechanism.
+    """Parts of the compliance over the torque, and K without the clearance.
 
-    The cup is in series; the others are differences when one is taken away alone, so
-    that they need not add up to the whole: what is left is bending, ball spacing and
-    what mechanisms do together.
+    Parts are of the tangent: clearance that is taken up has none, but shows in K.
     """
     rows, lines = [], []
     first = study.variants[0]
@@ -65,28 +63,44 @@ def shares(
         if "fault" in found[name]:
             continue
         row, design = catalogue_row(size, ratio), variant_design(size, ratio, first)
-        whole = rubbed(found[name], design)
-        compliance = 1.0 / stiffnesses(whole, row)
-        part = {f"cup ({first.cup})": whole.series / compliance}
-        for what in ("clearance", "balls", "teeth"):
-            one = found[f"{name} without {what}"]
-            if "fault" not in one:
-                less = 1.0 / stiffnesses(rubbed(one, design), row)
-                part[what] = (compliance - less) / compliance
-        left = 1.0 - np.sum(list(part.values()), axis=0)
-        part["bending, ball spacing, together"] = left
+        path = rubbed(found[name], design)
+        parts = {f"{first.cup} cup": path.series / path.compliance, **path.shares}
         rows += [
-            {"size": size, "ratio": ratio, "mechanism": k, "share": v.tolist()}
-            for k, v in part.items()
+            {
+                "size": size,
+                "ratio": ratio,
+                "mechanism": key,
+                "torque_Nm": path.torque.tolist(),
+                "share": share.tolist(),
+            }
+            for key, share in parts.items()
         ]
         text = ", ".join(
-            f"{k} {'/'.join(f'{100 * share:.0f}' for share in v)}"
-            for k, v in part.items()
+            f"{key} {'/'.join(f'{100 * part:.0f}' for part in share)}"
+            for key, share in parts.items()
         )
+        torques = "/".join(f"{torque:.3g}" for torque in path.torque)
         lines.append(
-            f"share in the compliance on the segments of K1/K2/K3 [%], size {size},"
-            f" ratio {ratio}: {text}"
+            f"share in the compliance [%], size {size}, ratio {ratio}, at {torques}"
+            f" N·m: {text}"
         )
+        tight = found[f"{name} tight"]
+        if "fault" not in tight:
+            K, free = stiffnesses(path, row), stiffnesses(rubbed(tight, design), row)
+            less = "/".join(f"{value:.2f}" for value in free / K)
+            rising = [f"{k[2] / k[0]:.2f}" for k in (K, free)]
+            lines[-1] += (
+                f"; without bearing clearance K1/K2/K3 times {less}, K3/K1"
+                f" {rising[1]} instead of {rising[0]}"
+            )
+            rows.append(
+                {
+                    "size": size,
+                    "ratio": ratio,
+                    "mechanism": "bearing clearance",
+                    "K_without_over_with": (free / K).tolist(),
+                }
+            )
     return {"rows": rows, "lines": lines}
 
 

@@ -31,6 +31,10 @@ def test_torsion_is_that_of_the_torsion_curve(design, path):
     assert path.outcome is Outcome.CONVERGED
     curve = torsion_curve(design, TORQUES, angles=ANGLES)
     assert path.torsion[1:] == pytest.approx(curve.torsion, rel=1e-6)
+    assert path.compliance[1:] == pytest.approx(curve.compliance, rel=1e-5)
+    parts = sum(path.shares.values()) + path.series / path.compliance
+    # the race is held by a spring that carries nothing
+    assert parts == pytest.approx(1.0, abs=1e-3)
 
 
 def test_work_adds_up_along_the_path(design, path):
@@ -70,6 +74,8 @@ def test_a_loop_of_known_friction():
         series=0.0,
         teeth_work=2.0 * np.diff(torsion),
         race_work=1.0 * np.diff(torsion),
+        compliance=np.full(3, 0.01),
+        shares={},
         balls=np.ones(3),
         tooth_pairs=np.ones(3),
         outcome=Outcome.CONVERGED,

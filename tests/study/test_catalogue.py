@@ -31,7 +31,7 @@ BROKEN = "path 20 80 28"
 
 def curve(task):
     """Rings of known stiffness, softer by a play at small torques."""
-    scale = 1.0 if "28" in task.name.rsplit(" ", 1)[-1] else 1.25
+    scale = 1.0 if " 28" in task.name else 1.25
     torque = np.array([0.1, *task.torques])
     x = 0.05 * arcmin + torque / (scale * 1e5)
     steps = np.diff(x)
@@ -40,6 +40,8 @@ def curve(task):
         "ring_torsion_rad": x.tolist(),
         "work_per_mu_J": (2.0 * steps).tolist(),
         "race_part": np.full(steps.size, 0.25).tolist(),
+        "ring_compliance_rad_Nm": [1.0 / (scale * 1e5)] * torque.size,
+        "ring_shares": {"rim": [0.7] * torque.size, "teeth": [0.3] * torque.size},
         "balls": [9.0] * torque.size,
         "tooth_pairs": [4.0] * torque.size,
     }
@@ -131,7 +133,8 @@ def test_rows_hold_brackets_and_failures(computed):
     assert rows["size 14, ratio 80", "transmission accuracy"].ours == 0.5
     assert rows["size 25, ratio 100", "no-load running torque"].ours is None
     shares = [r for r in found.more["shares"]["rows"] if r["ratio"] == 100]
-    assert np.sum([r["share"] for r in shares], axis=0) == pytest.approx(np.ones(3))
+    assert shares.pop()["K_without_over_with"] == pytest.approx([1.0] * 3)
+    assert np.sum([r["share"] for r in shares], axis=0) == pytest.approx(np.ones(6))
     rubs = [r for r in found.more["friction"]["rows"] if r["ratio"] == 100]
     assert [r["mu"] for r in rubs] == [0.0, 0.05, 0.1]
     losses = np.array([r["hysteresis_loss_arcmin"] for r in rubs])
