@@ -30,6 +30,7 @@ from swgjoint.fe.equilibrium import NewtonSolver
 from swgjoint.fe.state import State
 from swgjoint.gear.design import Design
 from swgjoint.gear.tolerances import without_errors
+from swgjoint.gear.wave_generator import lobe_height
 from swgjoint.progress import Progress, silent
 
 Array = NDArray[np.float64]
@@ -44,6 +45,9 @@ errs by the square of its rotation: a lobe height on the pitch radius turns it b
 to 0.04 rad, of which the square is a few percent of the depth of a tooth."""
 ITERATIONS = 200
 """Near the limit contact changes slowly; 120 do for a map."""
+TOLERANCE = 1e-4
+"""Increment at which the iteration ends, in lobe heights: flanks that conform change
+points of contact below it for many iterations, while the torque moves by as little."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -161,11 +165,18 @@ def ratcheting_path(
 def path_follower(design: Design) -> Continuation:
     """The drive in the plane, perfect and smooth, far from its map's torques."""
     perfect = without_errors(design)
+    small = TOLERANCE * lobe_height(design)
+    solver = NewtonSolver(
+        max_iterations=ITERATIONS,
+        step_tolerance=small,
+        thorough_below=10.0 * small,
+        ring_range=RING_RANGE,
+    )
     return Continuation(
         model=ring_model(perfect, half=can_halve(perfect), friction=False),
         ratio=design.ratio,
         layout=design.drive.layout,
-        solver=NewtonSolver(max_iterations=ITERATIONS, ring_range=RING_RANGE),
+        solver=solver,
     )
 
 
