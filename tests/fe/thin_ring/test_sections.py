@@ -6,11 +6,13 @@ from dataclasses import replace
 
 import pytest
 
+from swgjoint.fe.continuation import Continuation
 from swgjoint.fe.drive2d import ring_model, sector
 from swgjoint.fe.equilibrium import Load, NewtonSolver
 from swgjoint.fe.thin_ring.equilibrium import RingSolver, at_rest
 from swgjoint.fe.thin_ring.model import thin_ring
 from swgjoint.fe.thin_ring.sections import rim_section
+from swgjoint.fe.thin_ring.torsion import loaded, unloaded
 from swgjoint.gear.design import Design
 from swgjoint.gear.profile import tooth_profile
 
@@ -22,6 +24,23 @@ def plain(design):
     modulus = design.material_of("flexspline").youngs_modulus
     middle = design.flexspline_inner_radius + 0.5 * wall
     return modulus * width * wall, modulus * width * wall**3 / 12.0, middle
+
+
+def on_many_balls(design):
+    """The rings on stiff balls and a race that hardly bends: nearly a rigid cam."""
+    changes = {
+        "clearance_um": 0.0,
+        "balls": 110,
+        "ball_diameter_mm": 1.2,
+        "race_thickness_mm": 0.1,
+        "race_width_mm": design.drive.face_width_mm,
+    }
+    model = thin_ring(
+        design.with_changes(
+            {f"wave_generator.bearing.{k}": v for k, v in changes.items()}
+        )
+    )
+    return replace(model, ball_constant=4.0 * model.ball_constant)
 
 
 @pytest.mark.parametrize("name", ["size-25-50", "size-25-100"])
@@ -54,24 +73,37 @@ def test_section_scales_with_the_size():
     ("name", "tolerance"), [("size-25-50", 0.03), ("size-25-100", 0.015)]
 )
 def test_deflected_rim_holds_the_energy_of_plane_elements(name, tolerance):
-    """On many stiff balls of a race that hardly bends, as on a rigid wave generator."""
+    """On many stiff balls of a thin race, as on a rigid wave generator."""
     design = Design.load(name)
     plane = ring_model(design, half=True, elastic_circular_spline=False)
     load = Load(rotation=0.0, teeth=False)
     peer = NewtonSolver()(plane, plane.at_rest(), load)
     assert peer.outcome.ok
-    model = thin_ring(
-        design.with_changes(
-            {
-                "wave_generator.bearing.clearance_um": 0.0,
-                "wave_generator.bearing.balls": 110,
-                "wave_generator.bearing.ball_diameter_mm": 1.2,
-                "wave_generator.bearing.race_thickness_mm": 0.1,
-            }
-        )
-    )
-    model = replace(model, ball_constant=4.0 * model.ball_constant)
+    model = on_many_balls(design)
     state = RingSolver()(model, at_rest(model, 0.0), rotation=0.0, teeth=False)
     assert state.outcome.ok
     # without its teeth the rim would hold 21 and 38 % less
     assert state.energy == pytest.approx(peer.energy, rel=tolerance)
+
+
+@pytest.mark.fe
+@pytest.mark.parametrize("name", ["size-25-50", "size-25-100"])
+def test_rim_and_teeth_yield_as_plane_elements(name):
+    """On a nearly rigid cam their part of the compliance is that of the plane model."""
+    design = Design.load(name)
+    plane = Continuation(
+        model=ring_model(design, half=True),
+        ratio=design.ratio,
+        layout=design.drive.layout,
+    )
+    model = on_many_balls(design)
+    peer = plane.meshed(plane.deflected())
+    state = loaded(model, unloaded(model, 0.0), 1.0)
+    for torque in (60.0, 90.0, 120.0):
+        peer = plane.to_torque(peer, torque)
+        state = loaded(model, state, torque)
+        assert peer.outcome.ok
+        assert state.outcome.ok
+        own = state.compliance * (state.shares["rim"] + state.shares["teeth"])
+        # teeth that come in at other torques move the tangents by some per cent
+        assert own == pytest.approx(peer.compliance, rel=0.08)
