@@ -17,6 +17,7 @@ from swgjoint.gear import kinematics
 from swgjoint.gear.design_sections import (
     Boss,
     CircularSplineMember,
+    Coupling,
     Cup,
     Drive,
     Friction,
@@ -54,6 +55,7 @@ class Design(Section):
     cup: Cup | None = None
     boss: Boss | None = None
     housing: Housing | None = None
+    coupling: Coupling | None = None
     micro_geometry: MicroGeometry = MicroGeometry()
     tolerances: Tolerances = Tolerances()
     friction: Friction = Friction()
@@ -195,6 +197,8 @@ class Design(Section):
     def content_hash(self) -> str:
         """SHA-256 of everything that a result depends on: all but name and source."""
         data = self.model_dump(exclude={"drive": {"name", "source"}})
+        if self.coupling is None:  # younger than kept results, which hold without it
+            del data["coupling"]
         text = json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)
         return hashlib.sha256(text.encode()).hexdigest()
 

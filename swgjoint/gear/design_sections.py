@@ -341,6 +341,12 @@ class Housing(Section):
     torsional_stiffness_Nm_rad: Annotated[float, Field(gt=0, le=1e12)]
 
 
+class Coupling(Section):
+    """Spring between the wave generator and its shaft: Oldham coupling, hub, cam."""
+
+    torsional_stiffness_Nm_rad: Annotated[float, Field(gt=0, le=1e12)]
+
+
 class MicroGeometry(Section):
     """Crowning and slope; all zero by default."""
 
