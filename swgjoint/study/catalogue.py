@@ -2,8 +2,9 @@
 
 Parts: ``stiffness`` (K1, K2, K3, hysteresis loss and lost motion by the thin rings
 with the bearing of the wave generator, and the share of each mechanism),
-``individuals`` (gears with errors of their own), ``ratcheting`` and ``accuracy``
-(finite elements in the plane), ``losses``. What is run is stated in
+``individuals`` (gears with errors of their own) and ``accuracy`` (transmission error
+over an output turn) by the same rings, ``ratcheting`` (finite elements in the plane),
+``losses``. What is run is stated in
 ``models/studies/catalogue.toml``; where no source decides, variants are run: ``ours``
 is the middle of their bracket.
 """
@@ -146,7 +147,7 @@ def tasks_of(study: CatalogueFile, part: str) -> list[Task]:
                 design=variant_design(size, ratio, study.variants[0]).with_changes(
                     changes
                 ),
-                work=0.4 * ratio,
+                work=0.1 * ratio,
             )
             for size, ratio in cases
         ]

@@ -220,7 +220,7 @@ def accuracy_rows(
     one = found[f"accuracy {size} {row.ratio}"]
     own = found.get(f"accuracy {row.size} {row.ratio}", {})
     source = printed_accuracy(row)[key]
-    why = "catalogue states an upper bound; one gear with the stated pitch errors"
+    why = "catalogue states an upper bound; one gear with the stated errors"
     if "fault" in one:
         return [
             _row(row, "transmission accuracy", "arcmin", source, [], one["fault"], None)

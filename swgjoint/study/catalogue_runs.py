@@ -19,6 +19,7 @@ from swgjoint.files import write_whole
 from swgjoint.gear.design import Design
 from swgjoint.json_text import json_text
 from swgjoint.maps.cache import cache_folder, key_of
+from swgjoint.units import arcmin
 
 _log = logging.getLogger(__name__)
 
@@ -28,8 +29,8 @@ OUTSIDE = 1.37
 """Outer diameter of the circular spline over the pitch diameter, for ratcheting: mean
 of 1.34 to 1.41 of component sets of sizes 14 to 32 (50, 60, 70, 85, 110 mm; dimension
 tables from memory, not checked)."""
-ANGLES = 24
-"""Input positions of the map of which the accuracy is read."""
+ANGLES = 64
+"""Input angles over one output turn between which the accuracy is read."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -132,12 +133,11 @@ def _ratcheting(task: Task) -> Found:
 
 
 def _accuracy(task: Task) -> Found:
-    """Accuracy of the map in the plane with the design's manufacturing errors."""
-    from swgjoint.fe.build_map import build_map
+    """Peak to peak of the error of the rings over one output turn, hardly loaded."""
+    from swgjoint.fe.ring_accuracy import over_output_turn, transmission_error
 
-    drive = build_map(task.design, model="2d", angles=ANGLES)
-    key = "transmission_accuracy_arcmin"
-    return {key: drive.spec_sheet([key])[key]}
+    error = transmission_error(task.design, over_output_turn(task.design, ANGLES))
+    return {"transmission_accuracy_arcmin": float(np.ptp(error)) / arcmin}
 
 
 KINDS: dict[str, Callable[[Task], Found]] = {

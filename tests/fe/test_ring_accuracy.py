@@ -1,0 +1,62 @@
+"""The output of a thin-ring drive over input turns."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from swgjoint.errors import ComputationError, Outcome
+from swgjoint.fe import ring_accuracy
+from swgjoint.fe.ring_accuracy import over_output_turn, transmission_error
+from swgjoint.gear.design import Design
+from swgjoint.units import arcmin
+
+PERFECT = Design.preset("size-25-50")
+PITCH_UM = 4.0
+FLAWED = PERFECT.with_changes(
+    {
+        "tolerances.flexspline_cumulative_pitch_um": PITCH_UM,
+        "tolerances.circular_spline_cumulative_pitch_um": PITCH_UM,
+        "tolerances.seed": 2,
+    }
+)
+TURN = 2.0 * np.pi * 50.0
+"""Input angle of one output turn [rad]."""
+ANGLES = np.array([1.0, 100.0, 250.0, 1.0 + TURN])
+"""On both sides of half an output turn, and the first again a turn later."""
+
+
+def test_errors_of_teeth_return_after_one_output_turn():
+    """Perfect teeth leave the passage of the balls; others no more than their errors.
+
+    A turn later the balls are elsewhere, but the teeth meet as before.
+    """
+    perfect, flawed = (transmission_error(d, ANGLES) for d in (PERFECT, FLAWED))
+    assert np.ptp(perfect) < 0.05 * arcmin
+    # the play and 1 % of rated torque hold the output back
+    assert (perfect < 0.0).all()
+    for error in (perfect, flawed):
+        assert error[3] == pytest.approx(error[0], abs=0.01 * arcmin)
+    pitch_radius = 25 * 2.54e-3 / 2.0
+    bound = 2.0 * PITCH_UM * 1e-6 / pitch_radius
+    assert 0.05 * bound < np.ptp(flawed - perfect) < bound
+
+
+def test_angles_are_strewn_over_the_output_turn():
+    """One in each of the equal parts, no two of one spacing."""
+    angles = over_output_turn(PERFECT, 16)
+    assert (np.floor(angles / (TURN / 16)) == np.arange(16)).all()
+    assert np.ptp(np.diff(angles)) > 1.0
+
+
+def test_a_failure_says_where(monkeypatch):
+    """An equilibrium that is not found is an error, not a number."""
+
+    def stuck(model, state, torque):
+        return replace(state, outcome=Outcome.MAX_ITERATIONS)
+
+    monkeypatch.setattr(ring_accuracy, "loaded", stuck)
+    with pytest.raises(ComputationError, match="at 5 N·m and input angle 0.5 rad"):
+        transmission_error(PERFECT, [0.5], torque=5.0)
