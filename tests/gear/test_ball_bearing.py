@@ -49,6 +49,20 @@ def test_family_ball_is_near_palmgren():
     assert ratio ** (2 / 3) == pytest.approx(1.0, abs=0.1)
 
 
+def test_cam_bulges_and_race_bends_around_the_ball():
+    """Both contacts in series, with the curvature of the raceways on either side."""
+    bearing = BallBearing.of(Design.load("size-25-100"))
+    inner, outer = bearing.raceways
+    ball = 2.0 / bearing.ball_diameter
+    across = ball * (1.0 - 1.0 / (2.0 * 0.52))
+    modulus = effective_modulus(bearing)
+    approach = sum(
+        point_contact(along, across, modulus) ** (-2 / 3)
+        for along in (ball + 1.0 / inner, ball - 1.0 / outer)
+    )
+    assert bearing.hertz_constant() == pytest.approx(approach**-1.5, rel=1e-9)
+
+
 def test_bearing_is_measured_inwards_from_the_bore():
     """Bore, fit, race, clearance and ball leave the cam, half of each on a radius."""
     design = Design.load("size-25-100").with_changes(

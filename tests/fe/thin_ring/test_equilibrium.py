@@ -97,6 +97,58 @@ def test_mirror(model):
     assert back.energy == pytest.approx(there.energy, rel=1e-9)
 
 
+def test_tooth_gaps_and_their_derivatives(model, state):
+    """First and second derivatives of the gaps against differences."""
+    rng = np.random.default_rng(4)
+    nodes = state.q[: model.rim.size].reshape(-1, 2, 2)[:: model.nodes_per_tooth]
+    contacts, angle = model.teeth.seen(nodes[:, 0], nodes[:, 1])
+    rows, second = model.teeth.rows(contacts, nodes[:, 0], nodes[:, 1], angle)
+    move = rng.normal(size=nodes.shape) * 3e-7
+    # turned without stretch, whose product with the turn the tangent leaves out
+    unit = nodes[:, 1] / np.linalg.norm(nodes[:, 1], axis=1)[:, None]
+    move[:, 1] -= np.einsum("ni,ni->n", move[:, 1], unit)[:, None] * unit
+
+    def gaps(step):
+        there = nodes + step * move
+        found, _ = model.teeth.seen(there[:, 0], there[:, 1])
+        near = contacts.nearest_in(found)
+        return np.where(near >= 0, found.gap[near], np.nan)
+
+    along = move[contacts.sector].reshape(-1, 4)
+    slope = np.einsum("ni,ni->n", rows, along)
+    bend = np.einsum("nij,ni,nj->n", second, along, along)
+    up, down = gaps(1.0), gaps(-1.0)
+    touching = np.isfinite(up + down)  # the others let go within the move
+    assert touching.sum() >= 10
+    assert (up - down)[touching] == pytest.approx(2 * slope[touching], rel=1e-3)
+    change = (up + down - 2 * contacts.gap)[touching]
+    assert change == pytest.approx(bend[touching], rel=0.02, abs=1e-13)
+
+
+def test_cage_turns_with_half_the_wave_generator(model):
+    """Balls roll on the race: the cage keeps 1 - (1 + D/d)/2 of the cam's speed."""
+    centre, speed, _ = model.balls(0.3, 0.0)
+    across = centre[:, 0] * speed[:, 1] - centre[:, 1] * speed[:, 0]
+    turned_ = across / np.sum(centre**2, axis=1)
+    bearing = model.bearing
+    share = 0.5 * (1.0 + bearing.ball_diameter / sum(bearing.raceways))
+    # the race turns with the flexspline, a hundredth the other way
+    assert turned_.mean() == pytest.approx(1.0 - 1.01 * share, abs=2e-3)
+
+
+def test_work_of_the_cage(model, state):
+    """Moving the balls alone: M_cage dphi - T dpsi = dU."""
+    step = 2e-4
+    ends = [
+        RingSolver()(model, replace(state, phase=s * step), torque=TORQUE)
+        for s in (-1.0, 1.0)
+    ]
+    moment = race_on_balls(model, state, state.q[model.rim.size :]).cage_torque
+    gain = ends[1].energy - ends[0].energy
+    turn = ends[1].rotation - ends[0].rotation
+    assert moment * 2 * step == pytest.approx(gain + TORQUE * turn, rel=0.01)
+
+
 @pytest.mark.parametrize("member", ["shift", "ring_shift"])
 def test_errors_of_all_teeth_turn_the_output(model, state, member):
     """All teeth of a member moved along its pitch circle: the output turns by that."""

@@ -35,6 +35,13 @@ def test_energy_of_the_samples_is_torque_over_torsion():
     assert mean == pytest.approx(given.torque / drive.ratio, rel=0.01, abs=2e-4)
 
 
+@pytest.mark.slow
+def test_derivative_of_the_map_is_the_unseen_input_torque():
+    """Eight positions leave a tenth of the ripple of the input torque."""
+    drive = fit_map(sample_rings(Design.load("size-25-100"), angles=8), keep=0.0)
+    assert drive.info["energy_check"]["relative"] < 0.15
+
+
 def test_stiffness_of_the_map_is_that_of_the_rings():
     """The map's mean torsion is the torsion curve's, its stiffness rises with load."""
     drive = fit_map(samples(), keep=0.0)
