@@ -271,6 +271,7 @@ def summary(study: CatalogueFile, rows: Sequence[Row]) -> list[str]:
                 goal = 100.0 * judged[0].more["goal"]
                 text += f"; within {goal:.0f} %: {met} of {len(judged)}"
             lines.append(text)
+    lines += _ratcheting_order(study, rows)
     rising = [
         "<".join(f"{v:.3g}" for v in values)
         for case in dict.fromkeys(row.case for row in rows)
@@ -279,6 +280,32 @@ def summary(study: CatalogueFile, rows: Sequence[Row]) -> list[str]:
     ]
     if any(row.quantity == "K1" for row in rows):
         lines.append(f"K1 < K2 < K3 fails in {len(rising)} cases")
+    return lines
+
+
+def _ratcheting_order(study: CatalogueFile, rows: Sequence[Row]) -> list[str]:
+    """Ratios from the largest ratcheting torque to the smallest, ours and theirs."""
+    lines = []
+    for size in study.sizes:
+        some = [
+            row
+            for row in rows
+            if (row.quantity, row.more["size"]) == ("ratcheting torque", size)
+            and row.ours is not None
+        ]
+        if len(some) < 2:
+            continue
+        orders = [
+            " > ".join(
+                str(row.more["ratio"])
+                for row in sorted(some, key=lambda row: -(getattr(row, key) or 0.0))
+            )
+            for key in ("ours", "source_value")
+        ]
+        lines.append(
+            f"ratcheting torque, size {size}, by ratio: model {orders[0]}, catalogue"
+            f" {orders[1]}"
+        )
     return lines
 
 

@@ -142,6 +142,9 @@ def test_rows_hold_brackets_and_failures(computed):
     assert losses[0] == pytest.approx(0.1, rel=1e-6)
     assert losses[2] - losses[0] == pytest.approx(2 * (losses[1] - losses[0]))
     assert np.diff(rubs[-1]["round_loss_J"]).min() > 0.0
+    # the tables have the largest at 80; equal ones of ours stay in order
+    trend = "size 25, by ratio: model 50 > 80 > 100, catalogue 80 > 100 > 50"
+    assert trend in "".join(found.summary)
     assert "individual gears" in "".join(found.summary)
     json.dumps(found.more)
 
