@@ -32,9 +32,9 @@ Array = NDArray[np.float64]
 
 PHASES = 12
 """Positions of the balls over one passage."""
-LEVELS = (0.03, 0.06, 0.1, 0.15, 0.22, 0.31, 0.43, 0.58, 0.78, 1.0)
+LEVELS = (0.03, 0.06, 0.1, 0.15, 0.22, 0.31, 0.43, 0.58, 0.78, 1.01)
 """Sampled torques, of both signs, as parts of the repeated peak torque; closer where
-balls join the loaded arc."""
+balls join the loaded arc, and so far that every position reaches the peak."""
 
 
 def check_modelled(design: Design) -> None:

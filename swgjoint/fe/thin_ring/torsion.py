@@ -55,7 +55,7 @@ class RingTorsion:
     """Tangent, mean over the positions, what is in series included [rad/(N·m)]."""
     shares: dict[str, Array]
     """Of that compliance by part (n,): ``rim``, ``race``, ``balls``, ``bore`` (pressed
-    together with the race), ``teeth``, ``series`` (cup, boss, housing)."""
+    together with the race), ``teeth``, ``series`` (cup and springs of the design)."""
     outcome: Outcome
     """The first that is not converged, if any; its torques and those beyond are NaN."""
 
@@ -65,8 +65,8 @@ def torsion_curve(
 ) -> RingTorsion:
     """Torsion under torques with the wave generator locked, frictionless.
 
-    The curve is single-valued: loading and unloading coincide. Cup, boss and housing
-    count as springs in series.
+    The curve is single-valued: loading and unloading coincide. Cup, boss, housing
+    and coupling count as springs in series.
 
     Args:
         design: The drive; :func:`swgjoint.fe.thin_ring.model.check_modelled` says what
