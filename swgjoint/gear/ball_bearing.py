@@ -9,7 +9,7 @@ their halves from the deflection at the lobes.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import cos, log, pi, sqrt
+from math import pi, sqrt
 
 from swgjoint.gear.design import Design
 from swgjoint.gear.material import Material
@@ -19,8 +19,6 @@ GROOVE_CONFORMITY = 0.52
 """Radius of the grooves over the diameter of the balls where the design has none: the
 middle of the customary 0.515 to 0.53 of deep groove bearings (textbook, not checked).
 The stiffness of a ball moves by some 10 % over that range."""
-PALMGREN = 4.36e-4
-"""Approach of both races [mm] of a steel ball of 1 mm under 1 N, textbook figure."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -132,15 +130,6 @@ class BallBearing:
         ]
         return float(sum(k ** (-2.0 / 3.0) for k in both) ** -1.5)
 
-    def palmgren_constant(self) -> float:
-        r"""K after Palmgren, :math:`\delta = 4.36\cdot10^{-4}Q^{2/3}/D^{1/3}` mm.
-
-        Steel and customary grooves are in its figure, so the model uses
-        :meth:`hertz_constant` and this one stands beside it. [N/m^1.5]
-        """
-        diameter = self.ball_diameter / mm
-        return float((diameter ** (1.0 / 3.0) / (PALMGREN * mm)) ** 1.5)
-
 
 def effective_modulus(bearing: BallBearing) -> float:
     """E / (1 - nu^2) / 2 of two bodies of the same material [Pa]."""
@@ -191,59 +180,3 @@ def point_contact(curvature: float, across: float, modulus: float) -> float:
     b3 = 3.0 * ellipe(m) / (2.0 * pi * kappa * modulus * total)  # per Q
     flat = 3.0 * ellipk(m) / (2.0 * pi * kappa * modulus)
     return float(sqrt(b3) / flat**1.5)
-
-
-def hamrock_brewe(curvature: float, across: float, modulus: float) -> float:
-    r"""The same by simple fits of the elliptic integrals, a check [N/m^1.5].
-
-    .. math:: k = \alpha^{2/\pi}, \quad \mathcal E = 1 + \frac{q}{\alpha}, \quad
-        \mathcal F = \frac\pi2 + q\ln\alpha, \quad
-        K = \pi k E' \sqrt{\frac{R\mathcal E}{4.5\mathcal F^3}}
-
-    with :math:`\alpha = R_y/R_x`, :math:`q = \pi/2 - 1`,
-    :math:`1/R = 1/R_x + 1/R_y` and :math:`E' = 2E^*`.
-
-    Source:
-        Hamrock and Brewe (1983), "Simplified solution for stresses and deformations",
-        ASME J. Lubrication Technology 105, 171-177 (textbook, not checked).
-    """
-    larger, smaller = max(curvature, across), min(curvature, across)
-    ratio, q = larger / smaller, 0.5 * pi - 1.0
-    first, second = 0.5 * pi + q * log(ratio), 1.0 + q / ratio
-    form = second / ((larger + smaller) * 4.5 * first**3)
-    return float(2.0 * pi * ratio ** (2.0 / pi) * modulus * sqrt(form))
-
-
-def stribeck_largest_load(
-    radial_force: float, balls: int, *, clearance: bool = False
-) -> float:
-    r"""Load of the heaviest ball of a bearing with rigid races under a radial force.
-
-    .. math:: Q_{max} = \frac{4.37 F_r}{Z} \text{ without clearance}, \quad
-        \frac{5 F_r}{Z} \text{ with the customary one}
-
-    Args:
-        radial_force: [N].
-        balls: Z.
-        clearance: Whether there is some.
-
-    Source:
-        Stribeck, point contact with the exponent 3/2 (textbook).
-    """
-    return (5.0 if clearance else 4.37) * radial_force / balls
-
-
-def rigid_race_loads(
-    stiffness: float, gap: float, approach: float, angles: list[float]
-) -> list[float]:
-    r"""Loads of the balls when rigid round races move together by a given way.
-
-    .. math:: Q_j = K \max(0,\ \delta_r\cos\varphi_j - P/2)^{3/2}
-
-    Args:
-        stiffness: K [N/m^1.5].
-        gap: Radial clearance P/2 of every ball, races concentric [m].
-        approach: delta_r [m].
-        angles: Of the balls from the direction of the load [rad].
-    """
-    return [stiffness * max(0.0, approach * cos(a) - gap) ** 1.5 for a in angles]

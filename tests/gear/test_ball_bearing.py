@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import cos, pi, sqrt
+from math import log, pi, sqrt
 
 import pytest
 
@@ -10,10 +10,7 @@ from swgjoint.errors import DesignError
 from swgjoint.gear.ball_bearing import (
     BallBearing,
     effective_modulus,
-    hamrock_brewe,
     point_contact,
-    rigid_race_loads,
-    stribeck_largest_load,
 )
 from swgjoint.gear.design import Design
 
@@ -27,6 +24,27 @@ def test_sphere_on_plane(radius):
     assert point_contact(1 / radius, 1 / radius, MODULUS) == pytest.approx(
         expected, rel=1e-9
     )
+
+
+def hamrock_brewe(curvature: float, across: float, modulus: float) -> float:
+    r"""The same by simple fits of the elliptic integrals [N/m^1.5].
+
+    .. math:: k = \alpha^{2/\pi}, \quad \mathcal E = 1 + \frac{q}{\alpha}, \quad
+        \mathcal F = \frac\pi2 + q\ln\alpha, \quad
+        K = \pi k E' \sqrt{\frac{R\mathcal E}{4.5\mathcal F^3}}
+
+    with :math:`\alpha = R_y/R_x`, :math:`q = \pi/2 - 1`,
+    :math:`1/R = 1/R_x + 1/R_y` and :math:`E' = 2E^*`.
+
+    Source:
+        Hamrock and Brewe (1983), "Simplified solution for stresses and deformations",
+        ASME J. Lubrication Technology 105, 171-177 (textbook, not checked).
+    """
+    larger, smaller = max(curvature, across), min(curvature, across)
+    ratio, q = larger / smaller, 0.5 * pi - 1.0
+    first, second = 0.5 * pi + q * log(ratio), 1.0 + q / ratio
+    form = second / ((larger + smaller) * 4.5 * first**3)
+    return float(2.0 * pi * ratio ** (2.0 / pi) * modulus * sqrt(form))
 
 
 @pytest.mark.parametrize("ratio", [1.0, 1.5, 3.0, 10.0, 40.0, 90.0])
@@ -45,8 +63,9 @@ def test_planes_may_be_named_either_way():
 def test_family_ball_is_near_palmgren():
     """The law of the handbooks for steel lies within a tenth in approach."""
     bearing = BallBearing.of(Design.load("size-25-100"))
-    ratio = bearing.hertz_constant() / bearing.palmgren_constant()
-    assert ratio ** (2 / 3) == pytest.approx(1.0, abs=0.1)
+    # both races of a steel ball D: 4.36e-4 Q^(2/3) / D^(1/3) mm, textbook figure
+    palmgren = 4.36e-4 * 1e-3 / (bearing.ball_diameter * 1e3) ** (1 / 3)
+    assert bearing.hertz_constant() ** (-2 / 3) == pytest.approx(palmgren, rel=0.1)
 
 
 def test_cam_bulges_and_race_bends_around_the_ball():
@@ -76,28 +95,6 @@ def test_bearing_is_measured_inwards_from_the_bore():
     bore = design.flexspline_inner_radius
     assert outer == pytest.approx(bore - 3e-6 - bearing.race_thickness, abs=1e-15)
     assert outer - inner == pytest.approx(bearing.ball_diameter + 10e-6, abs=1e-15)
-
-
-@pytest.mark.parametrize("balls", [13, 23, 40])
-def test_stribeck_without_clearance(balls):
-    """The balls of rigid races share a radial force as Stribeck says."""
-    for start in (0.0, pi / balls):
-        angles = [start + 2 * pi * k / balls for k in range(balls)]
-        loads = rigid_race_loads(1e10, 0.0, 1e-5, angles)
-        force = sum(q * cos(a) for q, a in zip(loads, angles, strict=True))
-        # the ball under the load, where one stands there
-        largest = 1e10 * 1e-5**1.5
-        assert largest == pytest.approx(stribeck_largest_load(force, balls), rel=0.01)
-
-
-def test_stribeck_with_clearance():
-    """With clearance the arc is shorter and 5 F/Z the customary figure."""
-    angles = [2 * pi * k / 23 for k in range(23)]
-    loads = rigid_race_loads(1e10, 2.5e-6, 1e-5, angles)
-    force = sum(q * cos(a) for q, a in zip(loads, angles, strict=True))
-    assert max(loads) == pytest.approx(
-        stribeck_largest_load(force, 23, clearance=True), rel=0.05
-    )
 
 
 def test_modulus_of_like_bodies():

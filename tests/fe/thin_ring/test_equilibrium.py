@@ -12,7 +12,6 @@ from swgjoint.fe.thin_ring import torsion_curve
 from swgjoint.fe.thin_ring.equilibrium import RingSolver, at_rest, race_on_balls
 from swgjoint.fe.thin_ring.model import thin_ring
 from swgjoint.fe.thin_ring.torsion import loaded, positions, unloaded
-from swgjoint.gear.ball_bearing import stribeck_largest_load
 from swgjoint.gear.design import Design
 from swgjoint.gear.neutral_line import NeutralLine
 from swgjoint.gear.wave_generators.ellipse import Elliptical
@@ -189,7 +188,8 @@ def test_rigid_race_after_stribeck(model, clearance):
     force = np.abs(pressed.resultant[1])
     assert abs(pressed.resultant[0]) < 1e-9 * force
     assert pressed.force[0] == pressed.force.max()  # the ball at the top
-    expected = stribeck_largest_load(force, bearing.balls, clearance=clearance > 0)
+    # Stribeck's figures for point contact, without and with customary clearance
+    expected = (5.0 if clearance else 4.37) * force / bearing.balls
     assert pressed.force.max() == pytest.approx(
         expected, rel=0.05 if clearance else 0.01
     )
