@@ -274,10 +274,12 @@ def _details(result: dict[str, Any]) -> list[str]:
             f" {radial['smooth_shell_N_mm']:.4g} N/mm"
         )
     if path := result.get("ratcheting"):
+        so_far = "" if path["passed"] else "the search ended with the "
         lines.append(
-            f"ratcheting: torque largest after {path['at_largest_pitches']:.3g} of a"
-            f" pitch with {path['pairs'][-1]} teeth in contact, wave generator rigid"
-            " and locked, in the plane"
+            f"ratcheting: {so_far}torque largest after"
+            f" {path['at_largest_pitches']:.3g} of a pitch with"
+            f" {path['at_largest_pairs']} teeth in contact, wave generator rigid and"
+            " locked, in the plane"
         )
     if found := result.get("fatigue"):
         worst, middle = found["worst_section"], found["mid_face"]

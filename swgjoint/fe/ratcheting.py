@@ -76,8 +76,12 @@ class RatchetingPath:
 
     @property
     def passed(self) -> bool:
-        """Whether the path goes beyond the largest torque."""
-        return bool(self.torque[-1] < self.torque.max())
+        """Whether the path goes beyond the largest torque that teeth carry.
+
+        Within the backlash torque is round-off, and its falls say nothing.
+        """
+        k = int(self.torque.argmax())
+        return bool(self.pairs[k] > 0 and self.torque[-1] < self.torque[k])
 
     @property
     def limit(self) -> float:
@@ -94,11 +98,12 @@ class RatchetingPath:
 
     def as_dict(self) -> dict[str, Any]:
         """Plain values."""
-        parts = self.turned / self.pitch
+        parts, k = self.turned / self.pitch, int(self.torque.argmax())
         return {
             "limit_Nm": self.limit,
             "passed": self.passed,
-            "at_largest_pitches": float(parts[self.torque.argmax()]),
+            "at_largest_pitches": float(parts[k]),
+            "at_largest_pairs": int(self.pairs[k]),
             "turned_pitches": parts.tolist(),
             "torque_Nm": self.torque.tolist(),
             "pairs": self.pairs.tolist(),
@@ -114,7 +119,7 @@ def ratcheting_path(
     upto: float = 1.0,
     progress: Progress = silent,
 ) -> RatchetingPath:
-    """Turn the output until the torque falls, at most so far.
+    """Turn the output until the torque that teeth carry falls, at most so far.
 
     Teeth are perfect and without friction.
 
@@ -150,7 +155,7 @@ def ratcheting_path(
         states.append(state)
         turned.append(part * pitch)
         progress(f"{design.drive.name}: ratcheting", round(100 * part), 100)
-        if state.torque < states[-2].torque:
+        if _pairs(states[-2]) and state.torque < states[-2].torque:
             break
     return RatchetingPath(
         turned=np.array(turned),

@@ -77,3 +77,20 @@ def test_the_path_passes_a_limit():
     work = CubicSpline(x, path.torque[1:]).integrate(x[0], x[-1])
     # 2e-3: at the end the circular spline moves by a lobe height
     assert path.energy[-1] - path.energy[1] == pytest.approx(work, rel=2e-3)
+
+
+def test_backlash_is_no_limit():
+    """Within the play no tooth touches: round-off that falls does not end the path."""
+    members = ("flexspline", "circular_spline")
+    thin = {f"{member}.thickness_coefficient": 0.9 for member in members}
+    design = Design.preset("reference-2d-simplified")
+    design = design.with_changes({**thin, "mesh.refinement": 0.5})
+    path = ratcheting_path(design, step=0.04, upto=0.08)
+    assert path.pairs[1] == 0 < path.pairs[2]
+    # round-off, and falling; thousands of N·m are to come
+    assert path.torque[:2] == pytest.approx(0.0, abs=1e-4)
+    assert path.torque[1] < path.torque[0]
+    assert path.torque[2] > 1.0
+    assert not path.passed
+    loose = replace(path, torque=-np.arange(path.turned.size), pairs=0 * path.pairs)
+    assert not loose.passed
