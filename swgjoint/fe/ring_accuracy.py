@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swgjoint.errors import ComputationError
-from swgjoint.fe.corotation import rotate
-from swgjoint.fe.thin_ring.equilibrium import RingSolver, RingState, at_rest
-from swgjoint.fe.thin_ring.model import ThinRing, thin_ring
-from swgjoint.fe.thin_ring.torsion import SMALL, loaded
+from swgjoint.fe.thin_ring.model import thin_ring
+from swgjoint.fe.thin_ring.torsion import SMALL, loaded, unloaded
 from swgjoint.gear.design import Design
 from swgjoint.maps.catalogue import ratings_of
 
@@ -38,34 +34,14 @@ def transmission_error(
     load = SMALL * ratings_of(design).rated_torque if torque is None else torque
     found = []
     for theta in np.asarray(input_angles, dtype=float).ravel().tolist():
-        state = loaded(model, _unloaded(model, theta), load)
+        state = loaded(model, unloaded(model, theta), load)
         if not state.outcome.ok:
             raise ComputationError(
                 f"{design.drive.name}: no equilibrium at {load:.4g} N·m and input angle"
                 f" {theta:.4g} rad: {state.outcome.value}"
             )
-        found.append(_wrapped(state.rotation - theta / model.ratio))
+        found.append(state.rotation - theta / model.ratio)
     return np.array(found)
-
-
-def _unloaded(model: ThinRing, theta: float) -> RingState:
-    """The drive without torque, the output at the ideal ratio however far it has gone.
-
-    Both rings begin where the flexspline has turned to.
-    """
-    psi = theta / model.ratio
-    lag = -model.bearing.cage_share * (1.0 - 1.0 / model.ratio)
-    start = at_rest(model, theta - psi, lag * psi)
-    psi = _wrapped(psi)  # as the rotation of the rim is told
-    q = rotate(start.q.reshape(-1, 2), np.array(psi)).ravel()
-    start = replace(start, q=q, alpha=theta, phase=0.0)
-    solver = RingSolver()
-    return solver(model, solver(model, start, rotation=psi, teeth=False), rotation=psi)
-
-
-def _wrapped(angle: float) -> float:
-    """The same direction between -pi and pi [rad]."""
-    return float(np.mod(angle + np.pi, 2.0 * np.pi) - np.pi)
 
 
 def over_output_turn(design: Design, count: int, seed: int = 0) -> Array:

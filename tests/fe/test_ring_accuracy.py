@@ -44,6 +44,13 @@ def test_errors_of_teeth_return_after_one_output_turn():
     assert 0.05 * bound < np.ptp(flawed - perfect) < bound
 
 
+def test_half_an_output_turn_is_no_jump():
+    """Where the direction of the output wraps, the error goes on as before."""
+    half = 0.5 * TURN
+    error = transmission_error(PERFECT, [half - 1e-3, half, half + 1e-3])
+    assert error == pytest.approx(error[0], abs=0.01 * arcmin)
+
+
 def test_angles_are_strewn_over_the_output_turn():
     """One in each of the equal parts, no two of one spacing."""
     angles = over_output_turn(PERFECT, 16)

@@ -48,7 +48,7 @@ class RingState:
     torque: float = 0.0
     """T that the flexspline exerts on its load [N·m]."""
     rotation: float = 0.0
-    """psi, of the rim [rad]."""
+    """psi, of the rim, of any number of turns [rad]."""
     ball_force: Array | None = None
     """[N]. Shape (balls,)."""
     tooth_force: Array | None = None
@@ -80,13 +80,17 @@ class RingState:
 
 
 def at_rest(model: ThinRing, alpha: float, phase: float = 0.0) -> RingState:
-    """Start of a search: both rings inextensionally deflected by the lobes."""
+    """Start of a search: both rings deflected by the lobes, not stretched.
+
+    They have turned with the flexspline, however far: at the ideal ratio.
+    """
+    psi = alpha / model.ratio
     parts = []
     for ring in (model.rim, model.race):
         count, r, w0 = ring.elements, ring.radius, model.lobe_height
         phi = 2.0 * np.pi / count * np.arange(count)
-        wave = 2.0 * (phi - alpha)
-        outward = np.stack([-np.sin(phi), np.cos(phi)], -1)
+        wave = 2.0 * (phi + psi - alpha)
+        outward = np.stack([-np.sin(phi + psi), np.cos(phi + psi)], -1)
         along = turned(outward)
         w, v = w0 * np.cos(wave)[:, None], -0.5 * w0 * np.sin(wave)[:, None]
         place = (r + w) * outward + v * along
@@ -96,13 +100,14 @@ def at_rest(model: ThinRing, alpha: float, phase: float = 0.0) -> RingState:
         parts.append(np.stack([place, slope * (2.0 * np.pi / count)], axis=1).ravel())
     centres, _, _ = model.balls(alpha, phase)
     share = model.race.elements / (2.0 * np.pi)
-    feet = np.mod(np.arctan2(-centres[:, 0], centres[:, 1]), 2.0 * np.pi) * share
+    angle = np.arctan2(-centres[:, 0], centres[:, 1]) - psi
     return RingState(
         q=np.concatenate(parts),
-        ball_feet=feet,
+        ball_feet=np.mod(angle, 2.0 * np.pi) * share,
         bore_feet=model.bore.place.copy(),
         alpha=alpha,
         phase=phase,
+        rotation=psi,
     )
 
 
@@ -148,7 +153,7 @@ class RingSolver:
         for _ in range(self.max_iterations):
             tried = replace(state, q=state.q + part * step)
             tried, total, held = _linearised(model, tried, teeth=teeth)
-            psi, turn = _rotation(model, tried.q)
+            psi, turn = _rotation(model, tried.q, start.rotation)
             potential = tried.energy + load * psi
             rises = potential - last > 1e-12 * abs(last)
             if torque is not None and rises and part > self.shortest:
@@ -181,7 +186,7 @@ class RingSolver:
     def potential(self, model: ThinRing, state: RingState, torque: float) -> float:
         """Pi with the teeth in place [J]."""
         there, _, _ = _linearised(model, state, teeth=True)
-        return there.energy + torque * _rotation(model, state.q)[0]
+        return there.energy + torque * _rotation(model, state.q, state.rotation)[0]
 
 
 def _moved(step: Array) -> float:
@@ -189,15 +194,20 @@ def _moved(step: Array) -> float:
     return float(np.abs(step.reshape(-1, 2, 2)[:, 0]).max())
 
 
-def _rotation(model: ThinRing, q: Array) -> tuple[float, Array]:
-    """Best-fit rotation of the rim's nodes and its gradient."""
+def _rotation(model: ThinRing, q: Array, near: float) -> tuple[float, Array]:
+    """Best-fit rotation of the rim's nodes and its gradient.
+
+    Of all that differ by whole turns the nearest to another, so that it has no jump
+    within half a turn of where a search begins.
+    """
     x0 = model.rim.reference[:, 0]
     x = q[: model.rim.size].reshape(-1, 2, 2)[:, 0]
     sine, cosine = float(np.sum(turned(x0) * x)), float(np.sum(x0 * x))
     gradient = np.zeros(model.size)
     rows = gradient[: model.rim.size].reshape(-1, 2, 2)
     rows[:, 0] = (cosine * turned(x0) - sine * x0) / (sine**2 + cosine**2)
-    return float(np.arctan2(sine, cosine)), gradient
+    psi = float(np.arctan2(sine, cosine))
+    return psi + 2.0 * np.pi * round((near - psi) / (2.0 * np.pi)), gradient
 
 
 class _Sum:
@@ -439,5 +449,5 @@ def _finished(
 ) -> RingState:
     """Forces and energy at the last positions."""
     state, _, _ = _linearised(model, state, teeth=teeth)
-    psi, _ = _rotation(model, state.q)
+    psi, _ = _rotation(model, state.q, state.rotation)
     return replace(state, rotation=psi, outcome=outcome, history=tuple(history))

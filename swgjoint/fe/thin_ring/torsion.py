@@ -114,9 +114,15 @@ def positions(model: ThinRing, count: int = POSITIONS) -> Array:
 
 
 def unloaded(model: ThinRing, alpha: float, phase: float = 0.0) -> RingState:
-    """The drive without torque: rings on the balls, output at the ideal ratio."""
+    """The drive without torque: rings on the balls, output at the ideal ratio.
+
+    Args:
+        model: The rings.
+        alpha: Wave-generator angle, of any number of turns [rad].
+        phase: Angle of ball 0 from the major axis at alpha = 0 [rad].
+    """
     start = at_rest(model, alpha, phase)
-    solver, psi = RingSolver(), alpha / model.ratio
+    solver, psi = RingSolver(), start.rotation
     state = solver(model, start, rotation=psi, teeth=False)
     return solver(model, state, rotation=psi) if state.outcome.ok else state
 

@@ -37,6 +37,18 @@ def twisted(model, alpha, torque):
     return loaded(model, small, torque)
 
 
+@pytest.mark.parametrize("alpha", [3.3, 100.0 * np.pi, -1000.0])
+def test_any_wave_generator_angle_has_an_equilibrium(model, alpha):
+    """Far round, on either side and where the output's angle wraps, like near zero."""
+    rest = unloaded(model, alpha)
+    assert rest.outcome.ok
+    assert rest.rotation == pytest.approx(alpha / model.ratio, abs=1e-9)
+    found, near = loaded(model, rest, 1.0), loaded(model, unloaded(model, 0.0), 1.0)
+    lag, peer = found.rotation - alpha / model.ratio, near.rotation
+    # teeth meet at another phase and balls stand elsewhere
+    assert lag == pytest.approx(peer, rel=0.05)
+
+
 def test_potential_is_stationary(model, state):
     """No displacement of either ring changes the potential to first order."""
     rng = np.random.default_rng(0)
