@@ -19,6 +19,9 @@ from swgjoint.maps.torsion_fit import INTERVALS, fit_torsion
 from swgjoint.maps.torsion_law import potential_of_stiffness
 from swgjoint.units import arcmin, deg
 
+LEG_STEPS = 2.0
+"""Steps of a record from turn to turn of the torque, at least: rows in disorder have
+1.5 (of random numbers every third is no turn; textbook), rows in order many."""
 TORQUE = {"torque_Nm": 1.0}
 TORSION = {"torsion_arcmin": arcmin, "torsion_rad": 1.0}
 OUTPUT = {"output_deg": deg, "output_rad": 1.0}
@@ -43,6 +46,12 @@ def read_loop(path: str | Path) -> TorqueLoop:
             f"{path}: torque_Nm from {low:g} to {high:g} N·m; accepted: both signs"
         )
     loop = TorqueLoop(torque=torque, torsion=torsion)
+    legs = len(loop.turns())
+    if torque.size - 1 < LEG_STEPS * legs:
+        raise InputError(
+            f"{path}: torque_Nm turns {legs - 1} times in {torque.size} samples;"
+            " accepted: rows in order of time"
+        )
     ends = loop.mid_line(np.array([0.9 * low, 0.9 * high]))
     if not ends[1] > ends[0]:
         raise InputError(

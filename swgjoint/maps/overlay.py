@@ -53,7 +53,8 @@ class Overlay:
     def segments(self) -> list[dict[str, Any]]:
         """Residual and stiffness on 0..T1, T1..T2, T2..Tmax, both signs together.
 
-        Stiffness is None where the record does not reach, residuals without samples.
+        Stiffness is None where the record does not reach or jumps across, residuals
+        without samples.
         """
         size = np.abs(self.measured.torque)
         rows = []
@@ -83,19 +84,32 @@ class Overlay:
         both = min(float(torque.max()), -float(torque.min()))
         if high == self.edges[2] and both > low:
             high = both
-        if not high > low:
+        if not high > low or not self._sampled(low, high):
             return None
         value = loop.stiffness(low, high)
         return value if np.isfinite(value) else None
 
+    def _sampled(self, low: float, high: float) -> bool:
+        """Whether samples lie between two torques on every side that reaches them."""
+        sides = [sign * self.measured.torque for sign in (1.0, -1.0)]
+        return all(
+            bool(((side > low) & (side <= high)).any())
+            for side in sides
+            if side.max() >= high
+        )
+
     def as_dict(self) -> dict[str, Any]:
-        """Plain values: figures of both loops, residuals in all and by segment."""
+        """Plain values: figures of both loops, residuals in all and by segment.
+
+        What is read about zero is None without samples within T1 on either side.
+        """
         rest = self.residual / arcmin
         pair = {"measured": self.measured, "predicted": self.predicted}
+        about_zero = self._sampled(0.0, self.edges[0])
 
         def of_both(values: dict[str, float]) -> dict[str, float | None]:
             return {
-                k: float(v) / arcmin if np.isfinite(v) else None
+                k: float(v) / arcmin if about_zero and np.isfinite(v) else None
                 for k, v in values.items()
             }
 

@@ -340,6 +340,12 @@ def test_a_measured_loop_over_a_map(capsys, tmp_path, synthetic_map):
     assert "residual rms" in capsys.readouterr().out
 
 
+SHUFFLED = "torque_Nm,torsion_rad\n" + "".join(
+    f"{torque},{torque / 2e4}\n"
+    for torque in np.random.default_rng(1).permutation(np.linspace(-80.0, 80.0, 60))
+)
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [
@@ -347,6 +353,7 @@ def test_a_measured_loop_over_a_map(capsys, tmp_path, synthetic_map):
         ("torque_Nm,twist\n1,2\n", "no column torsion_arcmin or torsion_rad"),
         ("torque_Nm,torsion_rad\n" + "1,2\n" * 9, "both signs"),
         ("torque_Nm,torsion_rad\n1,x\n", "accepted: a finite number"),
+        (SHUFFLED, "accepted: rows in order of time"),
     ],
 )
 def test_a_bad_loop_is_one_line(capsys, tmp_path, text, words):

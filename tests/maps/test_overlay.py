@@ -123,3 +123,23 @@ def test_a_short_record_says_what_it_does_not_reach(synthetic_map):
     far = TorqueLoop(torque=4.0 * loop.torque, torsion=4.0 * loop.torque / 2e4)
     assert overlay(synthetic_map, far).beyond_range
     assert not overlay(synthetic_map, scale).beyond_range
+
+
+def test_no_figure_is_read_where_there_are_no_samples(synthetic_map):
+    """K across a gap in the torque, and what is read about zero there, are None."""
+    leg = np.linspace(20.0, 80.0, 31)
+    torque = np.concatenate([leg, leg[::-1], -leg, -leg[::-1]])
+    found = overlay(synthetic_map, TorqueLoop(torque=torque, torsion=torque / 2e4))
+    found = found.as_dict()
+    first, second, third = found["segments"]
+    assert first["samples"] == 0
+    assert first["K_measured_Nm_rad"] is None and first["K_predicted_Nm_rad"] is None
+    for row in (second, third):
+        assert row["K_measured_Nm_rad"] == pytest.approx(2e4)
+    for key in FIGURES:
+        assert found[key] == {"measured": None, "predicted": None}
+    # a gap on one side of zero alone hides as much
+    torque = np.concatenate([leg, leg[::-1], np.linspace(0.0, -80.0, 41)])
+    one_sided = overlay(synthetic_map, TorqueLoop(torque=torque, torsion=torque / 2e4))
+    assert one_sided.segments()[0]["K_measured_Nm_rad"] is None
+    assert one_sided.as_dict()[FIGURES[1]]["measured"] is None
