@@ -11,7 +11,8 @@ is the curve T(x) without friction, R above it while x grows and R below it whil
 falls. This is the first order in mu. It takes every contact as sliding and none as
 sticking, so near the turns of a loop it is wrong, and what sticks makes it narrower.
 
-The race is free to creep in the bore: it turns so that the work is least.
+The race is free to creep in the bore: it turns so that the work is least. One mu holds
+for both: what is stated for teeth is taken for rim on race, too, which is assumed.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swgjoint.errors import Outcome
+from swgjoint.errors import InputError, Outcome
 from swgjoint.fe.corotation import rotate
 from swgjoint.fe.thin_ring.equilibrium import RingState
 from swgjoint.fe.thin_ring.facing import facing
@@ -80,7 +81,20 @@ class RubbedPath:
         return np.asarray((self.teeth_work + self.race_work) / np.diff(self.torsion))
 
     def at(self, torque: float) -> float:
-        """Torsion at a torque, on a straight line below the second one [rad]."""
+        """Torsion at a torque, on a straight line below the second one [rad].
+
+        Args:
+            torque: T, from zero to the last of the path [N·m].
+
+        Raises:
+            InputError: If the path does not reach that far.
+        """
+        last = float(self.torque[-1])
+        if not 0.0 <= torque <= last * (1.0 + 1e-9):  # the same torque, rounded
+            raise InputError(
+                f"torque = {torque:.6g} N·m: outside the path; accepted: 0 to"
+                f" {last:.6g} N·m"
+            )
         if torque <= self.torque[1]:
             slope = np.diff(self.torsion[:2]) / np.diff(self.torque[:2])
             return float(self.torsion[0] + slope[0] * (torque - self.torque[0]))
@@ -90,6 +104,9 @@ class RubbedPath:
         """Width of the loop where the load is zero, the play included [rad].
 
         The falling branch comes to rest where T(x) = R, the rising one where it is -R.
+
+        Raises:
+            InputError: If the path does not reach R.
         """
         return 2.0 * self.at(mu * float(self.torque_per_mu[0]))
 

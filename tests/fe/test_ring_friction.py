@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from swgjoint.errors import Outcome
+from swgjoint.errors import InputError, Outcome
 from swgjoint.fe.ring_friction import RubbedPath, rubbed_path, weighted_median
 from swgjoint.fe.thin_ring import torsion_curve
 from swgjoint.gear.design import Design
@@ -65,10 +65,10 @@ def test_similar_drives_rub_in_proportion(design, path):
     assert found.teeth_work[1:] == pytest.approx(8.0 * path.teeth_work[1:], rel=1e-3)
 
 
-def test_a_loop_of_known_friction():
-    """R is 3 mu, K is 100: width 2 R/K, without load the play besides; round work."""
+def known():
+    """R is 3 mu, K is 100, the play 0.1 rad; 5 to 35 N·m."""
     torsion = np.array([0.1, 0.2, 0.4])
-    made = RubbedPath(
+    return RubbedPath(
         torque=100.0 * (torsion - 0.05),
         torsion=torsion,
         series=0.0,
@@ -80,11 +80,27 @@ def test_a_loop_of_known_friction():
         tooth_pairs=np.ones(3),
         outcome=Outcome.CONVERGED,
     )
+
+
+def test_a_loop_of_known_friction():
+    """Width 2 R/K, without load the play besides; round work."""
+    made, torsion = known(), known().torsion
     assert made.torque_per_mu == pytest.approx(3.0)
     assert made.widths(0.1) == pytest.approx(2 * 0.3 / 100.0)
     assert made.hysteresis_loss(0.1) == pytest.approx(2 * (0.05 + 0.3 / 100.0))
     # four branches of the round: out and back to either side
     assert made.round_loss(0.1) == pytest.approx(4 * 0.3 * (torsion - 0.1))
+
+
+def test_a_path_says_nothing_beyond_its_end():
+    """One line with what it reaches, instead of the last torsion."""
+    assert known().at(35.0) == pytest.approx(0.4)
+    assert known().at(0.0) == pytest.approx(0.05)
+    for torque in (35.1, -0.1, float("nan")):
+        with pytest.raises(InputError, match=r"accepted: 0 to 35 N·m"):
+            known().at(torque)
+    with pytest.raises(InputError, match=r"torque = 36 N·m"):
+        known().hysteresis_loss(12.0)
 
 
 def test_the_race_creeps_to_where_least_work_is():
