@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from math import pi
 
 import numpy as np
 
 from swgjoint.errors import DesignError
-from swgjoint.gear.ball_bearing import BallBearing
+from swgjoint.gear.bearing_checks import bearing_checks
 from swgjoint.gear.check import Check
 from swgjoint.gear.design import Design
 from swgjoint.gear.profile import TANGENCY_RAD, ToothProfile, tooth_profile
@@ -163,57 +162,5 @@ def _cup(design: Design) -> list[Check]:
             "mm",
             f"{design.drive.name}: cup.fillet_mm = {cup.fillet_mm:g} mm; accepted: at"
             f" most {room:.4g} mm, the room between cylinder and bore",
-        )
-    ]
-
-
-def bearing_checks(design: Design) -> list[Check]:
-    """The balls fit on their circle, and race and balls inside the outline."""
-    bearing = design.wave_generator.bearing
-    assert bearing is not None
-    bore = design.flexspline_inner_radius / mm
-    circle = bore - bearing.race_thickness_mm - 0.5 * bearing.ball_diameter_mm
-    # chord between neighbours on the undeformed circle
-    pitch = 2.0 * circle * np.sin(pi / bearing.balls)
-    clearance = float(pitch) - bearing.ball_diameter_mm
-    checks = _cam(design)
-    return [
-        *checks,
-        Check(
-            name="bearing: clearance between balls, above",
-            ok=clearance > 0.0,
-            value=clearance,
-            unit="mm",
-            limit=0.0,
-            fault=f"{design.drive.name}: wave_generator.bearing.balls ="
-            f" {bearing.balls}: balls of {bearing.ball_diameter_mm:g} mm overlap by"
-            f" {-clearance:.4g} mm; accepted: fewer or smaller balls",
-        ),
-    ]
-
-
-def _cam(design: Design) -> list[Check]:
-    """The cam below race and balls is a curve without corners."""
-    bearing = BallBearing.of(design)
-    try:
-        outline = with_checks(design)[0]
-    except DesignError:
-        return []
-    inner, _ = bearing.raceways
-    depth = bearing.bore_radius - inner
-    stations = np.linspace(0.0, outline.perimeter, 721)
-    sharpest = 1.0 / float(outline.evaluate(stations)[2].max())
-    value = (sharpest - depth) / mm
-    return [
-        Check(
-            name="bearing: sharpest radius of the cam below it, above",
-            ok=value > 0.0,
-            value=value,
-            unit="mm",
-            limit=0.0,
-            fault=f"{design.drive.name}: wave_generator.bearing: race, balls and"
-            f" clearances of {depth / mm:.4g} mm do not fit inside the outline, whose"
-            f" radius of curvature falls to {sharpest / mm:.4g} mm; accepted: a smaller"
-            " ball_diameter_mm or race_thickness_mm",
         )
     ]

@@ -22,9 +22,9 @@ from swgjoint.fe.thin_ring.hermite_ring import GAUSS, HermiteRing
 from swgjoint.fe.thin_ring.sections import rim_section, tooth_pair_stiffness
 from swgjoint.fe.thin_ring.teeth import Teeth
 from swgjoint.gear.ball_bearing import BallBearing
+from swgjoint.gear.bearing_checks import bearing_checks
 from swgjoint.gear.check import raise_faults
 from swgjoint.gear.design import Design
-from swgjoint.gear.feasibility import bearing_checks
 from swgjoint.gear.neutral_line import NeutralLine
 from swgjoint.gear.profile import tooth_profile
 from swgjoint.gear.tolerances import (

@@ -287,6 +287,16 @@ def test_clearance_is_what_makes_the_stiffness_rise():
         ({"friction.tooth_coefficient": 0.1}, "tooth_coefficient = 0.1"),
         ({"tolerances.misalignment_arcmin": 1.0}, "misalignment_arcmin = 1"),
         ({"wave_generator.bearing.ball_diameter_mm": 30.0}, "do not fit inside"),
+        (
+            {
+                "wave_generator.bearing.clearance_um": 500.0,
+                "wave_generator.bearing.fit_clearance_um": 136.0,
+            },
+            "clearance_um = 500 and fit_clearance_um = 136.*accepted: below 635 um",
+        ),
+        ({"wave_generator.bearing.clearance_um": 2e3}, "below 635 um together"),
+        ({"wave_generator.bearing.race_thickness_mm": 1e-3}, "at least 0.7906 mm"),
+        ({"wave_generator.bearing.race_width_mm": 1e3}, "at most 25.4 mm"),
     ],
 )
 def test_what_the_model_lacks_is_refused(changes, message):
