@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swgjoint.errors import ComputationError
+from swgjoint.fe.thin_ring.loading import SMALL, loaded, unloaded
 from swgjoint.fe.thin_ring.model import thin_ring
-from swgjoint.fe.thin_ring.torsion import SMALL, loaded, unloaded
 from swgjoint.gear.design import Design
 from swgjoint.maps.catalogue import ratings_of
 

@@ -13,9 +13,9 @@ from swgjoint.gear.design import Design
 from swgjoint.gear.wave_generator import lobe_height, with_checks
 from swgjoint.units import mm, um
 
-THINNEST_RACE = 0.15
-"""Of the ball diameter: a groove is a tenth to a fifth of it deep (customary,
-not checked)."""
+THINNEST_RACE = 0.08
+"""Of the ball diameter: grooves are a tenth to a fifth of it deep (customary, not
+checked), and flexible races some 0.25 thick. At 0.02 the search for rest fails."""
 WIDEST_RACE = 2.0
 """Of the face width: all of it counts as pressed, and the rim ends near the teeth."""
 

@@ -18,9 +18,11 @@ from swgjoint.errors import ComputationError, DesignError
 from swgjoint.fe.drive2d import can_halve, left_out
 from swgjoint.fe.pattern import across_clearance
 from swgjoint.fe.thin_ring import model as thin
-from swgjoint.fe.thin_ring.equilibrium import RingSolver, RingState, race_on_balls
+from swgjoint.fe.thin_ring.contacts import race_on_balls
+from swgjoint.fe.thin_ring.equilibrium import RingSolver
+from swgjoint.fe.thin_ring.loading import SMALL, loaded, unloaded
 from swgjoint.fe.thin_ring.model import ThinRing, thin_ring
-from swgjoint.fe.thin_ring.torsion import SMALL, loaded, unloaded
+from swgjoint.fe.thin_ring.state import RingState
 from swgjoint.gear.design import Design
 from swgjoint.gear.mounting import series_compliance, springs_of
 from swgjoint.gear.tolerances import has_errors

@@ -9,10 +9,11 @@ import pytest
 from swgjoint.fe.continuation import Continuation
 from swgjoint.fe.drive2d import ring_model, sector
 from swgjoint.fe.equilibrium import Load, NewtonSolver
-from swgjoint.fe.thin_ring.equilibrium import RingSolver, at_rest
+from swgjoint.fe.thin_ring.equilibrium import RingSolver
+from swgjoint.fe.thin_ring.loading import loaded, unloaded
 from swgjoint.fe.thin_ring.model import thin_ring
 from swgjoint.fe.thin_ring.sections import rim_section
-from swgjoint.fe.thin_ring.torsion import loaded, unloaded
+from swgjoint.fe.thin_ring.state import at_rest
 from swgjoint.gear.design import Design
 from swgjoint.gear.profile import tooth_profile
 
