@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swgjoint.arrays import frozen_array
+from swgjoint.maps.catalogue import CatalogueRow
 from swgjoint.maps.drive_map import DriveMap, Ratings
 from swgjoint.maps.equilibrium import output_angle
 from swgjoint.maps.hysteresis import Sliders
@@ -129,7 +130,7 @@ class TorqueLoop:
         return float(np.diff(self.mid_line([-at, at]))[0])
 
 
-def largest_torque(ratings: Ratings) -> float:
+def largest_torque(ratings: Ratings | CatalogueRow) -> float:
     """Torque of the standard loop: repeated peak, at least 1.5 T2 [N·m]."""
     return max(ratings.repeated_peak, 1.5 * ratings.T2)
 

@@ -21,16 +21,13 @@ from swgjoint.errors import InputError
 from swgjoint.files import write_whole
 from swgjoint.gear.design import Design
 from swgjoint.json_text import json_text
-from swgjoint.maps.catalogue import CatalogueRow
-from swgjoint.maps.loop import LOST_MOTION_TORQUE
 from swgjoint.study.catalogue_file import CatalogueFile, variant_design
+from swgjoint.study.catalogue_printed import catalogue_row, edges, torques_of
 from swgjoint.study.catalogue_rows import (
     accuracy_rows,
-    catalogue_row,
     loss_rows,
     ratcheting_rows,
     stiffness_rows,
-    summary,
 )
 from swgjoint.study.catalogue_runs import Found, Task, oval, run_task
 from swgjoint.study.catalogue_shares import (
@@ -38,6 +35,11 @@ from swgjoint.study.catalogue_shares import (
     individual_summary,
     scaling,
     shares,
+)
+from swgjoint.study.catalogue_summary import (
+    ratcheting_orders,
+    scaled_against_computed,
+    summary,
 )
 from swgjoint.study.pool import run_all
 from swgjoint.study.rows import Row, StudyOptions, StudyResult
@@ -79,6 +81,9 @@ def run_catalogue(options: StudyOptions) -> StudyResult:
     rows = [row for part in parts for row in rows_of(study, part, found)]
     failed = {name: f["fault"] for name, f in found.items() if "fault" in f}
     lines = summary(study, rows)
+    if "ratcheting" in parts:
+        lines += ratcheting_orders(study, found, REFERENCE)
+    lines += scaled_against_computed(study, found, REFERENCE, CHECK)
     more: dict[str, Any] = {
         "source": study.source,
         "variants": [v.name for v in study.variants],
@@ -97,13 +102,6 @@ def run_catalogue(options: StudyOptions) -> StudyResult:
     lines += [f"failed: {name}: {fault}" for name, fault in failed.items()]
     files = _write(options.folder, rows, lines)
     return StudyResult(rows=tuple(rows), summary=tuple(lines), more=more, files=files)
-
-
-def torques_of(row: CatalogueRow) -> tuple[float, ...]:
-    """Torques of a path: lost motion, T1, T2, rated, the end of the standard loop."""
-    top = max(row.repeated_peak, 1.5 * row.T2)
-    wanted = (LOST_MOTION_TORQUE * row.rated_torque, row.T1, row.T2, row.rated_torque)
-    return tuple(sorted({*wanted, top}))
 
 
 def tasks_of(study: CatalogueFile, part: str) -> list[Task]:
@@ -126,14 +124,14 @@ def tasks_of(study: CatalogueFile, part: str) -> list[Task]:
         return tasks
     if part == "individuals":
         own = study.individuals
-        torques = torques_of(catalogue_row(own.size, own.ratio))
+        torques = edges(catalogue_row(own.size, own.ratio))[1:]
         return [
             Task(
                 name=f"individual {seed}",
-                kind="path",
+                kind="individual",
                 design=study.individual(seed),
                 torques=torques,
-                work=2,
+                work=8,
             )
             for seed in own.seeds
         ]
@@ -184,7 +182,7 @@ def rows_of(study: CatalogueFile, part: str, found: Mapping[str, Found]) -> list
     build = {
         "stiffness": lambda row: stiffness_rows(study, row, found),
         "ratcheting": lambda row: ratcheting_rows(study, row, found, REFERENCE),
-        "accuracy": lambda row: accuracy_rows(row, found, REFERENCE),
+        "accuracy": lambda row: accuracy_rows(study, row, found, REFERENCE),
         "losses": loss_rows,
     }
     if part not in build:
@@ -200,17 +198,15 @@ def _write(
     from swgjoint.study.catalogue_plots import catalogue_picture
 
     plain = [row.to_json() for row in rows]
-    text = io.StringIO()
-    writer = csv.DictWriter(text, fieldnames=list(plain[0]), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(plain)
     folder.mkdir(parents=True, exist_ok=True)
-    files = [
-        write_whole(folder / "catalogue.csv", text.getvalue()),
-        write_whole(
-            folder / "catalogue.json", json_text({"rows": plain, "summary": lines})
-        ),
-    ]
+    content = json_text({"rows": plain, "summary": lines})
+    files = [write_whole(folder / "catalogue.json", content)]
+    if plain:
+        text = io.StringIO()
+        writer = csv.DictWriter(text, fieldnames=list(plain[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(plain)
+        files.append(write_whole(folder / "catalogue.csv", text.getvalue()))
     picture = catalogue_picture(rows)
     if picture is not None:
         files.append(write_whole(folder / "catalogue.png", picture))

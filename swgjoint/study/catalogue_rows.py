@@ -1,30 +1,32 @@
-"""Rows of the comparison with the catalogue, and what they add up to."""
+"""Rows of the comparison with the catalogue."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from swgjoint.errors import InputError, Outcome
+from swgjoint.errors import Outcome
 from swgjoint.fe.ring_friction import RubbedPath
 from swgjoint.gear.design import Design
 from swgjoint.gear.mounting import series_compliance
-from swgjoint.maps.catalogue import CatalogueRow, catalogue_rows, table
+from swgjoint.maps.catalogue import CatalogueRow, table
 from swgjoint.maps.friction_bending import without_friction
 from swgjoint.maps.loop import LOST_MOTION_TORQUE
+from swgjoint.study.catalogue_accuracy import accuracy_bracket
 from swgjoint.study.catalogue_file import CatalogueFile, variant_design
+from swgjoint.study.catalogue_printed import (
+    STIFFNESS,
+    catalogue_stiffness,
+    edges,
+    printed_accuracy,
+)
 from swgjoint.study.catalogue_runs import Found
 from swgjoint.study.rows import Row
 from swgjoint.units import arcmin
 
 Array = NDArray[np.float64]
-
-STIFFNESS = ("K1", "K2", "K3")
-RATIO_CLASS = 80
-"""Of the stiffness and accuracy tables: this ratio and above."""
 
 
 def rubbed(found: Found, design: Design) -> RubbedPath:
@@ -51,57 +53,11 @@ def rubbed(found: Found, design: Design) -> RubbedPath:
     )
 
 
-def catalogue_row(size: int, ratio: int) -> CatalogueRow:
-    """Ratings of a component set.
-
-    Raises:
-        InputError: If the catalogue has none.
-    """
-    for row in catalogue_rows():
-        if (row.size, row.ratio) == (size, ratio):
-            return row
-    raise InputError(f"the catalogue has no size {size}, ratio {ratio}")
-
-
-def edges(row: CatalogueRow) -> tuple[float, float, float, float]:
-    """0, T1, T2 and the end of the standard loop [N·m]."""
-    return 0.0, row.T1, row.T2, max(row.repeated_peak, 1.5 * row.T2)
-
-
 def stiffnesses(path: RubbedPath, row: CatalogueRow) -> Array:
     """K1, K2, K3: both signs are mirror images, so torsion begins at zero [N·m/rad]."""
     torques = edges(row)
-    x = [0.0, *(path.at(torque) for torque in torques[1:])]
-    return np.array(
-        [
-            (high - low) / (b - a)
-            for (low, high), (a, b) in zip(pairwise(torques), pairwise(x), strict=True)
-        ]
-    )
-
-
-def catalogue_stiffness(row: CatalogueRow) -> Array:
-    """K1, K2, K3 as printed [N·m/rad]."""
-    ratio_class = float(min(row.ratio, RATIO_CLASS))
-    for line in table("stiffness"):
-        if (line["size"], line["ratio_class"]) == (float(row.size), ratio_class):
-            values = [line[f"{key}_1e4Nm_rad"] for key in STIFFNESS]
-            return 1e4 * np.array([float(v) for v in values if v is not None])
-    raise ValueError(f"no stiffness of size {row.size}, ratio {row.ratio}")
-
-
-def printed_accuracy(row: CatalogueRow) -> dict[str, float | None]:
-    """Upper bounds of transmission accuracy, hysteresis loss and lost motion."""
-    ratio_class = float(min(row.ratio, RATIO_CLASS))
-    keys = ("transmission_accuracy_arcmin", "hysteresis_loss_arcmin")
-    for line in table("accuracy"):
-        same = (line["size"], line["ratio_class"]) == (float(row.size), ratio_class)
-        if line["series"] == "CHA" and same:
-            return {
-                key: None if line[key] is None else float(line[key])  # type: ignore[arg-type]
-                for key in (*keys, "lost_motion_arcmin")
-            }
-    return dict.fromkeys((*keys, "lost_motion_arcmin"))
+    x = np.array([0.0, *map(path.at, torques[1:])])
+    return np.asarray(np.diff(torques) / np.diff(x))
 
 
 def stiffness_rows(
@@ -124,19 +80,30 @@ def stiffness_rows(
         lost = 2.0 * path.at(LOST_MOTION_TORQUE * row.rated_torque) / arcmin
         values.setdefault("lost motion", []).append(lost)
     reason = "; ".join(dict.fromkeys(faults)) or None
+    whole = not faults
     bounds = printed_accuracy(row)
     printed = dict(zip(STIFFNESS, catalogue_stiffness(row).tolist(), strict=True))
     rows = []
     for key in STIFFNESS:
         goal = study.goal(row.size, row.ratio, key)
         rows.append(
-            _row(row, key, "N·m/rad", printed[key], values.get(key, []), reason, goal)
+            _row(
+                row,
+                key,
+                "N·m/rad",
+                printed[key],
+                values.get(key, []),
+                reason,
+                goal=goal,
+                whole=whole,
+            )
         )
     bound = "catalogue states an upper bound"
     for key in ("hysteresis loss", "lost motion"):
         source = bounds[f"{key.replace(' ', '_')}_arcmin"]
         why = f"{bound}; {reason}" if reason else bound
-        rows.append(_row(row, key, "arcmin", source, values.get(key, []), why, None))
+        some = values.get(key, [])
+        rows.append(_row(row, key, "arcmin", source, some, why, whole=whole))
     return rows
 
 
@@ -147,10 +114,29 @@ def _row(
     source: float | None,
     values: Sequence[float],
     reason: str | None,
-    goal: float | None,
+    *,
+    goal: float | None = None,
+    whole: bool = True,
+    above: Sequence[float] = (),
 ) -> Row:
-    """Middle of the bracket beside the catalogue."""
-    low, high = (min(values), max(values)) if values else (None, None)
+    """Middle of the bracket beside the catalogue.
+
+    Args:
+        row: The catalogue's.
+        quantity: Name.
+        unit: Of the values.
+        source: Of the catalogue.
+        values: Of the variants.
+        reason: See :class:`Row`.
+        goal: Deviation of the middle that is aimed at; a bracket that is not whole
+            does not meet it.
+        whole: Whether every variant has a value.
+        above: Lower bounds of variants without one: nothing is known of the upper end
+            of the bracket then.
+    """
+    known = [*values, *above]
+    low = min(known) if known else None
+    high = max(values) if values and not above else None
     middle = None if low is None or high is None else 0.5 * (low + high)
 
     def over(value: float | None) -> float | None:
@@ -159,7 +145,7 @@ def _row(
     ratio = over(middle)
     met = None
     if goal is not None:
-        met = ratio is not None and abs(ratio - 1.0) <= goal
+        met = whole and ratio is not None and abs(ratio - 1.0) <= goal
     return Row(
         case=f"size {row.size}, ratio {row.ratio}",
         quantity=quantity,
@@ -175,6 +161,7 @@ def _row(
             "over_source": ratio,
             "low_over_source": over(low),
             "high_over_source": over(high),
+            "whole": whole and not above,
             "goal": goal,
             "met": met,
         },
@@ -186,14 +173,15 @@ def ratcheting_rows(
 ) -> list[Row]:
     """Limits of both flanks at one size, scaled by the cube of the size."""
     scale = (row.size / size) ** 3
-    values, notes = [], []
+    values, above, notes, whole = [], [], [], True
     for flank in dict.fromkeys(v.flank_deg for v in study.variants):
         one = found[f"ratcheting {size} {row.ratio} {flank:g}"]
         if "fault" in one:
             notes.append(f"{flank:g} deg: {one['fault']}")
+            whole = False
         elif not one["passed"]:
-            bound = scale * one["limit_Nm"]
-            notes.append(f"{flank:g} deg: no limit up to {bound:.3g} N·m")
+            above.append(scale * one["limit_Nm"])
+            notes.append(f"{flank:g} deg: no limit up to {above[-1]:.3g} N·m")
         else:
             values.append(scale * one["limit_Nm"])
     fixed = found[
@@ -206,30 +194,42 @@ def ratcheting_rows(
     notes.insert(0, "circular spline free outside, wave generator rigid, in the plane")
     if row.size != size:
         notes.append(f"scaled from size {size}")
-    source = row.ratcheting_torque
     return [
-        _row(row, "ratcheting torque", "N·m", source, values, "; ".join(notes), None)
+        _row(
+            row,
+            "ratcheting torque",
+            "N·m",
+            row.ratcheting_torque,
+            values,
+            "; ".join(notes),
+            whole=whole,
+            above=above,
+        )
     ]
 
 
 def accuracy_rows(
-    row: CatalogueRow, found: Mapping[str, Found], size: int
+    study: CatalogueFile, row: CatalogueRow, found: Mapping[str, Found], size: int
 ) -> list[Row]:
     """Accuracy at one size; the errors are micrometres, so their angle scales down."""
-    key = "transmission_accuracy_arcmin"
     one = found[f"accuracy {size} {row.ratio}"]
-    own = found.get(f"accuracy {row.size} {row.ratio}", {})
-    source = printed_accuracy(row)[key]
-    why = "catalogue states an upper bound; one gear with the stated errors"
-    if "fault" in one:
-        return [
-            _row(row, "transmission accuracy", "arcmin", source, [], one["fault"], None)
-        ]
-    value = own.get(key)
-    if value is None:
-        value = one[key] * size / row.size
+    own = found.get(f"accuracy {row.size} {row.ratio}", {"fault": "not computed"})
+    source = printed_accuracy(row)["transmission_accuracy_arcmin"]
+    why = (
+        "catalogue states an upper bound; one gear with the stated errors; bracket: low"
+        " orders with 0 to 2 rms of the rest at either peak"
+    )
+    values: list[float] = []
+    if "fault" not in own:
+        design = variant_design(row.size, row.ratio, study.variants[0])
+        values += accuracy_bracket(own, design)
+    elif "fault" not in one:
+        design = variant_design(size, row.ratio, study.variants[0])
+        values += [v * size / row.size for v in accuracy_bracket(one, design)]
         why += f"; scaled from size {size}"
-    return [_row(row, "transmission accuracy", "arcmin", source, [value], why, None)]
+    else:
+        why = one["fault"]
+    return [_row(row, "transmission accuracy", "arcmin", source, values, why)]
 
 
 def loss_rows(row: CatalogueRow) -> list[Row]:
@@ -240,78 +240,5 @@ def loss_rows(row: CatalogueRow) -> list[Row]:
             assert isinstance(value, float)
             design = Design.preset(f"size-{row.size}-{row.ratio}")
             why = without_friction(design)
-            return [_row(row, "no-load running torque", "mN·m", value, [], why, None)]
+            return [_row(row, "no-load running torque", "mN·m", value, [], why)]
     return []
-
-
-def summary(study: CatalogueFile, rows: Sequence[Row]) -> list[str]:
-    """Range of model over catalogue by quantity and ratio, goals that are met."""
-    lines = []
-    for quantity in dict.fromkeys(row.quantity for row in rows):
-        for ratio in study.ratios:
-            some = [
-                row
-                for row in rows
-                if (row.quantity, row.more["ratio"]) == (quantity, ratio)
-                and row.more["over_source"] is not None
-            ]
-            if not some:
-                continue
-            middle = [row.more["over_source"] for row in some]
-            ends = [
-                row.more[f"{e}_over_source"] for row in some for e in ("low", "high")
-            ]
-            text = (
-                f"{quantity}, ratio {ratio}: model over catalogue {min(middle):.2f} to"
-                f" {max(middle):.2f} (brackets {min(ends):.2f} to {max(ends):.2f})"
-            )
-            judged = [row for row in some if row.more["goal"] is not None]
-            if judged:
-                met = sum(bool(row.more["met"]) for row in judged)
-                goal = 100.0 * judged[0].more["goal"]
-                text += f"; within {goal:.0f} %: {met} of {len(judged)}"
-            lines.append(text)
-    lines += _ratcheting_order(study, rows)
-    rising = [
-        "<".join(f"{v:.3g}" for v in values)
-        for case in dict.fromkeys(row.case for row in rows)
-        if len(values := _stiffness_of(rows, case)) == 3
-        and not values[0] < values[1] < values[2]
-    ]
-    if any(row.quantity == "K1" for row in rows):
-        lines.append(f"K1 < K2 < K3 fails in {len(rising)} cases")
-    return lines
-
-
-def _ratcheting_order(study: CatalogueFile, rows: Sequence[Row]) -> list[str]:
-    """Ratios from the largest ratcheting torque to the smallest, ours and theirs."""
-    lines = []
-    for size in study.sizes:
-        some = [
-            row
-            for row in rows
-            if (row.quantity, row.more["size"]) == ("ratcheting torque", size)
-            and row.ours is not None
-        ]
-        if len(some) < 2:
-            continue
-        orders = [
-            " > ".join(
-                str(row.more["ratio"])
-                for row in sorted(some, key=lambda row: -(getattr(row, key) or 0.0))
-            )
-            for key in ("ours", "source_value")
-        ]
-        lines.append(
-            f"ratcheting torque, size {size}, by ratio: model {orders[0]}, catalogue"
-            f" {orders[1]}"
-        )
-    return lines
-
-
-def _stiffness_of(rows: Sequence[Row], case: str) -> list[float]:
-    return [
-        row.ours
-        for row in rows
-        if row.case == case and row.quantity in STIFFNESS and row.ours is not None
-    ]

@@ -10,16 +10,21 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from swgjoint.errors import ComputationError, DesignError, InputError
 from swgjoint.files import write_whole
 from swgjoint.gear.design import Design
 from swgjoint.json_text import json_text
 from swgjoint.maps.cache import cache_folder, key_of
-from swgjoint.units import arcmin
+
+if TYPE_CHECKING:
+    from swgjoint.fe.ring_friction import RubbedPath
+
+Array = NDArray[np.float64]
 
 _log = logging.getLogger(__name__)
 
@@ -29,8 +34,10 @@ OUTSIDE = 1.37
 """Outer diameter of the circular spline over the pitch diameter, for ratcheting: mean
 of 1.34 to 1.41 of component sets of sizes 14 to 32 (50, 60, 70, 85, 110 mm; dimension
 tables from memory, not checked)."""
-ANGLES = 64
-"""Input angles over one output turn between which the accuracy is read."""
+ANGLES = 96
+"""Input angles over one output turn from which the accuracy is read."""
+INDIVIDUAL_ANGLES = 8
+"""Input angles over one output turn at which an individual gear is loaded."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,17 +105,23 @@ def _kept(path: Path) -> Found | None:
     return None
 
 
-def _path(task: Task) -> Found:
-    """Torsion behind the cup [rad] and sliding work per mu [J] over the torque."""
+def _whole_path(task: Task, angles: Array | None = None) -> RubbedPath:
+    """The path of the rings to the last torque of a task."""
     from swgjoint.fe.ring_friction import rubbed_path
 
-    path = rubbed_path(task.design, task.torques)
+    path = rubbed_path(task.design, task.torques, angles=angles)
     if not path.outcome.ok:
         reached = path.torque[-1] if path.torque.size else 0.0
         raise ComputationError(
             f"rings reach {reached:.4g} of {max(task.torques):.4g} N·m:"
             f" {path.outcome.value}"
         )
+    return path
+
+
+def _path(task: Task) -> Found:
+    """Torsion behind the cup [rad] and sliding work per mu [J] over the torque."""
+    path = _whole_path(task)
     work = path.teeth_work + path.race_work
     return {
         "torque_Nm": path.torque.tolist(),
@@ -132,16 +145,33 @@ def _ratcheting(task: Task) -> Found:
     return ratcheting_path(task.design).as_dict()
 
 
+def _individual(task: Task) -> Found:
+    """Torsion behind the cup [rad] over the torque, at angles over an output turn."""
+    from swgjoint.fe.ring_accuracy import over_output_turn
+
+    angles = over_output_turn(task.design, INDIVIDUAL_ANGLES)
+    paths = [_whole_path(task, angles[k : k + 1]) for k in range(angles.size)]
+    return {
+        "input_angles_rad": angles.tolist(),
+        "torque_Nm": paths[0].torque.tolist(),
+        "ring_torsion_rad": [
+            (path.torsion - path.series * path.torque).tolist() for path in paths
+        ],
+    }
+
+
 def _accuracy(task: Task) -> Found:
-    """Peak to peak of the error of the rings over one output turn, hardly loaded."""
+    """Error of the rings over one output turn, hardly loaded."""
     from swgjoint.fe.ring_accuracy import over_output_turn, transmission_error
 
-    error = transmission_error(task.design, over_output_turn(task.design, ANGLES))
-    return {"transmission_accuracy_arcmin": float(np.ptp(error)) / arcmin}
+    angles = over_output_turn(task.design, ANGLES)
+    error = transmission_error(task.design, angles)
+    return {"input_angles_rad": angles.tolist(), "error_rad": error.tolist()}
 
 
 KINDS: dict[str, Callable[[Task], Found]] = {
     "path": _path,
+    "individual": _individual,
     "ratcheting": _ratcheting,
     "accuracy": _accuracy,
 }

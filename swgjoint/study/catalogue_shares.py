@@ -6,23 +6,31 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicHermiteSpline
 
+from swgjoint.fe.ring_friction import RubbedPath
+from swgjoint.gear.design import Design
+from swgjoint.gear.mounting import series_compliance
+from swgjoint.maps.catalogue import CatalogueRow
 from swgjoint.study.catalogue_file import CatalogueFile, variant_design
-from swgjoint.study.catalogue_rows import (
-    STIFFNESS,
-    catalogue_row,
-    edges,
-    rubbed,
-    stiffnesses,
-)
+from swgjoint.study.catalogue_printed import STIFFNESS, catalogue_row, edges
+from swgjoint.study.catalogue_rows import rubbed, stiffnesses
 from swgjoint.study.catalogue_runs import Found
 from swgjoint.units import arcmin
+
+Array = NDArray[np.float64]
 
 
 def scaling(
     study: CatalogueFile, found: Mapping[str, Found], size: int
 ) -> dict[str, Any]:
-    """How far the cube of the size goes: K of every size over that scaled from one."""
+    """How far the cube of the size goes: K of every size over that scaled from one.
+
+    Segments end where both sizes have been loaded. Between their own torques curves
+    are cubics with the tangents that the rings tell: no value of one size is at the
+    scaled torque of another.
+    """
     rows, worst = [], 0.0
     first = study.variants[0]
     for ratio in study.ratios:
@@ -34,19 +42,34 @@ def scaling(
             one = found[f"path {other} {ratio} {first.flank_deg:g}"]
             if "fault" in one or other == size:
                 continue
-            row, scale = catalogue_row(other, ratio), (other / size) ** 3
-            own = stiffnesses(rubbed(one, variant_design(other, ratio, first)), row)
-            torques = edges(row)
-            x = [0.0, *(here.at(torque / scale) for torque in torques[1:])]
-            scaled = scale * np.diff(torques) / scale / np.diff(x)
-            ratios = (own / scaled).tolist()
+            scale = (other / size) ** 3
+            there = rubbed(one, variant_design(other, ratio, first))
+            reach = min(float(there.torque[-1]), scale * float(here.torque[-1]))
+            torques = np.minimum(edges(catalogue_row(other, ratio)), reach)
+            own = np.diff(_smooth(there, torques))
+            scaled = np.diff(_smooth(here, torques / scale))
+            both = np.diff(torques) > 0.0
+            ratios = (scaled[both] / own[both]).tolist()
             worst = max(worst, *(abs(r - 1.0) for r in ratios))
-            rows.append({"size": other, "ratio": ratio, "K_over_scaled": ratios})
+            rows.append(
+                {
+                    "size": other,
+                    "ratio": ratio,
+                    "up_to_Nm": reach,
+                    "K_over_scaled": ratios,
+                }
+            )
     line = (
         f"K computed at each size is within {100 * worst:.0f} % of that of size {size}"
-        " scaled by the cube: clearances do not scale"
+        " scaled by the cube, up to the torque that both reach: clearances do not scale"
     )
     return {"rows": rows, "lines": [line]}
+
+
+def _smooth(path: RubbedPath, torques: Array) -> Array:
+    """Torsion, zero at no torque, on cubics with the tangents of the path [rad]."""
+    curve = CubicHermiteSpline(path.torque, path.torsion, path.compliance)
+    return np.concatenate([[0.0], curve(torques[1:])])
 
 
 def shares(
@@ -107,29 +130,56 @@ def shares(
 def individual_summary(
     study: CatalogueFile, found: Mapping[str, Found]
 ) -> dict[str, Any]:
-    """Mean and scatter of K over the individual gears."""
+    """Mean of K over the individual gears, scatter among them and within each."""
     own = study.individuals
     row = catalogue_row(own.size, own.ratio)
-    values = [
-        stiffnesses(rubbed(one, study.individual(seed)), row)
+    tables = [
+        single_stiffnesses(one, study.individual(seed), row)
         for seed in own.seeds
         if "fault" not in (one := found[f"individual {seed}"])
     ]
-    if len(values) < 2:
+    if len(tables) < 2:
         return {"rows": [], "lines": ["fewer than two individual gears were solved"]}
-    table_ = np.array(values)
-    mean, scatter = table_.mean(axis=0), table_.std(axis=0, ddof=1)
-    percent = 100.0 * scatter / mean
+    K = np.array(tables)
+    within, between = scatter(K)
+    mean = K.mean(axis=(0, 1))
+    percent = ["/".join(f"{100 * v:.1f}" for v in s / mean) for s in (between, within)]
     line = (
-        f"{len(values)} individual gears, size {own.size}, ratio {own.ratio}: K1, K2,"
-        f" K3 scatter by {percent[0]:.1f}, {percent[1]:.1f}, {percent[2]:.1f} % (one"
-        " sigma)"
+        f"{len(K)} individual gears, size {own.size}, ratio {own.ratio}: K1/K2/K3"
+        f" scatter by {percent[0]} % (one sigma) from gear to gear, and within a gear"
+        f" by {percent[1]} % with the wave-generator angle ({K.shape[1]} over an"
+        " output turn)"
     )
     rows = [
-        {"quantity": key, "mean_Nm_rad": m, "sigma_Nm_rad": s}
-        for key, m, s in zip(STIFFNESS, mean.tolist(), scatter.tolist(), strict=True)
+        {"quantity": key, "mean_Nm_rad": m, "sigma_Nm_rad": s, "within_Nm_rad": w}
+        for key, m, s, w in zip(
+            STIFFNESS, mean.tolist(), between.tolist(), within.tolist(), strict=True
+        )
     ]
     return {"rows": rows, "lines": [line]}
+
+
+def single_stiffnesses(found: Found, design: Design, row: CatalogueRow) -> Array:
+    """K1, K2, K3 at each wave-generator angle by itself (n_angles, 3) [N·m/rad]."""
+    torque = np.array(found["torque_Nm"])
+    series = series_compliance(design, cup=True)
+    x = np.array(found["ring_torsion_rad"]) + series * torque
+    torques = edges(row)
+    at = np.searchsorted(torque, torques[1:])
+    return np.diff(torques) / np.diff(x[:, at], axis=1, prepend=0.0)
+
+
+def scatter(values: Array) -> tuple[Array, Array]:
+    """Standard deviations within and between gears, analysis of variance (textbook).
+
+    Args:
+        values: Shape (n_gears, n_angles, n). The mean of a gear over its angles still
+            scatters by the angles, which is taken off.
+    """
+    within = values.var(axis=1, ddof=1).mean(axis=0)
+    means = values.mean(axis=1).var(axis=0, ddof=1)
+    between = np.maximum(means - within / values.shape[1], 0.0)
+    return np.sqrt(within), np.sqrt(between)
 
 
 def friction(
