@@ -216,8 +216,8 @@ def accuracy_rows(
     own = found.get(f"accuracy {row.size} {row.ratio}", {"fault": "not computed"})
     source = printed_accuracy(row)["transmission_accuracy_arcmin"]
     why = (
-        "catalogue states an upper bound; one gear with the stated errors; bracket: low"
-        " orders with 0 to 2 rms of the rest at either peak"
+        "catalogue states an upper bound; one gear with the stated errors; from"
+        " what low orders or samples show to 2 rms of the rest beyond either peak"
     )
     values: list[float] = []
     if "fault" not in own:
