@@ -51,6 +51,18 @@ def test_any_wave_generator_angle_has_an_equilibrium(model, alpha):
     assert lag == pytest.approx(peer, rel=0.05)
 
 
+def test_a_search_begins_with_the_lobes_on_the_wave_generator(model):
+    """The rim has turned with the output, its oval with the wave generator."""
+    alpha = -1000.0
+    start = at_rest(model, alpha)
+    turn, _ = rim_rotation(model, start.q, start.rotation)
+    assert turn == pytest.approx(alpha / model.ratio, abs=1e-9)
+    x, y = start.q[: model.rim.size].reshape(-1, 2, 2)[:, 0].T
+    bearing, radius = np.arctan2(-x, y), np.hypot(x, y)
+    oval = np.sum((radius - radius.mean()) * np.exp(2j * bearing))
+    assert np.angle(oval * np.exp(-2j * alpha)) == pytest.approx(0.0, abs=0.01)
+
+
 def test_potential_is_stationary(model, state):
     """No displacement of either ring changes the potential to first order."""
     rng = np.random.default_rng(0)
