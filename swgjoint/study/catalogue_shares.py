@@ -31,7 +31,7 @@ def scaling(
     are cubics with the tangents that the rings tell: no value of one size is at the
     scaled torque of another.
     """
-    rows, worst = [], 0.0
+    rows, worst = [], np.zeros(len(STIFFNESS))
     first = study.variants[0]
     for ratio in study.ratios:
         base = found[f"path {size} {ratio} {first.flank_deg:g}"]
@@ -48,20 +48,22 @@ def scaling(
             torques = np.minimum(edges(catalogue_row(other, ratio)), reach)
             own = np.diff(_smooth(there, torques))
             scaled = np.diff(_smooth(here, torques / scale))
-            both = np.diff(torques) > 0.0
-            ratios = (scaled[both] / own[both]).tolist()
-            worst = max(worst, *(abs(r - 1.0) for r in ratios))
+            both = np.diff(torques) > 0.0  # a last segment that neither reaches is none
+            ratios = scaled[both] / own[both]
+            worst[both] = np.maximum(worst[both], np.abs(ratios - 1.0))
             rows.append(
                 {
                     "size": other,
                     "ratio": ratio,
                     "up_to_Nm": reach,
-                    "K_over_scaled": ratios,
+                    "K_over_scaled": ratios.tolist(),
                 }
             )
+    percent = "/".join(f"{100 * value:.0f}" for value in worst)
     line = (
-        f"K computed at each size is within {100 * worst:.0f} % of that of size {size}"
-        " scaled by the cube, up to the torque that both reach: clearances do not scale"
+        f"K1/K2/K3 computed at each size are within {percent} % of those of size"
+        f" {size} scaled by the cube, up to the torque that both reach: clearances do"
+        " not scale"
     )
     return {"rows": rows, "lines": [line]}
 

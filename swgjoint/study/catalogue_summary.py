@@ -26,11 +26,18 @@ def summary(study: CatalogueFile, rows: Sequence[Row]) -> list[str]:
             ]
             some = [row for row in every if row.more["over_source"] is not None]
             judged = [row for row in every if row.more["goal"] is not None]
-            if not some and not judged:
+            floor = [
+                row.more["low_over_source"]
+                for row in every
+                if row not in some and row.more["low_over_source"] is not None
+            ]
+            if not some and not judged and not floor:
                 continue
             text = f"{quantity}, ratio {ratio}: {_range(some)}"
-            if len(some) < len(every):
+            if 0 < len(some) < len(every):
                 text += f"; {len(every) - len(some)} of {len(every)} without a middle"
+            if floor:
+                text += f", more than {min(floor):.2f} to {max(floor):.2f}"
             if judged:
                 met = sum(bool(row.more["met"]) for row in judged)
                 goal = 100.0 * judged[0].more["goal"]
@@ -45,7 +52,7 @@ def summary(study: CatalogueFile, rows: Sequence[Row]) -> list[str]:
 def _range(rows: Sequence[Row]) -> str:
     """Smallest and largest middle over the catalogue, and ends of the brackets."""
     if not rows:
-        return "no value"
+        return "no middle"
     middle = [row.more["over_source"] for row in rows]
     ends = [row.more[f"{end}_over_source"] for row in rows for end in ("low", "high")]
     return (

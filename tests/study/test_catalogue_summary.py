@@ -15,7 +15,11 @@ from swgjoint.study.catalogue_file import CatalogueFile
 from swgjoint.study.catalogue_printed import catalogue_row
 from swgjoint.study.catalogue_rows import ratcheting_rows
 from swgjoint.study.catalogue_shares import scatter, single_stiffnesses
-from swgjoint.study.catalogue_summary import ratcheting_orders, scaled_against_computed
+from swgjoint.study.catalogue_summary import (
+    ratcheting_orders,
+    scaled_against_computed,
+    summary,
+)
 from swgjoint.study.rows import StudyOptions
 from swgjoint.units import arcmin
 
@@ -62,7 +66,7 @@ def test_similar_gears_scale_by_the_cube(monkeypatch):
     assert top[14, 80] == 30.0
     # the 433 N·m of size 32 are more than the 204 of size 25, scaled
     assert top[32, 100] == pytest.approx(204.0 * (32 / 25) ** 3)
-    assert any("within 0 % of that of size 25" in line for line in found.summary)
+    assert any("within 0/0/0 % of those of size 25" in line for line in found.summary)
 
 
 def line_of(found, start):
@@ -116,6 +120,10 @@ def test_a_flank_without_a_limit_leaves_a_lower_bound():
     assert "28 deg: no limit up to 1.2e+03 N·m" in open_end.reason
     (closed,) = ratcheting_rows(file, catalogue_row(25, 50), found, 25)
     assert (closed.ours, closed.more["high"]) == (1850.0, 1900.0)
+    rows = [open_end, closed]
+    lines = summary(file, rows)
+    assert "ratio 50: model over catalogue 3.19 to 3.19" in lines[0]
+    assert lines[1].endswith("ratio 80: no middle, more than 1.36 to 1.36")
     first, second = ratcheting_orders(file, found, 25)
     assert first.endswith(
         "20 deg, by ratio: model 50 > 100 > 80, catalogue 80 > 100 > 50"
