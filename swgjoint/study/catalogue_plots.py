@@ -19,7 +19,7 @@ def catalogue_picture(rows: Sequence[Row]) -> bytes | None:
     """
     from matplotlib.figure import Figure
 
-    shown = [row for row in rows if row.more["over_source"] is not None]
+    shown = [row for row in rows if row.more["low_over_source"] is not None]
     panels = [name for name in PANELS if any(row.quantity == name for row in shown)]
     if not panels:
         return None
@@ -35,8 +35,11 @@ def catalogue_picture(rows: Sequence[Row]) -> bytes | None:
             middle = row.more["over_source"]
             ends = row.more["low_over_source"], row.more["high_over_source"]
             colour = _COLOURS[size % len(_COLOURS)]
-            axis.vlines(x, *ends, color=colour, lw=4, alpha=0.45)
-            axis.plot(x, middle, "o", color=colour, ms=5)
+            if middle is None:  # a lower bound
+                axis.plot(x, ends[0], "^", color=colour, ms=6, mfc="none")
+            else:
+                axis.vlines(x, *ends, color=colour, lw=4, alpha=0.45)
+                axis.plot(x, middle, "o", color=colour, ms=5)
             if row.more["goal"] is not None:
                 goal = row.more["goal"]
                 axis.fill_between(
@@ -47,7 +50,9 @@ def catalogue_picture(rows: Sequence[Row]) -> bytes | None:
         axis.set_xlabel("ratio")
         axis.grid(axis="y", alpha=0.3)
     highest = max(
-        row.more["high_over_source"] for row in shown if row.quantity in panels
+        row.more["high_over_source"] or row.more["low_over_source"]
+        for row in shown
+        if row.quantity in panels
     )
     axes[0].set_ylim(0.0, 1.05 * max(highest, 1.4))
     for k, size in enumerate(sizes):
@@ -55,7 +60,9 @@ def catalogue_picture(rows: Sequence[Row]) -> bytes | None:
         axes[0].plot([], [], "o", color=colour, label=f"size {size}")
     axes[0].legend(fontsize="small")
     axes[0].set_ylabel("model over catalogue")
-    figure.suptitle("middle and bracket of the variants; grey: goal")
+    figure.suptitle(
+        "middle and bracket of the variants; triangle: lower bound; grey: goal"
+    )
     out = io.BytesIO()
     figure.savefig(out, format="png", dpi=130)
     return out.getvalue()

@@ -12,6 +12,7 @@ from swgjoint.gear.design import Design
 from swgjoint.study import catalogue as study
 from swgjoint.study.catalogue_accuracy import ORDERS, accuracy_bracket, peaks
 from swgjoint.study.catalogue_file import CatalogueFile
+from swgjoint.study.catalogue_plots import catalogue_picture
 from swgjoint.study.catalogue_printed import catalogue_row
 from swgjoint.study.catalogue_rows import ratcheting_rows
 from swgjoint.study.catalogue_shares import scatter, single_stiffnesses
@@ -124,6 +125,8 @@ def test_a_flank_without_a_limit_leaves_a_lower_bound():
     lines = summary(file, rows)
     assert "ratio 50: model over catalogue 3.19 to 3.19" in lines[0]
     assert lines[1].endswith("ratio 80: no middle, more than 1.36 to 1.36")
+    picture = catalogue_picture([open_end])
+    assert picture is not None and picture.startswith(b"\x89PNG")
     first, second = ratcheting_orders(file, found, 25)
     assert first.endswith(
         "20 deg, by ratio: model 50 > 100 > 80, catalogue 80 > 100 > 50"
