@@ -33,6 +33,7 @@ from swgjoint.control.kinematic_error import compensated, identify_kinematic_err
 from swgjoint.control.learning import LearningCompensation
 from swgjoint.control.motor_side import MotorPID, ideal_plan, rigid_plan
 from swgjoint.maps.drive_map import DriveMap
+from swgjoint.maps.error_spectrum import peak_to_peak
 from swgjoint.study.control_bench import (
     FREQUENCY,
     record_turn,
@@ -40,13 +41,13 @@ from swgjoint.study.control_bench import (
     two_per_turn,
 )
 from swgjoint.study.control_ladder import LEARNED
-from swgjoint.study.control_specimens import accuracy, specimen
+from swgjoint.study.control_specimens import specimen
 from swgjoint.units import arcmin
 
 SEED = 4
 drive = DriveMap.from_catalogue("CSG-25-100")
 plant = specimen(drive, SEED)
-print(f"kinematic error: {accuracy(plant) / arcmin:.2f} arcmin over one turn")
+print(f"kinematic error: {peak_to_peak(plant) / arcmin:.2f} arcmin over one turn")
 print(f"friction: {plant.friction.coulomb / drive.friction.coulomb:.2f} of the nominal")
 
 
