@@ -38,13 +38,12 @@ def bearing_checks(design: Design) -> list[Check]:
     widest = WIDEST_RACE * design.drive.face_width_mm
     return [
         *_cam(design),
-        Check(
-            name="bearing: deflection that its clearances leave, above",
-            ok=lobes_left > 0.0,
-            value=lobes_left,
-            unit="mm",
-            limit=0.0,
-            fault=f"{where}: clearance_um = {bearing.clearance_um:g} and"
+        Check.above(
+            "bearing: deflection that its clearances leave",
+            lobes_left,
+            0.0,
+            "mm",
+            f"{where}: clearance_um = {bearing.clearance_um:g} and"
             f" fit_clearance_um = {fit_um:g}: half of both takes up the lobes of"
             f" {lobes:.4g} mm; accepted: below {2.0 * lobes * mm / um:.4g} um together",
         ),
@@ -65,13 +64,12 @@ def bearing_checks(design: Design) -> list[Check]:
             f"{where}.race_width_mm = {width:g}: far wider than the teeth; accepted: at"
             f" most {widest:.4g} mm",
         ),
-        Check(
-            name="bearing: clearance between balls, above",
-            ok=clearance > 0.0,
-            value=clearance,
-            unit="mm",
-            limit=0.0,
-            fault=f"{where}.balls = {bearing.balls}: balls of"
+        Check.above(
+            "bearing: clearance between balls",
+            clearance,
+            0.0,
+            "mm",
+            f"{where}.balls = {bearing.balls}: balls of"
             f" {bearing.ball_diameter_mm:g} mm overlap by {-clearance:.4g} mm;"
             " accepted: fewer or smaller balls",
         ),
@@ -91,13 +89,12 @@ def _cam(design: Design) -> list[Check]:
     sharpest = 1.0 / float(outline.evaluate(stations)[2].max())
     value = (sharpest - depth) / mm
     return [
-        Check(
-            name="bearing: sharpest radius of the cam below it, above",
-            ok=value > 0.0,
-            value=value,
-            unit="mm",
-            limit=0.0,
-            fault=f"{design.drive.name}: wave_generator.bearing: race, balls and"
+        Check.above(
+            "bearing: sharpest radius of the cam below it",
+            value,
+            0.0,
+            "mm",
+            f"{design.drive.name}: wave_generator.bearing: race, balls and"
             f" clearances of {depth / mm:.4g} mm do not fit inside the outline, whose"
             f" radius of curvature falls to {sharpest / mm:.4g} mm; accepted: a smaller"
             " ball_diameter_mm or race_thickness_mm",

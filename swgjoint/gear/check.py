@@ -48,6 +48,20 @@ class Check:
             fault=fault,
         )
 
+    @classmethod
+    def above(
+        cls, name: str, value: float, limit: float, unit: str, fault: str
+    ) -> Check:
+        """Passes where value > limit."""
+        return cls(
+            name=f"{name}, above",
+            ok=value > limit,
+            value=value,
+            unit=unit,
+            limit=limit,
+            fault=fault,
+        )
+
 
 def raise_faults(checks: Iterable[Check]) -> None:
     """Refuse a design with a failed check.

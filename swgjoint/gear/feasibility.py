@@ -80,13 +80,12 @@ def _tooth(design: Design, member: str, profile: ToothProfile) -> list[Check]:
             "rad",
             f"{where}: a corner of {corner:.3g} rad; accepted: {TANGENCY_RAD:g} rad",
         ),
-        Check(
-            name=f"{name}: shortest segment, above",
-            ok=shortest > 0.0,
-            value=shortest,
-            unit="mm",
-            limit=0.0,
-            fault=f"{where}: a segment of {shortest:.3g} mm; accepted: above 0 mm",
+        Check.above(
+            f"{name}: shortest segment",
+            shortest,
+            0.0,
+            "mm",
+            f"{where}: a segment of {shortest:.3g} mm; accepted: above 0 mm",
         ),
         Check.at_most(
             f"{name}: end of the flank beside the middle of the gap",
@@ -128,13 +127,12 @@ def _fit(design: Design, profiles: Mapping[str, ToothProfile]) -> list[Check]:
     value = design.flexspline.addendum_coefficient
     other = design.circular_spline.addendum_coefficient
     checks.append(
-        Check(
-            name="teeth: clearance of the tips at the minor axis, above",
-            ok=apart > 0.0,
-            value=apart,
-            unit="mm",
-            limit=0.0,
-            fault=f"{drive.name}: flexspline.addendum_coefficient = {value:g}: the"
+        Check.above(
+            "teeth: clearance of the tips at the minor axis",
+            apart,
+            0.0,
+            "mm",
+            f"{drive.name}: flexspline.addendum_coefficient = {value:g}: the"
             f" teeth stay {-apart:.4g} mm in mesh at the minor axis; accepted: below"
             f" {2 * w0 / mm / drive.module_mm - other:.4g} with"
             f" circular_spline.addendum_coefficient = {other:g}",

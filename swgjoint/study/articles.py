@@ -43,12 +43,7 @@ def run_articles(options: StudyOptions) -> StudyResult:
     """
     if options.model not in (None, "3d"):
         raise InputError(f"--model {options.model}: the articles need solids, 3d")
-    unknown = [part for part in options.only if part not in PARTS]
-    if unknown:
-        raise InputError(
-            f"--only {','.join(unknown)}: no such part; accepted: {', '.join(PARTS)}"
-        )
-    parts = [part for part in PARTS if not options.only or part in options.only]
+    parts = options.chosen(PARTS)
     study = ArticlesFile.load()
     tasks = {task.name: task for part in parts for task in tasks_of(study, part)}
     ordered = sorted(tasks.values(), key=lambda task: -task.size)

@@ -61,12 +61,7 @@ def run_catalogue(options: StudyOptions) -> StudyResult:
         raise InputError(
             f"--model {options.model}: every quantity here has a level of its own"
         )
-    unknown = [part for part in options.only if part not in PARTS]
-    if unknown:
-        raise InputError(
-            f"--only {','.join(unknown)}: no such part; accepted: {', '.join(PARTS)}"
-        )
-    parts = [part for part in PARTS if not options.only or part in options.only]
+    parts = options.chosen(PARTS)
     study = CatalogueFile.load()
     tasks = [task for part in parts for task in tasks_of(study, part)]
     ordered = sorted(tasks, key=lambda task: -task.work)

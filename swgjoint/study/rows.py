@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from swgjoint.errors import InputError
 from swgjoint.progress import Progress, silent
 
 
@@ -22,6 +24,20 @@ class StudyOptions:
     folder: Path | None = None
     """Where tables, report and plots go; None writes nothing."""
     progress: Progress = silent
+
+    def chosen(self, parts: Sequence[str]) -> list[str]:
+        """Those of a study's parts that are to be run, in its order.
+
+        Raises:
+            InputError: If one is wanted that the study does not have.
+        """
+        unknown = [part for part in self.only if part not in parts]
+        if unknown:
+            raise InputError(
+                f"--only {','.join(unknown)}: no such part; accepted:"
+                f" {', '.join(parts)}"
+            )
+        return [part for part in parts if not self.only or part in self.only]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,8 +10,10 @@ import pytest
 
 from swgjoint.fe.solid.continuation import SolidContinuation
 from swgjoint.fe.solid.corotation import about_z
+from swgjoint.fe.solid.drive3d import solid_ring
 from swgjoint.fe.solid.equilibrium import SolidLoad
 from swgjoint.fe.solid.linearise import linearise
+from swgjoint.gear.design import Design
 
 TORQUE = 5.0
 PITCH = 2 * pi / 42
@@ -151,3 +153,19 @@ def test_sectors_fit_together(small_ring, loaded):
     size = small_ring.strip.masters.face_size
     assert masters[:-1, -size:] == pytest.approx(masters[1:, :size])
     assert masters[-1, -size:] == pytest.approx(masters[0, :size] * small_ring.closure)
+
+
+@pytest.mark.slow
+def test_crowned_wave_generator_engages_under_a_short_cup():
+    """It rocks: without half steps two sets of contacts ask for each other for ever."""
+    design = Design.load("stress-cup").with_changes(
+        {
+            "micro_geometry.wave_generator_crowning_um": 40.0,
+            "micro_geometry.wave_generator_slope_um": 45.0,
+            "mesh.refinement": 0.5,
+        }
+    )
+    follow = SolidContinuation(ring=solid_ring(design, half=True), ratio=design.ratio)
+    engaged = follow.meshed(follow.deflected())
+    assert engaged.outcome.ok
+    assert len(engaged.history) < 40
