@@ -6,6 +6,7 @@ given, which takes longer than encoding it.
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -47,3 +48,43 @@ class Column:
             )
         starts = np.arange(0, len(array) + 1, self._each, dtype=np.int32)
         return pa.ListArray.from_arrays(starts, array)
+
+
+class Numbers:
+    """A row of numbers as one tensor, for a bar chart."""
+
+    def __init__(self, values: NDArray[np.float64]) -> None:
+        """Keep the numbers, shape (n,)."""
+        self._values = np.ascontiguousarray(values, dtype=np.float64)
+
+    def as_arrow_array(self) -> Any:
+        """One tensor, as rerun asks for it."""
+        import pyarrow as pa
+
+        empty, number = _empty_tensor()
+        _, names, buffer = (empty.field(k) for k in range(3))
+        kinds = [buffer.field(k) for k in range(buffer.type.num_fields)]
+        ends = np.array([0, self._values.size])
+        kinds[number] = pa.Array.from_buffers(
+            kinds[number].type,
+            1,
+            [None, pa.py_buffer(ends.astype(np.int32))],
+            children=[pa.array(self._values)],
+        )
+        filled = pa.Array.from_buffers(
+            buffer.type, 1, buffer.buffers()[:3], children=kinds
+        )
+        shape = pa.ListArray.from_arrays([0, 1], pa.array(ends[1:], type=pa.uint64()))
+        fields = list(empty.type)
+        return pa.StructArray.from_arrays(
+            [shape.cast(fields[0].type), names, filled], fields=fields
+        )
+
+
+@cache
+def _empty_tensor() -> tuple[Any, int]:
+    """Rerun's tensor without numbers, and which of its kinds holds 64-bit floats."""
+    import rerun as rr
+
+    empty = rr.components.TensorDataBatch(np.zeros(0)).as_arrow_array()
+    return empty, empty.field(2)[0].type_code

@@ -18,6 +18,7 @@ however long, so that a recording stays small.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -99,6 +100,7 @@ def log_drive(stream: Any, path: str, assembly: Assembly, joint: str) -> None:
     """What of a drive does not change; arguments as for :func:`send_drive`."""
     import rerun as rr
 
+    _turbo()  # loads what the colours need while there is time
     drive = assembly.transmissions[assembly.joints.index(joint)].drive
     fields = drive.fields
     assert fields is not None
@@ -304,9 +306,13 @@ def about_z(angle: Array) -> Array:
 
 def stress_color(share: NDArray[np.floating[Any]]) -> NDArray[np.uint32]:
     """Colours of the stress over its largest, 0xRRGGBBAA, shape of the share."""
+    return np.asarray(_turbo()[np.clip(256.0 * share, 0.0, 255.0).astype(np.uint8)])
+
+
+@cache
+def _turbo() -> NDArray[np.uint32]:
+    """Colours from the least to the largest (256,)."""
     from matplotlib import colormaps
 
-    steps = np.arange(256) / 255.0
-    rgba = colormaps["turbo"](steps, bytes=True).astype(np.uint32)
-    table = (rgba[:, 0] << 24) | (rgba[:, 1] << 16) | (rgba[:, 2] << 8) | 255
-    return np.asarray(table[np.clip(256.0 * share, 0.0, 255.0).astype(np.uint8)])
+    rgba = colormaps["turbo"](np.arange(256) / 255.0, bytes=True).astype(np.uint32)
+    return np.asarray((rgba[:, 0] << 24) | (rgba[:, 1] << 16) | (rgba[:, 2] << 8) | 255)

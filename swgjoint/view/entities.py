@@ -46,6 +46,7 @@ from swgjoint.view.joint_pictures import (
     log_phase_ends,
     log_phase_path,
     log_phase_point,
+    log_ripple,
     phase_points,
     ripple_bars,
     send_phase,
@@ -153,11 +154,7 @@ def log_measured(stream: Any, runs: Mapping[str, Run], scales: Scales) -> None:
         for j, joint in enumerate(run.joints):
             bars = ripple_bars(run, j)
             if bars is not None:
-                stream.log(
-                    f"{prefix}joint/{joint}/ripple_orders",
-                    rr.BarChart(bars[1], abscissa=bars[0], color=color),
-                    static=True,
-                )
+                log_ripple(stream, f"{prefix}joint/{joint}", bars, color)
             if (of_joint := scales[joint]) is not None:
                 path = phase_path(joint, label)
                 log_phase_path(stream, path, run, j, of_joint, color)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from swgjoint.sim.metrics import highest_resolved_order, torque_ripple
 from swgjoint.units import arcmin
-from swgjoint.view.columns import Column
+from swgjoint.view.columns import Column, Numbers
 
 if TYPE_CHECKING:
     from swgjoint.sim.run import Run
@@ -57,6 +57,22 @@ def ripple_bars(run: Run, j: int) -> tuple[Array, Array] | None:
     starts = np.arange(0, order.size, per)
     middle = np.add.reduceat(order, starts) / np.diff(np.append(starts, order.size))
     return middle, np.maximum.reduceat(amplitude, starts)
+
+
+def log_ripple(
+    stream: Any, path: str, bars: tuple[Array, Array], color: tuple[int, int, int]
+) -> None:
+    """Spectrum of a joint's ripple, from :func:`ripple_bars`."""
+    import rerun as rr
+
+    # as rr.BarChart would have it, which takes longer than the spectrum
+    chart = (
+        (Numbers(bars[1]), rr.BarChart.descriptor_values()),
+        (Numbers(bars[0]), rr.BarChart.descriptor_abscissa()),
+        (rr.components.ColorBatch([color]), rr.BarChart.descriptor_color()),
+    )
+    parts = [rr.DescribedComponentBatch(*part) for part in chart]
+    stream.log(f"{path}/ripple_orders", parts, static=True)
 
 
 def phase_scales(runs: Mapping[str, Run]) -> Scales:
