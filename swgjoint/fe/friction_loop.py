@@ -14,7 +14,6 @@ from swgjoint.fe.drive2d import can_halve, ring_model
 from swgjoint.fe.sampling import SYMMETRIC
 from swgjoint.fe.state import State
 from swgjoint.gear.design import Design
-from swgjoint.gear.kinematics import periodicity
 from swgjoint.gear.mounting import series_compliance
 from swgjoint.gear.tolerances import without_errors
 from swgjoint.maps.hysteresis_loops import FrictionLoop
@@ -65,11 +64,7 @@ def friction_loops(
         ComputationError: If an equilibrium cannot be solved.
     """
     perfect, drive = without_errors(design), design.drive
-    period = (
-        2.0
-        * pi
-        / periodicity(drive.layout, drive.teeth_flexspline, drive.teeth_circular_spline)
-    )
+    period = 2.0 * pi / design.periodicity
     parts = (np.arange(positions) + 0.5) / positions
     if design.wave_generator.kind in SYMMETRIC:
         parts = parts[: (positions + 1) // 2]

@@ -68,7 +68,9 @@ def solve_many(matrix: Array, offset: Array, start: Mask | None = None) -> Pivot
             def solve(part: NDArray[np.int64]) -> Array:
                 return _at_active(scaled, q[part], active[part])
 
-            for part, found in zip(parts, pool.map(solve, parts), strict=True):
+            # the last few problems: a thread costs more than it saves
+            solve_all = pool.map if len(parts) > 1 else map
+            for part, found in zip(parts, solve_all(solve, parts), strict=True):
                 result[part] = found
             bad = result[open_] < -tolerance[open_, None]
             wrong = bad.sum(axis=1)

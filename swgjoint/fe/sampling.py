@@ -21,7 +21,7 @@ from swgjoint.fe.solid.shape_fields import solid_fields, solid_surface
 from swgjoint.fe.tolerance_rest import SMALL
 from swgjoint.fe.tolerance_sampling import sample_tolerances
 from swgjoint.gear.design import Design
-from swgjoint.gear.kinematics import angle_coefficients, periodicity
+from swgjoint.gear.kinematics import angle_coefficients
 from swgjoint.gear.mounting import series_compliance, springs_of
 from swgjoint.gear.tolerances import has_errors, without_errors
 from swgjoint.maps.catalogue import ratings_of
@@ -68,15 +68,12 @@ def sample_map(
     """
     begin = time.perf_counter()
     drive, ratings = design.drive, ratings_of(design)
-    cycles = periodicity(
-        drive.layout, drive.teeth_flexspline, drive.teeth_circular_spline
-    )
     if angles is None:
         angles = SOLID_ANGLES if model == "3d" else ANGLES
     symmetric = design.wave_generator.kind in SYMMETRIC
     parts = [part * ratings.repeated_peak for part in LEVELS]
     torques = parts if symmetric else [-t for t in parts[::-1]] + parts
-    period = 2.0 * pi / cycles
+    period = 2.0 * pi / design.periodicity
     theta = period * np.arange(angles) / angles
     total, done = angles * (len(torques) + 1) + len(theta[::EVERY]), 0
 
@@ -131,6 +128,7 @@ def sample_map(
     # the pattern follows the gear angle that depends on the input alone, written so
     # that its phase grows with theta
     alpha, beta = angle_coefficients(drive.layout)
+    cycles = design.periodicity
     return MapSamples(
         name=drive.name,
         level=model,

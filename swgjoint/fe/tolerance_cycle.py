@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from swgjoint.fe.corotation import rotate
 from swgjoint.gear.design import Design, MemberName
-from swgjoint.gear.kinematics import periodicity
 from swgjoint.gear.tolerances import ToothErrors, axis_tilt, tooth_errors
 
 Array = NDArray[np.float64]
@@ -29,11 +28,7 @@ def pitches_of(design: Design) -> int:
 
 def pitch_of(design: Design) -> float:
     """Input angle after which the teeth stand alike [rad]."""
-    drive = design.drive
-    cycles = periodicity(
-        drive.layout, drive.teeth_flexspline, drive.teeth_circular_spline
-    )
-    return 2.0 * pi / cycles
+    return 2.0 * pi / design.periodicity
 
 
 def shifted(errors: ToothErrors, pitches: Index, layout: str) -> Array:

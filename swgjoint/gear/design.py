@@ -214,6 +214,15 @@ class Design(Section):
         )
 
     @property
+    def periodicity(self) -> int:
+        """Pitches in a turn of the input; see :mod:`swgjoint.gear.kinematics`."""
+        return kinematics.periodicity(
+            self.drive.layout,
+            self.drive.teeth_flexspline,
+            self.drive.teeth_circular_spline,
+        )
+
+    @property
     def tooth_difference(self) -> int:
         """Teeth of the circular spline minus teeth of the flexspline."""
         return self.drive.teeth_circular_spline - self.drive.teeth_flexspline

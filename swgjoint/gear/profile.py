@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swgjoint.gear.design import Design
-from swgjoint.gear.segments import Piece
+from swgjoint.gear.segments import Piece, Segment
 
 Array = NDArray[np.float64]
 
@@ -103,6 +103,8 @@ class ToothProfile:
         index = np.clip(
             np.searchsorted(stations, s, side="right") - 1, 0, len(self.segments) - 1
         )
+        if self._arcs is not None:
+            return self._at_once(s - stations[index], index)
         points = np.empty((*s.shape, 2))
         normals = np.empty((*s.shape, 2))
         curvature = np.empty(s.shape)
@@ -113,6 +115,44 @@ class ToothProfile:
             found = part.at(s[here] - stations[k], self.side)
             points[here], normals[here], curvature[here] = found
         return points, normals, curvature
+
+    @cached_property
+    def _arcs(self) -> Array | None:
+        """Arcs and lines as numbers; None if there is a piece of another kind.
+
+        Point = base + s way + radius (cos, sin) and normal = sign (cos, sin) of an
+        angle that begins at ``first`` and grows by ``rate`` s, which is 0 on a line.
+        Rows base x, y, way x, y, radius, first, rate, sign, curvature (9, n_segments).
+        """
+        columns = []
+        for part in self.segments:
+            if not isinstance(part, Segment):
+                return None
+            if part.radius == 0.0:
+                way = (np.array(part.end) - np.array(part.start)) / part.length
+                turn = float(np.arctan2(self.side * way[0], -self.side * way[1]))
+                columns.append([*part.start, *way, 0.0, turn, 0.0, 1.0, 0.0])
+                continue
+            rate = (part.angle_end - part.angle_start) / part.length
+            sign = 1.0 if part.convex else -1.0
+            arc = [*part.centre, 0.0, 0.0, part.radius, part.angle_start, rate]
+            columns.append([*arc, sign, part.curvature])
+        return np.array(columns).T
+
+    def _at_once(
+        self, along: Array, index: NDArray[np.int64]
+    ) -> tuple[Array, Array, Array]:
+        """:meth:`evaluate` by number and arc length of the segments, without a loop."""
+        assert self._arcs is not None
+        x, y, way_x, way_y, radius, first, rate, sign, bend = self._arcs[:, index]
+        angle = first + rate * along
+        cos, sin = np.cos(angle), np.sin(angle)
+        points = np.empty((*along.shape, 2))
+        normals = np.empty((*along.shape, 2))
+        points[..., 0] = x + along * way_x + radius * cos
+        points[..., 1] = y + along * way_y + radius * sin
+        normals[..., 0], normals[..., 1] = sign * cos, sign * sin
+        return points, normals, bend
 
     def signed_distance(self, points: Array) -> tuple[Array, Array, Array]:
         """Distance of points near the flank, positive outside the steel.
