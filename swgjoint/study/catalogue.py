@@ -4,7 +4,8 @@ Parts: ``stiffness`` (K1, K2, K3, hysteresis loss and lost motion by the thin ri
 with the bearing of the wave generator, and the share of each mechanism),
 ``individuals`` (gears with errors of their own) and ``accuracy`` (transmission error
 over an output turn) by the same rings, ``ratcheting`` (finite elements in the plane),
-``losses``. What is run is stated in
+``losses``. ``coning``, when asked for: the wave generator in space, rigid and on its
+bearing, at two ratios (some twenty minutes of a core). What is run is stated in
 ``models/studies/catalogue.toml``; where no source decides, variants are run: ``ours``
 is the middle of their bracket.
 """
@@ -21,6 +22,11 @@ from swgjoint.errors import InputError
 from swgjoint.files import write_whole
 from swgjoint.gear.design import Design
 from swgjoint.json_text import json_text
+from swgjoint.study.catalogue_coning import (
+    coning_picture,
+    coning_summary,
+    coning_tasks,
+)
 from swgjoint.study.catalogue_file import CatalogueFile, variant_design
 from swgjoint.study.catalogue_printed import catalogue_row, edges, torques_of
 from swgjoint.study.catalogue_rows import (
@@ -45,6 +51,8 @@ from swgjoint.study.pool import run_all
 from swgjoint.study.rows import Row, StudyOptions, StudyResult
 
 PARTS = ("stiffness", "individuals", "ratcheting", "accuracy", "losses")
+EXTRA = ("coning",)
+"""Parts that run when they are asked for."""
 REFERENCE = 25
 """Size at which a computation stands for all, scaled."""
 CHECK = (14, 80)
@@ -61,7 +69,7 @@ def run_catalogue(options: StudyOptions) -> StudyResult:
         raise InputError(
             f"--model {options.model}: every quantity here has a level of its own"
         )
-    parts = options.chosen(PARTS)
+    parts = options.chosen((*PARTS, *EXTRA) if options.only else PARTS)
     study = CatalogueFile.load()
     tasks = [task for part in parts for task in tasks_of(study, part)]
     ordered = sorted(tasks, key=lambda task: -task.work)
@@ -94,8 +102,14 @@ def run_catalogue(options: StudyOptions) -> StudyResult:
     if "individuals" in parts:
         more["individuals"] = individual_summary(study, found)
         lines += more["individuals"]["lines"]
+    if "coning" in parts:
+        more["coning"] = coning_summary(study, found)
+        lines += more["coning"]["lines"]
     lines += [f"failed: {name}: {fault}" for name, fault in failed.items()]
     files = _write(options.folder, rows, lines)
+    if "coning" in parts and options.folder is not None:
+        picture = coning_picture(more["coning"]["rows"])
+        files += (str(write_whole(options.folder / "coning.png", picture)),)
     return StudyResult(rows=tuple(rows), summary=tuple(lines), more=more, files=files)
 
 
@@ -103,6 +117,8 @@ def tasks_of(study: CatalogueFile, part: str) -> list[Task]:
     """What a part computes."""
     if part == "losses":
         return []
+    if part == "coning":
+        return coning_tasks(study)
     flanks = {v.flank_deg: v for v in reversed(study.variants)}
     if part == "stiffness":
         tasks = [

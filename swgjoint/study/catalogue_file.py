@@ -58,6 +58,17 @@ class Individuals(Section):
     source: Text
 
 
+class Coning(Section):
+    """The wave generator in space, rigid and on its bearing, at one size."""
+
+    size: Whole
+    ratios: Numbers
+    variant: Text
+    refinement: float
+    straight: Mapping[str, Any]
+    assumptions: Annotated[tuple[Text, ...], Field(strict=False)]
+
+
 class CatalogueFile(Section):
     """The study file."""
 
@@ -70,6 +81,7 @@ class CatalogueFile(Section):
     stated: Mapping[str, Mapping[str, Any]]
     variants: Annotated[tuple[Variant, ...], Field(strict=False, min_length=1)]
     individuals: Individuals
+    coning: Coning
 
     @classmethod
     def load(cls, reference: str = "catalogue") -> CatalogueFile:
@@ -94,6 +106,14 @@ class CatalogueFile(Section):
                 value = getattr(goal, quantity, None)
                 return None if value is None else float(value)
         return None
+
+    def coned(self, ratio: int, *, straight: bool) -> Design:
+        """A design in space; straight: without relief along the face width."""
+        own = self.coning
+        variant = next(v for v in self.variants if v.name == own.variant)
+        design = variant_design(own.size, ratio, variant)
+        changes = {"mesh.refinement": own.refinement}
+        return design.with_changes({**changes, **(own.straight if straight else {})})
 
     def individual(self, seed: int) -> Design:
         """A gear with errors of its own and a clearance drawn from its class."""

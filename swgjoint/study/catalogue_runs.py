@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -169,11 +169,46 @@ def _accuracy(task: Task) -> Found:
     return {"input_angles_rad": angles.tolist(), "error_rad": error.tolist()}
 
 
+def _coning(task: Task) -> Found:
+    """Torsion in space over the torque; the kind ends with that of the bearing."""
+    from swgjoint.fe.solid.torsion import solid_torsion
+
+    bearing = {"rigid": None, "free": "free", "held": "held"}[task.kind.split()[1]]
+    found = solid_torsion(task.design, task.torques, bearing=cast(Any, bearing))
+    return {
+        "torque_Nm": found.torque.tolist(),
+        "torsion_rad": found.torsion.tolist(),
+        "compliance_rad_Nm": found.compliance.tolist(),
+        "tooth_centre_over_face": found.tooth_centre.tolist(),
+        "tooth_force_N": found.tooth_force.tolist(),
+        "bore_centre_over_face": found.bore_centre.tolist(),
+        "balls": found.balls.tolist(),
+        "half_play_rad": found.half_play,
+    }
+
+
+def _coning_ring(task: Task) -> Found:
+    """The same by the thin rings, the closed-form cup in series."""
+    path = _whole_path(task, np.zeros(1))
+    at = np.searchsorted(path.torque, task.torques)
+    return {
+        "torque_Nm": list(task.torques),
+        "torsion_rad": path.torsion[at].tolist(),
+        "compliance_rad_Nm": path.compliance[at].tolist(),
+        "balls": path.balls[at].tolist(),
+        "half_play_rad": float(path.torsion[0] - path.compliance[0] * path.torque[0]),
+    }
+
+
 KINDS: dict[str, Callable[[Task], Found]] = {
     "path": _path,
     "individual": _individual,
     "ratcheting": _ratcheting,
     "accuracy": _accuracy,
+    "coning rigid": _coning,
+    "coning free": _coning,
+    "coning held": _coning,
+    "coning ring": _coning_ring,
 }
 
 

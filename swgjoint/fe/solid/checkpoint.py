@@ -85,7 +85,7 @@ def _packed(state: SolidState) -> dict[str, Any]:
     arrays: dict[str, Any] = {}
     for item in fields(state):
         value = getattr(state, item.name)
-        if item.name == "held":
+        if item.name == "held" or value is None:
             continue
         arrays[item.name] = value.name if isinstance(value, Outcome) else value
     if state.held is not None:

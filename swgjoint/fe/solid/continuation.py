@@ -133,10 +133,15 @@ class SolidContinuation(Follower[SolidState]):
         moved = travelled(local, shift) + still
         now = about_z(np.array(rotation)) @ ring.place
         x = np.einsum("sij,saj->sai", now, moved)
+        race = state.race
+        if ring.race is not None and race is not None:
+            moved = travelled(ring.race.displaced(race, state.rotation), shift)
+            race = ring.race.placed(moved, rotation)
         return replace(
             state,
             faces=x[:, :size],
             inside=x[:, size:],
+            race=race,
             pressure=np.clip(travelled(state.pressure, shift), 0.0, None),
             touching=np.roll(state.touching, round(shift), axis=0),
             shared=np.roll(state.shared, round(shift), axis=0),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,12 +13,15 @@ from swgjoint.fe.contact_patch import averaged_spline
 from swgjoint.fe.drive2d import can_halve
 from swgjoint.fe.solid.masters import Orders
 from swgjoint.fe.solid.memory import require_memory, required_memory
+from swgjoint.fe.solid.race import SolidRace
 from swgjoint.fe.solid.ring import SolidRing
 from swgjoint.fe.solid.ring_gear import ring_gear
 from swgjoint.fe.solid.strip import flexspline
 from swgjoint.fe.solid.strip_mesh import circular_spline_strip, flexspline_strip
 from swgjoint.fe.solid.teeth import FlankCrowning, Teeth
 from swgjoint.fe.solid.wave_generator import WaveGeneratorSurface
+from swgjoint.gear.bearing_checks import bearing_checks
+from swgjoint.gear.check import raise_faults
 from swgjoint.gear.design import Design
 from swgjoint.gear.profile import tooth_profile
 from swgjoint.gear.tolerances import axis_tilt, has_errors, tooth_errors
@@ -24,6 +29,9 @@ from swgjoint.gear.wave_generator import lobe_height
 from swgjoint.units import mm, um
 
 Array = NDArray[np.float64]
+
+Bearing = Literal["free", "held"]
+"""Along the axis the grooves of the balls give way to the race, or hold it."""
 
 
 def solid_ring(
@@ -33,6 +41,7 @@ def solid_ring(
     nonlinear: bool = True,
     elastic_circular_spline: bool = True,
     orders: Orders | None = None,
+    bearing: Bearing | None = None,
 ) -> SolidRing:
     """3D model of a design.
 
@@ -42,6 +51,8 @@ def solid_ring(
         nonlinear: Large rotations of the segments.
         elastic_circular_spline: Whether the circular spline deforms.
         orders: Degrees of the displacements of faces and sections.
+        bearing: The outer race of ``[wave_generator.bearing]`` on its balls, free or
+            held along the axis; without, the wave generator is rigid.
 
     Raises:
         DesignError: If the design cannot be built, the half model does not apply, or
@@ -50,6 +61,8 @@ def solid_ring(
     """
     name = design.drive.name
     check_modelled(design)
+    if bearing is not None:
+        check_bearing(design, half=half)
     if half and not can_halve(design):
         raise DesignError(f"{name}: the half model does not apply; leave --half out")
     profile = tooth_profile(design, "flexspline")
@@ -92,7 +105,40 @@ def solid_ring(
         lobe_height=lobe_height(design),
         half=half,
         nonlinear=nonlinear,
+        race=None
+        if bearing is None
+        else SolidRace.of(design, half=half, axially_free=bearing == "free"),
     )
+
+
+def check_bearing(design: Design, *, half: bool) -> None:
+    """Refuse what the bearing in space does not contain.
+
+    Raises:
+        DesignError: One line per key.
+    """
+    drive, generator = design.drive, design.wave_generator
+    faults = []
+    if generator.bearing is None:
+        faults.append("wave_generator.bearing is absent")
+    elif half and generator.bearing.balls % 2:
+        faults.append(
+            f"wave_generator.bearing.balls = {generator.bearing.balls}: the half model"
+            " needs an even number"
+        )
+    if drive.layout != "circular_spline_fixed":
+        faults.append(
+            f"drive.layout = {drive.layout!r}: accepted with the bearing in space:"
+            " 'circular_spline_fixed'"
+        )
+    if generator.kind not in ("elliptical", "cosine", "table"):
+        faults.append(
+            f"wave_generator.kind = {generator.kind!r}: a bearing in space runs on"
+            " 'elliptical', 'cosine' or 'table'"
+        )
+    if faults:
+        raise DesignError("\n".join(f"{drive.name}: {fault}" for fault in faults))
+    raise_faults(bearing_checks(design))
 
 
 def check_modelled(design: Design) -> None:

@@ -17,6 +17,7 @@ from swgjoint.fe.complementarity import ActiveSetError, solve_mixed
 from swgjoint.fe.cyclic import SingularRingError
 from swgjoint.fe.solid.corotation import about_z, energies
 from swgjoint.fe.solid.linearise import Linearised, linearise
+from swgjoint.fe.solid.race import NODE
 from swgjoint.fe.solid.ring import SolidRing
 from swgjoint.fe.solid.ring_factor import RingFactor
 from swgjoint.fe.solid.state import SolidState
@@ -201,8 +202,8 @@ def _solve_linear(
             compliance = float(answer[-1])
     force, (turn, ring_turn) = unknown[:n], unknown[n:]
     increment = condensed.base + condensed.response @ unknown[: n + 1]
-    bore, strip = linear.bore, ring.strip
-    moved = increment[:, _dofs(strip.teeth.masters)]
+    bore = linear.bore
+    moved = increment[:, ring.contact_dofs]
     change = np.einsum("spm,sm->sp", bore.rows, moved)
     by_teeth = np.zeros_like(change)
     if found is not None:
@@ -265,17 +266,17 @@ def condense(
         rotation: To which the bore of the diaphragm is brought; where it is if None.
     """
     masters, bore, strip = ring.strip.masters, linear.bore, ring.strip
-    teeth_dofs, held = _dofs(strip.teeth.masters), _dofs(masters.held)
+    teeth_dofs, held = ring.dofs(strip.teeth.masters), ring.dofs(masters.held)
     n_sectors, size = linear.gradient.shape
     n = 0 if found is None else len(found)
     # known motions of the bore of the diaphragm: to its place, and turning
     rotation = state.rotation if rotation is None else rotation
     target = np.einsum("ij,saj->sai", about_z(np.array(rotation)), ring.reference)
     value = np.zeros((n_sectors, size, 2))
-    still = (target - ring.masters(state)).reshape(n_sectors, -1)
-    value[:, held, 0] = still[:, held]
+    still = target - ring.masters(state)
+    value[:, held, 0] = still[:, masters.held].reshape(n_sectors, -1)
     around = np.stack([-target[..., 1], target[..., 0], 0.0 * target[..., 2]], axis=-1)
-    value[:, held, 1] = around.reshape(n_sectors, -1)[:, held]
+    value[:, held, 1] = around[:, masters.held].reshape(n_sectors, -1)
 
     # rows of the candidates with the wave generator's contact condensed
     rows, local, gap = np.zeros((n, size)), np.zeros((n, n)), np.zeros(n)
@@ -289,9 +290,9 @@ def condense(
         coupling = np.einsum("kbi,kbi->kb", at_bore, bore.normal[sector])
         coupling = bore.with_vertices(coupling, sector)
         eased = np.einsum("kp,kpq->kq", coupling, bore.inverse[sector])
-        rows[:, teeth_dofs] = found.rows - np.einsum(
-            "kp,kpm->km", eased, bore.rows[sector]
-        )
+        into = ring.contact_dofs
+        rows[:, into] = -np.einsum("kp,kpm->km", eased, bore.rows[sector])
+        rows[:, teeth_dofs] += found.rows
         same = sector[:, None] == sector[None, :]
         local = ring.teeth.compliance(found)
         local -= np.where(same, np.einsum("kp,lp->kl", eased, coupling), 0.0)
@@ -314,6 +315,12 @@ def condense(
     matrix[:, :, held] = 0.0
     matrix[:, held, held] = scale
     columns[:, held] = 0.0
+    if linear.race is not None:
+        fixed = np.zeros((n_sectors, size), dtype=bool)
+        fixed[:, ring.race_dofs] = linear.race.fixed
+        matrix[fixed], columns[fixed] = 0.0, 0.0
+        matrix.transpose(0, 2, 1)[fixed] = 0.0
+        matrix.reshape(n_sectors, -1)[:, :: size + 1][fixed] = scale
     solved = _solve_ring(ring, matrix, columns)
     base, response = solved[:, :, 0] + value[:, :, 0], solved[:, :, 1:]
     response[:, :, n] += value[:, :, 1]
@@ -337,19 +344,15 @@ def condense(
     )
 
 
-def _dofs(masters: NDArray[np.int64]) -> NDArray[np.int64]:
-    return np.asarray((3 * masters[:, None] + np.arange(3)).ravel())
-
-
 def _solve_ring(ring: SolidRing, matrix: Array, columns: Array) -> Array:
     """Solve, the last face of a half model written in the frame of the first one."""
-    size = ring.strip.masters.face_size
-    sign = np.tile(ring.closure, size)
-    matrix[-1, -3 * size :] *= sign[:, None]
-    matrix[-1, :, -3 * size :] *= sign
-    columns[-1, -3 * size :] *= sign[:, None]
-    solved = RingFactor(matrix, 3 * size).solve(columns)
-    solved[-1, -3 * size :] *= sign[:, None]
+    sign = ring.face_closure
+    size = len(sign)
+    matrix[-1, -size:] *= sign[:, None]
+    matrix[-1, :, -size:] *= sign
+    columns[-1, -size:] *= sign[:, None]
+    solved = RingFactor(matrix, size).solve(columns)
+    solved[-1, -size:] *= sign[:, None]
     return solved
 
 
@@ -376,7 +379,11 @@ def _advance(
     shared = ~bore.found | apart.any(axis=1)
     size, last = masters.face_size, masters.size - masters.face_size
     moved = damping * step.increment
-    x = ring.masters(state) + moved.reshape(len(moved), -1, 3)
+    own = ring.dofs(np.arange(masters.size))
+    x = ring.masters(state) + moved[:, own].reshape(len(moved), -1, 3)
+    race = state.race
+    if race is not None:
+        race = race + moved[:, ring.race_dofs[:NODE]].reshape(race.shape)
     flank_force = np.zeros_like(state.flank_force)
     ring_force = np.zeros_like(state.ring_force)
     kept = None
@@ -389,6 +396,7 @@ def _advance(
         state,
         faces=x[:, :size],
         inside=x[:, size:last],
+        race=race,
         pressure=step.pressure,
         bore_force=bore.nodal_force(step.pressure),
         touching=touching,
@@ -428,6 +436,12 @@ def _finished(
     )
     moment = points[..., 0] * force[..., 1] - points[..., 1] * force[..., 0]
     teeth = 0.0 if state.held is None else float(state.tooth_force @ state.held.arm)
+    energy, torque = ring.copies * energy, ring.copies * float(moment.sum())
+    balls = None
+    if ring.race is not None and state.race is not None:
+        forces = ring.race.forces(state.race, state.wave_generator_angle)
+        energy += forces.energy
+        balls, torque = forces.balls.force, forces.balls.input_torque
     # in one order in memory, so that a state read from a file goes on bit for bit
     return replace(
         state,
@@ -435,7 +449,8 @@ def _finished(
         inside=np.ascontiguousarray(state.inside),
         outcome=outcome,
         history=tuple(history),
-        energy=ring.copies * energy,
-        wave_generator_torque=ring.copies * float(moment.sum()),
+        ball_force=balls,
+        energy=energy,
+        wave_generator_torque=torque,
         tooth_moment=ring.copies * teeth,
     )

@@ -28,6 +28,7 @@ from swgjoint.fe.solid.corotation import (
     spin,
     tangent,
 )
+from swgjoint.fe.solid.race import RaceForces
 from swgjoint.fe.solid.ring import SolidRing
 from swgjoint.fe.solid.state import SolidState
 
@@ -58,7 +59,8 @@ class BoreContact:
     active: Mask
     """Which touch (N, p)."""
     rows: Array
-    """B, by the masters of the teeth in the global frame (N, p, 3 m)."""
+    """B, by the masters of the teeth in the global frame and by the coordinates of a
+    race (N, p, 3 m)."""
     free_gap: Array
     """g, gaps as if the old forces were gone (N, p) [m]."""
     compliance: Array
@@ -80,7 +82,7 @@ class BoreContact:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Linearised:
-    """Ring at one state; n = 3 masters."""
+    """Ring at one state; n = 3 masters, and the coordinates of a race."""
 
     frames: tuple[Frames, ...]
     gradient: Array
@@ -90,6 +92,8 @@ class Linearised:
     pushed: Array
     """B^T W^-1 g, forces of the wave generator on undisplaced masters (N, n) [N]."""
     bore: BoreContact
+    race: RaceForces | None = None
+    """Counted in gradient and tangent."""
 
 
 def linearise(
@@ -104,7 +108,7 @@ def linearise(
             all without it.
     """
     frames = ring.frames(state)
-    n = 3 * ring.strip.masters.size
+    n = ring.size
     gradient, pushed = np.zeros((2, ring.sectors, n))
     hessian = np.zeros((ring.sectors, n, n))
     bore = bore_contact(ring, state, frames[0], kept=kept)
@@ -112,20 +116,33 @@ def linearise(
     for number, (segment, frame) in enumerate(
         zip(ring.strip.segments, frames, strict=True)
     ):
-        dofs = (3 * segment.masters[:, None] + np.arange(3)).ravel()
+        dofs = ring.dofs(segment.masters)
         elastic = frame.deformation @ segment.stiffness
         total = elastic
         if number == 0:
             total = elastic - loads @ segment.loaded_from_masters
         gradient[:, dofs] += in_global(frame, projected(frame, elastic))
         local = matrices_in_global(frame, tangent(segment, frame, total))
-        if number == 0:
-            held = bore.inverse @ bore.rows
-            local += bore.rows.transpose(0, 2, 1) @ held
-            pushed[:, dofs] += np.einsum("spi,sp->si", held, bore.free_gap)
         hessian[:, dofs[:, None], dofs] += local
+        if number == 0:
+            into, held = ring.contact_dofs, bore.inverse @ bore.rows
+            hessian[:, into[:, None], into] += bore.rows.transpose(0, 2, 1) @ held
+            pushed[:, into] += np.einsum("spi,sp->si", held, bore.free_gap)
+    race = None
+    if ring.race is not None and state.race is not None:
+        race, dofs = (
+            ring.race.forces(state.race, state.wave_generator_angle),
+            ring.race_dofs,
+        )
+        gradient[:, dofs] += race.gradient
+        hessian[:, dofs[:, None], dofs] += race.hessian
     return Linearised(
-        frames=frames, gradient=gradient, hessian=hessian, pushed=pushed, bore=bore
+        frames=frames,
+        gradient=gradient,
+        hessian=hessian,
+        pushed=pushed,
+        bore=bore,
+        race=race,
     )
 
 
@@ -138,10 +155,13 @@ def bore_contact(
     b = len(ring.strip.bore)
     local = ring.bore_positions(frame, state)
     points = np.einsum("sij,spj->spi", frame.turn, local)
-    gap, normal, _ = ring.wave_generator.gap(
-        points.reshape(-1, 3), state.wave_generator_angle
-    )
-    gap = gap.reshape(n, b)
+    if ring.race is not None and state.race is not None:
+        gap, normal, by_race = ring.race.gap(state.race, points, ring.bore_places)
+    else:
+        gap, normal, _ = ring.wave_generator.gap(
+            points.reshape(-1, 3), state.wave_generator_angle
+        )
+        gap, by_race = gap.reshape(n, b), np.zeros((n, b, 0))
     normal = np.einsum("sji,spj->spi", frame.turn, normal.reshape(n, b, 3))
     vertex, found, bend, covered = _vertices(ring, gap, state, kept)
     # by masters in the frame: carried by the teeth, and turned with the frame
@@ -154,7 +174,7 @@ def bore_contact(
     turning -= np.einsum("spm,smw->spw", carried, s)
     rows = carried + np.einsum("spw,swm->spm", turning, frame.gradient)
     rows = np.einsum("sij,spaj->spai", frame.turn, rows.reshape(n, b, m, 3))
-    rows = rows.reshape(n, b, 3 * m)
+    rows = np.concatenate([rows.reshape(n, b, 3 * m), by_race], axis=2)
     compliance = teeth.compliance[first:, first:].reshape(b, 3, b, 3)
     seen = np.einsum("iajb,sjb->siaj", compliance, normal)
     nodal = np.einsum("sia,siaj->sij", normal, seen)
@@ -168,6 +188,8 @@ def bore_contact(
     present = np.ones((n, p), dtype=bool)
     present[:, at], present[:, rolls] = found, False
     present[:, :b] = ~covered
+    if ring.race is not None:
+        present[:, :b] &= ring.race.covers(ring.strip.bore[:, 2])
     active = state.touching & present
     active[:, rolls] = active[:, at] & (state.pressure[:, at] > 0.0)
     loaded = np.where(active[:, rolls], state.pressure[:, at], 1.0)
@@ -220,6 +242,9 @@ def _vertices(
     flat[shared] *= WIDE
     flat[shared & (True if kept is None else kept.ravel())] = inf
     seen = vertices(over(gap), flat)
+    if ring.race is not None:  # none beside the race
+        beside = ~ring.race.covers(ring.strip.mesh.teeth.z @ seen.weight)
+        seen.found[beside], seen.covered[:, beside] = False, False
     means = np.zeros((n, 2, lines, planes, lines))
     line = np.arange(lines)
     for k, weight in enumerate((seen.weight, seen.slope)):

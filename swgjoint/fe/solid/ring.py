@@ -10,12 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.fe.solid.corotation import Frames, about_z, segment_frames
+from swgjoint.fe.solid.race import NODE, SIGN, SolidRace
 from swgjoint.fe.solid.state import SolidState
 from swgjoint.fe.solid.strip import Strip
 from swgjoint.fe.solid.teeth import Teeth
 from swgjoint.fe.solid.wave_generator import WaveGeneratorSurface
 
 Array = NDArray[np.float64]
+Index = NDArray[np.int64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -31,6 +33,50 @@ class SolidRing:
     """Half of the ring, closed by a rotation of 180 deg."""
     nonlinear: bool = True
     """Large rotations of the segments; else they turn with the output alone."""
+    race: SolidRace | None = None
+    """Outer race on balls in place of the rigid wave generator."""
+
+    def dofs(self, masters: Index) -> Index:
+        """Degrees of freedom of masters in a sector.
+
+        Those of the race's nodes follow the first face and end the last one.
+        """
+        first = 3 * masters
+        if self.race is not None:
+            first = first + NODE * (masters >= self.strip.masters.face_size)
+        return np.asarray((first[:, None] + np.arange(3)).ravel())
+
+    @cached_property
+    def race_dofs(self) -> Index:
+        """Those of the race's nodes at both faces of a sector; empty without."""
+        if self.race is None:
+            return np.zeros(0, dtype=np.int64)
+        ends = 3 * self.strip.masters.face_size, self.size - NODE
+        return np.concatenate([end + np.arange(NODE) for end in ends])
+
+    @cached_property
+    def bore_places(self) -> Array:
+        """Bore nodes on the undeformed elements of their sectors, 0 to 1 (b,)."""
+        x, y, _ = self.strip.bore.T
+        return np.asarray(0.5 + np.arctan2(-x, y) * self.strip.sectors / (2.0 * pi))
+
+    @cached_property
+    def contact_dofs(self) -> Index:
+        """Those that move the gap of the bore: of the teeth, then of the race."""
+        return np.concatenate([self.dofs(self.strip.teeth.masters), self.race_dofs])
+
+    @property
+    def size(self) -> int:
+        """Degrees of freedom of a sector, both faces counted."""
+        return 3 * self.strip.masters.size + (0 if self.race is None else 2 * NODE)
+
+    @property
+    def face_closure(self) -> Array:
+        """Factors of the degrees of freedom of a face that close the ring."""
+        own = np.tile(self.closure, self.strip.masters.face_size)
+        if self.race is None:
+            return own
+        return np.concatenate([own, SIGN if self.half else np.ones(NODE)])
 
     @property
     def copies(self) -> int:
@@ -121,11 +167,19 @@ class SolidRing:
         size, n_bore = strip.masters.face_size, len(strip.bore)
         points = n_bore + 2 * (n_bore // strip.planes)
         last = strip.masters.size - size
+        race, touching = None, np.zeros((self.sectors, points), bool)
+        if self.race is not None:
+            race = self.race.at_rest(alpha, rotation, closed)
+            # nothing but the rim keeps the race on its balls
+            along = np.arange(self.sectors) * 2.0 * pi / strip.sectors
+            at_lobe = np.cos(2.0 * (along + rotation - alpha)) > 0.9
+            touching[:, :n_bore] = at_lobe[:, None] & self.race.covers(strip.bore[:, 2])
         return SolidState(
             faces=moved[:, :size],
             inside=moved[:, size:last],
+            race=race,
             pressure=np.zeros((self.sectors, points)),
-            touching=np.zeros((self.sectors, points), bool),
+            touching=touching,
             shared=np.zeros((self.sectors, n_bore // strip.planes), bool),
             bore_force=np.zeros((self.sectors, 3 * n_bore)),
             flank_force=np.zeros((self.sectors, strip.flank_dofs)),

@@ -37,6 +37,11 @@ class SolidState:
     """Tooth forces as nodal forces in those frames (N, n_flank) [N]."""
     ring_force: Array
     """The same on the circular spline, in the frames of its teeth (N_c, n_c) [N]."""
+    race: Array | None = None
+    """Coordinates of the outer race (N, 2, 4), see
+    :class:`swgjoint.fe.solid.race.SolidRace`; None on a rigid wave generator."""
+    ball_force: Array | None = None
+    """Of the balls of the drive [N]."""
     held: ToothRows | None = None
     """Tooth contacts that carry force."""
     tooth_force: Array = field(default_factory=lambda: np.zeros(0))

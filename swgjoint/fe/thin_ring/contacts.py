@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,7 @@ from swgjoint.fe.corotation import rotate, turned
 from swgjoint.fe.thin_ring.assembly import Assembly
 from swgjoint.fe.thin_ring.facing import Facing, facing
 from swgjoint.fe.thin_ring.model import ThinRing
+from swgjoint.fe.thin_ring.race_on_balls import PressedBalls, pressed_form
 from swgjoint.fe.thin_ring.state import RingState
 
 Array = NDArray[np.float64]
@@ -52,40 +53,9 @@ def linearised(
     return replace(state, energy=total.energy), total, held
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class PressedBalls:
-    """Hertz contact of the balls, which sit on the cam, with the race."""
-
-    seen: Facing
-    overlap: Array
-    """[m]. Shape (balls,)."""
-    force: Array
-    """Q (balls,) [N]."""
-    push: Array
-    """Forces on the race (balls, 2) [N]."""
-    input_torque: float
-    """Power per speed of the wave generator that moves the balls [N·m]."""
-    cage_torque: float
-    """Power per speed of the cage against the cam [N·m]."""
-
-
 def race_on_balls(model: ThinRing, state: RingState, race: Array) -> PressedBalls:
     """Balls of a state under a race with given coordinates."""
-    centre, d_centre, d_phase = model.balls(state.alpha, state.phase)
-    seen = facing(model.race, race, centre, state.ball_feet, inside=True)
-    bearing = model.bearing
-    reach = 0.5 * (bearing.ball_diameter + bearing.race_thickness)
-    overlap = np.maximum(reach - seen.distance, 0.0)
-    force = model.ball_constant * overlap**1.5
-    push = -force[:, None] * seen.normal  # outwards
-    return PressedBalls(
-        seen=seen,
-        overlap=overlap,
-        force=force,
-        push=push,
-        input_torque=float(np.sum(push * d_centre)),
-        cage_torque=float(np.sum(push * d_phase)),
-    )
+    return model.pressed(race, state.alpha, state.phase, state.ball_feet)
 
 
 def _balls(
@@ -95,7 +65,7 @@ def _balls(
     on = np.flatnonzero(pressed.overlap > 0.0)
     near, overlap, force = pressed.seen.chosen(on), pressed.overlap, pressed.force
     slope = 1.5 * model.ball_constant * np.sqrt(overlap[on])
-    total.energy += 0.4 * float(force @ overlap)
+    total.energy += pressed.energy
     _press(
         total, "balls", near, near.by_ring, near.dofs + model.rim.size, force[on], slope
     )
@@ -175,11 +145,7 @@ def _press(
         stiffness: k (n,) [N/m].
         bend: Factor of that turn squared in n . d2p (n,).
     """
-    count = rows.shape[1]
-    form = np.zeros((len(force), count, count))
-    form[:, :3, :3] = -force[:, None, None] * seen.bends()
-    form[:, 0, 0] += stiffness
-    if bend is not None:
-        form[:, 3, 3] -= force * bend
-    hessian = np.swapaxes(rows, 1, 2) @ (form @ rows)
+    hessian = np.swapaxes(rows, 1, 2) @ (
+        pressed_form(seen, rows.shape[1], force, stiffness, bend) @ rows
+    )
     total.add(name, dofs, -force[:, None] * rows[:, 0], hessian)

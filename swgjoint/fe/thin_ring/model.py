@@ -9,30 +9,23 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from math import pi
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.errors import DesignError
-from swgjoint.fe.corotation import rotate, turned
 from swgjoint.fe.drive2d import sector
 from swgjoint.fe.thin_ring.facing import Surface
 from swgjoint.fe.thin_ring.hermite_ring import GAUSS, HermiteRing
+from swgjoint.fe.thin_ring.race_on_balls import RaceOnBalls
 from swgjoint.fe.thin_ring.sections import rim_section, tooth_pair_stiffness
 from swgjoint.fe.thin_ring.teeth import Teeth
 from swgjoint.gear.ball_bearing import BallBearing
 from swgjoint.gear.bearing_checks import bearing_checks
 from swgjoint.gear.check import raise_faults
 from swgjoint.gear.design import Design
-from swgjoint.gear.neutral_line import NeutralLine
 from swgjoint.gear.profile import tooth_profile
-from swgjoint.gear.tolerances import (
-    flawed_wave_generator,
-    tooth_errors,
-    wave_generator_offset,
-)
-from swgjoint.gear.wave_generator import lobe_height
+from swgjoint.gear.tolerances import tooth_errors
 from swgjoint.units import mm
 
 Array = NDArray[np.float64]
@@ -45,23 +38,12 @@ PER_ELEMENT = GAUSS[0][[0, 2]]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class ThinRing:
+class ThinRing(RaceOnBalls):
     """All that an equilibrium needs, in SI."""
 
     rim: HermiteRing
-    race: HermiteRing
     nodes_per_tooth: int
-    bearing: BallBearing
-    ball_constant: float
-    """K of one ball [N/m^1.5]."""
-    cam: NeutralLine
-    """Line of the ball centres when they sit on the cam."""
-    cam_offset: Array
-    """Its centre in the frame of the wave generator (2,) [m]."""
     teeth: Teeth
-    lobe_height: float
-    """Radial deflection that the clearances leave [m]."""
-    ratio: float
     press: float
     """Stiffness of bore against race per length [N/m^2]."""
 
@@ -94,23 +76,6 @@ class ThinRing:
         place = np.where(2 * place < count, 2 * place, 2 * (count - place) - 1)
         both = 8 * place[:, None] + np.arange(8)
         return np.concatenate([both[:, :4].ravel(), both[:, 4:].ravel()])
-
-    def balls(self, alpha: float, phase: float) -> tuple[Array, Array, Array]:
-        """Ball centres on the cam and their derivatives by alpha and by phase (n, 2).
-
-        The cage lags behind the wave generator as rolling without slip has it; the race
-        turns with the flexspline, at the ideal ratio.
-
-        Args:
-            alpha: Wave-generator angle [rad].
-            phase: Angle of ball 0 from the major axis at alpha = 0 [rad].
-        """
-        lag = -self.bearing.cage_share * (1.0 - 1.0 / self.ratio)
-        spacing = 2.0 * pi / self.bearing.balls * np.arange(self.bearing.balls)
-        pose = self.cam.pose(phase + lag * alpha + spacing)
-        centre = rotate(pose.point + self.cam_offset, alpha)
-        rolled = rotate(pose.d_point, alpha)
-        return centre, turned(centre) + lag * rolled, rolled
 
 
 def check_modelled(design: Design) -> None:
@@ -172,18 +137,6 @@ def thin_ring(design: Design) -> ThinRing:
         stretching=section.stretching,
         bending=section.bending,
     )
-    race = HermiteRing(
-        radius=bearing.race_radius,
-        elements=rim.elements,
-        stretching=bearing.race_stretching,
-        bending=bearing.race_bending,
-    )
-    inwards = (
-        0.5 * (bearing.fit_clearance + bearing.clearance + bearing.ball_diameter)
-        + bearing.race_thickness
-    )
-    outline = flawed_wave_generator(design)
-    length = outline.perimeter - 2.0 * pi * inwards
     thickness = design.flexspline.rim_mm * mm
     rim_steel = design.material_of("flexspline").youngs_modulus
     yielding = 0.5 * (
@@ -191,18 +144,9 @@ def thin_ring(design: Design) -> ThinRing:
     )
     ring_errors = tooth_errors(design, "circular_spline").shift
     return ThinRing(
+        **vars(RaceOnBalls.of(design, rim.elements)),
         rim=rim,
-        race=race,
         nodes_per_tooth=per_tooth,
-        bearing=bearing,
-        ball_constant=bearing.hertz_constant(),
-        cam=NeutralLine(
-            outline=outline,
-            lobes=design.lobes,
-            radius=length / (2.0 * pi),
-            offset=-inwards,
-        ),
-        cam_offset=wave_generator_offset(design),
         teeth=Teeth(
             flexspline=flexspline,
             circular_spline=circular_spline,
@@ -211,8 +155,5 @@ def thin_ring(design: Design) -> ThinRing:
             shift=tooth_errors(design, "flexspline").shift,
             ring_shift=ring_errors if ring_errors.any() else None,
         ),
-        lobe_height=lobe_height(design)
-        - 0.5 * (bearing.clearance + bearing.fit_clearance),
-        ratio=design.ratio,
         press=bearing.race_width / yielding,
     )
