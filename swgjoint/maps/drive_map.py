@@ -30,6 +30,7 @@ from swgjoint.gear.kinematics import LAYOUTS, angle_coefficients, ratio
 from swgjoint.maps.fields import DriveFields
 from swgjoint.maps.friction import Friction
 from swgjoint.maps.hysteresis import MAX_ELEMENTS, Jenkin
+from swgjoint.units import arcmin
 
 Array = NDArray[np.float64]
 
@@ -438,3 +439,19 @@ class DriveMap:
             end_stiffness=self.end_stiffness[mask],
             kinematic_error=self.kinematic_error[mask],
         )
+
+    def pruned(self, tolerance_arcmin: float) -> Self:
+        """A copy without the harmonics that a tolerance does not need.
+
+        ``info["pruned"]`` lists what was dropped and bounds its effect on output angle,
+        kinematic error and torque; see :mod:`swgjoint.maps.pruning`.
+
+        Args:
+            tolerance_arcmin: Of the output angle at a given torque and input angle.
+
+        Raises:
+            InputError: If it is not positive, or no bound follows from the map.
+        """
+        from swgjoint.maps.pruning import pruned_map
+
+        return pruned_map(self, tolerance_arcmin * arcmin)

@@ -40,6 +40,7 @@ def contents(assembly: Assembly) -> dict[str, Any]:
             for t in assembly.transmissions
             for item in _left_out(t)
         ],
+        "absent": _absent(assembly),
     }
 
 
@@ -72,6 +73,27 @@ def _features(assembly: Assembly) -> dict[str, Any]:
     if scene.disturbance:
         found["disturbances"] = [_given(one) for one in scene.disturbance]
     return found
+
+
+def _absent(assembly: Assembly) -> list[dict[str, str]]:
+    """Optional parts of a scene that this one does not have, so the model has none."""
+    scene, loops, tables = assembly.scene, assembly.loops, "the scene has no"
+    plugin = any(t.attached.plugin for t in assembly.transmissions)
+    parts = (
+        ("motor limits", any(loops.limits), f"{tables} motor table"),
+        ("payload", scene.payload, f"{tables} [payload]"),
+        ("sensors", scene.sensors, f"{tables} [sensors]: angles are read as they are"),
+        ("disturbances", scene.disturbance, f"{tables} [[disturbance]]"),
+        ("load torques", any(assembly.load), f"{tables} [load] that is not zero"),
+        ("integral of the error", any(loops.integral), "the controller is no pid"),
+        (
+            "sampled controller",
+            loops.sampled,
+            "nothing in the scene asks for one: it acts within every step",
+        ),
+        ("engine plugin", plugin, "no joint has a level that needs it"),
+    )
+    return [{"part": part, "reason": why} for part, there, why in parts if not there]
 
 
 def _given(section: Section) -> dict[str, Any]:
@@ -136,6 +158,17 @@ def _left_out(transmission: Transmission) -> list[dict[str, str]]:
     if attached.drive.hysteresis and attached.level not in _LOSSY:
         part = f"hysteresis ({len(attached.drive.hysteresis)} elements)"
         items.append({"part": part, "reason": "the scene asks for no more"})
+    if count := transmission.drive.info.get("hysteresis_left_out"):
+        part = f"hysteresis ({count} elements)"
+        items.append({"part": part, "reason": "the scene switches it off"})
+    if (pruned := transmission.drive.info.get("pruned")) and pruned["dropped"]:
+        bounds = (
+            f"at most {pruned['output_angle_bound_arcmin']:.3g} arcmin and"
+            f" {pruned['torque_bound_Nm']:.3g} N·m in all, below the tolerance of"
+            f" {pruned['tolerance_arcmin']:.3g} arcmin"
+        )
+        part = f"{len(pruned['dropped'])} harmonics of the map"
+        items.append({"part": part, "reason": bounds})
     friction = transmission.drive.friction
     if friction and not (attached.drive.friction and attached.level in _LOSSY):
         reason = "the scene asks for no more"

@@ -20,6 +20,9 @@ from swgjoint.sim.scene_sections import JointSection, LinearDrive
 if TYPE_CHECKING:
     from swgjoint.gear.design import Design
 
+WITHOUT_HARMONICS = ("rigid", "linear", "native")
+"""Levels that use of a map its mean alone."""
+
 
 def drive_of(
     section: JointSection,
@@ -29,7 +32,8 @@ def drive_of(
 ) -> DriveMap:
     """The map of a joint's drive; what was built is kept in ``known``.
 
-    Hysteresis that the section switches off is not in it.
+    Hysteresis that the section switches off is not in it, nor are harmonics below its
+    tolerance at the levels that have any.
 
     Args:
         section: Settings of the joint with a drive.
@@ -47,7 +51,13 @@ def drive_of(
     if reference not in known:
         known[reference] = load_drive(reference, progress=progress)
     drive = known[reference]
-    return replace(drive, hysteresis=()) if section.hysteresis is False else drive
+    if section.hysteresis is False and drive.hysteresis:
+        info = {**drive.info, "hysteresis_left_out": len(drive.hysteresis)}
+        drive = replace(drive, hysteresis=(), info=info)
+    tolerance = section.harmonics_tolerance_arcmin
+    if tolerance is None or section.level in WITHOUT_HARMONICS:
+        return drive
+    return drive.pruned(tolerance)
 
 
 def linear_map(section: LinearDrive) -> DriveMap:

@@ -55,6 +55,12 @@ class JointSection(Section):
     """False leaves the hysteresis of the drive out."""
     friction: bool | None = None
     """True takes the friction of the drive in, at the levels native and full."""
+    harmonics_tolerance_arcmin: Positive | None = None
+    """Drops harmonics of the drive that together turn the output by less at a given
+    torque, see :mod:`swgjoint.maps.pruning`; None keeps all. Without effect at the
+    levels rigid, linear and native, which have no harmonics. At the others a map is
+    refused where the swing of its stiffness, summed over the harmonics, exceeds the
+    mean: no torque then bounds an angle."""
     rotor: Literal["gyroscopic", "lumped"] | None = None
     """Whether the rotor is a body that its link carries along, the default."""
     motor: MotorLimits | None = None

@@ -1,0 +1,117 @@
+r"""Harmonics that a tolerance does not need, and what their loss can do at most.
+
+A harmonic k with kinematic error :math:`e_k` and potential :math:`A_k, B_k` changes, at
+given phases and inside the sampled torsion,
+
+.. math::
+    |\delta e_0| \le |e_k|, \quad
+    |\delta \partial_\Delta V| \le t_k = \max_\Delta |(A_k', B_k')|, \quad
+    |\delta\psi|_T \le |e_k| + t_k / c,
+
+the last at a given torque and input angle, with c the lowest stiffness that any phases
+leave: a torque that differs by t is met by torsions that differ by t/c at most. Sums of
+these bound what several harmonics do. Maxima are taken over Bernstein coefficients,
+which enclose a polynomial.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import comb
+from typing import TYPE_CHECKING, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.errors import InputError
+from swgjoint.units import arcmin
+
+if TYPE_CHECKING:
+    from swgjoint.maps.drive_map import DriveMap
+
+    Map = TypeVar("Map", bound=DriveMap)
+
+Array = NDArray[np.float64]
+
+
+def pruned_map(drive: Map, tolerance: float) -> Map:
+    """A copy without the weakest harmonics; ``info["pruned"]`` states the bounds.
+
+    Of a map that was pruned before, lists are joined, and tolerances and bounds added:
+    the distance from the first map to the last is at most the sum of both.
+
+    Args:
+        drive: The map.
+        tolerance: Of the output angle at a given torque and input angle [rad]. As many
+            harmonics are dropped, the weakest first, as their sum stays below it.
+
+    Raises:
+        InputError: If the tolerance is not positive, or if the harmonics of the
+            stiffness may exceed its mean: then no torque bounds an angle.
+    """
+    if not 0.0 < tolerance < np.inf:
+        raise InputError(f"tolerance {tolerance / arcmin:g} arcmin; accepted: > 0")
+    error, torque = np.hypot(*drive.kinematic_error.T), torque_amplitudes(drive)
+    lowest, highest = stiffness_range(drive)
+    if lowest <= 0.0:
+        raise InputError(
+            f"map {drive.name!r}: the stiffness that its harmonics leave may be as low"
+            f" as {lowest:.3g} N·m/rad, so that no bound of an angle follows; accepted:"
+            " a map whose harmonics together swing the stiffness by less than its mean"
+            " at every torsion; use it without a tolerance, or at a level without"
+            " harmonics (rigid, linear, native)"
+        )
+    angle = error + torque / lowest
+    angle[0] = np.inf  # the mean stays
+    weakest = np.argsort(angle, kind="stable")
+    gone = weakest[np.cumsum(angle[weakest]) <= tolerance]
+    keep = np.ones(angle.size, dtype=bool)
+    keep[gone] = False
+    of_error, of_torque = float(error[gone].sum()), float(torque[gone].sum())
+    note = {
+        "tolerance_arcmin": tolerance / arcmin,
+        "dropped": [[int(p), int(q)] for p, q in drive.orders[~keep]],
+        "output_angle_bound_arcmin": float(angle[gone].sum()) / arcmin,
+        "kinematic_error_bound_arcmin": of_error / arcmin,
+        # at given angles of input and output the torsion shifts, too
+        "torque_bound_Nm": of_torque + highest * of_error,
+    }
+    before = drive.info.get("pruned", {})
+    note = {key: before[key] + one if before else one for key, one in note.items()}
+    note["harmonics"] = int(keep.sum()) - 1
+    return replace(drive.with_harmonics(keep), info={**drive.info, "pruned": note})
+
+
+def torque_amplitudes(drive: DriveMap) -> Array:
+    """Largest torque of every harmonic inside the knots [N·m]. (n_harmonics,)."""
+    points = _enclosing(drive, 1)
+    return np.asarray(np.hypot(points[:, 0], points[:, 1]).max(axis=(1, 2)))
+
+
+def stiffness_range(drive: DriveMap) -> tuple[float, float]:
+    """Bounds of the stiffness inside the knots at any phases [N·m/rad]."""
+    points = _enclosing(drive, 2)
+    swing = np.hypot(points[1:, 0], points[1:, 1]).max(axis=-1).sum(axis=0)
+    mean = points[0, 0]  # (n_intervals, 3)
+    return float((mean.min(axis=-1) - swing).min()), float(
+        (mean.max(axis=-1) + swing).max()
+    )
+
+
+def _enclosing(drive: DriveMap, derivative: int) -> Array:
+    """Bernstein coefficients of a derivative of A and B by the torsion.
+
+    Returns:
+        Shape (n_harmonics, 2, n_intervals, 5 - derivative).
+    """
+    c = drive.potential
+    for _ in range(derivative):
+        c = c[..., 1:] * np.arange(1, c.shape[-1])
+    degree = c.shape[-1] - 1
+    c = c * np.diff(drive.torsion_knots)[:, None] ** np.arange(degree + 1)
+    # b_i = sum_j C(i, j) / C(n, j) c_j (textbook)
+    to_points = [
+        [comb(i, j) / comb(degree, j) for j in range(degree + 1)]
+        for i in range(degree + 1)
+    ]
+    return np.asarray(c @ np.array(to_points).T)
