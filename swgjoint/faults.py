@@ -37,6 +37,7 @@ _UNITS = {
     "deg": "deg",
     "rad": "rad",
     "arcmin": "arcmin",
+    "arcsec": "arcsec",
     "GPa": "GPa",
     "MPa": "MPa",
     "Nm": "N·m",
@@ -88,12 +89,17 @@ class Fault(ValueError):
         self.lines = lines
 
 
-def unit_of(key: str) -> str:
-    """Unit that a key carries in its last part, or the empty string."""
+def split_unit(key: str) -> tuple[str, str]:
+    """A key without the unit that it carries in its last part, and that unit."""
     for suffix, unit in _UNITS.items():
         if key == suffix or key.endswith("_" + suffix):
-            return unit
-    return ""
+            return key.removesuffix(suffix).removesuffix("_"), unit
+    return key, ""
+
+
+def unit_of(key: str) -> str:
+    """Unit that a key carries in its last part, or the empty string."""
+    return split_unit(key)[1]
 
 
 def read_toml(
@@ -166,7 +172,7 @@ def _lines(model: type[BaseModel], detail: ErrorDetails) -> list[str]:
     if kind == "missing":
         return [f"{path}: missing; accepted: {_accepted(info, key)}"]
     if kind == "union_tag_not_found":
-        tags = ", ".join(repr(_tag(m)) for m in _models_in(info.annotation))
+        tags = ", ".join(repr(_tag(m)) for m in models_in(info.annotation))
         return [f"{path}.kind: missing; accepted: {tags}"]
     if kind == "union_tag_invalid":
         tags = ctx["expected_tags"]
@@ -211,7 +217,7 @@ def _walk(
             named = False
             continue
         owner, info = here, here.model_fields.get(part)
-        models = _models_in(info.annotation) if info is not None else []
+        models = models_in(info.annotation) if info is not None else []
         # by kind, of the field itself or of the items of a list
         union = len(models) > 1 and all("kind" in m.model_fields for m in models)
         options = {_tag(m): m for m in models} if union else {}
@@ -226,13 +232,13 @@ def _tag(model: type[BaseModel]) -> str:
     return str(model.model_fields["kind"].default)
 
 
-def _models_in(annotation: Any) -> list[type[BaseModel]]:
+def models_in(annotation: Any) -> list[type[BaseModel]]:
     """Models that a type annotation holds, through unions and Annotated."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]
     found: list[type[BaseModel]] = []
     for argument in getattr(annotation, "__args__", ()):
-        found += _models_in(argument)
+        found += models_in(argument)
     return found
 
 
@@ -257,7 +263,7 @@ def _accepted(info: Any, key: str) -> str:
     if limits:
         return limits
     annotation = getattr(info, "annotation", None)
-    if _models_in(annotation):
+    if models_in(annotation):
         return "a table"
     items = get_args(annotation)
     if get_origin(annotation) is tuple and Ellipsis not in items:

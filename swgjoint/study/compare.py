@@ -94,8 +94,12 @@ class Compared:
         }
 
 
-def read_spec(path: str | Path) -> dict[str, float]:
+def read_spec(path: str | Path, accepted: Sequence[str] = SORTABLE) -> dict[str, float]:
     """Limits of a ``[spec]`` table.
+
+    Args:
+        path: TOML file.
+        accepted: Figures that may be limited.
 
     Raises:
         InputError: If the file or a key cannot be used.
@@ -105,9 +109,9 @@ def read_spec(path: str | Path) -> dict[str, float]:
         raise InputError(f"{path}: accepted: a table [spec] with limits")
     faults = [
         f"{path}: spec.{key} = {value!r}; accepted: a positive number under"
-        f" {', '.join(SORTABLE)}"
+        f" {', '.join(accepted)}"
         for key, value in table.items()
-        if key not in SORTABLE
+        if key not in accepted
         or isinstance(value, bool)
         or not isinstance(value, int | float)
         or not 0.0 < value < np.inf
@@ -152,7 +156,7 @@ def compare(
             run = run_scene(_with_drive(scene, name), drives={name: drive}, name=name)
             stress = _stress(source, drive, model)
             safety = _safety(source, drive, progress) if fatigue else None
-        row = _row(name, run, drive, level=name if source is None else None)
+        row = row_of(name, run, drive, level=name if source is None else None)
         row = replace(row, von_mises_MPa=stress, fatigue_safety_factor=safety)
         row = replace(row, wall_s=time.perf_counter() - begin)
         rows.append(replace(row, missed=missed(row, spec or {})))
@@ -196,7 +200,9 @@ def _changed(scene: Scene, change: Any) -> Scene:
     )
 
 
-def _row(name: str, run: Run, drive: DriveMap | None, *, level: str | None) -> Compared:
+def row_of(
+    name: str, run: Run, drive: DriveMap | None, *, level: str | None
+) -> Compared:
     """Figures of one run; those of the design itself are filled in later."""
     metrics = run.metrics()
     joints, tool = metrics["joints"], metrics["tool"]
@@ -277,19 +283,14 @@ def _stress(
         return None
     from swgjoint.fe.drive2d import can_halve
     from swgjoint.fe.meshing import simulate_meshing
-    from swgjoint.gear.kinematics import periodicity
 
-    gear = source.drive
-    pitches = periodicity(
-        gear.layout, gear.teeth_flexspline, gear.teeth_circular_spline
-    )
     try:
         run = simulate_meshing(
             source,
             model=model or ("3d" if source.cup is not None else "2d"),
             torque=drive.ratings.rated_torque,
             steps=STRESS_POSITIONS,
-            turn=1.0 / pitches,
+            turn=1.0 / source.periodicity,
             half=can_halve(source),
         )
     except ComputationError:

@@ -1,19 +1,136 @@
-"""Independent runs on several processes, one thread of linear algebra each."""
+"""Independent runs on the processes of one machine, one thread of algebra each."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from multiprocessing import get_context
-from typing import TypeVar
+import warnings
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from itertools import chain
+from typing import Any, Protocol, TypeVar
 
+from swgjoint.errors import ComputationError
 from swgjoint.progress import Progress, silent
+
+CACHE = "SWGJOINT_CACHE"
 
 Task = TypeVar("Task")
 Found = TypeVar("Found")
 
-_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+
+@dataclass(frozen=True)
+class Lost:
+    """A task whose process died every time that it was tried."""
+
+    reason: str
+
+
+class Executor(Protocol):
+    """Where tasks are computed."""
+
+    @property
+    def workers(self) -> int:
+        """Processes that compute at the same time."""
+
+    def run(
+        self, function: Callable[[Task], Found], tasks: Iterable[Task]
+    ) -> Iterator[tuple[Task, Found | Lost]]:
+        """Every task with its result, in the order in which they are ready.
+
+        Args:
+            function: Picklable; an exception of it ends the run.
+            tasks: Drawn when a process is about to need the next one.
+        """
+
+
+@dataclass(frozen=True)
+class LocalPool:
+    """Processes of this machine (joblib, loky); one job is this process itself.
+
+    When a process dies, by the kernel for want of memory or by anybody's hand, the
+    tasks that may have killed it are tried again one at a time, which tells the one
+    that kills from those that were merely beside it.
+    """
+
+    workers: int
+
+    def run(
+        self, function: Callable[[Task], Found], tasks: Iterable[Task]
+    ) -> Iterator[tuple[Task, Found | Lost]]:
+        """See :class:`Executor`."""
+        from joblib.externals.loky.process_executor import BrokenProcessPool
+
+        waiting: dict[int, Task] = {}  # drawn and not back, in the order of drawing
+        left: Iterator[tuple[int, Task]] = enumerate(tasks)
+
+        def drawn() -> Iterator[tuple[int, Task]]:
+            for number, task in left:
+                waiting[number] = task
+                yield number, task
+
+        while True:
+            results = _parallel(self.workers, function, drawn())
+            try:
+                for number, found in results:
+                    yield waiting.pop(number), found
+                return
+            except BrokenProcessPool:
+                pass
+            except GeneratorExit:  # the caller stops; joblib would warn of work lost
+                with warnings.catch_warnings():
+                    warnings.simplefilter("ignore")
+                    results.close()
+                raise
+            # begun in the order of drawing: those that ran are the first of the rest
+            suspects = list(waiting.items())[: self.workers]
+            left = chain(list(waiting.items())[self.workers :], left)
+            waiting.clear()
+            for number, task in suspects:
+                try:
+                    ((_, found),) = _parallel(2, function, [(number, task)])
+                except BrokenProcessPool:
+                    yield (
+                        task,
+                        Lost(
+                            "its process died twice, with no other beside it the second"
+                            " time: out of memory, or killed"
+                        ),
+                    )
+                else:
+                    yield task, found
+
+
+def _parallel(
+    jobs: int,
+    function: Callable[[Task], Found],
+    tasks: Iterable[tuple[int, Task]],
+) -> Generator[tuple[int, Found], None, None]:
+    from joblib import Parallel, delayed, parallel_config
+
+    # small dense products gain nothing from threads that fight for the cores
+    with parallel_config(backend="loky", n_jobs=jobs, inner_max_num_threads=1):
+        parallel = Parallel(
+            return_as="generator_unordered",
+            batch_size=1,
+            max_nbytes=None,  # tasks are small: no arrays in files
+        )
+    call, cache = delayed(_numbered), os.environ.get(CACHE)
+    found: Generator[tuple[int, Found], None, None] = parallel(
+        call(function, number, task, cache) for number, task in tasks
+    )
+    return found
+
+
+def _numbered(
+    function: Callable[[Task], Found], number: int, task: Task, cache: str | None
+) -> tuple[int, Found]:
+    # a process that an earlier run has left knows the cache of then
+    if cache is None:
+        os.environ.pop(CACHE, None)
+    else:
+        os.environ[CACHE] = cache
+    return number, function(task)
 
 
 def run_all(
@@ -27,36 +144,25 @@ def run_all(
     """Results in the order of the tasks, which are started in that order too.
 
     Args:
-        function: Picklable; called in a fresh process (spawn) unless ``jobs`` is 1.
+        function: Picklable; called in a fresh process unless ``jobs`` is 1.
         tasks: Put long ones first.
         jobs: Processes.
         stage: Name for the progress.
         progress: Called first of all and after every task.
+
+    Raises:
+        ComputationError: If a process dies of a task.
     """
-    found: dict[int, Found] = {}
+    found: dict[int, Any] = {}
     progress(stage, 0, len(tasks))
-    if jobs == 1 or len(tasks) < 2:
-        for k, task in enumerate(tasks):
-            found[k] = function(task)
-            progress(stage, k + 1, len(tasks))
-        return [found[k] for k in range(len(tasks))]
-    with ProcessPoolExecutor(
-        max_workers=min(jobs, len(tasks)),
-        mp_context=get_context("spawn"),
-        initializer=_one_thread,
-    ) as pool:
-        futures = {pool.submit(function, task): k for k, task in enumerate(tasks)}
-        try:
-            for done, future in enumerate(as_completed(futures), start=1):
-                found[futures[future]] = future.result()
-                progress(stage, done, len(tasks))
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+    pool = LocalPool(max(1, min(jobs, len(tasks))))
+    for (k, _), result in pool.run(partial(_of_pair, function), enumerate(tasks)):
+        if isinstance(result, Lost):
+            raise ComputationError(f"{stage}: task {k + 1}: {result.reason}")
+        found[k] = result
+        progress(stage, len(found), len(tasks))
     return [found[k] for k in range(len(tasks))]
 
 
-def _one_thread() -> None:
-    """Small dense products gain nothing from threads that fight for the cores."""
-    for name in _THREADS:
-        os.environ[name] = "1"
+def _of_pair(function: Callable[[Task], Found], pair: tuple[int, Task]) -> Found:
+    return function(pair[1])

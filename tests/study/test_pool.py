@@ -4,10 +4,19 @@ from __future__ import annotations
 
 import math
 import os
+import signal
+import sys
+import time
+from pathlib import Path
 
+import cloudpickle
 import pytest
 
-from swgjoint.study.pool import run_all
+from swgjoint.errors import ComputationError
+from swgjoint.study.pool import LocalPool, Lost, run_all
+
+# a process of the pool cannot import this file by its name
+cloudpickle.register_pickle_by_value(sys.modules[__name__])
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
@@ -25,6 +34,14 @@ def test_results_keep_the_order_of_the_tasks(jobs):
     assert seen == [("roots", k, 3) for k in (0, 1, 2, 3)]
 
 
+def test_processes_have_the_cache_of_now(monkeypatch):
+    """Also those that an earlier run has left."""
+    for name in ("one", "two"):
+        monkeypatch.setenv("SWGJOINT_CACHE", name)
+        keys = ["SWGJOINT_CACHE"] * 3
+        assert run_all(os.getenv, keys, jobs=2) == [name] * 3
+
+
 def test_an_error_ends_the_run():
     """An exception in a process reaches the caller."""
     with pytest.raises(ValueError, match="math domain error"):
@@ -36,3 +53,58 @@ def test_processes_use_one_thread(monkeypatch):
     monkeypatch.setenv("OMP_NUM_THREADS", "7")
     found = run_all(os.getenv, ["OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"], jobs=2)
     assert found == ["1", "1"]
+
+
+def deadly(task):
+    """Kills its process where it is asked to, at the first attempt or always."""
+    number, folder = task
+    mark = Path(folder) / str(number)
+    if number == 7 or (number == 3 and not mark.exists()):
+        mark.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return number
+
+
+def test_a_task_that_kills_its_process_is_lost_alone(tmp_path):
+    """What dies again is lost; what died once, and all others, are computed."""
+    tasks = [(number, str(tmp_path)) for number in range(10)]
+    found = list(LocalPool(2).run(deadly, tasks))
+    lost = [task[0] for task, result in found if isinstance(result, Lost)]
+    assert lost == [7]
+    kept = {task[0]: result for task, result in found if task[0] != 7}
+    assert kept == {number: number for number in range(10) if number != 7}
+    assert len(found) == 10
+
+
+def slow_root(number):
+    time.sleep(0.01)
+    return math.sqrt(number)
+
+
+def test_tasks_are_drawn_as_they_are_needed():
+    """An unbounded list of tasks can be run: no more are drawn than are in hand."""
+    drawn = []
+
+    def tasks():
+        for number in range(40):
+            drawn.append(number)
+            yield number
+
+    found = LocalPool(2).run(slow_root, tasks())
+    next(found)
+    assert len(drawn) < 20
+    assert len(list(found)) == 39
+    assert len(drawn) == 40
+
+
+def test_a_dead_process_of_a_study_is_one_line(tmp_path):
+    """A study cannot do without a result: the death of its process is an error."""
+    with pytest.raises(ComputationError, match="runs: task 2: its process died"):
+        run_all(deadly, [(1, str(tmp_path)), (7, str(tmp_path))], jobs=2)
+
+
+def test_a_run_may_be_left():
+    """Who takes no more results gets no warning about those that are ready."""
+    found = LocalPool(2).run(slow_root, range(30))
+    assert next(found)[1] is not None
+    found.close()

@@ -1,0 +1,186 @@
+"""``swgjoint sweep``: many designs, kept one by one."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING, Any
+
+from swgjoint.cli.text import table
+from swgjoint.errors import InputError
+from swgjoint.json_text import json_text
+
+if TYPE_CHECKING:
+    from swgjoint.study.sweep import SweepResult
+    from swgjoint.study.sweep_results import Place
+
+MAX_JOBS = 1024
+SHOWN = 40
+"""Rows of the table in the terminal."""
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Sweep file, where it is computed, where results are kept."""
+    parser.epilog = (
+        "A sweep that was stopped goes on with the same command. After kill -KILL of"
+        " this process its workers stay up to five minutes and finish what they have in"
+        " hand; another sweep may run beside them."
+    )
+    parser.add_argument("file", metavar="FILE", help="sweep file or bundled name")
+    parser.add_argument(
+        "--jobs",
+        type=int,
+        metavar="N",
+        help="processes of this machine; default: its cores, or the [cluster] of FILE",
+    )
+    parser.add_argument(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="compute on the workers of a dask scheduler, such as tcp://host:8786, or"
+        " of a scheduler file (.json)",
+    )
+    parser.add_argument(
+        "--out",
+        metavar="DIR",
+        help="keep results there, with sweep.csv, sweep.parquet, sweep.png and"
+        " sweep.json: a folder or any fsspec address (s3://...); default: results in"
+        " the user's cache, no files",
+    )
+    parser.add_argument(
+        "--retry-failed",
+        action="store_true",
+        help="compute designs again that failed in an earlier run; those that were lost"
+        " with their process are in any case",
+    )
+
+
+def run(args: argparse.Namespace) -> dict[str, Any]:
+    """Compute what is not kept yet.
+
+    Returns:
+        ``designs``, ``done`` (with figures), ``failed`` (without), ``reused`` (of
+        both, kept from earlier runs), ``computed`` in this run, ``workers``,
+        ``work_s``, ``wall_s``, ``efficiency`` (work over wall time and workers),
+        ``parameters``, ``figures``, ``validity`` (by task), ``rows``, ``files``.
+    """
+    if args.jobs is not None and not 1 <= args.jobs <= MAX_JOBS:
+        raise InputError(f"--jobs {args.jobs}; accepted: 1 to {MAX_JOBS}")
+    if args.jobs is not None and args.scheduler is not None:
+        raise InputError("--jobs and --scheduler; accepted: one of them")
+    from swgjoint.maps.cache import cache_folder
+    from swgjoint.study.sweep import run_sweep
+    from swgjoint.study.sweep_file import SweepFile
+    from swgjoint.study.sweep_results import place_of
+
+    file = SweepFile.load(args.file)
+    kept = args.out
+    if kept is None and (cache := cache_folder()) is not None:
+        kept = str(cache / "sweeps")
+    place = None if kept is None else place_of(kept)
+    from swgjoint.study.sweep_executor import chosen_executor
+
+    with chosen_executor(file, jobs=args.jobs, scheduler=args.scheduler) as executor:
+        found = run_sweep(
+            file,
+            executor=executor,
+            place=place,
+            retry_failed=args.retry_failed,
+            progress=args.progress,
+        )
+    result = {"sweep": args.file, **found.to_json(), "files": []}
+    if args.out is not None and place is not None:
+        result["files"] = _write(place, found, result)
+    return result
+
+
+def _write(place: Place, found: SweepResult, result: dict[str, Any]) -> list[str]:
+    """One row a design as tables, the picture, and the whole as JSON."""
+    from swgjoint.study.sweep_plots import sweep_picture
+    from swgjoint.study.sweep_results import csv_text, parquet_bytes
+
+    rows = found.rows()
+    contents = {
+        "sweep.csv": csv_text(rows).encode(),
+        "sweep.parquet": parquet_bytes(rows),
+        "sweep.png": sweep_picture(found),
+    }
+    files = [
+        place.write(name, data) for name, data in contents.items() if data is not None
+    ]
+    last = "sweep.json"  # which names them all
+    files.append(place.at(last))
+    place.write(last, (json_text({**result, "files": files}) + "\n").encode())
+    return files
+
+
+def status(result: dict[str, Any]) -> int:
+    """1 where no design at all has figures; single failures are rows."""
+    return int(result["done"] == 0)
+
+
+def report(result: dict[str, Any]) -> str:
+    """One line a design, failures with their reason, then the counts."""
+    names = [*result["parameters"], *result["figures"]]
+    rows = result["rows"]
+    shown = rows if len(rows) <= SHOWN else rows[: SHOWN - 1]
+    lines = [
+        table(
+            [
+                (
+                    k + 1,
+                    *(_short(row[name]) for name in names),
+                    row["outcome"],
+                    row["work_s"],
+                )
+                for k, row in enumerate(shown)
+            ],
+            header=("", *_headers(names), "outcome", "work [s]"),
+        )
+    ]
+    if len(shown) < len(rows):
+        lines.append(f"... and {len(rows) - len(shown)} more, all with --out DIR")
+    lines += _ranges(result)
+    reasons: dict[str, list[int]] = {}
+    for k, row in enumerate(rows):
+        if row["reason"]:
+            reasons.setdefault(f"{row['outcome']}: {row['reason']}", []).append(k + 1)
+    for reason, numbers in list(reasons.items())[:SHOWN]:
+        more = ", ..." if len(numbers) > 8 else ""
+        lines.append(f"{', '.join(map(str, numbers[:8]))}{more}: {reason}")
+    for task, label in result["validity"].items():
+        absent = [f"{part}: {what}" for part, what in label["not_modelled"].items()]
+        told = "; ".join([f"level {label['level']}, {label['torque']}", *absent])
+        lines.append(f"validity of {task}: {told}")
+    share = result["efficiency"]
+    busy = "" if share is None else f", {100 * share:.0f} % of {result['workers']} busy"
+    lines.append(
+        f"{result['done']} designs done, {result['failed']} failed; {result['reused']}"
+        f" of them reused, {result['computed']} computed in {result['wall_s']:.1f} s"
+        + busy
+    )
+    return "\n".join([*lines, *(f"wrote {name}" for name in result["files"])])
+
+
+def _headers(names: list[str]) -> list[str]:
+    """The last part of every key, the whole where that is not enough."""
+    lasts = [name.rpartition(".")[2] for name in names]
+    return [
+        last if lasts.count(last) == 1 else name
+        for name, last in zip(names, lasts, strict=True)
+    ]
+
+
+def _short(value: Any) -> Any:
+    return f"{value[:21]}..." if isinstance(value, str) and len(value) > 24 else value
+
+
+def _ranges(result: dict[str, Any]) -> list[str]:
+    """Least and largest value of every figure, and the rows that have them."""
+    found = []
+    for name in result["figures"]:
+        values = [(r[name], k + 1) for k, r in enumerate(result["rows"])]
+        numbers = [(v, k) for v, k in values if v is not None]
+        if len(numbers) > 1:
+            (low, at_low), (high, at_high) = min(numbers), max(numbers)
+            found.append((name, low, at_low, high, at_high))
+    header = ("", "least", "in row", "largest", "in row")
+    return ["", table(found, header=header), ""] if found else []

@@ -1,0 +1,250 @@
+"""Figures of one design of a sweep, computed where the executor puts it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from swgjoint.errors import InputError, MissingExtraError, SwgError
+from swgjoint.gear.design import Design
+from swgjoint.maps.cache import code_version
+from swgjoint.maps.spec_sheet import LOOP_KEYS, RATING_KEYS, TURN_KEYS
+
+if TYPE_CHECKING:
+    from swgjoint.maps.drive_map import DriveMap
+    from swgjoint.sim.scene import Scene
+    from swgjoint.study.sweep_file import MeshingTask, RunTask, SpecTask
+    from swgjoint.study.sweep_points import Point
+
+_STRESSES = ("von_mises_MPa", "tensile_MPa", "compressive_MPa")
+_RING = "circular_spline_"
+KINEMATIC = "kinematic_error_pp_arcsec"
+MESHING_FIGURES = (
+    *_STRESSES,
+    *(f"{_RING}{name}" for name in _STRESSES),
+    "transmission_error_pp_arcsec",
+    KINEMATIC,
+    "pairs_in_contact",
+    "wave_generator_torque_pp_Nm",
+)
+"""Stresses: mean over the positions of the largest one of the flexspline or of the
+circular spline. Errors: peak to peak of the output over the positions, under the torque
+and, in a second simulation, unloaded. Pairs: mean over the positions."""
+SPEC_FIGURES = tuple(
+    key for key in (*RATING_KEYS, *LOOP_KEYS, *TURN_KEYS) if key != "orders"
+)
+"""Keys of the specification sheet that the map of a design tells."""
+RUN_FIGURES = (
+    "ripple_rms_percent",
+    "ripple_pp_percent",
+    "transmission_error_arcmin",
+    "transmission_error_ripple_arcmin",
+    "torsion_arcmin",
+    "tool_path_rms_mm",
+    "tool_ap_mm",
+    "tool_rp_mm",
+    "peak_torque_of_rating",
+    "cubed_mean_torque_of_rating",
+)
+"""Figures of :class:`swgjoint.study.compare.Compared`, without run times."""
+
+OK = "ok"
+LOST = "lost"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Asked:
+    """One design, or scene, and what is computed of it."""
+
+    key: str
+    design: Design | None
+    scene: Scene | None
+    meshing: MeshingTask | None
+    spec: SpecTask | None
+    run: RunTask | None
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Record:
+    """What came of one design."""
+
+    outcome: str
+    """``ok``; ``refused`` (no drive), ``infeasible`` (cannot be built), ``failed`` (not
+    solved), ``error`` (a fault of the code), ``lost`` (its process died, or the machine
+    had no memory, disk or package for it: not kept, for the next one may)."""
+    reason: str = ""
+    figures: dict[str, float | None] = field(default_factory=dict)
+    """None where the model cannot tell."""
+    work_s: float = 0.0
+    """Time in the process that computed it."""
+
+    @property
+    def ok(self) -> bool:
+        """Whether there are figures."""
+        return self.outcome == OK
+
+
+def compute_all(points: Sequence[Point]) -> tuple[str, list[Record]]:
+    """Records of some designs, and the code that computed them."""
+    asked = [one for point in points if (one := point.asked) is not None]
+    _load(asked[0])  # all of a sweep ask for the same
+    return code_version(), [compute(one) for one in asked]
+
+
+def _load(first: Asked) -> None:
+    """Import what the work needs, which is no part of its time."""
+    from swgjoint.gear import feasibility  # noqa: F401
+    from swgjoint.maps.spec_sheet import needs_map
+
+    if first.meshing is not None:
+        from swgjoint.fe import meshing  # noqa: F401
+    mapped = first.spec is not None and needs_map(first.spec.figures)
+    if mapped or (first.run is not None and first.design is not None):
+        from swgjoint.fe import build_map  # noqa: F401
+    if first.run is not None:
+        from swgjoint.study import compare  # noqa: F401
+
+
+def compute(asked: Asked) -> Record:
+    """Figures of one design; whatever goes wrong is part of the record."""
+    begin = time.perf_counter()
+    figures: dict[str, float | None] = {}
+    reason = ""
+    try:
+        if asked.design is not None and (reason := _infeasible(asked.design)):
+            outcome = "infeasible"
+        else:
+            figures, reason = _figures(asked)
+            outcome = OK
+    except InputError as error:
+        outcome, reason = "refused", str(error)
+    except (MemoryError, OSError, MissingExtraError) as error:
+        outcome, reason = LOST, f"{type(error).__name__}: {error}"
+    except SwgError as error:
+        outcome, reason = "failed", str(error)
+    except Exception as error:  # one design must not end the sweep
+        outcome, reason = "error", f"{type(error).__name__}: {error}"
+    return Record(
+        outcome=outcome,
+        reason="; ".join(reason.splitlines()),
+        figures=figures,
+        work_s=time.perf_counter() - begin,
+    )
+
+
+def _infeasible(design: Design) -> str:
+    """Faults of the checks that a design does not pass; empty for a feasible one."""
+    from swgjoint.gear.feasibility import design_checks
+
+    return "\n".join(check.fault for check in design_checks(design) if not check.ok)
+
+
+def _figures(asked: Asked) -> tuple[dict[str, float | None], str]:
+    figures: dict[str, float | None] = {}
+    reasons: dict[str, str] = {}
+    if asked.meshing is not None:
+        assert asked.design is not None
+        figures |= _meshing(asked.design, asked.meshing)
+    if asked.spec is not None:
+        assert asked.design is not None
+        found, reasons = _spec(asked.design, asked.spec)
+        figures |= found
+    if asked.run is not None:
+        assert asked.scene is not None
+        figures |= _run(asked.scene, asked.design, asked.run)
+    return figures, "\n".join(f"{name}: {why}" for name, why in reasons.items())
+
+
+def _meshing(design: Design, task: MeshingTask) -> dict[str, float | None]:
+    """Means and ranges over the positions of the wave generator."""
+    from swgjoint.maps.catalogue import ratings_of
+
+    rated = ratings_of(design).rated_torque
+    torque = rated if task.torque_Nm is None else task.torque_Nm
+    found: dict[str, float | None] = {}
+    if set(task.figures) - {KINEMATIC}:
+        result = _simulated(design, task, torque)
+        steps = result["per_step"]
+        for member, above in (("flexspline", ""), ("circular_spline", _RING)):
+            means = result[member]["average_max_MPa"]
+            found |= {f"{above}{kind}_MPa": value for kind, value in means.items()}
+        found["transmission_error_pp_arcsec"] = _range(steps["output_error_arcsec"])
+        found["pairs_in_contact"] = float(np.mean(steps["pairs_in_contact"]))
+        found["wave_generator_torque_pp_Nm"] = _range(steps["wave_generator_torque_Nm"])
+    if KINEMATIC in task.figures:
+        steps = _simulated(design, task, 0.0)["per_step"]
+        found[KINEMATIC] = _range(steps["output_error_arcsec"])
+    return {name: found[name] for name in task.figures}
+
+
+def _simulated(design: Design, task: MeshingTask, torque: float) -> dict[str, Any]:
+    """A simulation of meshing with every position solved."""
+    from swgjoint.fe.drive2d import can_halve
+    from swgjoint.fe.meshing import simulate_meshing
+
+    turn = 1.0 / design.periodicity
+    run = simulate_meshing(
+        design,
+        model=task.model or ("3d" if design.cup is not None else "2d"),
+        torque=torque,
+        steps=task.positions,
+        turn=turn if task.turn_deg is None else task.turn_deg / 360.0,
+        half=can_halve(design),
+    )
+    result: dict[str, Any] = run.to_json()
+    return result
+
+
+def _range(values: Sequence[float]) -> float:
+    return float(np.ptp(values))
+
+
+def _map(
+    design: Design, task: SpecTask | RunTask, *, turn: bool
+) -> tuple[DriveMap, Design]:
+    from swgjoint.fe.build_map import build_map
+    from swgjoint.gear.tolerances import has_errors, without_errors
+
+    if not turn and has_errors(design):  # read with the input locked
+        design = without_errors(design)
+    return build_map(design, model=task.model, angles=task.angles), design
+
+
+def _spec(
+    design: Design, task: SpecTask
+) -> tuple[dict[str, float | None], dict[str, str]]:
+    """Figures of the specification sheet, and why some of them cannot be told."""
+    from swgjoint.maps.catalogue import ratings_of
+    from swgjoint.maps.spec_sheet import (
+        check_keys,
+        measure_spec,
+        needs_map,
+        needs_turn,
+    )
+
+    keys = check_keys(task.figures)
+    drive = None
+    if needs_map(keys):
+        drive, design = _map(design, task, turn=needs_turn(keys))
+    sheet = measure_spec(drive, ratings=ratings_of(design), only=keys)
+    return {name: sheet.figures[name] for name in task.figures}, sheet.missing
+
+
+def _run(scene: Scene, design: Design | None, task: RunTask) -> dict[str, float | None]:
+    """Figures of the worst joint of a run."""
+    from swgjoint.sim.run import run_scene
+    from swgjoint.study.compare import row_of
+
+    drive = None
+    if design is None:
+        run = run_scene(scene)
+    else:
+        drive, _ = _map(design, task, turn=True)
+        name = design.drive.name
+        run = run_scene(scene.with_drive(name), drives={name: drive})
+    row = row_of(scene.name, run, drive, level=None)
+    return {name: getattr(row, name) for name in task.figures}

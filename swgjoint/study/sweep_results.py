@@ -1,0 +1,184 @@
+"""Where the records of a sweep lie: a folder, or any place that fsspec reaches."""
+
+from __future__ import annotations
+
+import json
+import logging
+import math
+import secrets
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, fields
+from pathlib import Path
+from typing import Any, Protocol
+
+from pydantic import TypeAdapter
+
+from swgjoint.errors import InputError, MissingExtraError
+from swgjoint.files import output_folder, write_whole
+from swgjoint.json_text import json_text
+from swgjoint.study.sweep_figures import Record
+
+_log = logging.getLogger(__name__)
+
+
+class Place(Protocol):
+    """A folder."""
+
+    def at(self, name: str) -> str:
+        """Path of a file."""
+
+    def read(self, name: str) -> bytes | None:
+        """Content of a file; None if there is none."""
+
+    def write(self, name: str, data: bytes) -> str:
+        """Write a file whole; returns its path."""
+
+
+class Folder:
+    """A folder of this machine."""
+
+    def __init__(self, path: str | Path) -> None:
+        self.path = output_folder(path)
+
+    def at(self, name: str) -> str:
+        """See :class:`Place`."""
+        return str(self.path / name)
+
+    def read(self, name: str) -> bytes | None:
+        """See :class:`Place`."""
+        try:
+            return (self.path / name).read_bytes()
+        except FileNotFoundError:
+            return None
+        except OSError as error:  # a file where a folder should be, no permission
+            raise InputError(f"cannot read {self.at(name)}: {error.strerror}") from None
+
+    def write(self, name: str, data: bytes) -> str:
+        """See :class:`Place`."""
+        target = self.path / name
+        try:
+            target.parent.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InputError(f"cannot write {target}: {error.strerror}") from None
+        return str(write_whole(target, data))
+
+
+class Remote:
+    """A folder of another file system, such as ``s3://bucket/sweep``."""
+
+    def __init__(self, address: str) -> None:
+        try:
+            from fsspec.core import url_to_fs
+        except ImportError:
+            raise MissingExtraError(
+                f"results at {address!r} need fsspec: pip install 'swgjoint[cluster]'"
+            ) from None
+        try:
+            self._files, self._root = url_to_fs(address)
+        except (ValueError, ImportError) as error:  # unknown protocol, its package
+            raise InputError(f"results at {address!r}: {error}") from None
+        self._scheme = address.partition("://")[0]
+
+    def at(self, name: str) -> str:
+        """See :class:`Place`."""
+        return f"{self._scheme}://{f'{self._root}/{name}'.lstrip('/')}"
+
+    def read(self, name: str) -> bytes | None:
+        """See :class:`Place`."""
+        try:
+            data: bytes = self._files.cat_file(f"{self._root}/{name}")
+        except FileNotFoundError:
+            return None
+        return data
+
+    def write(self, name: str, data: bytes) -> str:
+        """See :class:`Place`; beside and moved, for not every system writes whole."""
+        target = f"{self._root}/{name}"
+        folder, _, last = target.rpartition("/")
+        beside = f"{folder}/.{last}.{secrets.token_hex(4)}"
+        self._files.makedirs(folder, exist_ok=True)
+        self._files.pipe_file(beside, data)
+        self._files.mv(beside, target)
+        return self.at(name)
+
+
+def place_of(where: str | Path) -> Place:
+    """The folder of a path or of an address with ``://``."""
+    return Remote(where) if isinstance(where, str) and "://" in where else Folder(where)
+
+
+_FIELDS = {item.name for item in fields(Record)}
+_KEPT = TypeAdapter(Record)
+
+
+def read_record(place: Place, key: str) -> Record | None:
+    """What is kept under a key; a damaged one is none."""
+    data = place.read(_name(key))
+    if data is None:
+        return None
+    try:
+        content = json.loads(data)
+        if isinstance(content, dict) and content.keys() >= _FIELDS:
+            return _KEPT.validate_json(data, strict=True)
+    except ValueError:  # no JSON, or of other types
+        pass
+    _log.warning("damaged result %s is computed again", key)
+    return None
+
+
+def write_record(
+    place: Place, key: str, record: Record, values: Mapping[str, Any]
+) -> None:
+    """Keep a record, with the values for whoever looks into the folder."""
+    content = {**asdict(record), "values": dict(values)}
+    place.write(_name(key), (json_text(content) + "\n").encode())
+
+
+def _name(key: str) -> str:
+    return f"results/{key[:2]}/{key}.json"
+
+
+def csv_text(rows: Sequence[Mapping[str, Any]]) -> str:
+    """Rows with the same keys as CSV; empty where there is no value."""
+    import csv
+    import io
+
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(rows[0].keys())
+    for row in rows:
+        writer.writerow(["" if v is None else v for v in row.values()])
+    return out.getvalue()
+
+
+def parquet_bytes(rows: Sequence[Mapping[str, Any]]) -> bytes | None:
+    """Rows with the same keys as Parquet; None where pyarrow is not installed."""
+    try:
+        import pyarrow
+        import pyarrow.parquet
+    except ImportError:
+        return None
+    columns = {key: _column([row[key] for row in rows]) for key in rows[0]}
+    out = pyarrow.BufferOutputStream()
+    pyarrow.parquet.write_table(pyarrow.table(columns), out)
+    data: bytes = out.getvalue().to_pybytes()
+    return data
+
+
+def _column(values: list[Any]) -> list[Any]:
+    """Values of one type: numbers where all are, else texts."""
+    kinds = {type(value) for value in values} - {type(None)}
+    if kinds == {int, float}:
+        return [None if value is None else float(value) for value in values]
+    if len(kinds) <= 1:
+        return values
+    return [None if value is None else str(value) for value in values]
+
+
+def flat(value: Any) -> Any:
+    """A value as it stands in one cell of a table."""
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    if isinstance(value, Mapping | list | tuple):
+        return json_text(value, indent=None)
+    return value
