@@ -15,7 +15,7 @@ the rim lifts off: the influences are superposed in this problem, not in its sol
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,6 +76,27 @@ class Influence:
     """b (n,)."""
     angle_by_torque: float
     """c [rad/(N·m)]."""
+    supports: Array | None = None
+    """Where the other contacts lie, in the frame of the wave generator (m - n, 2) [m];
+    in the plane only."""
+
+    def with_supports(self) -> Influence:
+        """The same, gap changes of the wave generator behind those of the teeth.
+
+        Such a change adds to the gap of an open contact. A closed one has its opening
+        as the unknown: an outline that recedes is an opening that the node has not
+        made.
+        """
+        n = len(self.sector)
+        closed = self.closed[n:]
+        outline = -self.matrix[:, n:] * closed
+        outline[n:] += np.diag(~closed)
+        angle = -self.angle_by_value[n:] * closed
+        return replace(
+            self,
+            by_gap=np.concatenate([self.by_gap, outline], axis=1),
+            angle_by_gap=np.concatenate([self.angle_by_gap, angle]),
+        )
 
     def gap_change(
         self, flexspline: Array, circular_spline: Array, tilt: Array | None = None

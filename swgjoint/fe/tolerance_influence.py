@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from swgjoint.fe.corotation import turned
+from swgjoint.fe.corotation import rotate, turned
 from swgjoint.fe.cyclic import CyclicFactor
 from swgjoint.fe.influence import Gaps, Influence, pivoted
 from swgjoint.fe.linearise import Linearised, linearise
@@ -96,7 +96,7 @@ def influence(model: RingModel, state: State, *, ring_is_output: bool) -> Influe
     offset[n:m] += supports.gap
     offset = np.append(offset, -state.torque if ring_is_output else 0.0)
 
-    return pivoted(
+    found = pivoted(
         system,
         offset,
         Gaps(
@@ -115,6 +115,7 @@ def influence(model: RingModel, state: State, *, ring_is_output: bool) -> Influe
         angle=state.ring_rotation if ring_is_output else state.rotation,
         torque=state.torque,
     )
+    return replace(found, supports=supports.place)
 
 
 def _by_shift(weight: Array) -> Array:
@@ -160,6 +161,8 @@ class _Supports:
     closed: Mask
     gap: Array
     """Zero where closed [m]."""
+    place: Array
+    """In the frame of the wave generator (k, 2) [m]."""
 
     @classmethod
     def of(cls, model: RingModel, ring: Linearised, state: State) -> _Supports:
@@ -169,12 +172,14 @@ class _Supports:
         used[:, spread] = gap[:, spread] < REACH * model.lobe_height
         sector, node = np.nonzero(used | touching)
         closed = touching[sector, node]
+        place = model.skeleton(state)[:, model.bore_nodes][sector, node]
         return cls(
             sector=sector,
             node=node,
             dof=ring.normal_dofs[node],
             closed=closed,
             gap=np.where(closed, 0.0, gap[sector, node]),
+            place=rotate(place, -state.wave_generator_angle),
         )
 
     def fill(self, load: Array, moved: Array) -> None:

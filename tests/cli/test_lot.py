@@ -1,0 +1,60 @@
+"""``swgjoint lot``."""
+
+from __future__ import annotations
+
+import csv
+import json
+
+import pytest
+
+from swgjoint.cli.main import main
+
+
+@pytest.mark.fe
+def test_lot_writes_rows_and_picture(tmp_path, capsys):
+    """JSON alone on stdout; one row a drive in the CSV; exit status 0."""
+    spec = tmp_path / "spec.toml"
+    spec.write_text("[spec]\nripple_rms_percent = 1000.0\n")
+    out = tmp_path / "deep" / "out"
+    arguments = ["lot", "reference-2d-tolerances", "--drives", "2", "--jobs", "1"]
+    arguments += ["--spec", str(spec), "--out", str(out), "--json"]
+    assert main(arguments) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["yield"]["part"] == 1.0
+    assert sorted(path.name for path in out.iterdir()) == [
+        "lot.csv",
+        "lot.json",
+        "lot.png",
+    ]
+    with (out / "lot.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [int(row["seed"]) for row in rows] == [1, 2]
+    assert float(rows[1]["ripple_rms_percent"]) == pytest.approx(
+        found["rows"][1]["ripple_rms_percent"]
+    )
+    assert json.loads((out / "lot.json").read_text())["rows"] == found["rows"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--drives", "0"], "--drives 0; accepted: 1 to"),
+        (["--jobs", "0"], "--jobs 0; accepted: 1 to"),
+        (["--seed", "-1"], "--seed -1; accepted: 1 to"),
+    ],
+)
+def test_bad_numbers_are_one_line(arguments, said, capsys):
+    """What, the value and what is accepted; exit status 2."""
+    assert main(["lot", "reference-2d-tolerances", *arguments]) == 2
+    assert said in capsys.readouterr().err
+
+
+def test_unknown_limit_is_one_line(tmp_path, capsys):
+    """The figures of a lot, not those of a comparison, are accepted."""
+    spec = tmp_path / "spec.toml"
+    spec.write_text("[spec]\nvon_mises_MPa = 300.0\n")
+    command = ["lot", "reference-2d-tolerances", "--spec", str(spec)]
+    assert main(command) == 2
+    said = capsys.readouterr().err
+    assert "spec.von_mises_MPa = 300.0" in said
+    assert "transmission_accuracy_arcmin, ripple_rms_percent" in said
