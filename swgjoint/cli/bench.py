@@ -3,29 +3,56 @@
 from __future__ import annotations
 
 import argparse
+import time
+from pathlib import Path
 from typing import Any
 
-from swgjoint.cli.text import table
+from swgjoint.cli import bench_fe, bench_joint, bench_scaling
+from swgjoint.errors import InputError
 from swgjoint.files import output_folder
+
+PARTS = {
+    "fe": "finite elements in the plane and in space, coarse to fine",
+    "joint": "levels, integrators and steps of the joint",
+    "scaling": "time over joints, batches, harmonics, teeth, nodes, torque, positions",
+}
+"""In the order in which ``all`` runs them."""
+DESIGN = "reference-3d-modified"
+OPTIONS = {"design": "fe", "recompute": "fe", "only": "joint"}
+"""With the part that they are of."""
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
-    """Part, design, output folder."""
+    """Part, its options, output folder."""
+    listing = "; ".join(f"{name}: {text}" for name, text in PARTS.items())
     parser.add_argument(
         "part",
         nargs="?",
-        choices=("fe",),
+        choices=(*PARTS, "all"),
         default="fe",
-        help="fe: finite elements in the plane and in space, coarse to fine",
+        help=f"{listing}; all: one after the other; default %(default)s",
     )
     parser.add_argument(
         "--design",
         metavar="DESIGN",
-        default="reference-3d-modified",
-        help="with a cup; default %(default)s",
+        help=f"of fe: with a cup; default {DESIGN}; of another one, settings that take"
+        " long are left out",
     )
     parser.add_argument(
-        "--out", metavar="DIR", help="write the table and the picture there"
+        "--recompute",
+        action="store_true",
+        help="of fe: solve the finest references, too, which else are stored (an hour),"
+        " and write that file anew into --out",
+    )
+    parser.add_argument(
+        "--only",
+        metavar="SCENE,...",
+        help="of joint: some of its scenes, ur5e, iiwa14, bench; default all",
+    )
+    parser.add_argument(
+        "--out",
+        metavar="DIR",
+        help="write tables and pictures there; all: a folder for each part",
     )
 
 
@@ -33,40 +60,91 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     """Run the benchmark.
 
     Returns:
-        See :func:`swgjoint.study.fe_cost.run_fe_cost`.
+        Of one part: what its function returns (``run_fe_cost``, ``run_joint_cost``).
+        Of ``all``: ``rows`` of all parts, ``parts`` with the rest of each, ``files``,
+        ``wall_s``.
+
+    Raises:
+        InputError: Before any part runs, if an option is not of this part, lacks
+            ``--out``, or names no scene.
     """
+    _check(args)
     folder = output_folder(args.out) if args.out else None
-    from swgjoint.gear.design import Design
+    if args.part != "all":
+        return _run_part(args.part, args, folder)
+    begin = time.perf_counter()
+    found = {
+        name: _run_part(name, args, None if folder is None else folder / name)
+        for name in PARTS
+    }
+    return {
+        "rows": [row for one in found.values() for row in one["rows"]],
+        "parts": found,
+        "files": [path for one in found.values() for path in one["files"]],
+        "wall_s": time.perf_counter() - begin,
+    }
 
-    design = Design.load(args.design)
-    from swgjoint.study.fe_cost import run_fe_cost
 
-    return run_fe_cost(design=design, folder=folder, progress=args.progress)
+def _check(args: argparse.Namespace) -> None:
+    """Refuse at once what a part would refuse after an hour of others."""
+    for option, part in OPTIONS.items():
+        given = getattr(args, option) not in (None, False)
+        if given and args.part not in (part, "all"):
+            raise InputError(
+                f"--{option}: not of bench {args.part}; accepted: bench {part} or all"
+            )
+    if args.recompute and not args.out:
+        raise InputError(
+            "--recompute: writes the file of the references anew, and there is no"
+            " folder for it; accepted: with --out DIR"
+        )
+    if args.only is not None:
+        from swgjoint.study.joint_cost import check_scenes
+
+        check_scenes(args.only.split(","))
+
+
+def _run_part(
+    name: str, args: argparse.Namespace, folder: Path | None
+) -> dict[str, Any]:
+    """One part with its options; the folder need not exist."""
+    if name == "fe":
+        from swgjoint.gear.design import Design
+
+        design = Design.load(args.design or DESIGN)
+        from swgjoint.study.fe_cost import run_fe_cost
+
+        return run_fe_cost(
+            design=design,
+            folder=folder,
+            progress=args.progress,
+            recompute=args.recompute,
+        )
+    if name == "joint":
+        from swgjoint.study.joint_cost import run_joint_cost
+
+        only = () if args.only is None else tuple(args.only.split(","))
+        return run_joint_cost(only=only, folder=folder, progress=args.progress)
+    if name == "scaling":
+        from swgjoint.study.scaling import run_scaling
+
+        return run_scaling(folder=folder, progress=args.progress)
+    raise ValueError(f"part {name!r} has no function")
 
 
 def report(result: dict[str, Any]) -> str:
-    """One line a setting: time, then value and error of every quantity."""
-    rows = result["rows"]
-    quantities = list(dict.fromkeys(row["quantity"] for row in rows))
-    units = {row["quantity"]: row["unit"] for row in rows}
-    lines: dict[tuple[str, str], list[Any]] = {}
-    for row in rows:
-        line = lines.setdefault(
-            (row["model"], row["setting"]), [row["wall_s"], row["outcome"]]
-        )
-        line += [row["value"], row["error"]]
-    header = ["model", "setting", "s"]
-    for quantity in quantities:
-        header += [quantity, f"error {units[quantity]}"]
-    body = [
-        (*key, wall, *values)
-        if values[0] is not None
-        else (*key, outcome, *[None] * (2 * len(quantities)))
-        for key, (wall, outcome, *values) in lines.items()
-    ]
-    text = [
-        f"{result['design']} against {rows[0]['reference']}",
-        table(body, header=tuple(header)),
-    ]
-    text += [f"wrote {name}" for name in result["files"]]
-    return "\n".join([*text, f"{result['wall_s']:.0f} s"])
+    """The tables of the parts."""
+    if "parts" not in result:
+        return _report_part(result["rows"][0]["bench"], result)
+    texts = [_report_part(name, one) for name, one in result["parts"].items()]
+    return "\n\n".join([*texts, f"all: {result['wall_s']:.0f} s"])
+
+
+def _report_part(name: str, result: dict[str, Any]) -> str:
+    if name == "fe":
+        return bench_fe.report(result)
+    if name == "joint":
+        return bench_joint.report(result)
+    if name == "scaling":
+        return bench_scaling.report(result)
+    raise ValueError(f"part {name!r} has no report")

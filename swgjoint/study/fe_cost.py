@@ -1,87 +1,66 @@
 """``swgjoint bench fe``: what finite elements of less effort miss, and their time.
 
-Every setting solves the same positions over one pitch: without torque for the kinematic
-error, at rated torque for stiffness and stress. The finest model in space is the
-reference; the plane model has the cup as closed-form torsion in series.
+Every setting is compared three times: with the finest model in space, with the finest
+mesh of its own kind, and with the finest of the next level up (ring, plane, space;
+linear, nonlinear). References that take long come from a stored file, which holds one
+short setting, too: solved again, it tells whether the file is of this code. What takes
+long and is not stored is left out.
 """
 
 from __future__ import annotations
 
+import csv
 import io
+import os
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from math import pi
+from collections.abc import Sequence
+from concurrent.futures import (
+    ProcessPoolExecutor,
+    ThreadPoolExecutor,
+    as_completed,
+)
+from concurrent.futures.process import BrokenProcessPool
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from swgjoint.errors import ComputationError, DesignError
-from swgjoint.fe.continuation import Continuation
-from swgjoint.fe.drive2d import can_halve, ring_model
-from swgjoint.fe.following import AnyState, Follower
-from swgjoint.fe.solid.continuation import SolidContinuation
-from swgjoint.fe.solid.drive3d import check_modelled, solid_ring
-from swgjoint.fe.solid.stress import SolidMaxima
-from swgjoint.fe.stress import MemberMaxima, StressMaxima
-from swgjoint.fe.tolerance_rest import SMALL
+from swgjoint.fe.solid.drive3d import check_modelled
 from swgjoint.files import write_whole
-from swgjoint.gear.cup import cup_torsional_stiffness
 from swgjoint.gear.design import Design
-from swgjoint.gear.kinematics import periodicity
 from swgjoint.json_text import json_text
-from swgjoint.maps.catalogue import ratings_of
 from swgjoint.progress import Progress, silent
-from swgjoint.units import arcsec
-
-Array = NDArray[np.float64]
-
-POSITIONS = 4
-"""Over one pitch; the same ones in every setting."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Setting:
-    """One model and its effort."""
-
-    model: str
-    refinement: float
-    nonlinear: bool = True
-
-    @property
-    def name(self) -> str:
-        """As the table has it."""
-        return f"refinement {self.refinement:g}" + (
-            "" if self.nonlinear else ", linear"
-        )
-
+from swgjoint.study.fe_cost_plots import cost_picture
+from swgjoint.study.fe_cost_rows import cheapest, rows_of
+from swgjoint.study.fe_cost_setting import POSITIONS, Found, Setting
+from swgjoint.study.fe_cost_solve import Task, solved_in
+from swgjoint.study.fe_cost_stored import FILE, LONG, stored_of, to_store, told
+from swgjoint.study.provenance import provenance
 
 SETTINGS = (
+    Setting(model="ring", refinement=0),
+    Setting(model="ring", refinement=0.5),
+    Setting(model="ring", refinement=1),
+    Setting(model="2d", refinement=0.5, nonlinear=False),
+    Setting(model="2d", refinement=1.0, nonlinear=False),
+    Setting(model="2d", refinement=2.0, nonlinear=False),
+    Setting(model="2d", refinement=0.5),
     Setting(model="2d", refinement=1.0),
+    Setting(model="2d", refinement=1.0, full=True),
     Setting(model="2d", refinement=2.0),
+    Setting(model="2d", refinement=4.0),
     Setting(model="3d", refinement=0.5, nonlinear=False),
     Setting(model="3d", refinement=1.0, nonlinear=False),
     Setting(model="3d", refinement=0.5),
+    Setting(model="3d", refinement=0.5, full=True),
     Setting(model="3d", refinement=0.7),
     Setting(model="3d", refinement=1.0),
     Setting(model="3d", refinement=1.4),
 )
-"""The last one is the reference."""
+"""The finest of every kind comes last; the last one of all is the reference."""
 
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Found:
-    """What a setting says of the drive."""
-
-    stiffness: float
-    """Mean tangent at rated torque [N·m/rad]."""
-    kinematic_error: Array
-    """Unloaded output error less its mean (POSITIONS,) [rad]."""
-    tensile: float
-    """Mean over the positions of the largest tensile stress of the flexspline [Pa]."""
-    wall_s: float
+LEFT_OUT = "left out: long, and not in a stored file; solved with --recompute"
+LOST = "its process died: out of memory, or killed"
 
 
 def run_fe_cost(
@@ -90,13 +69,27 @@ def run_fe_cost(
     settings: Sequence[Setting] = SETTINGS,
     folder: Path | None = None,
     progress: Progress = silent,
+    jobs: int = 2,
+    recompute: bool = False,
 ) -> dict[str, Any]:
-    """Solve every setting; the last one is the reference.
+    """Solve every setting; the last one that is not left out is the reference.
+
+    Args:
+        design: With a cup.
+        settings: Coarse to fine within each kind.
+        folder: For table, JSON and picture; None writes nothing.
+        progress: Called after every setting.
+        jobs: Processes, one a core; every setting has a fresh one.
+        recompute: Solve what the stored file has, too, and write that file anew
+            (into ``folder``).
 
     Returns:
-        ``rows``: ``bench``, ``model``, ``setting``, ``quantity``, ``value``, ``error``,
-        ``unit``, ``wall_s``, ``reference``, ``outcome``, three a setting; ``design``,
-        ``files``, ``wall_s``.
+        ``rows``, see :func:`swgjoint.study.fe_cost_rows.rows_of`; ``cheapest``: setting
+        by quantity and bound, ``cheapest_in_the_plane`` against the finest plane mesh;
+        ``design``, ``stored`` with the provenance of the stored settings and how far
+        they have drifted, ``left_out``: settings by key,
+        ``kinematic_error_positions``: so many of a pitch it is told at, which sees its
+        first harmonic, ``provenance``, ``files``, ``wall_s``.
 
     Raises:
         DesignError: If the design has no cup or holds what is not modelled in space.
@@ -109,182 +102,104 @@ def run_fe_cost(
             " [cup]; accepted: a design with one, such as reference-3d-modified"
         )
     check_modelled(design)
-    found: list[Found | None] = []
-    outcomes = []
+    kept = {} if recompute else stored_of(design)
+    stored = kept.get("settings", {})
+    found: dict[str, Found | str] = {
+        s.key: stored.get(s.key, LEFT_OUT)
+        for s in settings
+        if s.key in LONG and not recompute
+    }
+    left_out = [key for key, one in found.items() if one == LEFT_OUT]
+    missing = [setting for setting in settings if setting.key not in found]
     stage = f"{design.drive.name}: settings"
-    progress(stage, 0, len(settings))
-    for k, setting in enumerate(settings):
-        try:
-            found.append(_solved(design, setting))
-            outcomes.append("converged")
-        except (ComputationError, DesignError) as failure:
-            found.append(None)
-            outcomes.append(str(failure))
-        progress(stage, k + 1, len(settings))
-    best = found[-1]
-    if best is None:
-        raise ComputationError(f"the reference, {settings[-1].name}: {outcomes[-1]}")
-    reference = f"{settings[-1].model}, {settings[-1].name}"
-    rows = [
-        row
-        for setting, one, outcome in zip(settings, found, outcomes, strict=True)
-        for row in _rows(setting, one, outcome, best, reference)
-    ]
+    found |= _solve_all(design, missing, jobs=jobs, stage=stage, progress=progress)
+    best = [s for s in settings if s.key not in left_out][-1]
+    last = found[best.key]
+    if isinstance(last, str):
+        raise ComputationError(f"the reference, {best.name}: {last}")
+    from_file = set(LONG) & set(stored)
+    rows = rows_of(settings, found, best=best, stored=from_file)
+    result = {
+        "design": design.drive.name,
+        "rows": rows,
+        "cheapest": cheapest(rows),
+        "cheapest_in_the_plane": cheapest(rows, "2d"),
+        "stored": told(kept, found) if kept else None,
+        "left_out": left_out,
+        "kinematic_error_positions": POSITIONS,
+        "provenance": provenance(),
+    }
     files = []
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)
-        picture = cost_picture(design.drive.name, rows)
         files = [
-            write_whole(folder / "bench-fe.json", json_text({"rows": rows}) + "\n"),
-            write_whole(folder / "bench-fe.png", picture),
+            write_whole(folder / "bench-fe.json", json_text(result) + "\n"),
+            write_whole(folder / "bench-fe.csv", _table(rows)),
+            write_whole(folder / "bench-fe.png", cost_picture(result)),
         ]
-    return {
-        "design": design.drive.name,
-        "rows": rows,
-        "files": [str(path) for path in files],
-        "wall_s": time.perf_counter() - begin,
-    }
+        if recompute:
+            text = json_text(to_store(design, found))
+            files.append(write_whole(folder / FILE, text + "\n"))
+    wall = time.perf_counter() - begin
+    return result | {"files": [str(path) for path in files], "wall_s": wall}
 
 
-def _solved(design: Design, setting: Setting) -> Found:
-    begin = time.perf_counter()
-    changed = design.with_changes({"mesh.refinement": setting.refinement})
-    half = can_halve(changed)
-    if setting.model == "3d":
-        ring = solid_ring(changed, half=half, nonlinear=setting.nonlinear)
-        return _measured(
-            changed,
-            SolidContinuation(
-                ring=ring, ratio=changed.ratio, layout=changed.drive.layout
-            ),
-            lambda state: SolidMaxima.at(ring, state).flexspline,
-            0.0,
-            begin,
-        )
-    plane = ring_model(changed, half=half, nonlinear=setting.nonlinear)
-    return _measured(
-        changed,
-        Continuation(model=plane, ratio=changed.ratio, layout=changed.drive.layout),
-        lambda state: MemberMaxima.at(plane, state).flexspline,
-        1.0 / cup_torsional_stiffness(changed),
-        begin,
-    )
-
-
-def _measured(
+def _solve_all(
     design: Design,
-    follow: Follower[AnyState],
-    stress: Callable[[AnyState], StressMaxima],
-    series: float,
-    begin: float,
-) -> Found:
-    """Unloaded and loaded positions of any model.
-
-    Args:
-        design: The drive.
-        follow: Its model.
-        stress: Largest stresses of the flexspline at a state.
-        series: Compliance that the model lacks [rad/(N·m)].
-        begin: When the setting began [s].
-    """
-    drive, rated = design.drive, ratings_of(design).rated_torque
-    cycles = periodicity(
-        drive.layout, drive.teeth_flexspline, drive.teeth_circular_spline
-    )
-    theta = 2.0 * pi / cycles * np.arange(POSITIONS) / POSITIONS
-
-    def checked(state: AnyState) -> AnyState:
-        if not state.outcome.ok:
-            raise ComputationError(state.outcome.value)
-        return state
-
-    rest = follow.unloaded(checked(follow.meshed(follow.deflected())), SMALL * rated)
-    loaded = follow.to_torque(
-        rest.state if rest.sides is None else rest.sides[0], rated
-    )
-    error, compliance, tensile = [], [], []
-    for k, angle in enumerate(theta):
-        if k:
-            rest = follow.unloaded_to(rest, float(angle))
-            loaded = follow.to_angle(loaded, float(angle))
-        checked(rest.state)
-        checked(loaded)
-        error.append(follow.output_angle(rest.state) - angle / design.ratio)
-        compliance.append(loaded.compliance + series)
-        tensile.append(stress(loaded).tensile)
-    return Found(
-        stiffness=1.0 / float(np.mean(compliance)),
-        kinematic_error=np.array(error) - np.mean(error),
-        tensile=float(np.mean(tensile)),
-        wall_s=time.perf_counter() - begin,
-    )
+    settings: Sequence[Setting],
+    *,
+    jobs: int,
+    stage: str,
+    progress: Progress,
+) -> dict[str, Found | str]:
+    """Every setting in a process that does nothing else, the long ones first."""
+    order = sorted(settings, key=_work, reverse=True)
+    found: dict[str, Found | str] = {}
+    progress(stage, 0, len(order))
+    # a thread holds the process of one setting, so that one which dies ends no other
+    threads = ThreadPoolExecutor(max_workers=jobs)
+    try:
+        tasks = {
+            threads.submit(_solved_apart, Task(design=design, setting=s)): s
+            for s in order
+        }
+        for future in as_completed(tasks):
+            found[tasks[future].key] = future.result()
+            progress(stage, len(found), len(order))
+    finally:
+        threads.shutdown(cancel_futures=True)
+    return found
 
 
-def _rows(
-    setting: Setting, found: Found | None, outcome: str, best: Found, reference: str
-) -> list[dict[str, Any]]:
-    same = {
-        "bench": "fe",
-        "model": setting.model,
-        "setting": setting.name,
-        "wall_s": None if found is None else found.wall_s,
-        "reference": reference,
-        "outcome": outcome,
-    }
-    if found is None:
-        nothing = {"value": None, "error": None, "unit": "%"}
-        return [same | nothing | {"quantity": "torsional_stiffness_Nm_rad"}]
-    apart = found.kinematic_error - best.kinematic_error
-    return [
-        same
-        | {
-            "quantity": "torsional_stiffness_Nm_rad",
-            "value": found.stiffness,
-            "error": 100.0 * (found.stiffness / best.stiffness - 1.0),
-            "unit": "%",
-        },
-        same
-        | {
-            "quantity": "kinematic_error_pp_arcsec",
-            "value": float(np.ptp(found.kinematic_error)) / arcsec,
-            "error": float(np.ptp(apart)) / arcsec,
-            "unit": "arcsec",
-        },
-        same
-        | {
-            "quantity": "tensile_MPa",
-            "value": found.tensile / 1e6,
-            "error": 100.0 * (found.tensile / best.tensile - 1.0),
-            "unit": "%",
-        },
-    ]
+def _solved_apart(task: Task) -> Found | str:
+    """A setting in a process of its own; what becomes of that is part of the result."""
+    with ProcessPoolExecutor(
+        max_workers=1, mp_context=get_context("spawn"), initializer=_one_thread
+    ) as process:
+        try:
+            return process.submit(solved_in, task).result()
+        except BrokenProcessPool:
+            return LOST
+        except MemoryError:
+            return "out of memory"
 
 
-def cost_picture(name: str, rows: Sequence[dict[str, Any]]) -> bytes:
-    """PNG: magnitude of the error over wall time, one panel a quantity."""
-    from matplotlib.figure import Figure
+def _one_thread() -> None:
+    """Before linear algebra is loaded: a second thread would blur what a core costs."""
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ[name] = "1"
 
-    solved = [row for row in rows if row["error"] is not None]
-    quantities = list(dict.fromkeys(row["quantity"] for row in solved))
-    figure = Figure(figsize=(12.0, 4.2), layout="constrained")
-    panels = figure.subplots(1, len(quantities), squeeze=False)[0]
-    for ax, quantity in zip(panels, quantities, strict=True):
-        for row in solved:
-            size = abs(row["error"])
-            if row["quantity"] != quantity or size == 0.0:
-                continue
-            linear = row["setting"].endswith("linear")
-            marker = "x" if linear else "s" if row["model"] == "2d" else "o"
-            ax.loglog(
-                row["wall_s"], size, marker, color=f"C{'23'.index(row['model'][0])}"
-            )
-            label = f" {row['model']} {row['setting'].removeprefix('refinement ')}"
-            ax.annotate(label, (row["wall_s"], size), fontsize=7)
-        unit = next(row["unit"] for row in solved if row["quantity"] == quantity)
-        ax.set(title=quantity, xlabel="wall time [s]", ylabel=f"error [{unit}]")
-        ax.margins(x=0.25)
-        ax.grid(alpha=0.3, which="both")
-    figure.suptitle(f"{name} against {rows[0]['reference']}")
-    out = io.BytesIO()
-    figure.savefig(out, format="png", dpi=110)
+
+def _work(setting: Setting) -> float:
+    """Rough seconds."""
+    base = {"ring": 6.0, "2d": 5.0, "3d": 150.0}[setting.model]
+    active_sets = 3.0 if setting.kind == "3d linear" else 1.0
+    return (2 if setting.full else 1) * active_sets * base * setting.refinement**2
+
+
+def _table(rows: Sequence[dict[str, Any]]) -> str:
+    out = io.StringIO()
+    writer = csv.DictWriter(out, list(rows[0]), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
     return out.getvalue()

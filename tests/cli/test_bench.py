@@ -3,34 +3,43 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import pytest
 
+from swgjoint.cli import bench, bench_fe, bench_scaling
 from swgjoint.cli.main import main
-from swgjoint.study import fe_cost
+from swgjoint.study import fe_cost, scaling
 from swgjoint.study.fe_cost import Setting
 
 
 @pytest.mark.fe
-def test_bench_fe(monkeypatch, capsys):
+def test_bench_fe(monkeypatch, capsys, tmp_path):
     """One JSON object with a row for every setting and quantity, then as a table."""
-    settings = tuple(Setting(model="2d", refinement=n) for n in (0.5, 1.0))
+    settings = (
+        Setting(model="ring", refinement=0),
+        *(Setting(model="2d", refinement=n) for n in (0.5, 0.6)),
+    )
     monkeypatch.setattr(
         fe_cost.run_fe_cost,
         "__kwdefaults__",
         {**fe_cost.run_fe_cost.__kwdefaults__, "settings": settings},
     )
-    assert main(["bench", "fe", "--json"]) == 0
+    assert main(["bench", "fe", "--json", "--recompute", "--out", str(tmp_path)]) == 0
     result = json.loads(capsys.readouterr().out)
-    assert len(result["rows"]) == 6
+    assert len(result["rows"]) == 12
     keys = {"bench", "model", "setting", "error", "unit", "wall_s", "reference"}
     for row in result["rows"]:
-        assert keys | {"outcome"} <= set(row)
-        assert row["reference"] == "2d, refinement 1"
-    assert main(["bench"]) == 0
-    text = capsys.readouterr().out
+        assert keys | {"outcome", "peak_MB", "cores", "pareto"} <= set(row)
+        assert row["reference"] == "2d, refinement 0.6"
+        assert row["peak_MB"] > 50.0  # of a process of its own
+    names = {path.name for path in tmp_path.iterdir()}
+    table = {f"bench-fe.{suffix}" for suffix in ("json", "csv", "png")}
+    assert names == table | {"bench-fe-reference.json"}
+    text = bench_fe.report(result)
     assert "refinement 0.5" in text
     assert "torsional_stiffness_Nm_rad" in text
+    assert "cheapest within" in text and "15 %" in text
 
 
 def test_bench_refuses_a_plane_design(capsys):
@@ -40,3 +49,44 @@ def test_bench_refuses_a_plane_design(capsys):
     assert len(lines) == 1
     assert "reference-2d: bench fe goes by the model in space" in lines[0]
     assert "accepted: a design with one" in lines[0] and "--model" not in lines[0]
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (["all", "--only", "nonsense"], "--only nonsense: no such scene; accepted: ur"),
+        (["joint", "--only", ","], "--only '','': no such scene; accepted: ur5e"),
+        (["joint", "--only", ""], "--only '': no such scene; accepted: ur5e"),
+        (["fe", "--only", "bench"], "--only: not of bench fe; accepted: bench joint"),
+        (["--only", "bench"], "--only: not of bench fe; accepted: bench joint or all"),
+        (["joint", "--design", "x"], "--design: not of bench joint; accepted: bench f"),
+        (["scaling", "--recompute"], "--recompute: not of bench scaling; accepted: b"),
+        (["fe", "--recompute"], "no folder for it; accepted: with --out DIR"),
+        (["all", "--recompute"], "no folder for it; accepted: with --out DIR"),
+    ],
+)
+def test_bench_refuses_before_it_works(given, message, monkeypatch, capsys):
+    """Options that are wrong, or of another part: one line, and no part has begun."""
+
+    def begun(*_):
+        raise AssertionError("a part has begun")
+
+    monkeypatch.setattr(bench, "_run_part", begun)
+    assert main(["bench", *given]) == 2
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 1 and message in lines[0]
+
+
+def test_bench_scaling(monkeypatch, capsys, tmp_path):
+    """Rows and fits; then as a table with the exponents."""
+    sweeps = [sweep for sweep in scaling.SWEEPS if sweep.name in ("joints", "batch")]
+    small = [replace(sweep, sizes=(1, 8, 16)) for sweep in sweeps]
+    monkeypatch.setitem(scaling.run_scaling.__kwdefaults__, "sweeps", small)
+    assert main(["bench", "scaling", "--json", "--out", str(tmp_path)]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert [row["size"] for row in result["rows"]] == [1, 8, 16, 1, 8, 16]
+    keys = {"bench", "model", "setting", "error", "unit", "wall_s", "reference"}
+    assert all(keys | {"outcome"} <= set(row) for row in result["rows"])
+    assert {fit["sweep"] for fit in result["fits"]} == {"joints", "batch"}
+    assert len(list(tmp_path.iterdir())) == 3
+    assert "size^" in bench_scaling.report(result)

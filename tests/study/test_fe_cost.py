@@ -3,65 +3,145 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
+from importlib import import_module
 
 import numpy as np
 import pytest
 
+from swgjoint.cli import bench_fe
 from swgjoint.errors import ComputationError, DesignError
 from swgjoint.gear.cup import cup_torsional_stiffness
 from swgjoint.gear.design import Design
-from swgjoint.study import fe_cost
-from swgjoint.study.fe_cost import Found, Setting, run_fe_cost
+from swgjoint.json_text import json_text
+from swgjoint.study import fe_cost, fe_cost_solve
+from swgjoint.study.fe_cost import run_fe_cost
+from swgjoint.study.fe_cost_rows import cheapest
+from swgjoint.study.fe_cost_setting import (
+    POSITIONS,
+    RIM,
+    Found,
+    Setting,
+    rim_shape,
+)
+from swgjoint.study.fe_cost_solve import Task, solved, solved_in
+from swgjoint.study.fe_cost_stored import FILE, LONG, WITNESS, stored_of, to_store
 
 CUP = Design.load("reference-3d")
+PHI = np.pi * np.arange(RIM) / RIM
 
 
-def found(part):
+def found(part, cost=1.0):
     """A setting that is off by a part."""
     return Found(
         stiffness=1e5 * (1.0 + part),
         kinematic_error=1e-6 * (1.0 + part) * np.array([1.0, 0.0, -1.0, 0.0]),
         tensile=3e8 * (1.0 - part),
-        wall_s=1.0 / (0.1 + part),
+        rim_shape=1e-3 * np.cos(2.0 * PHI) * (1.0 + part),
+        wall_s=3.0 * cost,
+        cpu_s=cost,
+        peak_MB=100.0,
+        nodes=10,
     )
 
 
-def test_rows_compare_with_the_last_setting(monkeypatch, tmp_path):
-    """Errors in percent of the reference, of the pattern in arcsec; one may fail."""
-    settings = [Setting(model="3d", refinement=n) for n in (0.5, 0.7, 1.0)]
-    parts = {0.5: 0.1, 1.0: 0.0}
+@pytest.fixture
+def solve(monkeypatch):
+    """Set what every setting says, by its key."""
 
-    def solved(design, setting):
-        if setting.refinement not in parts:
-            raise ComputationError("no equilibrium")
-        return found(parts[setting.refinement])
+    def given(table):
+        def all_of(design, settings, **keys):
+            return {setting.key: table[setting.key] for setting in settings}
 
-    monkeypatch.setattr(fe_cost, "_solved", solved)
-    result = run_fe_cost(design=CUP, settings=settings, folder=tmp_path / "out")
-    assert [row["outcome"] for row in result["rows"]] == [
-        *["converged"] * 3,
-        "no equilibrium",
-        *["converged"] * 3,
+        monkeypatch.setattr(fe_cost, "_solve_all", all_of)
+        monkeypatch.setattr(fe_cost, "stored_of", lambda design: {})
+
+    return given
+
+
+def test_rows_compare_with_three_references(solve, tmp_path):
+    """The best, the finest of the kind, the next level up; one may fail."""
+    settings = [
+        Setting(model="2d", refinement=1),
+        Setting(model="2d", refinement=2),
+        Setting(model="3d", refinement=0.7),
+        Setting(model="3d", refinement=0.5),
+        Setting(model="3d", refinement=1.0),
     ]
-    coarse, fine = result["rows"][:3], result["rows"][4:]
-    assert [row["error"] for row in fine] == [0.0, 0.0, 0.0]
-    assert coarse[0]["error"] == pytest.approx(10.0)
-    assert coarse[1]["error"] == pytest.approx(0.2 * 180 * 3600 / np.pi * 1e-6)
-    assert coarse[2]["error"] == pytest.approx(-10.0)
-    table, picture = result["files"]
-    with open(table, encoding="utf-8") as file:
-        assert len(json.load(file)["rows"]) == 7
+    parts = (0.2, 0.15, None, 0.1, 0.0)
+    table = {
+        s.key: "no equilibrium" if part is None else found(part, k + 1.0)
+        for k, (s, part) in enumerate(zip(settings, parts, strict=True))
+    }
+    solve(table)
+    result = run_fe_cost(design=CUP, settings=settings, folder=tmp_path / "out")
+    rows = {(r["model"], r["setting"], r["quantity"]): r for r in result["rows"]}
+    assert len(result["rows"]) == 4 * 4 + 1
+
+    def row(model, mesh, quantity="torsional_stiffness_Nm_rad"):
+        return rows[model, f"refinement {mesh}", quantity]
+
+    assert row("3d", 0.7)["outcome"] == "no equilibrium"
+    assert row("3d", 0.7)["error"] is None and not row("3d", 0.7)["pareto"]
+    assert row("3d", 1)["error"] == 0.0 and row("3d", 1)["error_next_level"] is None
+    coarse = row("2d", 1)
+    assert coarse["reference"] == "3d, refinement 1"
+    assert coarse["error"] == pytest.approx(20.0)
+    assert coarse["reference_of_kind"] == "2d, refinement 2"
+    assert coarse["error_of_kind"] == pytest.approx(100.0 * (1.2 / 1.15 - 1.0))
+    assert coarse["reference_next_level"] == "3d, refinement 1"
+    assert row("3d", 0.5, "tensile_MPa")["error"] == pytest.approx(-10.0)
+    assert row("3d", 0.5, "rim_shape_mm")["error"] == pytest.approx(10.0)
+    pattern = row("2d", 1, "kinematic_error_pp_arcsec")
+    assert pattern["error"] == pytest.approx(0.2 * 2e-6 * 180 * 3600 / np.pi)
+    assert pattern["error_percent"] == pytest.approx(20.0)
+    *files, picture = result["files"]
+    with open(files[0], encoding="utf-8") as file:
+        kept = json.load(file)
+    assert kept["rows"] == result["rows"]
+    assert {"commit", "versions", "machine"} <= set(kept["provenance"])
+    with open(files[1], encoding="utf-8") as file:
+        assert len(file.readlines()) == 1 + len(result["rows"])
     with open(picture, "rb") as file:
         assert file.read(4) == b"\x89PNG"
 
 
-def test_a_reference_that_fails_is_an_error(monkeypatch):
+def test_the_front_has_what_nothing_cheaper_beats(solve):
+    """A dearer setting with a larger or the same error is not on it."""
+    settings = [Setting(model="3d", refinement=n) for n in (0.5, 0.6, 0.7, 0.8, 1.0)]
+    parts = ((0.1, 1), (0.1 - 1e-9, 1.5), (0.2, 2), (0.05, 3), (0.0, 4))
+    table = zip(settings, parts, strict=True)
+    solve({s.key: found(*values) for s, values in table})
+    rows = run_fe_cost(design=CUP, settings=settings)["rows"]
+    front = [row["pareto"] for row in rows if row["quantity"] == "tensile_MPa"]
+    assert front == [True, False, False, True, True]
+
+
+def test_a_bound_that_is_met_by_chance_does_not_count(solve):
+    """The finer mesh of the same kind must meet it, too."""
+    settings = [Setting(model="3d", refinement=n) for n in (0.5, 0.7, 0.8, 1.0)]
+    table = zip(settings, ((0.02, 1), (0.08, 2), (0.03, 3), (0.0, 4)), strict=True)
+    solve({s.key: found(*values) for s, values in table})
+    picks = cheapest(run_fe_cost(design=CUP, settings=settings)["rows"])
+    stiffness = [p["setting"] for p in picks if p["quantity"].startswith("torsional")]
+    assert stiffness == [None, "refinement 0.8", "refinement 0.5"]
+
+
+def test_the_plane_alone_goes_by_its_own_finest_mesh(solve):
+    """Far from the model in space, near to the finest plane mesh."""
+    settings = [Setting(model="2d", refinement=n) for n in (1, 2, 4)]
+    settings.append(Setting(model="3d", refinement=1.0))
+    table = zip(settings, ((0.33, 1), (0.31, 2), (0.3, 3), (0.0, 4)), strict=True)
+    solve({s.key: found(*values) for s, values in table})
+    result = run_fe_cost(design=CUP, settings=settings)
+    assert all(one["setting"] is None for one in result["cheapest"])
+    plane = [one["setting"] for one in result["cheapest_in_the_plane"]][:3]
+    assert plane == ["refinement 2", "refinement 1", "refinement 1"]
+
+
+def test_a_reference_that_fails_is_an_error(solve):
     """Without it there is nothing to compare with."""
-
-    def failed(design, setting):
-        raise ComputationError("diverged")
-
-    monkeypatch.setattr(fe_cost, "_solved", failed)
+    solve({"3d, refinement 1": "diverged"})
     with pytest.raises(ComputationError, match="the reference, refinement 1: diverged"):
         run_fe_cost(design=CUP, settings=[Setting(model="3d", refinement=1.0)])
 
@@ -72,12 +152,168 @@ def test_a_design_without_cup_is_refused():
         run_fe_cost(design=Design.load("reference-2d"))
 
 
-@pytest.mark.fe
-def test_plane_model_has_the_cup_in_series(monkeypatch):
+def test_stored_settings_are_of_their_design_and_tell_drift(tmp_path, monkeypatch):
+    """Written and read again; of another design nothing; a moved witness is told."""
+    table = {key: found(0.0) for key in (*LONG, WITNESS)}
+    path = tmp_path / FILE
+    path.write_text(json_text(to_store(CUP, table)), encoding="utf-8")
+    kept = stored_of(CUP, path)
+    assert set(kept["settings"]) == set(table)
+    again = kept["settings"][WITNESS]
+    assert np.array_equal(again.kinematic_error, table[WITNESS].kinematic_error)
+    assert stored_of(CUP.with_changes({"flexspline.rim_mm": 1.1}), path) == {}
+
+    linear = Setting(model="3d", refinement=1, nonlinear=False)
+    settings = [linear, *(Setting(model="3d", refinement=n) for n in (0.5, 1.4))]
+    del kept["settings"][linear.key]
+
+    def now(design, wanted, **keys):
+        assert [setting.key for setting in wanted] == [WITNESS]
+        return {WITNESS: replace(found(0.0), stiffness=1.01e5)}
+
+    monkeypatch.setattr(fe_cost, "_solve_all", now)
+    monkeypatch.setattr(fe_cost, "stored_of", lambda design: kept)
+    result = run_fe_cost(design=CUP, settings=settings)
+    assert result["rows"][0]["outcome"].startswith("left out")
+    assert not result["rows"][0]["stored"] and result["rows"][-1]["stored"]
+    told = result["stored"]
+    assert told["drift"] == pytest.approx(0.01) and not told["of_this_code"]
+
+
+def test_what_is_long_and_not_stored_is_left_out(solve):
+    """Of a design without a file an hour is not spent unasked; the rows say so."""
+    long = [
+        Setting(model="3d", refinement=1, nonlinear=False),
+        Setting(model="3d", refinement=1.4),
+    ]
+    short = [Setting(model="3d", refinement=n) for n in (0.5, 1.0)]
+    assert [setting.key for setting in long] == list(LONG)
+    # of the long ones nothing is known: to solve one would be a KeyError
+    solve({s.key: found(part) for s, part in zip(short, (0.1, 0.0), strict=True)})
+    result = run_fe_cost(design=CUP, settings=[long[0], *short, long[1]])
+    assert result["left_out"] == list(LONG)
+    rows = {(r["setting"], r["quantity"]): r for r in result["rows"]}
+    stiffness = "torsional_stiffness_Nm_rad"
+    for setting in long:
+        assert "--recompute" in rows[setting.name, stiffness]["outcome"]
+    row = rows["refinement 0.5", stiffness]
+    assert row["reference"] == "3d, refinement 1"
+    assert row["error"] == pytest.approx(10.0)
+    assert f"{row['reference']}" in bench_fe.report(result).splitlines()[0]
+
+
+def test_the_only_mesh_of_a_kind_is_not_its_own_reference(solve):
+    """No error of its kind instead of none."""
+    settings = [
+        Setting(model="3d", refinement=0.5, nonlinear=False),
+        *(Setting(model="3d", refinement=n) for n in (0.5, 1.0)),
+    ]
+    table = zip(settings, (0.4, 0.1, 0.0), strict=True)
+    solve({s.key: found(part) for s, part in table})
+    rows = run_fe_cost(design=CUP, settings=settings)["rows"]
+    linear = [row for row in rows if row["kind"] == "3d linear"]
+    keys = ("error_of_kind", "reference_of_kind", "error_of_kind_percent")
+    assert len(linear) == 4
+    assert all(row[key] is None for row in linear for key in keys)
+    assert {row["reference_of_kind"] for row in rows[4:]} == {"3d, refinement 1"}
+
+
+FATED = """
+import os
+import signal
+
+
+def fated(task):
+    if task.setting.refinement == 3.0:
+        os.kill(os.getpid(), signal.SIGKILL)
+    if task.setting.refinement == 2.0:
+        raise MemoryError
+    return task
+"""
+"""Instead of a solution what may befall a process; a file that processes can import."""
+
+
+def test_a_process_that_dies_is_a_row(tmp_path, monkeypatch):
+    """Killed or out of memory: why stands in its place, the others go on."""
+    (tmp_path / "fates.py").write_text(FATED)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(fe_cost, "solved_in", import_module("fates").fated)
+    settings = [Setting(model="2d", refinement=n) for n in (1.0, 2.0, 3.0)]
+    got = fe_cost._solve_all(
+        CUP, settings, jobs=2, stage="settings", progress=lambda *_: None
+    )
+    assert got["2d, refinement 1"].setting == settings[0]
+    assert got["2d, refinement 2"] == "out of memory"
+    assert "killed" in got["2d, refinement 3"]
+
+
+def test_the_kinematic_error_says_at_how_many_positions(solve):
+    """In JSON and table: four of a pitch, which see its first harmonic alone."""
+    setting = Setting(model="3d", refinement=1.0)
+    solve({setting.key: found(0.0)})
+    result = run_fe_cost(design=CUP, settings=[setting])
+    assert result["kinematic_error_positions"] == POSITIONS == 4
+    text = bench_fe.report(result)
+    assert "kinematic error at 4 positions of a pitch, first harmonic" in text
+    assert text.count("first harmonic") == 1
+
+
+def test_the_bundled_file_is_of_the_default_design():
+    """The default run needs no reference of its own, and can check the file."""
+    kept = stored_of(Design.load("reference-3d-modified"))
+    reference = fe_cost.SETTINGS[-1].key
+    assert {reference, WITNESS} <= set(kept["settings"])
+    assert kept["positions"] == POSITIONS
+    assert kept["provenance"]["commit"] and "--recompute" in kept["command"]
+    keys = {setting.key for setting in fe_cost.SETTINGS}
+    assert set(kept["settings"]) <= keys
+    # solids: stiffer than the cup alone never, and no stress below that of the lobe
+    best = kept["settings"][reference]
+    assert best.stiffness < cup_torsional_stiffness(CUP)
+    assert best.tensile > 2e8 and best.rim_shape.shape == (RIM,)
+
+
+def test_rim_shape_folds_half_turns():
+    """A two-lobe shape, its major axis at the wave generator's angle."""
+    angle = np.linspace(0.0, 2.0 * np.pi, 2000, endpoint=False)
+    radius = 0.05 + 1e-3 * np.cos(2.0 * (angle - 0.3))
+    points = radius[:, None] * np.stack([-np.sin(angle), np.cos(angle)], axis=-1)
+    shape = rim_shape(points, 0.05, 0.3)
+    assert np.abs(shape - 1e-3 * np.cos(2.0 * PHI)).max() < 1e-8
+
+
+PLANE = Setting(model="2d", refinement=0.5)
+
+
+@pytest.fixture(scope="module")
+def half():
+    """The coarsest plane model, of half the teeth."""
+    return solved_in(Task(design=CUP, setting=PLANE))
+
+
+def test_half_and_all_teeth_agree(half):
+    """The same drive; and the process tells its memory and time."""
+    whole = solved(CUP, replace(PLANE, full=True))
+    assert whole.stiffness == pytest.approx(half.stiffness, rel=1e-7)
+    assert np.abs(whole.rim_shape - half.rim_shape).max() < 1e-10
+    assert np.abs(whole.kinematic_error - half.kinematic_error).max() < 1e-11
+    assert half.peak_MB > 50.0 and 0.0 < half.cpu_s
+
+
+def test_plane_model_has_the_cup_in_series(half, monkeypatch):
     """Stiffness at rated torque behind that of the cup."""
-    settings = [Setting(model="2d", refinement=0.5)]
-    both = run_fe_cost(design=CUP, settings=settings)["rows"][0]["value"]
-    monkeypatch.setattr(fe_cost, "cup_torsional_stiffness", lambda design: np.inf)
-    ring = run_fe_cost(design=CUP, settings=settings)["rows"][0]["value"]
+    monkeypatch.setattr(fe_cost_solve, "cup_torsional_stiffness", lambda design: np.inf)
+    ring = solved(CUP, PLANE).stiffness
     cup = cup_torsional_stiffness(CUP)
-    assert 1.0 / both == pytest.approx(1.0 / ring + 1.0 / cup, rel=1e-6)
+    assert 1.0 / half.stiffness == pytest.approx(1.0 / ring + 1.0 / cup, rel=1e-6)
+
+
+def test_closed_form_and_rings_tell_the_lobe():
+    """Rings on a stiff bearing keep the deflection at the lobes and the cup behind."""
+    closed = solved(CUP, Setting(model="ring", refinement=0))
+    assert closed.rim_shape[0] == pytest.approx(1e-3)
+    assert closed.stiffness == cup_torsional_stiffness(CUP)
+    rings = solved(CUP, Setting(model="ring", refinement=0.5))
+    assert rings.stiffness < closed.stiffness
+    assert rings.rim_shape[0] == pytest.approx(1e-3, rel=0.02)
+    assert rings.tensile == pytest.approx(closed.tensile, rel=0.3)

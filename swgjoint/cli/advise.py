@@ -1,0 +1,84 @@
+"""``swgjoint advise``: level, integrator and step for a wanted error."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from swgjoint.cli.text import table
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """Scene, error, changes."""
+    parser.add_argument(
+        "scene", metavar="SCENE", help="scene or arm, a file or a bundled name"
+    )
+    parser.add_argument(
+        "--error",
+        required=True,
+        metavar="VALUE",
+        help="of the link angle, rms of the worst joint (0.1arcmin, 5arcsec, 2e-5rad),"
+        " or of the tool, rms (0.05mm)",
+    )
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="KEY=VALUE",
+        help="change a value of the scene; may be repeated",
+    )
+
+
+def run(args: argparse.Namespace) -> dict[str, Any]:
+    """Find the setting.
+
+    Returns:
+        See :func:`swgjoint.study.advise.advise`.
+    """
+    from swgjoint.study.advise import advise
+    from swgjoint.study.advise_bound import parse_bound
+
+    bound = parse_bound(args.error)
+    from swgjoint.sim.arm_scene import is_arm, scene_of_arm
+    from swgjoint.sim.scene import Scene
+
+    scene = (
+        scene_of_arm(args.scene, overrides=args.set)
+        if is_arm(args.scene)
+        else Scene.load_file(args.scene, args.set)
+    )
+    return advise(scene, bound, progress=args.progress)
+
+
+def report(result: dict[str, Any]) -> str:
+    """The advice, then what was tried."""
+    parts = result["sub_steps"]
+    cut = "" if parts == 1 else f" in {parts} sub-steps"
+    error = f"{result['expected_error']:.3g} {result['unit']}"
+    reference = result["reference"]
+    rows = [
+        (
+            row["level"],
+            row["integrator"],
+            f"{1e3 * row['step_s']:g}",
+            row["outcome"],
+            row["cost"],
+            row["link_angle_arcmin"],
+            row["tool_position_mm"],
+        )
+        for row in result["rows"]
+    ]
+    header = ("level", "integrator", "step ms", "outcome", "cost", "arcmin", "tool mm")
+    return "\n".join(
+        [
+            f"{result['scene']} within {result['bound']}: level {result['level']},"
+            f" {result['integrator']} at {1e3 * result['step_s']:g} ms{cut}",
+            f"error {error} rms, cost {result['cost']:.3g} times the rigid arm at 1 ms",
+            "",
+            table(rows, header=header),
+            "",
+            f"against level full, step {1e3 * reference['step_s']:g} ms and less,"
+            f" settled to {reference['error']:.2g} {result['unit']}",
+            f"{result['wall_s']:.0f} s",
+        ]
+    )

@@ -1,0 +1,74 @@
+"""References of ``swgjoint bench fe`` that take long, in a file."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from swgjoint.gear.design import Design
+from swgjoint.models_path import models_path
+from swgjoint.study.fe_cost_setting import POSITIONS, Found
+from swgjoint.study.provenance import provenance
+
+LONG = ("3d, refinement 1, linear", "3d, refinement 1.4")
+"""Settings of up to an hour: they come from the file where it has them, else they are
+left out; only ``recompute`` solves them."""
+WITNESS = "3d, refinement 0.5"
+"""In the file, too, and always solved: its figures must not have moved."""
+DRIFT = 1e-3
+"""Change of the witness beyond which the file is of another code [-]."""
+FILE = "bench-fe-reference.json"
+
+
+def stored_of(design: Design, path: Path | None = None) -> dict[str, Any]:
+    """Stored settings of a design, empty if the file is of another one."""
+    path = path or models_path() / "studies" / FILE
+    if not path.is_file():
+        return {}
+    kept: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    of_this = (kept["design_hash"], kept["positions"])
+    if of_this != (design.content_hash(), POSITIONS):
+        return {}
+    return kept | {"settings": {k: _read(v) for k, v in kept["settings"].items()}}
+
+
+def _read(values: dict[str, Any]) -> Found:
+    arrays = {
+        key: None if values[key] is None else np.array(values[key], float)
+        for key in ("kinematic_error", "rim_shape")
+    }
+    return Found(**(values | arrays))
+
+
+def to_store(design: Design, found: dict[str, Found | str]) -> dict[str, Any]:
+    """What the file holds of a design's settings."""
+    kept = {key: found.get(key) for key in (*LONG, WITNESS)}
+    return {
+        "what": "stored settings of swgjoint bench fe",
+        "command": "swgjoint bench fe --recompute --out DIR",
+        "design": design.drive.name,
+        "design_hash": design.content_hash(),
+        "positions": POSITIONS,
+        "provenance": provenance(),
+        "settings": {k: v for k, v in kept.items() if isinstance(v, Found)},
+    }
+
+
+def told(kept: dict[str, Any], found: dict[str, Found | str]) -> dict[str, Any]:
+    """Provenance of the file and how far its witness is from that of today."""
+    was, now = kept["settings"].get(WITNESS), found.get(WITNESS)
+    drift = None
+    if isinstance(was, Found) and isinstance(now, Found):
+        pairs = [(was.stiffness, now.stiffness), (was.tensile, now.tensile)]
+        drift = max(abs(b / a - 1.0) for a, b in pairs if a and b)
+    return {
+        "settings": [key for key in LONG if key in kept["settings"]],
+        "command": kept["command"],
+        "provenance": kept["provenance"],
+        "witness": WITNESS,
+        "drift": drift,
+        "of_this_code": drift is not None and drift < DRIFT,
+    }

@@ -1,0 +1,171 @@
+r"""Modes of an arm as its steps have them, and the damping that the steps add.
+
+Motors give the torque that holds the start of the scene and no more: their loops would
+damp the modes, too. The step of the engine about that start is linearised in positions,
+velocities, actuator states and what the plugin remembers. Eigenvalues :math:`\lambda`
+of that matrix are :math:`e^{sh}`, with
+
+.. math:: f = |s|/2\pi, \qquad \zeta = -\operatorname{Re} s/|s|.
+"""
+
+from __future__ import annotations
+
+import copy
+from dataclasses import dataclass, replace
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.joint.drive import ACCELERATIONS
+from swgjoint.sim.actuators import control_inputs
+from swgjoint.sim.assembly import Assembly
+from swgjoint.sim.equilibrium import set_start
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+EXACT_STEP = 1e-5
+"""Of RK4, which gives what the model has of itself [s]."""
+LOWEST, HIGHEST = 5.0, 60.0
+"""Modes that are looked at [Hz]."""
+LIGHT = 0.3
+"""Damping ratio below which a mode is one of the drives and not of a loop."""
+ALIKE = 0.7
+"""Product of two shapes of unit length from which on they are the same mode."""
+_STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
+_CHANGE = {"q": 1e-6, "v": 1e-4, "act": 1e-6, "plugin": 1e-1}
+
+
+def released(whole: Assembly) -> Assembly:
+    """The same with the motors' torque at the start in place of their loops.
+
+    Loops with an integral or a torque-speed line stay.
+    """
+    model = copy.copy(whole.model)
+    data = mujoco.MjData(model)
+    set_start(whole, data)
+    data.ctrl[:] = control_inputs(whole)[0]
+    mujoco.mj_forward(model, data)
+    affine = model.actuator_biastype == mujoco.mjtBias.mjBIAS_AFFINE
+    model.actuator_biasprm[affine, :3] = 0.0
+    model.actuator_biasprm[affine, 0] = (data.actuator_force - data.ctrl)[affine]
+    return replace(whole, model=model)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Modes:
+    """Oscillating modes, those with a positive frequency."""
+
+    s: Complex
+    """[1/s]. Shape (n,)."""
+    shape: Complex
+    """Positions at the output, of unit length. Shape (nq, n)."""
+
+    def where(self, chosen: NDArray[Any]) -> Modes:
+        """Some of them, by mask or index."""
+        return Modes(s=self.s[chosen], shape=self.shape[:, chosen])
+
+
+def modes(whole: Assembly) -> Modes:
+    """All oscillating modes; none where a step gives no numbers."""
+    matrix, nq = step_matrix(whole), whole.model.nq
+    if not np.isfinite(matrix).all():
+        return Modes(s=np.zeros(0, complex), shape=np.zeros((nq, 0), complex))
+    value, vector = np.linalg.eig(matrix)
+    kept = np.abs(value) > 1e-12
+    value, shape = value[kept].astype(complex), vector[:nq, kept].astype(complex)
+    flexible = whole.motor_position >= 0
+    shape[whole.motor_position[flexible]] /= whole.ratio[flexible, None]
+    shape /= np.maximum(np.linalg.norm(shape, axis=0), 1e-300)
+    s = np.log(value) / float(whole.model.opt.timestep)
+    return Modes(s=s, shape=shape).where(s.imag > 0.0)
+
+
+def step_matrix(whole: Assembly) -> Array:
+    """The linearised step about the start, by central differences. Shape (n, n)."""
+    model = whole.model
+    data = mujoco.MjData(model)
+    set_start(whole, data)
+    if model.nu:
+        data.ctrl[:] = control_inputs(whole)[0]
+    begin = np.empty(mujoco.mj_stateSize(model, _STATE))
+    mujoco.mj_getState(model, data, begin, _STATE)
+    entries, sizes = _entries(whole)
+    warm = data.qacc_warmstart.copy()
+
+    def after(k: int, change: float) -> Array:
+        state = begin.copy()
+        state[entries[k]] += change
+        mujoco.mj_setState(model, data, state, _STATE)
+        data.qacc_warmstart[:] = warm
+        mujoco.mj_step(model, data)
+        mujoco.mj_getState(model, data, state, _STATE)
+        return np.asarray(state[entries])
+
+    columns = [
+        (after(k, size) - after(k, -size)) / (2.0 * size)
+        for k, size in enumerate(sizes)
+    ]
+    return np.column_stack(columns)
+
+
+def _entries(whole: Assembly) -> tuple[NDArray[np.intp], Array]:
+    """Entries of the engine's state that take part, and how far each is moved.
+
+    Time does not, nor where hysteresis and bristles are relaxed: they stick.
+    """
+    model = whole.model
+    flexible = whole.motor_position[whole.motor_position >= 0]
+    turn = np.full(model.nq, _CHANGE["q"])
+    rate = np.full(model.nv, _CHANGE["v"])
+    turn[flexible] *= 100.0  # a rotor turns so many times as far as its link
+    rate[whole.motor_velocity[whole.motor_velocity >= 0]] *= 100.0
+    first = 1 + model.nq + model.nv + model.na
+    remembered = [
+        first + int(model.plugin_stateadr[k]) + n
+        for k in range(model.nplugin)
+        for n in range(ACCELERATIONS)
+    ]
+    entries = [*range(1, first), *remembered]
+    sizes = [
+        *turn,
+        *rate,
+        *[_CHANGE["act"]] * int(model.na),
+        *[_CHANGE["plugin"]] * len(remembered),
+    ]
+    return np.array(entries, dtype=np.intp), np.array(sizes)
+
+
+def own_modes(whole: Assembly) -> Modes:
+    """Modes up to :data:`HIGHEST` without what steps add, by RK4, lowest first."""
+    exact = replace(whole, model=copy.copy(whole.model))
+    exact.model.opt.integrator = mujoco.mjtIntegrator.mjINT_RK4
+    exact.model.opt.timestep = EXACT_STEP
+    found = modes(exact)
+    low, high = 2.0 * np.pi * LOWEST, 2.0 * np.pi * HIGHEST
+    size = np.abs(found.s)
+    light = -found.s.real / size < LIGHT
+    found = found.where((size >= low) & (size <= high) & light)
+    return found.where(np.argsort(np.abs(found.s)))
+
+
+def numerical_damping(whole: Assembly) -> list[tuple[float, float, float]]:
+    """Frequency [Hz], own damping ratio and what the steps add, by mode, lowest first.
+
+    A mode at the scene's step is the one of the nearest shape. Where steps leave a mode
+    no oscillation, they add what is missing to a damping ratio of one.
+    """
+    free = released(whole)
+    stepped = modes(free)
+    own = own_modes(free)
+    alike = np.abs(own.shape.conj().T @ stepped.shape)
+    rows = []
+    for k, s in enumerate(own.s):
+        ratio, stepped_ratio = float(-s.real / abs(s)), 1.0
+        if alike[k].max(initial=0.0) > ALIKE:
+            near = stepped.s[np.argmax(alike[k])]
+            stepped_ratio = float(-near.real / abs(near))
+        rows.append((float(abs(s) / (2.0 * np.pi)), ratio, stepped_ratio - ratio))
+    return rows

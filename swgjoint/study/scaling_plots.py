@@ -1,0 +1,46 @@
+"""The picture of ``swgjoint bench scaling``."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+
+def scaling_picture(result: Mapping[str, Any], labels: Mapping[str, str]) -> bytes:
+    """PNG: time over size, one panel a sweep, with the fitted power.
+
+    Args:
+        result: Rows and fits.
+        labels: Of the axes by sweep, in the order of the panels.
+    """
+    from matplotlib.figure import Figure
+
+    columns = min(4, len(labels))
+    lines = -(-len(labels) // columns)
+    figure = Figure(figsize=(3.6 * columns, 3.3 * lines), layout="constrained")
+    panels = figure.subplots(lines, columns, squeeze=False).ravel()
+    fits = {fit["sweep"]: fit for fit in result["fits"]}
+    for ax, (sweep, label) in zip(panels, labels.items(), strict=False):
+        rows = [r for r in result["rows"] if r["sweep"] == sweep and r["seconds"]]
+        ax.loglog([r["size"] for r in rows], [r["seconds"] for r in rows], "o-", ms=4)
+        if (fit := fits.get(sweep)) is not None:
+            x = np.array([r["size"] for r in rows if r["size"] >= fit["from_size"]])
+            y = fit["coefficient"] * x ** fit["exponent"]
+            ax.loglog(x, y, "k--", lw=1.0, label=f"power {fit['exponent']:.2f}")
+            ax.legend(fontsize="small")
+        ax.set(xlabel=label, ylabel="seconds of one core")
+        if rows:
+            ax.set_title(f"{sweep}: one {rows[0]['per']}", fontsize=9)
+            sizes = [row["size"] for row in rows]
+            ax.set_xticks(sizes, [f"{size:.3g}" for size in sizes], fontsize=7)
+        ax.xaxis.minorticks_off()
+        ax.tick_params(axis="y", which="both", labelsize=7)
+        ax.grid(alpha=0.3)
+    for ax in panels[len(labels) :]:
+        ax.set_visible(False)
+    out = io.BytesIO()
+    figure.savefig(out, format="png", dpi=90)
+    return out.getvalue()

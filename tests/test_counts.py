@@ -1,0 +1,173 @@
+"""Work that does not depend on the machine: iterations, factorisations, memory.
+
+A count that grows is a slower program, on any machine and under any load. Where another
+BLAS may let a contact touch one iteration later, a band says so; it is narrower than a
+fifth of the count.
+"""
+
+from __future__ import annotations
+
+import tracemalloc
+
+import numpy as np
+import pytest
+
+from swgjoint.fe import complementarity, equilibrium
+from swgjoint.fe.continuation import Continuation
+from swgjoint.fe.drive2d import ring_model
+from swgjoint.fe.solid import equilibrium as solid_equilibrium
+from swgjoint.fe.solid.continuation import SolidContinuation
+from swgjoint.fe.solid.drive3d import solid_ring
+from swgjoint.gear.design import Design
+
+PITCH = 2.0 * np.pi / 122
+BAND = 0.1
+"""Of a count, for another order of contacts at round-off."""
+
+
+# as counted where they were written; a change that lowers one lowers it here
+PLANE_ITERATIONS = 23
+PLANE_ACTIVE_SETS = 42
+PLANE_PEAK_MB = 4.86
+RANDOM_ACTIVE_SETS = 179
+SOLID_FACTORISATIONS = 35
+SOLID_ACTIVE_SETS = 102
+
+
+class Counter:
+    """Calls of functions and classes that it stands in for."""
+
+    def __init__(self, monkeypatch):
+        self.calls = {}
+        self._patch = monkeypatch
+
+    def watch(self, module, name):
+        """Count the calls of a name in a module."""
+        original = getattr(module, name)
+        self.calls[name] = 0
+
+        def counted(*args, **keys):
+            self.calls[name] += 1
+            return original(*args, **keys)
+
+        self._patch.setattr(module, name, counted)
+
+    def taken(self):
+        """Counts since the last time."""
+        found = dict(self.calls)
+        self.calls = dict.fromkeys(self.calls, 0)
+        return found
+
+
+@pytest.fixture
+def counter(monkeypatch):
+    return Counter(monkeypatch)
+
+
+def near(count, recorded, band=BAND):
+    """Within the band; a fifth more is not."""
+    return abs(count - recorded) <= max(1.0, band * recorded) < 0.2 * recorded
+
+
+def test_a_fifth_more_is_found():
+    """No band is so wide that the counts below could grow by a fifth unseen."""
+    for recorded in (
+        *(PLANE_ITERATIONS, PLANE_ACTIVE_SETS, RANDOM_ACTIVE_SETS),
+        *(SOLID_FACTORISATIONS, SOLID_ACTIVE_SETS),
+    ):
+        assert near(recorded, recorded)
+        assert not near(1.2 * recorded, recorded) and not near(0.8 * recorded, recorded)
+
+
+def path(follow, torque, angle):
+    """Iterations of deflection, engagement, loading and one position, and the last."""
+    states = [follow.deflected()]
+    states.append(follow.meshed(states[-1]))
+    states.append(follow.to_torque(states[-1], torque))
+    states.append(follow.to_angle(states[-1], angle))
+    assert all(state.outcome.ok for state in states)
+    return [len(state.history) for state in states], states[-1]
+
+
+@pytest.fixture(scope="module")
+def plane():
+    """Half of the reference drive on a coarse mesh."""
+    design = Design.load("reference-2d").with_changes({"mesh.refinement": 0.5})
+    model = ring_model(design, half=True)
+    return Continuation(model=model, ratio=design.ratio, layout=design.drive.layout)
+
+
+def test_plane_iterations_and_factorisations(plane, counter):
+    """One factorisation and one complementarity problem an iteration; no try fails."""
+    counter.watch(equilibrium, "CyclicFactor")
+    counter.watch(equilibrium, "solve_mixed")
+    iterations, _ = path(plane, 20.0, 0.25 * PITCH)
+    made = counter.taken()
+    assert near(sum(iterations), PLANE_ITERATIONS)
+    assert made == {"CyclicFactor": sum(iterations), "solve_mixed": sum(iterations)}
+
+
+def test_plane_complementarity_solves(plane, counter):
+    """Systems of active sets that tooth contact needs, over all iterations."""
+    counter.watch(complementarity, "_solve_active")
+    counter.watch(complementarity, "_least_squares")
+    path(plane, 20.0, 0.25 * PITCH)
+    made = counter.taken()
+    assert near(made["_solve_active"], PLANE_ACTIVE_SETS)
+    assert made["_least_squares"] == 0
+
+
+def test_plane_memory_of_a_position(plane):
+    """Largest memory that one more position takes beyond what was there."""
+    _, state = path(plane, 20.0, 0.25 * PITCH)
+    tracemalloc.start()
+    try:
+        plane.to_angle(state, 0.5 * PITCH)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak / 1e6 == pytest.approx(PLANE_PEAK_MB, rel=BAND)
+
+
+def test_complementarity_of_random_problems(counter):
+    """Systems over fifty problems; the active set rarely cycles."""
+    counter.watch(complementarity, "_solve_active")
+    counter.watch(complementarity, "_least_squares")
+    for seed in range(50):
+        rng = np.random.default_rng(seed)
+        root = rng.normal(size=(12, 15))
+        offset = rng.normal(size=12)
+        complementarity.solve_mixed(root @ root.T, offset, 12, 0, np.zeros(12, bool))
+    made = counter.taken()
+    assert near(made["_solve_active"], RANDOM_ACTIVE_SETS)
+    assert made["_least_squares"] == 0
+
+
+@pytest.fixture(scope="module")
+def small_solid():
+    """Half of a small gear in space, crowned and sloped, on a coarse mesh."""
+    design = Design.load("reference-3d-modified").with_changes(
+        {
+            "drive.teeth_flexspline": 40,
+            "drive.teeth_circular_spline": 42,
+            "cup.length_mm": 14.0,
+            "cup.bore_radius_mm": 7.0,
+            "mesh.refinement": 0.5,
+        }
+    )
+    return SolidContinuation(ring=solid_ring(design, half=True), ratio=design.ratio)
+
+
+@pytest.mark.fe
+def test_solid_iterations_and_factorisations(small_solid, counter):
+    """One factorisation and one complementarity problem an iteration."""
+    counter.watch(solid_equilibrium, "RingFactor")
+    counter.watch(solid_equilibrium, "solve_mixed")
+    counter.watch(complementarity, "_solve_active")
+    iterations, _ = path(small_solid, 5.0, 0.25 * 2.0 * np.pi / 42)
+    made = counter.taken()
+    assert near(made["RingFactor"], SOLID_FACTORISATIONS)
+    assert near(made["_solve_active"], SOLID_ACTIVE_SETS)
+    # the deflection has no tooth contact, the search knows no other system
+    assert made["RingFactor"] - made["solve_mixed"] == iterations[0]
+    assert made["RingFactor"] >= sum(iterations)
