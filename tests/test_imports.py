@@ -104,7 +104,7 @@ def test_heavy_parts_are_imported_when_used():
     The environments are the one part that is made of such a package.
     """
     heavy = {"rerun", "matplotlib", "pyvista", "pinocchio", "casadi", "jinja2", "dask"}
-    heavy |= {"gymnasium", "cma", "optuna"}
+    heavy |= {"gymnasium", "cma", "optuna", "joblib", "distributed"}
     found = [
         f"{path.relative_to(PACKAGE)} imports {name}"
         for path in modules()

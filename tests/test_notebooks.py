@@ -20,6 +20,8 @@ STORIES = {
     "control",
     "identification",
     "reinforcement-learning",
+    "sweeps",
+    "hot-paths",
 }
 MOST_S = 180.0
 """Time of one core that a notebook may take."""

@@ -42,7 +42,7 @@ def test_shown_commands_parse(shown):
     parser = Parser(prog=name, allow_abbrev=False)
     import_module(f"swgjoint.cli.{name}").configure(parser)
     args = parser.parse_args(arguments)
-    if hasattr(args, "design"):
+    if getattr(args, "design", None) is not None:
         assert args.design in bundled_names("drives", ".toml")
     if hasattr(args, "scene"):
         arms = bundled_names("arms", ".xml") if name == "run" else []

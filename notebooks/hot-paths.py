@@ -1,0 +1,225 @@
+# ---
+# jupyter:
+#   jupytext:
+#     text_representation:
+#       extension: .py
+#       format_name: percent
+#   kernelspec:
+#     display_name: Python 3
+#     language: python
+#     name: python3
+# ---
+
+# %% [markdown]
+# # What takes the time
+#
+# Three programs make up most of what a user waits for: the equilibria behind a map in
+# the plane, a simulation of meshing in space, and the steps of an arm. Each is profiled
+# here on the machine that runs this page, and set beside the same program of an older
+# commit, measured in turns (`tests/benchmarks/profile_cost.py`). There are two such
+# pairs, of the run in space one, on two cores that other programs shared: one ratio may
+# be a third above the other, and what lies near one or on both sides of it is no
+# difference.
+
+# %%
+import cProfile
+import json
+import pstats
+import time
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import mujoco
+import numpy as np
+
+import swgjoint
+from swgjoint.fe.build_map import build_map
+from swgjoint.fe.solid.continuation import SolidContinuation
+from swgjoint.fe.solid.drive3d import solid_ring
+from swgjoint.fe.solid.stress import SolidMaxima
+from swgjoint.study.scaling_joint import chain_model
+
+here = Path(__file__).parent if "__file__" in globals() else Path.cwd()
+stored = json.loads((here / "hot-paths.json").read_text(encoding="utf-8"))
+for task, one in stored["tasks"].items():
+    print(f"{task}: commit {one['after']['commit']} against {one['before']}")
+
+
+# %%
+def profiled(work):
+    """CPU time by function, with what it calls."""
+    profile = cProfile.Profile(time.process_time)
+    profile.runcall(work)
+    return {key: row[3] for key, row in pstats.Stats(profile).stats.items()}
+
+
+def seconds(times, file, *functions):
+    """Of functions that do not call one another; of those of one name the outermost."""
+    found = dict.fromkeys(functions, 0.0)
+    for (path, _, name), value in times.items():
+        if path.endswith(file) and name in found:
+            found[name] = max(found[name], value)
+    return sum(found.values())
+
+
+def bars(axis, parts, title):
+    """Shares of a whole, the largest first."""
+    names = sorted(parts, key=parts.get)
+    whole = sum(parts.values())
+    axis.barh(names, [100.0 * parts[name] / whole for name in names])
+    axis.set(xlabel="share of CPU time [%]", title=f"{title}: {whole:.1f} s")
+
+
+def pairs(axis, task, title):
+    """Time over that before by part; a dot is one pair of runs in turns."""
+    parts = stored["tasks"][task]["parts"]
+    for k, one in enumerate(parts.values()):
+        axis.plot([k] * len(one["ratios"]), 1.0 / np.array(one["ratios"]), "ko")
+    axis.margins(x=0.2)
+    axis.axhline(1.0, color="0.6", label="before")
+    axis.set_xticks(range(len(parts)), parts, fontsize=8, rotation=15)
+    axis.set(ylabel="time over that before", title=title, ylim=(0.0, 1.4))
+    axis.legend(fontsize=8, loc="lower right")
+
+
+def commit(task):
+    """That of the time before."""
+    return stored["tasks"][task]["before"].split()[0]
+
+
+def page(task, shares, title):
+    """Both plots beside each other."""
+    _, axes = plt.subplots(1, 2, figsize=(11, 3.8), layout="constrained")
+    bars(axes[0], shares, f"{title} now")
+    pairs(axes[1], task, f"{title}, against {commit(task)}")
+
+
+# %% [markdown]
+# ## A map in the plane
+#
+# `reference-2d`, four positions over a pitch at all torques, no cache. A Newton step
+# condenses the ring of sectors, which is a banded factorisation, and looks where teeth
+# touch, which is not linear algebra at all: feet of points on curved flanks.
+
+# %%
+design = swgjoint.Design.load("reference-2d")
+times = profiled(lambda: build_map(design, model="2d", angles=4, cache=False))
+whole = seconds(times, "build_map.py", "build_map")
+search = seconds(times, "tooth_contact.py", "search")
+plane = {
+    "search of tooth contact": search,
+    "ring: factorise, solve": seconds(times, "fe/cyclic.py", "__init__", "solve"),
+    "frames and tangents": seconds(times, "fe/linearise.py", "linearise"),
+    "contact forces": seconds(times, "complementarity.py", "solve_mixed"),
+    "sector: mesh, condense": seconds(times, "superelement.py", "condense"),
+}
+plane["rest"] = whole - sum(plane.values())
+page("2d map", plane, "map in the plane")
+for name, value in plane.items():
+    print(f"{name:26} {value:6.2f} s, {100 * value / whole:4.1f} %")
+
+# %% [markdown]
+# The search of contact is the largest part. It evaluated the flank piece by piece, arc
+# after line after arc; as a table of numbers all points go at once. In the two pairs
+# the map took 6 and 46 % longer before: it is faster, and two pairs do not tell by how
+# much.
+
+# %%
+assert plane["search of tooth contact"] > plane["contact forces"]
+
+# %% [markdown]
+# ## A run in space
+#
+# A small gear, half of it, on the coarsest mesh: condensation, deflection, load, one
+# position, stresses.
+
+# %%
+small = swgjoint.Design.load("reference-3d-modified").with_changes(
+    {
+        "drive.teeth_flexspline": 40,
+        "drive.teeth_circular_spline": 42,
+        "cup.length_mm": 14.0,
+        "cup.bore_radius_mm": 7.0,
+        "mesh.refinement": 0.5,
+    }
+)
+
+
+def run_in_space():
+    """As many positions as a profile needs."""
+    ring = solid_ring(small, half=True)
+    follow = SolidContinuation(ring=ring, ratio=small.ratio)
+    state = follow.to_torque(follow.meshed(follow.deflected()), 5.0)
+    state = follow.to_angle(state, 0.5 * np.pi / 42)
+    assert state.outcome.ok
+    return SolidMaxima.at(ring, state)
+
+
+times = profiled(run_in_space)
+whole = max(times.values())
+space = {
+    "condensation of sectors": seconds(times, "drive3d.py", "solid_ring"),
+    "ring: factorise, solve": seconds(times, "solid/equilibrium.py", "_solve_ring"),
+    "frames and tangents": seconds(times, "solid/linearise.py", "linearise"),
+    "search of tooth contact": seconds(times, "solid/teeth.py", "find"),
+    "stresses": seconds(times, "solid/stress.py", "at"),
+}
+space["rest"] = whole - sum(space.values())
+page("3d run", space, "run in space")
+for name, value in space.items():
+    print(f"{name:26} {value:6.2f} s, {100 * value / whole:4.1f} %")
+
+# %% [markdown]
+# Condensing the sectors is done once and the same for any number of positions; after
+# that the dense blocks of the ring, the tangents of its segments and the search of
+# contact share the time. No part is more than 14 % faster or slower than it was in the
+# one pair there is, which is no difference.
+
+# %% [markdown]
+# ## A step of a joint
+#
+# Six joints in a chain, one step of 1 ms. Levels differ by what they add to the rigid
+# chain: a rotor and a tendon (`native`), and the map (`full`), here with ever more
+# harmonics.
+
+
+# %%
+def step_time(**keys):
+    """Least CPU time of a step over some runs [µs]."""
+    model, data = chain_model(6, **keys)
+    mujoco.mj_step(model, data, 200)
+    least = []
+    for _ in range(7):
+        begin = time.process_time()
+        mujoco.mj_step(model, data, 1000)
+        least.append((time.process_time() - begin) * 1e3)
+    return min(least)
+
+
+rigid, native = step_time(level="rigid"), step_time(level="native")
+harmonics = (1, 4, 16, 64)
+full = {n: step_time(harmonics=n) for n in harmonics}
+figure, axes = plt.subplots(1, 2, figsize=(11, 3.8), layout="constrained")
+names = ["rigid", "native", *(f"full, {n}" for n in harmonics)]
+axes[0].bar(names, [rigid, native, *full.values()], color="0.7")
+axes[0].bar(names, [rigid] * len(names), label="the arm itself")
+axes[0].set(ylabel="CPU time of a step [µs]", title="six joints, harmonics of the map")
+axes[0].tick_params(axis="x", labelsize=8)
+axes[0].legend(fontsize=8)
+pairs(axes[1], "joint step", f"step, 16 harmonics, against {commit('joint step')}")
+print(f"rigid {rigid:.1f} µs, native {native:.1f} µs")
+print(f"rotors and tendons {native - rigid:.1f} µs, map {full[16] - native:.1f} µs")
+print({n: f"{value:.1f} µs" for n, value in full.items()})
+
+# %% [markdown]
+# The map is the dearest part of `full`: more than the rotors, which double the degrees
+# of freedom, and their tendons, which `native` has as well. A few harmonics cost little
+# more than one, because four are summed side by side. How
+# all this grows with teeth, mesh and joints is what `swgjoint bench scaling` measures;
+# counts of iterations, factorisations and map evaluations are asserted in
+# `tests/test_counts.py`.
+
+# %%
+last = {k: v["after_s"] for k, v in stored["tasks"]["joint step"]["parts"].items()}
+assert last["full"] - last["native"] > last["native"] - last["rigid"]
+assert rigid < native < full[64]

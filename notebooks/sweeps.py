@@ -1,0 +1,273 @@
+# ---
+# jupyter:
+#   jupytext:
+#     text_representation:
+#       extension: .py
+#       format_name: percent
+#   kernelspec:
+#     display_name: Python 3
+#     language: python
+#     name: python3
+# ---
+
+# %% [markdown]
+# # Many designs: a sweep, the same on a cluster, and what a million would take
+#
+# A designer does not ask about one drive but about the space of drives. A sweep file
+# says which designs, and what is computed of each; this one takes eight ellipses and
+# rims in the plane. The bundled ones are in `models/sweeps`:
+#
+#     swgjoint sweep wave-generator --out wave-generator
+#     swgjoint sweep tolerances --out tolerances
+
+# %%
+import importlib.util
+import os
+import subprocess
+import sys
+import tempfile
+import time
+import tracemalloc
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+from swgjoint.study.pool import LocalPool
+from swgjoint.study.sweep import TASK_S, run_sweep
+from swgjoint.study.sweep_executor import dask_pool
+from swgjoint.study.sweep_file import SweepFile
+from swgjoint.study.sweep_points import points_of
+from swgjoint.study.sweep_results import place_of
+from swgjoint.study.sweep_scale import schedule, tasks_of
+
+SWEEP = """
+description = "Rim and minor axis"
+design = "reference-2d"
+
+[meshing]
+figures = ["von_mises_MPa", "transmission_error_pp_arcsec"]
+positions = 3
+
+[plan]
+kind = "grid"
+
+[[plan.parameters]]
+keys = ["wave_generator.minor_axis_coefficient"]
+values = [0.985, 0.99, 0.995, 1.0]
+
+[[plan.parameters]]
+keys = ["flexspline.rim_mm"]
+values = [1.0, 1.2]
+"""
+folder = Path(tempfile.mkdtemp(prefix="sweeps-"))
+(folder / "rim.toml").write_text(SWEEP)
+file = SweepFile.load(folder / "rim.toml")
+
+# %% [markdown]
+# ## On this machine
+#
+# The same as `swgjoint sweep rim.toml --jobs 2 --out results`. Every result is kept as
+# soon as it is there, under the hash of the design, what is asked and the code.
+
+# %%
+place = place_of(folder / "results")
+found = run_sweep(file, executor=LocalPool(2), place=place)
+print(f"{'C':>6} {'rim [mm]':>9} {'von Mises [MPa]':>16} {'error pp [arcsec]':>18}")
+for row in found.rows():
+    C, rim, _, stress, error, *_ = row.values()
+    print(f"{C:6.3f} {rim:9.1f} {stress:16.1f} {error:18.3f}")
+assert all(record.ok for record in found.records)
+
+# %%
+figure, axes = plt.subplots(1, 2, figsize=(10, 3.8), layout="constrained")
+rows = found.rows()
+for rim in (1.0, 1.2):
+    part = [row for row in rows if row["flexspline.rim_mm"] == rim]
+    C = [row["wave_generator.minor_axis_coefficient"] for row in part]
+    for axis, name in zip(axes, file.figures, strict=True):
+        axis.plot(C, [row[name] for row in part], "o-", label=f"rim {rim:g} mm")
+axes[0].set(xlabel="minor axis coefficient C", ylabel="von Mises [MPa]")
+axes[1].set(xlabel="minor axis coefficient C", ylabel="transmission error, pp [arcsec]")
+for axis in axes:
+    axis.grid(alpha=0.3)
+    axis.legend()
+
+# %% [markdown]
+# ## Stopped and gone on with
+#
+# A sweep that was stopped, by whatever means, goes on where it was; what is finished is
+# not computed again. Here nothing is left to do.
+
+# %%
+again = run_sweep(file, executor=LocalPool(2), place=place)
+print(f"computed {again.computed}, reused {again.reused}, {again.wall_s:.2f} s")
+assert (again.computed, again.reused) == (0, len(found.points))
+assert again.rows() == found.rows()
+
+# %% [markdown]
+# ## On a cluster
+#
+# The same file on the workers of a [dask](https://distributed.dask.org) scheduler, here
+# three processes of this machine (`pip install 'swgjoint[cluster]'`):
+#
+#     dask scheduler --host 127.0.0.1 --port 8786
+#     dask worker tcp://127.0.0.1:8786 --nworkers 2 --nthreads 1
+#     swgjoint sweep wave-generator --scheduler tcp://127.0.0.1:8786 --out results
+#
+# or, with a table `[cluster]` in the file, in jobs of SLURM that it submits itself:
+#
+#     [cluster]
+#     kind = "slurm"
+#     jobs = 20
+#     cores = 16
+#     memory_GB = 32.0
+#     walltime = "02:00:00"
+#
+# A worker that dies costs nothing but the design that it had in hand, which another one
+# computes again.
+
+
+# %%
+def same(one, other):
+    """Whether two sweeps have the same rows, but for the time that they took."""
+    rows = [[{**row, "work_s": None} for row in sweep.rows()] for sweep in (one, other)]
+    return rows[0] == rows[1]
+
+
+handing = None
+if importlib.util.find_spec("distributed") is None:
+    print("dask is not installed: this part is left out")
+else:
+    told = folder / "scheduler.json"
+    options = ["--scheduler-file", str(told), "--host", "127.0.0.1", "--no-dashboard"]
+
+    def started(kind, *more):
+        """A process of the cluster, as the commands above start it."""
+        command = [sys.executable, "-m", f"distributed.cli.dask_{kind}"]
+        return subprocess.Popen(
+            [*command, *options, *more],
+            cwd=folder,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+
+    processes = [started("scheduler", "--port", "0")]
+    while not told.exists():
+        time.sleep(0.1)
+    processes.append(started("worker", "--nworkers", "2", "--nthreads", "1"))
+    try:
+        with dask_pool(str(told)) as pool:
+            pool.client.wait_for_workers(2)
+            on_cluster = run_sweep(file, executor=pool)
+            begin = time.perf_counter()
+            count = sum(1 for _ in pool.run(os.getenv, ["HOME"] * 200))
+            handing = (time.perf_counter() - begin) / count
+    finally:
+        for process in reversed(processes):
+            process.terminate()
+            process.wait()
+    print(f"identical: {same(on_cluster, found)}; {1e3 * handing:.1f} ms to hand out")
+    assert same(on_cluster, found)
+
+# %% [markdown]
+# ## What a million designs would take
+#
+# Six measured numbers: the work of a design, what it costs to check it and to name its
+# result, what it costs to hand out a task (of two hundred empty ones, two workers, so
+# rather too much), how long a process takes to start and to import the finite elements,
+# how much a result weighs, and how much memory a design takes in the process that hands
+# out, where it is kept as its values and key: the worker makes it.
+
+# %%
+work = np.array([record.work_s for record in found.records])
+if handing is None:
+    begin = time.perf_counter()
+    count = sum(1 for _ in LocalPool(2).run(os.getenv, ["HOME"] * 200))
+    handing = (time.perf_counter() - begin) / count
+begin = time.perf_counter()
+subprocess.run([sys.executable, "-c", "import swgjoint.fe.meshing"], check=True)
+start = time.perf_counter() - begin
+(folder / "many.toml").write_text(
+    SWEEP.replace('"grid"', '"latin_hypercube"\ndesigns = 300')
+)
+many = SweepFile.load(folder / "many.toml")
+begin = time.perf_counter()
+points = points_of(many)
+planning = (time.perf_counter() - begin) / len(points)
+del points
+tracemalloc.start()
+points = points_of(many)
+held = tracemalloc.get_traced_memory()[0] / len(points)
+tracemalloc.stop()
+sizes = [path.stat().st_size for path in (folder / "results").rglob("*.json")]
+low, high = work.min(), work.max()
+print(f"work of a design    {work.mean():8.2f} s ({low:.2f} to {high:.2f})")
+print(f"planning of a design{1e3 * planning:8.2f} ms")
+print(f"handing out a task  {1e3 * handing:8.2f} ms")
+print(f"start of a process  {start:8.2f} s")
+print(f"a result            {np.mean(sizes):8.0f} bytes")
+print(f"memory of a design  {held:8.0f} bytes")
+assert held < 2000.0
+
+# %% [markdown]
+# List scheduling says the rest: whichever worker is free takes the next task, and one
+# process hands them out. First the check that it tells the sweep above: two workers,
+# the measured work in the order of the plan.
+
+# %%
+told_wall = schedule(work, found.workers, start=start, handing=handing).wall
+print(f"simulated {told_wall:.1f} s, measured {found.wall_s:.1f} s")
+# the work alone is a lower bound; the rest depends on what else the machine does
+assert schedule(work, found.workers).wall < found.wall_s
+
+# %% [markdown]
+# Then a million designs whose work is drawn from the measured ones. The sweep puts
+# cheap designs together until a task lasts two seconds; handing them out one by one
+# would keep fewer workers busy.
+
+# %%
+million = 1_000_000
+drawn = np.random.default_rng(0).choice(work, size=million)
+start += million * planning  # before the first task is handed out
+tasks = tasks_of(drawn, TASK_S)
+tenths = tasks_of(drawn / 10.0, TASK_S)  # ten times cheaper: coarser, or a ring model
+print(f"core hours: {drawn.sum() / 3600:.0f}, with a tenth of the work a tenth")
+print(f"memory of the process that hands out: {million * held / 1e9:.1f} GB of designs")
+print(f"results: {million * np.mean(sizes) / 1e9:.1f} GB in a million files")
+print(f"{'':8} {'':>9} {'':>6}    a tenth of the work")
+header = ("workers", "wall [h]", "busy", "wall [h]", "busy", "one by one")
+print("{:>8} {:>9} {:>6} {:>10} {:>8} {}".format(*header))
+for workers in (16, 64, 256, 1024, 4096):
+    one = schedule(tasks, workers, start=start, handing=handing)
+    together = schedule(tenths, workers, start=start, handing=handing)
+    single = schedule(drawn / 10.0, workers, start=start, handing=handing)
+    print(
+        f"{workers:8} {one.wall / 3600:9.2f} {one.efficiency:6.0%}"
+        f" {together.wall / 3600:10.2f} {together.efficiency:8.0%}"
+        f" {single.efficiency:10.0%}"
+    )
+limit = np.mean(tasks) / handing
+print(f"one scheduler feeds about {limit:.0f} workers with these tasks")
+assert schedule(tasks, 16, start=start, handing=handing).efficiency > 0.9
+
+# %% [markdown]
+# What the plan says:
+#
+# - Up to some hundred workers the wall time is the core hours over the workers: take as
+#   many as the queue gives.
+# - Beyond that the process that hands out is the bound, not the drives. A task of more
+#   designs (`swgjoint.study.sweep.TASK_S`) moves it in proportion; so do several sweeps
+#   of a part of the plan each, into the same folder.
+# - That process needs about 1 GB for a million designs with their records, and some
+#   5 GB while it writes the tables at the end: run it where it may have them.
+# - A million small files are slow to list on a parallel file system, though few
+#   gigabytes: give `--out` an object store (`s3://bucket/sweep`), or sweep in parts.
+#   The table `sweep.parquet` is one file.
+# - A worker that dies loses one task, two seconds; the process that hands out loses
+#   what is in hand, and goes on with the same command.
+
+# %%
+for path in sorted(folder.rglob("*"), reverse=True):
+    path.rmdir() if path.is_dir() else path.unlink()
+folder.rmdir()
