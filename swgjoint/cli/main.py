@@ -36,6 +36,7 @@ COMMANDS = {
     "lot": "accuracy and ripple of many drives with errors, yield against a spec",
     "tune": "gains of a controller in an environment, against a textbook rule",
     "sweep": "many designs, on this machine or a cluster, gone on with after a stop",
+    "optimise": "designs that are good in several figures at once",
     "study": "our values beside those of a source",
     "bench": "error against run time",
     "advise": "the cheapest level, integrator and step within a wanted error",

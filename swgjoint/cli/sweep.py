@@ -5,15 +5,14 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from swgjoint.cli.text import table
-from swgjoint.errors import InputError
+from swgjoint.cli.places import configure_places, places_of
+from swgjoint.cli.text import short_headers, table
 from swgjoint.json_text import json_text
 
 if TYPE_CHECKING:
     from swgjoint.study.sweep import SweepResult
     from swgjoint.study.sweep_results import Place
 
-MAX_JOBS = 1024
 SHOWN = 40
 """Rows of the table in the terminal."""
 
@@ -26,24 +25,10 @@ def configure(parser: argparse.ArgumentParser) -> None:
         " hand; another sweep may run beside them."
     )
     parser.add_argument("file", metavar="FILE", help="sweep file or bundled name")
-    parser.add_argument(
-        "--jobs",
-        type=int,
-        metavar="N",
-        help="processes of this machine; default: its cores, or the [cluster] of FILE",
-    )
-    parser.add_argument(
-        "--scheduler",
-        metavar="ADDRESS",
-        help="compute on the workers of a dask scheduler, such as tcp://host:8786, or"
-        " of a scheduler file (.json)",
-    )
-    parser.add_argument(
-        "--out",
-        metavar="DIR",
-        help="keep results there, with sweep.csv, sweep.parquet, sweep.png and"
-        " sweep.json: a folder or any fsspec address (s3://...); default: results in"
-        " the user's cache, no files",
+    configure_places(
+        parser,
+        out="keep results there, with sweep.csv, sweep.parquet, sweep.png and"
+        " sweep.json",
     )
     parser.add_argument(
         "--retry-failed",
@@ -62,23 +47,12 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         ``work_s``, ``wall_s``, ``efficiency`` (work over wall time and workers),
         ``parameters``, ``figures``, ``validity`` (by task), ``rows``, ``files``.
     """
-    if args.jobs is not None and not 1 <= args.jobs <= MAX_JOBS:
-        raise InputError(f"--jobs {args.jobs}; accepted: 1 to {MAX_JOBS}")
-    if args.jobs is not None and args.scheduler is not None:
-        raise InputError("--jobs and --scheduler; accepted: one of them")
-    from swgjoint.maps.cache import cache_folder
     from swgjoint.study.sweep import run_sweep
     from swgjoint.study.sweep_file import SweepFile
-    from swgjoint.study.sweep_results import place_of
 
+    place, executor_of = places_of(args)
     file = SweepFile.load(args.file)
-    kept = args.out
-    if kept is None and (cache := cache_folder()) is not None:
-        kept = str(cache / "sweeps")
-    place = None if kept is None else place_of(kept)
-    from swgjoint.study.sweep_executor import chosen_executor
-
-    with chosen_executor(file, jobs=args.jobs, scheduler=args.scheduler) as executor:
+    with executor_of(file) as executor:
         found = run_sweep(
             file,
             executor=executor,
@@ -133,7 +107,7 @@ def report(result: dict[str, Any]) -> str:
                 )
                 for k, row in enumerate(shown)
             ],
-            header=("", *_headers(names), "outcome", "work [s]"),
+            header=("", *short_headers(names), "outcome", "work [s]"),
         )
     ]
     if len(shown) < len(rows):
@@ -158,15 +132,6 @@ def report(result: dict[str, Any]) -> str:
         + busy
     )
     return "\n".join([*lines, *(f"wrote {name}" for name in result["files"])])
-
-
-def _headers(names: list[str]) -> list[str]:
-    """The last part of every key, the whole where that is not enough."""
-    lasts = [name.rpartition(".")[2] for name in names]
-    return [
-        last if lasts.count(last) == 1 else name
-        for name, last in zip(names, lasts, strict=True)
-    ]
 
 
 def _short(value: Any) -> Any:

@@ -19,6 +19,15 @@ def table(rows: Sequence[Sequence[object]], *, header: Sequence[str] = ()) -> st
     )
 
 
+def short_headers(names: Sequence[str]) -> list[str]:
+    """The last part of every key, the whole where that is not enough."""
+    lasts = [name.rpartition(".")[2] for name in names]
+    return [
+        last if lasts.count(last) == 1 else name
+        for name, last in zip(names, lasts, strict=True)
+    ]
+
+
 def _cell(value: object) -> str:
     if value is None:
         return "-"

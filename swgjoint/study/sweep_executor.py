@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 
 from swgjoint.errors import ComputationError, InputError, MissingExtraError
 from swgjoint.study.pool import Executor, LocalPool, Lost
-from swgjoint.study.sweep_file import SlurmCluster, SweepFile
+from swgjoint.study.sweep_tasks import AskedFile, SlurmCluster
 
 Task = TypeVar("Task")
 Found = TypeVar("Found")
@@ -185,7 +185,7 @@ def _missing() -> MissingExtraError:
 
 @contextmanager
 def chosen_executor(
-    file: SweepFile, *, jobs: int | None = None, scheduler: str | None = None
+    file: AskedFile, *, jobs: int | None = None, scheduler: str | None = None
 ) -> Iterator[Executor]:
     """The scheduler, the number of jobs on this machine, or what the file says.
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from math import pi
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,10 +16,12 @@ from swgjoint.maps.cache import code_version
 from swgjoint.maps.spec_sheet import LOOP_KEYS, RATING_KEYS, TURN_KEYS
 
 if TYPE_CHECKING:
+    from swgjoint.fe.meshing_run import MeshingRun
+    from swgjoint.fe.solid.meshing import SolidRun
     from swgjoint.maps.drive_map import DriveMap
     from swgjoint.sim.scene import Scene
-    from swgjoint.study.sweep_file import MeshingTask, RunTask, SpecTask
     from swgjoint.study.sweep_points import Point
+    from swgjoint.study.sweep_tasks import MeshingTask, RunTask, SizeTask, SpecTask
 
 _STRESSES = ("von_mises_MPa", "tensile_MPa", "compressive_MPa")
 _RING = "circular_spline_"
@@ -30,14 +33,19 @@ MESHING_FIGURES = (
     KINEMATIC,
     "pairs_in_contact",
     "wave_generator_torque_pp_Nm",
+    "torsional_stiffness_Nm_rad",
 )
 """Stresses: mean over the positions of the largest one of the flexspline or of the
 circular spline. Errors: peak to peak of the output over the positions, under the torque
-and, in a second simulation, unloaded. Pairs: mean over the positions."""
+and, in a second simulation, unloaded. Pairs: mean over the positions. Stiffness: one
+over the mean compliance under the torque, that of the cup and the mounting included."""
 SPEC_FIGURES = tuple(
     key for key in (*RATING_KEYS, *LOOP_KEYS, *TURN_KEYS) if key != "orders"
 )
 """Keys of the specification sheet that the map of a design tells."""
+SIZE_FIGURES = ("outer_diameter_mm", "length_mm", "volume_cm3")
+"""Of the circular spline with its rim; of the face or, where there is one, of the cup;
+of the cylinder around both."""
 RUN_FIGURES = (
     "ripple_rms_percent",
     "ripple_pp_percent",
@@ -65,6 +73,7 @@ class Asked:
     scene: Scene | None
     meshing: MeshingTask | None
     spec: SpecTask | None
+    size: SizeTask | None
     run: RunTask | None
 
 
@@ -153,6 +162,9 @@ def _figures(asked: Asked) -> tuple[dict[str, float | None], str]:
         assert asked.design is not None
         found, reasons = _spec(asked.design, asked.spec)
         figures |= found
+    if asked.size is not None:
+        assert asked.design is not None
+        figures |= _size(asked.design, asked.size)
     if asked.run is not None:
         assert asked.scene is not None
         figures |= _run(asked.scene, asked.design, asked.run)
@@ -161,13 +173,15 @@ def _figures(asked: Asked) -> tuple[dict[str, float | None], str]:
 
 def _meshing(design: Design, task: MeshingTask) -> dict[str, float | None]:
     """Means and ranges over the positions of the wave generator."""
+    from swgjoint.gear.mounting import series_compliance
     from swgjoint.maps.catalogue import ratings_of
 
     rated = ratings_of(design).rated_torque
     torque = rated if task.torque_Nm is None else task.torque_Nm
     found: dict[str, float | None] = {}
     if set(task.figures) - {KINEMATIC}:
-        result = _simulated(design, task, torque)
+        run = _simulated(design, task, torque)
+        result = run.to_json()
         steps = result["per_step"]
         for member, above in (("flexspline", ""), ("circular_spline", _RING)):
             means = result[member]["average_max_MPa"]
@@ -175,28 +189,35 @@ def _meshing(design: Design, task: MeshingTask) -> dict[str, float | None]:
         found["transmission_error_pp_arcsec"] = _range(steps["output_error_arcsec"])
         found["pairs_in_contact"] = float(np.mean(steps["pairs_in_contact"]))
         found["wave_generator_torque_pp_Nm"] = _range(steps["wave_generator_torque_Nm"])
+        series = series_compliance(design, cup=_model(design, task) == "2d")
+        compliance = float(np.mean([state.compliance for state in run.states]))
+        found["torsional_stiffness_Nm_rad"] = 1.0 / (compliance + series)
     if KINEMATIC in task.figures:
-        steps = _simulated(design, task, 0.0)["per_step"]
+        steps = _simulated(design, task, 0.0).common_series()
         found[KINEMATIC] = _range(steps["output_error_arcsec"])
     return {name: found[name] for name in task.figures}
 
 
-def _simulated(design: Design, task: MeshingTask, torque: float) -> dict[str, Any]:
+def _model(design: Design, task: MeshingTask) -> str:
+    return task.model or ("3d" if design.cup is not None else "2d")
+
+
+def _simulated(
+    design: Design, task: MeshingTask, torque: float
+) -> MeshingRun | SolidRun:
     """A simulation of meshing with every position solved."""
     from swgjoint.fe.drive2d import can_halve
     from swgjoint.fe.meshing import simulate_meshing
 
     turn = 1.0 / design.periodicity
-    run = simulate_meshing(
+    return simulate_meshing(
         design,
-        model=task.model or ("3d" if design.cup is not None else "2d"),
+        model=_model(design, task),
         torque=torque,
         steps=task.positions,
         turn=turn if task.turn_deg is None else task.turn_deg / 360.0,
         half=can_halve(design),
     )
-    result: dict[str, Any] = run.to_json()
-    return result
 
 
 def _range(values: Sequence[float]) -> float:
@@ -232,6 +253,21 @@ def _spec(
         drive, design = _map(design, task, turn=needs_turn(keys))
     sheet = measure_spec(drive, ratings=ratings_of(design), only=keys)
     return {name: sheet.figures[name] for name in task.figures}, sheet.missing
+
+
+def _size(design: Design, task: SizeTask) -> dict[str, float | None]:
+    """Of the cylinder around the drive."""
+    gear, ring = design.drive, design.circular_spline
+    teeth, cup = gear.teeth_circular_spline, design.cup
+    depth = ring.dedendum_coefficient * gear.module_mm + ring.rim_mm
+    diameter = gear.module_mm * teeth + 2.0 * depth
+    length = gear.face_width_mm if cup is None else cup.length_mm
+    found = {
+        "outer_diameter_mm": diameter,
+        "length_mm": length,
+        "volume_cm3": 0.25e-3 * pi * diameter**2 * length,
+    }
+    return {name: found[name] for name in task.figures}
 
 
 def _run(scene: Scene, design: Design | None, task: RunTask) -> dict[str, float | None]:

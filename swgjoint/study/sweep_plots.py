@@ -58,11 +58,11 @@ def sweep_picture(found: SweepResult) -> bytes:
             if labels is not None:
                 axis.set_xticks(range(len(labels)), labels, rotation=30, ha="right")
             if i == len(figures) - 1:
-                axis.set_xlabel(_label(column))
+                axis.set_xlabel(label_of(column))
             if j == 0:
-                axis.set_ylabel(_label(figure))
+                axis.set_ylabel(label_of(figure))
     if shown is not None:
-        canvas.colorbar(shown, ax=axes, label=_label(figures[0]), aspect=40)
+        canvas.colorbar(shown, ax=axes, label=label_of(figures[0]), aspect=40)
     ok = sum(record.ok for record in found.records)
     text = f"{ok} designs, {len(rows) - ok} without figures (crosses)"
     canvas.suptitle(f"{found.file.description or 'sweep'}\n{text}", fontsize=10)
@@ -84,7 +84,7 @@ def _places(values: Sequence[Any]) -> tuple[Any, list[str] | None]:
     return places, [text if len(text) <= 20 else f"{text[:17]}..." for text in labels]
 
 
-def _label(key: str) -> str:
+def label_of(key: str) -> str:
     """Last part of a key in words, with its unit; a joint after what it has."""
     *above, last = key.split(".")
     name, unit = split_unit(last)

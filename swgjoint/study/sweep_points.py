@@ -17,14 +17,14 @@ from swgjoint.gear.design import Design
 from swgjoint.maps.cache import key_of
 from swgjoint.sim.scene import Scene
 from swgjoint.study.sweep_figures import Asked
-from swgjoint.study.sweep_file import (
+from swgjoint.study.sweep_file import SweepFile
+from swgjoint.study.sweep_keys import BASE, kind_of
+from swgjoint.study.sweep_plan import (
     Grid,
     LatinHypercube,
     Parameter,
-    SweepFile,
     takes_whole_numbers,
 )
-from swgjoint.study.sweep_keys import BASE, kind_of
 
 Values = dict[str, Any]
 """Value of every parameter by its column."""
@@ -58,6 +58,7 @@ class Point:
             scene=scene,
             meshing=file.meshing,
             spec=file.spec,
+            size=file.size,
             run=file.run,
         )
 
@@ -203,6 +204,7 @@ def _parts(
             for name, task in (
                 ("meshing", file.meshing),
                 ("spec", file.spec),
+                ("size", file.size),
                 ("run", file.run),
             )
         },

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from swgjoint.study.sweep_file import SweepFile
+from swgjoint.study.sweep_tasks import AskedFile
 
 NOT_MODELLED = {
     "ring": "passage of teeth, rim of the circular spline, micro-geometry, cup but for"
@@ -17,7 +17,7 @@ NOT_MODELLED = {
 RUN = "what the level of a joint leaves out, orders too fast for the step"
 
 
-def validity_of(file: SweepFile) -> dict[str, dict[str, Any]]:
+def validity_of(file: AskedFile) -> dict[str, dict[str, Any]]:
     """One label for every task of a sweep.
 
     ``swgjoint meshing``, ``spec`` and ``run`` tell more of a single design. No error

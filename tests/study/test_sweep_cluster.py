@@ -17,7 +17,8 @@ from swgjoint.faults import parse_toml, validated
 from swgjoint.study.pool import LocalPool, Lost
 from swgjoint.study.sweep import run_sweep
 from swgjoint.study.sweep_executor import DaskPool, dask_pool, slurm_cluster
-from swgjoint.study.sweep_file import SlurmCluster, SweepFile
+from swgjoint.study.sweep_file import SweepFile
+from swgjoint.study.sweep_tasks import SlurmCluster
 
 pytest.importorskip("distributed", reason="needs swgjoint[cluster]")
 

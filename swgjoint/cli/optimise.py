@@ -1,0 +1,121 @@
+"""``swgjoint optimise``: designs that are good in several figures at once."""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING, Any
+
+from swgjoint.cli.places import configure_places, places_of
+from swgjoint.cli.text import short_headers, table
+from swgjoint.json_text import json_text
+
+if TYPE_CHECKING:
+    from swgjoint.study.optimise import Optimum
+    from swgjoint.study.sweep_results import Place
+
+
+def configure(parser: argparse.ArgumentParser) -> None:
+    """File of the search, where it is computed, where results are kept."""
+    parser.epilog = (
+        "A search that was stopped goes on with the same command: designs that were"
+        " computed are kept. Seed, population and number of designs are in FILE."
+    )
+    parser.add_argument(
+        "file", metavar="FILE", help="optimisation file or bundled name"
+    )
+    configure_places(
+        parser,
+        out="keep results there, with the designs of the front (front-01.toml, ...),"
+        " tried.csv, optimise.png and optimise.json",
+    )
+
+
+def run(args: argparse.Namespace) -> dict[str, Any]:
+    """Search, and compute some of the front again with more care.
+
+    Returns:
+        ``front`` (designs that no other one beats, by the first objective: values of
+        the parameters, figures, ``confirmed`` figures or null, ``not_worse_than``, in
+        every objective, of the designs beside), ``evaluations``, ``failed``,
+        ``generations``, ``reused``, ``computed``, ``workers``, ``work_s``, ``wall_s``,
+        ``objectives``, ``parameters``, ``figures``, ``validity``, ``start``,
+        ``beside``, ``rows`` (all that were tried), ``files``.
+    """
+    from swgjoint.study.optimise import optimise
+    from swgjoint.study.optimise_file import OptimisationFile
+
+    place, executor_of = places_of(args)
+    file = OptimisationFile.load(args.file)
+    with executor_of(file) as executor:
+        found = optimise(file, executor=executor, place=place, progress=args.progress)
+    result = {"optimisation": args.file, **found.to_json(), "files": []}
+    if args.out is not None and place is not None:
+        result["files"] = _write(place, found, result)
+    return result
+
+
+def _write(place: Place, found: Optimum, result: dict[str, Any]) -> list[str]:
+    """Designs of the front, all that were tried, the picture, the whole as JSON."""
+    from swgjoint.study.optimise_plots import optimum_picture
+    from swgjoint.study.sweep_results import csv_text
+
+    rows = [
+        {key: value for key, value in row.items() if key != "confirmed"}
+        for row in result["rows"]
+    ]
+    contents = {
+        **{
+            f"front-{k + 1:02d}.toml": design.to_toml().encode()
+            for k, design in enumerate(found.designs(result["optimisation"]))
+        },
+        "tried.csv": csv_text(rows).encode(),
+        "optimise.png": optimum_picture(found),
+    }
+    files = [place.write(name, data) for name, data in contents.items()]
+    last = "optimise.json"  # which names them all
+    files.append(place.at(last))
+    place.write(last, (json_text({**result, "files": files}) + "\n").encode())
+    return files
+
+
+def report(result: dict[str, Any]) -> str:
+    """The start and the designs beside it, the front, what was tried."""
+    names, figures = result["parameters"], result["figures"]
+    rivals = [result["start"], *result["beside"]]
+    header = ("", *short_headers(names), *short_headers(figures))
+    rows = [(r["design"], *("" for _ in names), *_best(r, figures)) for r in rivals]
+    rows += [
+        (f"front {k + 1}", *(r[n] for n in names), *_best(r, figures))
+        for k, r in enumerate(result["front"])
+    ]
+    goals = [f"{figure}: {goal}" for figure, goal in result["objectives"].items()]
+    care = any(row["confirmed"] is not None for row in rivals)
+    lines = [
+        ", ".join(goals),
+        table(rows, header=header),
+        "*: confirmed; the rest as the search has seen it" if care else "",
+    ]
+    for k, row in enumerate(result["front"]):
+        if row["not_worse_than"]:
+            told = ", ".join(row["not_worse_than"])
+            lines.append(f"front {k + 1} is in no objective worse than {told}")
+    for task, label in result["validity"].items():
+        absent = [f"{part}: {what}" for part, what in label["not_modelled"].items()]
+        told = "; ".join([f"level {label['level']}, {label['torque']}", *absent])
+        lines.append(f"validity of {task}: {told}")
+    lines.append(
+        f"{result['evaluations']} designs tried in {result['generations']} generations,"
+        f" {result['failed']} of them without figures; {result['computed']} computed,"
+        f" {result['reused']} reused, {result['wall_s']:.0f} s"
+    )
+    return "\n".join(
+        [*(x for x in lines if x), *(f"wrote {f}" for f in result["files"])]
+    )
+
+
+def _best(row: dict[str, Any], figures: list[str]) -> list[str]:
+    """Figures of a design, with a star where they are confirmed."""
+    confirmed = row["confirmed"]
+    if confirmed is not None and confirmed["outcome"] == "ok":
+        return [f"{confirmed[name]:.5g}*" for name in figures]
+    return ["" if row[name] is None else f"{row[name]:.5g}" for name in figures]
