@@ -16,7 +16,7 @@ from swgjoint.study.pool import LocalPool, Lost
 from swgjoint.study.sweep import run_sweep
 from swgjoint.study.sweep_figures import Record, compute
 from swgjoint.study.sweep_file import SweepFile
-from swgjoint.study.sweep_plots import _label, sweep_picture
+from swgjoint.study.sweep_plots import label_of, sweep_picture
 from swgjoint.study.sweep_points import points_of
 from swgjoint.study.sweep_results import csv_text, parquet_bytes, place_of
 
@@ -339,6 +339,37 @@ def test_meshing_figures_are_those_of_the_simulation():
     assert record.figures["transmission_error_pp_arcsec"] > 0.0
 
 
+@pytest.mark.parametrize("design", ["reference-2d", "stress-cup"])
+def test_stiffness_is_the_slope_of_torque_over_torsion(design):
+    """By differences of the simulated output, in the plane with the cup in series."""
+    from swgjoint.fe.meshing import simulate_meshing
+    from swgjoint.units import arcsec
+
+    text = f"""
+design = "{design}"
+[meshing]
+figures = ["torsional_stiffness_Nm_rad"]
+model = "2d"
+torque_Nm = 20.0
+positions = 1
+[plan]
+kind = "list"
+[[plan.parameters]]
+keys = ["mesh.refinement"]
+values = [0.5]
+"""
+    file = validated(SweepFile, parse_toml(text, where="x"), where="x")
+    (point,) = points_of(file)
+    told = compute(point.asked).figures["torsional_stiffness_Nm_rad"]
+
+    def output(torque):
+        run = simulate_meshing(point.asked.design, torque=torque, steps=1, half=True)
+        return run.to_json()["per_step"]["output_error_arcsec"][0] * arcsec
+
+    slope = 0.2 / (output(19.9) - output(20.1))
+    assert told == pytest.approx(slope, rel=1e-3)  # 1 % of torque, round-off of 1e-12
+
+
 def test_run_figures_are_those_of_the_scene():
     """The worst joint of a short run with a catalogue drive."""
     from swgjoint.sim.run import run_scene
@@ -383,9 +414,9 @@ def test_tables_hold_every_row(counted):
 
 def test_labels_of_axes_carry_units():
     """The unit of the key, also where the name of a joint follows it."""
-    assert _label("flexspline.rim_mm") == "rim [mm]"
-    assert _label("trajectory.speed_deg_s.joint") == "speed [deg/s], joint"
-    assert _label("wave_generator.kind") == "kind"
+    assert label_of("flexspline.rim_mm") == "rim [mm]"
+    assert label_of("trajectory.speed_deg_s.joint") == "speed [deg/s], joint"
+    assert label_of("wave_generator.kind") == "kind"
 
 
 def test_the_picture_shows_numbers_names_and_failures(counted):
