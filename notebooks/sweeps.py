@@ -11,7 +11,7 @@
 # ---
 
 # %% [markdown]
-# # Many designs: a sweep, the same on a cluster, and what a million would take
+# # Many designs: a sweep, a cluster, a search, and what a million would take
 #
 # A designer does not ask about one drive but about the space of drives. A sweep file
 # says which designs, and what is computed of each; this one takes eight ellipses and
@@ -19,9 +19,11 @@
 #
 #     swgjoint sweep wave-generator --out wave-generator
 #     swgjoint sweep tolerances --out tolerances
+#     swgjoint optimise qca-stress --out qca-stress
 
 # %%
 import importlib.util
+import io
 import os
 import subprocess
 import sys
@@ -33,6 +35,10 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
+from swgjoint import Design
+from swgjoint.study.optimise import optimise
+from swgjoint.study.optimise_file import OptimisationFile
+from swgjoint.study.optimise_plots import optimum_picture
 from swgjoint.study.pool import LocalPool
 from swgjoint.study.sweep import TASK_S, run_sweep
 from swgjoint.study.sweep_executor import dask_pool
@@ -169,6 +175,90 @@ else:
             process.wait()
     print(f"identical: {same(on_cluster, found)}; {1e3 * handing:.1f} ms to hand out")
     assert same(on_cluster, found)
+
+# %% [markdown]
+# ## A search instead of a plan
+#
+# Where the question is which design is best, a genetic search chooses the values. It is
+# a file, too: what counts, what may change, how the front is computed again. Each of
+# its generations is a sweep, so that it runs where sweeps run and goes on where it was
+# stopped. Here a small one, on a coarse mesh; `swgjoint optimise qca-stress` searches
+# on the mesh of the thesis.
+#
+#     swgjoint optimise search.toml --jobs 2 --out results
+
+# %%
+SEARCH = """
+description = "Profile and ellipse, coarse"
+design = "coarse.toml"
+beside = ["improved.toml"]
+
+[meshing]
+figures = ["von_mises_MPa", "torsional_stiffness_Nm_rad"]
+torque_Nm = 20.0
+positions = 1
+
+[[objectives]]
+figure = "von_mises_MPa"
+
+[[objectives]]
+figure = "torsional_stiffness_Nm_rad"
+goal = "maximise"
+
+[plan]
+kind = "nsga2"
+designs = 24
+population = 8
+
+[[plan.parameters]]
+keys = ["wave_generator.minor_axis_coefficient"]
+values = [0.99, 0.995, 1.0]
+
+[[plan.parameters]]
+keys = ["flexspline.profile.tip_radius_mm", "circular_spline.profile.tip_radius_mm"]
+low = 0.2
+high = 0.6
+
+[[plan.parameters]]
+keys = [
+  "flexspline.profile.dedendum_radius_mm",
+  "circular_spline.profile.dedendum_radius_mm",
+]
+low = 1.0
+high = 30.0
+
+[[plan.parameters]]
+keys = ["flexspline.profile.root_radius_mm", "circular_spline.profile.root_radius_mm"]
+low = 0.2
+high = 0.6
+
+[confirm]
+designs = 2
+positions = 3
+"""
+for name, source in (
+    ("coarse", "reference-2d"),
+    ("improved", "reference-2d-qca-improved"),
+):
+    coarse = Design.load(source).with_changes({"mesh.refinement": 0.5})
+    (folder / f"{name}.toml").write_text(coarse.to_toml())
+(folder / "search.toml").write_text(SEARCH)
+if importlib.util.find_spec("optuna") is None:
+    print("optuna is not installed (swgjoint[tune]): this part is left out")
+else:
+    search = OptimisationFile.load(folder / "search.toml")
+    optimum = optimise(search, executor=LocalPool(2), place=place)
+    told = optimum.to_json()
+    print(f"{told['evaluations']} designs in {told['wall_s']:.0f} s")
+    for row in (told["start"], *told["beside"], *told["front"]):
+        best = row["confirmed"] or row
+        name = Path(row.get("design", "front")).stem
+        values = [best[figure] for figure in told["figures"]]
+        print(f"{name:10} {values[0]:8.1f} MPa {values[1]:10.3g} N·m/rad")
+    figure, axis = plt.subplots(figsize=(15, 5), layout="constrained")
+    axis.imshow(plt.imread(io.BytesIO(optimum_picture(optimum))))
+    axis.axis("off")
+    assert told["front"][0]["von_mises_MPa"] < told["start"]["von_mises_MPa"]
 
 # %% [markdown]
 # ## What a million designs would take

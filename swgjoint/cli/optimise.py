@@ -95,6 +95,11 @@ def report(result: dict[str, Any]) -> str:
         table(rows, header=header),
         "*: confirmed; the rest as the search has seen it" if care else "",
     ]
+    lines += [
+        f"{row['design']}: {record['outcome']}: {record['reason']}"
+        for row in rivals
+        if (record := row["confirmed"] or row)["outcome"] != "ok"
+    ]
     for k, row in enumerate(result["front"]):
         if row["not_worse_than"]:
             told = ", ".join(row["not_worse_than"])

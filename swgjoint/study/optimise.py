@@ -164,6 +164,8 @@ def optimise(
         ]
 
     named = {BASE: [file.design, *file.beside]}
+    for name in file.beside:
+        Design.load(name)  # before anything is computed
     start, *beside = computed(named, partial(_as, progress, "start and others"))
     if not start.record.ok:
         raise ComputationError(

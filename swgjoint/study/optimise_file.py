@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 
 from swgjoint.faults import Fault, Section, read_toml, unit_of, validated
 from swgjoint.models_path import find
-from swgjoint.study.sweep_file import SweepFile, anchored
+from swgjoint.study.sweep_file import SweepFile, anchored, lying_in
 from swgjoint.study.sweep_keys import BASE
 from swgjoint.study.sweep_plan import List, Parameter, Search, plan_faults
 from swgjoint.study.sweep_tasks import AskedFile, MeshingTask, Text, task_faults
@@ -108,12 +108,16 @@ class OptimisationFile(AskedFile):
     def load(cls, reference: str | Path) -> OptimisationFile:
         """Read a file, given as a path or as the name of a bundled one.
 
+        Files that it names by a path lie relative to it.
+
         Raises:
             InputError: With one line per fault of the file.
         """
         path = find(reference, "optimisations", ".toml", what="optimisation")
         data = read_toml(path, what="optimisation")
-        return anchored(validated(cls, data, where=str(path)), path.parent)
+        file = anchored(validated(cls, data, where=str(path)), path.parent)
+        beside = tuple(lying_in(path.parent, name) for name in file.beside)
+        return file.model_copy(update={"beside": beside})
 
     def violations(self, figures: Mapping[str, float | None]) -> dict[str, float]:
         """By how much each limit is missed; what cannot be told misses it by all."""

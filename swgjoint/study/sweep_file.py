@@ -60,18 +60,19 @@ Planned = TypeVar("Planned", bound=_Planned)
 
 def anchored(file: Planned, folder: Path) -> Planned:
     """The file with those that it names relative to a folder."""
-
-    def anchor(value: Any) -> Any:
-        if isinstance(value, str) and os.path.isfile(folder / value):
-            return str((folder / value).resolve())
-        return value
-
     parameters = tuple(
-        p.model_copy(update={"values": tuple(map(anchor, p.values))})
+        p.model_copy(update={"values": tuple(lying_in(folder, v) for v in p.values)})
         if p.values is not None and any(map(is_path, p.keys))
         else p
         for p in file.plan.parameters
     )
     plan = file.plan.model_copy(update={"parameters": parameters})
-    bases = {"design": anchor(file.design), "scene": anchor(file.scene)}
+    bases = {key: lying_in(folder, getattr(file, key)) for key in ("design", "scene")}
     return file.model_copy(update={**bases, "plan": plan})
+
+
+def lying_in(folder: Path, value: Any) -> Any:
+    """The path of a file in the folder; whatever names none as it is."""
+    if isinstance(value, str) and os.path.isfile(folder / value):
+        return str((folder / value).resolve())
+    return value

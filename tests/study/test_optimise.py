@@ -309,6 +309,25 @@ def test_confirmed_figures_decide_where_both_have_them():
     assert not not_worse(file, one((1.0, 4.9), None), rival)
 
 
+def test_files_that_it_names_lie_relative_to_it(tmp_path, monkeypatch):
+    """The start and the designs beside; one that is not there ends it at once."""
+    monkeypatch.chdir(tmp_path)
+    there = tmp_path / "there"
+    there.mkdir()
+    for name, rim in (("one", 2.0), ("two", 2.5)):
+        made = Design.load("reference-2d").with_changes({"circular_spline.rim_mm": rim})
+        (there / f"{name}.toml").write_text(made.to_toml())
+    text = HEAD.replace("reference-2d", "one.toml") + PLAN.format(designs=4, seed=0)
+    (there / "search.toml").write_text('beside = ["two.toml"]\n' + text)
+    file = OptimisationFile.load("there/search.toml")
+    found = optimise(file, executor=LocalPool(1))
+    rivals = [c.design.circular_spline.rim_mm for c in (found.start, *found.beside)]
+    assert rivals == [2.0, 2.5]
+    gone = file.model_copy(update={"beside": ("three.toml",)})
+    with pytest.raises(InputError, match=r"'three.toml' is neither a file nor"):
+        optimise(gone, executor=LocalPool(1))
+
+
 def test_a_search_that_finds_nothing_is_one_line():
     """Limits that no design keeps; a start that has no figures."""
     file = sizes(20, more='[[limits]]\nfigure = "volume_cm3"\nmost = 1.0\n')
