@@ -63,8 +63,9 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         None where the source cannot tell, with the reason in ``missing``; ``design``,
         ``validity``, ``files``, ``wall_s``; ``radial_stiffness`` and ``fatigue`` with
         what stands behind these two figures, where they were computed; ``ratcheting``
-        with the path to the largest torque, or to where it ended; ``measured``
-        with --measured, see :meth:`swgjoint.maps.overlay.Overlay.as_dict`.
+        with the path to the largest torque, or to where it ended; ``running`` with
+        what rubs in a design that turns without load; ``measured`` with --measured,
+        see :meth:`swgjoint.maps.overlay.Overlay.as_dict`.
     """
     start = time.perf_counter()
     folder = output_folder(args.out) if args.out else None
@@ -81,6 +82,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     values, reasons, details = _solid(args, keys, ratings)
     if only:
         _ratcheting(args, keys, values, reasons, details)
+    _running(args, keys, values, reasons, details)
     sheet = measure_spec(
         drive, ratings=ratings, only=keys, known=values, unknown=reasons
     )
@@ -185,6 +187,41 @@ def _ratcheting(
         )
 
 
+def _running(
+    args: argparse.Namespace,
+    keys: tuple[str, ...],
+    values: dict[str, float],
+    reasons: dict[str, str],
+    details: dict[str, Any],
+) -> None:
+    """Add what friction of teeth and race takes of the unloaded input of a design."""
+    from swgjoint.errors import ComputationError, DesignError
+    from swgjoint.gear.design import Design
+    from swgjoint.maps.friction_bending import without_friction
+    from swgjoint.maps.spec_sheet import SLOW_KEYS
+    from swgjoint.sim.drives import find_drive
+
+    wanted = [key for key in SLOW_KEYS if key in keys]
+    source = find_drive(args.drive) if wanted else None
+    if not isinstance(source, Design):
+        return
+    from swgjoint.fe.ring_running import running_friction
+
+    mu = source.friction.tooth_coefficient
+    found, why = None, "nothing rubs with friction.tooth_coefficient = 0"
+    if mu:
+        try:
+            found = running_friction(source)
+        except (ComputationError, DesignError) as error:
+            why = "; ".join(str(error).splitlines())
+    if found is None:
+        reasons |= dict.fromkeys(wanted, f"{why}; {without_friction(source)}")
+        return
+    details["running"] = found.as_dict(mu)
+    figures = (found.running_torque(mu), found.starting_torque(mu))
+    values |= {k: v for k, v in zip(SLOW_KEYS, figures, strict=True) if k in wanted}
+
+
 def _write(
     folder: Any,
     result: dict[str, Any],
@@ -280,6 +317,13 @@ def _details(result: dict[str, Any]) -> list[str]:
             f" {path['at_largest_pitches']:.3g} of a pitch with"
             f" {path['at_largest_pairs']} teeth in contact, wave generator rigid and"
             " locked, in the plane"
+        )
+    if slow := result.get("running"):
+        lines.append(
+            "running and starting torque: slow, Coulomb friction"
+            f" {slow['coefficient']:g} of the teeth ({100.0 * slow['teeth_share']:.3g}"
+            " %) and of the rim on its race, a lower bound; left out:"
+            f" {slow['left_out']}"
         )
     if found := result.get("fatigue"):
         worst, middle = found["worst_section"], found["mid_face"]

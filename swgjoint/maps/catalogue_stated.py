@@ -32,6 +32,8 @@ LOSS_KEYS = (
 _LOSS_RATIO = 100
 """Ratio of every row of ``losses.csv``."""
 _MILLI = 1e-3
+LOSS_CONDITIONS = "+20 C, grease, RT1-H-CS of the same rated torque, second-hand"
+"""Of all figures of ``losses.csv``; running torque and efficiency at 2000 rpm."""
 
 
 def stated_losses(row: CatalogueRow) -> StatedLosses | None:

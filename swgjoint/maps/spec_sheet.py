@@ -62,6 +62,8 @@ SOLID_KEYS = ("fatigue_safety_factor", "radial_stiffness_N_mm")
 """From the finite elements of a design in space, of which a map knows nothing."""
 RATCHETING_KEY = "ratcheting_torque_Nm"
 """From the finite elements of a design in the plane."""
+SLOW_KEYS = ("no_load_running_torque_Nm", "starting_torque_Nm")
+"""From the friction of teeth and race of a design that turns slowly."""
 ABSENT_KEYS = {
     RATCHETING_KEY: "needs the finite elements of a design in the plane, a minute or"
     " more: name it in --only",
@@ -158,8 +160,8 @@ def measure_spec(
         drive: The map; None where :func:`needs_map` says so.
         ratings: Needed without a map, else those of the map.
         only: Keys of the sheet; all for none.
-        known: Values that were found elsewhere, of :data:`SOLID_KEYS` and
-            :data:`RATCHETING_KEY`.
+        known: Values that were found elsewhere, of :data:`SOLID_KEYS`,
+            :data:`RATCHETING_KEY` and :data:`SLOW_KEYS`.
         unknown: Reasons why they were not.
 
     Raises:
@@ -180,7 +182,7 @@ def measure_spec(
         "momentary_peak_Nm": float(ratings.momentary_peak),
         **(known or {}),
     }
-    missing = ABSENT_KEYS | dict.fromkeys(LOSS_KEYS, _NO_FRICTION) | dict(unknown or {})
+    missing = ABSENT_KEYS | dict.fromkeys(LOSS_KEYS, _NO_FRICTION)
     loop, turns, losses = None, {}, None
     if drive is not None:
         if set(keys) & set(LOOP_KEYS):
@@ -197,6 +199,7 @@ def measure_spec(
         own = drive.info.get("missing")
         if isinstance(own, dict):
             missing |= {k: str(own[k]) for k in missing if k in own}
+    missing |= dict(unknown or {})
     return SpecSheet(
         figures={key: values.get(key) for key in keys},
         missing={k: missing[k] for k in keys if values.get(k) is None},

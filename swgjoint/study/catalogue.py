@@ -4,7 +4,8 @@ Parts: ``stiffness`` (K1, K2, K3, hysteresis loss and lost motion by the thin ri
 with the bearing of the wave generator, and the share of each mechanism),
 ``individuals`` (gears with errors of their own) and ``accuracy`` (transmission error
 over an output turn) by the same rings, ``ratcheting`` (finite elements in the plane),
-``losses``. ``coning``, when asked for: the wave generator in space, rigid and on its
+``losses`` (no-load running and starting torque, from the friction of teeth and race).
+``coning``, when asked for: the wave generator in space, rigid and on its
 bearing, at two ratios (some twenty minutes of a core). What is run is stated in
 ``models/studies/catalogue.toml``; where no source decides, variants are run: ``ours``
 is the middle of their bracket.
@@ -28,10 +29,10 @@ from swgjoint.study.catalogue_coning import (
     coning_tasks,
 )
 from swgjoint.study.catalogue_file import CatalogueFile, variant_design
+from swgjoint.study.catalogue_losses import loss_lines, loss_rows, loss_tasks
 from swgjoint.study.catalogue_printed import catalogue_row, edges, torques_of
 from swgjoint.study.catalogue_rows import (
     accuracy_rows,
-    loss_rows,
     ratcheting_rows,
     stiffness_rows,
 )
@@ -83,7 +84,7 @@ def run_catalogue(options: StudyOptions) -> StudyResult:
     found = dict(zip((task.name for task in ordered), results, strict=True))
     rows = [row for part in parts for row in rows_of(study, part, found)]
     failed = {name: f["fault"] for name, f in found.items() if "fault" in f}
-    lines = summary(study, rows)
+    lines = summary(study, rows) + loss_lines(rows)
     if "ratcheting" in parts:
         lines += ratcheting_orders(study, found, REFERENCE)
     lines += scaled_against_computed(study, found, REFERENCE, CHECK)
@@ -116,7 +117,7 @@ def run_catalogue(options: StudyOptions) -> StudyResult:
 def tasks_of(study: CatalogueFile, part: str) -> list[Task]:
     """What a part computes."""
     if part == "losses":
-        return []
+        return loss_tasks(study)
     if part == "coning":
         return coning_tasks(study)
     flanks = {v.flank_deg: v for v in reversed(study.variants)}
@@ -194,7 +195,7 @@ def rows_of(study: CatalogueFile, part: str, found: Mapping[str, Found]) -> list
         "stiffness": lambda row: stiffness_rows(study, row, found),
         "ratcheting": lambda row: ratcheting_rows(study, row, found, REFERENCE),
         "accuracy": lambda row: accuracy_rows(study, row, found, REFERENCE),
-        "losses": loss_rows,
+        "losses": lambda row: loss_rows(study, row, found),
     }
     if part not in build:
         return []

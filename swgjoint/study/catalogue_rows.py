@@ -11,8 +11,7 @@ from swgjoint.errors import Outcome
 from swgjoint.fe.ring_friction import RubbedPath
 from swgjoint.gear.design import Design
 from swgjoint.gear.mounting import series_compliance
-from swgjoint.maps.catalogue import CatalogueRow, table
-from swgjoint.maps.friction_bending import without_friction
+from swgjoint.maps.catalogue import CatalogueRow
 from swgjoint.maps.loop import LOST_MOTION_TORQUE
 from swgjoint.study.catalogue_accuracy import accuracy_bracket
 from swgjoint.study.catalogue_file import CatalogueFile, variant_design
@@ -87,7 +86,7 @@ def stiffness_rows(
     for key in STIFFNESS:
         goal = study.goal(row.size, row.ratio, key)
         rows.append(
-            _row(
+            bracket_row(
                 row,
                 key,
                 "N·m/rad",
@@ -103,11 +102,11 @@ def stiffness_rows(
         source = bounds[f"{key.replace(' ', '_')}_arcmin"]
         why = f"{bound}; {reason}" if reason else bound
         some = values.get(key, [])
-        rows.append(_row(row, key, "arcmin", source, some, why, whole=whole))
+        rows.append(bracket_row(row, key, "arcmin", source, some, why, whole=whole))
     return rows
 
 
-def _row(
+def bracket_row(
     row: CatalogueRow,
     quantity: str,
     unit: str,
@@ -118,6 +117,7 @@ def _row(
     goal: float | None = None,
     whole: bool = True,
     above: Sequence[float] = (),
+    conditions: str | None = None,
 ) -> Row:
     """Middle of the bracket beside the catalogue.
 
@@ -133,6 +133,7 @@ def _row(
         whole: Whether every variant has a value.
         above: Lower bounds of variants without one: nothing is known of the upper end
             of the bracket then.
+        conditions: Under which the catalogue states its value.
     """
     known = [*values, *above]
     low = min(known) if known else None
@@ -164,6 +165,7 @@ def _row(
             "whole": whole and not above,
             "goal": goal,
             "met": met,
+            "conditions": conditions,
         },
     )
 
@@ -195,7 +197,7 @@ def ratcheting_rows(
     if row.size != size:
         notes.append(f"scaled from size {size}")
     return [
-        _row(
+        bracket_row(
             row,
             "ratcheting torque",
             "N·m",
@@ -229,16 +231,4 @@ def accuracy_rows(
         why += f"; scaled from size {size}"
     else:
         why = one["fault"]
-    return [_row(row, "transmission accuracy", "arcmin", source, values, why)]
-
-
-def loss_rows(row: CatalogueRow) -> list[Row]:
-    """No-load running torque: the models hold no friction at speed."""
-    for line in table("losses"):
-        if line["size"] == float(row.size) and row.ratio == 100:
-            value = line["no_load_running_mNm"]
-            assert isinstance(value, float)
-            design = Design.preset(f"size-{row.size}-{row.ratio}")
-            why = without_friction(design)
-            return [_row(row, "no-load running torque", "mN·m", value, [], why)]
-    return []
+    return [bracket_row(row, "transmission accuracy", "arcmin", source, values, why)]

@@ -169,6 +169,20 @@ def _accuracy(task: Task) -> Found:
     return {"input_angles_rad": angles.tolist(), "error_rad": error.tolist()}
 
 
+def _running(task: Task) -> Found:
+    """Input torque of slow turning without load, and what rubs takes per mu."""
+    from swgjoint.fe.ring_running import running_friction
+
+    found = running_friction(task.design)
+    return {
+        "input_angles_rad": found.input_angle.tolist(),
+        "elastic_Nm": found.elastic.tolist(),
+        "teeth_per_mu_Nm": found.teeth.tolist(),
+        "race_per_mu_Nm": found.race.tolist(),
+        "tooth_pairs": found.tooth_pairs.tolist(),
+    }
+
+
 def _coning(task: Task) -> Found:
     """Torsion in space over the torque; the kind ends with that of the bearing."""
     from swgjoint.fe.solid.torsion import solid_torsion
@@ -205,6 +219,7 @@ KINDS: dict[str, Callable[[Task], Found]] = {
     "individual": _individual,
     "ratcheting": _ratcheting,
     "accuracy": _accuracy,
+    "running": _running,
     "coning rigid": _coning,
     "coning free": _coning,
     "coning held": _coning,

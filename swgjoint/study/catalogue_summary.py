@@ -56,9 +56,14 @@ def _range(rows: Sequence[Row]) -> str:
     middle = [row.more["over_source"] for row in rows]
     ends = [row.more[f"{end}_over_source"] for row in rows for end in ("low", "high")]
     return (
-        f"model over catalogue {min(middle):.2f} to {max(middle):.2f} (brackets"
-        f" {min(ends):.2f} to {max(ends):.2f})"
+        f"model over catalogue {_part(min(middle))} to {_part(max(middle))} (brackets"
+        f" {_part(min(ends))} to {_part(max(ends))})"
     )
+
+
+def _part(value: float) -> str:
+    """Two decimals; two digits of what is far smaller."""
+    return f"{value:.2f}" if value >= 0.05 else f"{value:.2g}"
 
 
 def _rising(rows: Sequence[Row]) -> list[str]:

@@ -8,13 +8,15 @@ import numpy as np
 import pytest
 
 from swgjoint.cli.main import main
-from swgjoint.errors import Outcome
+from swgjoint.errors import DesignError, Outcome
 from swgjoint.fe import build_map as builder
-from swgjoint.fe import ratcheting
+from swgjoint.fe import ratcheting, ring_running
 from swgjoint.fe.ratcheting import RatchetingPath
+from swgjoint.fe.ring_running import RunningFriction
 from swgjoint.fe.solid import spec_figures
 from swgjoint.fe.solid.fatigue import Fatigue, Limits, SectionFatigue
 from swgjoint.fe.solid.radial_stiffness import RadialStiffness
+from swgjoint.gear.design import Design
 from swgjoint.gear.shell_theory import (
     SafetyFactor,
     ShellDimensions,
@@ -258,6 +260,71 @@ def test_a_built_map_names_what_bending_alone_takes(built, capsys):
     assert len(built) == 1
 
 
+@pytest.fixture
+def turning(monkeypatch):
+    """Friction of a design that turns slowly, at once; the designs that were asked."""
+    asked = []
+
+    def friction(design):
+        asked.append(design)
+        if not design.wave_generator.bearing:
+            raise DesignError("no bearing\nno cam")
+        return RunningFriction(
+            input_angle=np.zeros(2),
+            elastic=np.array([0.004, -0.004]),
+            teeth=np.array([0.1, 0.2]),
+            race=np.array([0.3, 0.6]),
+            tooth_pairs=np.array([2.0, 4.0]),
+        )
+
+    monkeypatch.setattr(ring_running, "running_friction", friction)
+    return asked
+
+
+def rubbing_file(tmp_path, name):
+    """A bundled design with a coefficient of friction, as a file."""
+    design = Design.preset(name).with_changes({"friction.tooth_coefficient": 0.1})
+    path = tmp_path / "rubs.toml"
+    path.write_text(design.to_toml())
+    return str(path)
+
+
+def test_slow_running_of_a_design(built, turning, capsys, tmp_path):
+    """Mean and worst torque on the input with the design's coefficient; no map."""
+    path = rubbing_file(tmp_path, "size-25-100")
+    key = "no_load_running_torque_Nm"
+    found = spec(capsys, path, "--only", key)
+    assert found[key] == pytest.approx(0.06)
+    assert "starting_torque_Nm" not in found and found["missing"] == {}
+    slow = found["running"]
+    assert slow["coefficient"] == 0.1 and slow["bound"] == "lower"
+    assert [slow["teeth_Nm"], slow["race_Nm"]] == pytest.approx([0.015, 0.045])
+    assert slow["teeth_share"] == pytest.approx(0.25)
+    both = spec(capsys, path, "--only", f"starting_torque_Nm,{key}")
+    assert both["starting_torque_Nm"] == pytest.approx(0.076)
+    assert built == []
+    assert main(["spec", path, "--only", key]) == 0
+    out = capsys.readouterr().out
+    assert "teeth (25 %)" in out and "a lower bound; left out: churning" in out
+
+
+def test_reasons_of_slow_running(built, turning, capsys, tmp_path):
+    """No coefficient, no bearing, a map without friction: null with the reason."""
+    key = "no_load_running_torque_Nm"
+    for argument, reason in (
+        ("size-25-100", "nothing rubs with friction.tooth_coefficient = 0"),
+        (rubbing_file(tmp_path, "reference-2d"), "no bearing; no cam"),
+        ("CSG-25-50", "ratio 100"),
+    ):
+        found = spec(capsys, argument, "--only", key)
+        assert found[key] is None
+        assert reason in found["missing"][key]
+        assert "running" not in found
+    assert len(turning) == 1
+    found = spec(capsys, "reference-2d", "--only", f"{key},K1_Nm_rad")
+    assert "nothing rubs" in found["missing"][key]
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -299,7 +366,6 @@ def test_scenes_resolve_the_same_references(tmp_path, monkeypatch, synthetic_map
 
     monkeypatch.setattr(builder, "build_map", build)
     monkeypatch.chdir(tmp_path)
-    from swgjoint.gear.design import Design
     from swgjoint.models_path import models_path
 
     text = (models_path() / "drives" / "reference-2d.toml").read_text()

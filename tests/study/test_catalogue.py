@@ -13,9 +13,11 @@ from swgjoint.errors import ComputationError, InputError
 from swgjoint.fe.ring_accuracy import over_output_turn
 from swgjoint.gear.design import Design
 from swgjoint.gear.mounting import series_compliance
+from swgjoint.maps.catalogue_stated import stated_losses
 from swgjoint.study import catalogue as study
 from swgjoint.study import catalogue_runs as runs
 from swgjoint.study.catalogue_file import CatalogueFile, variant_design
+from swgjoint.study.catalogue_losses import running_of
 from swgjoint.study.catalogue_printed import (
     catalogue_row,
     catalogue_stiffness,
@@ -54,6 +56,18 @@ def single(task, torque):
     return [(angle * soft * torque / 1e5).tolist() for angle in (1.0, 0.8)]
 
 
+def turning(task):
+    """Friction of 60 mN·m per mu, a quarter of the teeth; twice with 28 deg."""
+    scale = 2.0 if task.name.endswith(" 28") else 1.0
+    return {
+        "input_angles_rad": [0.0, 1.0],
+        "elastic_Nm": [0.5e-3, -0.5e-3],
+        "teeth_per_mu_Nm": [scale * 0.01, scale * 0.02],
+        "race_per_mu_Nm": [scale * 0.03, scale * 0.06],
+        "tooth_pairs": [2.0, 4.0],
+    }
+
+
 def instant(task):
     """Numbers of the right shape at once."""
     if task.name == BROKEN:
@@ -67,6 +81,8 @@ def instant(task):
         theta = over_output_turn(task.design, 96)
         error = 0.25 * arcmin * np.cos(2.0 * theta)
         return {"input_angles_rad": theta.tolist(), "error_rad": error.tolist()}
+    if task.kind == "running":
+        return turning(task) | {"wall_s": 0.0}
     fixed = task.name.endswith("fixed")
     return {"limit_Nm": 4000.0 if fixed else 1000.0, "passed": not fixed, "wall_s": 0.0}
 
@@ -119,7 +135,7 @@ def test_rows_hold_brackets_and_failures(computed):
     """Every case is there, the failed one with its reason; middles are middles."""
     found = study.run_catalogue(options())
     rows = {(row.case, row.quantity): row for row in found.rows}
-    assert len(rows) == 15 * 7 + 4
+    assert len(rows) == 15 * 7 + 2 * 4
     one = rows["size 25, ratio 100", "K2"]
     assert one.source_value == pytest.approx(5e4)
     assert one.ours == pytest.approx(0.5 * (one.more["low"] + one.more["high"]))
@@ -148,7 +164,15 @@ def test_rows_hold_brackets_and_failures(computed):
     assert rows["size 14, ratio 80", "transmission accuracy"].ours == (
         pytest.approx(0.5, rel=1e-5)
     )
-    assert rows["size 25, ratio 100", "no-load running torque"].ours is None
+    slow = rows["size 25, ratio 100", "no-load running torque"]
+    assert slow.source_value == pytest.approx(195.0)
+    # mean over the angles; mu of 0.05 and one flank to 0.1 and the other
+    assert [slow.more["low"], slow.more["high"]] == pytest.approx([3.0, 12.0])
+    assert slow.more["conditions"].startswith("2000 rpm, +20 C, grease")
+    assert "25 % of it, 3 pairs touch" in slow.reason and "seals" in slow.reason
+    start = rows["size 25, ratio 100", "starting torque"]
+    assert [start.more["low"], start.more["high"]] == pytest.approx([3.5, 15.5])
+    assert "a lower bound in 4 of 4 cases" in "".join(found.summary)
     shares = [r for r in found.more["shares"]["rows"] if r["ratio"] == 100]
     assert shares.pop()["K_without_over_with"] == pytest.approx([1.0] * 3)
     assert np.sum([r["share"] for r in shares], axis=0) == pytest.approx(np.ones(6))
@@ -164,6 +188,29 @@ def test_rows_hold_brackets_and_failures(computed):
     assert trend in "".join(found.summary)
     assert "individual gears" in "".join(found.summary)
     json.dumps(found.more)
+
+
+def test_friction_above_the_catalogue_is_told(monkeypatch):
+    """A case whose friction alone takes more than is stated is named."""
+
+    def heavy(task):
+        one = turning(task)
+        if "running 17" not in task.name:
+            return one
+        return one | {"race_per_mu_Nm": [0.3, 0.3]}
+
+    monkeypatch.setattr(study, "run_task", heavy)
+    found = study.run_catalogue(options(only=("losses",)))
+    (line,) = (s for s in found.summary if "running" in s and "lower bound" in s)
+    assert "in 4 of 4 cases" in line
+    monkeypatch.setattr(
+        study,
+        "run_task",
+        lambda task: heavy(task) | {"teeth_per_mu_Nm": [0.3, 0.4]},
+    )
+    found = study.run_catalogue(options(only=("losses",)))
+    (line,) = (s for s in found.summary if "running" in s and "lower bound" in s)
+    assert "in 2 of 4 cases, above it in size 14, ratio 100, size 17" in line
 
 
 def test_the_command_writes_table_and_plot(computed, capsys, tmp_path):
@@ -239,3 +286,17 @@ def test_one_case_runs_whole(monkeypatch, tmp_path):
     K = stiffnesses(rubbed(found, design), row)
     assert K[0] < K[1] < K[2]
     assert run_task(task) == found
+
+
+@pytest.mark.slow
+def test_friction_of_teeth_and_race_is_below_the_catalogue(monkeypatch, tmp_path):
+    """The smallest size by the real rings: less than what grease and seals add to."""
+    monkeypatch.setenv("SWGJOINT_CACHE", str(tmp_path))
+    file = CatalogueFile.load()
+    tasks = {task.name: task for task in study.tasks_of(file, "losses")}
+    assert len(tasks) == 8
+    slow = running_of(run_task(tasks["running 14 100 20"]))
+    stated = stated_losses(catalogue_row(14, 100))
+    for mu in file.coefficients:
+        assert 0.0 < slow.running_torque(mu) < stated.no_load_running
+        assert 0.0 < slow.starting_torque(mu) < stated.starting

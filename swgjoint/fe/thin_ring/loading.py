@@ -42,6 +42,19 @@ def unloaded(model: ThinRing, alpha: float, phase: float = 0.0) -> RingState:
     return solver(model, state, rotation=psi) if state.outcome.ok else state
 
 
+def without_torque(model: ThinRing, alpha: float) -> RingState:
+    """The drive that nothing loads; an output that play leaves free stays as ideal.
+
+    Args:
+        model: The rings.
+        alpha: Wave-generator angle, of any number of turns [rad].
+    """
+    state = unloaded(model, alpha)
+    if state.outcome.ok and state.loaded_teeth:
+        state = RingSolver()(model, state, torque=0.0)
+    return state
+
+
 def loaded(model: ThinRing, state: RingState, torque: float) -> RingState:
     """Equilibrium under a torque; on failure in halved steps.
 
