@@ -82,7 +82,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     values, reasons, details = _solid(args, keys, ratings)
     if only:
         _ratcheting(args, keys, values, reasons, details)
-    _running(args, keys, values, reasons, details)
+    _running(args, keys, reasons, details)
     sheet = measure_spec(
         drive, ratings=ratings, only=keys, known=values, unknown=reasons
     )
@@ -190,11 +190,14 @@ def _ratcheting(
 def _running(
     args: argparse.Namespace,
     keys: tuple[str, ...],
-    values: dict[str, float],
     reasons: dict[str, str],
     details: dict[str, Any],
 ) -> None:
-    """Add what friction of teeth and race takes of the unloaded input of a design."""
+    """Add what friction of teeth and race takes of the unloaded input of a design.
+
+    A lower bound, a small part of what a drive takes: no figure, but the reason why
+    there is none.
+    """
     from swgjoint.errors import ComputationError, DesignError
     from swgjoint.gear.design import Design
     from swgjoint.maps.friction_bending import without_friction
@@ -205,7 +208,7 @@ def _running(
     source = find_drive(args.drive) if wanted else None
     if not isinstance(source, Design):
         return
-    from swgjoint.fe.ring_running import running_friction
+    from swgjoint.fe.ring_running import LEFT_OUT, running_friction
 
     mu = source.friction.tooth_coefficient
     found, why = None, "nothing rubs with friction.tooth_coefficient = 0"
@@ -219,7 +222,12 @@ def _running(
         return
     details["running"] = found.as_dict(mu)
     figures = (found.running_torque(mu), found.starting_torque(mu))
-    values |= {k: v for k, v in zip(SLOW_KEYS, figures, strict=True) if k in wanted}
+    for key, figure in zip(SLOW_KEYS, figures, strict=True):
+        if key in wanted:
+            reasons[key] = (
+                f"more than {figure:.3g} N·m (friction of teeth and race, a lower"
+                f" bound); not modelled: {LEFT_OUT}"
+            )
 
 
 def _write(

@@ -290,18 +290,20 @@ def rubbing_file(tmp_path, name):
 
 
 def test_slow_running_of_a_design(built, turning, capsys, tmp_path):
-    """Mean and worst torque on the input with the design's coefficient; no map."""
+    """A lower bound is no figure, but told with its parts; no map is built."""
     path = rubbing_file(tmp_path, "size-25-100")
     key = "no_load_running_torque_Nm"
     found = spec(capsys, path, "--only", key)
-    assert found[key] == pytest.approx(0.06)
-    assert "starting_torque_Nm" not in found and found["missing"] == {}
+    assert found[key] is None and "starting_torque_Nm" not in found
+    assert list(found["missing"]) == [key]
+    assert found["missing"][key].startswith("more than 0.06 N·m (friction of teeth")
     slow = found["running"]
     assert slow["coefficient"] == 0.1 and slow["bound"] == "lower"
     assert [slow["teeth_Nm"], slow["race_Nm"]] == pytest.approx([0.015, 0.045])
     assert slow["teeth_share"] == pytest.approx(0.25)
     both = spec(capsys, path, "--only", f"starting_torque_Nm,{key}")
-    assert both["starting_torque_Nm"] == pytest.approx(0.076)
+    assert "more than 0.076 N·m" in both["missing"]["starting_torque_Nm"]
+    assert slow["running_torque_Nm"] == pytest.approx(0.06)
     assert built == []
     assert main(["spec", path, "--only", key]) == 0
     out = capsys.readouterr().out
