@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from swgjoint.fe.pivoting import solve_active, solve_many
+from swgjoint.fe.pivoting import exchange, solve_active, solve_many
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -204,7 +204,7 @@ def pivoted(
     m = n + len(closed_supports)
     closed = np.concatenate([gaps.carries, closed_supports])
     inside = np.concatenate([np.flatnonzero(gaps.carries), free])
-    exchanged, forward = _pivot(system, inside)
+    exchanged, forward = exchange(system, inside)
     start = forward @ offset
     matrix = exchanged[:m, :m]
     matrix[closed, closed] += _stiffening(matrix[np.ix_(closed, closed)])
@@ -237,30 +237,3 @@ def _stiffening(block: Array) -> Array:
     scale = np.sqrt(size)
     lowest = float(np.linalg.eigvalsh(block / scale[:, None] / scale)[0])
     return np.asarray(max(0.0, SOFTEST - lowest) * size)
-
-
-def _pivot(system: Array, inside: Index) -> tuple[Array, Array]:
-    """Exchange unknowns and rows of a linear map y = A z + q.
-
-    Args:
-        system: A (k, k).
-        inside: Where the row becomes the unknown.
-
-    Returns:
-        The exchanged map (k, k), and the factor that q gets (k, k).
-    """
-    k = len(system)
-    outside = np.setdiff1d(np.arange(k), inside)
-    inverse = np.linalg.inv(system[np.ix_(inside, inside)])
-    reach = system[np.ix_(outside, inside)] @ inverse
-    pivoted, forward = np.empty_like(system), np.zeros_like(system)
-    pivoted[np.ix_(inside, inside)] = inverse
-    pivoted[np.ix_(outside, inside)] = reach
-    pivoted[np.ix_(inside, outside)] = -inverse @ system[np.ix_(inside, outside)]
-    pivoted[np.ix_(outside, outside)] = (
-        system[np.ix_(outside, outside)] - reach @ system[np.ix_(inside, outside)]
-    )
-    forward[np.ix_(inside, inside)] = -inverse
-    forward[np.ix_(outside, inside)] = -reach
-    forward[outside, outside] = 1.0
-    return pivoted, forward

@@ -10,13 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Index = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
 TOLERANCE = 1e-9
 """Part of the largest offset of a problem that counts as zero."""
 TRIES = 3
-"""Exchanges of whole blocks without progress before single ones."""
-EXCHANGES = 5000
+"""Exchanges of whole blocks without progress before a problem is solved alone."""
+PIVOTS = 10
+"""Most pivots of a problem alone, over its size; contacts take a fifth of its size."""
+TIE = 1e-12
+"""Part of the largest offset within which rows leave Lemke's basis together."""
 BATCH = 32
 """Problems with active sets of similar size that are solved at once."""
 
@@ -38,11 +42,11 @@ class Pivoted:
 def solve_many(matrix: Array, offset: Array, start: Mask | None = None) -> Pivoted:
     r"""Solve :math:`0 \le v \perp w = q + M v \ge 0` for every row q of the offset.
 
-    Block principal pivoting: all wrong members of the active set change sides; where
-    that makes no progress only the last one does, which ends for a P-matrix (Murty).
+    Block principal pivoting: all wrong members of the active set change sides. Where
+    that makes no progress the problem is solved alone, see :func:`lemke`.
 
     Args:
-        matrix: M, a P-matrix of which symmetry is not asked. Shape (n, n).
+        matrix: M, positive definite; symmetry is not asked. Shape (n, n).
         offset: Shape (n_problems, n).
         start: Guess of the active sets; empty ones if None.
 
@@ -57,15 +61,17 @@ def solve_many(matrix: Array, offset: Array, start: Mask | None = None) -> Pivot
     active = np.zeros(q.shape, bool) if start is None else start.copy()
     result = np.full(q.shape, np.nan)  # v where active, else w
     open_ = np.arange(count)
+    stuck: list[int] = []
     fewest = np.full(count, q.shape[1] + 1)
+    nearest = active.copy()
     tries = np.full(count, TRIES)
     tolerance = TOLERANCE * np.abs(q).max(axis=1, initial=1e-300)
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        for _ in range(EXCHANGES):
+        while open_.size:
             order = open_[np.argsort(active[open_].sum(axis=1))]
             parts = [order[k : k + BATCH] for k in range(0, order.size, BATCH)]
 
-            def solve(part: NDArray[np.int64]) -> Array:
+            def solve(part: Index) -> Array:
                 return _at_active(scaled, q[part], active[part])
 
             # the last few problems: a thread costs more than it saves
@@ -74,18 +80,25 @@ def solve_many(matrix: Array, offset: Array, start: Mask | None = None) -> Pivot
                 result[part] = found
             bad = result[open_] < -tolerance[open_, None]
             wrong = bad.sum(axis=1)
-            open_, bad, wrong = (x[wrong > 0] for x in (open_, bad, wrong))
-            if not open_.size:
-                break
             better = wrong < fewest[open_]
             fewest[open_] = np.minimum(fewest[open_], wrong)
+            nearest[open_[better]] = active[open_[better]]
             tries[open_] = np.where(better, TRIES, tries[open_] - 1)
-            single = np.flatnonzero(tries[open_] < 0)
-            last = bad.shape[1] - 1 - bad[single, ::-1].argmax(axis=1)
-            bad[single] = False
-            bad[single, last] = True
+            stuck += open_[(wrong > 0) & (tries[open_] < 0)].tolist()
+            left = (wrong > 0) & (tries[open_] >= 0)
+            open_, bad = open_[left], bad[left]
             active[open_] ^= bad
-    result[open_] = np.nan
+
+        def alone(k: int) -> Mask | None:
+            return lemke(scaled, q[k], nearest[k])
+
+        for k, ended in zip(stuck, pool.map(alone, stuck), strict=True):
+            result[k] = np.nan
+            if ended is not None:
+                active[k] = ended
+                at_end = _at_active(scaled, q[k : k + 1], active[k : k + 1])[0]
+                if at_end.min() >= -tolerance[k]:
+                    result[k] = at_end
     solved = np.isfinite(result).all(axis=1)
     return Pivoted(
         value=np.where(active, result, 0.0) / scale,
@@ -93,6 +106,94 @@ def solve_many(matrix: Array, offset: Array, start: Mask | None = None) -> Pivot
         active=active,
         solved=solved,
     )
+
+
+def lemke(matrix: Array, offset: Array, start: Mask) -> Mask | None:
+    """Active set of one problem; None where its search ends without any.
+
+    An artificial unknown that makes all others positive is driven out: each pivot lets
+    the complement of what has just left enter. For a positive definite matrix that
+    ends at the only solution.
+
+    Args:
+        matrix: M with a diagonal of one (n, n).
+        offset: q (n,).
+        start: Guess of the active set (n,).
+
+    Source:
+        Lemke (1965), "Bimatrix equilibrium points and mathematical programming",
+        Management Science 11(7), 681-689; Cottle, Pang and Stone (1992), "The linear
+        complementarity problem", section 4.4.
+    """
+    n = len(offset)
+    try:
+        exchanged, forward = exchange(matrix, np.flatnonzero(start))
+    except np.linalg.LinAlgError:
+        exchanged, forward, start = matrix, np.eye(n), np.zeros(n, bool)
+    begin = forward @ offset
+    if begin.min() >= 0.0:
+        return start
+    # basic unknowns by the others: w are 0 to n - 1, v n to 2 n - 1, one artificial
+    table = np.concatenate([-exchanged, -np.ones((n, 1)), begin[:, None]], axis=1)
+    basis = np.arange(n) + n * start
+    others = np.append(np.arange(n) + n * ~start, 2 * n)
+    tie, artificial = TIE * np.abs(begin).max(), 2 * n
+
+    def pivot(row: int, column: int) -> int:
+        entering = table[:, column].copy()
+        above = table[row] / entering[row]
+        np.subtract(table, np.outer(entering, above), out=table)
+        table[row], table[:, column] = above, -entering / entering[row]
+        table[row, column] = 1.0 / entering[row]
+        basis[row], others[column] = others[column], basis[row]
+        return int(others[column])
+
+    left = pivot(int(np.argmin(begin)), n)
+    for _ in range(PIVOTS * n):
+        entering = left + n if left < n else left - n
+        column = int(np.flatnonzero(others == entering)[0])
+        slope = table[:, column]
+        falling = np.flatnonzero(slope > TIE)
+        if not falling.size:
+            return None
+        ratio = table[falling, -1] / slope[falling]
+        first = falling[ratio <= ratio.min() + tie]
+        ends = first[basis[first] == artificial]
+        left = pivot(
+            int(ends[0] if ends.size else first[slope[first].argmax()]), column
+        )
+        if left == artificial:
+            active = np.zeros(n, bool)
+            active[basis[basis >= n] - n] = True
+            return active
+    return None
+
+
+def exchange(system: Array, inside: Index) -> tuple[Array, Array]:
+    """Exchange unknowns and rows of a linear map y = A z + q.
+
+    Args:
+        system: A (k, k).
+        inside: Where the row becomes the unknown.
+
+    Returns:
+        The exchanged map (k, k), and the factor that q gets (k, k).
+    """
+    k = len(system)
+    outside = np.setdiff1d(np.arange(k), inside)
+    inverse = np.linalg.inv(system[np.ix_(inside, inside)])
+    reach = system[np.ix_(outside, inside)] @ inverse
+    pivoted, forward = np.empty_like(system), np.zeros_like(system)
+    pivoted[np.ix_(inside, inside)] = inverse
+    pivoted[np.ix_(outside, inside)] = reach
+    pivoted[np.ix_(inside, outside)] = -inverse @ system[np.ix_(inside, outside)]
+    pivoted[np.ix_(outside, outside)] = (
+        system[np.ix_(outside, outside)] - reach @ system[np.ix_(inside, outside)]
+    )
+    forward[np.ix_(inside, inside)] = -inverse
+    forward[np.ix_(outside, inside)] = -reach
+    forward[outside, outside] = 1.0
+    return pivoted, forward
 
 
 def solve_active(matrix: Array, right: Array, active: Mask) -> Array:

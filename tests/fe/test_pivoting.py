@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
+from swgjoint.fe import pivoting
 from swgjoint.fe.pivoting import solve_active, solve_many
 
 
@@ -67,3 +69,41 @@ def test_a_problem_without_a_solution_is_nan():
     assert found.solved.tolist() == [False, True]
     assert np.isnan(found.value[0]).any()
     assert np.allclose(found.value[1], [1.0, 0.0])
+
+
+def held(generator, n):
+    """A matrix as of contacts, half of them closed: definite by a millionth."""
+    half = n // 2
+    roots = [generator.normal(size=(half, half // 4)) for _ in range(2)]
+    blocks = [root @ root.T / half + 3e-6 * np.eye(half) for root in roots]
+    coupling = generator.normal(size=(half, half))
+    return np.block([[blocks[0], coupling], [-coupling.T, blocks[1]]])
+
+
+@pytest.mark.parametrize("tries", [pivoting.TRIES, -1])
+def test_every_definite_problem_is_solved(tries, monkeypatch):
+    """Known solutions come back, from whole blocks and from Lemke's pivots alone."""
+    monkeypatch.setattr(pivoting, "TRIES", tries)
+    generator = np.random.default_rng(11)
+    matrix = held(generator, 60)
+    known = generator.normal(size=(40, 60))
+    value, slack = np.maximum(known, 0.0), np.maximum(-known, 0.0)
+    found = solve_many(matrix, slack - value @ matrix.T)
+    assert found.solved.all()
+    np.testing.assert_array_equal(found.active, known > 0.0)
+    np.testing.assert_allclose(found.value, value, rtol=0, atol=1e-8)
+    np.testing.assert_allclose(found.slack, slack, rtol=0, atol=1e-8)
+
+
+def test_lemke_begins_wherever_it_is_told():
+    """The same end from no guess, from any guess and from the solution itself."""
+    generator = np.random.default_rng(2)
+    matrix = held(generator, 40)
+    scale = np.sqrt(np.diag(matrix))
+    scaled = matrix / scale[:, None] / scale
+    known = generator.normal(size=40)
+    offset = np.maximum(-known, 0.0) - scaled @ np.maximum(known, 0.0)
+    guesses = [np.zeros(40, bool), known > 0.0, generator.random(40) < 0.5]
+    for guess in guesses:
+        found = pivoting.lemke(scaled, offset, guess)
+        np.testing.assert_array_equal(found, known > 0.0)
