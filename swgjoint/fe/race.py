@@ -21,7 +21,7 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
-from swgjoint.fe.corotation import rotate, turned
+from swgjoint.fe.corotation import rotate
 from swgjoint.fe.superelement import Superelement
 from swgjoint.fe.thin_ring.facing import facing
 from swgjoint.fe.thin_ring.race_on_balls import (
@@ -154,20 +154,12 @@ class PlaneRace:
             alpha: Wave-generator angle [rad].
             rotation: Of race and flexspline [rad].
         """
-        own, m = self.on_balls, self.per_sector
-        r = own.race.radius
+        own, shape = self.on_balls, (self.sectors, self.per_sector, 2, 2)
         # the lobes of the rim and the clearance that it takes up
         w0 = PRESSED * (own.lobe_height + 0.5 * own.bearing.fit_clearance)
-        step = self._pitch / m
-        phi = step * np.arange(self.sectors * m) - 0.5 * self._pitch + rotation
-        wave = 2.0 * (phi - alpha)
-        outward = np.stack([-np.sin(phi), np.cos(phi)], -1)
-        along = turned(outward)
-        w, v = w0 * np.cos(wave)[:, None], -0.5 * w0 * np.sin(wave)[:, None]
-        dw, dv = -2.0 * w0 * np.sin(wave)[:, None], -w0 * np.cos(wave)[:, None]
-        place = (r + w) * outward + v * along
-        slope = ((r + w + dv) * along + (dw - v) * outward) * step
-        return np.stack([place, slope], axis=1).reshape(self.sectors, m, 2, 2)
+        step = self._pitch / self.per_sector
+        phi = step * np.arange(shape[0] * shape[1]) - 0.5 * self._pitch + rotation
+        return own.race.two_lobes(w0, phi, alpha).reshape(shape)
 
     @cached_property
     def _still(self) -> Array:

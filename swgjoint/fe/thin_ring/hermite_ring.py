@@ -18,7 +18,7 @@ from functools import cached_property
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -81,6 +81,27 @@ class HermiteRing:
         outward = np.stack([-np.sin(phi), np.cos(phi)], -1)
         along = np.stack([-np.cos(phi), -np.sin(phi)], -1)
         return np.stack([self.radius * outward, self.step * along], axis=1)
+
+    def two_lobes(self, height: float, angle: ArrayLike, major: float) -> Array:
+        """Coordinates of nodes deflected by two lobes without stretch (n, 2, 2) [m].
+
+        Radial w0 cos 2 phi, tangential -w0/2 sin 2 phi, phi from the major axis.
+
+        Args:
+            height: w0 [m].
+            angle: Of the undeformed nodes from +y (n,) [rad].
+            major: Of the major axis [rad].
+        """
+        angle = np.asarray(angle, dtype=np.float64)
+        r, w0, wave = self.radius, height, 2.0 * (angle - major)
+        outward = np.stack([-np.sin(angle), np.cos(angle)], -1)
+        along = np.stack([-np.cos(angle), -np.sin(angle)], -1)
+        w, v = w0 * np.cos(wave)[:, None], -0.5 * w0 * np.sin(wave)[:, None]
+        place = (r + w) * outward + v * along
+        # d/dphi: w' - v outwards, r + w + v' along
+        dw, dv = -2.0 * w0 * np.sin(wave)[:, None], -w0 * np.cos(wave)[:, None]
+        slope = (r + w + dv) * along + (dw - v) * outward
+        return np.stack([place, slope * (2.0 * pi / self.elements)], axis=1)
 
     @cached_property
     def dofs(self) -> Index:
