@@ -134,7 +134,9 @@ def ring_model(
     """
     if half and not can_halve(design, bearing=bearing):
         drive, own = design.drive, design.wave_generator.bearing
-        balls = f", {own.balls} balls" if own is not None and bearing else ""
+        balls = ""
+        if bearing and carries_bearing(design) and own is not None and own.balls % 2:
+            balls = f" on {own.balls} balls; accepted: an even number"
         raise DesignError(
             f"{drive.name}: a half model needs even tooth counts and a wave generator "
             "that half a turn maps onto itself, without tolerances, not "
