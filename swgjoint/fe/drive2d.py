@@ -11,9 +11,12 @@ from numpy.typing import NDArray
 from swgjoint.errors import DesignError
 from swgjoint.fe.circular_spline import CircularSpline, ring_compliance
 from swgjoint.fe.friction import STICK_STIFFNESS, Friction
+from swgjoint.fe.race import PlaneRace
 from swgjoint.fe.ring import RingModel
 from swgjoint.fe.sector_mesh import sector_mesh
 from swgjoint.fe.superelement import Superelement, condense
+from swgjoint.gear.bearing_checks import bearing_checks
+from swgjoint.gear.check import raise_faults
 from swgjoint.gear.design import Design, MemberName
 from swgjoint.gear.profile import ToothProfile, tooth_profile
 from swgjoint.gear.tolerances import (
@@ -28,14 +31,36 @@ from swgjoint.units import mm
 Array = NDArray[np.float64]
 
 
-def can_halve(design: Design) -> bool:
-    """Whether half a turn maps the drive onto itself: lobes, even teeth, no errors."""
-    drive = design.drive
+def can_halve(design: Design, *, bearing: bool = True) -> bool:
+    """Whether half a turn maps the drive onto itself: lobes, even teeth, no errors.
+
+    Args:
+        design: The drive.
+        bearing: Whether the model is plane and carries the bearing of the wave
+            generator where :func:`carries_bearing`: then of even balls.
+    """
+    drive, own = design.drive, design.wave_generator.bearing
+    odd = bearing and carries_bearing(design) and own is not None and own.balls % 2
     return (
         drive.teeth_flexspline % 2 == 0
         and drive.teeth_circular_spline % 2 == 0
         and wave_generator(design).folds % 2 == 0
         and not has_errors(design)
+        and not odd
+    )
+
+
+def carries_bearing(design: Design) -> bool:
+    """Whether the plane model has the ball bearing of a design's wave generator.
+
+    It needs an outline without corners or straights, and a wave generator that turns
+    against a circular spline at rest: the balls roll as the flexspline then does.
+    """
+    generator = design.wave_generator
+    return (
+        generator.bearing is not None
+        and generator.kind in ("elliptical", "cosine", "table")
+        and design.drive.layout == "circular_spline_fixed"
     )
 
 
@@ -58,12 +83,19 @@ def check_modelled(design: Design, model: str) -> None:
         raise DesignError("\n".join(f"{drive.name}: {fault}" for fault in faults))
 
 
-def left_out(design: Design, model: str = "2d") -> str | None:
-    """Parts of the design that the model cannot see, for the validity label."""
+def left_out(design: Design, model: str = "2d", *, bearing: bool = True) -> str | None:
+    """Parts of the design that the model cannot see, for the validity label.
+
+    Args:
+        design: The drive.
+        model: Its fidelity.
+        bearing: Whether the plane model was built with the bearing.
+    """
+    carried = bearing and carries_bearing(design)
     shapes = design.micro_geometry.model_dump(exclude={"crowning_kind"})
     parts = {
-        "wave_generator.bearing": model != "ring"
-        and design.wave_generator.bearing is not None,
+        "wave_generator.bearing": design.wave_generator.bearing is not None
+        and (model == "3d" or (model == "2d" and not carried)),
         "micro_geometry": model != "3d" and any(shapes.values()),
         "passage of teeth": model == "ring",
         "rim of the circular spline": model == "ring",
@@ -78,6 +110,8 @@ def ring_model(
     nonlinear: bool = True,
     elastic_circular_spline: bool = True,
     friction: bool = True,
+    bearing: bool = True,
+    cage_held: bool = False,
     profiles: Mapping[MemberName, ToothProfile] | None = None,
 ) -> RingModel:
     """2D model of a design.
@@ -90,18 +124,24 @@ def ring_model(
             diameter is fixed or free as the design says.
         friction: Whether the flanks rub, with the coefficient of the design; False for
             the conservative part alone.
+        bearing: Whether the wave generator carries the rim on its ball bearing, if the
+            design has one that the plane can carry; False for its rigid surface.
+        cage_held: Whether the balls stand still on the cam instead of rolling.
         profiles: Flanks to use instead of those of the design, by member.
 
     Raises:
         DesignError: If the design cannot be built or the half model does not apply.
     """
-    if half and not can_halve(design):
-        drive = design.drive
+    if half and not can_halve(design, bearing=bearing):
+        drive, own = design.drive, design.wave_generator.bearing
+        balls = ""
+        if bearing and carries_bearing(design) and own is not None and own.balls % 2:
+            balls = f" on {own.balls} balls; accepted: an even number"
         raise DesignError(
             f"{drive.name}: a half model needs even tooth counts and a wave generator "
             "that half a turn maps onto itself, without tolerances, not "
             f"{drive.teeth_flexspline}/{drive.teeth_circular_spline} teeth and "
-            f"{design.wave_generator.kind}"
+            f"{design.wave_generator.kind}{balls}"
         )
     flanks: dict[MemberName, ToothProfile] = dict(profiles or {})
     members: tuple[MemberName, ...] = ("flexspline", "circular_spline")
@@ -137,15 +177,22 @@ def ring_model(
             "ring_tooth_shift": tooth_errors(design, "circular_spline").shift,
             "wave_generator_offset": wave_generator_offset(design),
         }
+    element = sector(design, "flexspline", flanks["flexspline"])
+    height, race = lobe_height(design), None
+    if bearing and carries_bearing(design):
+        raise_faults(bearing_checks(design))
+        race = PlaneRace.of(design, element, half=half, cage_held=cage_held)
+        height = race.on_balls.lobe_height
     return RingModel(
         **shifts,
         friction=law,
-        element=sector(design, "flexspline", flanks["flexspline"]),
+        element=element,
         wave_generator=flawed_wave_generator(design),
         circular_spline=ring,
-        lobe_height=lobe_height(design),
+        lobe_height=height,
         half=half,
         nonlinear=nonlinear,
+        race=race,
     )
 
 

@@ -18,6 +18,7 @@ from swgjoint.fe.corotation import elastic_energy, turned
 from swgjoint.fe.cyclic import CyclicFactor, SingularRingError
 from swgjoint.fe.friction import Sliding, SlipHistory, dissipated, spring_energy
 from swgjoint.fe.linearise import Linearised, linearise
+from swgjoint.fe.race import NODE
 from swgjoint.fe.ring import RingModel
 from swgjoint.fe.state import State
 from swgjoint.fe.tooth_contact import Contacts
@@ -147,14 +148,17 @@ class _Step:
     increment: Array
     """In the node bases (N, n) [m]."""
     shift: Array
-    """In the global frame (N, n_a, 2) [m]."""
+    """Of the skeleton in the global frame (N, n_a, 2) [m]."""
+    race_shift: Array
+    """Of the race's nodes (N, m, 2, 2) [m]; empty without a race."""
     pressure: Array
     """Force of the wave generator on each of its nodes (N, n_bore + 1) [N]."""
 
     @property
     def largest(self) -> float:
         """Largest displacement increment [m]."""
-        return float(np.abs(self.shift).max())
+        of_race = float(np.abs(self.race_shift).max(initial=0.0))
+        return max(float(np.abs(self.shift).max()), of_race)
 
 
 def _solve_linear(
@@ -192,7 +196,7 @@ def _solve_linear(
     rhs = -ring.gradient - np.einsum("sij,sj->si", ring.hessian, ring.value)
     columns = np.concatenate([rhs[:, :, None], levers], axis=2)
     columns[ring.known] = 0.0
-    solved = CyclicFactor(ring.anchored(), 2 * element.face_size).solve(columns)
+    solved = CyclicFactor(ring.anchored(), ring.face_dofs).solve(columns)
     base, response = solved[:, :, 0] + ring.value, solved[:, :, 1:]
 
     # forces on the lines, displacement of the anchor, rotation of the circular spline,
@@ -281,7 +285,12 @@ def _solve_linear(
         ring_turn=float(ring_turn),
         increment=increment,
         shift=ring.in_global_frame(increment),
-        pressure=np.where(state.touching, ring.normal_rows(residual), 0.0),
+        race_shift=increment[:, model.race_dofs[:-NODE]].reshape(
+            model.sectors, -1, 2, 2
+        ),
+        pressure=np.where(
+            state.touching, ring.pressure_after(increment, residual), 0.0
+        ),
     )
 
 
@@ -316,8 +325,8 @@ def _advance(
     one_at_a_time: bool,
 ) -> tuple[State, bool]:
     """Move, exchange tooth forces, update the wave generator's active set."""
-    after = ring.wave_generator_gap + damping * step.increment[:, ring.normal_dofs]
-    wrong = np.where(state.touching, -step.pressure / ring.anchor_stiffness, -after)
+    after = ring.gap_after(damping * step.increment)
+    wrong = np.where(state.touching, -step.pressure / ring.contact_stiffness, -after)
     bad = wrong > 1e-15
     # without any contact the rim springs back: let go of the worst node only
     if bad.any() and (one_at_a_time or not (state.touching ^ bad).any()):
@@ -335,6 +344,7 @@ def _advance(
         state,
         faces=moved[:, :size],
         bores=moved[:, size : size + inside],
+        race=None if state.race is None else state.race + damping * step.race_shift,
         pressure=step.pressure,
         touching=state.touching ^ bad,
         flank_force=flank_force,
@@ -364,8 +374,6 @@ def _finished(
     """Moments and energy of the whole drive at the last positions."""
     frames = model.frames(state)
     nodes = model.skeleton(state)[:, model.bore_nodes]
-    _, normal, _ = model.wave_generator_gap(nodes, state.wave_generator_angle)
-    arm = np.einsum("sni,sni->sn", turned(nodes), normal)
     rotation, _ = model.best_fit_rotation(nodes)
     moment = 0.0
     if state.contacts is not None:
@@ -380,9 +388,20 @@ def _finished(
     # the circular spline is linear: it must stay near its place
     if outcome.ok and np.abs(moved).max(initial=0.0) > ring_range * model.lobe_height:
         outcome = Outcome.DIVERGED
+    energy, balls = model.copies * energy, None
+    if model.race is not None and state.race is not None:
+        alpha = state.wave_generator_angle
+        race = model.race.forces(state.race, alpha, nodes, state.touching)
+        energy += race.energy
+        input_torque, balls = race.balls.input_torque, race.balls.force
+    else:
+        arm = np.einsum(
+            "sni,sni->sn", turned(nodes), model.wave_generator_normal(state)
+        )
+        input_torque = model.copies * float(np.sum(state.pressure * arm))
     work, law = 0.0, model.friction
     if law is not None and state.candidates is not None:
-        energy += spring_energy(law, state.candidates)
+        energy += model.copies * spring_energy(law, state.candidates)
         work = dissipated(law, state.slip, state.candidates)
         state = replace(state, slip=state.candidates)
     return replace(
@@ -390,9 +409,10 @@ def _finished(
         outcome=outcome,
         history=tuple(history),
         rotation=rotation,
-        wave_generator_torque=model.copies * float(np.sum(state.pressure * arm)),
+        wave_generator_torque=input_torque,
+        ball_force=balls,
         tooth_moment=model.copies * moment,
-        energy=model.copies * energy,
+        energy=energy,
         friction_work=state.friction_work + model.copies * work,
         candidates=None,
     )

@@ -68,7 +68,7 @@ def friction_loops(
     parts = (np.arange(positions) + 0.5) / positions
     if design.wave_generator.kind in SYMMETRIC:
         parts = parts[: (positions + 1) // 2]
-    model = ring_model(perfect, half=can_halve(perfect))
+    model = ring_model(perfect, half=can_halve(perfect), cage_held=True)
     rubbing = Continuation(model=model, ratio=design.ratio, layout=drive.layout)
     smooth = replace(rubbing, model=replace(model, friction=None))
     torque = loop_torques(top, steps)

@@ -164,6 +164,7 @@ class MeshingRun(Positions):
                 "layout": self.design.drive.layout,
                 "level": "nonlinear" if self.model.nonlinear else "linear",
                 "circular_spline": ring if elastic else "rigid",
+                "bearing": None if self.model.race is None else "balls roll",
                 "half": self.model.half,
                 "cup": cup,
                 "springs_Nm_rad": springs_of(self.design),

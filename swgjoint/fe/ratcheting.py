@@ -170,6 +170,7 @@ def ratcheting_path(
 def path_follower(design: Design) -> Continuation:
     """The drive in the plane, perfect and smooth, far from its map's torques."""
     perfect = without_errors(design)
+    half = can_halve(perfect, bearing=False)
     small = TOLERANCE * lobe_height(design)
     solver = NewtonSolver(
         max_iterations=ITERATIONS,
@@ -178,7 +179,7 @@ def path_follower(design: Design) -> Continuation:
         ring_range=RING_RANGE,
     )
     return Continuation(
-        model=ring_model(perfect, half=can_halve(perfect), friction=False),
+        model=ring_model(perfect, half=half, friction=False, bearing=False),
         ratio=design.ratio,
         layout=design.drive.layout,
         solver=solver,

@@ -15,11 +15,18 @@ from numpy.typing import NDArray
 from swgjoint.fe.circular_spline import CircularSpline
 from swgjoint.fe.corotation import Frames, rotate, sector_frames, turned
 from swgjoint.fe.friction import Friction
+from swgjoint.fe.race import NODE, PlaneRace
 from swgjoint.fe.state import State
 from swgjoint.fe.superelement import Superelement
 from swgjoint.gear.wave_generator import WaveGenerator
 
 Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+
+AT_LOBE = 0.9
+"""Cosine of twice the angle from the major axis, above which nodes of the bore lie on
+the race where a search begins."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -42,6 +49,8 @@ class RingModel:
     """The same of the circular spline, which must be elastic (N_c, 2) [m]."""
     wave_generator_offset: Array | None = None
     """Centre of the outline in the frame of the wave generator (2,) [m]."""
+    race: PlaneRace | None = None
+    """Outer race on balls in place of the rigid wave generator."""
 
     @property
     def sectors(self) -> int:
@@ -84,6 +93,31 @@ class RingModel:
         size = self.element.face_size
         return np.arange(size - 1, size + self.element.bore_size)
 
+    @property
+    def face_dofs(self) -> int:
+        """Degrees of freedom of a face; its node of the race comes last."""
+        return 2 * self.element.face_size + (0 if self.race is None else NODE)
+
+    @cached_property
+    def dofs(self) -> Index:
+        """Those of the skeleton among the degrees of freedom of a sector (2 n_a,)."""
+        own, face = 2 * len(self.element.skeleton), 2 * self.element.face_size
+        if self.race is None:
+            return np.arange(own)
+        inside = self.race.size - 2 * NODE
+        return np.concatenate(
+            [
+                np.arange(own - face) + NODE * (np.arange(own - face) >= face),
+                np.arange(own - face, own) + NODE + inside,
+            ]
+        )
+
+    @cached_property
+    def race_dofs(self) -> Index:
+        """Those of the race's nodes, first face to last; empty without."""
+        size = len(self.dofs) + (0 if self.race is None else self.race.size)
+        return np.setdiff1d(np.arange(size), self.dofs)
+
     def skeleton(self, state: State) -> Array:
         """Positions of all skeleton nodes per sector (N, n_a, 2) [m]."""
         last = np.roll(state.faces, -1, axis=0)
@@ -119,12 +153,20 @@ class RingModel:
         moved = rotate(moved, rotation)
         size, inside = element.face_size, element.bore_size
         nodes = moved[:, self.bore_nodes]
-        gap, _, _ = self.wave_generator_gap(nodes, alpha)
+        race = None
+        if self.race is None:
+            gap, _, _ = self.wave_generator_gap(nodes, alpha)
+            touching = gap < 0.01 * w0
+        else:
+            race = self.race.at_rest(alpha, rotation)
+            # nothing but the rim keeps the race on its balls
+            touching = np.cos(2.0 * phi[:, self.bore_nodes]) > AT_LOBE
         return State(
+            race=race,
             faces=moved[:, :size],
             bores=moved[:, size : size + inside],
-            pressure=np.zeros(gap.shape),
-            touching=gap < 0.01 * w0,
+            pressure=np.zeros(touching.shape),
+            touching=touching,
             flank_force=np.zeros((self.sectors, 4 * element.flank_size)),
             ring_force=np.zeros((self.ring_teeth, self.circular_spline.flank_dofs)),
             wave_generator_angle=alpha,
@@ -149,6 +191,16 @@ class RingModel:
             rotate(normal, alpha).reshape(nodes.shape),
             (curvature / (1.0 + curvature * gap)).reshape(nodes.shape[:-1]),
         )
+
+    def wave_generator_normal(self, state: State) -> Array:
+        """Outward normal of what the bore lies on, at its nodes (N, n_bore + 1, 2)."""
+        nodes, alpha = (
+            self.skeleton(state)[:, self.bore_nodes],
+            state.wave_generator_angle,
+        )
+        if self.race is None or state.race is None:
+            return self.wave_generator_gap(nodes, alpha)[1]
+        return self.race.forces(state.race, alpha, nodes, state.touching).normal
 
     def best_fit_rotation(self, nodes: Array) -> tuple[float, Array]:
         """Best-fit rotation of the bore nodes and its gradient (N, n_bore + 1, 2)."""
@@ -181,8 +233,13 @@ class RingModel:
             still + travelled(local - still, shift),
             (self.place + rotation)[:, None],
         )
+        race = state.race
+        if self.race is not None and race is not None:
+            race = travelled(self.race.displaced(race, state.rotation), shift)
+            race = self.race.placed(race, rotation)
         return replace(
             state,
+            race=race,
             faces=x[:, :size],
             bores=x[:, size:],
             pressure=travelled(state.pressure, shift),

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from swgjoint.errors import ComputationError
 from swgjoint.fe.continuation import Continuation
-from swgjoint.fe.drive2d import can_halve, left_out, ring_model
+from swgjoint.fe.drive2d import can_halve, carries_bearing, left_out, ring_model
 from swgjoint.fe.pattern import EVERY, Pattern, solve_pattern
 from swgjoint.fe.shape_fields import drive_fields, plane_fields, plane_surface
 from swgjoint.fe.solid.continuation import SolidContinuation
@@ -54,7 +54,11 @@ def sample_map(
     negative torques are the mirror image of the positive ones; both claims are checked
     at rated torque and recorded. Torques at which a solve fails, and those beyond, are
     left out, and the record says so. Manufacturing errors are superposed, see
-    :mod:`swgjoint.fe.tolerance_sampling`.
+    :mod:`swgjoint.fe.tolerance_sampling`, on a rigid wave generator in either model.
+
+    In the plane the balls of a bearing stand still on the cam, the first one on the
+    major axis: they pass at another rate than teeth, and what repeats after a pitch and
+    is its own mirror image is the drive without that passage.
 
     Args:
         design: The drive.
@@ -158,6 +162,7 @@ def sample_map(
                 "cup": "closed-form torsion in series"
                 if model == "2d" and design.cup is not None
                 else None,
+                "bearing": _bearing(design) if model == "2d" else None,
                 "springs_Nm_rad": springs_of(design),
                 "friction": "left out of the potential"
                 if design.friction.tooth_coefficient
@@ -176,7 +181,9 @@ def sample_map(
 def _in_plane(design: Design) -> Continuation:
     perfect = without_errors(design)
     return Continuation(
-        model=ring_model(perfect, half=can_halve(perfect), friction=False),
+        model=ring_model(
+            perfect, half=can_halve(perfect), friction=False, cage_held=True
+        ),
         ratio=design.ratio,
         layout=design.drive.layout,
     )
@@ -185,10 +192,18 @@ def _in_plane(design: Design) -> Continuation:
 def _in_space(design: Design) -> SolidContinuation:
     perfect = without_errors(design)
     return SolidContinuation(
-        ring=solid_ring(perfect, half=can_halve(perfect)),
+        ring=solid_ring(perfect, half=can_halve(perfect, bearing=False)),
         ratio=design.ratio,
         layout=design.drive.layout,
     )
+
+
+def _bearing(design: Design) -> str | None:
+    """What the plane has of the bearing of the wave generator, for the label."""
+    if not carries_bearing(design):
+        return None
+    held = "balls at rest on the cam, their passage left out"
+    return f"{held}; absent under the errors" if has_errors(design) else held
 
 
 def _named(design: Design) -> dict[str, float] | None:

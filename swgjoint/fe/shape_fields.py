@@ -125,10 +125,10 @@ def plane_fields(model: RingModel, state: State, surface: Surface) -> SectorFiel
     # from the frames of the sectors to those of the teeth where they stood
     back = frames.angle - model.place - state.rotation
     points = rotate(rest + u, back[:, None])
-    nodes = model.skeleton(state)[:, model.bore_nodes]
-    _, normal, _ = model.wave_generator_gap(nodes, state.wave_generator_angle)
     pressed = np.einsum(
-        "sn,sni->si", np.where(state.touching, state.pressure, 0.0), normal
+        "sn,sni->si",
+        np.where(state.touching, state.pressure, 0.0),
+        model.wave_generator_normal(state),
     )
     teeth = state.flank_force.reshape(len(u), -1, 2).sum(axis=1)
     return SectorFields(

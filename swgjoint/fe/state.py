@@ -31,6 +31,11 @@ class State:
     """Tooth forces as nodal forces in the sector frames (N, 2 n_b) [N]."""
     ring_force: Array
     """The same on the circular spline, in the frames of its teeth (N_c, 2 n_c) [N]."""
+    race: Array | None = None
+    """Nodes of the wave generator's outer race (N, m, 2, 2), see
+    :class:`swgjoint.fe.race.PlaneRace` [m]; None for a rigid wave generator."""
+    ball_force: Array | None = None
+    """Of the balls of the whole drive (balls,) [N]."""
     contacts: Contacts | None = None
     """Points that carry force."""
     tooth_force: Array = field(default_factory=lambda: np.zeros(0))

@@ -33,8 +33,8 @@ def influence(model: RingModel, state: State, *, ring_is_output: bool) -> Influe
     """Condense a drive with perfect teeth at an equilibrium.
 
     Args:
-        model: All sectors, an elastic circular spline, no errors of the teeth, no
-            friction.
+        model: All sectors, an elastic circular spline, a rigid wave generator, no
+            errors of the teeth, no friction.
         state: The equilibrium.
         ring_is_output: Whether the circular spline is the output.
     """
@@ -42,6 +42,8 @@ def influence(model: RingModel, state: State, *, ring_is_output: bool) -> Influe
     flawed = any(shift is not None and shift.any() for shift in shifts)
     if model.half or model.friction is not None or flawed:
         raise ValueError("needs all sectors, without friction and errors of the teeth")
+    if model.race is not None:
+        raise ValueError("needs a rigid wave generator")
     element, compliance = model.element, model.circular_spline.compliance
     assert compliance is not None
     ring = linearise(model, state, None if ring_is_output else state.torque)

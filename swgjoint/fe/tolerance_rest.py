@@ -30,7 +30,7 @@ def perfect_drive(design: Design, model: str = "2d") -> Follower[Any]:
     if model == "3d":
         ring = solid_ring(perfect)
         return SolidContinuation(ring=ring, ratio=design.ratio, layout=layout)
-    plane = ring_model(perfect, friction=False)
+    plane = ring_model(perfect, friction=False, bearing=False)
     return Continuation(model=plane, ratio=design.ratio, layout=layout)
 
 

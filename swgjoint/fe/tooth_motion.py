@@ -77,7 +77,11 @@ def deflected_rim(design: Design) -> DeflectedRim:
         ComputationError: If the deflection fails.
     """
     model = ring_model(
-        design, half=can_halve(design), elastic_circular_spline=False, friction=False
+        design,
+        half=can_halve(design, bearing=False),
+        elastic_circular_spline=False,
+        friction=False,
+        bearing=False,
     )
     state = Continuation(model=model, ratio=design.ratio).deflected()
     if not state.outcome.ok:

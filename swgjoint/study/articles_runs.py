@@ -114,9 +114,8 @@ def _fatigue(task: Task) -> Found:
 
 def _deflected(task: Task) -> Found:
     """On the wave generator, no tooth contact: displacement [mm], stress [MPa]."""
-    ring = solid_ring(
-        task.design, half=can_halve(task.design), elastic_circular_spline=False
-    )
+    half = can_halve(task.design, bearing=False)
+    ring = solid_ring(task.design, half=half, elastic_circular_spline=False)
     state = SolidContinuation(ring=ring, ratio=task.design.ratio).deflected()
     if not state.outcome.ok:
         raise ComputationError(f"{task.name}: {state.outcome.value}")

@@ -284,14 +284,15 @@ def _stress(
     from swgjoint.fe.drive2d import can_halve
     from swgjoint.fe.meshing import simulate_meshing
 
+    model = model or ("3d" if source.cup is not None else "2d")
     try:
         run = simulate_meshing(
             source,
-            model=model or ("3d" if source.cup is not None else "2d"),
+            model=model,
             torque=drive.ratings.rated_torque,
             steps=STRESS_POSITIONS,
             turn=1.0 / source.periodicity,
-            half=can_halve(source),
+            half=can_halve(source, bearing=model == "2d"),
         )
     except ComputationError:
         return None

@@ -74,7 +74,8 @@ def solved(design: Design, setting: Setting) -> Found:
     if setting.model == "ring":
         return solved_by_rings(design, setting, begin)
     changed = design.with_changes({"mesh.refinement": setting.refinement})
-    half = can_halve(changed) and not setting.full
+    # on the rigid wave generator that the levels in space have
+    half = can_halve(changed, bearing=False) and not setting.full
     if setting.model == "3d":
         ring = solid_ring(changed, half=half, nonlinear=setting.nonlinear)
         return _measured(
@@ -88,7 +89,7 @@ def solved(design: Design, setting: Setting) -> Found:
             nodes=sum(s.mesh.mesh.p.shape[1] for s in ring.strip.segments),
             begin=begin,
         )
-    plane = ring_model(changed, half=half, nonlinear=setting.nonlinear)
+    plane = ring_model(changed, half=half, nonlinear=setting.nonlinear, bearing=False)
     return _measured(
         changed,
         Continuation(model=plane, ratio=changed.ratio, layout=changed.drive.layout),

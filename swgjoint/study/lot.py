@@ -172,7 +172,7 @@ def run_lot(
         "validity": {
             "level": "2d, errors superposed",
             "torque_Nm": ratings_of(design).rated_torque,
-            "left_out": left_out(design),
+            "left_out": left_out(design, bearing=False),
             "friction": "none",
             "cup": None if design.cup is None else "closed-form torsion in series",
             "superposition_error": off,

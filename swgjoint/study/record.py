@@ -148,7 +148,7 @@ def compute(spec: RunSpec) -> RunRecord:
             torque=spec.torque,
             steps=spec.positions,
             turn=spec.turn,
-            half=can_halve(spec.design),
+            half=can_halve(spec.design, bearing=spec.model == "2d"),
             throw=False,
         )
     except (ComputationError, DesignError) as error:

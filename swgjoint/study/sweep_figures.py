@@ -209,14 +209,14 @@ def _simulated(
     from swgjoint.fe.drive2d import can_halve
     from swgjoint.fe.meshing import simulate_meshing
 
-    turn = 1.0 / design.periodicity
+    turn, model = 1.0 / design.periodicity, _model(design, task)
     return simulate_meshing(
         design,
-        model=_model(design, task),
+        model=model,
         torque=torque,
         steps=task.positions,
         turn=turn if task.turn_deg is None else task.turn_deg / 360.0,
-        half=can_halve(design),
+        half=can_halve(design, bearing=model == "2d"),
     )
 
 

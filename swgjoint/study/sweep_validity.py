@@ -9,7 +9,9 @@ from swgjoint.study.sweep_tasks import AskedFile
 NOT_MODELLED = {
     "ring": "passage of teeth, rim of the circular spline, micro-geometry, cup but for"
     " its torsion",
-    "2d": "micro-geometry, bearing of the wave generator, cup but for its torsion",
+    "2d": "micro-geometry, cup but for its torsion; in a map the passage of balls; the"
+    " bearing of the wave generator outside of the layout circular_spline_fixed and on"
+    " outlines with corners or straights",
     "3d": "bearing of the wave generator; stresses at edges and at the step from rim to"
     " cup do not converge with the mesh",
 }

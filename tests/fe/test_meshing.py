@@ -264,11 +264,9 @@ def test_backlash_is_taken_up_by_torque():
 
 
 def test_label_names_what_a_plane_model_cannot_see():
-    """Bearing and micro-geometry of a design are left out, and the label says so."""
+    """Micro-geometry of a design is left out, and the label says so."""
     assert left_out(Design.load("reference-2d")) is None
-    assert left_out(Design.load("size-25-100")) == (
-        "wave_generator.bearing and micro_geometry"
-    )
+    assert left_out(Design.load("size-25-100")) == "micro_geometry"
     assert one_pitch().to_json()["label"]["left_out"] is None
 
 

@@ -63,7 +63,7 @@ def solid_ring(
     check_modelled(design)
     if bearing is not None:
         check_bearing(design, half=half)
-    if half and not can_halve(design):
+    if half and not can_halve(design, bearing=False):
         raise DesignError(f"{name}: the half model does not apply; leave --half out")
     profile = tooth_profile(design, "flexspline")
     facing = tooth_profile(design, "circular_spline")

@@ -159,7 +159,7 @@ def fatigue(
         ComputationError: If a solve fails or memory will not do.
     """
     limits, shell = Limits.of(design), ShellDimensions.of(design)
-    ring = solid_ring(design, half=can_halve(design))
+    ring = solid_ring(design, half=can_halve(design, bearing=False))
     follow = SolidContinuation(
         ring=ring, ratio=design.ratio, layout=design.drive.layout
     )

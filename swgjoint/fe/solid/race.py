@@ -21,7 +21,7 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
-from swgjoint.fe.corotation import rotate, turned
+from swgjoint.fe.corotation import rotate
 from swgjoint.fe.solid.race_outside import RaceOutside
 from swgjoint.fe.solid.race_roll import RaceRoll
 from swgjoint.fe.thin_ring.race_on_balls import (
@@ -116,17 +116,11 @@ class SolidRace:
             closed: Where the coned bore would meet the undeformed one [m].
         """
         own = self.on_balls
-        r, w0 = own.race.radius, own.lobe_height + 0.5 * own.bearing.clearance
-        w0 *= 1.01
+        w0 = 1.01 * (own.lobe_height + 0.5 * own.bearing.clearance)
         phi = self.pitch * (np.arange(self.sectors) - 0.5) + rotation
         wave = 2.0 * (phi - alpha)
-        outward = np.stack([-np.sin(phi), np.cos(phi)], -1)
-        along = turned(outward)
-        w, v = w0 * np.cos(wave)[:, None], -0.5 * w0 * np.sin(wave)[:, None]
-        dw, dv = -2.0 * w0 * np.sin(wave)[:, None], -w0 * np.cos(wave)[:, None]
         race = np.zeros((self.sectors, 2, len(KINDS)))
-        race[:, 0, :2] = (r + w) * outward + v * along
-        race[:, 1, :2] = ((r + w + dv) * along + (dw - v) * outward) * self.pitch
+        race[..., :2] = own.race.two_lobes(w0, phi, alpha)
         roll = -0.5 * self.outside.width / closed * w0
         race[:, 0, 2] = roll * np.cos(wave)
         race[:, 1, 2] = -2.0 * self.pitch * roll * np.sin(wave)

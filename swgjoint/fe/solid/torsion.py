@@ -74,7 +74,7 @@ def solid_torsion(
         DesignError: If the design cannot be built or holds what is not modelled.
         ComputationError: If a solve fails.
     """
-    half = can_halve(design)
+    half = can_halve(design, bearing=False)
     if bearing is not None and design.wave_generator.bearing is not None:
         half = half and design.wave_generator.bearing.balls % 2 == 0
     ring = solid_ring(design, half=half, bearing=bearing)

@@ -62,7 +62,13 @@ class Facing:
 
 
 def facing(
-    ring: HermiteRing, q: Array, points: Array, start: Array, *, inside: bool
+    ring: HermiteRing,
+    q: Array,
+    points: Array,
+    start: Array,
+    *,
+    inside: bool,
+    own: Index | None = None,
 ) -> Facing:
     """Distances of points from the mean line of a ring.
 
@@ -72,11 +78,12 @@ def facing(
         points: Shape (n, 2) [m].
         start: Places near the feet (n,).
         inside: On which side of the line the points are.
+        own: Elements that the points face even from beyond their ends (n,).
     """
-    place = ring.nearest(q, points, start)
-    element, xi = ring.split(place)
+    place = ring.nearest(q, points, start, own)
+    element, xi = ring.split(place, own)
     value, slope, _ = hermite(xi)
-    r, v, w = ring.at(q, place)
+    r, v, w = ring.at(q, place, own)
     length = np.hypot(v[:, 0], v[:, 1])
     tangent = v / length[:, None]
     outward = np.stack([tangent[:, 1], -tangent[:, 0]], -1)

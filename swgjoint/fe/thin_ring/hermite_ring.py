@@ -18,7 +18,7 @@ from functools import cached_property
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -82,6 +82,27 @@ class HermiteRing:
         along = np.stack([-np.cos(phi), -np.sin(phi)], -1)
         return np.stack([self.radius * outward, self.step * along], axis=1)
 
+    def two_lobes(self, height: float, angle: ArrayLike, major: float) -> Array:
+        """Coordinates of nodes deflected by two lobes without stretch (n, 2, 2) [m].
+
+        Radial w0 cos 2 phi, tangential -w0/2 sin 2 phi, phi from the major axis.
+
+        Args:
+            height: w0 [m].
+            angle: Of the undeformed nodes from +y (n,) [rad].
+            major: Of the major axis [rad].
+        """
+        angle = np.asarray(angle, dtype=np.float64)
+        r, w0, wave = self.radius, height, 2.0 * (angle - major)
+        outward = np.stack([-np.sin(angle), np.cos(angle)], -1)
+        along = np.stack([-np.cos(angle), -np.sin(angle)], -1)
+        w, v = w0 * np.cos(wave)[:, None], -0.5 * w0 * np.sin(wave)[:, None]
+        place = (r + w) * outward + v * along
+        # d/dphi: w' - v outwards, r + w + v' along
+        dw, dv = -2.0 * w0 * np.sin(wave)[:, None], -w0 * np.cos(wave)[:, None]
+        slope = (r + w + dv) * along + (dw - v) * outward
+        return np.stack([place, slope * (2.0 * pi / self.elements)], axis=1)
+
     @cached_property
     def dofs(self) -> Index:
         """Degrees of freedom of every element (elements, 8)."""
@@ -93,20 +114,31 @@ class HermiteRing:
         x = q.reshape(self.elements, 2, 2)
         return np.concatenate([x, np.roll(x, -1, axis=0)], axis=1)
 
-    def at(self, q: Array, place: Array) -> tuple[Array, Array, Array]:
+    def at(
+        self, q: Array, place: Array, own: Index | None = None
+    ) -> tuple[Array, Array, Array]:
         """Position and its first two derivatives by the element parameter, (n, 2) each.
 
         Args:
             q: Coordinates.
             place: Element number plus parameter, from 0 to ``elements`` (n,).
+            own: As in :meth:`split`.
         """
-        element, xi = self.split(place)
+        element, xi = self.split(place, own)
         local = self.nodal(q)[element]
         value, first, second = (np.einsum("na,nai->ni", h, local) for h in hermite(xi))
         return value, first, second
 
-    def split(self, place: Array) -> tuple[Index, Array]:
-        """Element numbers and parameters of places, any number of turns."""
+    def split(self, place: Array, own: Index | None = None) -> tuple[Index, Array]:
+        """Element numbers and parameters of places, any number of turns.
+
+        Args:
+            place: Element number plus parameter (n,).
+            own: Elements whose cubics go on where places lie beyond them (n,); None
+                for those that the places lie on.
+        """
+        if own is not None:
+            return own, place - own
         whole = np.floor(place)
         return np.mod(whole, self.elements).astype(np.int64), place - whole
 
@@ -190,11 +222,20 @@ class HermiteRing:
         )
         return gradient, matrix.reshape(self.elements, 8, 8)
 
-    def nearest(self, q: Array, points: Array, start: Array) -> Array:
-        """Places of the feet of perpendiculars from points, near given ones (n,)."""
+    def nearest(
+        self, q: Array, points: Array, start: Array, own: Index | None = None
+    ) -> Array:
+        """Places of the feet of perpendiculars from points, near given ones (n,).
+
+        Args:
+            q: Coordinates.
+            points: Shape (n, 2) [m].
+            start: Places near the feet (n,).
+            own: As in :meth:`split`.
+        """
         place = start
         for _ in range(6):
-            r, v, w = self.at(q, place)
+            r, v, w = self.at(q, place, own)
             rest = points - r
             slope = np.einsum("ni,ni->n", rest, v)
             gain = np.einsum("ni,ni->n", v, v) - np.einsum("ni,ni->n", rest, w)

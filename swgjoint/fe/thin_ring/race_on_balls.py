@@ -57,6 +57,10 @@ class RaceOnBalls:
     lobe_height: float
     """Radial deflection that the clearances leave [m]."""
     ratio: float
+    cage_held: bool = False
+    """Whether the cage stands still on the cam instead of rolling: every pitch of the
+    teeth then finds the balls in the same places, and only the passage of balls is
+    lost."""
 
     @classmethod
     def of(cls, design: Design, elements: int) -> RaceOnBalls:
@@ -100,6 +104,8 @@ class RaceOnBalls:
             phase: Angle of ball 0 from the major axis at alpha = 0 [rad].
         """
         lag = -self.bearing.cage_share * (1.0 - 1.0 / self.ratio)
+        if self.cage_held:
+            lag = 0.0
         spacing = 2.0 * pi / self.bearing.balls * np.arange(self.bearing.balls)
         pose = self.cam.pose(phase + lag * alpha + spacing)
         centre = rotate(pose.point + self.cam_offset, alpha)

@@ -73,7 +73,7 @@ class BallPassage:
 def ball_passage(design: Design, model: ThinRing) -> BallPassage:
     """Ball passage of a design."""
     balls = model.bearing.balls
-    count = balls * (2 if balls % 2 and can_halve(design) else 1)
+    count = balls * (2 if balls % 2 and can_halve(design, bearing=False) else 1)
     rate = count * model.bearing.cage_share * (1.0 - 1.0 / model.ratio)
     return BallPassage(
         per_cage_turn=count, per_input_turn=rate, carried_as=max(1, round(rate))

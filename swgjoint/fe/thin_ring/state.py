@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.errors import Outcome
-from swgjoint.fe.corotation import turned
 from swgjoint.fe.thin_ring.model import ThinRing
 from swgjoint.fe.tooth_contact import Contacts
 
@@ -72,17 +71,8 @@ def at_rest(model: ThinRing, alpha: float, phase: float = 0.0) -> RingState:
     psi = alpha / model.ratio
     parts = []
     for ring in (model.rim, model.race):
-        count, r, w0 = ring.elements, ring.radius, model.lobe_height
-        phi = 2.0 * np.pi / count * np.arange(count)
-        wave = 2.0 * (phi + psi - alpha)
-        outward = np.stack([-np.sin(phi + psi), np.cos(phi + psi)], -1)
-        along = turned(outward)
-        w, v = w0 * np.cos(wave)[:, None], -0.5 * w0 * np.sin(wave)[:, None]
-        place = (r + w) * outward + v * along
-        # d/dphi: w' - v outwards, r + w + v' along
-        dw, dv = -2.0 * w0 * np.sin(wave)[:, None], -w0 * np.cos(wave)[:, None]
-        slope = (r + w + dv) * along + (dw - v) * outward
-        parts.append(np.stack([place, slope * (2.0 * np.pi / count)], axis=1).ravel())
+        phi = 2.0 * np.pi / ring.elements * np.arange(ring.elements)
+        parts.append(ring.two_lobes(model.lobe_height, phi + psi, alpha).ravel())
     centres, _, _ = model.balls(alpha, phase)
     share = model.race.elements / (2.0 * np.pi)
     angle = np.arctan2(-centres[:, 0], centres[:, 1]) - psi
