@@ -95,10 +95,17 @@ def report(result: dict[str, Any]) -> str:
         table(rows, header=header),
         "*: confirmed; the rest as the search has seen it" if care else "",
     ]
+    named = [(row["design"], row) for row in rivals]
+    named += [(f"front {k + 1}", row) for k, row in enumerate(result["front"])]
     lines += [
-        f"{row['design']}: {record['outcome']}: {record['reason']}"
-        for row in rivals
+        f"{name}: {record['outcome']}: {record['reason']}"
+        for name, row in named
         if (record := row["confirmed"] or row)["outcome"] != "ok"
+    ]
+    lines += [
+        f"{name}: confirmed, it misses the limit of {', '.join(row['missed'])}"
+        for name, row in named
+        if row["missed"]
     ]
     for k, row in enumerate(result["front"]):
         if row["not_worse_than"]:
@@ -121,6 +128,6 @@ def report(result: dict[str, Any]) -> str:
 def _best(row: dict[str, Any], figures: list[str]) -> list[str]:
     """Figures of a design, with a star where they are confirmed."""
     confirmed = row["confirmed"]
-    if confirmed is not None and confirmed["outcome"] == "ok":
-        return [f"{confirmed[name]:.5g}*" for name in figures]
-    return ["" if row[name] is None else f"{row[name]:.5g}" for name in figures]
+    ok = confirmed is not None and confirmed["outcome"] == "ok"
+    best, mark = (confirmed, "*") if ok else (row, "")
+    return ["" if (v := best[name]) is None else f"{v:.5g}{mark}" for name in figures]

@@ -53,13 +53,14 @@ def can_halve(design: Design, *, bearing: bool = True) -> bool:
 def carries_bearing(design: Design) -> bool:
     """Whether the plane model has the ball bearing of a design's wave generator.
 
-    It needs an outline without corners or straights, and a wave generator that turns
+    It needs two lobes of an outline without corners or straights, that turns
     against a circular spline at rest: the balls roll as the flexspline then does.
     """
     generator = design.wave_generator
     return (
         generator.bearing is not None
         and generator.kind in ("elliptical", "cosine", "table")
+        and design.lobes == 2
         and design.drive.layout == "circular_spline_fixed"
     )
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from swgjoint.errors import ComputationError
 from swgjoint.fe.continuation import Continuation
 from swgjoint.fe.drive2d import can_halve, ring_model
-from swgjoint.fe.sampling import SYMMETRIC
+from swgjoint.fe.sampling import SYMMETRIC, on_bearing
 from swgjoint.fe.state import State
 from swgjoint.gear.design import Design
 from swgjoint.gear.mounting import series_compliance
@@ -68,7 +68,9 @@ def friction_loops(
     parts = (np.arange(positions) + 0.5) / positions
     if design.wave_generator.kind in SYMMETRIC:
         parts = parts[: (positions + 1) // 2]
-    model = ring_model(perfect, half=can_halve(perfect), cage_held=True)
+    bearing = on_bearing(design)
+    half = can_halve(perfect, bearing=bearing)
+    model = ring_model(perfect, half=half, bearing=bearing, cage_held=True)
     rubbing = Continuation(model=model, ratio=design.ratio, layout=drive.layout)
     smooth = replace(rubbing, model=replace(model, friction=None))
     torque = loop_torques(top, steps)

@@ -54,7 +54,7 @@ def sample_map(
     negative torques are the mirror image of the positive ones; both claims are checked
     at rated torque and recorded. Torques at which a solve fails, and those beyond, are
     left out, and the record says so. Manufacturing errors are superposed, see
-    :mod:`swgjoint.fe.tolerance_sampling`, on a rigid wave generator in either model.
+    :mod:`swgjoint.fe.tolerance_sampling`; a map with them has a rigid wave generator.
 
     In the plane the balls of a bearing stand still on the cam, the first one on the
     major axis: they pass at another rate than teeth, and what repeats after a pitch and
@@ -162,13 +162,15 @@ def sample_map(
                 "cup": "closed-form torsion in series"
                 if model == "2d" and design.cup is not None
                 else None,
-                "bearing": _bearing(design) if model == "2d" else None,
+                "bearing": "balls at rest on the cam, their passage left out"
+                if model == "2d" and on_bearing(design)
+                else None,
                 "springs_Nm_rad": springs_of(design),
                 "friction": "left out of the potential"
                 if design.friction.tooth_coefficient
                 else None,
                 "tolerances": _named(design),
-                "left_out": left_out(design, model),
+                "left_out": left_out(design, model, bearing=on_bearing(design)),
             },
             "ratings_source": ratings.source,
             "truncated": found.truncated,
@@ -179,10 +181,14 @@ def sample_map(
 
 
 def _in_plane(design: Design) -> Continuation:
-    perfect = without_errors(design)
+    perfect, bearing = without_errors(design), on_bearing(design)
     return Continuation(
         model=ring_model(
-            perfect, half=can_halve(perfect), friction=False, cage_held=True
+            perfect,
+            half=can_halve(perfect, bearing=bearing),
+            friction=False,
+            bearing=bearing,
+            cage_held=True,
         ),
         ratio=design.ratio,
         layout=design.drive.layout,
@@ -198,12 +204,12 @@ def _in_space(design: Design) -> SolidContinuation:
     )
 
 
-def _bearing(design: Design) -> str | None:
-    """What the plane has of the bearing of the wave generator, for the label."""
-    if not carries_bearing(design):
-        return None
-    held = "balls at rest on the cam, their passage left out"
-    return f"{held}; absent under the errors" if has_errors(design) else held
+def on_bearing(design: Design) -> bool:
+    """Whether a map of the plane carries the bearing of the wave generator.
+
+    Errors are superposed on a rigid wave generator: a map with them is of that drive.
+    """
+    return carries_bearing(design) and not has_errors(design)
 
 
 def _named(design: Design) -> dict[str, float] | None:

@@ -160,9 +160,9 @@ def measure_spec(
         drive: The map; None where :func:`needs_map` says so.
         ratings: Needed without a map, else those of the map.
         only: Keys of the sheet; all for none.
-        known: Values that were found elsewhere, of :data:`SOLID_KEYS`,
-            :data:`RATCHETING_KEY` and :data:`SLOW_KEYS`.
-        unknown: Reasons why they were not.
+        known: Values that were found elsewhere, of :data:`SOLID_KEYS` and
+            :data:`RATCHETING_KEY`.
+        unknown: Reasons why they were not, of :data:`SLOW_KEYS`, too.
 
     Raises:
         InputError: If a key is unknown.

@@ -284,6 +284,8 @@ def _stress(
     from swgjoint.fe.drive2d import can_halve
     from swgjoint.fe.meshing import simulate_meshing
 
+    if model == "ring":  # has no notches
+        model = "2d"
     model = model or ("3d" if source.cup is not None else "2d")
     try:
         run = simulate_meshing(

@@ -26,10 +26,14 @@ from swgjoint.study.optimise_front import (
 from swgjoint.study.optimise_search import search
 from swgjoint.study.pool import Executor
 from swgjoint.study.sweep import SweepResult, run_sweep
+from swgjoint.study.sweep_figures import LOST
 from swgjoint.study.sweep_keys import BASE
 from swgjoint.study.sweep_points import Values
 from swgjoint.study.sweep_results import Place, flat
 from swgjoint.study.sweep_validity import validity_of
+
+NAME = 80
+"""Characters of the start's name in those of the front."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -84,7 +88,7 @@ class Optimum:
     def designs(self, source: str) -> list[Design]:
         """Designs of the front, named after the one to start from."""
         assert self.start.design is not None
-        base = self.start.design.drive.name
+        base = self.start.design.drive.name[:NAME]
         found = []
         for k, candidate in enumerate(self.front):
             assert candidate.design is not None
@@ -105,6 +109,9 @@ class Optimum:
             "outcome": record.outcome,
             **{name: record.figures.get(name) for name in self.file.figures},
             "reason": record.reason,
+            "missed": []
+            if confirmed is None or not confirmed.ok
+            else [k for k, v in self.file.violations(confirmed.figures).items() if v],
             "confirmed": None
             if confirmed is None
             else {
@@ -181,7 +188,14 @@ def optimise(
             progress("search", len(tried) + kept + done, file.plan.designs)
 
         columns = {name: [v[name] for v in generation] for name in generation[0]}
-        return computed(columns, report)
+        found = computed(columns, report)
+        lost = [c.record.reason for c in found if c.record.outcome == LOST]
+        if lost:  # not kept: the search would go elsewhere another time
+            raise ComputationError(
+                f"{len(lost)} designs of a generation were lost, the first:"
+                f" {lost[0]}; what is finished is kept, the same command goes on"
+            )
+        return found
 
     generations = 0
     for generation in search(file, start.design, evaluate):

@@ -13,7 +13,15 @@ from swgjoint.models_path import find
 from swgjoint.study.sweep_file import SweepFile, anchored, lying_in
 from swgjoint.study.sweep_keys import BASE
 from swgjoint.study.sweep_plan import List, Parameter, Search, plan_faults
-from swgjoint.study.sweep_tasks import AskedFile, MeshingTask, Text, task_faults
+from swgjoint.study.sweep_tasks import (
+    AskedFile,
+    MeshingTask,
+    Reference,
+    Text,
+    task_faults,
+)
+
+REFINEMENT = "mesh.refinement"
 
 
 class Objective(Section):
@@ -75,7 +83,7 @@ class OptimisationFile(AskedFile):
     limits: Annotated[tuple[Limit, ...], Field(strict=False)] = ()
     plan: Search
     confirm: Confirmation | None = None
-    beside: Annotated[tuple[Text, ...], Field(strict=False)] = ()
+    beside: Annotated[tuple[Reference, ...], Field(strict=False)] = ()
     """Designs to hold against the front; the search does not see them."""
 
     @model_validator(mode="after")
@@ -98,7 +106,11 @@ class OptimisationFile(AskedFile):
                 faults.append(("confirm.positions", "read by nobody without meshing"))
             if confirm.model is not None and self.spec is None and self.run is None:
                 faults.append(("confirm.model", "read by nobody but meshing and maps"))
-        if any(BASE in parameter.keys for parameter in self.plan.parameters):
+        varied = {key for p in self.plan.parameters for key in p.keys}
+        if confirm is not None and confirm.refinement and REFINEMENT in varied:
+            told = f"{REFINEMENT} is a parameter; accepted: one of the two"
+            faults.append(("confirm.refinement", told))
+        if BASE in varied:
             faults.append(("plan.parameters", f"key {BASE!r}; accepted: in a sweep"))
         if faults:
             raise Fault(*faults)
@@ -140,7 +152,7 @@ class OptimisationFile(AskedFile):
         if confirm and (care := self.confirm) is not None:
             if care.refinement is not None:
                 count = len(next(iter(columns.values())))
-                columns = {**columns, "mesh.refinement": [care.refinement] * count}
+                columns = {**columns, REFINEMENT: [care.refinement] * count}
             for name, task in tasks.items():
                 if task is None:
                     continue

@@ -87,6 +87,8 @@ def not_worse(file: OptimisationFile, one: Candidate, other: Candidate) -> bool:
     """
     records = [one.record, other.record]
     confirmed = [one.confirmed, other.confirmed]
+    if any(record is not None and not record.ok for record in confirmed):
+        return False  # it did not stand the care
     if all(record is not None and record.ok for record in confirmed):
         records = [record for record in confirmed if record is not None]
     for objective in file.objectives:

@@ -127,9 +127,9 @@ def _values(axis: Axes, found: Optimum) -> None:
     import matplotlib
 
     parameters = found.file.plan.parameters
-    objective = found.file.objectives[0].figure
-    height = _figures(found.front, objective, confirmed=False)
-    scale = matplotlib.colors.Normalize(height.min(), max(height.max(), 1e-9))
+    first = found.file.objectives[0]
+    height = first.sign * _figures(found.front, first.figure, confirmed=False)
+    scale = matplotlib.colors.Normalize(height.min(), height.max())
     colours = matplotlib.colormaps["viridis"]
     places = range(len(parameters))
     for candidate, value in zip(found.front, height, strict=True):

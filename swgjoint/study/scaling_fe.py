@@ -43,8 +43,9 @@ def _measure(
 
 
 def teeth(count: float) -> dict[str, Any]:
-    """One pitch diameter, teeth of its module, rated torque."""
-    return _measure(Design.load(f"size-25-{int(count) // 2}"))
+    """One pitch diameter, teeth of its module, rated torque, rigid wave generator."""
+    design = Design.load(f"size-25-{int(count) // 2}")
+    return _measure(design.with_changes({"wave_generator.bearing": None}))
 
 
 def mesh(refinement: float) -> dict[str, Any]:

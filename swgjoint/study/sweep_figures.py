@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from math import pi
+from math import isfinite, pi
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 _STRESSES = ("von_mises_MPa", "tensile_MPa", "compressive_MPa")
 _RING = "circular_spline_"
 KINEMATIC = "kinematic_error_pp_arcsec"
+STIFFNESS = "torsional_stiffness_Nm_rad"
 MESHING_FIGURES = (
     *_STRESSES,
     *(f"{_RING}{name}" for name in _STRESSES),
@@ -33,7 +34,7 @@ MESHING_FIGURES = (
     KINEMATIC,
     "pairs_in_contact",
     "wave_generator_torque_pp_Nm",
-    "torsional_stiffness_Nm_rad",
+    STIFFNESS,
 )
 """Stresses: mean over the positions of the largest one of the flexspline or of the
 circular spline. Errors: peak to peak of the output over the positions, under the torque
@@ -127,7 +128,9 @@ def compute(asked: Asked) -> Record:
         if asked.design is not None and (reason := _infeasible(asked.design)):
             outcome = "infeasible"
         else:
-            figures, reason = _figures(asked)
+            found, reason = _figures(asked)
+            # no number is None, as where the model cannot tell
+            figures = {k: v if _finite(v) else None for k, v in found.items()}
             outcome = OK
     except InputError as error:
         outcome, reason = "refused", str(error)
@@ -143,6 +146,10 @@ def compute(asked: Asked) -> Record:
         figures=figures,
         work_s=time.perf_counter() - begin,
     )
+
+
+def _finite(value: float | None) -> bool:
+    return value is not None and isfinite(value)
 
 
 def _infeasible(design: Design) -> str:
@@ -191,7 +198,7 @@ def _meshing(design: Design, task: MeshingTask) -> dict[str, float | None]:
         found["wave_generator_torque_pp_Nm"] = _range(steps["wave_generator_torque_Nm"])
         series = series_compliance(design, cup=_model(design, task) == "2d")
         compliance = float(np.mean([state.compliance for state in run.states]))
-        found["torsional_stiffness_Nm_rad"] = 1.0 / (compliance + series)
+        found[STIFFNESS] = 1.0 / (compliance + series)
     if KINEMATIC in task.figures:
         steps = _simulated(design, task, 0.0).common_series()
         found[KINEMATIC] = _range(steps["output_error_arcsec"])

@@ -13,10 +13,13 @@ from swgjoint.study.sweep_figures import (
     RUN_FIGURES,
     SIZE_FIGURES,
     SPEC_FIGURES,
+    STIFFNESS,
 )
 
 Listed = Field(strict=False, min_length=1)  # TOML has lists, the models tuples
 Text = Annotated[str, Field(min_length=1, max_length=200)]
+Reference = Annotated[str, Field(min_length=1, max_length=4096)]
+"""A bundled name or a path."""
 
 
 class FigureTask(Section):
@@ -51,6 +54,14 @@ class MeshingTask(FigureTask):
     a perfect gear repeats."""
     model: Literal["2d", "3d"] | None = None
     """3d for a design with a cup, else 2d, without."""
+
+    @model_validator(mode="after")
+    def _loaded(self) -> MeshingTask:
+        if self.torque_Nm == 0 and STIFFNESS in self.figures:
+            # with play the output is free then
+            told = f"0 N·m with {STIFFNESS}; accepted: another torque"
+            raise Fault(("torque_Nm", told))
+        return self
 
 
 class SpecTask(FigureTask):
@@ -98,9 +109,9 @@ class AskedFile(Section):
 
     description: Annotated[str, Field(max_length=1000)] = ""
     source: Annotated[str, Field(max_length=1000)] = ""
-    design: Text | None = None
+    design: Reference | None = None
     """Base of the designs; a scene alone keeps its drives."""
-    scene: Text | None = None
+    scene: Reference | None = None
     meshing: MeshingTask | None = None
     spec: SpecTask | None = None
     size: SizeTask | None = None

@@ -11,7 +11,7 @@ NOT_MODELLED = {
     " its torsion",
     "2d": "micro-geometry, cup but for its torsion; in a map the passage of balls; the"
     " bearing of the wave generator outside of the layout circular_spline_fixed and on"
-    " outlines with corners or straights",
+    " outlines with corners, straights or three lobes, and in a map with errors",
     "3d": "bearing of the wave generator; stresses at edges and at the step from rim to"
     " cup do not converge with the mesh",
 }
@@ -37,6 +37,8 @@ def validity_of(file: AskedFile) -> dict[str, dict[str, Any]]:
         found["spec"] = _label(file.spec.model, torque)
         if not needs_map(file.spec.figures):
             found["spec"] |= {"level": "ratings alone", "not_modelled": {}}
+    if file.size is not None:
+        found["size"] = {"level": "design", "torque": "none", "not_modelled": {}}
     if file.run is not None:
         found["run"] = _label(file.run.model, "within the map of a drive")
         if file.design is None:

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from swgjoint.cli.main import main
+from swgjoint.cli.optimise import _best
 from swgjoint.gear.design import Design
 
 pytest.importorskip("optuna", reason="needs swgjoint[tune]")
@@ -115,3 +116,11 @@ def test_bad_input_is_one_line(arguments, status, told, file, tmp_path, capsys):
     error = capsys.readouterr().err
     assert told in error and "Traceback" not in error
     assert not list(out.glob("optimise.*"))
+
+
+def test_figures_that_nobody_can_tell_stay_empty():
+    """Of a confirmed design as of one that the search alone has seen."""
+    row = {"a": 2.0, "b": None, "confirmed": {"outcome": "ok", "a": None, "b": 3.0}}
+    assert _best(row, ["a", "b"]) == ["", "3*"]
+    assert _best({**row, "confirmed": None}, ["a", "b"]) == ["2", ""]
+    assert _best({**row, "confirmed": {"outcome": "failed"}}, ["a", "b"]) == ["2", ""]

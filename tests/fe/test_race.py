@@ -13,11 +13,12 @@ from swgjoint.errors import DesignError
 from swgjoint.fe.build_map import build_map
 from swgjoint.fe.continuation import Continuation
 from swgjoint.fe.corotation import turned
-from swgjoint.fe.drive2d import can_halve, left_out, ring_model
+from swgjoint.fe.drive2d import can_halve, carries_bearing, left_out, ring_model
 from swgjoint.fe.equilibrium import Load
 from swgjoint.fe.linearise import linearise
 from swgjoint.fe.meshing import simulate_meshing
 from swgjoint.fe.race import PlaneRace
+from swgjoint.fe.sampling import on_bearing
 from swgjoint.fe.thin_ring.loading import loaded, unloaded
 from swgjoint.fe.thin_ring.model import thin_ring
 from swgjoint.gear.ball_bearing import BallBearing
@@ -371,3 +372,25 @@ def test_map_carries_the_bearing():
     label = found.info["label"]
     assert label["bearing"] == "balls at rest on the cam, their passage left out"
     assert label["left_out"] is None and rigid.info["label"]["bearing"] is None
+
+
+def test_a_map_with_errors_is_of_the_rigid_wave_generator():
+    """Errors are superposed on that: pattern, loops and errors are of one drive."""
+    flawed = small(**{"tolerances.circular_spline_cumulative_pitch_um": 5.0})
+    assert on_bearing(small()) and not on_bearing(flawed)
+    bare = flawed.with_changes({"wave_generator.bearing": None})
+    found, wanted = (
+        build_map(d, model="2d", angles=2, cache=False) for d in (flawed, bare)
+    )
+    np.testing.assert_array_equal(found.torque_range, wanted.torque_range)
+    assert found.info["label"]["left_out"] == "wave_generator.bearing"
+
+
+def test_three_lobes_keep_the_rigid_wave_generator():
+    """A search begins with two lobes of the race."""
+    three = Design.load("reference-2d").with_changes(
+        {"drive.teeth_circular_spline": 123, "wave_generator": {"kind": "cosine"}}
+        | BEARING
+    )
+    assert three.lobes == 3
+    assert not carries_bearing(three)

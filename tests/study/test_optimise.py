@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -328,6 +330,49 @@ def test_files_that_it_names_lie_relative_to_it(tmp_path, monkeypatch):
         optimise(gone, executor=LocalPool(1))
 
 
+def test_a_lost_design_ends_the_search_with_what_is_kept(tmp_path, monkeypatch):
+    """Told as one without figures it would lead elsewhere than another run."""
+    file, place, real = sizes(40), place_of(tmp_path), optimise_module.run_sweep
+
+    def run_sweep(file, **kwargs):
+        found = real(file, **kwargs)
+        if len(found.records) < 3:
+            return found
+        records = (Record(outcome="lost", reason="no memory"), *found.records[1:])
+        return replace(found, records=records)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(optimise_module, "run_sweep", run_sweep)
+        with pytest.raises(ComputationError, match=r"1 designs .* lost.*no memory"):
+            optimise(file, executor=LocalPool(1), place=place)
+    again = optimise(file, executor=LocalPool(1), place=place)
+    fresh = optimise(file, executor=LocalPool(1))
+    assert again.to_json()["rows"] == fresh.to_json()["rows"]
+
+
+def test_a_design_that_fails_with_care_is_not_called_as_good():
+    """Whatever the search had seen of it."""
+    rival = with_figures(2.0, 5.0)
+    good = with_figures(1.0, 5.0)
+    assert not_worse(sizes(), good, rival)
+    failed = replace(good, confirmed=Record(outcome="failed"))
+    assert not not_worse(sizes(), failed, rival)
+
+
+def test_long_paths_and_names_are_no_hindrance(tmp_path):
+    """Of the file of the start, and of the start itself."""
+    folder = tmp_path / ("a" * 120) / ("b" * 120)
+    folder.mkdir(parents=True)
+    made = Design.load("reference-2d").with_changes({"drive.name": "n" * 100})
+    (folder / "one.toml").write_text(made.to_toml())
+    text = HEAD.replace("reference-2d", "one.toml") + PLAN.format(designs=4, seed=0)
+    (folder / "search.toml").write_text(text)
+    found = optimise(
+        OptimisationFile.load(folder / "search.toml"), executor=LocalPool(1)
+    )
+    assert all(d.drive.name.startswith("nnn") for d in found.designs("search"))
+
+
 def test_a_search_that_finds_nothing_is_one_line():
     """Limits that no design keeps; a start that has no figures."""
     file = sizes(20, more='[[limits]]\nfigure = "volume_cm3"\nmost = 1.0\n')
@@ -370,6 +415,14 @@ def test_a_file_that_cannot_be_used_is_one_line_a_fault(old, new, told):
     assert old in text
     with pytest.raises(InputError, match=told):
         read(text.replace(old, new))
+
+
+def test_care_and_search_do_not_both_choose_the_mesh():
+    """Or the confirmation would fail after the whole search."""
+    text = HEAD + "[confirm]\nrefinement = 2.0\n" + PLAN.format(designs=4, seed=0)
+    keys = '"drive.face_width_mm"'
+    with pytest.raises(InputError, match=r"confirm.refinement: mesh.refinement is a"):
+        read(text.replace(keys, f'{keys}, "mesh.refinement"'))
 
 
 def test_a_start_outside_the_ranges_is_no_hindrance():

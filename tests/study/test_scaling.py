@@ -96,3 +96,10 @@ def test_a_position_is_timed_without_its_set_up():
     # which of them is longer depends on who else uses the cores
     assert row["seconds"] > 0.0 and row["setup_s"] > 0.0
     assert row["iterations"] > 2
+
+
+def test_teeth_are_timed_on_a_rigid_wave_generator():
+    """The family has an odd number of balls, which half a drive does not take."""
+    row = scaling_fe.teeth(60)
+    assert row["outcome"] == "converged"
+    assert row["seconds"] > 0.0

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 
 import pytest
 
-from swgjoint.errors import ComputationError, MissingExtraError
+from swgjoint.errors import ComputationError, InputError, MissingExtraError
 from swgjoint.faults import parse_toml, validated
 from swgjoint.study import sweep as sweep_module
 from swgjoint.study.pool import LocalPool, Lost
@@ -368,6 +368,23 @@ values = [0.5]
 
     slope = 0.2 / (output(19.9) - output(20.1))
     assert told == pytest.approx(slope, rel=1e-3)  # 1 % of torque, round-off of 1e-12
+
+
+def test_no_stiffness_is_asked_for_without_torque():
+    """With play the output is free then."""
+    text = """
+design = "reference-2d"
+[meshing]
+figures = ["torsional_stiffness_Nm_rad"]
+torque_Nm = 0.0
+[plan]
+kind = "list"
+[[plan.parameters]]
+keys = ["mesh.refinement"]
+values = [0.5]
+"""
+    with pytest.raises(InputError, match=r"torque_Nm: 0 N·m with torsional_stiffness"):
+        validated(SweepFile, parse_toml(text, where="x"), where="x")
 
 
 def test_run_figures_are_those_of_the_scene():
