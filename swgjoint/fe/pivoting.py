@@ -16,7 +16,9 @@ Mask = NDArray[np.bool_]
 TOLERANCE = 1e-9
 """Part of the largest offset of a problem that counts as zero."""
 TRIES = 3
-"""Exchanges of whole blocks without progress before a problem is solved alone."""
+"""Exchanges of whole blocks without progress before single ones."""
+SINGLES = 60
+"""Single exchanges without progress before a problem is solved alone."""
 PIVOTS = 10
 """Most pivots of a problem alone, over its size; contacts take a fifth of its size."""
 TIE = 1e-12
@@ -42,8 +44,9 @@ class Pivoted:
 def solve_many(matrix: Array, offset: Array, start: Mask | None = None) -> Pivoted:
     r"""Solve :math:`0 \le v \perp w = q + M v \ge 0` for every row q of the offset.
 
-    Block principal pivoting: all wrong members of the active set change sides. Where
-    that makes no progress the problem is solved alone, see :func:`lemke`.
+    Block principal pivoting: all wrong members of the active set change sides; where
+    that makes no progress only the last one does (Murty), which may take long. Where
+    that makes none either the problem is solved alone, see :func:`lemke`.
 
     Args:
         matrix: M, positive definite; symmetry is not asked. Shape (n, n).
@@ -84,9 +87,14 @@ def solve_many(matrix: Array, offset: Array, start: Mask | None = None) -> Pivot
             fewest[open_] = np.minimum(fewest[open_], wrong)
             nearest[open_[better]] = active[open_[better]]
             tries[open_] = np.where(better, TRIES, tries[open_] - 1)
-            stuck += open_[(wrong > 0) & (tries[open_] < 0)].tolist()
-            left = (wrong > 0) & (tries[open_] >= 0)
+            ends = tries[open_] < -SINGLES
+            stuck += open_[(wrong > 0) & ends].tolist()
+            left = (wrong > 0) & ~ends
             open_, bad = open_[left], bad[left]
+            single = np.flatnonzero(tries[open_] < 0)
+            last = bad.shape[1] - 1 - bad[single, ::-1].argmax(axis=1)
+            bad[single] = False
+            bad[single, last] = True
             active[open_] ^= bad
 
         def alone(k: int) -> Mask | None:
