@@ -15,7 +15,7 @@ from swgjoint.fe.corotation import (
     tangent,
     turned,
 )
-from swgjoint.fe.race import NODE, RaceForces
+from swgjoint.fe.race import NODE, PlaneRaceForces
 from swgjoint.fe.ring import RingModel
 from swgjoint.fe.state import State
 from swgjoint.fe.superelement import Superelement
@@ -71,7 +71,7 @@ class Linearised:
     ring_elastic: Array
     """Elastic displacement of the circular spline's flanks (N_c, 2 n_c) [m]."""
     search: ToothContact
-    race: RaceForces | None = None
+    race: PlaneRaceForces | None = None
     """Counted in gradient and tangent; None for a rigid wave generator."""
     race_rows: Array | None = None
     """Derivative of the gaps to the race (N, n_bore + 1, n)."""
@@ -246,7 +246,7 @@ def linearise(model: RingModel, state: State, torque: float | None) -> Linearise
     return found if race is None else _on_race(model, found, race)
 
 
-def _on_race(model: RingModel, ring: Linearised, race: RaceForces) -> Linearised:
+def _on_race(model: RingModel, ring: Linearised, race: PlaneRaceForces) -> Linearised:
     """The ring with the race, whose nodes join the faces of the sectors."""
     assert model.race is not None
     size = len(model.dofs) + len(model.race_dofs)

@@ -41,14 +41,12 @@ class SetupState:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class MeshingStep:
+class Position:
     """Results at one wave-generator position; NaN and None where the solve failed."""
 
     input_angle: float
     """theta [rad]."""
     outcome: Outcome = Outcome.CONVERGED
-    wave_generator_angle: float = nan
-    """Against the frame in which the flexspline or circular spline stands [rad]."""
     output_error: float = nan
     """Output angle minus theta/i, from the undeformed position [rad]."""
     input_torque: float = nan
@@ -59,13 +57,21 @@ class MeshingStep:
     """Moment of the tooth forces on the flexspline [N·m]."""
     energy: float = nan
     """Strain energy [J]."""
+    pairs_in_contact: int | None = None
+    iterations: int = 0
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class MeshingStep(Position):
+    """Results at one position of a plane model."""
+
+    wave_generator_angle: float = nan
+    """Against the frame in which the flexspline or circular spline stands [rad]."""
     friction_work: float = nan
     """Work of tooth friction since the deflection [J]."""
-    pairs_in_contact: int | None = None
     contact_nodes: int | None = None
     """Bore nodes that touch the wave generator, whole drive."""
     stress: MemberMaxima | None = None
-    iterations: int = 0
     state: State | None = None
     """The equilibrium, for fields and pictures."""
 

@@ -46,10 +46,26 @@ PRESSED = 1.01
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RaceForces:
-    """Race, balls and what presses the bore on them, by sectors.
+    """Race and balls at one state, by sectors of m coordinates."""
+
+    gradient: Array
+    """Of their energy (N, m) [N]."""
+    hessian: Array
+    """(N, m, m) [N/m]."""
+    fixed: Mask
+    """What is held (N, m)."""
+    balls: PressedBalls
+    """All of the drive."""
+    energy: float
+    """Of race and balls, whole drive [J]."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PlaneRaceForces(RaceForces):
+    """Race, balls and what presses the bore on them.
 
     Coordinates of a sector: its bore nodes but the last corner, then the nodes of the
-    race from its first face to its last one; b and r of them.
+    race from its first face to its last one; b and r of them, m together.
     """
 
     gap: Array
@@ -58,16 +74,6 @@ class RaceForces:
     """Its derivative (N, b/2, b + r)."""
     normal: Array
     """Out of the race at the bore nodes (N, b/2, 2)."""
-    gradient: Array
-    """Of the energy (N, b + r) [N]."""
-    hessian: Array
-    """(N, b + r, b + r) [N/m]."""
-    fixed: Mask
-    """What is held (N, b + r)."""
-    balls: PressedBalls
-    """All of the drive."""
-    energy: float
-    """Whole drive [J]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -184,7 +190,7 @@ class PlaneRace:
 
     def forces(
         self, race: Array, alpha: float, points: Array, touching: Mask
-    ) -> RaceForces:
+    ) -> PlaneRaceForces:
         """Race, balls and the bore's nodes on it.
 
         Args:
@@ -249,7 +255,7 @@ class PlaneRace:
 
         pressed = 0.5 * float(-force @ gap) * (2.0 if self.half else 1.0)
         shape = points.shape[:2]
-        return RaceForces(
+        return PlaneRaceForces(
             gap=gap.reshape(shape),
             rows=gap_rows.reshape(*shape, -1),
             normal=seen.normal.reshape(points.shape),

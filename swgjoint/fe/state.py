@@ -16,7 +16,36 @@ Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class State:
+class StateFigures:
+    """What an equilibrium tells in the plane as in space."""
+
+    wave_generator_angle: float = 0.0
+    """In the frame of the solver [rad]."""
+    rotation: float = 0.0
+    """Best-fit rotation of the bore, in space of the bore of the diaphragm [rad]."""
+    ring_rotation: float = 0.0
+    """Of the circular spline [rad]."""
+    torque: float = 0.0
+    """Torque T that the output exerts on its load, whole drive [N·m]."""
+    holding_torque: float = 0.0
+    """External torque on the flexspline, in space on the bore of its diaphragm, whole
+    drive [N·m]."""
+    wave_generator_torque: float = 0.0
+    """External torque on the wave generator, whole drive [N·m]."""
+    tooth_moment: float = 0.0
+    """Moment of the tooth forces on the flexspline, whole drive [N·m]."""
+    energy: float = 0.0
+    """Strain energy, whole drive [J]."""
+    compliance: float = 0.0
+    """Tangent -d(output rotation)/dT at the active contacts [rad/(N·m)], NaN where no
+    torque is prescribed."""
+    outcome: Outcome = Outcome.CONVERGED
+    history: tuple[float, ...] = ()
+    """Largest displacement increment of every iteration [m]."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class State(StateFigures):
     """One equilibrium, or the start of the search for one. Global frame, SI."""
 
     faces: Array
@@ -48,23 +77,3 @@ class State:
     """The same of the running iteration; None at its end."""
     friction_work: float = 0.0
     """Work of friction since the deflection, whole drive [J]."""
-    wave_generator_angle: float = 0.0
-    rotation: float = 0.0
-    """Best-fit rotation of the bore [rad]."""
-    ring_rotation: float = 0.0
-    """Rotation of the circular spline [rad]."""
-    torque: float = 0.0
-    """Torque T that the output exerts on its load, whole drive [N·m]."""
-    holding_torque: float = 0.0
-    """External torque on the flexspline, whole drive [N·m]."""
-    wave_generator_torque: float = 0.0
-    """External torque on the wave generator, whole drive [N·m]."""
-    tooth_moment: float = 0.0
-    """Moment of the tooth forces on the flexspline, whole drive [N·m]."""
-    energy: float = 0.0
-    """Strain energy, whole drive [J]."""
-    compliance: float = 0.0
-    """Tangent -d(output rotation)/dT at the active contacts [rad/(N·m)]."""
-    outcome: Outcome = Outcome.CONVERGED
-    history: tuple[float, ...] = ()
-    """Largest displacement increment of every iteration [m]."""

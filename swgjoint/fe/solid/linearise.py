@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from swgjoint.fe.race import RaceForces
 from swgjoint.fe.solid.across import FLAT, WIDE, crown_bend, vertices
 from swgjoint.fe.solid.corotation import (
     Frames,
@@ -28,7 +29,6 @@ from swgjoint.fe.solid.corotation import (
     spin,
     tangent,
 )
-from swgjoint.fe.solid.race import RaceForces
 from swgjoint.fe.solid.ring import SolidRing
 from swgjoint.fe.solid.state import SolidState
 

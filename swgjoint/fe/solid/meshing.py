@@ -6,15 +6,15 @@ import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from functools import partial
-from math import nan, pi
+from math import pi
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from swgjoint.errors import ComputationError, Outcome
-from swgjoint.fe.meshing_run import Positions
+from swgjoint.errors import ComputationError
+from swgjoint.fe.meshing_run import Position, Positions
 from swgjoint.fe.solid.axial_section import coning
 from swgjoint.fe.solid.checkpoint import Checkpoint
 from swgjoint.fe.solid.continuation import SolidContinuation
@@ -44,25 +44,10 @@ class SolidSetup:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class SolidStep:
-    """Results at one wave-generator position; NaN and None where the solve failed."""
+class SolidStep(Position):
+    """Results at one position in space."""
 
-    input_angle: float
-    """theta [rad]."""
-    outcome: Outcome = Outcome.CONVERGED
-    output_error: float = nan
-    """Output angle minus theta/i, from the undeformed position [rad]."""
-    input_torque: float = nan
-    """External torque on the input [N·m]."""
-    wave_generator_torque: float = nan
-    """External torque on the wave generator [N·m]."""
-    tooth_moment: float = nan
-    """Moment of the tooth forces on the flexspline [N·m]."""
-    energy: float = nan
-    """Strain energy [J]."""
-    pairs_in_contact: int | None = None
     stress: SolidMaxima | None = None
-    iterations: int = 0
     state: SolidState | None = None
 
 

@@ -22,10 +22,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.fe.corotation import rotate
+from swgjoint.fe.race import RaceForces
 from swgjoint.fe.solid.race_outside import RaceOutside
 from swgjoint.fe.solid.race_roll import RaceRoll
 from swgjoint.fe.thin_ring.race_on_balls import (
-    PressedBalls,
     RaceOnBalls,
     pressed_form,
 )
@@ -47,22 +47,6 @@ AXIAL = np.array([3, 7, 11, 15])
 ANCHOR = 1e-11
 """Part of the largest stiffness that holds back in every step what nothing holds. At
 1e-9 the race of size 25 and ratio 100 went half of the way left at every step."""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class RaceForces:
-    """Race and balls at one state, by sectors."""
-
-    gradient: Array
-    """Of their energy (N, 16) [N]."""
-    hessian: Array
-    """(N, 16, 16) [N/m]."""
-    fixed: Mask
-    """What is held (N, 16)."""
-    balls: PressedBalls
-    """All of the drive."""
-    energy: float
-    """Of race and balls, whole drive [J]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

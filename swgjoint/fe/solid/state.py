@@ -7,15 +7,15 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from swgjoint.errors import Outcome
 from swgjoint.fe.solid.teeth import ToothRows
+from swgjoint.fe.state import StateFigures
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class SolidState:
+class SolidState(StateFigures):
     """One equilibrium, or the start of the search for one. Global frame, SI."""
 
     faces: Array
@@ -46,24 +46,3 @@ class SolidState:
     """Tooth contacts that carry force."""
     tooth_force: Array = field(default_factory=lambda: np.zeros(0))
     """Their normal forces (n_contacts,) [N]."""
-    wave_generator_angle: float = 0.0
-    rotation: float = 0.0
-    """Of the bore of the diaphragm [rad]."""
-    ring_rotation: float = 0.0
-    """Of the circular spline [rad]."""
-    torque: float = 0.0
-    """That the output exerts on its load, whole drive [N·m]."""
-    holding_torque: float = 0.0
-    """External torque on the bore of the diaphragm, whole drive [N·m]."""
-    wave_generator_torque: float = 0.0
-    """External torque on the wave generator, whole drive [N·m]."""
-    tooth_moment: float = 0.0
-    """Moment of the tooth forces on the flexspline, whole drive [N·m]."""
-    energy: float = 0.0
-    """Strain energy, whole drive [J]."""
-    compliance: float = 0.0
-    """Tangent -d(output rotation)/dT at the active contacts [rad/(N·m)], NaN where no
-    torque is prescribed."""
-    outcome: Outcome = Outcome.CONVERGED
-    history: tuple[float, ...] = ()
-    """Largest displacement increment of every iteration [m]."""
