@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from swgjoint.maps.drive_map import DriveMap, Ratings
+from swgjoint.maps.fields import DriveFields
 from swgjoint.maps.friction import Friction
 
 
@@ -62,6 +63,33 @@ def make_synthetic_map(
 @pytest.fixture
 def synthetic_map() -> DriveMap:
     return make_synthetic_map()
+
+
+@pytest.fixture
+def fields() -> DriveFields:
+    """A ring of 120 teeth that the lobes push out; stress 1 to 3 MPa."""
+    places, radius, lobe = 120, 0.06, 1e-3
+    place = np.pi * np.arange(places) / places
+    u = np.zeros((2, places, 3, 3))
+    u[..., 1] = lobe * np.cos(2.0 * place)[None, :, None]
+    stress = 2e6 + 1e6 * np.cos(2.0 * place)
+    force = np.zeros((2, places, 3))
+    force[..., 1] = -10.0
+    return DriveFields(
+        torque=np.array([-100.0, 100.0]),
+        first_place=np.zeros(2),
+        period=np.pi,
+        points=radius
+        * np.array([[-0.01, 1.0, 0.0], [0.01, 1.0, 0.0], [0.0, 0.9, 0.0]]),
+        triangles=np.array([[0, 1, 2]]),
+        displacement=u,
+        von_mises=np.broadcast_to(stress[None, :, None], (2, places, 3)),
+        tooth_force=force,
+        wave_generator_force=-force,
+        wave_generator=radius
+        * np.array([[0.0, 0.9], [-0.9, 0.0], [0.0, -0.9], [0.9, 0]]),
+        circular_spline=radius * np.array([[0.02, 1.05], [0.0, 1.0], [-0.02, 1.05]]),
+    )
 
 
 @pytest.fixture

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import time
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from swgjoint.cli.text import table
@@ -31,6 +32,12 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--model",
         choices=("ring", "2d", "3d"),
         help="fidelity; default 3d for a design with a cup, else 2d",
+    )
+    parser.add_argument(
+        "--no-fields",
+        action="store_true",
+        help="without stresses and shapes for the recording: a file of tens of kB"
+        " instead of a MB, the same drive otherwise",
     )
     measured = parser.add_argument_group("measured drive")
     measured.add_argument(
@@ -61,6 +68,8 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     start = time.perf_counter()
     path = check_output_file(args.output, ".swg")
     drive = _measured(args) if args.design.endswith(".csv") else _built(args)
+    if args.no_fields:
+        drive = replace(drive, fields=None)
     drive.save(path)
     info = dict(drive.info)
     return {

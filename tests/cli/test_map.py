@@ -48,6 +48,18 @@ def test_map_is_written(built, tmp_path, capsys):
     assert (seen["design"], seen["model"]) == ("reference-2d", "2d")
 
 
+def test_fields_are_left_out(monkeypatch, synthetic_map, fields, tmp_path):
+    """The file without them holds the same drive and is far smaller."""
+    drive = replace(synthetic_map, fields=fields)
+    monkeypatch.setattr(builder, "build_map", lambda design, **_: drive)
+    whole, lean = tmp_path / "whole.swg", tmp_path / "lean.swg"
+    assert main(["map", "reference-2d", "-o", str(whole)]) == 0
+    assert main(["map", "reference-2d", "--no-fields", "-o", str(lean)]) == 0
+    assert DriveMap.load(whole).fields is not None
+    assert map_bytes(DriveMap.load(lean)) == map_bytes(synthetic_map)
+    assert lean.stat().st_size < 0.5 * whole.stat().st_size
+
+
 def test_report(built, tmp_path, capsys):
     """The terminal names the file, the residual and the energy check."""
     path = tmp_path / "a.swg"

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
-from swgjoint.maps.fields import DriveFields
 from swgjoint.sim.run import Run, run_scene
 from swgjoint.view.drive_view import (
     FRAMES,
@@ -20,34 +19,6 @@ from swgjoint.view.drive_view import (
 from swgjoint.view.entities import pose_rows
 
 SHORT = {"simulation.duration_s": 1.0, "trajectory.settle_s": 0.2}
-PLACES = 120
-RADIUS, LOBE = 0.06, 1e-3
-
-
-@pytest.fixture
-def fields():
-    """A ring of 120 teeth that the lobes push out; stress 1 to 3 MPa."""
-    place = np.pi * np.arange(PLACES) / PLACES
-    u = np.zeros((2, PLACES, 3, 3))
-    u[..., 1] = LOBE * np.cos(2.0 * place)[None, :, None]
-    stress = 2e6 + 1e6 * np.cos(2.0 * place)
-    force = np.zeros((2, PLACES, 3))
-    force[..., 1] = -10.0
-    return DriveFields(
-        torque=np.array([-100.0, 100.0]),
-        first_place=np.zeros(2),
-        period=np.pi,
-        points=RADIUS
-        * np.array([[-0.01, 1.0, 0.0], [0.01, 1.0, 0.0], [0.0, 0.9, 0.0]]),
-        triangles=np.array([[0, 1, 2]]),
-        displacement=u,
-        von_mises=np.broadcast_to(stress[None, :, None], (2, PLACES, 3)),
-        tooth_force=force,
-        wave_generator_force=-force,
-        wave_generator=RADIUS
-        * np.array([[0.0, 0.9], [-0.9, 0.0], [0.0, -0.9], [0.9, 0]]),
-        circular_spline=RADIUS * np.array([[0.02, 1.05], [0.0, 1.0], [-0.02, 1.05]]),
-    )
 
 
 @pytest.fixture
