@@ -19,11 +19,13 @@
 # these designs compares their stresses; here they become joints of a UR5e.
 
 # %%
+from pathlib import Path
+
 import matplotlib.pyplot as plt
 import numpy as np
 
+from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.spec_sheet import measure_spec
-from swgjoint.sim.drives import load_drive
 from swgjoint.sim.run import run_scene
 from swgjoint.sim.scene import Scene
 from swgjoint.units import arcmin, mm
@@ -43,13 +45,18 @@ COLORS = dict(
 # ## Four maps
 #
 # Finite elements in the plane, both members elastic, contact everywhere, large
-# rotations. A quarter of the usual positions of the wave generator is enough for a
-# comparison and takes some ten seconds a drive; the default, without `angles`, takes
-# 45 s and is kept in the cache.
+# rotations, 96 positions of the wave generator over a pitch. That takes one to five
+# minutes of a core a drive, so the maps are read from files, which
+#
+#     swgjoint map reference-2d --no-fields -o notebooks/maps/reference-2d.swg
+#
+# writes again, and the other designs alike.
 
 # %%
+here = Path(__file__).parent if "__file__" in globals() else Path.cwd()
 maps = {
-    name: load_drive(design, model="2d", angles=24) for name, design in DESIGNS.items()
+    name: DriveMap.load(here / "maps" / f"{design}.swg")
+    for name, design in DESIGNS.items()
 }
 sheets = {name: measure_spec(drive) for name, drive in maps.items()}
 keys = ("K1_Nm_rad", "transmission_accuracy_arcmin", "ripple_rms_percent")
@@ -133,7 +140,7 @@ comparison_figure(runs, rigid=rigid)
 
 # %% [markdown]
 # Torque ripple is error times stiffness, filtered by the arm. The parabolic drive has
-# the most: thirteen times stiffer than four rollers at a seventh of their error. The
+# the most: thirteen times stiffer than four rollers at a fifth of their error. The
 # simplified drive has the least, and a tool a millimetre off its path. Which is better
 # depends on what the joint is for; a position-controlled arm wants the ellipse, a
 # torque-controlled one may prefer a softer drive.

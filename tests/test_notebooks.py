@@ -11,6 +11,9 @@ from pathlib import Path
 import jupytext
 import pytest
 
+from swgjoint.gear.design import Design
+from swgjoint.maps.drive_map import DriveMap
+
 STORIES = {
     "first-drive",
     "wave-generators",
@@ -25,7 +28,8 @@ STORIES = {
 }
 MOST_S = 180.0
 """Time of one core that a notebook may take."""
-NOTEBOOKS = sorted((Path(__file__).parents[1] / "notebooks").glob("*.py"))
+FOLDER = Path(__file__).parents[1] / "notebooks"
+NOTEBOOKS = sorted(FOLDER.glob("*.py"))
 
 
 def test_there_are_notebooks():
@@ -41,6 +45,16 @@ def test_opens_as_a_notebook(path):
     assert notebook.cells[0].source.startswith("# ")
     assert {"markdown", "code"} == set(kinds)
     assert notebook.metadata.kernelspec.name == "python3"
+
+
+@pytest.mark.parametrize(
+    "path", sorted(FOLDER.glob("maps/*.swg")), ids=lambda path: path.stem
+)
+def test_stored_maps_are_of_the_bundled_designs(path):
+    """A design that was changed wants its map built again, by the command beside it."""
+    drive, design = DriveMap.load(path), Design.load(path.stem)
+    assert drive.info["design_hash"] == design.content_hash()
+    assert drive.info["label"]["model"] == "2d"
 
 
 @pytest.mark.slow
