@@ -12,7 +12,6 @@ from own_contact import own_contact
 from quadratic_ring import MIRROR, quadratic_ring
 from replay import Forces, flexspline_deck, replay, um
 from states import (
-    DESIGNS,
     POSITIONS,
     TORQUE,
     deflected,
@@ -97,9 +96,12 @@ def test_substituted_constants_are_plane_stress(tmp_path):
 
 @needs_calculix
 @pytest.mark.slow
-@pytest.mark.parametrize("kind", DESIGNS)
-def test_wave_generator_state_holds_in_calculix(kind, tmp_path):
-    """Our contact forces give the same shape and root stress in CalculiX."""
+def test_wave_generator_state_holds_in_calculix(tmp_path):
+    """Our contact forces give the same shape and root stress in CalculiX.
+
+    Where the rim is free beside the lobes; ``study.py`` has the other outlines.
+    """
+    kind = "simplified"
     design, model = design_of(kind, OURS), model_of(kind, OURS, False)
     state = deflected(kind, OURS)
 
@@ -116,11 +118,11 @@ def test_wave_generator_state_holds_in_calculix(kind, tmp_path):
 
 @needs_calculix
 @pytest.mark.slow
-@pytest.mark.parametrize("pitches", POSITIONS)
-def test_meshed_position_holds_in_calculix(pitches, tmp_path):
+def test_meshed_position_holds_in_calculix(tmp_path):
     """The same at 20 N·m, where the moments of all forces balance besides."""
     design, model = design_of("elliptical", OURS), model_of("elliptical", OURS)
-    state = turned_to("elliptical", OURS, pitches)
+    # a position of no symmetry
+    state = turned_to("elliptical", OURS, POSITIONS[-1])
 
     def found(element):
         return replay(
