@@ -63,19 +63,27 @@ def _write(place: Place, found: Optimum, result: dict[str, Any]) -> list[str]:
         {key: value for key, value in row.items() if key != "confirmed"}
         for row in result["rows"]
     ]
+    designs = found.designs(result["optimisation"])
     contents = {
-        **{
-            f"front-{k + 1:02d}.toml": design.to_toml().encode()
-            for k, design in enumerate(found.designs(result["optimisation"]))
-        },
+        **{_front(k): design.to_toml().encode() for k, design in enumerate(designs)},
         "tried.csv": csv_text(rows).encode(),
         "optimise.png": optimum_picture(found),
     }
     files = [place.write(name, data) for name, data in contents.items()]
+    # a longer front that an earlier search left there is none of this one
+    left = len(designs)
+    while place.read(_front(left)) is not None:
+        place.remove(_front(left))
+        left += 1
     last = "optimise.json"  # which names them all
     files.append(place.at(last))
     place.write(last, (json_text({**result, "files": files}) + "\n").encode())
     return files
+
+
+def _front(k: int) -> str:
+    """File of a design of the front, counted from 0."""
+    return f"front-{k + 1:02d}.toml"
 
 
 def report(result: dict[str, Any]) -> str:

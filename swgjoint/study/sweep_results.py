@@ -33,6 +33,9 @@ class Place(Protocol):
     def write(self, name: str, data: bytes) -> str:
         """Write a file whole; returns its path."""
 
+    def remove(self, name: str) -> None:
+        """Take a file away that is there."""
+
 
 class Folder:
     """A folder of this machine."""
@@ -61,6 +64,14 @@ class Folder:
         except OSError as error:
             raise InputError(f"cannot write {target}: {error.strerror}") from None
         return str(write_whole(target, data))
+
+    def remove(self, name: str) -> None:
+        """See :class:`Place`."""
+        target = self.path / name
+        try:
+            target.unlink()
+        except OSError as error:
+            raise InputError(f"cannot remove {target}: {error.strerror}") from None
 
 
 class Remote:
@@ -100,6 +111,10 @@ class Remote:
         self._files.pipe_file(beside, data)
         self._files.mv(beside, target)
         return self.at(name)
+
+    def remove(self, name: str) -> None:
+        """See :class:`Place`."""
+        self._files.rm_file(f"{self._root}/{name}")
 
 
 def place_of(where: str | Path) -> Place:

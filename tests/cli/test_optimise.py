@@ -78,7 +78,12 @@ def test_json_and_files(file, tmp_path, capsys):
         assert design.drive.name == f"reference-2d-{name.removesuffix('.toml')}"
     with (out / "tried.csv").open() as text:
         assert len(list(csv.DictReader(text))) == 12
+    # left by a search with a longer front
+    (out / f"front-{count + 1:02d}.toml").write_text("old")
+    (out / "front-ours.toml").write_text("the user's")
     assert main(arguments) == 0
+    found = {path.name for path in out.glob("front*")}
+    assert found == {*fronts, "front-ours.toml"}
     told = capsys.readouterr().out
     assert (
         "12 designs tried in 2 generations, 0 of them without figures; 0 comp" in told
