@@ -2,12 +2,30 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 from swgjoint.maps.drive_map import DriveMap, Ratings
 from swgjoint.maps.fields import DriveFields
 from swgjoint.maps.friction import Friction
+
+
+@pytest.hookimpl(optionalhook=True)  # of pytest-xdist
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
+    """With ``-n``, one process has all tests of a file of finite elements.
+
+    They share drives that take long to solve; other tests go one by one.
+    """
+    from xdist.scheduler import LoadScopeScheduling
+
+    class Scheduling(LoadScopeScheduling):
+        def _split_scope(self, nodeid: str) -> str:
+            file = nodeid.partition("::")[0]
+            return file if "/fe/" in file else nodeid
+
+    return Scheduling(config, log)
 
 
 def make_synthetic_map(
