@@ -118,6 +118,7 @@ def test_wave_generator_state_holds_in_calculix(tmp_path):
 
 @needs_calculix
 @pytest.mark.slow
+@pytest.mark.timeout(1800)
 def test_meshed_position_holds_in_calculix(tmp_path):
     """The same at 20 N·m, where the moments of all forces balance besides."""
     design, model = design_of("elliptical", OURS), model_of("elliptical", OURS)

@@ -124,6 +124,7 @@ def test_element_is_c3d8i_but_for_one_factor(distortion, tmp_path, monkeypatch):
 
 @needs_calculix
 @pytest.mark.slow
+@pytest.mark.timeout(1800)
 def test_wave_generator_state_holds_in_calculix(tmp_path):
     """Our forces on the same mesh: shape within a micrometre, root stress 5 %.
 
