@@ -30,10 +30,12 @@ MOST_S = 180.0
 """Time of one core that a notebook may take."""
 FOLDER = Path(__file__).parents[1] / "notebooks"
 NOTEBOOKS = sorted(FOLDER.glob("*.py"))
+MAPS = sorted(FOLDER.glob("maps/*.swg"))
 
 
 def test_there_are_notebooks():
     """The folder is found, so the tests below run something."""
+    assert MAPS
     assert {path.stem for path in NOTEBOOKS} >= STORIES
 
 
@@ -47,9 +49,7 @@ def test_opens_as_a_notebook(path):
     assert notebook.metadata.kernelspec.name == "python3"
 
 
-@pytest.mark.parametrize(
-    "path", sorted(FOLDER.glob("maps/*.swg")), ids=lambda path: path.stem
-)
+@pytest.mark.parametrize("path", MAPS, ids=lambda path: path.stem)
 def test_stored_maps_are_of_the_bundled_designs(path):
     """A design that was changed wants its map built again, by the command beside it."""
     drive, design = DriveMap.load(path), Design.load(path.stem)
