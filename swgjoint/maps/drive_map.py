@@ -16,6 +16,7 @@ Beside the potential a map may have hysteresis, Jenkin elements along the torsio
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -417,11 +418,20 @@ class DriveMap:
         """Torsion of the mean curve at an output torque [rad]."""
         from scipy.optimize import brentq
 
-        def residual(x: float) -> float:
-            return float(self.coefficients(x, 1)[0, 0]) - torque
+        # a search asks for one after the other: numbers are 30 times as fast as arrays
+        knots, pieces = self.torsion_knots.tolist(), self.potential[0, 0].tolist()
+        before, after = self.end_stiffness[0, 0].tolist()
 
-        span = float(self.torsion_knots[-1] - self.torsion_knots[0])
-        low, high = float(self.torsion_knots[0]), float(self.torsion_knots[-1])
+        def residual(x: float) -> float:
+            inside = min(max(x, knots[0]), knots[-1])
+            j = min(bisect_right(knots, inside), len(pieces)) - 1
+            d, out = inside - knots[j], x - inside
+            _, c1, c2, c3, c4 = pieces[j]
+            mean = c1 + d * (2 * c2 + d * (3 * c3 + d * 4 * c4))
+            return float(mean + out * (before if out < 0.0 else after) - torque)
+
+        span = knots[-1] - knots[0]
+        low, high = knots[0], knots[-1]
         for _ in range(60):
             if residual(low) <= 0.0 <= residual(high):
                 return float(brentq(residual, low, high, xtol=1e-18, rtol=1e-14))

@@ -83,14 +83,17 @@ class RigidArm:
             velocity: [rad/s]. Shape (n, n_joints).
             acceleration: [rad/s²]. Shape (n, n_joints).
         """
-        data, out, touching = self._data, np.empty_like(position), ""
-        for row, q, v, a in zip(out, position, velocity, acceleration, strict=True):
-            data.qpos[:], data.qvel[:], data.qacc[:] = q, v, a
-            mujoco.mj_inverse(self.model, data)
-            row[:] = data.qfrc_inverse
+        model, data, out, touching = self.model, self._data, np.empty_like(position), ""
+        # a lookup costs as much as a copy
+        qpos, qvel, qacc, needed = data.qpos, data.qvel, data.qacc, data.qfrc_inverse
+        motion = zip(position, velocity, acceleration, strict=True)
+        for k, (q, v, a) in enumerate(motion):
+            qpos[:], qvel[:], qacc[:] = q, v, a
+            mujoco.mj_inverse(model, data)
+            out[k] = needed
             if data.ncon and not touching:
-                bodies = self.model.geom_bodyid[data.contact.geom[0]]
-                names = sorted(self.model.body(b).name for b in bodies)
+                bodies = model.geom_bodyid[data.contact.geom[0]]
+                names = sorted(model.body(b).name for b in bodies)
                 touching = " and ".join(map(repr, names))
         if touching:
             warnings.warn(
@@ -119,11 +122,12 @@ class RigidArm:
         """Tool in the world [m]. Shape (n, 3); empty rows where the arm has none."""
         if self.tool < 0:
             return np.empty((len(position), 0))
-        data, out = self._data, np.empty((len(position), 3))
-        for row, q in zip(out, position, strict=True):
-            data.qpos[:] = q
-            mujoco.mj_kinematics(self.model, data)
-            row[:] = data.site_xpos[self.tool]
+        model, data, out = self.model, self._data, np.empty((len(position), 3))
+        qpos, place = data.qpos, data.site_xpos[self.tool]  # as in torques
+        for k, q in enumerate(position):
+            qpos[:] = q
+            mujoco.mj_kinematics(model, data)
+            out[k] = place
         return out
 
     def body_poses(self, position: Array) -> tuple[Array, Array]:
@@ -135,7 +139,7 @@ class RigidArm:
         model, data, count = self.model, self._data, len(position)
         places = np.empty((count, model.nbody, 3))
         turns = np.empty((count, model.nbody, 4))
-        qpos, xpos, xquat = data.qpos, data.xpos, data.xquat  # a lookup costs as much
+        qpos, xpos, xquat = data.qpos, data.xpos, data.xquat  # as in torques
         for k, q in enumerate(position):
             qpos[:] = q
             mujoco.mj_kinematics(model, data)
