@@ -61,30 +61,35 @@ class Numbers:
         """One tensor, as rerun asks for it."""
         import pyarrow as pa
 
-        empty, number = _empty_tensor()
-        _, names, buffer = (empty.field(k) for k in range(3))
-        kinds = [buffer.field(k) for k in range(buffer.type.num_fields)]
+        fields, names, kinds, number, union = _empty_tensor()
         ends = np.array([0, self._values.size])
-        kinds[number] = pa.Array.from_buffers(
+        filled = pa.Array.from_buffers(
             kinds[number].type,
             1,
             [None, pa.py_buffer(ends.astype(np.int32))],
             children=[pa.array(self._values)],
         )
-        filled = pa.Array.from_buffers(
-            buffer.type, 1, buffer.buffers()[:3], children=kinds
+        kinds = [*kinds[:number], filled, *kinds[number + 1 :]]
+        values = pa.Array.from_buffers(fields[2].type, 1, union, children=kinds)
+        sizes = pa.array(ends[1:].astype(np.uint64))
+        starts = pa.py_buffer(np.array([0, 1], dtype=np.int32))
+        shape = pa.Array.from_buffers(
+            fields[0].type, 1, [None, starts], children=[sizes]
         )
-        shape = pa.ListArray.from_arrays([0, 1], pa.array(ends[1:], type=pa.uint64()))
-        fields = list(empty.type)
-        return pa.StructArray.from_arrays(
-            [shape.cast(fields[0].type), names, filled], fields=fields
-        )
+        return pa.StructArray.from_arrays([shape, names, values], fields=fields)
 
 
 @cache
-def _empty_tensor() -> tuple[Any, int]:
-    """Rerun's tensor without numbers, and which of its kinds holds 64-bit floats."""
+def _empty_tensor() -> tuple[list[Any], Any, list[Any], int, list[Any]]:
+    """Rerun's tensor without numbers.
+
+    Fields, names, arrays of the kinds of numbers, which of them holds 64-bit floats,
+    buffers of the union of the kinds.
+    """
     import rerun as rr
 
     empty = rr.components.TensorDataBatch(np.zeros(0)).as_arrow_array()
-    return empty, empty.field(2)[0].type_code
+    _, names, buffer = (empty.field(k) for k in range(3))
+    kinds = [buffer.field(k) for k in range(buffer.type.num_fields)]
+    number = buffer[0].type_code
+    return list(empty.type), names, kinds, number, buffer.buffers()[:3]

@@ -121,7 +121,7 @@ def log_drive(stream: Any, path: str, assembly: Assembly, joint: str) -> None:
         rr.Points3D(
             [[0.0, 0.0, z]],
             radii=[rr.Radius.ui_points(0.5)],
-            colors=[(250, 250, 250)],
+            colors=[0xFAFAFAFF],
             labels=[f"von Mises stress: blue 0, red {top:.0f} MPa"],
             show_labels=True,
         ),
@@ -137,8 +137,8 @@ def log_drive(stream: Any, path: str, assembly: Assembly, joint: str) -> None:
         style = rr.Arrows3D.from_fields(colors=[arrow])
         stream.log(f"{path}/{name}", style, static=True)
     for name, outline, color in (
-        ("circular_spline", ring, (110, 150, 230)),
-        ("wave_generator", fields.wave_generator, (230, 230, 230)),
+        ("circular_spline", ring, 0x6E96E6FF),
+        ("wave_generator", fields.wave_generator, 0xE6E6E6FF),
     ):
         closed = np.concatenate([outline, outline[:1]])
         points = np.concatenate([closed, np.full((len(closed), 1), z)], axis=1)

@@ -62,7 +62,7 @@ Array = NDArray[np.float64]
 TIMELINE = "time"
 COLORS = ((31, 119, 180), (214, 96, 30), (110, 110, 110), (44, 140, 70))
 """One for each run, in pictures too."""
-LABEL_COLOR = (250, 250, 250)
+LABEL_COLOR = 0xFAFAFAFF
 
 
 def signals_of(run: Run, j: int) -> dict[str, Array]:
@@ -222,12 +222,12 @@ def log_moving(
             )
 
 
-def color_of_run(k: int) -> tuple[int, int, int]:
-    """Colour of the run of this number."""
-    return COLORS[k % len(COLORS)]
+def color_of_run(k: int) -> int:
+    """Colour of the run of this number, 0xRRGGBBAA: rerun takes numbers fastest."""
+    return int.from_bytes(bytes((*COLORS[k % len(COLORS)], 255)), "big")
 
 
-def _style(name: str, color: tuple[int, int, int]) -> Any:
+def _style(name: str, color: int) -> Any:
     import rerun as rr
 
     return rr.SeriesLines(

@@ -43,11 +43,12 @@ def shape_of(model: mujoco.MjModel, geom: int) -> Any | None:
     return None
 
 
-def color_of(model: mujoco.MjModel, geom: int) -> list[int]:
-    """Colour of a geom, of its material where it has one, 0 to 255. Shape (4,)."""
+def color_of(model: mujoco.MjModel, geom: int) -> int:
+    """Colour of a geom, of its material where it has one, 0xRRGGBBAA."""
     material = int(model.geom_matid[geom])
     rgba = model.mat_rgba[material] if material >= 0 else model.geom_rgba[geom]
-    return [round(255 * float(value)) for value in rgba]
+    parts = np.rint(255.0 * np.clip(rgba, 0.0, 1.0)).astype(np.uint8)
+    return int.from_bytes(parts.tobytes(), "big")
 
 
 def quaternion_xyzw(wxyz: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -55,7 +56,7 @@ def quaternion_xyzw(wxyz: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.roll(wxyz, -1, axis=-1)
 
 
-def _mesh(model: mujoco.MjModel, mesh: int, color: list[int]) -> Any:
+def _mesh(model: mujoco.MjModel, mesh: int, color: int) -> Any:
     import rerun as rr
 
     first, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])

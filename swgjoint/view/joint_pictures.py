@@ -23,7 +23,7 @@ WIDTH = 1.6
 """Of the phase picture, its height from the middle is 1."""
 Scales = dict[str, tuple[float, float] | None]
 _POINTS = 2000
-_FRAME = (120, 120, 120)
+_FRAME = 0x787878FF
 
 
 def ripple_bars(run: Run, j: int) -> tuple[Array, Array] | None:
@@ -34,6 +34,8 @@ def ripple_bars(run: Run, j: int) -> tuple[Array, Array] | None:
         zero to peak [% of rated torque]; both of shape (n,). None for a joint that
         stands still.
     """
+    from scipy.fft import next_fast_len
+
     highest = highest_resolved_order(run, j)
     if highest is None:
         return None
@@ -46,7 +48,7 @@ def ripple_bars(run: Run, j: int) -> tuple[Array, Array] | None:
     # the splines of the metrics would take half of the time of a recording
     grid = np.linspace(0.0, travel[-1], travel.size)
     ripple = np.interp(grid, travel, torque_ripple(run, j)) * np.hanning(grid.size)
-    size = 1 << int(np.ceil(np.log2(2 * grid.size)))
+    size = next_fast_len(2 * grid.size, real=True)
     amplitude = np.abs(np.fft.rfft(ripple, size)) * (400.0 / rated / (grid.size - 1))
     order = 2.0 * np.pi * np.fft.rfftfreq(size, grid[1])
     inside = slice(1, int(np.searchsorted(order, highest, side="right")))
@@ -59,9 +61,7 @@ def ripple_bars(run: Run, j: int) -> tuple[Array, Array] | None:
     return middle, np.maximum.reduceat(amplitude, starts)
 
 
-def log_ripple(
-    stream: Any, path: str, bars: tuple[Array, Array], color: tuple[int, int, int]
-) -> None:
+def log_ripple(stream: Any, path: str, bars: tuple[Array, Array], color: int) -> None:
     """Spectrum of a joint's ripple, from :func:`ripple_bars`."""
     import rerun as rr
 
@@ -142,7 +142,7 @@ def log_phase_path(
     run: Run,
     j: int,
     scales: tuple[float, float],
-    color: tuple[int, int, int],
+    color: int,
 ) -> None:
     """Torque against torsion of one run."""
     import rerun as rr
@@ -153,7 +153,7 @@ def log_phase_path(
     stream.log(f"{path}/path", line, static=True)
 
 
-def log_phase_point(stream: Any, path: str, color: tuple[int, int, int]) -> None:
+def log_phase_point(stream: Any, path: str, color: int) -> None:
     """Look of the point that moves."""
     import rerun as rr
 

@@ -56,10 +56,13 @@ def measure(name: str, runs: int, duration: float | None) -> dict[str, float | s
     drives = {drive: load_drive(drive) for drive in named if drive}
     times, shares, speeds = [], [], []
     with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "run.rrd"
         for k in range(runs + 1):
+            # new files: one that takes the place of another waits for the disk
+            path, other = (
+                Path(folder) / f"{part}{k}.rrd" for part in ("run", "beside")
+            )
             wall = time.perf_counter()
-            run_scene(scene, drives=drives, recording=path)
+            run_scene(scene, drives=drives, recording=other)
             beside = time.perf_counter() - wall
             begin, wall = time.process_time(), time.perf_counter()
             run = run_scene(scene, drives=drives)

@@ -38,6 +38,6 @@ def test_every_solid_kind_is_drawn_and_scenery_is_not():
 
 def test_colours_and_quaternions_are_in_the_viewers_order():
     """Colours run to 255; the scalar part of a quaternion comes last."""
-    assert color_of(MODEL, MODEL.geom("capsule").id) == [255, 0, 128, 255]
+    assert color_of(MODEL, MODEL.geom("capsule").id) == 0xFF0080FF
     turned = quaternion_xyzw(np.array([0.5, 0.1, 0.2, 0.3]))
     np.testing.assert_array_equal(turned, [0.1, 0.2, 0.3, 0.5])
