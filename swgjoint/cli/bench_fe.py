@@ -69,10 +69,12 @@ def _stored(stored: dict[str, Any]) -> str:
     """Where the stored settings come from, and whether they still hold."""
     drift = "unknown" if stored["drift"] is None else f"{stored['drift']:.1g}"
     state = "of this code" if stored["of_this_code"] else "of ANOTHER code"
+    pace = stored["pace"]
+    times = "" if pace is None else f", times of a machine {pace:.2g} times as fast"
     return (
         f"stored: {'; '.join(stored['settings'])}, commit"
         f" {stored['provenance']['commit']}, {state} ({stored['witness']} has moved by"
-        f" {drift}); again: {stored['command']}"
+        f" {drift}){times}; again: {stored['command']}"
     )
 
 

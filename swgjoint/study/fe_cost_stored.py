@@ -58,17 +58,22 @@ def to_store(design: Design, found: dict[str, Found | str]) -> dict[str, Any]:
 
 
 def told(kept: dict[str, Any], found: dict[str, Found | str]) -> dict[str, Any]:
-    """Provenance of the file and how far its witness is from that of today."""
+    """Provenance of the file, how far its witness is from today's, and how much faster.
+
+    ``pace`` is CPU time of the witness today over that in the file.
+    """
     was, now = kept["settings"].get(WITNESS), found.get(WITNESS)
-    drift = None
+    drift = pace = None
     if isinstance(was, Found) and isinstance(now, Found):
         pairs = [(was.stiffness, now.stiffness), (was.tensile, now.tensile)]
         drift = max(abs(b / a - 1.0) for a, b in pairs if a and b)
+        pace = now.cpu_s / was.cpu_s if now.cpu_s and was.cpu_s else None
     return {
         "settings": [key for key in LONG if key in kept["settings"]],
         "command": kept["command"],
         "provenance": kept["provenance"],
         "witness": WITNESS,
         "drift": drift,
+        "pace": pace,
         "of_this_code": drift is not None and drift < DRIFT,
     }

@@ -153,7 +153,10 @@ def test_a_design_without_cup_is_refused():
 
 
 def test_stored_settings_are_of_their_design_and_tell_drift(tmp_path, monkeypatch):
-    """Written and read again; of another design nothing; a moved witness is told."""
+    """Written and read again; of another design nothing; a moved witness is told.
+
+    So is one that takes another time here.
+    """
     table = {key: found(0.0) for key in (*LONG, WITNESS)}
     path = tmp_path / FILE
     path.write_text(json_text(to_store(CUP, table)), encoding="utf-8")
@@ -168,8 +171,9 @@ def test_stored_settings_are_of_their_design_and_tell_drift(tmp_path, monkeypatc
     del kept["settings"][linear.key]
 
     def now(design, wanted, **keys):
+        was = kept["settings"][WITNESS]
         assert [setting.key for setting in wanted] == [WITNESS]
-        return {WITNESS: replace(found(0.0), stiffness=1.01e5)}
+        return {WITNESS: replace(was, stiffness=1.01e5, cpu_s=1.5 * was.cpu_s)}
 
     monkeypatch.setattr(fe_cost, "_solve_all", now)
     monkeypatch.setattr(fe_cost, "stored_of", lambda design: kept)
@@ -178,6 +182,8 @@ def test_stored_settings_are_of_their_design_and_tell_drift(tmp_path, monkeypatc
     assert not result["rows"][0]["stored"] and result["rows"][-1]["stored"]
     told = result["stored"]
     assert told["drift"] == pytest.approx(0.01) and not told["of_this_code"]
+    assert told["pace"] == pytest.approx(1.5)
+    assert "times of a machine 1.5 times as fast" in bench_fe.report(result)
 
 
 def test_what_is_long_and_not_stored_is_left_out(solve):
