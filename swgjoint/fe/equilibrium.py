@@ -69,7 +69,7 @@ class NewtonSolver:
     step_tolerance: float = 2e-12
     """Displacement increment at which the iteration ends [m]; about 1e-5 of the
     smallest effect of interest, a tenth of a micrometre."""
-    thorough_below: float = 1e-8
+    thorough_below: float = 1e-7
     """Increment below which contact is searched between the nodes, too [m]."""
     stride: float = 0.1
     """Longest move of one iteration, in lobe heights: contact changes on the way."""
@@ -90,9 +90,10 @@ class NewtonSolver:
         try:
             for iteration in range(self.max_iterations):
                 ring = linearise(model, state, load.on_flexspline)
-                # after the first steps only close candidates matter
-                reach = (0.02 if iteration > 2 else 0.1) * model.lobe_height
                 thorough = bool(history) and history[-1] < self.thorough_below
+                # after the first steps, or a short one, only close candidates matter
+                close = thorough or iteration > 2
+                reach = (0.02 if close else 0.1) * model.lobe_height
                 step = _solve_linear(model, state, ring, load, reach, thorough)
                 history.append(step.largest)
                 if not step.largest < self.largest_step:
