@@ -66,6 +66,10 @@ def main(argv: Sequence[str] | None = None) -> int:
         Exit status: 0, 1 for a computation that failed, 2 for bad input.
     """
     arguments = list(sys.argv[1:] if argv is None else argv)
+    if "OMP_NUM_THREADS" not in os.environ:
+        # before numpy and scipy load theirs: on matrices of this size their threads
+        # wait for each other, and a model in space takes twice as long
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):  # an ASCII terminal shows ? for a unit
             stream.reconfigure(errors="replace")

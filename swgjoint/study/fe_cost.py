@@ -13,13 +13,14 @@ import csv
 import io
 import os
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import (
     ProcessPoolExecutor,
     ThreadPoolExecutor,
     as_completed,
 )
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
@@ -158,24 +159,24 @@ def _solve_all(
     progress(stage, 0, len(order))
     # a thread holds the process of one setting, so that one which dies ends no other
     threads = ThreadPoolExecutor(max_workers=jobs)
-    try:
-        tasks = {
-            threads.submit(_solved_apart, Task(design=design, setting=s)): s
-            for s in order
-        }
-        for future in as_completed(tasks):
-            found[tasks[future].key] = future.result()
-            progress(stage, len(found), len(order))
-    finally:
-        threads.shutdown(cancel_futures=True)
+    with _one_thread():
+        try:
+            tasks = {
+                threads.submit(_solved_apart, Task(design=design, setting=s)): s
+                for s in order
+            }
+            for future in as_completed(tasks):
+                found[tasks[future].key] = future.result()
+                progress(stage, len(found), len(order))
+        finally:
+            threads.shutdown(cancel_futures=True)
     return found
 
 
 def _solved_apart(task: Task) -> Found | str:
     """A setting in a process of its own; what becomes of that is part of the result."""
-    with ProcessPoolExecutor(
-        max_workers=1, mp_context=get_context("spawn"), initializer=_one_thread
-    ) as process:
+    context = get_context("spawn")
+    with ProcessPoolExecutor(max_workers=1, mp_context=context) as process:
         try:
             return process.submit(solved_in, task).result()
         except BrokenProcessPool:
@@ -184,10 +185,24 @@ def _solved_apart(task: Task) -> Found | str:
             return "out of memory"
 
 
-def _one_thread() -> None:
-    """Before linear algebra is loaded: a second thread would blur what a core costs."""
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-        os.environ[name] = "1"
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """Processes that begin inside have one thread of algebra.
+
+    A second one would blur what a core costs. A process loads its algebra with this
+    module, before any code of ours runs in it: only what it is born with counts.
+    """
+    names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+    before = {name: os.environ.get(name) for name in names}
+    os.environ.update(dict.fromkeys(names, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
 
 
 def _work(setting: Setting) -> float:

@@ -56,6 +56,39 @@ def test_every_command_is_there(name, capsys):
     assert "--json" in capsys.readouterr().out
 
 
+ALGEBRA = """
+import os
+from swgjoint.cli.main import main
+try:
+    main(["--version"])
+finally:
+    import scipy.linalg
+    tasks = "/proc/self/task"
+    threads = len(os.listdir(tasks)) if os.path.exists(tasks) else "uncounted"
+    print(os.getenv("OPENBLAS_NUM_THREADS"), threads)
+"""
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        ({}, "1"),
+        ({"OPENBLAS_NUM_THREADS": "2"}, "2"),
+        ({"OMP_NUM_THREADS": "2"}, "None"),
+    ],
+)
+def test_algebra_has_one_thread_unless_asked(given, told):
+    """Numpy and scipy each bring a pool of threads, which fight for the cores."""
+    names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")
+    clean = {k: v for k, v in os.environ.items() if k not in names}
+    script = [sys.executable, "-c", ALGEBRA]
+    done = subprocess.run(script, capture_output=True, text=True, env=clean | given)
+    setting, threads = done.stdout.split()[-2:]
+    assert setting == told
+    if not given:
+        assert threads in ("1", "uncounted")
+
+
 def test_help_lists_the_commands(capsys):
     """--help goes to stdout and names every command."""
     with pytest.raises(SystemExit) as left:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
 from dataclasses import replace
 from importlib import import_module
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -224,6 +226,8 @@ def test_the_only_mesh_of_a_kind_is_not_its_own_reference(solve):
     assert {row["reference_of_kind"] for row in rows[4:]} == {"3d, refinement 1"}
 
 
+PLANE = Setting(model="2d", refinement=0.5)
+
 FATED = """
 import os
 import signal
@@ -251,6 +255,31 @@ def test_a_process_that_dies_is_a_row(tmp_path, monkeypatch):
     assert got["2d, refinement 1"].setting == settings[0]
     assert got["2d, refinement 2"] == "out of memory"
     assert "killed" in got["2d, refinement 3"]
+
+
+THREADS = """
+import os
+
+
+def threads(task):
+    return len(os.listdir("/proc/self/task"))
+"""
+"""Instead of a solution the threads of the process, its algebra loaded."""
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="counts under Linux")
+def test_a_process_has_one_thread(tmp_path, monkeypatch):
+    """Whatever the shell says: two pools of them would fight for the cores."""
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
+        monkeypatch.setenv(name, "3")
+    (tmp_path / "threads.py").write_text(THREADS)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(fe_cost, "solved_in", import_module("threads").threads)
+    got = fe_cost._solve_all(
+        CUP, [PLANE], jobs=1, stage="settings", progress=lambda *_: None
+    )
+    assert got == {PLANE.key: 1}
+    assert os.environ["OPENBLAS_NUM_THREADS"] == "3"
 
 
 def test_the_kinematic_error_says_at_how_many_positions(solve):
@@ -286,9 +315,6 @@ def test_rim_shape_folds_half_turns():
     points = radius[:, None] * np.stack([-np.sin(angle), np.cos(angle)], axis=-1)
     shape = rim_shape(points, 0.05, 0.3)
     assert np.abs(shape - 1e-3 * np.cos(2.0 * PHI)).max() < 1e-8
-
-
-PLANE = Setting(model="2d", refinement=0.5)
 
 
 @pytest.fixture(scope="module")
