@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import resource
 import subprocess
 import sys
 from pathlib import Path
@@ -26,8 +25,6 @@ STORIES = {
     "sweeps",
     "hot-paths",
 }
-MOST_S = 180.0
-"""Time of one core that a notebook may take."""
 FOLDER = Path(__file__).parents[1] / "notebooks"
 NOTEBOOKS = sorted(FOLDER.glob("*.py"))
 MAPS = sorted(FOLDER.glob("maps/*.swg"))
@@ -60,8 +57,7 @@ def test_stored_maps_are_of_the_bundled_designs(path):
 @pytest.mark.slow
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_runs(path, tmp_path):
-    """Every cell runs without error or warning, in an empty folder, soon enough."""
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    """Every cell runs without error or warning, in an empty folder."""
     done = subprocess.run(
         [sys.executable, "-W", "error", str(path)],
         cwd=tmp_path,
@@ -71,5 +67,3 @@ def test_runs(path, tmp_path):
     )
     assert done.returncode == 0, done.stderr
     assert list(tmp_path.iterdir()) == []
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    assert after.ru_utime - before.ru_utime < MOST_S

