@@ -220,7 +220,6 @@ def test_radial_stiffness_of_xb1(capsys):
     """The figure itself, within the 1 % that mesh and displacements leave."""
     found = spec(capsys, "xb1-100-80", "--only", "radial_stiffness_N_mm")
     assert found["radial_stiffness_N_mm"] == pytest.approx(65.4, rel=0.01)
-    assert found["wall_s"] < 600.0
 
 
 def test_report(capsys, tmp_path, synthetic_map):
