@@ -168,7 +168,7 @@ def test_free_ring_of_unit_width_is_the_plane_model():
             "sij,ab->saibj", turn[:, :size, :size], np.eye(len(matrix) // size)
         )
         spread = spread.reshape(n, len(matrix), len(matrix))
-        return spread, np.einsum("sij,jk,slk->sil", spread, matrix, spread)
+        return spread, spread @ matrix @ spread.swapaxes(1, 2)
 
     spread, blocks = everywhere(teeth.stiffness, 3)
     push = np.einsum("sij,sj->si", spread, pull)
