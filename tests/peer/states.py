@@ -27,7 +27,7 @@ def design_of(kind: str, refinement: int) -> Design:
 
 
 @cache
-def model_of(kind: str, refinement: int, elastic: bool = True) -> RingModel:
+def model_of(kind: str, refinement: int, elastic: bool) -> RingModel:
     """Half of its drive."""
     design = design_of(kind, refinement)
     return ring_model(design, half=True, elastic_circular_spline=elastic)
@@ -40,13 +40,13 @@ def _follow(kind: str, refinement: int, elastic: bool) -> Continuation:
 
 
 @cache
-def deflected(kind: str, refinement: int, elastic: bool = False) -> State:
+def deflected(kind: str, refinement: int, elastic: bool) -> State:
     """The wave generator alone."""
     return _checked(_follow(kind, refinement, elastic).deflected())
 
 
 @cache
-def loaded(kind: str, refinement: int, elastic: bool = True) -> State:
+def loaded(kind: str, refinement: int, elastic: bool) -> State:
     """At the torque, the wave generator not turned."""
     follow = _follow(kind, refinement, elastic)
     meshed = _checked(follow.meshed(deflected(kind, refinement, elastic)))
@@ -55,10 +55,10 @@ def loaded(kind: str, refinement: int, elastic: bool = True) -> State:
 
 def turned_to(kind: str, refinement: int, pitches: float) -> State:
     """At the torque, the wave generator turned by pitches of the circular spline."""
-    state = loaded(kind, refinement)
+    state = loaded(kind, refinement, True)
     if not pitches:
         return state
-    teeth = model_of(kind, refinement).circular_spline.profile.teeth
+    teeth = model_of(kind, refinement, True).circular_spline.profile.teeth
     follow = _follow(kind, refinement, True)
     return _checked(follow.to_angle(state, pitches * 2.0 * pi / teeth))
 

@@ -85,7 +85,7 @@ def rows(folder: Path, quick: bool) -> Iterator[Row]:
     for kind in DESIGNS:
         for mesh in QUICK if quick else WAVE_GENERATOR:
             ours, theirs, element = mesh
-            start = deflected(kind, ours)
+            start = deflected(kind, ours, False)
             clock = time.perf_counter()
             found = replay(
                 design_of(kind, ours),
@@ -104,7 +104,7 @@ def rows(folder: Path, quick: bool) -> Iterator[Row]:
             clock = time.perf_counter()
             found = replay(
                 design_of("elliptical", ours),
-                model_of("elliptical", ours),
+                model_of("elliptical", ours, True),
                 start,
                 folder,
                 element=element,
@@ -122,7 +122,7 @@ def contact_rows(folder: Path, quick: bool) -> Iterator[Row]:
     """Contact forces and CalculiX's own contact on one mesh, rigid circular spline."""
     ours, theirs, element = CONTACT_MESH
     design, model = design_of("elliptical", ours), model_of("elliptical", ours, False)
-    states = {"elliptical": deflected("elliptical", ours)}
+    states = {"elliptical": deflected("elliptical", ours, False)}
     if not quick:
         label = f"elliptical, {TORQUE:g} N·m, rigid circular spline"
         states[label] = loaded("elliptical", ours, False)

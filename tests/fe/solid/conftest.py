@@ -21,6 +21,7 @@ def small_design():
             "drive.teeth_circular_spline": 42,
             "cup.length_mm": 14.0,
             "cup.bore_radius_mm": 7.0,
+            "mesh.refinement": 0.5,
         }
     )
 
