@@ -2,30 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Any
+import os
 
-import numpy as np
-import pytest
+# before numpy starts a pool of threads in each of several processes
+for _pool in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
+    os.environ.setdefault(_pool, "1")
 
-from swgjoint.maps.drive_map import DriveMap, Ratings
-from swgjoint.maps.fields import DriveFields
-from swgjoint.maps.friction import Friction
+import numpy as np  # noqa: E402
+import pytest  # noqa: E402
 
+from swgjoint.maps.drive_map import DriveMap, Ratings  # noqa: E402
+from swgjoint.maps.fields import DriveFields  # noqa: E402
+from swgjoint.maps.friction import Friction  # noqa: E402
 
-@pytest.hookimpl(optionalhook=True)  # of pytest-xdist
-def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:
-    """With ``-n``, one process has all tests of a file of finite elements.
-
-    They share drives that take long to solve; other tests go one by one.
-    """
-    from xdist.scheduler import LoadScopeScheduling
-
-    class Scheduling(LoadScopeScheduling):
-        def _split_scope(self, nodeid: str) -> str:
-            file = nodeid.partition("::")[0]
-            return file if "/fe/" in file else nodeid
-
-    return Scheduling(config, log)
+pytest_plugins = ["scheduling"]
 
 
 def make_synthetic_map(

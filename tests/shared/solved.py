@@ -1,0 +1,55 @@
+"""What tests of finite elements share: solved once in a run, by whoever needs it first.
+
+All processes of a run share the run's cache folder (see ``scheduling``). A result lies
+there under its name; a lock makes others wait for the process that computes it. The
+name must say all that decides the result, down to the refinement.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import pickle
+from collections.abc import Callable
+from math import pi
+from pathlib import Path
+from typing import TypeVar
+
+from filelock import FileLock
+
+from swgjoint.gear.design import Design
+from swgjoint.maps.cache import code_version
+
+T = TypeVar("T")
+
+FOLDER = Path(os.environ["SWGJOINT_CACHE"]) / "solved"
+"""Read once: tests that name another cache still share what is solved."""
+
+COARSE = {
+    "drive.teeth_flexspline": 60,
+    "drive.teeth_circular_spline": 62,
+    "mesh.refinement": 0.5,
+}
+"""A plane drive that costs a tenth of the thesis' and obeys the same laws."""
+PITCH = 2.0 * pi / 62
+"""Of its circular spline [rad]."""
+
+
+def kept(name: str, solve: Callable[[], T]) -> T:
+    """The result of ``solve``, from the folder of the run or computed and put there."""
+    key = hashlib.sha256(f"{code_version()} {name}".encode()).hexdigest()[:32]
+    path = FOLDER / f"{key}.pickle"
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    with FileLock(path.with_suffix(".lock")):
+        if path.exists():
+            return pickle.loads(path.read_bytes())
+        result = solve()
+        beside = path.with_suffix(".part")
+        beside.write_bytes(pickle.dumps(result, pickle.HIGHEST_PROTOCOL))
+        beside.replace(path)
+    return result
+
+
+def coarse(name: str = "reference-2d", **changes: object) -> Design:
+    """A bundled plane design with the teeth and the mesh of ``COARSE``."""
+    return Design.load(name).with_changes(COARSE | changes)
