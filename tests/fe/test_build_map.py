@@ -6,6 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from solved import coarse, kept
 
 from swgjoint.fe.build_map import build_map
 from swgjoint.fe.sampling import sample_map
@@ -13,13 +14,13 @@ from swgjoint.gear.design import Design
 from swgjoint.maps.fit import fit_map
 
 LAYOUTS = ("circular_spline_fixed", "flexspline_fixed", "wave_generator_fixed")
-ANGLES = 12
+ANGLES = 8
 
 
 @cache
 def samples(layout):
-    design = Design.load("reference-2d-simplified")
-    return sample_map(design.with_changes({"drive.layout": layout}), angles=ANGLES)
+    design = coarse("reference-2d-simplified", **{"drive.layout": layout})
+    return kept(f"samples {layout}", lambda: sample_map(design, angles=ANGLES))
 
 
 @pytest.mark.fe
@@ -35,7 +36,7 @@ def test_map_of_a_design(layout):
     )
     check = drive.info["energy_check"]
     assert check["strain_energy_relative"] < 1e-3
-    # a dozen positions alias the corners of the ripple
+    # few positions alias the corners of the ripple
     assert check["relative"] < 0.25
     assert drive.info["stiffness_range_Nm_rad"][0] > 0.0
     assert not drive.info["truncated"]
@@ -48,7 +49,7 @@ def test_map_of_a_design(layout):
 @pytest.mark.parametrize("name", ["reference-2d", "reference-2d-simplified"])
 def test_derivative_is_the_unseen_input_torque(name):
     """The map of a design gives the input torque within 2 % of its ripple."""
-    check = build_map(Design.load(name), cache=False).info["energy_check"]
+    check = build_map(Design.load(name)).info["energy_check"]
     # at the worst torque, that of no-load cogging among them
     assert check["relative"] < 0.02
 
@@ -73,7 +74,7 @@ def test_energy_follows_from_torque():
 def test_build_map_is_cached(tmp_path, monkeypatch):
     """A second call reads what the first one computed, bit for bit."""
     monkeypatch.setenv("SWGJOINT_CACHE", str(tmp_path))
-    design = Design.load("reference-2d-simplified")
+    design = coarse("reference-2d-simplified")
     calls = []
     first = build_map(design, angles=4, progress=lambda *a: calls.append(a))
     count = len(calls)

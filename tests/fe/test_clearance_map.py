@@ -7,10 +7,10 @@ from math import pi
 
 import numpy as np
 import pytest
+from solved import FEW_PITCH, FEW_TEETH, few_teeth, kept
 
 from swgjoint.fe.pattern import across_clearance
 from swgjoint.fe.sampling import sample_map
-from swgjoint.gear.design import Design
 from swgjoint.maps.equilibrium import output_angle
 from swgjoint.maps.fit import fit_map
 from swgjoint.maps.loop import torque_loop
@@ -21,9 +21,9 @@ pytestmark = pytest.mark.fe
 @cache
 def samples():
     """Teeth 5 % thinner than their spaces."""
-    design = Design.load("reference-2d-simplified")
-    thin = design.with_changes({"flexspline.thickness_coefficient": 0.95})
-    return sample_map(thin, angles=6)
+    thin = {"flexspline.thickness_coefficient": 0.95}
+    design = few_teeth("reference-2d-simplified", **thin)
+    return kept("clearance map", lambda: sample_map(design, angles=6))
 
 
 @cache
@@ -43,7 +43,7 @@ def test_the_output_is_free_between_the_flanks():
     rated = found.ratings.rated_torque
     torsion = given.output_error[at(0.0)] - given.output_error
     begin = torsion[at(0.0) + 1].min()
-    theta = np.linspace(0.0, 2.0 * pi / 122, 25)
+    theta = np.linspace(0.0, FEW_PITCH, 25)
     inside = np.linspace(-begin, begin, 201)[:, None]
     torque = found.torque(inside, theta, theta / found.ratio)
     assert np.abs(torque).max() < 1e-5 * rated
@@ -60,7 +60,7 @@ def test_clearance_is_that_of_the_teeth():
     given = samples()
     free = np.ptp(given.output_error[[at(-0.2), at(0.2)]], axis=0).mean()
     # 5 % of half a pitch; the play of the conjugate paths and the torque make a little
-    assert free == pytest.approx(0.05 * pi / 120, rel=0.1)
+    assert free == pytest.approx(0.05 * pi / FEW_TEETH, rel=0.1)
 
 
 def test_the_loop_of_a_free_output_is_as_wide_as_its_clearance():
@@ -98,7 +98,7 @@ def test_energy_without_torque_is_flat():
 def test_the_torque_does_not_fall_where_contact_begins():
     """Beside the clearance the torque rises, but for 1e-4 of the rated one."""
     x = np.linspace(0.0, 8e-4, 2001)[:, None]
-    theta = np.linspace(0.0, 2.0 * pi / 122, 25)
+    theta = np.linspace(0.0, FEW_PITCH, 25)
     torque = drive().torque(x, theta, theta / drive().ratio)
     assert (np.maximum.accumulate(torque) - torque).max() < 1e-4 * 20.0
 

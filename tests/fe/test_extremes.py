@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from solved import coarse
 
 from swgjoint.errors import ComputationError, Outcome
 from swgjoint.fe.meshing import simulate_meshing
@@ -63,7 +64,7 @@ def test_extreme_designs_run_and_balance(case):
 @pytest.mark.fe
 def test_a_load_out_of_reach_ends_with_advice():
     """A thousand times the rated torque: what failed, and what to try."""
-    design = Design.preset("reference-2d")
+    design = coarse()
     with pytest.raises(ComputationError, match="loading to 20000 N·m failed") as found:
         simulate_meshing(design, torque=20_000.0, steps=1, half=True)
     advice = str(found.value).split("failed: ")[1]

@@ -7,6 +7,7 @@ from math import pi
 
 import numpy as np
 import pytest
+from solved import kept
 
 from swgjoint.fe.corotation import rotate, turned
 from swgjoint.fe.elasticity import stress_maxima
@@ -30,7 +31,10 @@ TORQUE = -20.0
 @cache
 def half_turn():
     design = Design.load("reference-2d")
-    return simulate_meshing(design, torque=TORQUE, steps=24, half=True)
+    return kept(
+        "half a turn",
+        lambda: simulate_meshing(design, torque=TORQUE, steps=24, half=True),
+    )
 
 
 def state():

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 import pytest
+from solved import kept
 
 import swgjoint.fe.build_map as building
 from swgjoint.errors import ComputationError
@@ -22,14 +23,18 @@ TOP = 40.0
 def rubbing(coefficient: float) -> Design:
     # the parabola leaves its flanks room to slide; the ellipse holds the whole rim
     return Design.preset("reference-2d-parabolic").with_changes(
-        {"friction.tooth_coefficient": coefficient}
+        {"friction.tooth_coefficient": coefficient, "mesh.refinement": 0.5}
     )
 
 
 @cache
 def loop(coefficient: float, steps: int = 4):
     """The loop half a pitch from the symmetric position, where it is symmetric, too."""
-    (found,) = friction_loops(rubbing(coefficient), top=TOP, positions=1, steps=steps)
+    design = rubbing(coefficient)
+    (found,) = kept(
+        f"friction loop {coefficient} {steps}",
+        lambda: friction_loops(design, top=TOP, positions=1, steps=steps),
+    )
     return found
 
 
@@ -49,14 +54,14 @@ def test_loop_closes_and_encloses_the_work_of_friction():
     assert one.friction_work > 0.0
     # the solver leaves 1e-12 J where nothing slips
     assert np.diff(one.work).min() > -1e-8 * one.friction_work
-    # four steps a quarter leave 15 %
+    # four steps a quarter leave 18 %
     assert one.area == pytest.approx(one.friction_work, rel=0.2)
     assert one.loss > 0.0
 
 
 @pytest.mark.slow
 def test_area_comes_to_the_work_with_more_steps():
-    """The balance of the round closes as the steps do: 15 % at 4, 4 % at 12."""
+    """The balance of the round closes as the steps do: 18 % at 4, 2 % at 12."""
     loops = [loop(0.1, steps) for steps in (4, 12)]
     few, many = (abs(one.area / one.friction_work - 1.0) for one in loops)
     assert many < 0.4 * few and many < 0.05
@@ -118,7 +123,9 @@ def test_map_has_the_hysteresis_of_its_teeth(monkeypatch):
         return given[-1]
 
     monkeypatch.setattr(building, "sample_map", sampled)
-    drive = building.build_map(design, angles=6, cache=False)
+    few = partial(friction_loops, positions=2, steps=4)
+    monkeypatch.setattr(building, "friction_loops", few)
+    drive = building.build_map(design, angles=4, cache=False)
     smooth = fit_map(given[0])
     np.testing.assert_array_equal(drive.potential, smooth.potential)
     assert smooth.hysteresis == () and len(drive.hysteresis) > 0

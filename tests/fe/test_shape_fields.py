@@ -4,27 +4,25 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from solved import PITCH, coarse, kept
 
 from swgjoint.fe.continuation import Continuation
 from swgjoint.fe.drive2d import ring_model
 from swgjoint.fe.fields import flexspline_field
 from swgjoint.fe.sampling import sample_map
 from swgjoint.fe.shape_fields import plane_surface
-from swgjoint.gear.design import Design
-
-PITCH = 2.0 * np.pi / 122
 
 
 @pytest.fixture(scope="module")
 def design():
-    """Coarse, half of it; half-circles let teeth move more."""
-    return Design.load("reference-2d-simplified").with_changes({"mesh.refinement": 0.5})
+    """Half-circles let teeth move more."""
+    return coarse("reference-2d-simplified")
 
 
 @pytest.fixture(scope="module")
 def shown(design):
     """Of four positions."""
-    found = sample_map(design, model="2d", angles=4).fields
+    found = kept("shown", lambda: sample_map(design, model="2d", angles=4).fields)
     assert found is not None
     return found
 

@@ -6,18 +6,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from solved import FEW_PITCH, coarse, few_teeth
 
 from swgjoint.errors import DesignError
 from swgjoint.fe.continuation import Continuation
 from swgjoint.fe.drive2d import can_halve, ring_model
 from swgjoint.gear.design import Design
 
-PITCH = 2.0 * np.pi / 122
-
 
 def flawed(**values) -> Design:
     changes = {f"tolerances.{key}": value for key, value in values.items()}
-    return Design.preset("reference-2d").with_changes(changes)
+    return few_teeth(**changes)
 
 
 def orders(torque=4.0, positions=16, **values):
@@ -27,7 +26,7 @@ def orders(torque=4.0, positions=16, **values):
     state = follow.to_torque(follow.meshed(follow.deflected()), torque)
     error = []
     for k in range(positions):
-        angle = PITCH * round(122 * k / positions)
+        angle = FEW_PITCH * round(62 * k / positions)
         state = follow.to_angle(state, angle)
         assert state.outcome.ok
         error.append(follow.output_angle(state) - angle / design.ratio)
@@ -66,7 +65,7 @@ def test_oval_circular_spline_shows_twice_a_turn():
 @pytest.mark.fe
 def test_teeth_shifted_alike_turn_the_member():
     """A common pitch error is a rotation of the member by error over radius."""
-    design = Design.preset("reference-2d")
+    design = coarse()
     perfect, shift = ring_model(design, half=True), 2e-6
     moved = replace(
         perfect,

@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 from functools import cache
-from math import pi
 
 import numpy as np
+from solved import FEW_PITCH as PITCH
+from solved import few_teeth, kept
 
 from swgjoint.fe.continuation import Continuation
 from swgjoint.fe.drive2d import ring_model
-from swgjoint.gear.design import Design
 
 TORQUE = 20.0
-PITCH = 2 * pi / 122
-"""Of the circular spline, which is fixed: the pattern repeats after it [rad]."""
 
 
 @cache
 def follow():
-    design = Design.load("reference-2d")
+    design = few_teeth()
     return Continuation(model=ring_model(design, half=True), ratio=design.ratio)
 
 
@@ -45,7 +43,7 @@ def test_input_torque_is_the_slope_of_the_energy():
     """T_wg from contact forces is d(U + T psi)/d theta to 1e-6 of T/|i|."""
     h = 6e-4 * PITCH
     state, errors = loaded(), []
-    for part in np.arange(0.013, 1.0, 0.04):
+    for part in np.arange(0.013, 1.0, 0.08):
         state = follow().to_angle(state, part * PITCH)
         steps = (-h, -h / 2, h / 2, h)
         near = [follow().to_angle(state, part * PITCH + step) for step in steps]
@@ -55,13 +53,17 @@ def test_input_torque_is_the_slope_of_the_energy():
         # central differences over 2 h and h, extrapolated
         slope = (4 * (half_high - half_low) / h - (high - low) / (2 * h)) / 3
         errors.append(abs(slope - state.wave_generator_torque))
-    assert len(errors) >= 10
+    assert len(errors) >= 5
     assert max(errors) < 1e-6 * TORQUE / abs(follow().ratio)
 
 
 @cache
 def one_pitch(angles):
-    """theta, psi, T_wg and U over one pitch."""
+    """theta, psi, T_wg and U over one pitch of the fixed member."""
+    return kept(f"one pitch {angles}", lambda: _one_pitch(angles))
+
+
+def _one_pitch(angles):
     state, rows = loaded(), []
     for theta in PITCH * np.arange(angles + 1) / angles:
         state = follow().to_angle(state, theta)
@@ -91,6 +93,7 @@ def test_balance_of_work_over_a_pitch():
 def test_equilibria_do_not_depend_on_the_path():
     """Without friction 24 steps to an angle lead where 96 lead."""
     coarse, fine = one_pitch(24)[1:], one_pitch(96)[1:, ::4]
-    scale = np.array([[np.ptp(fine[0])], [TORQUE / 60.0], [fine[2].max()]])
+    mean = TORQUE / abs(follow().ratio)
+    scale = np.array([[np.ptp(fine[0])], [mean], [fine[2].max()]])
     # 5e-7 seen in the torque, where flanks conform and several sets of points hold
     assert (np.abs(coarse - fine) < 1e-6 * scale).all()
