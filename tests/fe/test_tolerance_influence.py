@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from solved import coarse
 
 from swgjoint.fe.continuation import Continuation
 from swgjoint.fe.drive2d import ring_model
@@ -28,7 +29,7 @@ ERRORS = {
 
 def flawed(name="reference-2d", **values) -> Design:
     changes = {f"tolerances.{key}": value for key, value in values.items()}
-    return Design.preset(name).with_changes(changes)
+    return coarse(name, **changes)
 
 
 def gaps_at(design, at, pitches):
@@ -41,7 +42,7 @@ def gaps_at(design, at, pitches):
 @pytest.fixture(scope="module")
 def reference():
     """The perfect drive without load at one position, and its influences."""
-    follow, found = influences(Design.preset("reference-2d"), phases=1)
+    follow, found = influences(coarse(), phases=1)
     return follow, found[0].state, found[0].at
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from solved import coarse
 
 from swgjoint.errors import DesignError
 from swgjoint.fe.tolerance_cycle import gap_errors, pitch_of
@@ -15,12 +16,11 @@ from swgjoint.fe.tolerance_lot import (
 )
 from swgjoint.fe.tolerance_rest import influences
 from swgjoint.fe.tolerance_sampling import full_solves
-from swgjoint.gear.design import Design
 from swgjoint.gear.tolerances import without_errors
 
 pytestmark = pytest.mark.fe
 
-DESIGN = Design.preset("reference-2d-tolerances")
+DESIGN = coarse("reference-2d-tolerances")
 
 
 @pytest.fixture(scope="module")
