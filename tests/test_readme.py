@@ -31,7 +31,7 @@ def test_the_two_commands():
     """Install and demo, install and test: verbatim, each in a line of its own."""
     lines = [line for block in blocks("sh") for line in block.splitlines()]
     assert "python3 -m pip install . && swgjoint demo" in lines
-    assert "python3 -m pip install '.[test]' && pytest" in lines
+    assert "python3 -m pip install '.[test]' && pytest -n 2" in lines
 
 
 @pytest.mark.parametrize("shown", shown_commands())
