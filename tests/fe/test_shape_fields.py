@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from solved import PITCH, coarse, kept
+from solved import PITCH, coarse
 
 from swgjoint.fe.continuation import Continuation
 from swgjoint.fe.drive2d import ring_model
 from swgjoint.fe.fields import flexspline_field
-from swgjoint.fe.sampling import sample_map
 from swgjoint.fe.shape_fields import plane_surface
 
 
@@ -20,11 +19,10 @@ def design():
 
 
 @pytest.fixture(scope="module")
-def shown(design):
-    """Of four positions."""
-    found = kept("shown", lambda: sample_map(design, model="2d", angles=4).fields)
-    assert found is not None
-    return found
+def shown(coarse_samples):
+    """Of eight positions."""
+    assert coarse_samples.fields is not None
+    return coarse_samples.fields
 
 
 @pytest.fixture(scope="module")

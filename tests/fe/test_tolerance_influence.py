@@ -40,9 +40,9 @@ def gaps_at(design, at, pitches):
 
 
 @pytest.fixture(scope="module")
-def reference():
+def reference(perfect_influences):
     """The perfect drive without load at one position, and its influences."""
-    follow, found = influences(coarse(), phases=1)
+    follow, found = perfect_influences
     return follow, found[0].state, found[0].at
 
 

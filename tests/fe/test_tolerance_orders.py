@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from solved import coarse
 
 from swgjoint.fe.tolerance_cycle import MEMBERS, pitches_of, shifted
 from swgjoint.fe.tolerance_rest import influences
@@ -19,16 +20,14 @@ ECCENTRIC = {"wave_generator_eccentricity_um": 5.0}
 
 def flawed(**values) -> Design:
     changes = {f"tolerances.{key}": value for key, value in values.items()}
-    return Design.preset("reference-2d").with_changes(changes)
+    return coarse(**changes)
 
 
 @pytest.fixture(scope="module")
-def perfect():
+def perfect(perfect_influences):
     """Influences of the drive with a perfect and with an eccentric wave generator."""
-    return {
-        bool(values): influences(flawed(**values), phases=1)[1][0].at
-        for values in ({}, ECCENTRIC)
-    }
+    eccentric = influences(flawed(**ECCENTRIC), phases=1)
+    return {False: perfect_influences[1][0].at, True: eccentric[1][0].at}
 
 
 def orders(at, shifts, torque=4.0):

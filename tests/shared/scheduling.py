@@ -46,16 +46,17 @@ def pytest_configure(config: pytest.Config) -> None:
     if hasattr(config, "workerinput"):
         return
     config.pluginmanager.register(Durations(config.getoption("record_durations")))
-    kept = os.environ.get("SWGJOINT_TEST_CACHE")  # what two runs in a row may share
-    if not kept:
-        kept = config.stash[FOLDER] = tempfile.mkdtemp(prefix="swgjoint-tests-")
-    os.environ["SWGJOINT_CACHE"] = kept
+    if not os.environ.get("SWGJOINT_TEST_CACHE"):  # which two runs in a row may share
+        folder = config.stash[FOLDER] = tempfile.mkdtemp(prefix="swgjoint-tests-")
+        os.environ["SWGJOINT_TEST_CACHE"] = folder
+    os.environ["SWGJOINT_CACHE"] = os.environ["SWGJOINT_TEST_CACHE"]
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:
     """Remove the folder of the run."""
     if folder := config.stash.get(FOLDER, None):
         shutil.rmtree(folder, ignore_errors=True)
+        del os.environ["SWGJOINT_TEST_CACHE"]
 
 
 # -- order and shares ------------------------------------------------------------------

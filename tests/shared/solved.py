@@ -22,9 +22,6 @@ from swgjoint.maps.cache import code_version
 
 T = TypeVar("T")
 
-FOLDER = Path(os.environ["SWGJOINT_CACHE"]) / "solved"
-"""Read once: tests that name another cache still share what is solved."""
-
 PITCH = 2.0 * pi / 122
 """Of the circular spline of the bundled plane designs [rad]."""
 FEW_TEETH = 60
@@ -35,8 +32,9 @@ FEW_PITCH = 2.0 * pi / 62
 def kept(name: str, solve: Callable[[], T]) -> T:
     """The result of ``solve``, from the folder of the run or computed and put there."""
     key = hashlib.sha256(f"{code_version()} {name}".encode()).hexdigest()[:32]
-    path = FOLDER / f"{key}.pickle"
-    FOLDER.mkdir(parents=True, exist_ok=True)
+    # not the cache in use, which a test may have replaced by another one
+    path = Path(os.environ["SWGJOINT_TEST_CACHE"]) / "solved" / f"{key}.pickle"
+    path.parent.mkdir(parents=True, exist_ok=True)
     with FileLock(path.with_suffix(".lock")):
         if path.exists():
             return pickle.loads(path.read_bytes())
