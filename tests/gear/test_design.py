@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import tomllib
 
 import pytest
@@ -328,9 +329,9 @@ def test_files_that_are_no_designs(tmp_path):
         with pytest.raises(DesignError) as caught:
             Design.load(reference)
         assert "\n" not in str(caught.value)
-    assert names(
-        _refusal("reference-2e"), "'reference-2e'", "reference-2d", "size-NN-RRR"
-    )
+    nearest = _refusal("reference-2e")
+    assert names(nearest, "'reference-2e'", "size-NN-RRR", "models/drives")
+    assert len(re.findall(r"reference-2d(?!\w|-)", nearest)) == 2  # and among all
     with pytest.raises(
         DesignError, match=naming("'none'", "models/drives", "reference-2d")
     ):
