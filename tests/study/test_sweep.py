@@ -8,6 +8,7 @@ import json
 from dataclasses import dataclass, replace
 
 import pytest
+from messages import naming
 
 from swgjoint.errors import ComputationError, InputError, MissingExtraError
 from swgjoint.faults import parse_toml, validated
@@ -296,7 +297,7 @@ def test_a_lost_task_is_tried_design_by_design(monkeypatch):
 def test_a_worker_with_other_code_ends_the_sweep(monkeypatch):
     """Its figures would be kept under the name of this code."""
     monkeypatch.setattr(sweep_module, "compute_all", lambda task: ("other", []))
-    with pytest.raises(ComputationError, match="another version of swgjoint"):
+    with pytest.raises(ComputationError, match=naming("worker", "version", "swgjoint")):
         run_sweep(sheet([1.0]), executor=Counted(tasks=[]))
 
 
@@ -385,7 +386,10 @@ kind = "list"
 keys = ["mesh.refinement"]
 values = [0.5]
 """
-    with pytest.raises(InputError, match=r"torque_Nm: 0 N·m with torsional_stiffness"):
+    with pytest.raises(
+        InputError,
+        match=naming("meshing.torque_Nm", "0 N·m", "torsional_stiffness_Nm_rad"),
+    ):
         validated(SweepFile, parse_toml(text, where="x"), where="x")
 
 
