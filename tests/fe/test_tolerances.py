@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from messages import naming
 
 from swgjoint.errors import DesignError
 from swgjoint.fe.continuation import Continuation
@@ -108,5 +109,10 @@ def test_errors_need_all_sectors():
     """No half model."""
     design = flawed(random_pitch_um=2.0)
     assert not can_halve(design)
-    with pytest.raises(DesignError, match="without tolerances"):
+    with pytest.raises(
+        DesignError,
+        match=naming(
+            "reference-2d", "120/122 teeth", "half model", "even", "tolerances"
+        ),
+    ):
         ring_model(design, half=True)
