@@ -8,7 +8,7 @@ import json
 from dataclasses import dataclass, replace
 
 import pytest
-from messages import naming
+from messages import names, naming
 
 from swgjoint.errors import ComputationError, InputError, MissingExtraError
 from swgjoint.faults import parse_toml, validated
@@ -114,8 +114,9 @@ def test_a_bad_design_is_reported_and_the_rest_finishes(counted):
     assert (result["done"], result["failed"]) == (1, 3)
     reasons = [row["reason"] for row in result["rows"]]
     assert reasons[0] == ""
-    assert "the addendum arc does not reach the tip" in reasons[1]
-    assert reasons[2] == "ratings.rated_torque_Nm = -1 N·m: accepted: > 0 N·m"
+    tip = ("flexspline.profile.addendum_radius_mm", "1.0 mm", "tip_radius_mm")
+    assert names(reasons[1], *tip, "straight_mm")
+    assert names(reasons[2], "ratings.rated_torque_Nm", "-1 N·m", "> 0 N·m")
     assert result["rows"][1]["rated_torque_Nm"] is None
 
 

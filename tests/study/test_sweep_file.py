@@ -376,9 +376,8 @@ def test_a_value_that_no_design_takes_is_a_row():
     good, bad = points_of(file)
     assert good.fault == ""
     assert bad.asked is None
-    assert bad.fault == (
-        "flexspline.pressure_angle_deg = 90 deg: accepted: > 0 deg and < 60 deg"
-    )
+    parts = ("flexspline.pressure_angle_deg", "90 deg", "> 0 deg", "< 60 deg")
+    assert names(bad.fault, *parts) and "\n" not in bad.fault
 
 
 @pytest.mark.parametrize("name", bundled_names("sweeps", ".toml"))
