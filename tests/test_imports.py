@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from messages import naming
 
 import swgjoint
 
@@ -158,5 +159,5 @@ def test_public_names_resolve(name):
 
 def test_unknown_names_are_refused():
     """A name that is not public is an AttributeError."""
-    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+    with pytest.raises(AttributeError, match=naming("'swgjoint'", "'nothing'")):
         _ = swgjoint.nothing

@@ -6,6 +6,7 @@ import json
 import re
 
 import pytest
+from messages import names
 from rerun.chunk import RrdReader
 
 from swgjoint.cli.main import main
@@ -158,9 +159,15 @@ def test_design_has_a_stress_and_a_picture(tmp_path, capsys, monkeypatch):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["CSG-25-101"], "CSG-25-100"),
-        (["CSG-25-100", "--sort", "beauty"], "--sort beauty; accepted: ripple_rms"),
-        (["CSG-25-100", "--spec", "spec.toml"], "spec.beauty = 1; accepted"),
+        (["CSG-25-101"], ("'CSG-25-101'", "ratings.csv", "CSG-25-100")),
+        (
+            ["CSG-25-100", "--sort", "beauty"],
+            ("--sort", "beauty", "ripple_rms_percent", "wall_s"),
+        ),
+        (
+            ["CSG-25-100", "--spec", "spec.toml"],
+            ("spec.toml", "spec.beauty", "1", "positive", "wall_s"),
+        ),
     ],
 )
 def test_bad_input_is_one_line(arguments, message, tmp_path, monkeypatch, capsys):
@@ -170,4 +177,4 @@ def test_bad_input_is_one_line(arguments, message, tmp_path, monkeypatch, capsys
     assert main(["compare", *arguments]) == 2
     out, err = capsys.readouterr()
     assert out == "" and err.count("\n") == 1
-    assert message in err
+    assert names(err, *message)

@@ -6,6 +6,7 @@ import json
 
 import numpy as np
 import pytest
+from messages import names
 
 from swgjoint.cli.main import main
 from swgjoint.gear.design import Design
@@ -77,8 +78,10 @@ def test_infeasible_design_is_status_2_with_one_line_per_fault(tmp_path, capsys)
     assert len(bad) == len(lines) == 2
     assert all(line.startswith("swgjoint design: reference-2d: ") for line in lines)
     assert all("accepted" in line for line in lines)
-    assert any("roller_radius_mm = 10 mm" in line for line in lines)
-    assert any("flexspline.addendum_coefficient = 0.6" in line for line in lines)
+    roller = ("wave_generator.roller_radius_mm", "10 mm", "8.759 mm", "aperture_deg")
+    assert any(names(line, *roller) for line in lines)
+    tip = ("flexspline.addendum_coefficient", "0.6", "0.55", "dedendum_coefficient")
+    assert any(names(line, *tip) for line in lines)
 
 
 def test_good_and_bad_designs_together(tmp_path, capsys):
@@ -101,18 +104,24 @@ def test_infeasible_designs_write_nothing(action, tmp_path, capsys):
     assert status == 2
     assert result is None
     assert len(lines) == 1
-    assert "roller_radius_mm = 10 mm" in lines[0]
+    assert names(lines[0], "wave_generator.roller_radius_mm", "10 mm", "8.759 mm")
     assert not folder.exists()
 
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (("show", "reference-2d"), "needs --out DIR"),
-        (("export", "reference-2d"), "needs --out DIR"),
-        (("show", "reference-2d", "reference-3d", "--out", "x"), "one DESIGN, not 2"),
-        (("check", "reference-2d", "--out", "x"), "writes nothing"),
-        (("check", "no-such-design"), "neither a file nor"),
+        (("show", "reference-2d"), ("design show", "--out DIR")),
+        (("export", "reference-2d"), ("design export", "--out DIR")),
+        (
+            ("show", "reference-2d", "reference-3d", "--out", "x"),
+            ("design show", "one DESIGN", "2"),
+        ),
+        (("check", "reference-2d", "--out", "x"), ("design check", "--out")),
+        (
+            ("check", "no-such-design"),
+            ("'no-such-design'", "models/drives", "reference-2d"),
+        ),
     ],
 )
 def test_bad_calls(arguments, message, tmp_path, capsys, monkeypatch):
@@ -121,7 +130,7 @@ def test_bad_calls(arguments, message, tmp_path, capsys, monkeypatch):
     status, _, lines = outcome(capsys, *arguments)
     assert status == 2
     assert len(lines) == 1
-    assert message in lines[0]
+    assert names(lines[0], *message)
     assert list(tmp_path.iterdir()) == []
 
 

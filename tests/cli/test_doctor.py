@@ -7,6 +7,7 @@ import sys
 
 import mujoco
 import pytest
+from messages import names, naming
 
 from swgjoint.cli import doctor
 from swgjoint.cli.main import main
@@ -65,14 +66,15 @@ def test_another_mujoco(capsys, monkeypatch):
         status, result = run(capsys)
         assert status == 1
         detail = by_name(result)["engine plugin"]["detail"]
-        assert "mujoco 4.1.0 is installed" in detail
-        assert detail.endswith("needs 4.0.0: pip install mujoco==4.0.0")
+        assert names(detail, "4.1.0", "4.0.0", "pip install mujoco==4.0.0")
         spec = mujoco.MjSpec.from_string(
             '<mujoco><worldbody><body><joint name="j"/><geom size=".1"/></body>'
             "</worldbody></mujoco>"
         )
         drive = DriveMap.linear(1e4)
-        with pytest.raises(ComputationError, match=r"pip install mujoco==4\.0\.0"):
+        with pytest.raises(
+            ComputationError, match=naming("4.1.0", "pip install mujoco==4.0.0")
+        ):
             attach(spec, joint="j", drive=drive, rotor_inertia=1e-4)
         # what needs no plugin still works
         attach(spec, joint="j", drive=drive, level="linear", rotor_inertia=1e-4)

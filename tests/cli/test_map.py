@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from messages import names
 
 from swgjoint.cli.main import main
 from swgjoint.fe import build_map as builder
@@ -113,13 +114,16 @@ def test_measured_loop_becomes_a_map(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["loop.csv"], "needs --measured-teeth"),
-        (["loop.csv", "--model", "2d"], "--model 2d with a measured loop"),
+        (["loop.csv"], ("loop.csv", "--measured-teeth FS/CS", "--measured-rated NM")),
+        (["loop.csv", "--model", "2d"], ("--model 2d", "measured loop")),
         (
             ["loop.csv", "--measured-teeth", "200", "--measured-rated", "8"],
-            "--measured-teeth 200; accepted: two numbers",
+            ("--measured-teeth", "200", "FS/CS"),
         ),
-        (["reference-2d", "--measured-rated", "8"], "--measured-rated with a design"),
+        (
+            ["reference-2d", "--measured-rated", "8"],
+            ("--measured-rated", "design", ".csv"),
+        ),
     ],
 )
 def test_measured_loop_needs_its_drive(
@@ -130,5 +134,5 @@ def test_measured_loop_needs_its_drive(
     (tmp_path / "loop.csv").write_text(LOOP)
     assert main(["map", *arguments, "-o", "a.swg"]) == 2
     err = capsys.readouterr().err
-    assert err.count("\n") == 1 and message in err
+    assert err.count("\n") == 1 and names(err, *message)
     assert not (tmp_path / "a.swg").exists()

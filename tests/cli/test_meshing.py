@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 
 import pytest
+from messages import names
 
 from swgjoint.cli.main import main
 
@@ -129,16 +130,16 @@ def test_three_dimensional_model_needs_a_cup(capsys):
     out, err = capsys.readouterr()
     assert out == ""
     assert err.count("\n") == 1
-    assert "[cup]" in err and "--model 2d" in err
+    assert names(err, "reference-2d", "3d", "[cup]", "--model 2d")
 
 
 def test_resume_needs_a_run(tmp_path, capsys):
     """Going on needs a 3D run and the folder of its states."""
     assert main(["meshing", "reference-2d", "--resume"]) == 2
-    assert "--resume needs a 3d model and --out" in capsys.readouterr().err
+    assert names(capsys.readouterr().err, "--resume", "3d", "--out DIR")
     folder = str(tmp_path / "none")
     command = ["meshing", "reference-3d", "--half", "--out", folder, "--resume"]
     assert main(command) == 2
     err = capsys.readouterr().err
-    assert err.count("\n") == 1 and "no interrupted run" in err
+    assert err.count("\n") == 1 and names(err, "--resume", f"{folder}/states")
     assert not (tmp_path / "none").exists()

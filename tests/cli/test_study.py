@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 
 import pytest
+from messages import names
 
 from swgjoint.cli.main import main
 from swgjoint.cli.study import report
@@ -60,10 +61,13 @@ def test_report(instant, capsys):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["thesis", "--only", "9.9"], "part 9.9; accepted: 4.4"),
-        (["thesis", "--jobs", "0"], "--jobs 0; accepted: 1 to 256"),
-        (["thesis", "--model", "3d", "--only", "4.4"], "part 4.4; accepted: 7.9"),
-        (["thesis", "--out", "file/below"], "is a file"),
+        (["thesis", "--only", "9.9"], ("9.9", "4.4", "4.6", "table-6.12")),
+        (["thesis", "--jobs", "0"], ("--jobs", "0", "1", "256")),
+        (
+            ["thesis", "--model", "3d", "--only", "4.4"],
+            ("4.4", "7.9", "7.10", "table-7.4"),
+        ),
+        (["thesis", "--out", "file/below"], ("folder", "'file/below'", "'file'")),
     ],
 )
 def test_bad_input(arguments, message, tmp_path, monkeypatch, capsys):
@@ -73,7 +77,7 @@ def test_bad_input(arguments, message, tmp_path, monkeypatch, capsys):
     assert main(["study", *arguments]) == 2
     out, err = capsys.readouterr()
     assert out == "" and err.count("\n") == 1
-    assert message in err
+    assert names(err, *message)
     assert [p.name for p in tmp_path.iterdir()] == ["file"]
 
 
@@ -82,4 +86,4 @@ def test_unknown_study(capsys):
     with pytest.raises(SystemExit) as left:
         main(["study", "nothing"])
     assert left.value.code == 2
-    assert "thesis" in capsys.readouterr().err
+    assert names(capsys.readouterr().err, "'nothing'", "thesis", "ring", "catalogue")

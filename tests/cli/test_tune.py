@@ -6,6 +6,7 @@ import json
 import sys
 
 import pytest
+from messages import names
 
 from swgjoint.cli.main import main
 
@@ -40,26 +41,53 @@ def test_json_of_the_contract(tmp_path, capsys):
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        (["JointTracking-v1"], "did you mean JointTracking-v0"),
-        (["ArmTracking-v0"], "accepted: JointTracking-v0"),
-        (["JointTracking-v0", "--controller", "pid"], "accepted: pd "),
-        (["JointTracking-v0", "--optimiser", "sgd"], "accepted: de, cma, optuna"),
-        (["JointTracking-v0", "--evaluations", "3"], "at least 32"),
-        (["JointTracking-v0", "--minutes", "-1"], "minutes -1"),
-        (["JointTracking-v0", "--resume"], "accepted: --out"),
-        (["JointTracking-v0", "--set", "drive=CSG-1-1"], "CSG-1-1"),
-        (["JointTracking-v0", "--set", "error_scale_arcmin=0"], "error_scale_arcmin 0"),
-        (["JointTracking-v0", "--set", "num_envs=3"], "'num_envs' of an env"),
-        (["JointTracking-v0", "--set", "threads=1"], "accepted: drive, level"),
-        (["JointTracking-v0", "--set", "vectorization_mode=sync"], "'vectorization"),
-        (["JointTracking-v0", "--set", "autoreset_mode=SameStep"], "'autoreset_mode'"),
+        (
+            ["JointTracking-v1"],
+            ("environment", "'JointTracking-v1'", "JointTracking-v0"),
+        ),
+        (["ArmTracking-v0"], ("environment", "'ArmTracking-v0'", "JointTracking-v0")),
+        (
+            ["JointTracking-v0", "--controller", "pid"],
+            ("controller", "'pid'", "pd", "pd-feedforward", "pd-flexible"),
+        ),
+        (
+            ["JointTracking-v0", "--optimiser", "sgd"],
+            ("optimiser", "'sgd'", "de", "cma", "optuna"),
+        ),
+        (["JointTracking-v0", "--evaluations", "3"], ("evaluations", "3", "32", "16")),
+        (["JointTracking-v0", "--minutes", "-1"], ("minutes", "-1", "> 0", "<= 1440")),
+        (["JointTracking-v0", "--resume"], ("resume", "--out")),
+        (
+            ["JointTracking-v0", "--set", "drive=CSG-1-1"],
+            ("'CSG-1-1'", "ratings.csv", "CSG-14-50"),
+        ),
+        (
+            ["JointTracking-v0", "--set", "error_scale_arcmin=0"],
+            ("error_scale_arcmin", "0 arcmin", "> 0"),
+        ),
+        (
+            ["JointTracking-v0", "--set", "num_envs=3"],
+            ("'num_envs'", "drive", "level", "effort_weight"),
+        ),
+        (
+            ["JointTracking-v0", "--set", "threads=1"],
+            ("'threads'", "drive", "level", "effort_weight"),
+        ),
+        (
+            ["JointTracking-v0", "--set", "vectorization_mode=sync"],
+            ("'vectorization_mode'", "drive", "level", "effort_weight"),
+        ),
+        (
+            ["JointTracking-v0", "--set", "autoreset_mode=SameStep"],
+            ("'autoreset_mode'", "drive", "level", "effort_weight"),
+        ),
     ],
 )
 def test_bad_input_is_one_line(arguments, text, capsys):
     """What is not accepted, and what is; exit status 2, no traceback."""
     assert main(["tune", *arguments]) == 2
     out, err = capsys.readouterr()
-    assert text in err and "Traceback" not in err and not out
+    assert names(err, *text) and "Traceback" not in err and not out
     assert len(err.strip().splitlines()) == 1
 
 
@@ -69,4 +97,4 @@ def test_missing_optimiser_says_what_installs_it(name, monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, name, None)
     assert main(["tune", "JointTracking-v0", *QUICK, "--optimiser", name]) == 1
     err = capsys.readouterr()[1]
-    assert "pip install 'swgjoint[tune]'" in err
+    assert names(err, name, "pip install 'swgjoint[tune]'", "de")

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from messages import naming
 
 from swgjoint.control.flexible import flexible_plan, motor_angle
 from swgjoint.control.motor_side import MotorPID, rigid_plan
@@ -77,7 +78,9 @@ def test_the_motor_stands_where_the_map_exerts_the_torque(synthetic_map):
 def test_a_torque_that_the_map_cannot_give_is_refused():
     """One line that says which."""
     weak = replace(LINEAR, end_stiffness=np.zeros((1, 2, 2)))
-    with pytest.raises(ComputationError, match="torque 300"):
+    with pytest.raises(
+        ComputationError, match=naming("'linear'", "torque", "300.0 N·m")
+    ):
         motor_angle(weak, np.zeros(1), np.array([300.0]))
 
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from messages import naming
 
 from swgjoint.control.flexible import flexible_plan
 from swgjoint.control.kinematic_error import KinematicErrorTable
@@ -115,7 +116,12 @@ def test_ramps_are_not_learned_from(turn):
     """A block in which the commanded speed changes is left out."""
     learning = LearningCompensation(Spy(), orders=[(2, 0)], turns=1.0)
     sweep = {"kind": "sweep", "ramp_s": 0.5, "hold_s": 0.1, "end_deg": {"joint": 60.0}}
-    with pytest.raises(InputError, match=r"output_torque without its sensor"):
+    with pytest.raises(
+        InputError,
+        match=naming(
+            "output_torque", "controller.feedback", "'link'", "sensors.torque"
+        ),
+    ):
         turn(LINEAR, LINEAR, LearningCompensation(Spy(), signal="output_torque"),
              speed=30.0, duration=0.1)  # fmt: skip
     turn(LINEAR, LINEAR, learning, speed=0.0, duration=1.3, trajectory=sweep)
@@ -124,9 +130,24 @@ def test_ramps_are_not_learned_from(turn):
 
 
 @pytest.mark.parametrize(
-    "bad", [{"rate": 0.0}, {"forgetting": 1.0}, {"turns": 0.5}, {"signal": "sound"}]
+    ("bad", "says"),
+    [
+        (
+            {"rate": 0.0},
+            ("rate 0", "0 < rate <= 1", "0 <= forgetting < 1", "turns >= 1"),
+        ),
+        (
+            {"forgetting": 1.0},
+            ("forgetting 1", "0 < rate <= 1", "0 <= forgetting < 1", "turns >= 1"),
+        ),
+        (
+            {"turns": 0.5},
+            ("0.5 turns", "0 < rate <= 1", "0 <= forgetting < 1", "turns >= 1"),
+        ),
+        ({"signal": "sound"}, ("signal", "'sound'", "link_angle", "output_torque")),
+    ],
 )
-def test_rates_that_do_not_learn_are_refused(bad):
+def test_rates_that_do_not_learn_are_refused(bad, says):
     """One line with what is accepted."""
-    with pytest.raises(InputError, match="accepted"):
+    with pytest.raises(InputError, match=naming(*says)):
         LearningCompensation(Spy(), **bad)

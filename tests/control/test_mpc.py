@@ -7,6 +7,7 @@ from dataclasses import replace
 import casadi
 import numpy as np
 import pytest
+from messages import naming
 
 from swgjoint.control.flexible import flexible_plan
 from swgjoint.control.motor_side import MotorPID, rigid_plan
@@ -308,5 +309,5 @@ def test_batch_is_its_members():
 @pytest.mark.parametrize("key", ["horizon", "frequency", "peak", "drift"])
 def test_weights_are_positive(key):
     """A clear line."""
-    with pytest.raises(InputError, match="accepted: > 0"):
+    with pytest.raises(InputError, match=naming("> 0") + rf".*{key}\W+0\b"):
         PredictiveController(**{key: 0})

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from messages import naming
 
 from swgjoint.control.flexible import flexible_plan
 from swgjoint.control.motor_side import MotorPID
@@ -88,5 +89,7 @@ def test_an_unknown_load_no_longer_moves_the_motor(turn):
 def test_a_bandwidth_beyond_the_period_is_refused(turn):
     """One line with the largest."""
     observer = DisturbanceObserver(Still(), bandwidth=100.0)
-    with pytest.raises(InputError, match=r"100 Hz at a period of 0.001 s; accepted:"):
+    with pytest.raises(
+        InputError, match=naming("bandwidth", "100 Hz", "0.001 s", "> 0", "<= 39.8 Hz")
+    ):
         observer.start(told(turn))

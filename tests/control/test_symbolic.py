@@ -9,6 +9,7 @@ import casadi
 import mujoco
 import numpy as np
 import pytest
+from messages import naming
 
 from swgjoint.control import symbolic
 from swgjoint.control.symbolic import (
@@ -253,5 +254,7 @@ def test_missing_casadi_says_what_installs_it(monkeypatch, synthetic_map):
         return import_module(name)
 
     monkeypatch.setattr(symbolic, "import_module", absent)
-    with pytest.raises(MissingExtraError, match=r"pip install 'swgjoint\[control\]'"):
+    with pytest.raises(
+        MissingExtraError, match=naming("casadi", "pip install 'swgjoint[control]'")
+    ):
         joint_forces(synthetic_map, damping=1.0)

@@ -10,6 +10,7 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
+from messages import names, naming
 from rerun.chunk import RrdReader
 
 from swgjoint.envs import ENVIRONMENTS
@@ -27,8 +28,8 @@ def can_draw(env) -> bool:
     try:
         Picture(env.unwrapped.core.plant.model).close()
     except ComputationError as error:
-        assert "render_mode 'rgb_array': no OpenGL off screen" in str(error)
-        assert "install EGL" in str(error) and "\n" not in str(error)
+        assert names(str(error), "render_mode", "'rgb_array'", "OpenGL")
+        assert names(str(error), "EGL") and "\n" not in str(error)
         return False
     return True
 
@@ -39,7 +40,9 @@ def test_pictures_show_that_the_arm_moves(name):
     env = make(name, render_mode="rgb_array")
     env.reset(seed=0)
     if not can_draw(env):
-        with pytest.raises(ComputationError, match="no OpenGL off screen"):
+        with pytest.raises(
+            ComputationError, match=naming("'rgb_array'", "OpenGL", "EGL")
+        ):
             env.render()
         return
     check_env(env.unwrapped)
@@ -69,12 +72,15 @@ def test_without_opengl_one_line_says_what_to_do(tmp_path):
         cwd=tmp_path,  # the installed package, not the sources beside the tests
     )
     assert done.returncode == 1
-    assert "no OpenGL off screen with MUJOCO_GL=disabled" in done.stderr
+    assert names(done.stderr, "'rgb_array'", "OpenGL", "MUJOCO_GL=disabled", "EGL")
 
 
 def test_other_render_modes_are_refused():
     """The rerun viewer has a recorder of its own."""
-    with pytest.raises(InputError, match="EpisodeRecorder"):
+    with pytest.raises(
+        InputError,
+        match=naming("render_mode", "'rerun'", "'rgb_array'", "EpisodeRecorder"),
+    ):
         make("swgjoint/JointTracking-v0", disable_env_checker=True).unwrapped.__class__(
             render_mode="rerun"
         )
@@ -136,5 +142,7 @@ def test_recordings_in_the_folder_stay(tmp_path):
 
 def test_only_environments_of_the_package_are_recorded(tmp_path):
     """Others have no arm to show."""
-    with pytest.raises(InputError, match="accepted: a single environment"):
+    with pytest.raises(
+        InputError, match=naming("CartPoleEnv", "single", "swgjoint.envs")
+    ):
         EpisodeRecorder(gymnasium.make("CartPole-v1"), tmp_path)

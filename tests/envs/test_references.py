@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from messages import naming
 
 from swgjoint.envs.references import KINDS, draw_motion
 from swgjoint.envs.specimen import with_assumed_error
@@ -66,6 +67,8 @@ def test_assumed_error_is_what_the_catalogue_states():
             drive.coefficients(1e-3, 1)[0], plain.coefficients(1e-3, 1)[0]
         )
     assert with_assumed_error(plain, 0.0) is plain
-    with pytest.raises(InputError, match="which has its own"):
+    with pytest.raises(
+        InputError, match=naming("kinematic_error_arcmin", "1", "'CSG-25-100'", "None")
+    ):
         with_assumed_error(drive, 1.0 * arcmin)
     assert with_assumed_error(drive) is drive

@@ -7,6 +7,7 @@ from math import pi
 
 import numpy as np
 import pytest
+from messages import naming
 from solved import coarse
 
 from swgjoint.errors import DesignError
@@ -173,5 +174,13 @@ def test_meshing_in_space_has_the_springs():
 def test_springs_must_be_positive():
     """A spring without stiffness is none."""
     for name in ("boss", "housing"):
-        with pytest.raises(DesignError, match=f"{name}.torsional_stiffness_Nm_rad"):
+        with pytest.raises(
+            DesignError,
+            match=naming(
+                f"{name}.torsional_stiffness_Nm_rad",
+                "0 N·m/rad",
+                "> 0 N·m/rad",
+                "<= 1e+12 N·m/rad",
+            ),
+        ):
             mounted("flexspline_fixed", **{name: 0.0})

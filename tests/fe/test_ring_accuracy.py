@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from messages import naming
 
 from swgjoint.errors import ComputationError, Outcome
 from swgjoint.fe import ring_accuracy
@@ -65,5 +66,7 @@ def test_a_failure_says_where(monkeypatch):
         return replace(state, outcome=Outcome.MAX_ITERATIONS)
 
     monkeypatch.setattr(ring_accuracy, "loaded", stuck)
-    with pytest.raises(ComputationError, match="at 5 N·m and input angle"):
+    with pytest.raises(
+        ComputationError, match=naming("size-25-50", "5 N·m", "0.5 rad", "load steps")
+    ):
         transmission_error(PERFECT, [0.5], torque=5.0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from messages import naming
 
 from swgjoint.errors import DesignError
 from swgjoint.fe import ring_running
@@ -232,5 +233,8 @@ def test_the_coefficient_of_the_design_is_not_looked_at(design, free):
     """It multiplies the result; what the rings do not hold is refused."""
     rubs = design.with_changes({"friction.tooth_coefficient": 0.1})
     assert running_friction(rubs, angles=[ANGLE]).race == pytest.approx(free.race)
-    with pytest.raises(DesignError, match=r"wave_generator\.bearing"):
+    with pytest.raises(
+        DesignError,
+        match=naming("reference-2d", "wave_generator.bearing", "table", "2d model"),
+    ):
         running_friction(Design.preset("reference-2d"))

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from messages import naming
 from solved import coarse
 
 from swgjoint.fe.continuation import Continuation
@@ -140,5 +141,7 @@ def test_flawed_or_half_models_are_refused(reference):
     shifts = np.full((120, 2), 1e-6)
     for change in ({"tooth_shift": shifts}, {"half": True}):
         model = replace(follow.model, **change)
-        with pytest.raises(ValueError, match="without friction and errors"):
+        with pytest.raises(
+            ValueError, match=naming("all sectors", "friction", "errors")
+        ):
             influence(model, state, ring_is_output=False)

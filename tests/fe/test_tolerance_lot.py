@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from messages import naming
 from solved import coarse
 
 from swgjoint.errors import DesignError
@@ -103,7 +104,9 @@ def test_error_of_the_superposition_is_told(rests):
 def test_an_axis_that_leans_is_refused():
     """A plane has none; silence would count it as nothing."""
     leaning = DESIGN.with_changes({"tolerances.misalignment_arcmin": 5.0})
-    with pytest.raises(DesignError, match="misalignment_arcmin = 5"):
+    with pytest.raises(
+        DesignError, match=naming("tolerances.misalignment_arcmin", "5", "2d", "0")
+    ):
         perfect_positions(leaning, phases=1)
 
 

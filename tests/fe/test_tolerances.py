@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from messages import naming
 from solved import FEW_PITCH, coarse, few_teeth
 
 from swgjoint.errors import DesignError
@@ -107,5 +108,10 @@ def test_errors_need_all_sectors():
     """No half model."""
     design = flawed(random_pitch_um=2.0)
     assert not can_halve(design)
-    with pytest.raises(DesignError, match="without tolerances"):
+    with pytest.raises(
+        DesignError,
+        match=naming(
+            "reference-2d", "120/122 teeth", "half model", "even", "tolerances"
+        ),
+    ):
         ring_model(design, half=True)

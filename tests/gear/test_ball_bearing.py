@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import log, pi, sqrt
 
 import pytest
+from messages import naming
 
 from swgjoint.errors import DesignError
 from swgjoint.gear.ball_bearing import (
@@ -114,17 +115,18 @@ def test_constant_scales_with_the_root_of_length():
 
 
 @pytest.mark.parametrize(
-    ("key", "value"),
+    ("key", "value", "message"),
     [
-        ("groove_conformity", 0.5),
-        ("groove_inertia_factor", 0.0),
-        ("fit_clearance_um", -1.0),
-        ("race_width_mm", 0.0),
+        ("groove_conformity", 0.5, ("0.5", "> 0.5", "<= 1")),
+        ("groove_inertia_factor", 0.0, ("0", "> 0", "<= 1")),
+        ("fit_clearance_um", -1.0, ("-1 µm", ">= 0 µm", "<= 2000 µm")),
+        ("race_width_mm", 0.0, ("0 mm", "> 0 mm", "<= 10000 mm")),
     ],
 )
-def test_impossible_bearings_are_refused(key, value):
+def test_impossible_bearings_are_refused(key, value, message):
     """A groove tighter than the ball, no race, interference: one line with the key."""
-    with pytest.raises(DesignError, match=f"wave_generator.*bearing.{key}"):
+    pattern = naming(f"wave_generator.bearing.{key}", *message)
+    with pytest.raises(DesignError, match=pattern):
         Design.load("size-25-100").with_changes(
             {f"wave_generator.bearing.{key}": value}
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pytest
+from messages import naming
 
 from swgjoint.errors import DesignError
 from swgjoint.gear import kinematics
@@ -57,7 +58,15 @@ def test_designs_without_it_keep_their_hash():
 
 def test_a_coupling_without_stiffness_is_refused():
     """One line with the key."""
-    with pytest.raises(DesignError, match=r"coupling\.torsional_stiffness_Nm_rad"):
+    with pytest.raises(
+        DesignError,
+        match=naming(
+            "coupling.torsional_stiffness_Nm_rad",
+            "0 N·m/rad",
+            "> 0 N·m/rad",
+            "<= 1e+12 N·m/rad",
+        ),
+    ):
         Design.load("reference-2d").with_changes(
             {"coupling.torsional_stiffness_Nm_rad": 0.0}
         )

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from math import pi
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from messages import naming
 
 from swgjoint.errors import DesignError
 from swgjoint.gear.design import Design
@@ -193,10 +195,14 @@ def test_two_arcs_of_the_article_share_a_tangent(make_profile, profile_laws):
 def test_two_arc_says_how_deep_it_reaches(make_profile):
     """The article's root circle lies below its concave arc; the limit is printed."""
     values = {"profile": {"kind": "two_arc"}, "dedendum_coefficient": 1.1}
-    with pytest.raises(DesignError, match=r"dedendum_coefficient = 1.1.*<= 0\.9"):
+    with pytest.raises(
+        DesignError, match=naming("dedendum_coefficient", "1.1", "<= 0.9203")
+    ):
         make_profile("flexspline", values)
     values = {"profile": {"kind": "two_arc"}, "addendum_coefficient": 1.0}
-    with pytest.raises(DesignError, match=r"addendum_coefficient = 1.0.*pointed"):
+    with pytest.raises(
+        DesignError, match=naming("addendum_coefficient", "1.0", "<= 0.637")
+    ):
         make_profile("flexspline", values)
 
 
@@ -241,7 +247,6 @@ def test_any_arc_profile_is_right_or_refused(
     except DesignError as error:
         assert "\n" not in str(error)
         assert member in str(error)
-        keys = ("_mm = ", "_deg = ", "_coefficient = ", "_split = ")
-        assert any(key in str(error) for key in keys)
+        assert re.search(r"_(mm|deg|coefficient|split)\W+\d", str(error))
         return
     profile_laws(p)

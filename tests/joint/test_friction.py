@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from messages import naming
 
 from swgjoint.errors import InputError
 from swgjoint.joint import plugin
@@ -360,7 +361,10 @@ def test_bad_attribute_is_rejected(text):
     attach(spec, joint="j", drive=drive, rotor_inertia=4e-5, friction=True)
     [instance] = spec.plugins
     instance.config = {**plugin.config(drive, damping=1.0), "friction": text}
-    with pytest.raises(ValueError, match="attribute 'friction' is not nine numbers"):
+    with pytest.raises(
+        ValueError,
+        match=naming("'j_drive'", "'friction'", "nine", "b_theta", "b_psi", "load"),
+    ):
         spec.compile()
 
 
@@ -383,17 +387,17 @@ def test_a_prefix_and_suffix_leave_the_friction_in_place(synthetic_map, friction
 @pytest.mark.parametrize(
     ("change", "says"),
     [
-        ({"stiffness": 0.0}, "friction stiffness 0.0 N·m/rad; accepted"),
-        ({"viscous": -1.0}, "friction viscous -1.0"),
-        ({"load": float("nan")}, "friction load nan"),
-        ({"static": 0.01}, "friction static 0.01 N·m; accepted: at least coulomb"),
-        ({"stribeck_speed": 0.0}, "friction stribeck_speed"),
-        ({"coulomb": True}, "friction coulomb True"),
+        ({"stiffness": 0.0}, ("stiffness", "0.0 N·m/rad", "> 0")),
+        ({"viscous": -1.0}, ("viscous", "-1.0 N·m·s/rad", ">= 0")),
+        ({"load": float("nan")}, ("load", "nan", ">= 0")),
+        ({"static": 0.01}, ("static", "0.01 N·m", "coulomb", "0.04 N·m")),
+        ({"stribeck_speed": 0.0}, ("stribeck_speed", "0.0 rad/s", "> 0")),
+        ({"coulomb": True}, ("coulomb", "True N·m", ">= 0")),
     ],
 )
 def test_bad_friction_is_refused(change, says, friction_law):
     """Parameters that no friction has are named with what is accepted."""
-    with pytest.raises(InputError, match=says):
+    with pytest.raises(InputError, match=naming("friction", *says)):
         replace(friction_law, **change)
 
 

@@ -9,6 +9,7 @@ import mujoco
 import mujoco.rollout
 import numpy as np
 import pytest
+from messages import naming
 
 from swgjoint.joint import plugin
 from swgjoint.joint.attach import attach
@@ -268,7 +269,9 @@ def test_bad_attribute_is_rejected(text):
     attach(spec, joint="j", drive=drive, rotor_inertia=4e-5)
     [instance] = spec.plugins
     instance.config = {**plugin.config(drive, damping=1.0), "hysteresis": text}
-    with pytest.raises(ValueError, match="attribute 'hysteresis' is not up to 64"):
+    with pytest.raises(
+        ValueError, match=naming("'j_drive'", "'hysteresis'", "64", "pairs", "> 0")
+    ):
         spec.compile()
 
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from messages import naming
 
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.equilibrium import output_angle
@@ -124,5 +125,5 @@ def test_report_compares_what_was_played(synthetic_map):
 def test_round_of_unequal_branches_is_refused(synthetic_map):
     """Widths are differences at equal torques: other paths are a ValueError."""
     loop = blank(synthetic_map, 0.1)
-    with pytest.raises(ValueError, match="round of equal branches"):
+    with pytest.raises(ValueError, match=naming("217", "torques", "24 steps")):
         replace(loop, torque=np.linspace(-1.0, 1.0, loop.torque.size))

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from messages import names, naming
 
 from swgjoint.errors import InputError
 from swgjoint.maps.drive_map import DriveMap, Ratings
@@ -237,19 +238,25 @@ def test_orders_that_the_samples_cannot_tell_are_listed(synthetic_map, tmp_path)
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("torque_Nm,torsion\n1,2\n", "no column torsion_arcmin or torsion_rad"),
-        ("torque_Nm,torsion_rad\n1,2\n3\n", "line 3: 1 cells"),
-        ("# x\ntorque_Nm,torsion_rad\n1,x\n", "line 3: torsion_rad = 'x'"),
-        ("torque_Nm,torsion_rad\n1,nan\n", "accepted: a finite number"),
-        ("", "empty"),
-        ("torque_Nm,torsion_rad\n-1,0\n1,1\n", "2 samples"),
+        ("torque_Nm,torsion\n1,2\n", ("torsion_arcmin", "torsion_rad", "'torsion'")),
+        ("torque_Nm,torsion_rad\n1,2\n3\n", ("line 3", "1", "2")),
+        (
+            "# x\ntorque_Nm,torsion_rad\n1,x\n",
+            ("line 3", "torsion_rad", "'x'", "finite"),
+        ),
+        (
+            "torque_Nm,torsion_rad\n1,nan\n",
+            ("line 2", "torsion_rad", "'nan'", "finite"),
+        ),
+        ("", ("empty", "torque_Nm", "torsion_arcmin", "torsion_rad")),
+        ("torque_Nm,torsion_rad\n-1,0\n1,1\n", ("2 samples", "8")),
         (
             "torque_Nm,torsion_rad\n" + "\n".join(f"{k},{k}" for k in range(20)),
-            "accepted: both signs",
+            ("torque_Nm", "0", "19 N·m", "signs"),
         ),
         (
             "torque_Nm,torsion_rad\n" + "\n".join(f"{k},{-k}" for k in range(-9, 10)),
-            "torsion does not grow",
+            ("torsion", "torque", "sign"),
         ),
     ],
 )
@@ -259,7 +266,7 @@ def test_bad_loops(tmp_path, text, message):
     path.write_text(text)
     with pytest.raises(InputError) as caught:
         DriveMap.from_measurement(path, ratings=50.0, **TEETH)
-    assert message in str(caught.value)
+    assert names(str(caught.value), *message)
     assert "bad.csv" in str(caught.value)
     assert "\n" not in str(caught.value)
 
@@ -278,15 +285,31 @@ def test_bad_options(synthetic_map, tmp_path):
         error[:1000] / arcmin,
     )
     for path, options, message in (
-        (tmp_path / "none.csv", {}, "cannot be read"),
-        (loop, {"kinematic_error": half}, "accepted: one turn, 360 deg"),
-        (loop, {"ratings": -1.0}, "rated torque -1"),
-        (loop, {"layout": "x"}, "layout 'x'"),
-        (loop, {"intervals": 0}, "intervals 0"),
+        (tmp_path / "none.csv", {}, ("none.csv", "No such file")),
+        (
+            loop,
+            {"kinematic_error": half},
+            ("half.csv", "183.115 deg", "1000", "360 deg", "16"),
+        ),
+        (loop, {"ratings": -1.0}, ("rated torque", "-1 N·m", "> 0 N·m")),
+        (
+            loop,
+            {"layout": "x"},
+            (
+                "layout",
+                "'x'",
+                "circular_spline_fixed",
+                "flexspline_fixed",
+                "wave_generator_fixed",
+            ),
+        ),
+        (loop, {"intervals": 0}, ("intervals", "0", "1")),
     ):
-        with pytest.raises(InputError, match=message):
+        with pytest.raises(InputError, match=naming(*message)):
             DriveMap.from_measurement(path, **{"ratings": 50.0, **TEETH, **options})
-    with pytest.raises(InputError, match="teeth 122 and 120"):
+    with pytest.raises(
+        InputError, match=naming("teeth", "122", "120", "flexspline", "circular spline")
+    ):
         DriveMap.from_measurement(
             loop, ratings=50.0, teeth_flexspline=122, teeth_circular_spline=120
         )

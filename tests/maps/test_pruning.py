@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from messages import naming
 from scipy.optimize import brentq
 
 from swgjoint.errors import InputError
@@ -186,7 +187,9 @@ def test_pruning_twice_keeps_the_first_bound(drive):
 @pytest.mark.parametrize("tolerance", [0.0, -1.0, float("nan"), float("inf")])
 def test_a_tolerance_is_positive(drive, tolerance):
     """One line with the value and what is accepted."""
-    with pytest.raises(InputError, match=r"arcmin; accepted: > 0"):
+    with pytest.raises(
+        InputError, match=naming("tolerance", f"{tolerance:g} arcmin", "> 0")
+    ):
         drive.pruned(tolerance)
 
 
@@ -194,5 +197,16 @@ def test_no_bound_is_claimed_where_none_follows(synthetic_map):
     """Harmonics that may cancel the mean stiffness are refused in one line."""
     drive = rippled(synthetic_map, 0)
     more = np.array([1.0, *12 * [300.0]])[:, None, None, None]
-    with pytest.raises(InputError, match=r"no bound of an angle.*without a tolerance"):
+    with pytest.raises(
+        InputError,
+        match=naming(
+            "map 'synthetic'",
+            "stiffness",
+            "N·m/rad",
+            "tolerance",
+            "rigid",
+            "linear",
+            "native",
+        ),
+    ):
         replace(drive, potential=more * drive.potential).pruned(0.1)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from itertools import combinations
 
 import pytest
+from messages import names, naming
 
 from swgjoint.errors import InputError
 from swgjoint.gear.design import Design
@@ -115,7 +116,9 @@ def test_parts_choose_whole_names():
     chosen = [group.id for group in STUDY.chosen(("5.4", "table"))]
     assert chosen[0] == "5.4.1" and "5.4.4" in chosen and "5.5.1" not in chosen
     assert set(TABLES) <= set(chosen)
-    with pytest.raises(InputError, match=r"part 4.1, 9; accepted: 4.4, 4.6"):
+    with pytest.raises(
+        InputError, match=naming("4.1", "9", "4.4", "4.6", "table-6.12")
+    ):
         STUDY.chosen(("4.1", "9"))
 
 
@@ -156,14 +159,17 @@ def test_all_faults_of_a_file_at_once(tmp_path):
     with pytest.raises(InputError) as refused:
         StudyFile.load(path)
     lines = str(refused.value).splitlines()
-    assert any("torque_Nm = -2 N·m: accepted: >= 0 N·m" in line for line in lines)
-    assert any("tensile_MPa = -5 MPa: accepted: > 0 MPa" in line for line in lines)
-    assert any("nam: unknown key; did you mean name?" in line for line in lines)
+    assert any(names(line, "torque_Nm", "-2 N·m", ">= 0 N·m") for line in lines)
+    assert any(
+        names(line, "group[0].cases[1].tensile_MPa", "-5 MPa", "> 0 MPa")
+        for line in lines
+    )
+    assert any(names(line, "group[1].cases[0].nam", "name", "note") for line in lines)
     path.write_text(FAULTY.replace("-2.0", "2.0").replace("-5.0", "5.0"))
     path.write_text(path.read_text().replace("nam =", "name ="))
     with pytest.raises(InputError) as refused:
         StudyFile.load(path)
     lines = str(refused.value).splitlines()
-    assert any("cases: accepted: values in increasing order" in line for line in lines)
-    assert any("lowest.von_mises: 3; accepted" in line for line in lines)
-    assert any("cases[2].value: accepted: exactly where" in line for line in lines)
+    assert any(names(line, "group[0].cases", "increasing") for line in lines)
+    assert any(names(line, "group[0].lowest.von_mises", "3", "case") for line in lines)
+    assert any(names(line, "group[0].cases[2].value", "keys") for line in lines)

@@ -10,6 +10,7 @@ from math import log2, pi, sqrt
 
 import numpy as np
 import pytest
+from messages import names
 
 from swgjoint.cli import bench_joint
 from swgjoint.cli.main import main
@@ -270,9 +271,8 @@ def test_unknown_scenes_are_refused(capsys):
     """One line, exit status 2."""
     assert main(["bench", "joint", "--only", "ur6"]) == 2
     lines = capsys.readouterr().err.splitlines()
-    assert lines == [
-        "swgjoint bench: --only ur6: no such scene; accepted: ur5e, iiwa14, bench"
-    ]
+    assert len(lines) == 1
+    assert names(lines[0], "swgjoint bench", "--only", "ur6", "ur5e", "iiwa14")
 
 
 def test_provenance_names_what_ran():

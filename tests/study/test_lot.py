@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from messages import naming
 
 from swgjoint.errors import DesignError
 from swgjoint.fe.tolerance_cycle import gap_errors, pitch_of, pitches_of
@@ -128,5 +129,7 @@ def test_picture_shows_a_lot_with_a_failed_drive():
 
 def test_a_design_without_tolerances_has_no_lot():
     """One line that names what is accepted."""
-    with pytest.raises(DesignError, match=r"all tolerances are zero; accepted"):
+    with pytest.raises(
+        DesignError, match=naming("reference-2d", "zero", "[tolerances]")
+    ):
         run_lot(Design.preset("reference-2d"), count=1)

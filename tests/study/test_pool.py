@@ -11,6 +11,7 @@ from pathlib import Path
 
 import cloudpickle
 import pytest
+from messages import naming
 
 from swgjoint.errors import ComputationError
 from swgjoint.study.pool import LocalPool, Lost, run_all
@@ -99,7 +100,9 @@ def test_tasks_are_drawn_as_they_are_needed():
 
 def test_a_dead_process_of_a_study_is_one_line(tmp_path):
     """A study cannot do without a result: the death of its process is an error."""
-    with pytest.raises(ComputationError, match="runs: task 2: its process died"):
+    with pytest.raises(
+        ComputationError, match=naming("runs", "task 2", "process", "memory")
+    ):
         run_all(deadly, [(1, str(tmp_path)), (7, str(tmp_path))], jobs=2)
 
 

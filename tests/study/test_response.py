@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 
 import pytest
+from messages import names
 
 from swgjoint.cli.main import main
 from swgjoint.sim import frequency_response
@@ -35,4 +36,4 @@ def test_study_writes_rows_and_a_picture(tmp_path, capsys, monkeypatch):
 def test_unknown_drive_is_one_line(capsys):
     """A drive that does not exist names the nearest one."""
     assert main(["study", "response", "--only", "CSG-25-101"]) == 2
-    assert "CSG-25-100" in capsys.readouterr().err
+    assert names(capsys.readouterr().err, "'CSG-25-101'", "ratings.csv", "CSG-25-100")

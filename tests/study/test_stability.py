@@ -8,6 +8,7 @@ from math import log, pi
 
 import numpy as np
 import pytest
+from messages import names
 
 from swgjoint.cli.main import main
 from swgjoint.maps.drive_map import DriveMap
@@ -269,7 +270,7 @@ def test_the_command_fails_when_a_run_went_wrong(small, capsys, monkeypatch):
 def test_bad_jobs_are_refused(capsys):
     """One line on stderr, status 2."""
     assert main(["stability", "--jobs", "0"]) == 2
-    assert "--jobs 0; accepted: 1 to 256" in capsys.readouterr().err
+    assert names(capsys.readouterr().err, "--jobs", "0", "1", "256")
 
 
 def test_the_grid_spans_what_it_says():

@@ -8,6 +8,7 @@ import json
 from dataclasses import dataclass, replace
 
 import pytest
+from messages import names, naming
 
 from swgjoint.errors import ComputationError, InputError, MissingExtraError
 from swgjoint.faults import parse_toml, validated
@@ -113,8 +114,9 @@ def test_a_bad_design_is_reported_and_the_rest_finishes(counted):
     assert (result["done"], result["failed"]) == (1, 3)
     reasons = [row["reason"] for row in result["rows"]]
     assert reasons[0] == ""
-    assert "the addendum arc does not reach the tip" in reasons[1]
-    assert reasons[2] == "ratings.rated_torque_Nm = -1 N·m: accepted: > 0 N·m"
+    tip = ("flexspline.profile.addendum_radius_mm", "1.0 mm", "tip_radius_mm")
+    assert names(reasons[1], *tip, "straight_mm")
+    assert names(reasons[2], "ratings.rated_torque_Nm", "-1 N·m", "> 0 N·m")
     assert result["rows"][1]["rated_torque_Nm"] is None
 
 
@@ -296,7 +298,7 @@ def test_a_lost_task_is_tried_design_by_design(monkeypatch):
 def test_a_worker_with_other_code_ends_the_sweep(monkeypatch):
     """Its figures would be kept under the name of this code."""
     monkeypatch.setattr(sweep_module, "compute_all", lambda task: ("other", []))
-    with pytest.raises(ComputationError, match="another version of swgjoint"):
+    with pytest.raises(ComputationError, match=naming("worker", "version", "swgjoint")):
         run_sweep(sheet([1.0]), executor=Counted(tasks=[]))
 
 
@@ -385,7 +387,10 @@ kind = "list"
 keys = ["mesh.refinement"]
 values = [0.5]
 """
-    with pytest.raises(InputError, match=r"torque_Nm: 0 N·m with torsional_stiffness"):
+    with pytest.raises(
+        InputError,
+        match=naming("meshing.torque_Nm", "0 N·m", "torsional_stiffness_Nm_rad"),
+    ):
         validated(SweepFile, parse_toml(text, where="x"), where="x")
 
 

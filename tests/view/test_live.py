@@ -6,6 +6,7 @@ import time
 
 import numpy as np
 import pytest
+from messages import naming
 from rerun.chunk import RrdReader
 
 from swgjoint.errors import ComputationError, InputError
@@ -96,7 +97,10 @@ def test_the_server_listens_on_loopback_only(server):
 )
 def test_an_address_elsewhere_is_refused(run, url):
     """Nothing leaves the machine; the line says what is accepted."""
-    with pytest.raises(InputError, match=r"accepted: an address on this machine"):
+    with pytest.raises(
+        InputError,
+        match=naming(f"'{url}'", "this machine", "rerun+http://127.0.0.1:9876/proxy"),
+    ):
         stream_runs({"": run}, url=url)
 
 
@@ -110,12 +114,12 @@ def test_addresses_of_this_machine_are_accepted():
 def test_a_viewer_that_is_not_there_is_told():
     """The line names the port."""
     port = free_port()
-    with pytest.raises(ComputationError, match=f"port {port}"):
+    with pytest.raises(ComputationError, match=naming("rerun", f"{port}")):
         wait_for(port, limit=0.3)
 
 
 def test_a_pace_must_be_positive(run):
     """Zero and less are refused before anything starts."""
-    with pytest.raises(InputError, match="pace 0; accepted: > 0"):
+    with pytest.raises(InputError, match=naming("pace", "0", "> 0")):
         stream_runs({"": run}, pace=0.0)
     assert STARTED == []

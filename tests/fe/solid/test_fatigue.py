@@ -7,6 +7,7 @@ from math import pi
 
 import numpy as np
 import pytest
+from messages import naming
 
 from swgjoint.errors import DesignError
 from swgjoint.fe.solid import fatigue as module
@@ -163,7 +164,14 @@ def test_bending_of_four_forces_is_the_shell_theory():
 
 def test_limits_are_needed():
     """Refused with the keys that are missing."""
-    with pytest.raises(DesignError, match="fatigue_limit_bending_MPa"):
+    with pytest.raises(
+        DesignError,
+        match=naming(
+            "reference-3d",
+            "material.fatigue_limit_bending_MPa",
+            "material.fatigue_limit_torsion_MPa",
+        ),
+    ):
         fatigue(Design.load("reference-3d"), [20.0])
 
 

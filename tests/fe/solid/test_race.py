@@ -7,6 +7,7 @@ from math import pi
 
 import numpy as np
 import pytest
+from messages import naming
 
 from swgjoint.errors import DesignError
 from swgjoint.fe.corotation import rotate, turned
@@ -327,11 +328,14 @@ def test_bearing_is_absent_unless_asked_for(design):
 @pytest.mark.parametrize(
     ("changes", "wanted"),
     [
-        ({"wave_generator.bearing": None}, "wave_generator.bearing is absent"),
-        ({"wave_generator.bearing.balls": 11}, "an even number"),
+        ({"wave_generator.bearing": None}, ("wave_generator.bearing",)),
+        (
+            {"wave_generator.bearing.balls": 11},
+            ("wave_generator.bearing.balls", "11", "even"),
+        ),
     ],
 )
 def test_what_is_not_modelled_is_refused(design, changes, wanted):
     """One line that says what."""
-    with pytest.raises(DesignError, match=wanted):
+    with pytest.raises(DesignError, match=naming("reference-3d-modified", *wanted)):
         solid_ring(design.with_changes(changes), half=True, bearing="free")

@@ -7,6 +7,7 @@ from math import pi
 
 import numpy as np
 import pytest
+from messages import naming
 
 from swgjoint.errors import DesignError
 from swgjoint.fe.corotation import rotate
@@ -235,14 +236,18 @@ def test_flawed_half_or_rigid_models_are_refused(design, reference):
     """The linearised drive is perfect and whole; errors need an elastic ring."""
     follow, state, _ = reference
     flawed = follow.with_errors(np.full((40, 2), 1e-6), *none(follow, None)[1:])
-    with pytest.raises(ValueError, match="without errors"):
+    with pytest.raises(ValueError, match=naming("all sectors", "elastic", "errors")):
         flawed.influence(state)
-    with pytest.raises(ValueError, match="all sectors"):
+    with pytest.raises(ValueError, match=naming("all sectors", "elastic", "errors")):
         influence(replace(follow.ring, half=True), state, ring_is_output=False)
     leaning = design.with_changes({"tolerances.misalignment_arcmin": 2.0})
-    with pytest.raises(DesignError, match="elastic circular spline"):
+    with pytest.raises(
+        DesignError, match=naming("reference-3d", "tolerances", "elastic")
+    ):
         solid_ring(leaning, elastic_circular_spline=False)
-    with pytest.raises(DesignError, match="half model"):
+    with pytest.raises(
+        DesignError, match=naming("reference-3d", "half model", "--half")
+    ):
         solid_ring(leaning, half=True)
 
 

@@ -7,6 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from messages import naming
 
 from swgjoint.cli.main import main
 from swgjoint.errors import DesignError
@@ -92,14 +93,18 @@ def test_odd_ball_counts_run_smoother():
 @pytest.mark.parametrize(
     ("name", "changes", "message"),
     [
-        ("reference-2d", {}, "wave_generator.bearing is absent"),
-        ("size-25-100", {"tolerances.random_pitch_um": 1.0}, "tolerances"),
+        ("reference-2d", {}, ("wave_generator.bearing", "table", "2d model")),
+        (
+            "size-25-100",
+            {"tolerances.random_pitch_um": 1.0},
+            ("tolerances", "0", "2d model"),
+        ),
     ],
 )
 def test_what_a_ring_map_lacks_is_refused(name, changes, message):
     """One line that names the key, before anything is solved."""
     design = Design.load(name).with_changes(changes)
-    with pytest.raises(DesignError, match=message):
+    with pytest.raises(DesignError, match=naming(name, *message)):
         build_map(design, model="ring", cache=False)
 
 
