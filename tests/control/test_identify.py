@@ -434,7 +434,7 @@ def test_command(bench, csv_file, tmp_path, capsys):
             {"--teeth": "202/200"},
             ("teeth", "202", "200", "0", "flexspline", "circular spline"),
         ),
-        ({"--rated": "0"}, ("rated torque", "0 N·m", "> 0 N·m")),
+        ({"--rated": "0"}, ("rated torque 0 N·m", "> 0 N·m")),
         ({"--corners": "40/20"}, ("40", "20 N·m", "T1 < T2")),
         (
             {"--layout": "free"},
@@ -452,7 +452,7 @@ def test_command(bench, csv_file, tmp_path, capsys):
         ),
         ({"--orders": "2:x"}, ("--orders", "2:x", "P:Q")),
         ({"--orders": "2:0,2:0"}, ("orders", "2:0, 2:0", "0:0")),
-        ({"--window": "0"}, ("window", "0 s", "> 0 s")),
+        ({"--window": "0"}, ("window 0 s", "> 0 s")),
         ({"--window": "1"}, ("bench.csv", "8", "1 s", "200")),
         ({"--window": "1e-300"}, ("window", "1e-300 s", "0.001 s", "bench.csv")),
         ({"--rotor-inertia": "-1"}, ("rotor inertia", "-1 kg·m²", "> 0 kg·m²")),

@@ -118,9 +118,9 @@ def test_balls_fit_around_the_bearing():
 @pytest.mark.parametrize(
     ("name", "message"),
     [
-        ("size-7-50", ("size-7-50", "7", "8", "100")),
-        ("size-101-50", ("size-101-50", "101", "8", "100")),
-        ("size-25-20", ("size-25-20", "20", "30", "200")),
+        ("size-7-50", ("size-7-50", "size 7", "8", "100")),
+        ("size-101-50", ("size-101-50", "size 101", "8", "100")),
+        ("size-25-20", ("size-25-20", "ratio 20", "30", "200")),
         ("size-25", ("size-25", "models/drives", "reference-2d", "size-NN-RRR")),
     ],
 )
