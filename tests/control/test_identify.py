@@ -241,11 +241,17 @@ def test_intervals_cover_the_truth_of_other_drives(stiffness, yield_torque):
     assert 0.91 < sum(inside.values()) / (repeats * len(truth)) < 0.98
 
 
-@pytest.mark.parametrize("seed", [1, 13])
-def test_no_hysteresis_is_said(bench, seed):
-    """A drive without it: a note and no element, whichever way noise pulls the fit."""
+@pytest.fixture(scope="module")
+def without_hysteresis(bench):
+    """The same bench with a drive that has none, and its samples."""
     drive = replace(bench[0], hysteresis=())
-    rows, _ = simulated(drive, 8.0, 0.35)
+    return drive, simulated(drive, 8.0, 0.35)[0]
+
+
+@pytest.mark.parametrize("seed", [1, 13])
+def test_no_hysteresis_is_said(without_hysteresis, seed):
+    """A drive without it: a note and no element, whichever way noise pulls the fit."""
+    drive, rows = without_hysteresis
     found = identify(log_of(rows, np.random.default_rng(seed)), **settings(drive))
     (note,) = found.notes
     assert note.startswith("no hysteresis: ")
@@ -398,11 +404,11 @@ def test_means_of_derivatives_are_of_fourth_order():
     assert (np.log2(np.divide(*errors)) > 3.9).all()
 
 
-@pytest.fixture
-def csv_file(bench, tmp_path):
+@pytest.fixture(scope="module")
+def csv_file(bench, tmp_path_factory):
     _, rows, _ = bench
     log = log_of(rows, np.random.default_rng(6))
-    path = tmp_path / "bench.csv"
+    path = tmp_path_factory.mktemp("log") / "bench.csv"
     columns = [
         log.time,
         np.degrees(log.motor_angle),
