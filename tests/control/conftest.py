@@ -10,7 +10,7 @@ from swgjoint.sim.run import Run, run_scene
 from swgjoint.sim.scene import Scene
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def turn() -> Callable[..., Run]:
     """The bench joint at constant speed under a load, seen by two encoders."""
 

@@ -164,18 +164,24 @@ def test_log_with_noise_gives_all_parameters(bench):
 
 @pytest.mark.slow
 def test_intervals_cover_the_truth(bench):
-    """Every parameter lies in its interval of 95 % in at least 90 of 100 repeats."""
+    """Every parameter lies in its interval of 95 % in at least 24 of 30 repeats.
+
+    Fewer are in six of ten thousand such series by the binomial distribution; of all
+    450 intervals it leaves the bounds below in one of a thousand. 25 and 93.8 % were
+    seen. Intervals too narrow or too wide by half are far out.
+    """
     drive, rows, truth = bench
     inside = dict.fromkeys(truth, 0)
-    for seed in range(100):
+    repeats = 30
+    for seed in range(repeats):
         found = identify(log_of(rows, np.random.default_rng(seed)), **settings(drive))
         assert_recovers(found, truth, 0.05)
         for name, value in truth.items():
             inside[name] += found.estimates[name].low <= value
             inside[name] -= found.estimates[name].high < value
-    assert min(inside.values()) >= 90, inside
-    # no wider than they need be: 95 % were 1425 of all 1500
-    assert sum(inside.values()) < 0.98 * 100 * len(truth)
+    assert min(inside.values()) >= 24, inside
+    # no wider than they need be
+    assert 0.915 < sum(inside.values()) / (repeats * len(truth)) < 0.98
 
 
 def with_element(stiffness: float, yield_torque: float):
@@ -189,7 +195,14 @@ def with_element(stiffness: float, yield_torque: float):
 
 @pytest.mark.parametrize(
     ("stiffness", "yield_torque"),
-    [(1.2e4, 0.3), (1.2e4, 1.0), (3e3, 1.0), (3e3, 3.0), (5e4, 1.0), (2e4, 6.0)],
+    [
+        (1.2e4, 0.3),
+        (3e3, 3.0),
+        *(
+            pytest.param(*pair, marks=pytest.mark.slow)
+            for pair in ((1.2e4, 1.0), (3e3, 1.0), (5e4, 1.0), (2e4, 6.0))
+        ),
+    ],
 )
 def test_elements_of_many_drives_are_found(stiffness, yield_torque):
     """Soft and stiff, weak and strong: 2 % from a log without noise, else in noise."""
@@ -213,23 +226,33 @@ def test_elements_of_many_drives_are_found(stiffness, yield_torque):
     ("stiffness", "yield_torque"), [(3e3, 3.0), (1.2e4, 0.3)], ids=["soft", "weak"]
 )
 def test_intervals_cover_the_truth_of_other_drives(stiffness, yield_torque):
-    """Of 60 repeats 50 at least for every parameter, 93 % of all."""
+    """Of 20 repeats 15 at least for every parameter, and 91 to 98 % of all.
+
+    Fewer are in three of ten thousand series; 16 and 93.3 % were seen.
+    """
     drive, rows, truth = with_element(stiffness, yield_torque)
     inside = dict.fromkeys(truth, 0)
-    for seed in range(60):
+    repeats = 20
+    for seed in range(repeats):
         found = identify(log_of(rows, np.random.default_rng(seed)), **settings(drive))
         for name, value in truth.items():
             e = found.estimates[name]
             inside[name] += int(e.low <= value <= e.high)
-    assert min(inside.values()) >= 50, inside
-    assert 0.93 < sum(inside.values()) / (60 * len(truth)) < 0.98
+    assert min(inside.values()) >= 15, inside
+    assert 0.91 < sum(inside.values()) / (repeats * len(truth)) < 0.98
+
+
+@pytest.fixture(scope="module")
+def without_hysteresis(bench):
+    """The same bench with a drive that has none, and its samples."""
+    drive = replace(bench[0], hysteresis=())
+    return drive, simulated(drive, 8.0, 0.35)[0]
 
 
 @pytest.mark.parametrize("seed", [1, 13])
-def test_no_hysteresis_is_said(bench, seed):
+def test_no_hysteresis_is_said(without_hysteresis, seed):
     """A drive without it: a note and no element, whichever way noise pulls the fit."""
-    drive = replace(bench[0], hysteresis=())
-    rows, _ = simulated(drive, 8.0, 0.35)
+    drive, rows = without_hysteresis
     found = identify(log_of(rows, np.random.default_rng(seed)), **settings(drive))
     (note,) = found.notes
     assert note.startswith("no hysteresis: ")
@@ -382,11 +405,11 @@ def test_means_of_derivatives_are_of_fourth_order():
     assert (np.log2(np.divide(*errors)) > 3.9).all()
 
 
-@pytest.fixture
-def csv_file(bench, tmp_path):
+@pytest.fixture(scope="module")
+def csv_file(bench, tmp_path_factory):
     _, rows, _ = bench
     log = log_of(rows, np.random.default_rng(6))
-    path = tmp_path / "bench.csv"
+    path = tmp_path_factory.mktemp("log") / "bench.csv"
     columns = [
         log.time,
         np.degrees(log.motor_angle),

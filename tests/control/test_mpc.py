@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import casadi
 import numpy as np
@@ -174,14 +175,20 @@ def test_period_of_two_milliseconds():
 
 
 @pytest.mark.parametrize(
-    ("motor", "link"), [(1e-3, 1e-3), (2e-3, 2e-3), (0.0, 2e-3), (2e-3, 0.0)]
+    ("motor", "link"),
+    [pytest.param(1e-3, 1e-3, marks=SLOW), (2e-3, 2e-3), (0.0, 2e-3), (2e-3, 0.0)],
 )
 def test_old_readings(motor, link):
     """The model goes on from them; one of them may be older than the other."""
     scene = bench(sensors__motor__delay_s=motor, sensors__link__delay_s=link)
     got = link_error(PredictiveController(), scene, true_drive(1.0))
-    now = link_error(PredictiveController(), bench(), true_drive(1.0))
-    assert got < 1.1 * now
+    assert got < 1.1 * error_with_readings_of_now()
+
+
+@cache
+def error_with_readings_of_now() -> float:
+    """What the old readings below are held against."""
+    return link_error(PredictiveController(), bench(), true_drive(1.0))
 
 
 def test_limits_of_motor_and_drive_are_kept():
@@ -287,15 +294,15 @@ def task_of_joints(count: int, side_by_side: tuple[int, ...]) -> Task:
 def test_batch_is_its_members():
     """Motions side by side get what each gets alone, limits reached included."""
     rng = np.random.default_rng(2)
-    off = 0.3 * rng.normal(size=(50, 4, 2))
+    off = 0.3 * rng.normal(size=(20, 3, 2))
     whole = PredictiveController()
-    whole.start(task_of_joints(2, (4,)))
-    alone = [PredictiveController() for _ in range(4)]
+    whole.start(task_of_joints(2, (3,)))
+    alone = [PredictiveController() for _ in range(3)]
     for controller in alone:
         controller.start(task_of_joints(2, ()))
-    for k in range(50):
+    for k in range(20):
         at = whole.planned.angle[k] + off[k]
-        read = {"motor_speed": np.zeros((4, 2)), "link_angle": -off[k] / 100.0}
+        read = {"motor_speed": np.zeros((3, 2)), "link_angle": -off[k] / 100.0}
         got = whole.torque(k, Measured(motor_angle=at, **read))
         for m, controller in enumerate(alone):
             mine = Measured(motor_angle=at[m], **{key: x[m] for key, x in read.items()})

@@ -9,6 +9,7 @@ import casadi
 import mujoco
 import numpy as np
 import pytest
+from solved import coarse, kept
 from messages import naming
 
 from swgjoint.control import symbolic
@@ -141,16 +142,15 @@ def test_forces_of_a_map_of_finite_elements(toleranced_map, layout, lossy):
 
 @pytest.fixture(scope="module")
 def toleranced_map() -> DriveMap:
+    """Of a coarse drive: any map with all these parts will do."""
     from swgjoint.fe.sampling import sample_map
-    from swgjoint.gear.design import Design
     from swgjoint.maps.fit import fit_map
 
-    design = Design.preset("reference-2d").with_changes(
-        {
-            "tolerances.circular_spline_cumulative_pitch_um": 10.0,
-        }
+    errors = {"tolerances.circular_spline_cumulative_pitch_um": 10.0}
+    return kept(
+        "coarse map, pitch error of 10 um, 4 angles",
+        lambda: fit_map(sample_map(coarse(**errors), angles=4)),
     )
-    return fit_map(sample_map(design, angles=4))
 
 
 def assert_trajectory_agrees(drive: DriveMap, chunks: int) -> None:
@@ -192,9 +192,9 @@ def test_trajectory_equals_plugin(conservative, losses, lossy):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("layout", LAYOUTS)
-def test_second_of_trajectory_equals_plugin(conservative, layout):
-    """Within 1e-6 rad over 1 s in every layout."""
-    assert_trajectory_agrees(replace(conservative, layout=layout), 100)
+def test_long_trajectory_equals_plugin(conservative, layout):
+    """Within 1e-6 rad over 0.3 s, a turn of the rotor, in every layout."""
+    assert_trajectory_agrees(replace(conservative, layout=layout), 30)
 
 
 def test_hessian_is_symmetric_and_the_slope_of_the_forces(synthetic_map):
