@@ -12,7 +12,9 @@ from swgjoint.fe.cyclic import CyclicFactor
 from swgjoint.fe.drive2d import ring_model
 from swgjoint.fe.solid.across import spread_over
 from swgjoint.fe.solid.corotation import about_z
+from swgjoint.fe.solid.masters import strip_masters
 from swgjoint.fe.solid.ring_gear import ring_gear
+from swgjoint.fe.solid.segment import condense_segment
 from swgjoint.fe.solid.strip import flexspline
 from swgjoint.fe.solid.strip_mesh import circular_spline_strip, flexspline_strip
 from swgjoint.gear.cup import cup_torsional_stiffness
@@ -22,9 +24,29 @@ from swgjoint.gear.profile import tooth_profile
 
 @cache
 def strip():
-    design = Design.load("reference-3d")
+    """Of the coarsest mesh."""
+    design = Design.load("reference-3d").with_changes({"mesh.refinement": 0.5})
     profile = tooth_profile(design, "flexspline")
     return flexspline(design, profile, flexspline_strip(design, profile))
+
+
+def diaphragm():
+    """The last two segments of a strip of the thesis mesh, and all of its masters."""
+    design = Design.load("reference-3d")
+    steel = design.material_of("flexspline")
+    mesh = flexspline_strip(design, tooth_profile(design, "flexspline"))
+    masters = strip_masters(mesh)
+    segments = [
+        condense_segment(
+            mesh.segments[number],
+            masters.segments[number],
+            masters.position,
+            youngs_modulus=steel.youngs_modulus,
+            poisson_ratio=steel.poisson_ratio,
+        )
+        for number in (-2, -1)
+    ]
+    return segments, masters
 
 
 def dofs(masters):
@@ -105,16 +127,17 @@ def guided_plate(rigidity, outer, inner):
 
 def test_diaphragm_bends_as_an_annular_plate():
     """Clamped at the bore, its outer edge pushed along the axis without turning."""
-    cup, design = strip(), Design.load("reference-3d")
-    masters, size = cup.masters, 3 * cup.masters.size
-    face, pitch = 3 * masters.face_size, 2 * pi / cup.sectors
-    matrix = axisymmetric(sector_stiffness(cup.segments[-2:], size), face, pitch)
+    design = Design.load("reference-3d")
+    segments, masters = diaphragm()
+    size, sectors = 3 * masters.size, design.drive.teeth_flexspline
+    face, pitch = 3 * masters.face_size, 2 * pi / sectors
+    matrix = axisymmetric(sector_stiffness(segments, size), face, pitch)
     first = masters.size - masters.face_size
-    rim = np.intersect1d(cup.segments[-3].masters, cup.segments[-2].masters)
+    rim = np.intersect1d(masters.segments[-3].masters, segments[0].masters)
     held, rim = (dofs(part[part < first]) for part in (masters.held, rim))
     value = np.concatenate([0.0 * held, np.tile([0.0, 0.0, 1.0], len(rim) // 3)])
-    found = cup.sectors * stored(matrix, np.concatenate([held, rim]), value)
-    mesh = cup.mesh.cup[-2]
+    found = sectors * stored(matrix, np.concatenate([held, rim]), value)
+    mesh = segments[0].mesh
     p = np.asarray(mesh.mesh.p)[:, mesh.begin.ravel()]
     wall, outer = np.ptp(p[2]), float(np.hypot(p[0], p[1]).max())
     steel = design.material_of("flexspline")
@@ -211,6 +234,7 @@ def test_ring_gear_is_the_plane_model_without_poisson_ratio():
             "cup": None,
             "drive.teeth_flexspline": 40,
             "drive.teeth_circular_spline": 42,
+            "mesh.refinement": 0.5,
         }
     )
     profile = tooth_profile(design, "circular_spline")

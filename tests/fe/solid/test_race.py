@@ -25,7 +25,6 @@ BEARING = {
     "wave_generator.bearing.race_thickness_mm": 1.0,
     "wave_generator.bearing.clearance_um": 20.0,
     "wave_generator.bearing.race_width_mm": 8.0,
-    "mesh.refinement": 0.5,
 }
 
 
@@ -36,9 +35,15 @@ def design(small_design):
 
 
 @pytest.fixture(scope="module")
-def ring(design):
+def ring(design, few_masters):
     """Half of it."""
-    return solid_ring(design, half=True, bearing="free", elastic_circular_spline=False)
+    return solid_ring(
+        design,
+        half=True,
+        bearing="free",
+        elastic_circular_spline=False,
+        orders=few_masters,
+    )
 
 
 @pytest.fixture(scope="module")
@@ -226,13 +231,15 @@ def test_balls_teeth_and_load_balance(ring, turned_on):
     assert 4 <= loaded.sum() < 12
 
 
-def test_ball_and_bore_forces_balance(design):
+def test_ball_and_bore_forces_balance(design, few_masters):
     """Net forces of an odd number of balls and of the bore, along x and y.
 
     At no position of symmetry, so that 5 N are left; node 0 is held along x, see above.
     """
     odd = design.with_changes({"wave_generator.bearing.balls": 11})
-    whole = solid_ring(odd, bearing="free", elastic_circular_spline=False)
+    whole = solid_ring(
+        odd, bearing="free", elastic_circular_spline=False, orders=few_masters
+    )
     state = SolidContinuation(ring=whole, ratio=odd.ratio).deflected(0.1)
     assert state.outcome.ok
     balls = whole.race.forces(state.race, state.wave_generator_angle).balls
@@ -317,9 +324,11 @@ def test_race_rolls_with_the_cone_unless_its_warping_is_held(ring, design, defle
     assert np.abs(deflected.race[..., 3]).max() > 1e-5
 
 
-def test_bearing_is_absent_unless_asked_for(design):
+def test_bearing_is_absent_unless_asked_for(design, few_masters):
     """A design with a bearing keeps its rigid wave generator."""
-    plain = solid_ring(design, half=True, elastic_circular_spline=False)
+    plain = solid_ring(
+        design, half=True, elastic_circular_spline=False, orders=few_masters
+    )
     assert plain.race is None
     assert plain.at_rest().race is None
     assert plain.size == 3 * plain.strip.masters.size

@@ -50,7 +50,7 @@ def design():
 
 
 @pytest.fixture(scope="module")
-def reference(design):
+def reference(design, few_masters_everywhere):
     """The perfect drive without load, and its influences."""
     follow, found = influences(design, phases=1, model="3d")
     return follow, found[0].state, found[0].at
@@ -115,28 +115,31 @@ def test_without_errors_the_perfect_drive_comes_back(reference):
 
 
 def test_superposition_errs_by_the_square_of_the_errors(reference):
-    """U + T psi against full solves: half the errors, a quarter of the difference."""
+    """U + T psi against full solves: half the errors, a quarter of the difference.
+
+    All errors at once: a derivative by teeth or tilt that is wrong would halve it.
+    """
     follow, state, at = reference
     random = np.random.default_rng(1)
-    shapes = [random.normal(size=shape) for shape in ((40, 2), (42, 2), (2,))]
-    for used, size in (((1, 1, 0), 1e-7), ((0, 0, 1), 5e-5)):
-        apart = []
-        for part in (1.0, 0.5):
-            errors = [u * part * size * e for u, e in zip(used, shapes, strict=True)]
-            full = follow.with_errors(*errors).to_torque(state, 0.0)
-            assert full.outcome.ok
-            found = at.respond(at.gap_change(*errors)[None], 0.0)
-            gained = full.energy - state.energy
-            assert abs(gained) > 1e-9
-            apart.append(found.potential[0] - gained)
-        assert apart[0] / apart[1] == pytest.approx(4.0, rel=0.1)
+    sizes = (((40, 2), 1e-7), ((42, 2), 1e-7), ((2,), 5e-5))
+    shapes = [size * random.normal(size=shape) for shape, size in sizes]
+    apart = []
+    for part in (1.0, 0.5):
+        errors = [part * e for e in shapes]
+        full = follow.with_errors(*errors).to_torque(state, 0.0)
+        assert full.outcome.ok
+        found = at.respond(at.gap_change(*errors)[None], 0.0)
+        gained = full.energy - state.energy
+        assert abs(gained) > 1e-9
+        apart.append(found.potential[0] - gained)
+    assert apart[0] / apart[1] == pytest.approx(4.0, rel=0.1)
 
 
 def test_superposition_follows_contacts_that_change(design, reference):
     """Errors of micrometres: the output within 3 % of the largest change."""
     follow, state, at = reference
     flawed = design.with_changes({f"tolerances.{k}": v for k, v in ERRORS.items()})
-    pitches = np.array([101, 250])
+    pitches = np.array([250])
     errors = gap_errors(flawed, pitches)
     found = at.respond(at.gap_change(*errors), 0.0)
     assert found.active.any()

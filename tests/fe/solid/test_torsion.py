@@ -17,13 +17,12 @@ BEARING = {
     "wave_generator.bearing.clearance_um": 20.0,
     "wave_generator.bearing.race_width_mm": 8.0,
 }
-COARSE = {"mesh.refinement": 0.5}
 
 
 @pytest.fixture(scope="module")
 def design(small_design):
-    """The small gear, coarse, behind a boss half as stiff as itself."""
-    return small_design.with_changes({**COARSE, "boss.torsional_stiffness_Nm_rad": 8e3})
+    """The small gear behind a boss half as stiff as itself."""
+    return small_design.with_changes({"boss.torsional_stiffness_Nm_rad": 8e3})
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +32,7 @@ def followed():
 
 
 @pytest.fixture(scope="module")
-def spied(followed):
+def spied(followed, few_masters_everywhere):
     """Look at what is solved on the way."""
     from swgjoint.fe.solid.continuation import SolidContinuation
 
