@@ -9,8 +9,8 @@ import casadi
 import mujoco
 import numpy as np
 import pytest
-from solved import coarse, kept
 from messages import naming
+from solved import coarse, kept
 
 from swgjoint.control import symbolic
 from swgjoint.control.symbolic import (

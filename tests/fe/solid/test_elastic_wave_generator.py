@@ -7,8 +7,8 @@ from math import inf, isnan, nan, radians, tan
 
 import numpy as np
 import pytest
-from solved import kept
 from messages import naming
+from solved import kept
 
 from swgjoint.errors import InputError
 from swgjoint.fe.solid import elastic_wave_generator as module
