@@ -176,3 +176,18 @@ def test_bad_attribute_is_rejected(key, value, says):
     instance.config = {**plugin.config(drive, damping=1.0), key: value}
     with pytest.raises(ValueError, match=naming("'j_drive'", f"'{key}'", *says)):
         spec.compile()
+
+
+def test_a_tendon_of_the_other_sense_is_rejected():
+    """The coefficient of the rotor must be 1/ratio, its sign included."""
+    spec = mujoco.MjSpec.from_string(
+        '<mujoco><worldbody><body><joint name="j"/><geom size=".1"/></body>'
+        "</worldbody></mujoco>"
+    )
+    drive = DriveMap.linear(1e4)
+    attach(spec, joint="j", drive=drive, rotor_inertia=4e-5)
+    [instance] = spec.plugins
+    settings = plugin.config(drive, damping=1.0)
+    instance.config = settings | {"ratio": f"{-drive.ratio:.17g}"}
+    with pytest.raises(ValueError, match=naming("'j_drive'", "rotor", "ratio", "link")):
+        spec.compile()

@@ -67,6 +67,8 @@ def test_the_tooth_order_is_found_where_the_step_carries_it(bench, synthetic_map
     # peak to peak of the ripple is at least that of its strongest line
     assert joint["ripple_pp_percent"] > 1.8 * first["amplitude_percent"] > 0.0
     assert joint["ripple_rms_percent"] >= 0.6 * first["amplitude_percent"]
+    # Popoviciu's inequality: the deviation is at most half of the range
+    assert joint["ripple_rms_percent"] <= 0.5 * joint["ripple_pp_percent"]
 
 
 def test_a_too_fast_sweep_reports_the_tooth_order_and_shows_no_false_line(
