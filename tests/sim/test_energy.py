@@ -47,6 +47,25 @@ def test_the_balance_closes(bench, level, drive, integrator):
     assert abs(energy["balance_error_J"]) < bound
 
 
+def test_springs_of_the_hysteresis_keep_their_energy(bench):
+    """Elements that stretch and do not slip dissipate nothing."""
+    element = Jenkin(stiffness=2e4, yield_torque=30.0)
+    sine = {"kind": "joint_sine", "joint": "joint", "torque_Nm": 5.0}
+    run = bench(
+        replace(LINEAR, hysteresis=(element,)),
+        defaults__damping_ratio=0.0,
+        trajectory=SWEEP,
+        # ends at the largest torque
+        simulation={"duration_s": 1.125, "step_s": 1e-4},
+        disturbance=[sine | {"frequency_Hz": 2.0}],
+    )
+    energy = run.metrics()["energy"]
+    stretch = run.torsion[-1, 0] - run.torsion[0, 0]
+    held = 0.5 * element.stiffness * stretch**2
+    assert held > 1e-4
+    assert abs(energy["dissipated_J"]) < 0.01 * held
+
+
 def test_the_balance_of_an_arm_closes(synthetic_map):
     """Weight, coupled inertias, spinning rotors, springs: nothing is left over."""
     missed = []
