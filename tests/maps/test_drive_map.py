@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from messages import naming
@@ -41,6 +43,19 @@ def test_derivatives_are_consistent(synthetic_map):
         ours = derivative(x, 0.3, 0.01)
         assert np.abs(ours - slope).max() < 1e-5 * np.abs(ours).max()
     assert (drive.stiffness(x, 0.3, 0.01) <= drive.max_stiffness).all()
+
+
+def test_each_end_continues_with_its_own_stiffness():
+    """Softer below the sampled torsion than above it: both tangents come back."""
+    drive = DriveMap.linear(1e4)
+    ends = np.zeros_like(drive.end_stiffness)
+    ends[0, 0] = [0.5e4, 2e4]
+    drive = replace(drive, end_stiffness=ends)
+    low, high = drive.torsion_knots[[0, -1]]
+    assert drive.stiffness(low - 1e-3, 0.0, 0.0) == pytest.approx(0.5e4)
+    assert drive.stiffness(high + 1e-3, 0.0, 0.0) == pytest.approx(2e4)
+    rise = drive.torque(high + 1e-3, 0.0, 0.0) - drive.torque(high, 0.0, 0.0)
+    assert rise == pytest.approx(20.0)
 
 
 def test_linear_map():

@@ -214,6 +214,20 @@ def test_wrong_arrays(synthetic_map, tmp_path):
     )
 
 
+@pytest.mark.parametrize("jumps", ["potential", "torque"])
+def test_a_small_jump_at_a_knot_is_refused(synthetic_map, tmp_path, jumps):
+    """A thousandth of the largest energy or torque would be a blow on the joint."""
+    c, knots = synthetic_map.potential.copy(), synthetic_map.torsion_knots
+    if jumps == "potential":
+        c[0, 0, 4:, 0] += 1e-3 * np.abs(c[..., 0]).max()
+    else:  # one piece sags between its ends
+        slope = 1e-3 * np.abs(c[..., 1]).max()
+        c[0, 0, 4, 1] += slope
+        c[0, 0, 4, 2] -= slope / (knots[5] - knots[4])
+    said = refusal(tmp_path, repacked(map_bytes(synthetic_map), potential=npy(c)))
+    assert names(said, jumps, "knot", "torsion")
+
+
 def test_wrong_members(synthetic_map, tmp_path):
     """Missing, additional, doubled and compressed members are refused."""
     data = map_bytes(synthetic_map)
