@@ -1,4 +1,4 @@
-"""The spring between the wave generator and its shaft."""
+"""The springs between the members and what they are mounted to."""
 
 from __future__ import annotations
 
@@ -40,6 +40,27 @@ def test_output_yields_as_the_wave_generator_would_turn_it(layout, member):
     assert coupling_share(design) == pytest.approx(turned, rel=1e-12)
     expected = turned**2 / STIFFNESS
     assert series_compliance(design, cup=True) == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("layout", "boss", "housing"),
+    [
+        ("circular_spline_fixed", 1.0, 122 / 120),
+        ("flexspline_fixed", 120 / 122, 1.0),
+        ("wave_generator_fixed", 120 / 122, 1.0),
+    ],
+)
+def test_output_yields_as_the_other_springs_would_turn_it(layout, boss, housing):
+    """Under a held wave generator the teeth hand a turn on by their numbers."""
+    stiffness = {"boss": 2e5, "housing": 1e5}
+    turned = {"boss": boss, "housing": housing}
+    for used in (["boss"], ["housing"], ["boss", "housing"]):
+        design = Design.load("reference-2d").with_changes(
+            {"drive.layout": layout}
+            | {f"{name}.torsional_stiffness_Nm_rad": stiffness[name] for name in used}
+        )
+        expected = sum(turned[name] ** 2 / stiffness[name] for name in used)
+        assert series_compliance(design, cup=True) == pytest.approx(expected, rel=1e-12)
 
 
 def test_the_label_names_it():
