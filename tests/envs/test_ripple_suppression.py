@@ -42,6 +42,9 @@ def test_a_perfect_drive_has_no_ripple():
     )
     rows = turn(env)
     assert np.abs(steady(rows, "torque_ripple_Nm")).max() < 0.05
+    # the inertia of the link, 2 N·m while it speeds up, is known and no ripple
+    ripple = [abs(info["torque_ripple_Nm"]) for _, info in rows]
+    assert max(ripple) < 0.5
     assert np.abs(steady(rows, "transmission_error_ripple_arcmin")).max() < 0.01
     rewards = [reward for reward, info in rows if info["steady"]]
     assert min(rewards) > 0.98
