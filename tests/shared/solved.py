@@ -11,12 +11,14 @@ import hashlib
 import os
 import pickle
 from collections.abc import Callable
+from functools import cache
 from math import pi
 from pathlib import Path
 from typing import TypeVar
 
 from filelock import FileLock
 
+from swgjoint.fe.ring_friction import RubbedPath, rubbed_path
 from swgjoint.gear.design import Design
 from swgjoint.maps.cache import code_version
 
@@ -57,3 +59,15 @@ def few_teeth(name: str = "reference-2d", **changes: object) -> Design:
     """
     teeth = {"drive.teeth_flexspline": 60, "drive.teeth_circular_spline": 62}
     return coarse(name, **{**teeth, **changes})
+
+
+RING_TORQUES = (7.0, 14.0, 48.0, 96.0)
+"""Of ``ring_path`` [N·m]; it puts a small one before them."""
+
+
+@cache
+def ring_path() -> RubbedPath:
+    """The thin rings of size 25 and ratio 100, loaded at an input angle of 0.1 rad."""
+    design = Design.load("size-25-100")
+    name = f"ring path {design.content_hash()} {RING_TORQUES}"
+    return kept(name, lambda: rubbed_path(design, RING_TORQUES, angles=[0.1]))

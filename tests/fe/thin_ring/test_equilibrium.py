@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from messages import naming
+from solved import RING_TORQUES, ring_path
 
 from swgjoint.errors import DesignError
 from swgjoint.fe.ring_friction import rubbed_path
@@ -40,16 +41,21 @@ def twisted(model, alpha, torque):
     return loaded(model, small, torque)
 
 
+@pytest.fixture(scope="module")
+def near_zero(model):
+    """Under 1 N·m, the wave generator where it starts."""
+    return loaded(model, unloaded(model, 0.0), 1.0)
+
+
 @pytest.mark.parametrize("alpha", [3.3, 100.0 * np.pi, -1000.0])
-def test_any_wave_generator_angle_has_an_equilibrium(model, alpha):
+def test_any_wave_generator_angle_has_an_equilibrium(model, near_zero, alpha):
     """Far round, on either side and where the output's angle wraps, like near zero."""
     rest = unloaded(model, alpha)
     assert rest.outcome.ok
     assert rest.rotation == pytest.approx(alpha / model.ratio, abs=1e-9)
-    found, near = loaded(model, rest, 1.0), loaded(model, unloaded(model, 0.0), 1.0)
-    lag, peer = found.rotation - alpha / model.ratio, near.rotation
+    lag = loaded(model, rest, 1.0).rotation - alpha / model.ratio
     # teeth meet at another phase and balls stand elsewhere
-    assert lag == pytest.approx(peer, rel=0.05)
+    assert lag == pytest.approx(near_zero.rotation, rel=0.05)
 
 
 def test_a_search_begins_with_the_lobes_on_the_wave_generator(model):
@@ -112,7 +118,7 @@ def test_energy_of_a_slow_step(model, state):
 def test_input_torque_is_in_the_mean_the_torque_over_the_ratio(model):
     """Averaged over the passage of a ball, T_wg = T/i."""
     found = []
-    for alpha in positions(model, 6):
+    for alpha in positions(model, 3):
         one = twisted(model, float(alpha), TORQUE)
         assert one.outcome.ok
         found.append(one.wave_generator_torque)
@@ -120,12 +126,11 @@ def test_input_torque_is_in_the_mean_the_torque_over_the_ratio(model):
     assert np.mean(found) == pytest.approx(TORQUE / model.ratio, rel=2e-3)
 
 
-def test_mirror(model):
+def test_mirror(model, state):
     """The opposite torque at the opposite angle is the mirror image."""
-    there = twisted(model, 0.1, 30.0)
-    back = twisted(model, -0.1, -30.0)
-    assert back.rotation == pytest.approx(-there.rotation, rel=1e-9)
-    assert back.energy == pytest.approx(there.energy, rel=1e-9)
+    back = twisted(model, -0.1, -TORQUE)
+    assert back.rotation == pytest.approx(-state.rotation, rel=1e-9)
+    assert back.energy == pytest.approx(state.energy, rel=1e-9)
 
 
 def test_tooth_gaps_and_their_derivatives(model, state):
@@ -245,14 +250,14 @@ def scaled(table, factor):
 
 def test_stiffness_scales_with_the_cube_of_the_size():
     """Twice the lengths, clearances included: eight times the torque, same torsion."""
-    small = Design.load("size-20-80").with_changes(
+    small = Design.load("size-25-50").with_changes(
         {"ratings.rated_torque_Nm": 40.0, "ratings.repeated_peak_Nm": 90.0}
     )
     data = small.model_dump(exclude_unset=True)
     large = Design.model_validate(scaled(data, 2.0)).with_changes(
         {"ratings.rated_torque_Nm": 320.0, "ratings.repeated_peak_Nm": 720.0}
     )
-    torque = np.array([5.0, 20.0, 60.0])
+    torque = np.array([5.0, 60.0])
     one, two = (
         rubbed_path(design, torque * by, angles=[0.05])
         for design, by in ((small, 1.0), (large, 8.0))
@@ -264,32 +269,29 @@ def test_stiffness_scales_with_the_cube_of_the_size():
 
 def test_shares_of_the_compliance():
     """The energies of a small twist add up to its work; a softer cup adds its own."""
-    design = Design.load("size-25-100")
-    torque = np.array([10.0, 100.0])
-    found = rubbed_path(design, torque, angles=[0.1])
+    design, found = Design.load("size-25-100"), ring_path()
     series = found.series / found.compliance
     # the solver's anchor holds some 3e-6 of it
     assert (sum(found.shares.values()) + series)[1:] == pytest.approx(1.0, rel=1e-5)
     # behind a longer cup the same rings: only the share in series grows
     longer = design.with_changes({"cup.length_mm": 2.0 * design.cup.length_mm})
-    soft = rubbed_path(longer, torque, angles=[0.1])
+    soft = rubbed_path(longer, RING_TORQUES[:1], angles=[0.1])
+    assert soft.series > 1.2 * found.series
     for part in ("rim", "balls", "teeth"):
         own, other = (one.shares[part] * one.compliance for one in (soft, found))
-        assert own == pytest.approx(other, rel=1e-6)
+        assert own == pytest.approx(other[: len(own)], rel=1e-6)
     # the loaded arc grows: the race bends less between balls, the cup has most
-    assert found.shares["race"][2] < 0.5 * found.shares["race"][1]
-    assert series[2] > 0.4
+    assert found.shares["race"][-1] < 0.5 * found.shares["race"][1]
+    assert series[-1] > 0.4
 
 
 def test_clearance_is_what_makes_the_stiffness_rise():
     """Without it the curve is nearly straight, with it K rises; nothing is fitted."""
-    torque = np.array([7.0, 14.0, 48.0, 96.0])
+    tight = Design.load("size-25-100").with_changes(
+        {"wave_generator.bearing.clearance_um": 0.0}
+    )
     rise, balls = [], []
-    for clearance in (0.0, 14.5):
-        design = Design.load("size-25-100").with_changes(
-            {"wave_generator.bearing.clearance_um": clearance}
-        )
-        found = rubbed_path(design, torque, angles=[0.1])
+    for found in (rubbed_path(tight, RING_TORQUES, angles=[0.1]), ring_path()):
         slope = np.diff(found.torque[1:]) / np.diff(found.torsion[1:])
         rise.append(slope[-1] / slope[0])
         balls.append(found.balls[1:])
