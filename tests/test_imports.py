@@ -6,7 +6,7 @@ import ast
 import json
 import subprocess
 import sys
-from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -30,9 +30,11 @@ def modules() -> list[Path]:
     return sorted(PACKAGE.rglob("*.py"))
 
 
-def imports(path: Path) -> Iterator[tuple[str, bool]]:
+@cache
+def imports(path: Path) -> list[tuple[str, bool]]:
     """Imported names of a file and whether they are imported at import time."""
     tree = ast.parse(path.read_text(encoding="utf-8"))
+    found = []
     parents = {c: p for p in ast.walk(tree) for c in ast.iter_child_nodes(p)}
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
@@ -50,7 +52,8 @@ def imports(path: Path) -> Iterator[tuple[str, bool]]:
             if isinstance(up, ast.If) and "TYPE_CHECKING" in ast.unparse(up.test):
                 only_types = True
         if not only_types:
-            yield from ((name, at_import) for name in names)
+            found += [(name, at_import) for name in names]
+    return found
 
 
 def part_of(path: Path) -> str | None:

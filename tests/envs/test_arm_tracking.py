@@ -75,9 +75,8 @@ def test_a_set_point_moves_links_by_what_it_says():
 
 def test_a_torque_is_added_to_the_motors():
     """In the first step the motors give what the loop gives, and the action."""
-    torques = []
+    env, torques = ArmTrackingEnv(friction=False), []
     for action in (0.0, 0.1, 0.2):
-        env = ArmTrackingEnv(friction=False)
         env.reset(seed=0)
         torques.append(env.step(np.full(6, action))[-1]["motor_torque_Nm"])
     rated = np.array([d.ratings.rated_torque / 100.0 for d in env.task.joints.drives])

@@ -18,7 +18,7 @@ from swgjoint.errors import InputError
 ALL = {"link_encoder": True, "torque_sensor": True}
 SHORT = {
     "swgjoint/JointTracking-v0": {"episode_s": 0.5, "load_of_rated": 0.05},
-    "swgjoint/RippleSuppression-v0": {"episode_s": 1.6, "period_s": 2e-3},
+    "swgjoint/RippleSuppression-v0": {"episode_s": 1.6, "period_s": 4e-3},
     "swgjoint/ArmTracking-v0": {"episode_s": 0.4},
 }
 """Arguments with which episodes end within the tests."""
@@ -87,14 +87,14 @@ def test_one_seed_gives_one_run(name):
     [*((name, "full") for name in ENVIRONMENTS), (next(iter(ENVIRONMENTS)), "linear")],
 )
 def test_batch_equals_single_environments(name, level):
-    """1,000 steps with restarts, specimens, sensors and delay agree to the last bit."""
+    """550 steps with restarts, specimens, sensors and delay agree to the last bit."""
     keys = {
         **SHORT[name],
         "level": level,
         "randomise": True,
         "sensors": {**ALL, "delay_periods": 2},
     }
-    count = 3 if name.endswith("ArmTracking-v0") else 7
+    count = 2 if name.endswith("ArmTracking-v0") else 5
     sync = SyncVectorEnv([lambda: make(name, **keys).unwrapped] * count)
     batch = gymnasium.make_vec(name, num_envs=count, threads=2, **keys)
     assert batch.metadata["autoreset_mode"] is AutoresetMode.NEXT_STEP
@@ -103,8 +103,8 @@ def test_batch_equals_single_environments(name, level):
     same(got, want)
     # some wander until a limit breaks, some stay until the end
     size = np.linspace(0.02, 1.0, count)[:, None]
-    for _ in range(1000):
-        actions = size * rng.uniform(-0.9, 0.9, batch.action_space.shape)
+    for _ in range(550):
+        actions = size * rng.uniform(-0.5, 0.9, batch.action_space.shape)
         got, want = batch.step(actions), sync.step(actions)
         same(got, want)
         ended += got[3]
@@ -112,7 +112,7 @@ def test_batch_equals_single_environments(name, level):
     # every episode began anew, and not in the last step
     assert (ended + broken >= 1).all() and (batch.unwrapped.core.instant > 0).all()
     if name.endswith("JointTracking-v0"):
-        assert ended.sum() >= 4 and broken.sum() >= 1
+        assert ended.sum() >= 1 and broken.sum() >= 1
 
 
 @NAMES
@@ -148,7 +148,7 @@ def test_an_action_that_is_none_is_refused(action, match):
 
 def test_episodes_that_restart_at_once():
     """In the other mode, too, the batch is gymnasium's, last observations included."""
-    name, count = "swgjoint/JointTracking-v0", 5
+    name, count = "swgjoint/JointTracking-v0", 4
     keys = {**SHORT[name], "randomise": True}
     sync = SyncVectorEnv(
         [lambda: make(name, **keys).unwrapped] * count,
@@ -158,7 +158,7 @@ def test_episodes_that_restart_at_once():
     assert batch.metadata["autoreset_mode"] is AutoresetMode.SAME_STEP
     batch.reset(seed=1), sync.reset(seed=1)
     rng, size, ended = np.random.default_rng(0), np.linspace(0.02, 1.0, count), 0
-    for _ in range(600):
+    for _ in range(550):
         actions = size[:, None] * rng.uniform(-0.9, 0.9, (count, 1))
         got, want = batch.step(actions), sync.step(actions)
         same(got, want)

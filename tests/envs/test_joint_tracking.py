@@ -186,7 +186,7 @@ def test_broken_limits_end_an_episode(number, action, keys):
 
 def test_a_controller_sees_all_episodes_of_a_batch():
     """The same PD, broadcast over a batch, follows all references."""
-    batch = gymnasium.make_vec(NAME, num_envs=8, randomise=True)
+    batch = gymnasium.make_vec(NAME, num_envs=4, randomise=True)
     observation, _ = batch.reset(seed=1)
     errors = []
     for k in range(2000):
@@ -322,7 +322,7 @@ def test_linear_joints_draw_the_load_alone(said):
     assert {v for (v,) in batch.core.variations} == {Variation()}
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=30, deadline=None)
 @given(
     episode_s=st.one_of(st.just(0.5), st.floats(0.5, 3.0)),
     speed=st.floats(0.01, 5.0),

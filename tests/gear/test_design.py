@@ -362,10 +362,28 @@ _KEYS = [
 ]
 
 
-@settings(max_examples=300, deadline=None, derandomize=True)
-@given(changes=st.dictionaries(st.sampled_from(_KEYS), _values, max_size=4))
+any_changes = given(
+    changes=st.dictionaries(st.sampled_from(_KEYS), _values, max_size=4)
+)
+
+
+@settings(max_examples=80, deadline=None, derandomize=True)
+@any_changes
 def test_any_value_is_accepted_or_refused_in_lines(changes):
     """Whatever a file holds: a design, or lines that name the keys; no traceback."""
+    assert_accepted_or_refused(changes)
+
+
+@pytest.mark.slow
+@settings(max_examples=300, deadline=None)
+@any_changes
+def test_many_values_are_accepted_or_refused_in_lines(changes):
+    """The same of more of them, others in every run."""
+    assert_accepted_or_refused(changes)
+
+
+def assert_accepted_or_refused(changes):
+    """A whole design, or lines with a key each."""
     design = Design.preset("reference-2d")
     try:
         changed = design.with_changes(changes)

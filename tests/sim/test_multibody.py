@@ -21,8 +21,8 @@ QUICK = ("bench", "two-link")
 """Arms whose motion is compared in the first tier; matrices are, of all of them."""
 INERTIA = 1e-4
 STEP = 1e-5
-DURATION = 0.5
-"""Of the compared motion: a period of the loops on the motors [s]."""
+DURATION = 0.3
+"""Of the compared motion: the motors come to their targets in it [s]."""
 
 
 def pinocchio_model(model: mujoco.MjModel) -> pinocchio.Model:
@@ -160,7 +160,11 @@ def servo(spec: mujoco.MjSpec, arm: RigidArm, drives: list[JointDrive], q: np.nd
 
 @pytest.mark.parametrize(
     "name",
-    [pytest.param(n, marks=[] if n in QUICK else pytest.mark.slow) for n in ARMS],
+    [
+        pytest.param(n, marks=[] if n in QUICK else pytest.mark.slow)
+        for n in ARMS
+        if n != "iiwa14"  # the axes of the iiwa7
+    ],
 )
 def test_motion_agrees_with_an_independent_integration(name, synthetic_map):
     """RK4 at 10 µs and DOP853 with Pinocchio end within 1e-6 rad at the links.

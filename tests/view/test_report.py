@@ -47,14 +47,36 @@ def run(synthetic_map: DriveMap) -> Run:
     return run_scene("bench", overrides=SHORT, drives={"reference-2d": synthetic_map})
 
 
-def page_of(path) -> Page:
-    return Page(path.read_text(encoding="utf-8"))
+WRITTEN: list[tuple[Run, str]] = []
+"""The run and the text of the page that tests share: its pictures take seconds."""
 
 
-def test_the_page_needs_nothing_else(run, tmp_path):
+@pytest.fixture
+def written(synthetic_map: DriveMap, tmp_path) -> tuple[Run, str]:
+    """Run ``a``, too fast for the tooth order, beside the rigid ``b``: a whole page."""
+    if not WRITTEN:
+        fast = {**SHORT, "trajectory.speed_deg_s.joint": 6.0}
+        drives = {"reference-2d": synthetic_map}
+        run = run_scene("bench", overrides=fast, drives=drives)
+        rigid = run_scene(
+            "bench", overrides={**fast, "defaults.level": "rigid"}, drives=drives
+        )
+        path = write_report({"a": run, "b": rigid}, tmp_path / "report.html")
+        assert [p.name for p in tmp_path.iterdir()] == ["report.html"]
+        WRITTEN.append((run, path.read_text(encoding="utf-8")))
+    return WRITTEN[0]
+
+
+@pytest.fixture
+def without_pictures(monkeypatch):
+    """The first bytes of a PNG in place of every picture."""
+    for picture in ("joint_png", "spec_picture"):
+        monkeypatch.setattr(f"swgjoint.view.report.{picture}", lambda *_: b"\x89PNG")
+
+
+def test_the_page_needs_nothing_else(written):
     """No address, no script; every picture is inside and is a PNG."""
-    path = write_report({"": run}, tmp_path / "report.html")
-    text = path.read_text(encoding="utf-8")
+    _, text = written
     page = Page(text)
     assert page.open == []
     assert not re.search(r"\w+://|@import|url\(", text)
@@ -67,9 +89,9 @@ def test_the_page_needs_nothing_else(run, tmp_path):
         assert head == "data:image/png;base64"
         assert base64.b64decode(data, validate=True).startswith(b"\x89PNG")
     assert ("meta", "http-equiv", "Content-Security-Policy") in page.attributes
-    assert [p.name for p in tmp_path.iterdir()] == ["report.html"]
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_names_from_files_are_text_not_markup(synthetic_map, tmp_path):
     """Markup in the names of drive, scene and run is shown, not obeyed."""
     evil = "<script>alert(1)</script>"
@@ -90,9 +112,11 @@ def test_names_from_files_are_text_not_markup(synthetic_map, tmp_path):
     assert f"Scene {evil}scene" in page.texts
 
 
+@pytest.mark.usefixtures("without_pictures")
 def test_figures_are_those_of_the_metrics(run, tmp_path):
     """Ripple, torsion, error and the use of ratings stand there as in the JSON."""
-    page = page_of(write_report({"soft": run}, tmp_path / "report.html"))
+    path = write_report({"": run}, tmp_path / "report.html", check_step=False)
+    page = Page(path.read_text(encoding="utf-8"))
     figures = run.metrics()["joints"]["joint"]
     for value in (
         figures["ripple_rms_percent"],
@@ -104,16 +128,10 @@ def test_figures_are_those_of_the_metrics(run, tmp_path):
         assert shown(value) in page.texts
 
 
-def test_every_run_has_its_label_and_error_estimate(synthetic_map, tmp_path):
+def test_every_run_has_its_label_and_error_estimate(written):
     """Level, range of the map, orders left out, and the change at half the step."""
-    fast = {**SHORT, "trajectory.speed_deg_s.joint": 6.0}
-    run = run_scene("bench", overrides=fast, drives={"reference-2d": synthetic_map})
-    rigid = run_scene(
-        "bench",
-        overrides={**fast, "defaults.level": "rigid"},
-        drives={"reference-2d": synthetic_map},
-    )
-    page = page_of(write_report({"a": run, "b": rigid}, tmp_path / "report.html"))
+    run, text = written
+    page = Page(text)
     assert page.texts.count("a") >= 2 and page.texts.count("b") >= 2
     assert "synthetic (synthetic)" in page.texts
     assert "122" in page.texts  # too fast at 6 deg/s, left out
