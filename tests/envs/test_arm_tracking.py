@@ -88,6 +88,17 @@ def test_a_torque_is_added_to_the_motors():
     )
 
 
+def test_reward_is_what_the_docstring_says():
+    """From the error of the tool and the mean square of unequal actions."""
+    env = ArmTrackingEnv(friction=False, effort_weight=0.2)
+    env.reset(seed=0)
+    action = np.array([0.5, 0.1, 0.0, -0.3, 0.0, 0.2])
+    _, reward, _, _, info = env.step(action)
+    error = info["tool_error_mm"] / env.core.settings.error_scale_mm
+    expected = 1.0 / (1.0 + error**2) - 0.2 * np.mean(action**2)
+    assert reward == pytest.approx(expected, rel=1e-5)
+
+
 def test_sensors_know_the_load_from_the_first_instant():
     """Torque sensors read the weight at the start, link encoders the sag."""
     env = ArmTrackingEnv(sensors={"torque_sensor": True, "link_encoder": True})
