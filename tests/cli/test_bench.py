@@ -10,8 +10,18 @@ from messages import names
 
 from swgjoint.cli import bench, bench_fe, bench_scaling
 from swgjoint.cli.main import main
+from swgjoint.gear.design import Design
 from swgjoint.study import fe_cost, scaling
 from swgjoint.study.fe_cost import Setting
+
+SMALL = Design.load("reference-3d").with_changes(
+    {
+        "drive.teeth_flexspline": 60,
+        "drive.teeth_circular_spline": 62,
+        "cup.length_mm": 20.0,
+        "cup.bore_radius_mm": 10.0,
+    }
+)
 
 
 @pytest.mark.fe
@@ -26,7 +36,11 @@ def test_bench_fe(monkeypatch, capsys, tmp_path):
         "__kwdefaults__",
         {**fe_cost.run_fe_cost.__kwdefaults__, "settings": settings},
     )
-    assert main(["bench", "fe", "--json", "--recompute", "--out", str(tmp_path)]) == 0
+    out = tmp_path / "out"
+    path = tmp_path / "small.toml"
+    path.write_text(SMALL.to_toml(), encoding="utf-8")
+    arguments = ["bench", "fe", "--design", str(path), "--recompute"]
+    assert main([*arguments, "--json", "--out", str(out)]) == 0
     result = json.loads(capsys.readouterr().out)
     assert len(result["rows"]) == 12
     keys = {"bench", "model", "setting", "error", "unit", "wall_s", "reference"}
@@ -34,7 +48,7 @@ def test_bench_fe(monkeypatch, capsys, tmp_path):
         assert keys | {"outcome", "peak_MB", "cores", "pareto"} <= set(row)
         assert row["reference"] == "2d, refinement 0.6"
         assert row["peak_MB"] > 50.0  # of a process of its own
-    names = {path.name for path in tmp_path.iterdir()}
+    names = {path.name for path in out.iterdir()}
     table = {f"bench-fe.{suffix}" for suffix in ("json", "csv", "png")}
     assert names == table | {"bench-fe-reference.json"}
     text = bench_fe.report(result)

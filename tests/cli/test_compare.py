@@ -8,6 +8,7 @@ import re
 import pytest
 from messages import names
 from rerun.chunk import RrdReader
+from solved import coarse
 
 from swgjoint.cli.main import main
 from swgjoint.study.compare import LOWER, UPPER
@@ -148,7 +149,9 @@ def test_design_has_a_stress_and_a_picture(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr("swgjoint.study.compare.STRESS_POSITIONS", 1)
     monkeypatch.setattr("swgjoint.fe.sampling.ANGLES", 4)
     out = tmp_path / "out"
-    result = found(capsys, "reference-2d", "--out", str(out))
+    path = tmp_path / "design.toml"
+    path.write_text(coarse().to_toml(), encoding="utf-8")
+    result = found(capsys, str(path), "--out", str(out))
     (row,) = result["rows"]
     # 321 MPa at 20 N·m on the mesh of the thesis
     assert 280.0 < row["von_mises_MPa"] < 360.0

@@ -7,6 +7,7 @@ import json
 
 import pytest
 from messages import names
+from solved import few_teeth
 
 from swgjoint.cli.main import main
 
@@ -17,7 +18,9 @@ def test_lot_writes_rows_and_picture(tmp_path, capsys):
     spec = tmp_path / "spec.toml"
     spec.write_text("[spec]\nripple_rms_percent = 1000.0\n")
     out = tmp_path / "deep" / "out"
-    arguments = ["lot", "reference-2d-tolerances", "--drives", "2", "--jobs", "1"]
+    design = tmp_path / "design.toml"
+    design.write_text(few_teeth("reference-2d-tolerances").to_toml(), encoding="utf-8")
+    arguments = ["lot", str(design), "--drives", "2", "--jobs", "1"]
     arguments += ["--spec", str(spec), "--out", str(out), "--json"]
     assert main(arguments) == 0
     found = json.loads(capsys.readouterr().out)

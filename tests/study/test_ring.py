@@ -96,7 +96,7 @@ def test_impossible_travel_is_reported():
 def test_study_ring(monkeypatch, capsys, tmp_path):
     """Rows of the contract, the scaling of Table A.1, files; bad options refused."""
     monkeypatch.setattr(study, "REFINEMENTS", (1, 2))
-    monkeypatch.setattr(study, "TRAVEL_mm", (0.001, 0.5, 1.0, 1.6))
+    monkeypatch.setattr(study, "TRAVEL_mm", (0.001, 0.8, 1.6))
     out = tmp_path / "ring"
     assert main(["study", "ring", "--json", "--out", str(out)]) == 0
     result = json.loads(capsys.readouterr().out)
