@@ -196,7 +196,7 @@ def test_without_coefficient_nothing_and_with_it_in_proportion(free):
 def test_without_friction_the_input_balances_the_load(design):
     """T/i but for the ripple of balls and teeth, which is below 1 %."""
     torque = 4.0 * TORQUE
-    found = running_friction(design, torque=torque, angles=[ANGLE, ANGLE + 0.1])
+    found = running_friction(design, torque=torque, angles=[ANGLE])
     assert found.elastic == pytest.approx(torque / design.ratio, rel=0.01)
     # load presses the teeth on: they rub more than the race does
     assert found.teeth_share > 0.5

@@ -97,3 +97,32 @@ def loaded(small_design, small_drive, deflected, kept_once):
         return small_drive.to_angle(state, 0.4 * 2.0 * np.pi / 42)
 
     return kept_once(f"loaded {small_design.content_hash()} {ORDERS}", solve)
+
+
+@pytest.fixture(scope="module")
+def small_pattern(few_masters_everywhere, kept_once):
+    """Samples of the small drive for its map, its teeth perfect or not.
+
+    Equilibria of the perfect teeth at eight angles and two torques are solved once.
+    """
+    from swgjoint.fe import sampling
+
+    solve_pattern = sampling.solve_pattern
+
+    def pattern(*args, **settings):
+        return kept_once(
+            f"pattern of the small drive {ORDERS}",
+            lambda: solve_pattern(*args, **{**settings, "tick": nothing}),
+        )
+
+    def sample(design):
+        return sampling.sample_map(design, model="3d", angles=8)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sampling, "solve_pattern", pattern)
+        patch.setattr(sampling, "LEVELS", (0.35, 1.0))
+        yield sample
+
+
+def nothing() -> None:
+    """A solve is done."""

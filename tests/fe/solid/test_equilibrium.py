@@ -63,8 +63,8 @@ def test_input_torque_is_the_slope_of_the_energy(small_drive, loaded):
 @pytest.mark.slow
 def test_input_torque_is_the_slope_of_the_energy_over_a_pitch(small_drive, loaded):
     """The same at more positions."""
-    errors = energy_slopes(small_drive, loaded, np.arange(0.45, 1.4, 0.12))
-    assert len(errors) >= 4
+    errors = energy_slopes(small_drive, loaded, np.arange(0.45, 1.4, 0.24))
+    assert len(errors) >= 2
     assert max(errors) < 1e-5
 
 
@@ -156,7 +156,7 @@ def test_sectors_fit_together(small_ring, loaded):
 
 
 @pytest.mark.slow
-def test_crowned_wave_generator_engages_under_a_short_cup():
+def test_crowned_wave_generator_engages_under_a_short_cup(few_masters):
     """It rocks: without half steps two sets of contacts ask for each other for ever."""
     design = Design.load("stress-cup").with_changes(
         {
@@ -165,7 +165,8 @@ def test_crowned_wave_generator_engages_under_a_short_cup():
             "mesh.refinement": 0.5,
         }
     )
-    follow = SolidContinuation(ring=solid_ring(design, half=True), ratio=design.ratio)
+    ring = solid_ring(design, half=True, orders=few_masters)
+    follow = SolidContinuation(ring=ring, ratio=design.ratio)
     engaged = follow.meshed(follow.deflected())
     assert engaged.outcome.ok
     assert len(engaged.history) < 40

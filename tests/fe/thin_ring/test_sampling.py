@@ -127,7 +127,7 @@ def test_spec_by_the_rings(capsys, monkeypatch, tmp_path):
     # a coarse map that others must not find
     monkeypatch.setenv("SWGJOINT_CACHE", str(tmp_path))
     keys = "K1_Nm_rad,K2_Nm_rad,K3_Nm_rad,lost_motion_arcmin"
-    arguments = ["spec", "size-17-80", "--model", "ring", "--only", keys, "--json"]
+    arguments = ["spec", "size-17-50", "--model", "ring", "--only", keys, "--json"]
     assert main(arguments) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["validity"]["level"] == "ring"
