@@ -97,13 +97,13 @@ def page(task, shares, title):
 # %% [markdown]
 # ## A map in the plane
 #
-# `reference-2d`, four positions over a pitch at all torques, no cache. A Newton step
+# `reference-2d`, two positions over a pitch at all torques, no cache. A Newton step
 # condenses the ring of sectors, which is a banded factorisation, and looks where teeth
 # touch, which is not linear algebra at all: feet of points on curved flanks.
 
 # %%
 design = swgjoint.Design.load("reference-2d")
-times = profiled(lambda: build_map(design, model="2d", angles=4, cache=False))
+times = profiled(lambda: build_map(design, model="2d", angles=2, cache=False))
 whole = seconds(times, "build_map.py", "build_map")
 search = seconds(times, "tooth_contact.py", "search")
 plane = {
@@ -189,7 +189,7 @@ def step_time(**keys):
     model, data = chain_model(6, **keys)
     mujoco.mj_step(model, data, 200)
     least = []
-    for _ in range(7):
+    for _ in range(5):
         begin = time.process_time()
         mujoco.mj_step(model, data, 1000)
         least.append((time.process_time() - begin) * 1e3)

@@ -147,7 +147,7 @@ def test_least_loss_of_three_joints():
         end=end,
         duration=DURATION,
         torque_limit=top,
-        intervals=40,
+        intervals=24,
     )
     assert np.abs(found.motor_torque).max() <= top
     rigid = RigidArm("ur5e")
