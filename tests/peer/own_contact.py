@@ -36,7 +36,8 @@ from swgjoint.units import mm
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-CAM_SIDES_PER_TURN = 4800  # chords of 0.08 mm leave the outline by 0.01 micrometre
+CHORDS = 0.0125e-6
+"""By which the sides of the cam leave its outline [m]."""
 FLANK_SIDES = 160
 STRIP = 0.05 * mm
 CLEARANCE = 1e-3 * mm
@@ -73,7 +74,8 @@ class Strip:
 def cam_strip(outline: WaveGenerator, bore: float, alpha: float, turn: float) -> Strip:
     """From a circle to the outline, over a part of a turn and a little more."""
     margin = 0.01
-    count = int(CAM_SIDES_PER_TURN * (turn + 2 * margin))
+    sides = 2.0 * pi / np.sqrt(8.0 * CHORDS / bore)  # 4800 of the reference drive
+    count = int(sides * (turn + 2 * margin))
     share = np.linspace(-margin, turn + margin, count + 1)
     share = share - alpha / (2.0 * pi)  # of the perimeter, from the major axis
     final, _, _ = outline.evaluate(share * outline.perimeter)
@@ -109,7 +111,7 @@ def own_contact(
     folder: Path,
     *,
     element: str,
-    refinement: int,
+    refinement: float,
     penalty: float,
     quarter: bool,
 ) -> Replay:
@@ -170,7 +172,7 @@ def own_contact(
         for slave, master in pairs[1:]
     )
     step = "*STEP, NLGEOM, INC=400\n*STATIC\n{}\n"
-    deck += step.format("0.1, 1.0, 1e-5, 0.2")
+    deck += step.format("0.17, 1.0, 1e-5, 0.17")
     deck += change.replace("{}", "REMOVE") + rigid_nodes
     deck += calculix.OUTPUT + "*END STEP\n"
     if not quarter:

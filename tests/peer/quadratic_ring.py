@@ -74,7 +74,7 @@ class QuadraticRing:
 def quadratic_ring(
     profile: ToothProfile,
     rim: float,
-    refinement: int,
+    refinement: float,
     *,
     sectors: int,
     quarter: bool = False,

@@ -133,11 +133,16 @@ class Replay:
         return radial, tangential
 
     @property
-    def two_lobe(self) -> float:
-        """Radial difference a cos 2 phi from the lobes; a < 0: ours is softer [m]."""
+    def angle(self) -> Array:
+        """Of the nodes of the shape from the +y axis, increasing (n,) [rad]."""
         x, y = np.moveaxis(self.model.reference[:, self.model.bore_nodes], -1, 0)
         nodes, _ = self.ring.bore.at(self.forces.bore_angle)
-        phi = np.arctan2(-x, y)[nodes[..., 0] >= 0] - self.state.wave_generator_angle
+        return np.unwrap(np.arctan2(-x, y)[nodes[..., 0] >= 0])
+
+    @property
+    def two_lobe(self) -> float:
+        """Radial difference a cos 2 phi from the lobes; a < 0: ours is softer [m]."""
+        phi = self.angle - self.state.wave_generator_angle
         return float(self.shape[0] @ np.cos(2 * phi) / np.sum(np.cos(2 * phi) ** 2))
 
     @cached_property
@@ -187,7 +192,7 @@ def replay(
     folder: Path,
     *,
     element: str,
-    refinement: int,
+    refinement: float,
     quarter: bool,
 ) -> Replay:
     """Apply the contact forces of a state to the same flexspline.

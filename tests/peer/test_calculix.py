@@ -24,7 +24,9 @@ from states import (
 from swgjoint.fe.corotation import rotate, turned
 from swgjoint.units import mm
 
-OURS = 10  # our mesh error in the shape is then below 0.1 micrometre
+OURS = 2, 3
+"""Refinements of ours. The error of our mesh in the shape falls with the square: 2.9
+and 1.3 micrometres at 20 N·m, and 0.18 without it."""
 SHAPE = 0.2 * um
 STRESS = 0.03
 
@@ -94,46 +96,73 @@ def test_substituted_constants_are_plane_stress(tmp_path):
     assert found.stress == pytest.approx(np.tile([100.0, 0.0, 0.0], (8, 1)), abs=0.02)
 
 
+def without_mesh_error(coarse, fine):
+    """Differences of shape of two refinements, extrapolated where both have nodes."""
+    square = (OURS[1] / OURS[0]) ** 2
+    return [
+        (square * np.interp(coarse.angle, fine.angle, two) - one) / (square - 1.0)
+        for one, two in zip(coarse.shape, fine.shape, strict=True)
+    ]
+
+
 @needs_calculix
 @pytest.mark.slow
 def test_wave_generator_state_holds_in_calculix(tmp_path):
     """Our contact forces give the same shape and root stress in CalculiX.
 
-    Where the rim is free beside the lobes; ``study.py`` has the other outlines.
+    Where the rim is free beside the lobes; ``study.py`` has the other outlines and the
+    reference drive.
     """
-    kind = "simplified"
-    design, model = design_of(kind, OURS), model_of(kind, OURS, False)
-    state = deflected(kind, OURS, False)
 
-    def found(element):
+    def found(refinement, element):
         return replay(
-            design, model, state, tmp_path, element=element, refinement=1, quarter=True
+            design_of("small simplified", refinement),
+            model_of("small simplified", refinement, False),
+            deflected("small simplified", refinement, False),
+            tmp_path,
+            element=element,
+            refinement=1,
+            quarter=True,
         )
 
-    radial, tangential = found("CPE8R").shape
-    assert max(largest(radial), largest(tangential)) < SHAPE
-    ours, theirs = found("CPE8").root_stress
+    shapes = [found(refinement, "CPE8R") for refinement in OURS]
+    assert max(map(largest, without_mesh_error(*shapes))) < SHAPE
+    ours, theirs = found(OURS[-1], "CPE8").root_stress
     assert ours == pytest.approx(theirs, rel=STRESS)
+
+
+def meshed(kind, refinement, element, folder):
+    """At the torque in a position of no symmetry, in CalculiX."""
+    return replay(
+        design_of(kind, refinement),
+        model_of(kind, refinement, True),
+        turned_to(kind, refinement, POSITIONS[-1]),
+        folder,
+        element=element,
+        refinement=1,
+        quarter=False,
+    )
 
 
 @needs_calculix
 @pytest.mark.slow
-@pytest.mark.timeout(1800)
 def test_meshed_position_holds_in_calculix(tmp_path):
-    """The same at 20 N·m, where the moments of all forces balance besides."""
-    design, model = design_of("elliptical", OURS), model_of("elliptical", OURS, True)
-    # a position of no symmetry
-    state = turned_to("elliptical", OURS, POSITIONS[-1])
+    """The same at 20 N·m, where the moments of all forces balance besides.
 
-    def found(element):
-        return replay(
-            design, model, state, tmp_path, element=element, refinement=1, quarter=False
-        )
+    On the reference drive: a difference of 0.2 micrometres is of second order in the
+    strain, 0.4 to 0.6 on the small one.
+    """
+    shapes = [meshed("elliptical", of, "CPE8R", tmp_path) for of in OURS]
+    assert max(map(largest, without_mesh_error(*shapes))) < SHAPE
+    for found in shapes:
+        assert abs(found.model.copies * found.moment) < 1e-4 * TORQUE
 
-    shape = found("CPE8R")
-    assert max(largest(part) for part in shape.shape) < SHAPE
-    assert abs(model.copies * shape.moment) < 1e-4 * TORQUE
-    ours, theirs = found("CPE8").root_stress
+
+@needs_calculix
+@pytest.mark.slow
+def test_root_stress_of_a_meshed_position_holds_in_calculix(tmp_path):
+    """The tooth forces add to what bends the rim, at 5 N·m on a small drive."""
+    ours, theirs = meshed("small elliptical", OURS[-1], "CPE8", tmp_path).root_stress
     assert ours == pytest.approx(theirs, rel=STRESS)
 
 
@@ -141,15 +170,13 @@ def test_meshed_position_holds_in_calculix(tmp_path):
 @pytest.mark.slow
 def test_own_contact_finds_our_shape(tmp_path):
     """CalculiX's contact with the wave generator, no force of ours in it."""
-    design, model = design_of("elliptical", 4), model_of("elliptical", 4, False)
-    state = deflected("elliptical", 4, False)
     found = own_contact(
-        design,
-        model,
-        state,
+        design_of("small elliptical", 4),
+        model_of("small elliptical", 4, False),
+        deflected("small elliptical", 4, False),
         tmp_path,
         element="CPE8R",
-        refinement=1,
+        refinement=0.5,
         penalty=1e15,
         quarter=True,
     )

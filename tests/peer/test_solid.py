@@ -36,6 +36,7 @@ def small_design():
             "flexspline.rim_mm": 0.4,
             "cup.length_mm": 14.0,
             "cup.bore_radius_mm": 7.0,
+            "mesh.refinement": 0.5,
         }
     )
 
@@ -124,29 +125,32 @@ def test_element_is_c3d8i_but_for_one_factor(distortion, tmp_path, monkeypatch):
 
 @needs_calculix
 @pytest.mark.slow
-@pytest.mark.timeout(1800)
-def test_wave_generator_state_holds_in_calculix(tmp_path):
-    """Our forces on the same mesh: shape within a micrometre, root stress 5 %.
+def test_wave_generator_state_holds_in_calculix(tmp_path, monkeypatch):
+    """Our forces on the same mesh of the same elements: shape and stress of every part.
 
-    The mesh changes root stress by 3 % in our code and 1 % in CalculiX, and by 0.1 %
-    from twice to three times the elements (see ``solid_study.py``).
+    Stress 1.5 %, where 0.9 % are seen; with our factor the mesh of half the elements
+    would make 6 % at the root, that of the thesis 3 % (see ``solid_study.py``).
     """
-    design = Design.load("reference-3d-modified")
+    monkeypatch.setattr(elasticity, "ElementHexIncompatible", CentreJacobian)
+    design = Design.load("reference-3d-modified").with_changes({"mesh.refinement": 0.5})
     ring = solid_ring(design, half=True, elastic_circular_spline=False)
     state = SolidContinuation(ring=ring, ratio=design.ratio).deflected()
     found = solid_replay(design, ring, state, tmp_path)
     for name, apart in found.shape.items():
-        assert np.abs(apart[:, 0]).max() < 1.0 * um, name
+        assert np.abs(apart).max() < 0.7 * um, name  # 0.57 at the back, axially
     ours, theirs = found.root_stress
-    assert ours == pytest.approx(theirs, rel=0.05)
+    assert ours == pytest.approx(theirs, rel=0.01)
     for segment in ring.strip.mesh.segments:
         every = np.arange(segment.mesh.p.shape[1])
         ours, theirs = (part[2].max() for part in found.stresses(segment.name, every))
-        assert ours == pytest.approx(theirs, rel=0.05), segment.name
+        assert ours == pytest.approx(theirs, rel=0.015), segment.name
 
     # two teeth of that state under the same motion and forces: the root between them
-    teeth = two_teeth(design, ring, state, 0, refinement=1)
+    teeth = two_teeth(design, ring, state, 0, refinement=0.5)
     stress = teeth.root_stress(teeth.ours(design))
     assert stress == pytest.approx(found.root_stress[0], rel=0.01)
     theirs = teeth.root_stress(teeth.theirs(design, tmp_path))
-    assert stress == pytest.approx(theirs, rel=0.04)
+    assert stress == pytest.approx(theirs, rel=0.01)
+    # and in our element
+    monkeypatch.undo()
+    assert teeth.root_stress(teeth.ours(design)) == pytest.approx(theirs, rel=0.06)

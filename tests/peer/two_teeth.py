@@ -101,7 +101,7 @@ def two_teeth(
     state: SolidState,
     sector: int,
     *,
-    refinement: int,
+    refinement: float,
     orders: Orders | None = None,
 ) -> TwoTeeth:
     """Teeth of a sector and of the next one.
