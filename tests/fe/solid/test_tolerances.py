@@ -7,8 +7,8 @@ from math import pi
 
 import numpy as np
 import pytest
-from solved import kept
 from messages import naming
+from solved import kept
 
 from swgjoint.errors import DesignError
 from swgjoint.fe import tolerance_sampling
