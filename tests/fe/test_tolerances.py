@@ -111,7 +111,7 @@ def test_errors_need_all_sectors():
     with pytest.raises(
         DesignError,
         match=naming(
-            "reference-2d", "120/122 teeth", "half model", "even", "tolerances"
+            "reference-2d", "60/62 teeth", "half model", "even", "tolerances"
         ),
     ):
         ring_model(design, half=True)
