@@ -67,6 +67,7 @@ def test_the_limit_is_the_top_of_a_parabola(short):
     assert ended.limit == 3.0
 
 
+@pytest.mark.slow
 def test_the_path_passes_a_limit():
     """The torque falls at last, and up to there its work is still the energy."""
     path = ratcheting_path(drive(25))

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from solved import hundred_elements
 from messages import naming
 
 from swgjoint.errors import ComputationError, Outcome
@@ -27,6 +28,13 @@ TURN = 2.0 * np.pi * 50.0
 """Input angle of one output turn [rad]."""
 ANGLES = np.array([100.0, 250.0, 100.0 + TURN])
 """On both sides of half an output turn, and the first again a turn later."""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def few_elements():
+    """The laws hold for rings of any number of elements."""
+    with hundred_elements():
+        yield
 
 
 def test_errors_of_teeth_return_after_one_output_turn():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from solved import hundred_elements
 from messages import naming
 
 from swgjoint.errors import InputError, Outcome
@@ -15,6 +16,13 @@ from swgjoint.gear.design import Design
 
 ANGLES = [0.3]
 TORQUES = [20.0, 40.0, 80.0]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def few_elements():
+    """The laws hold for rings of any number of elements."""
+    with hundred_elements():
+        yield
 
 
 @pytest.fixture(scope="module")
@@ -47,6 +55,7 @@ def test_torsion_is_from_the_middle_of_the_play(design, path):
     assert rings == pytest.approx(0.5 * (down - up), rel=0.02)
 
 
+@pytest.mark.slow
 def test_work_adds_up_along_the_path(design, path):
     """Half way in between the same slides: 5 % of the work, as forces are not linear.
 

@@ -10,15 +10,18 @@ from __future__ import annotations
 import hashlib
 import os
 import pickle
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import cache
 from math import pi
 from pathlib import Path
 from typing import TypeVar
 
+import pytest
 from filelock import FileLock
 
 from swgjoint.fe.ring_friction import RubbedPath, rubbed_path
+from swgjoint.fe.thin_ring import model as rings
 from swgjoint.gear.design import Design
 from swgjoint.maps.cache import code_version
 
@@ -63,6 +66,14 @@ def few_teeth(name: str = "reference-2d", **changes: object) -> Design:
 
 RING_TORQUES = (7.0, 14.0, 48.0, 96.0)
 """Of ``ring_path`` [N·m]; it puts a small one before them."""
+
+
+@contextmanager
+def hundred_elements() -> Iterator[None]:
+    """Thin rings of one element a tooth of a hundred teeth, half as many as usual."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(rings, "ELEMENTS", 100)
+        yield
 
 
 @cache

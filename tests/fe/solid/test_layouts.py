@@ -78,10 +78,9 @@ def test_tangent_compliance(follow, driven):
 
 
 @pytest.mark.slow
-def test_balance_and_mean_torque_over_a_pitch(follow):
-    """From rest: the teeth carry T, the input T/i in the mean; the error repeats."""
-    state = follow.to_torque(follow.meshed(follow.deflected()), TORQUE)
-    torques, errors = [], []
+def test_balance_and_mean_torque_over_a_pitch(follow, driven):
+    """The teeth carry T, the input T/i in the mean; the error repeats."""
+    torques, errors, state = [], [], follow.to_torque(driven, TORQUE)
     for k in range(7):
         state = follow.to_angle(state, (0.4 + k / 6) * PITCH)
         assert state.outcome.ok

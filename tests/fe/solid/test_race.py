@@ -231,6 +231,7 @@ def test_balls_teeth_and_load_balance(ring, turned_on):
     assert 4 <= loaded.sum() < 12
 
 
+@pytest.mark.slow
 def test_ball_and_bore_forces_balance(design, few_masters):
     """Net forces of an odd number of balls and of the bore, along x and y.
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from solved import RING_TORQUES, hundred_elements, ring_path
 from messages import naming
 from solved import RING_TORQUES, ring_path
 
@@ -47,7 +48,14 @@ def near_zero(model):
     return loaded(model, unloaded(model, 0.0), 1.0)
 
 
-@pytest.mark.parametrize("alpha", [3.3, 100.0 * np.pi, -1000.0])
+@pytest.mark.parametrize(
+    "alpha",
+    [
+        pytest.param(3.3, marks=pytest.mark.slow),
+        pytest.param(100.0 * np.pi, marks=pytest.mark.slow),
+        -1000.0,
+    ],
+)
 def test_any_wave_generator_angle_has_an_equilibrium(model, near_zero, alpha):
     """Far round, on either side and where the output's angle wraps, like near zero."""
     rest = unloaded(model, alpha)
@@ -258,10 +266,11 @@ def test_stiffness_scales_with_the_cube_of_the_size():
         {"ratings.rated_torque_Nm": 320.0, "ratings.repeated_peak_Nm": 720.0}
     )
     torque = np.array([5.0, 60.0])
-    one, two = (
-        rubbed_path(design, torque * by, angles=[0.05])
-        for design, by in ((small, 1.0), (large, 8.0))
-    )
+    with hundred_elements():
+        one, two = (
+            rubbed_path(design, torque * by, angles=[0.05])
+            for design, by in ((small, 1.0), (large, 8.0))
+        )
     assert one.outcome.ok
     assert two.torsion == pytest.approx(one.torsion, rel=1e-6)
     assert (two.balls == one.balls).all()
@@ -285,6 +294,7 @@ def test_shares_of_the_compliance():
     assert series[-1] > 0.4
 
 
+@pytest.mark.slow
 def test_clearance_is_what_makes_the_stiffness_rise():
     """Without it the curve is nearly straight, with it K rises; nothing is fitted."""
     tight = Design.load("size-25-100").with_changes(

@@ -87,10 +87,9 @@ def test_deflected_rim_holds_the_energy_of_plane_elements(name, tolerance):
     assert state.energy == pytest.approx(peer.energy, rel=tolerance)
 
 
+@pytest.mark.slow
 @pytest.mark.fe
-@pytest.mark.parametrize(
-    "name", ["size-25-50", pytest.param("size-25-100", marks=pytest.mark.slow)]
-)
+@pytest.mark.parametrize("name", ["size-25-50", "size-25-100"])
 def test_rim_and_teeth_yield_as_plane_elements(name):
     """On a nearly rigid cam their part of the compliance is that of the plane model."""
     design = Design.load(name)
