@@ -22,6 +22,11 @@ SHORT = {
 }
 """Arguments with which episodes end within the tests."""
 NAMES = pytest.mark.parametrize("name", ENVIRONMENTS)
+EACH_KIND = [
+    "swgjoint/JointTracking-v0",
+    pytest.param("swgjoint/ArmTracking-v0", marks=pytest.mark.slow),
+]
+"""One of a joint; arms go the same way and take longer to make."""
 
 
 def make(name, **keys):
@@ -114,7 +119,7 @@ def test_batch_equals_single_environments(name, level):
         assert ended.sum() >= 1 and broken.sum() >= 1
 
 
-@NAMES
+@pytest.mark.parametrize("name", EACH_KIND)
 @pytest.mark.parametrize(
     ("keys", "match"),
     [
