@@ -88,7 +88,10 @@ def test_one_seed_gives_one_run(name):
 
 @pytest.mark.parametrize(
     ("name", "level"),
-    [*((name, "full") for name in ENVIRONMENTS), (next(iter(ENVIRONMENTS)), "linear")],
+    [
+        *((name, "full") for name in ENVIRONMENTS),
+        pytest.param(next(iter(ENVIRONMENTS)), "linear", marks=pytest.mark.slow),
+    ],
 )
 def test_batch_equals_single_environments(name, level):
     """550 steps with restarts, specimens, sensors and delay agree to the last bit."""
