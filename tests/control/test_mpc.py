@@ -200,6 +200,7 @@ def test_limits_of_motor_and_drive_are_kept():
     push = {"kind": "joint_pulse", "joint": "joint", "torque_Nm": -40.0}
     scene = bench(
         trajectory__to_Hz=1.0,
+        simulation__duration_s=2.0,
         disturbance=[{**push, "start_s": 1.0, "duration_s": 0.5}],
         defaults__motor={"torque_limit_Nm": 1.6},
     )

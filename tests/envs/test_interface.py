@@ -23,6 +23,11 @@ SHORT = {
 }
 """Arguments with which episodes end within the tests."""
 NAMES = pytest.mark.parametrize("name", ENVIRONMENTS)
+EACH_KIND = [
+    "swgjoint/JointTracking-v0",
+    pytest.param("swgjoint/ArmTracking-v0", marks=pytest.mark.slow),
+]
+"""One of a joint; arms go the same way and take longer to make."""
 
 
 def make(name, **keys):
@@ -84,7 +89,10 @@ def test_one_seed_gives_one_run(name):
 
 @pytest.mark.parametrize(
     ("name", "level"),
-    [*((name, "full") for name in ENVIRONMENTS), (next(iter(ENVIRONMENTS)), "linear")],
+    [
+        *((name, "full") for name in ENVIRONMENTS),
+        pytest.param(next(iter(ENVIRONMENTS)), "linear", marks=pytest.mark.slow),
+    ],
 )
 def test_batch_equals_single_environments(name, level):
     """550 steps with restarts, specimens, sensors and delay agree to the last bit."""
@@ -115,7 +123,7 @@ def test_batch_equals_single_environments(name, level):
         assert ended.sum() >= 1 and broken.sum() >= 1
 
 
-@NAMES
+@pytest.mark.parametrize("name", EACH_KIND)
 @pytest.mark.parametrize(
     ("keys", "match"),
     [

@@ -38,7 +38,7 @@ def steady(rows, key):
 def test_a_perfect_drive_has_no_ripple():
     """Without kinematic error torque and speed are even, and the reward is full."""
     env = RippleSuppressionEnv(
-        kinematic_error_arcmin=0.0, sensors=QUIET, friction=False
+        kinematic_error_arcmin=0.0, sensors=QUIET, friction=False, episode_s=2.5
     )
     rows = turn(env)
     assert np.abs(steady(rows, "torque_ripple_Nm")).max() < 0.05
@@ -56,7 +56,11 @@ def test_ripple_has_the_orders_of_the_error():
     sizes = []
     for error in (0.5, 1.0):
         env = RippleSuppressionEnv(
-            kinematic_error_arcmin=error, sensors=QUIET, friction=False, slowest=1.0
+            kinematic_error_arcmin=error,
+            sensors=QUIET,
+            friction=False,
+            slowest=1.0,
+            episode_s=3.0,
         )
         rows = turn(env)
         ripple = steady(rows, "transmission_error_ripple_arcmin")
@@ -75,7 +79,7 @@ def test_ripple_has_the_orders_of_the_error():
 
 def test_reward_and_observation_are_what_the_docstring_says():
     """Reward from ripple, error and action; sine and cosine of the angle read."""
-    env = RippleSuppressionEnv(authority_of_rated=0.01)
+    env = RippleSuppressionEnv(authority_of_rated=0.01, episode_s=2.5)
     rated = env.task.joints.drives[0].ratings.rated_torque
     for reward, info in turn(env, action=0.5):
         a = info["torque_ripple_Nm"] / (0.01 * rated)
@@ -93,7 +97,11 @@ def test_reward_and_observation_are_what_the_docstring_says():
 def test_what_evens_the_link_takes_ripple_and_not_the_transmission_error():
     """A motor that runs against the known kinematic error leaves little to see."""
     env = RippleSuppressionEnv(
-        sensors=QUIET, friction=False, slowest=1.0, authority_of_rated=1.0
+        sensors=QUIET,
+        friction=False,
+        slowest=1.0,
+        authority_of_rated=1.0,
+        episode_s=3.0,
     )
     runs = []
     for compensate in (False, True):

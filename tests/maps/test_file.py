@@ -131,7 +131,7 @@ def test_every_truncation_is_refused(synthetic_map, tmp_path):
 
 
 @settings(
-    max_examples=300,
+    max_examples=150,
     deadline=None,
     derandomize=True,
     suppress_health_check=[HealthCheck.function_scoped_fixture],
@@ -170,7 +170,7 @@ def test_every_byte_of_the_directory(synthetic_map, tmp_path):
 
 
 @settings(
-    max_examples=200,
+    max_examples=100,
     deadline=None,
     derandomize=True,
     suppress_health_check=[HealthCheck.function_scoped_fixture],

@@ -23,8 +23,17 @@ LOSSY = replace(
 SWEEP = {"kind": "sweep", "hold_s": 0.1, "ramp_s": 0.3, "end_deg": {"joint": 10.0}}
 
 
-@pytest.mark.parametrize("integrator", ["discrete", "RK4"])
-@pytest.mark.parametrize("level", ["rigid", "linear", "native", "full"])
+@pytest.mark.parametrize(
+    ("level", "integrator"),
+    [
+        *((level, "discrete") for level in ("rigid", "linear", "native", "full")),
+        ("full", "RK4"),
+        *(
+            pytest.param(level, "RK4", marks=pytest.mark.slow)
+            for level in ("rigid", "linear", "native")
+        ),
+    ],
+)
 @pytest.mark.parametrize("drive", [LINEAR, LOSSY], ids=["plain", "lossy"])
 def test_the_balance_closes(bench, level, drive, integrator):
     """Work in is storage and losses, with hysteresis and friction and without."""
