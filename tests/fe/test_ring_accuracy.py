@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from solved import hundred_elements
 from messages import naming
+from solved import hundred_elements
 
 from swgjoint.errors import ComputationError, Outcome
 from swgjoint.fe import ring_accuracy

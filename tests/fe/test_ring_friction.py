@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from solved import hundred_elements
 from messages import naming
+from solved import hundred_elements
 
 from swgjoint.errors import InputError, Outcome
 from swgjoint.fe.ring_friction import RubbedPath, rubbed_path

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from solved import hundred_elements
 from messages import naming
+from solved import hundred_elements
 
 from swgjoint.errors import DesignError
 from swgjoint.fe import ring_running

@@ -110,8 +110,6 @@ def test_errors_need_all_sectors():
     assert not can_halve(design)
     with pytest.raises(
         DesignError,
-        match=naming(
-            "reference-2d", "60/62 teeth", "half model", "even", "tolerances"
-        ),
+        match=naming("reference-2d", "60/62 teeth", "half model", "even", "tolerances"),
     ):
         ring_model(design, half=True)

@@ -6,9 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from solved import RING_TORQUES, hundred_elements, ring_path
 from messages import naming
-from solved import RING_TORQUES, ring_path
+from solved import RING_TORQUES, hundred_elements, ring_path
 
 from swgjoint.errors import DesignError
 from swgjoint.fe.ring_friction import rubbed_path
