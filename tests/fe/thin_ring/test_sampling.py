@@ -21,13 +21,8 @@ from swgjoint.gear.design import Design
 from swgjoint.maps.fit import fit_map
 from swgjoint.units import arcsec
 
-<<<<<<< HEAD
-LEVELS = (0.05, 0.15, 0.35, 0.65, 1.01)
-"""Half as many torques as in a map for use: an equilibrium less for each."""
-=======
 LEVELS = (0.1, 0.35, 1.01)
 """Fewer torques than in a map for use, which has ten."""
->>>>>>> 861bd4b72841f03fbba39e64c04134817b4fb2f1
 
 
 def sampled(angles):
