@@ -158,6 +158,7 @@ def small_solid():
     return SolidContinuation(ring=solid_ring(design, half=True), ratio=design.ratio)
 
 
+@pytest.mark.slow
 @pytest.mark.fe
 def test_solid_iterations_and_factorisations(small_solid, counter):
     """One factorisation and one complementarity problem an iteration."""

@@ -21,7 +21,7 @@ def samples(layout, coarse_samples):
     if layout == LAYOUTS[0]:
         return coarse_samples
     design = coarse("reference-2d-simplified", **{"drive.layout": layout})
-    return sample_map(design, angles=ANGLES)
+    return sample_map(design, angles=6)
 
 
 @pytest.mark.fe

@@ -349,15 +349,15 @@ def test_two_hundred_hostile_files(synthetic_map, tmp_path):
         for _ in range(30):
             file = hostile(data, kind, rng)
             seen.add(file)
-            begin = time.perf_counter()
+            begin = time.process_time()
             refusal(tmp_path, file)
-            took += time.perf_counter() - begin
+            took += time.process_time() - begin
     whole = tmp_path / "whole.swg"
     whole.write_bytes(data)
-    begin = time.perf_counter()
+    begin = time.process_time()
     for _ in seen:
         DriveMap.load(whole)
-    assert took < 10.0 * (time.perf_counter() - begin)
+    assert took < 10.0 * (time.process_time() - begin)
     assert len(seen) > 150
 
 

@@ -353,6 +353,7 @@ def test_plane_model_has_the_cup_in_series(half, monkeypatch):
     assert 1.0 / half.stiffness == pytest.approx(1.0 / ring + 1.0 / cup, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_closed_form_and_rings_tell_the_lobe():
     """Rings on a stiff bearing keep the deflection at the lobes and the cup behind."""
     closed = solved(CUP, Setting(model="ring", refinement=0))

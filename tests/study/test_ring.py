@@ -93,6 +93,7 @@ def test_impossible_travel_is_reported():
         pull_ring(steel_ring(1.4), np.array([60 * mm]), ANGLES)
 
 
+@pytest.mark.slow
 def test_study_ring(monkeypatch, capsys, tmp_path):
     """Rows of the contract, the scaling of Table A.1, files; bad options refused."""
     monkeypatch.setattr(study, "REFINEMENTS", (1, 2))

@@ -119,6 +119,7 @@ def test_a_cluster_gives_what_one_process_gives(file, here, scheduler):
     assert set(threads.values()) == {"1"}
 
 
+@pytest.mark.slow
 def test_a_killed_worker_loses_nothing(file, here, scheduler):
     """A worker that dies in the middle of a design: all are there, and the same."""
     killed = []
@@ -136,6 +137,7 @@ def test_a_killed_worker_loses_nothing(file, here, scheduler):
     assert figures(found) == here
 
 
+@pytest.mark.slow
 def test_a_task_that_kills_every_worker_is_lost(scheduler):
     """After the deaths that the scheduler allows the task is given up, not the rest."""
 
@@ -151,6 +153,7 @@ def test_a_task_that_kills_every_worker_is_lost(scheduler):
     assert found == {0: 0, 1: 1, 3: 3}
 
 
+@pytest.mark.slow
 def test_a_result_that_dies_with_its_worker_is_computed_again(scheduler):
     """All four are done, three not fetched, when both workers are killed."""
     with joined(scheduler) as pool:
@@ -166,6 +169,7 @@ def test_a_result_that_dies_with_its_worker_is_computed_again(scheduler):
     assert {first: text, **rest} == {k: str(k) for k in range(4)}
 
 
+@pytest.mark.slow
 def test_what_waits_beside_a_deadly_task_is_not_lost(tmp_path):
     """A scheduler that gives up at once blames what its dead worker still had to do."""
 

@@ -180,6 +180,7 @@ def test_a_study_resumes(result, study, folders, monkeypatch):
     assert run_cases(study, StudyOptions(jobs=2)).rows == result.rows
 
 
+@pytest.mark.slow
 def test_finer_meshes(study, monkeypatch):
     """A group that converges has the value of the finest mesh and its last change."""
     monkeypatch.setenv("SWGJOINT_CACHE", "")

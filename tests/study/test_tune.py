@@ -158,7 +158,10 @@ def test_old_readings_are_held_against_the_plan_of_then(trials):
     np.testing.assert_allclose(got.torque, plan.torque, rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize("optimiser", ["de", "cma", "optuna"])
+@pytest.mark.parametrize(
+    "optimiser",
+    ["de", *(pytest.param(name, marks=pytest.mark.slow) for name in ("cma", "optuna"))],
+)
 def test_same_seed_same_result_and_resumed_runs_too(optimiser, tmp_path):
     """A run that was interrupted ends with the same bits as one that was not."""
     if optimiser != "de":
