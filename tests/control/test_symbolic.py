@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 import pytest
 from messages import naming
-from solved import coarse, kept
+from solved import few_teeth, kept
 
 from swgjoint.control import symbolic
 from swgjoint.control.symbolic import (
@@ -149,7 +149,7 @@ def toleranced_map() -> DriveMap:
     errors = {"tolerances.circular_spline_cumulative_pitch_um": 10.0}
     return kept(
         "coarse map, pitch error of 10 um, 4 angles",
-        lambda: fit_map(sample_map(coarse(**errors), angles=4)),
+        lambda: fit_map(sample_map(few_teeth(**errors), angles=4)),
     )
 
 

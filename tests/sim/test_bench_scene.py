@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from solved import coarse, kept
+from solved import few_teeth, kept
 
 from swgjoint.fe.sampling import sample_map
 from swgjoint.maps.drive_map import DriveMap
@@ -28,7 +28,7 @@ def coarse_map(name: str, **changes: object) -> DriveMap:
     """Map of a drive with 60/62 teeth from finite elements, sampled coarsely."""
     return kept(
         f"coarse map of {name}, {changes}, 6 angles",
-        lambda: fit_map(sample_map(coarse(name, **changes), angles=6)),
+        lambda: fit_map(sample_map(few_teeth(name, **changes), angles=6)),
     )
 
 

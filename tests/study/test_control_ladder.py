@@ -157,11 +157,14 @@ def test_ladder_of_a_drive_without_friction_or_errors(short):
 
 @pytest.mark.slow
 def test_each_rung_improves_what_it_is_made_for():
-    """On two specimens each; the issue's thirty percent and ten times included."""
-    found = climb(CSG, seeds=2, jobs=2)
+    """On one specimen; thirty percent and ten times included.
+
+    ``swgjoint study control`` does it on ten.
+    """
+    found = climb(CSG, seeds=1, jobs=1)
     for rung in RUNGS[1:]:
         share, better = found.improvement(rung)
-        assert better == 2, (rung.name, share)
+        assert better == 1, (rung.name, share)
     by = {rung.name: found.improvement(rung)[0] for rung in RUNGS[1:]}
     assert by["+ kinematic error"] < 0.7
     assert by["flexible joint, learning"] < 0.1
