@@ -7,21 +7,14 @@ from dataclasses import replace
 
 import pytest
 from messages import names
+from solved import small_cup
 
 from swgjoint.cli import bench, bench_fe, bench_scaling
 from swgjoint.cli.main import main
-from swgjoint.gear.design import Design
 from swgjoint.study import fe_cost, scaling
 from swgjoint.study.fe_cost import Setting
 
-SMALL = Design.load("reference-3d").with_changes(
-    {
-        "drive.teeth_flexspline": 60,
-        "drive.teeth_circular_spline": 62,
-        "cup.length_mm": 20.0,
-        "cup.bore_radius_mm": 10.0,
-    }
-)
+SMALL = small_cup()
 
 
 @pytest.mark.fe

@@ -64,6 +64,18 @@ def few_teeth(name: str = "reference-2d", **changes: object) -> Design:
     return coarse(name, **{**teeth, **changes})
 
 
+def small_cup() -> Design:
+    """``reference-3d`` with 60 and 62 teeth, its cup in proportion."""
+    return Design.load("reference-3d").with_changes(
+        {
+            "drive.teeth_flexspline": 60,
+            "drive.teeth_circular_spline": 62,
+            "cup.length_mm": 20.0,
+            "cup.bore_radius_mm": 10.0,
+        }
+    )
+
+
 RING_TORQUES = (7.0, 14.0, 48.0, 96.0)
 """Of ``ring_path`` [N·m]; it puts a small one before them."""
 

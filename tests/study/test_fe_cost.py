@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from messages import naming
+from solved import small_cup
 
 from swgjoint.cli import bench_fe
 from swgjoint.errors import ComputationError, DesignError
@@ -31,14 +32,7 @@ from swgjoint.study.fe_cost_solve import Task, solved, solved_in
 from swgjoint.study.fe_cost_stored import FILE, LONG, WITNESS, stored_of, to_store
 
 CUP = Design.load("reference-3d")
-SMALL = CUP.with_changes(
-    {
-        "drive.teeth_flexspline": 60,
-        "drive.teeth_circular_spline": 62,
-        "cup.length_mm": 20.0,
-        "cup.bore_radius_mm": 10.0,
-    }
-)
+SMALL = small_cup()
 PHI = np.pi * np.arange(RIM) / RIM
 
 
