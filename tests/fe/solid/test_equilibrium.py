@@ -55,7 +55,7 @@ def energy_slopes(drive, state, parts):
 
 def test_input_torque_is_the_slope_of_the_energy(small_drive, loaded):
     """T_wg from contact forces is d(U + T psi)/d theta to 1e-5 of T/|i|."""
-    errors = energy_slopes(small_drive, loaded, [0.4])
+    errors = energy_slopes(small_drive, loaded, [0.55])
     assert errors
     assert max(errors) < 1e-5
 
@@ -156,7 +156,7 @@ def test_sectors_fit_together(small_ring, loaded):
 
 
 @pytest.mark.slow
-def test_crowned_wave_generator_engages_under_a_short_cup(few_masters):
+def test_crowned_wave_generator_engages_under_a_short_cup():
     """It rocks: without half steps two sets of contacts ask for each other for ever."""
     design = Design.load("stress-cup").with_changes(
         {
@@ -165,8 +165,8 @@ def test_crowned_wave_generator_engages_under_a_short_cup(few_masters):
             "mesh.refinement": 0.5,
         }
     )
-    ring = solid_ring(design, half=True, orders=few_masters)
-    follow = SolidContinuation(ring=ring, ratio=design.ratio)
+    # with fewer masters it does not rock
+    follow = SolidContinuation(ring=solid_ring(design, half=True), ratio=design.ratio)
     engaged = follow.meshed(follow.deflected())
     assert engaged.outcome.ok
     assert len(engaged.history) < 40
