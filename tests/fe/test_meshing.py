@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from math import pi
 
@@ -12,6 +13,7 @@ from solved import coarse, kept
 
 from swgjoint.errors import DesignError
 from swgjoint.fe.continuation import Continuation
+from swgjoint.fe.corotation import turned
 from swgjoint.fe.drive2d import left_out, ring_model
 from swgjoint.fe.linearise import linearise
 from swgjoint.fe.meshing import simulate_meshing
@@ -155,6 +157,30 @@ def test_nothing_penetrates():
     slope = (moved[1] - moved[0]) / (2 * h)
     ours = np.einsum("kb,kb->k", found.weight, direction[found.sector])
     assert ours == pytest.approx(slope, rel=1e-4, abs=1e-5)
+
+
+def test_sliding_turns_the_force_of_the_wave_generator():
+    """What a contact force adds to the tangent against differences of its normal."""
+    model, h = follow().model, 1e-6
+    state = follow().to_torque(meshed(), TORQUE)
+    bare = replace(state, pressure=np.zeros_like(state.pressure))
+    slide = 2 * model.bore_nodes + 1
+    tangents = [
+        linearise(model, s, None).hessian[:, slide, slide] for s in (state, bare)
+    ]
+    nodes, angle = (
+        model.skeleton(state)[:, model.bore_nodes],
+        state.wave_generator_angle,
+    )
+    along = turned(model.wave_generator_gap(nodes, angle)[1])
+    ahead, behind = (
+        model.wave_generator_gap(nodes + s * along, angle)[1] for s in (h, -h)
+    )
+    bend = np.einsum("sni,sni->sn", ahead - behind, along) / (2 * h)
+    pressed = np.where(state.touching, state.pressure, 0.0)
+    assert (pressed * bend).max() > 100.0
+    # the force pushes the bore outward, its turn along the slide is in the residual
+    assert tangents[0] - tangents[1] == pytest.approx(-pressed * bend, abs=0.1)
 
 
 def test_stress_is_continuous_across_the_faces():
