@@ -71,7 +71,7 @@ axes.legend()
 # %%
 pitch = 1.0 / design.drive.teeth_circular_spline
 meshing = swgjoint.simulate_meshing(
-    design, torque=ratings.rated_torque, steps=6, turn=pitch, half=True
+    design, torque=ratings.rated_torque, steps=8, turn=pitch, half=True
 )
 angle = meshing.series("wave_generator_angle") / deg
 error = meshing.series("output_error") / arcmin
@@ -95,13 +95,12 @@ assert abs(input_torque.mean() / ideal - 1.0) < 0.005
 # %% [markdown]
 # ## The map
 #
-# Samples over one pitch and both signs of torque become a potential, kept in the cache.
-# Six positions over the pitch take some seconds; without `angles` there are as many as
-# `swgjoint map` takes, in half a minute. Torque and stiffness are the derivatives of
-# the potential, so that the joint can neither create nor lose energy by them.
+# Samples over one pitch and both signs of torque become a potential. It takes about
+# half a minute and is kept in the cache. Torque and stiffness are its derivatives, so
+# that the joint can neither create nor lose energy by them.
 
 # %%
-drive = swgjoint.build_map(design, angles=6)
+drive = swgjoint.build_map(design)
 low, high = drive.torsion_knots[[0, -1]]
 torsion = np.linspace(low, high, 200)
 figure, axes = plt.subplots(figsize=(6, 3.5))
