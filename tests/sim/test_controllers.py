@@ -246,3 +246,49 @@ def test_controllers_hold_at_every_level(bench, synthetic_map):
             )
             off = np.abs(motor_error(run)).max() / 60.0
             assert off < np.deg2rad(0.15), (level, kind)
+
+
+def test_a_loop_at_level_kinematic_sees_the_motor_behind_the_error(
+    bench, synthetic_map
+):
+    """At rest the motor stands where it shall, the link off by the kinematic error."""
+    run = bench(
+        synthetic_map,
+        defaults__level="kinematic",
+        trajectory={
+            "kind": "trapezoid",
+            "end_deg": {"joint": 4.0},
+            "max_speed_deg_s": 10.0,
+            "max_acceleration_deg_s2": 50.0,
+        },
+        simulation__duration_s=2.0,
+        load={},
+        controller={**LOOP, "control_period_s": 0.001},
+    )
+    motor = run.motor_position[-1, 0] / -60.0 - run.reference[-1, 0]
+    link = run.position[-1, 0] - run.reference[-1, 0]
+    assert abs(link) > 1e-6
+    assert abs(motor) < 0.01 * abs(link)
+
+
+def test_a_trapezoid_keeps_its_limits(bench):
+    """Speed and acceleration of the reference are those of the scene, in degrees."""
+    run = bench(
+        LINEAR,
+        defaults__level="rigid",
+        trajectory={
+            "kind": "trapezoid",
+            "end_deg": {"joint": 10.0},
+            "max_speed_deg_s": 10.0,
+            "max_acceleration_deg_s2": 20.0,
+        },
+        simulation__duration_s=2.0,
+        load={},
+    )
+    step = run.assembly.scene.simulation.step_s
+    speed = np.diff(run.reference[:, 0]) / step
+    acceleration = np.diff(speed) / step
+    assert np.rad2deg(speed.max()) == pytest.approx(10.0, rel=1e-6)
+    assert np.rad2deg(np.median(acceleration[acceleration > 0.01])) == pytest.approx(
+        20.0, rel=1e-3
+    )
