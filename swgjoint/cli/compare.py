@@ -70,8 +70,8 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     )
     if args.sort is not None:
         sign = -1.0 if args.sort in LOWER else 1.0
-        known = [row for row in rows if getattr(row, args.sort) is not None]
-        known.sort(key=lambda row: sign * float(getattr(row, args.sort)))
+        known = [row for row in rows if row.told(args.sort) is not None]
+        known.sort(key=lambda row: sign * float(row.told(args.sort)))
         rows = known + [row for row in rows if row not in known]
     result: dict[str, Any] = {
         "scene": scene.name,
@@ -118,13 +118,16 @@ def _write(
 
 
 def status(result: dict[str, Any]) -> int:
-    """1 where a limit of the spec is missed."""
-    return int(result["passed"] is False)
+    """1 where a limit of the spec is missed or a run is not valid."""
+    from swgjoint.sim.verdict import VALID
+
+    valid = all(row["verdict"] == VALID for row in result["rows"])
+    return int(result["passed"] is False or not valid)
 
 
 def report(result: dict[str, Any]) -> str:
     """One line an argument, then what misses the spec."""
-    from swgjoint.view.words import shown
+    from swgjoint.study.compare_shown import cell
 
     columns, spec = result["columns"], result["spec"]
     verdict = [] if spec is None else ["spec"]
@@ -134,7 +137,7 @@ def report(result: dict[str, Any]) -> str:
         (
             row["argument"],
             row["level"],
-            *(shown(row[key]) for key in columns),
+            *(cell(row, key) for key in columns),
             *(["MISSED" if row["missed"] else "kept"] if verdict else []),
         )
         for row in result["rows"]
@@ -145,9 +148,11 @@ def report(result: dict[str, Any]) -> str:
         *result["notes"],
     ]
     for row in result["rows"]:
+        lines += [f"{row['argument']}: {row['verdict']}: {r}" for r in row["reasons"]]
         for key in row["missed"]:
-            told = "not told" if row[key] is None else shown(row[key])
-            lines.append(f"{row['argument']}: {key} {told}, limit {spec[key]:g}")
+            lines.append(
+                f"{row['argument']}: {key} {cell(row, key)}, limit {spec[key]:g}"
+            )
     if result["passed"]:
         lines.append("every limit of the spec is kept")
     return "\n".join([*lines, *(f"wrote {name}" for name in result["files"])])

@@ -7,7 +7,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from swgjoint.cli.run import joint_table, notes
+from swgjoint.cli.run import joint_table, notes, verdict_lines
 from swgjoint.cli.text import table
 from swgjoint.files import output_folder
 
@@ -97,6 +97,13 @@ def _write(folder: Path, runs: Any, rigid: Any, progress: Any) -> list[str]:
     return [str(recording), str(picture), str(report)]
 
 
+def status(result: dict[str, Any]) -> int:
+    """1 where a run is not valid."""
+    from swgjoint.sim.verdict import VALID
+
+    return int(any(m["verdict"] != VALID for m in result["metrics"].values()))
+
+
 def report(result: dict[str, Any]) -> str:
     """Tables of drives, joints and tool, and where the files are."""
     lines = []
@@ -108,7 +115,9 @@ def report(result: dict[str, Any]) -> str:
             f" {low:.3g} to {high:.3g} N·m"
         )
     for label, metrics in result["metrics"].items():
-        lines += ["", f"UR5e, {label}:", joint_table(metrics["joints"])]
+        verdict, *reasons = verdict_lines(metrics)
+        lines += ["", f"UR5e, {label}: {verdict}", *reasons]
+        lines.append(joint_table(metrics["joints"]))
         lines += notes(metrics["joints"])
     rows = [
         (

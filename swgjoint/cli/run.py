@@ -56,6 +56,17 @@ def configure(parser: argparse.ArgumentParser) -> None:
         " absent",
     )
     parser.add_argument(
+        "--model",
+        choices=("ring", "2d", "3d"),
+        help="fidelity of designs; default: 3d for a design with a cup, else 2d",
+    )
+    parser.add_argument(
+        "--strict",
+        action="store_true",
+        help="exit status 1 for a drive above its ratings and for a ripple that is a"
+        " lower bound, too",
+    )
+    parser.add_argument(
         "--report", action="store_true", help="write report.html into DIR, too"
     )
     parser.add_argument(
@@ -109,6 +120,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         "scene": scene.name,
         "arm": {"file": str(arm.path), "held": arm.held},
         "drives_by_rule": of_arm and args.drive is None,
+        "strict": args.strict,
         **result.metrics(),
         "contains": result.contains,
         "files": files,
@@ -131,10 +143,21 @@ def _scene(args: argparse.Namespace) -> tuple[Scene, bool]:
     return Scene.load_file(args.scene, args.overrides), False
 
 
+def status(result: dict[str, Any]) -> int:
+    """1 where the run is not valid; with ``--strict`` where anything is marked."""
+    from swgjoint.sim.verdict import VALID
+    from swgjoint.view.validity import warnings_of
+
+    if result["verdict"] != VALID:
+        return 1
+    return int(result["strict"] and bool(warnings_of(result["joints"])))
+
+
 def report(result: dict[str, Any]) -> str:
-    """Table of the joints, error of the tool, what the model contains."""
+    """Verdict, table of the joints, error of the tool, what the model contains."""
     contains = result["contains"]
     lines = [
+        *verdict_lines(result),
         f"scene {result['scene']}, {result['window_of']} from"
         f" {result['window_s'][0]:.3g} to {result['window_s'][1]:.3g} s",
         joint_table(result["joints"]),
@@ -146,13 +169,35 @@ def report(result: dict[str, Any]) -> str:
         f" instances, {contains['integrator']} at {1e3 * contains['step_s']:g} ms,"
         f" {result['steps_per_s']:.3g} steps/s",
         sub_step_line(contains),
-        *[
-            f"left out in {item['joint']}: {item['part']}: {item['reason']}"
-            for item in contains["left_out"]
-        ],
+        *left_out_lines(contains),
         *[f"wrote {path}" for path in result["files"]],
     ]
     return "\n".join(line for line in lines if line)
+
+
+def verdict_lines(metrics: dict[str, Any]) -> list[str]:
+    """Whether the figures describe the scene, and why not."""
+    from swgjoint.sim.verdict import VALID
+
+    if metrics["verdict"] == VALID:
+        return [metrics["verdict"]]
+    return [
+        f"{metrics['verdict']}: the figures below do not describe this scene",
+        *(f"  {reason}" for reason in metrics["reasons"]),
+    ]
+
+
+def left_out_lines(contains: dict[str, Any]) -> list[str]:
+    """What the model leaves out and why, joints with the same together."""
+    found: dict[tuple[str, str], list[str]] = {}
+    for item in contains["left_out"]:
+        found.setdefault((item["part"], item["reason"]), []).append(item["joint"])
+    count = len(contains["joints"])
+    return [
+        f"not simulated: {part}: {reason}"
+        + ("" if len(joints) == count else f" ({', '.join(joints)})")
+        for (part, reason), joints in found.items()
+    ]
 
 
 def sub_step_line(contains: dict[str, Any]) -> str:
@@ -178,14 +223,14 @@ def joint_row(item: tuple[str, dict[str, Any]]) -> tuple[str, ...]:
     name, joint = item
     torsion, error = joint["torsion_arcmin"], joint["transmission_error_arcmin"]
     return (
-        name.removesuffix("_joint"),
+        name,
         joint["level"],
         fixed(torsion["mean"]),
         fixed(torsion["pp"]),
         fixed(error["mean"]),
         fixed(error["pp"]),
-        fixed(joint["ripple_pp_percent"]),
-        fixed(joint["ripple_rms_percent"]),
+        ripple_cell(joint, "ripple_pp_percent"),
+        ripple_cell(joint, "ripple_rms_percent"),
         "  ".join(
             f"{line['order']:.1f}{'' if line['drive_order'] else '*'}"
             f" ({line['amplitude_percent']:.3f})"
@@ -194,6 +239,13 @@ def joint_row(item: tuple[str, dict[str, Any]]) -> tuple[str, ...]:
         or "-",
         _orders(joint["unresolved"]),
     )
+
+
+def ripple_cell(joint: dict[str, Any], key: str) -> str:
+    """A figure of the ripple: a dash for none, marked where it is a lower bound."""
+    if joint["ripple_missing"]:
+        return "-"
+    return f"{'> ' if joint['ripple_is_lower_bound'] else ''}{fixed(joint[key])}"
 
 
 def fixed(value: float, digits: int = 3) -> str:
@@ -206,6 +258,8 @@ def notes(joints: dict[str, Any]) -> list[str]:
     from swgjoint.view.validity import warnings_of
 
     lines = warnings_of(joints)
+    whys = {joint["ripple_missing"] for joint in joints.values()} - {None}
+    lines += [f"-: no torque ripple: {why}" for why in sorted(whys)]
     if any(not line["drive_order"] for j in joints.values() for line in j["orders"]):
         lines.insert(
             0,

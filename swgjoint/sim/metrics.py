@@ -18,7 +18,9 @@ from numpy.typing import NDArray
 
 from swgjoint.sim.energy import joint_energy, run_energy
 from swgjoint.sim.orders import OrderLine, resample, strongest_lines
+from swgjoint.sim.ripple_validity import HARMONIC_LEVELS, ripple_label
 from swgjoint.sim.tool_metrics import joint_settling, tool_metrics
+from swgjoint.sim.verdict import PHASE_STEP, judged
 from swgjoint.units import arcmin, mm, rpm
 
 if TYPE_CHECKING:
@@ -27,9 +29,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-HARMONIC_LEVELS = ("kinematic", "full")
-PHASE_STEP = 0.5
-"""Largest phase of an order per step that counts as resolved [rad]."""
 NOISE = 1e-6
 """Lines below this share of the rated torque, or of one arcmin, are round-off."""
 SLACK = 1.01
@@ -41,8 +40,10 @@ NOT_STEADY = "whole motion, no speed is constant: no ripple alone, but dynamics 
 def run_metrics(run: Run) -> dict[str, Any]:
     """Figures of all joints and of the tool under the keys of the JSON output."""
     steady = _any_steady(run)
+    joints = {name: joint_metrics(run, j) for j, name in enumerate(run.joints)}
     return {
-        "joints": {name: joint_metrics(run, j) for j, name in enumerate(run.joints)},
+        **judged(run, joints),
+        "joints": joints,
         "tool": tool_metrics(run),
         "window_s": [float(t) for t in run.time[run.steady][[0, -1]]],
         "window_of": "constant speed" if steady else "motion",
@@ -71,6 +72,7 @@ def joint_metrics(run: Run, j: int) -> dict[str, Any]:
         "source": drive.level,
         "ripple_rms_percent": float(100.0 * np.sqrt(np.mean(ripple**2)) / rated),
         "ripple_pp_percent": float(100.0 * np.ptp(ripple) / rated),
+        **ripple_label(run, j, ripple),
         "orders": [
             {
                 "order": line.order,
@@ -170,14 +172,14 @@ def highest_resolved_order(run: Run, j: int) -> float | None:
 def phase_step(run: Run, j: int) -> float:
     """Largest phase of the highest kept order in one step of the engine [rad].
 
-    Harmonics are kept by the commanded speed; a rotor may turn faster than that. Levels
+    Over the part of the motion that the figures are taken from. Harmonics are kept by the commanded speed; a rotor may turn faster than that. Levels
     without harmonics have no such phase.
     """
     attached = run.assembly.transmissions[j].attached
     if attached.level not in HARMONIC_LEVELS:
         return 0.0
     order = max(attached.kept_orders, default=0.0)
-    speed = float(np.abs(run.motor_velocity[:, j]).max())
+    speed = float(np.abs(run.motor_velocity[run.steady, j]).max())
     return run.assembly.step * order * speed
 
 

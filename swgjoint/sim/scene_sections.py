@@ -205,3 +205,6 @@ class Metrics(Section):
     """Half width of the band about the last tool position that settling refers to."""
     settle_band_arcmin: Positive = 1.0
     """The same about the last angle of every joint."""
+    contacts_expected: bool = False
+    """Whether bodies may touch in this scene; if not, a run in which they do is not
+    valid."""

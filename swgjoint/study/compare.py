@@ -45,6 +45,12 @@ UPPER = (
 """Figures that a spec limits from above."""
 LOWER = ("K1_Nm_rad", "fatigue_safety_factor", "real_time_factor")
 """Figures that a spec limits from below."""
+RIPPLE = (
+    "ripple_rms_percent",
+    "ripple_pp_percent",
+    "transmission_error_ripple_arcmin",
+)
+"""Figures that a drive without harmonics does not have."""
 SORTABLE = (*UPPER, *LOWER)
 SLOW = "fatigue_safety_factor"
 """Computed only where a spec or the order asks for it: minutes in space."""
@@ -57,8 +63,16 @@ class Compared:
     argument: str
     design: str
     level: str
+    verdict: str
+    """Whether the run is valid, see :mod:`swgjoint.sim.verdict`."""
+    reasons: tuple[str, ...]
+    """Why it is not."""
     ripple_rms_percent: float
     ripple_pp_percent: float
+    ripple_missing: str | None
+    """Why there is no ripple to tell: its figures are vibration and round-off."""
+    ripple_is_lower_bound: bool
+    """Whether the step leaves orders out that matter, in the joint with most ripple."""
     transmission_error_arcmin: float
     """Peak to peak."""
     transmission_error_ripple_arcmin: float
@@ -86,6 +100,10 @@ class Compared:
     run: Run = field(repr=False, compare=False)
     missed: tuple[str, ...] = ()
     """Limits of the spec that it does not keep."""
+
+    def told(self, key: str) -> Any:
+        """A figure; None where the run cannot tell it."""
+        return None if self.ripple_missing and key in RIPPLE else getattr(self, key)
 
     def to_json(self) -> dict[str, Any]:
         """All figures."""
@@ -168,7 +186,7 @@ def missed(row: Compared, spec: Mapping[str, float]) -> tuple[str, ...]:
     """Limits that a row does not keep, a figure that is not known among them."""
     found = []
     for key, limit in spec.items():
-        value = getattr(row, key)
+        value = row.told(key)
         kept = value is not None and (
             value >= limit if key in LOWER else value <= limit
         )
@@ -220,8 +238,12 @@ def row_of(
         argument=name,
         design=drive.name,
         level=level or joints[worst]["level"],
+        verdict=metrics["verdict"],
+        reasons=tuple(metrics["reasons"]),
         ripple_rms_percent=largest("ripple_rms_percent"),
         ripple_pp_percent=largest("ripple_pp_percent"),
+        ripple_missing=joints[worst]["ripple_missing"],
+        ripple_is_lower_bound=bool(joints[worst]["ripple_is_lower_bound"]),
         transmission_error_arcmin=max(float(error["pp"]) for error in errors),
         transmission_error_ripple_arcmin=_error_ripple(run, joints),
         torsion_arcmin=max(

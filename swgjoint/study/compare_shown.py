@@ -6,7 +6,7 @@ import io
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from swgjoint.study.compare import LOWER, Compared
+from swgjoint.study.compare import LOWER, RIPPLE, Compared
 from swgjoint.view.entities import COLORS
 from swgjoint.view.report import Cell, Table
 from swgjoint.view.words import shown
@@ -40,12 +40,21 @@ _WIDE = 30.0
 """From this ratio of the largest to the smallest an axis is logarithmic."""
 
 
+def cell(row: Mapping[str, Any], key: str) -> str:
+    """A figure as text: a dash for none, > before a ripple that lacks orders."""
+    if key not in RIPPLE:
+        return shown(row[key])
+    if row["ripple_missing"]:
+        return "-"
+    return f"{'> ' if row['ripple_is_lower_bound'] else ''}{shown(row[key])}"
+
+
 def columns(rows: Sequence[Compared]) -> dict[str, tuple[str, str]]:
     """The figures that at least one row knows."""
     return {
         key: title
         for key, title in HEADER.items()
-        if any(getattr(row, key) is not None for row in rows)
+        if any(row.told(key) is not None for row in rows)
     }
 
 
@@ -60,7 +69,7 @@ def comparison_table(
         cells = [Cell(row.argument, "text"), Cell(row.level)]
         for key in shown_keys:
             mark = "bad" if key in row.missed else "good" if key in (spec or {}) else ""
-            cells.append(Cell(shown(getattr(row, key)), mark))
+            cells.append(Cell(cell(row.to_json(), key), mark))
         if spec:
             kept = not row.missed
             cells.append(Cell("kept" if kept else "missed", "good" if kept else "bad"))
@@ -101,7 +110,7 @@ def comparison_picture(
     from matplotlib.figure import Figure
 
     panels = [
-        key for key in PANELS if any((getattr(row, key) or 0.0) > 0.0 for row in rows)
+        key for key in PANELS if any((row.told(key) or 0.0) > 0.0 for row in rows)
     ]
     across = min(4, len(panels))
     down = -(-len(panels) // across)
@@ -131,7 +140,7 @@ def _bars(
     limit: float | None,
 ) -> None:
     """One figure of all rows, each bar with its value."""
-    values = [getattr(row, key) for row in rows]
+    values = [row.told(key) for row in rows]
     heights = [value or 0.0 for value in values]
     seen = [value for value in heights if value > 0.0]
     wide = max(seen) > _WIDE * min(seen)
@@ -142,8 +151,8 @@ def _bars(
     else:
         ax.set_xlim(0.0, 1.35 * max(seen))
     left = ax.get_xlim()[0]
-    for k, (row, value) in enumerate(zip(rows, values, strict=True)):
-        text = " not told" if value is None else f" {shown(float(value))}"
+    for k, row in enumerate(rows):
+        text = f" {cell(row.to_json(), key)}"
         color = "tab:red" if key in row.missed else "black"
         ax.text(
             max(heights[k], left), k, text, va="center", fontsize="small", color=color

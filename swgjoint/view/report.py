@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import platform
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib import metadata
@@ -16,6 +16,7 @@ from swgjoint.files import write_whole
 from swgjoint.json_text import json_text, plain
 from swgjoint.maps.spec_sheet import measure_spec, validity
 from swgjoint.progress import Progress, silent
+from swgjoint.sim.verdict import NOT_VALID, VALID
 from swgjoint.toml_text import toml_text
 from swgjoint.view.blueprint import joints_by_interest
 from swgjoint.view.report_plots import joint_png
@@ -111,6 +112,7 @@ def write_report(
         path,
         title=f"Scene {scene.name}",
         description=scene.description,
+        alerts=alerts(runs),
         summary=summary or summary_table(runs),
         pictures=pictures or {},
         labels=labels,
@@ -167,7 +169,8 @@ def _write_page(
     path: str | Path, *, pictures: Mapping[str, bytes], **sections: Any
 ) -> Path:
     """Fill the template; sections that are not given are left out."""
-    none: dict[str, Any] = dict.fromkeys(("tables", "labels", "joints", "sheets"), ())
+    lists = ("alerts", "tables", "labels", "joints", "sheets")
+    none: dict[str, Any] = dict.fromkeys(lists, ())
     page = _template().render(
         **(none | {"provenance": None} | sections),
         version=__version__,
@@ -187,6 +190,15 @@ WINDOWS = {
 """What figures are taken over."""
 
 
+def alerts(runs: Mapping[str, Run]) -> list[str]:
+    """Why runs are not valid, one line a reason."""
+    return [
+        f"{label}: {NOT_VALID}: {reason}"
+        for label, run in runs.items()
+        for reason in run.metrics()["reasons"]
+    ]
+
+
 def summary_table(runs: Mapping[str, Run]) -> Table:
     """One line a run: worst joint and tool."""
     rows, window = [], ""
@@ -201,12 +213,14 @@ def summary_table(runs: Mapping[str, Run]) -> Table:
         within = all(joint["ratings"]["within"] for joint in joints)
         torsion = [abs(j["torsion_arcmin"]["mean"]) for j in joints]
         error = [j["transmission_error_arcmin"]["pp"] for j in joints]
+        valid = metrics["verdict"] == VALID
         rows.append(
             [
                 Cell(label, "text"),
+                Cell(metrics["verdict"], "good" if valid else "bad"),
+                ripple_cell(joints, "ripple_rms_percent"),
+                ripple_cell(joints, "ripple_pp_percent"),
                 *_cells(
-                    max(joint["ripple_rms_percent"] for joint in joints),
-                    max(joint["ripple_pp_percent"] for joint in joints),
                     max(torsion),
                     max(error),
                     metrics["tool"]["path_rms_mm"],
@@ -219,6 +233,7 @@ def summary_table(runs: Mapping[str, Run]) -> Table:
     return Table(
         header=[
             ("", ""),
+            ("verdict", ""),
             ("ripple rms", "% of rated"),
             ("ripple", "% of rated, pp"),
             ("torsion, mean", "arcmin"),
@@ -233,11 +248,22 @@ def summary_table(runs: Mapping[str, Run]) -> Table:
     )
 
 
+def ripple_cell(joints: Iterable[Mapping[str, Any]], key: str) -> Cell:
+    """Largest ripple of some joints: a dash for none, > where orders are left out."""
+    told = [joint for joint in joints if joint["ripple_missing"] is None]
+    if not told:
+        return Cell("-")
+    most = max(told, key=lambda joint: float(joint[key]))
+    bound = most["ripple_is_lower_bound"]
+    return Cell(f"{'> ' if bound else ''}{shown(most[key])}", "bad" if bound else "")
+
+
 def _label(label: str, run: Run, step: dict[str, Any] | None) -> dict[str, Any]:
     """What limits the figures of one run, and their change at half the step."""
     simulation = run.assembly.scene.simulation
     metrics = run.metrics()
-    lines = [Cell(text, "bad") for text in warnings_of(metrics["joints"])]
+    limits = [*metrics["reasons"], *warnings_of(metrics["joints"])]
+    lines = [Cell(text, "bad") for text in limits]
     lines.append(
         Cell(
             f"{simulation.integrator} at {1e3 * run.assembly.step:g} ms; figures from"
@@ -318,9 +344,9 @@ def _joint_table(runs: Mapping[str, Run], joint: str) -> Table:
                     torsion["pp"],
                     error["mean"],
                     error["pp"],
-                    figures["ripple_rms_percent"],
-                    figures["ripple_pp_percent"],
                 ),
+                ripple_cell([figures], "ripple_rms_percent"),
+                ripple_cell([figures], "ripple_pp_percent"),
                 Cell(orders or "-"),
                 *_cells(
                     ratings["peak_Nm"],

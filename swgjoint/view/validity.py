@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from swgjoint.errors import SwgError
-from swgjoint.sim.metrics import PHASE_STEP
 from swgjoint.sim.run import run_scene
 from swgjoint.sim.scene import Scene
 from swgjoint.units import arcmin
@@ -29,8 +28,6 @@ STEP_KEYS = {
     "torsion_arcmin": ("torsion_arcmin", "mean"),
 }
 """Figures whose change is given, by their place in the metrics of a joint."""
-FAST = 1.5
-"""Phase of an order in a step, over what a step carries, at which a run says so."""
 MAX_STEPS = 400_000
 """Of the finer run: some seconds."""
 
@@ -118,31 +115,23 @@ def map_error(drive: DriveMap) -> list[str]:
 def warnings_of(joints: Mapping[str, Any]) -> list[str]:
     """What a reader of the figures must know, one line each.
 
+    What takes a run out of its model is in its ``reasons``, see
+    :mod:`swgjoint.sim.verdict`.
+
     Args:
         joints: Figures of the joints, see :meth:`swgjoint.sim.run.Run.metrics`.
     """
     lines = []
     for name, joint in joints.items():
-        if joint["phase_step_rad"] > FAST * PHASE_STEP:
+        if joint["ripple_is_lower_bound"] and (carries := joint["resolving"]):
             lines.append(
-                f"{name}: its rotor turned faster than commanded, the highest order of"
-                f" its drive by {joint['phase_step_rad']:.2g} rad a step; up to"
-                f" {PHASE_STEP:g} rad is carried: use a smaller simulation.step_s"
+                f"{name}: ripple is a lower bound: the step leaves out orders of about"
+                f" {joint['ripple_left_out_percent']:.2g} % rms; order"
+                f" {carries['order']:.4g} needs a step of"
+                f" {1e3 * carries['step_s']:.2g} ms or a speed of"
+                f" {carries['speed_deg_s']:.2g} deg/s"
             )
         ratings = joint["ratings"]
-        if not ratings["within_map"]:
-            low, high = ratings["map_range_Nm"]
-            lines.append(
-                f"{name}: torque up to {ratings['peak_Nm']:.3g} N·m leaves the map"
-                f" ({low:.3g} to {high:.3g} N·m), which continues linearly there"
-            )
-        if ratings["ratcheting"]:
-            lines.append(
-                f"{name}: teeth would skip at {ratings['ratcheting']['time_s']:.4g} s"
-                f" with {ratings['ratcheting']['torque_Nm']:.4g} N·m, above the"
-                f" ratcheting torque {ratings['ratcheting_Nm']:.4g} N·m; the run goes"
-                " on elastic"
-            )
         if not ratings["within"]:
             lines.append(
                 f"{name}: above its ratings: cubed mean"

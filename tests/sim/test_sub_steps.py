@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from messages import naming
+from messages import names, naming
 
 from swgjoint.errors import ComputationError, InputError
 from swgjoint.maps.drive_map import DriveMap
@@ -177,21 +177,20 @@ def test_contacts_and_limits_cut_the_steps_of_a_light_link():
 
 def test_a_rotor_that_outruns_its_command_is_named(bench):
     """Harmonics are kept by the commanded speed; the metrics have the real one."""
-    from swgjoint.cli.run import notes
-
     drive = erring(2e4)
-    slow = bench(drive)
-    joint = slow.metrics()["joints"]["joint"]
+    slow = bench(drive).metrics()
+    joint = slow["joints"]["joint"]
     # order 4 at 60 times 3 deg/s, plus what the kinematic error adds
     assert joint["phase_step_rad"] == pytest.approx(1e-3 * 4 * np.pi, rel=0.2)
-    assert not notes({"joint": joint})
+    assert slow["reasons"] == []
     # a free motor under load: the loop gives almost nothing
     keys = {"stiffness_Nm_rad": 1e-6, "damping_Nms_rad": 0.0, "feedforward": "none"}
-    fast = bench(drive, controller=keys, load__joint__torque_Nm=20.0)
-    joint = fast.metrics()["joints"]["joint"]
-    assert joint["phase_step_rad"] > 0.75
-    lines = notes({"joint": joint})
-    assert any("joint: its rotor turned faster than comm" in line for line in lines)
+    fast = bench(drive, controller=keys, load__joint__torque_Nm=20.0).metrics()
+    assert fast["joints"]["joint"]["phase_step_rad"] > 0.75
+    assert any(
+        names(line, "joint", "rotor", "0.5 rad", "simulation.step_s")
+        for line in fast["reasons"]
+    )
 
 
 @pytest.mark.parametrize("level", ["rigid", "linear"])

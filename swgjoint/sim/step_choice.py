@@ -1,0 +1,52 @@
+"""Time step at which a run carries the ripple of its drives."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from swgjoint.gear.design import Design
+from swgjoint.joint.drive import input_orders
+from swgjoint.maps.drive_map import DriveMap
+from swgjoint.sim.commanded import trajectory_of
+from swgjoint.sim.drives import find_drive
+from swgjoint.sim.rigid_arm import RigidArm
+from swgjoint.sim.scene import Scene
+
+STEPS = (1e-3, 5e-4, 2.5e-4, 2e-4, 1e-4, 5e-5)
+"""Steps to choose from [s]."""
+PHASE_STEP = 0.25
+"""Phase of the strongest order in a step [rad]: half of what the step can carry, so
+that its amplitude is right to some percent and twice the order is carried, too."""
+
+
+def resolving_step(scene: Scene, arm: RigidArm) -> float:
+    """Largest of :data:`STEPS` that carries the strongest order of every drive [s].
+
+    The smallest of them where none does; the run then marks what it leaves out.
+
+    Args:
+        scene: Scene of the arm; its own step is not used.
+        arm: The arm.
+    """
+    speed = trajectory_of(scene, arm).top_speed
+    needed = STEPS[0]
+    for name, top in zip(arm.joints, speed, strict=True):
+        section = scene.of_joint(name)
+        if section.drive is None or section.level not in (None, "kinematic", "full"):
+            continue
+        source = find_drive(section.drive)
+        rate = strongest_order(source) * abs(source.ratio) * float(top)
+        if rate > 0.0:
+            needed = min(needed, PHASE_STEP / rate)
+    return next((step for step in STEPS if step <= needed), STEPS[-1])
+
+
+def strongest_order(source: DriveMap | Design) -> float:
+    """Order per input turn with the most torque; of a design that of its teeth."""
+    if isinstance(source, Design):
+        return float(source.periodicity)
+    torsion = source.mean_torsion(source.ratings.rated_torque)
+    torque = np.hypot(*source.coefficients(torsion, 1).T)
+    torque = torque + source.mean_stiffness * np.hypot(*source.kinematic_error.T)
+    torque[0] = 0.0
+    return float(input_orders(source)[int(np.argmax(torque))])

@@ -1,0 +1,164 @@
+"""Verdict of a run, ripple that is a lower bound, ripple that is none."""
+
+import json
+
+import numpy as np
+import pytest
+from messages import names
+
+from swgjoint.cli.main import main
+from swgjoint.maps.drive_map import DriveMap
+from swgjoint.sim.ripple_validity import integration_noise
+from swgjoint.sim.run import run_scene
+from swgjoint.sim.scene import Scene
+
+LINEAR = "defaults.linear={stiffness_Nm_rad=2e4,rated_torque_Nm=50.0}"
+SHORT = ["--set", LINEAR, "--set", "simulation.duration_s=1.0"]
+ARM = """
+<mujoco>
+  <worldbody>
+    <geom name="floor" type="plane" size="2 2 0.1"/>
+    <body name="upper" pos="0 0 0.3">
+      <joint name="lift" axis="0 1 0"/>
+      <geom type="capsule" size="0.03" fromto="0.1 0 0 0.5 0 0" mass="2"/>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+SCENE = """
+name = "into the floor"
+arm = "{arm}"
+defaults = {{ linear = {{ stiffness_Nm_rad = 2e4 }}, rotor_inertia_kgm2 = 1e-4 }}
+simulation = {{ duration_s = 1.0 }}
+[trajectory]
+kind = "sweep"
+hold_s = 0.1
+ramp_s = 0.2
+start_deg = {{ lift = 0.0 }}
+end_deg = {{ lift = {end} }}
+"""
+
+
+def loaded(torque: float) -> list[str]:
+    """Changes of the bench scene: CSG-25-100 under a torque [N·m]."""
+    changes = ("defaults.drive=CSG-25-100", "simulation.duration_s=1.0")
+    load = f"load.joint={{torque_Nm={torque}}}"
+    return [part for change in (*changes, load) for part in ("--set", change)]
+
+
+@pytest.mark.filterwarnings("ignore:.*touch")
+@pytest.mark.parametrize(("end", "status"), [(60.0, 1), (20.0, 0)])
+def test_bodies_that_collide_make_a_run_invalid(tmp_path, capsys, end, status):
+    """The link goes into the floor: named in the reasons, exit status 1."""
+    (tmp_path / "arm.xml").write_text(ARM)
+    scene = tmp_path / "scene.toml"
+    scene.write_text(SCENE.format(arm="arm.xml", end=end))
+    assert main(["run", str(scene), "--json"]) == status
+    found = json.loads(capsys.readouterr().out)
+    assert found["verdict"] == ("NOT VALID" if status else "VALID")
+    assert bool(found["reasons"]) == bool(status)
+    if status:
+        assert names(found["reasons"][0], "world", "upper", "mm")
+        assert found["collisions"][0]["depth_mm"] > 0.0
+        expected = ["--set", "metrics.contacts_expected=true"]
+        main(["run", str(scene), *expected, "--json"])
+        found = json.loads(capsys.readouterr().out)
+        assert found["collisions"]
+        assert not any("collide" in reason for reason in found["reasons"])
+
+
+def test_torque_beyond_the_map_makes_a_run_invalid(bench, synthetic_map):
+    """The joint, its torque and the range of the map stand in the reason."""
+    _, end = synthetic_map.torque_range
+    settled = {"trajectory__settle_s": 0.3}
+    fine = bench(synthetic_map, **settled, load__joint__torque_Nm=0.5 * end).metrics()
+    assert (fine["verdict"], fine["reasons"]) == ("VALID", [])
+    over = bench(synthetic_map, **settled, load__joint__torque_Nm=1.5 * end).metrics()
+    assert over["verdict"] == "NOT VALID"
+    assert names(over["reasons"][0], "joint", f"{end:.4g} N·m")
+
+
+def test_the_verdict_stands_above_the_figures(capsys):
+    """First line of the output; teeth that skip turn the exit status."""
+    assert main(["run", "bench", *SHORT]) == 0
+    assert capsys.readouterr().out.splitlines()[0] == "VALID"
+    load = [
+        "--set",
+        "defaults.drive=CSG-25-100",
+        "--set",
+        "load.joint={torque_Nm=700.0}",
+    ]
+    short = ["--set", "simulation.duration_s=1.0"]
+    assert main(["run", "bench", *load, *short]) == 1
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].startswith("NOT VALID")
+    assert any(names(line, "joint", "skip", "650 N·m") for line in lines[1:3])
+
+
+def test_strict_turns_the_status_for_an_overloaded_drive(capsys):
+    """Above the ratings inside the map: a warning, with --strict exit status 1."""
+    load = [
+        "--set",
+        "defaults.drive=CSG-25-100",
+        "--set",
+        "load.joint={torque_Nm=200.0}",
+    ]
+    arguments = ["run", "bench", *load, "--set", "simulation.duration_s=1.0"]
+    assert main(arguments) == 0
+    assert names(capsys.readouterr().out, "joint", "ratings", "200", "204 N·m")
+    assert main([*arguments, "--strict"]) == 1
+
+
+def test_ripple_without_orders_of_the_drive_is_a_lower_bound(bench, synthetic_map):
+    """Too fast for the tooth order: marked; at the named step it is there."""
+    fast = {"trajectory__speed_deg_s__joint": 40.0, "simulation__duration_s": 0.25}
+    joint = bench(synthetic_map, **fast).metrics()["joints"]["joint"]
+    assert [item["order"] for item in joint["unresolved"]] == [122.0]
+    assert joint["ripple_is_lower_bound"]
+    carries = joint["resolving"]
+    assert carries["order"] == 122.0
+    slow = bench(synthetic_map, trajectory__speed_deg_s__joint=carries["speed_deg_s"])
+    assert not slow.metrics()["joints"]["joint"]["unresolved"]
+    step = 0.99 * carries["step_s"]
+    fine = bench(synthetic_map, **fast, simulation__step_s=step)
+    found = fine.metrics()["joints"]["joint"]
+    assert not found["unresolved"] and not found["ripple_is_lower_bound"]
+    # what was said to be missing is what is there now
+    missing = found["ripple_rms_percent"]
+    assert joint["ripple_left_out_percent"] == pytest.approx(missing, rel=0.5)
+
+
+def test_a_drive_without_harmonics_has_no_ripple(bench, plain_map, synthetic_map):
+    """A reason instead of vibration and round-off; with harmonics there is none."""
+    joint = bench(plain_map).metrics()["joints"]["joint"]
+    assert joint["ripple_missing"] and joint["ripple_rms_percent"] >= 0.0
+    assert bench(synthetic_map).metrics()["joints"]["joint"]["ripple_missing"] is None
+    level = bench(synthetic_map, defaults__level="linear").metrics()
+    assert level["joints"]["joint"]["ripple_missing"]
+
+
+def test_ripple_that_is_none_is_a_dash(capsys):
+    """In the table of the joints, with the reason below."""
+    assert main(["run", "bench", *SHORT]) == 0
+    row = next(
+        line for line in capsys.readouterr().out.splitlines() if "full" in line
+    ).split()
+    assert row.count("-") >= 2
+
+
+def test_noise_is_what_jumps_between_samples():
+    """White noise keeps its deviation, a wave that the step carries has none."""
+    noise = np.random.default_rng(1).normal(scale=0.3, size=20_000)
+    assert integration_noise(noise) == pytest.approx(0.3, rel=0.03)
+    wave = np.sin(0.1 * np.arange(20_000))
+    assert integration_noise(wave) < 0.005
+    assert integration_noise(noise[:2]) == 0.0
+
+
+def test_a_run_of_a_catalogue_drive_in_an_arm_is_valid():
+    """The bundled scenes stay inside their models."""
+    run = run_scene(
+        Scene.load_file("ur5e-catalogue", {"simulation.duration_s": 2.5}),
+    )
+    assert run.metrics()["reasons"] == []
+    assert isinstance(run.assembly.transmissions[0].drive, DriveMap)
