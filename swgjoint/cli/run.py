@@ -162,7 +162,7 @@ def report(result: dict[str, Any]) -> str:
         f" {result['window_s'][0]:.3g} to {result['window_s'][1]:.3g} s",
         joint_table(result["joints"]),
         *notes(result["joints"]),
-        tool_line(result["tool"]),
+        tool_line(result["tool"], random="sensors" in contains),
         _drives_line(result) if result.get("drives_by_rule") else "",
         f"model: {contains['degrees_of_freedom']} degrees of freedom,"
         f" {contains['tendons']} tendons, {contains['plugin_instances']} plugin"
@@ -268,8 +268,14 @@ def notes(joints: dict[str, Any]) -> list[str]:
     return lines
 
 
-def tool_line(tool: dict[str, Any]) -> str:
-    """Errors of the tool in one line, those that the motion has."""
+def tool_line(tool: dict[str, Any], *, random: bool) -> str:
+    """Errors of the tool in one line, those that the motion has.
+
+    Args:
+        tool: Figures of the tool.
+        random: Whether anything in the scene differs from cycle to cycle; without it a
+            repeatability tells nothing.
+    """
     parts = []
     if tool["path_rms_mm"] is not None:
         parts.append(
@@ -277,7 +283,8 @@ def tool_line(tool: dict[str, Any]) -> str:
             f" {tool['path_max_mm']:.4f} mm at most"
         )
     if tool["rp_mm"] is not None:
-        parts.append(f"AP {tool['ap_mm']:.4f} mm, RP {tool['rp_mm']:.4f} mm")
+        repeats = f"{tool['rp_mm']:.4f} mm" if random else "- (nothing is random)"
+        parts.append(f"AP {tool['ap_mm']:.4f} mm, RP {repeats}")
     elif tool["ap_mm"] is not None:
         parts.append(f"{tool['ap_mm']:.4f} mm at the end")
     for key, name in (("at_mm", "AT"), ("rt_mm", "RT")):

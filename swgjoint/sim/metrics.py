@@ -172,8 +172,9 @@ def highest_resolved_order(run: Run, j: int) -> float | None:
 def phase_step(run: Run, j: int) -> float:
     """Largest phase of the highest kept order in one step of the engine [rad].
 
-    Over the part of the motion that the figures are taken from. Harmonics are kept by the commanded speed; a rotor may turn faster than that. Levels
-    without harmonics have no such phase.
+    Over the part of the motion that the figures are taken from. Harmonics are kept by
+    the commanded speed; a rotor may turn faster than that. Levels without harmonics
+    have no such phase.
     """
     attached = run.assembly.transmissions[j].attached
     if attached.level not in HARMONIC_LEVELS:

@@ -14,7 +14,7 @@ from swgjoint.sim.scene import Scene
 
 STEPS = (1e-3, 5e-4, 2.5e-4, 2e-4, 1e-4, 5e-5)
 """Steps to choose from [s]."""
-PHASE_STEP = 0.25
+PHASE_STEP = 0.1
 """Phase of the strongest order in a step [rad]: half of what the step can carry, so
 that its amplitude is right to some percent and twice the order is carried, too."""
 
