@@ -124,9 +124,9 @@ def _command(name: str, arguments: list[str]) -> int:
         "--json", action="store_true", help="one JSON object on stdout, nothing else"
     )
     args = parser.parse_args(arguments)
-    args.progress = StderrProgress()
+    args.progress = progress = StderrProgress()
     try:
-        with warnings.catch_warnings():
+        with warnings.catch_warnings(), _ended(progress):
             warnings.showwarning = _show_warning
             result = _result(module, args)
     except SwgError as exc:
@@ -166,6 +166,15 @@ def _refuse(name: str, message: str, status: int) -> int:
 
 def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
     print(f"swgjoint: warning: {message}", file=sys.stderr)
+
+
+@contextmanager
+def _ended(progress: StderrProgress) -> Iterator[None]:
+    """End the line of a progress that stops early, before anything else is said."""
+    try:
+        yield
+    finally:
+        progress.end_line()
 
 
 @contextmanager
