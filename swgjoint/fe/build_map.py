@@ -15,6 +15,7 @@ from swgjoint.maps.cache import cached
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.fit import fit_map
 from swgjoint.maps.hysteresis_loops import with_hysteresis
+from swgjoint.maps.unfinished import Unfinished
 from swgjoint.progress import Progress, silent
 
 
@@ -41,7 +42,9 @@ def build_map(
             :func:`swgjoint.fe.sampling.sample_map` or
             :func:`swgjoint.fe.thin_ring.sampling.sample_rings` if None.
         progress: Called with the stage, the solves done and their number.
-        cache: Whether to look in the cache of maps, and to store there.
+        cache: Whether to look in the cache of maps, and to store there. With it a map
+            in the plane or in space that was interrupted goes on where it was, and is
+            the same bit for bit.
 
     Raises:
         DesignError: If the design cannot be built or holds what is not modelled.
@@ -55,28 +58,33 @@ def build_map(
     else:
         drive2d.check_modelled(design, model)
 
+    parts = {"design": design.content_hash(), "model": model, "angles": angles}
+
     def build() -> DriveMap:
         if model == "ring":
             given = thin_ring.sample_rings(design, angles=angles, progress=progress)
             return fit_map(given)
-        drive = fit_map(
-            sample_map(design, model=model, angles=angles, progress=progress)
+        keep = Unfinished.of(parts) if cache else None
+        samples = sample_map(
+            design, model=model, angles=angles, progress=progress, keep=keep
         )
-        if not design.friction.tooth_coefficient:
-            return drive
-        return _with_friction(design, drive, progress)
+        drive = fit_map(samples)
+        if design.friction.tooth_coefficient:
+            drive = _with_friction(design, drive, progress, keep)
+        if keep is not None:
+            keep.clear()
+        return drive
 
-    if not cache:
-        return build()
-    parts = {"design": design.content_hash(), "model": model, "angles": angles}
-    return cached(parts, build, name=design.drive.name)
+    return cached(parts, build, name=design.drive.name) if cache else build()
 
 
-def _with_friction(design: Design, drive: DriveMap, progress: Progress) -> DriveMap:
+def _with_friction(
+    design: Design, drive: DriveMap, progress: Progress, keep: Unfinished | None
+) -> DriveMap:
     """The map with the hysteresis of the teeth; where it cannot be had it says so."""
     top = min(drive.ratings.repeated_peak, *(abs(t) for t in drive.torque_range))
     try:
-        loops = friction_loops(design, top=top, progress=progress)
+        loops = friction_loops(design, top=top, progress=progress, keep=keep)
     except ComputationError as failure:
         reason = f"friction of the teeth gives no hysteresis: {failure}"
         missing = {**drive.info.get("missing", {}), "hysteresis_loss_arcmin": reason}

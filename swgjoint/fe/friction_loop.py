@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from math import pi
 
 import numpy as np
@@ -17,6 +17,7 @@ from swgjoint.gear.design import Design
 from swgjoint.gear.mounting import series_compliance
 from swgjoint.gear.tolerances import without_errors
 from swgjoint.maps.hysteresis_loops import FrictionLoop
+from swgjoint.maps.unfinished import UNREADABLE, Unfinished
 from swgjoint.progress import Progress, silent
 
 Array = NDArray[np.float64]
@@ -29,6 +30,7 @@ STEPS = 12
 """Torques from zero to the largest, closer together at small ones."""
 FIRST_STEPS = 4
 """The same in the first loading and unloading, which the drive has to forget."""
+_LOOP, _FIELDS = "friction-loop-{:04d}", fields(FrictionLoop)
 
 
 def loop_torques(top: float, steps: int = STEPS) -> Array:
@@ -50,6 +52,7 @@ def friction_loops(
     positions: int = POSITIONS,
     steps: int = STEPS,
     progress: Progress = silent,
+    keep: Unfinished | None = None,
 ) -> tuple[FrictionLoop, ...]:
     """Loops of the drive with perfect teeth, friction carried from step to step.
 
@@ -58,7 +61,8 @@ def friction_loops(
         top: Largest torque [N·m].
         positions: Over one pitch of the fixed member.
         steps: Torques from zero to the largest, a multiple of :data:`FIRST_STEPS`.
-        progress: Called with the stage, the solves done and their number.
+        progress: Called with the stage, the loops done and their number.
+        keep: Where solved loops are kept and taken up again; None keeps none.
 
     Raises:
         ComputationError: If an equilibrium cannot be solved.
@@ -77,8 +81,14 @@ def friction_loops(
     outward = np.unique(torque)
     series = series_compliance(design, cup=True)
     loops: list[FrictionLoop] = []
+    stage = f"{drive.name}: friction loops"
     for k, part in enumerate(parts):
+        progress(stage, k, len(parts))
         theta = period * float(part)
+        there = _kept(keep, k, theta, torque)
+        if there is not None:
+            loops.append(there)
+            continue
         elastic: dict[float, State] = {}
         for side in (outward[outward >= 0.0], outward[outward <= 0.0][::-1]):
             states = _along(smooth, theta, side)
@@ -101,8 +111,34 @@ def friction_loops(
                 work=np.array([s.friction_work for s in rubbed]),
             )
         )
-        progress(f"{drive.name}: friction loops", k + 1, len(parts))
+        if keep is not None:
+            values = {item.name: getattr(loops[-1], item.name) for item in _FIELDS}
+            keep.write(_LOOP.format(k), values)
+    progress(stage, len(parts), len(parts))
     return tuple(loops)
+
+
+def _kept(
+    keep: Unfinished | None, number: int, theta: float, torque: Array
+) -> FrictionLoop | None:
+    """A loop of an interrupted run."""
+    arrays = None if keep is None else keep.read(_LOOP.format(number))
+    if keep is None or arrays is None:
+        return None
+    try:
+        loop = FrictionLoop(
+            **arrays
+            | {
+                "input_angle": float(arrays["input_angle"]),
+                "quarter": int(arrays["quarter"]),
+            }
+        )
+        if loop.input_angle != theta or not np.array_equal(loop.torque, torque):
+            raise ValueError("a loop along other torques")
+    except UNREADABLE as error:
+        keep.ignored(_LOOP.format(number), error)
+        return None
+    return loop
 
 
 def _along(follow: Continuation, theta: float, torques: Array) -> list[State]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Generic
 
@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from swgjoint.errors import ComputationError
 from swgjoint.fe.following import AnyState, Follower, Unloaded
+from swgjoint.fe.state_arrays import packed, settled, unpacked
+from swgjoint.maps.unfinished import UNREADABLE, Unfinished
 
 Array = NDArray[np.float64]
 
@@ -19,6 +21,7 @@ EVERY = 4
 FAINT = 1e-8
 """Part of the torque that takes up a clearance, that acts at its ends: no stiffness is
 zero."""
+_POSITION, _REST, _TORQUES, _STATE = "position-{:04d}", "rest", "torques", "state"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -51,6 +54,8 @@ def solve_pattern(
     rated: float,
     symmetric: bool,
     tick: Callable[[], None],
+    keep: Unfinished | None = None,
+    restored: Callable[[int], None] = lambda solves: None,
 ) -> Pattern[AnyState]:
     """Solve all positions; the claims that the map rests on are checked at one torque.
 
@@ -63,14 +68,23 @@ def solve_pattern(
         rated: Next to it the claims are checked [N·m].
         symmetric: Whether the negative torques are the mirror image.
         tick: Called after every solve.
+        keep: Where solved positions are kept, and taken up again; None keeps none.
+        restored: Called with the number of solves that an interrupted run had done.
 
     Raises:
         ComputationError: If the unloaded drive or all torques cannot be solved.
     """
     rows = _Rows(follow=follow, small=small, tick=tick)
-    rows.start(torques)
-    for angle in theta[1:]:
-        rows.advance(float(angle))
+    done, solves = _restored(rows, keep, len(theta), torques)
+    if done:
+        restored(solves)
+    for k in range(done, len(theta)):
+        if k:
+            rows.advance(float(theta[k]))
+        else:
+            rows.start(torques)
+        if keep is not None:
+            keep.write(_POSITION.format(k), rows.last())
     if not rows.states:
         raise ComputationError(
             "no torque can be solved; the smallest is"
@@ -79,8 +93,14 @@ def solve_pattern(
     tables = rows.tables(theta)
     check = min(rows.states, key=lambda t: abs(t - rated))
     state, second = rows.states[check][-1], []
-    for angle in theta[::EVERY]:
-        state = follow.to_angle(state, period + float(angle))
+    for k, angle in enumerate(theta[::EVERY]):
+        name = f"second-pitch-{k:04d}"
+        there = None if keep is None else _read(keep, name, like=state)
+        if there is None:
+            there = settled(follow.to_angle(state, period + float(angle)))
+            if keep is not None:
+                keep.write(name, packed(there, _STATE))
+        state = there
         ok = state.outcome.ok
         second.append(follow.output_angle(state) if ok else np.nan)
         tick()
@@ -96,11 +116,11 @@ def solve_pattern(
     if symmetric:
         opposite = {-t: _mirrored(values) for t, values in tables.items() if t}
         solved = follow.to_torque(rows.rest[1].state, -check)
-        there = follow.output_angle(solved) - theta[1] / follow.ratio
-        there -= opposite[-check][0, 1]
+        image = follow.output_angle(solved) - theta[1] / follow.ratio
+        image -= opposite[-check][0, 1]
         info["mirror"] = {
             "torque_Nm": -check,
-            "difference_rad": float(there) if solved.outcome.ok else None,
+            "difference_rad": float(image) if solved.outcome.ok else None,
         }
         tables |= opposite
     used = np.array(sorted(tables))
@@ -142,6 +162,7 @@ class _Rows(Generic[AnyState]):
                 state = self.follow.to_torque(state, torque)
                 if not state.outcome.ok:
                     break
+                state = settled(state)
                 self.states[torque] = [state]
                 self.tick()
 
@@ -155,7 +176,7 @@ class _Rows(Generic[AnyState]):
                 if not state.outcome.ok:
                     state = self.follow.to_torque(self._towards(torque), torque)
                 if state.outcome.ok:
-                    self.states[torque].append(state)
+                    self.states[torque].append(settled(state))
                     self.tick()
                     continue
             lost.add(torque > 0.0)
@@ -188,8 +209,40 @@ class _Rows(Generic[AnyState]):
     def _stand(self, unloaded: Unloaded[AnyState], theta: float) -> None:
         if not unloaded.state.outcome.ok:
             raise _no_rest(theta, unloaded.state)
-        self.rest.append(unloaded)
+        self.rest.append(settled(unloaded))
         self.tick()
+
+    def last(self) -> dict[str, Any]:
+        """Arrays of the last position, all torques that could be solved there."""
+        arrays = packed(self.rest[-1], _REST) | {_TORQUES: np.array([*self.states])}
+        for j, row in enumerate(self.states.values()):
+            arrays |= packed(row[-1], f"{_STATE}-{j}")
+        return arrays
+
+    def take(self, arrays: Mapping[str, Any], torques: list[float]) -> int:
+        """Add a position as :meth:`last` gave it; the number of its solves.
+
+        Raises:
+            ValueError: If it does not follow the positions before.
+        """
+        rest: Any = unpacked(arrays, _REST)
+        torque: list[float] = np.asarray(arrays[_TORQUES]).tolist()
+        found: dict[float, Any] = {
+            t: unpacked(arrays, f"{_STATE}-{j}") for j, t in enumerate(torque)
+        }
+        if not isinstance(rest, Unloaded):
+            raise ValueError("no position without torque")
+        if not found.keys() <= (self.states.keys() if self.rest else {*torques}):
+            raise ValueError(f"other torques: {torque}")
+        like = self.rest[0].state if self.rest else rest.state
+        for state in (rest.state, *(rest.sides or ()), *found.values()):
+            _check_like(state, like)
+        self.rest.append(rest)
+        for t in [t for t in self.states if t not in found]:
+            del self.states[t]
+        for t, state in found.items():
+            self.states.setdefault(t, []).append(state)
+        return 1 + len(found)
 
     def _towards(self, torque: float) -> AnyState:
         """Where a torque of this sign begins at the last position."""
@@ -207,6 +260,47 @@ class _Rows(Generic[AnyState]):
         values = np.array(rows).T
         values[0] -= theta / follow.ratio
         return values
+
+
+def _restored(
+    rows: _Rows[Any], keep: Unfinished | None, count: int, torques: list[float]
+) -> tuple[int, int]:
+    """Take up the positions of an interrupted run: how many, and their solves."""
+    solves = 0
+    for k in range(count if keep is not None else 0):
+        assert keep is not None
+        name = _POSITION.format(k)
+        arrays = keep.read(name)
+        if arrays is None:
+            return k, solves
+        try:
+            solves += rows.take(arrays, torques)
+        except UNREADABLE as error:
+            keep.ignored(name, error)
+            return k, solves
+    return (count, solves) if keep is not None else (0, 0)
+
+
+def _read(keep: Unfinished, name: str, *, like: AnyState) -> AnyState | None:
+    """A state of an interrupted run; None if it did not get there."""
+    arrays = keep.read(name)
+    if arrays is None:
+        return None
+    try:
+        state: AnyState = unpacked(arrays, _STATE)
+        _check_like(state, like)
+    except UNREADABLE as error:
+        keep.ignored(name, error)
+        return None
+    return state
+
+
+def _check_like(state: Any, like: Any) -> None:
+    """Refuse what is no equilibrium of the same model."""
+    if type(state) is not type(like) or state.faces.shape != like.faces.shape:
+        raise ValueError("a state of another model")
+    if not np.isfinite(state.faces).all():
+        raise ValueError("positions that are not finite")
 
 
 def _no_rest(theta: float, state: AnyState) -> ComputationError:

@@ -19,13 +19,14 @@ from swgjoint.fe.solid.continuation import SolidContinuation
 from swgjoint.fe.solid.drive3d import solid_ring
 from swgjoint.fe.solid.shape_fields import solid_fields, solid_surface
 from swgjoint.fe.tolerance_rest import SMALL
-from swgjoint.fe.tolerance_sampling import sample_tolerances
+from swgjoint.fe.tolerance_sampling import STAGES, sample_tolerances
 from swgjoint.gear.design import Design
 from swgjoint.gear.kinematics import angle_coefficients
 from swgjoint.gear.mounting import series_compliance, springs_of
 from swgjoint.gear.tolerances import has_errors, without_errors
 from swgjoint.maps.catalogue import ratings_of
 from swgjoint.maps.samples import MapSamples
+from swgjoint.maps.unfinished import Unfinished
 from swgjoint.progress import Progress, silent
 
 Array = NDArray[np.float64]
@@ -47,6 +48,7 @@ def sample_map(
     model: str = "2d",
     angles: int | None = None,
     progress: Progress = silent,
+    keep: Unfinished | None = None,
 ) -> MapSamples:
     """Equilibria over one pitch and both signs of torque, by the nonlinear models.
 
@@ -66,6 +68,8 @@ def sample_map(
         angles: Input positions over one pitch of the fixed member; by default
             :data:`ANGLES`, in space :data:`SOLID_ANGLES`.
         progress: Called with the stage, the solves done and their number.
+        keep: Where solved positions are kept and taken up again after an interruption;
+            the samples are the same, bit for bit. None keeps none.
 
     Raises:
         ComputationError: If the unloaded drive or small torques cannot be solved.
@@ -81,16 +85,21 @@ def sample_map(
     theta = period * np.arange(angles) / angles
     total, done = angles * (len(torques) + 1) + len(theta[::EVERY]), 0
 
-    def tick() -> None:
+    stages = len(STAGES) if has_errors(design) else 1
+    stage = f"{drive.name}: equilibria" + (f", part 1 of {stages}" * (stages > 1))
+
+    def tick(solves: int = 1) -> None:
         nonlocal done
-        done += 1
-        progress(f"{drive.name}: equilibria", min(done, total), total)
+        done += solves
+        progress(stage, min(done, total), total)
 
     settings: dict[str, Any] = {
         "small": SMALL * ratings.rated_torque,
         "rated": ratings.rated_torque,
         "symmetric": symmetric,
         "tick": tick,
+        "keep": keep,
+        "restored": tick,
     }
     try:
         # two calls: states in the plane and in space differ
@@ -127,6 +136,7 @@ def sample_map(
             rated_torque=ratings.rated_torque,
             model=model,
             progress=progress,
+            keep=keep,
         )
         tolerances = tolerances.in_series(series)
     # the pattern follows the gear angle that depends on the input alone, written so

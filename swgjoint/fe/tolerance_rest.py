@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -55,7 +56,11 @@ class Rest:
 
 
 def influences(
-    design: Design, *, phases: int = PHASES, model: str = "2d"
+    design: Design,
+    *,
+    phases: int = PHASES,
+    model: str = "2d",
+    tick: Callable[[], None] = lambda: None,
 ) -> tuple[Follower[Any], list[Rest]]:
     """The drive with perfect teeth, unloaded and linearised at positions in a pitch.
 
@@ -65,6 +70,7 @@ def influences(
         design: The drive; errors of its wave generator are kept.
         phases: Positions, equally spaced.
         model: Fidelity, ``2d`` or ``3d``.
+        tick: Called after every position.
 
     Raises:
         ComputationError: If the unloaded drive cannot be solved.
@@ -87,4 +93,5 @@ def influences(
         up, down = rest.sides or (rest.state, None)
         opposite = None if down is None else (down, follow.influence(down))
         found.append(Rest(state=up, at=follow.influence(up), opposite=opposite))
+        tick()
     return follow, found

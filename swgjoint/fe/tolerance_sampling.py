@@ -8,7 +8,7 @@ a few positions within one pitch, and the errors of all pitches are superposed t
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -22,6 +22,7 @@ from swgjoint.fe.tolerance_rest import PHASES, SMALL, Rest, influences
 from swgjoint.gear.design import Design
 from swgjoint.gear.tolerances import has_errors, with_perfect_teeth, without_errors
 from swgjoint.maps.samples import FullSolves, ToleranceSamples
+from swgjoint.maps.unfinished import UNREADABLE, Unfinished
 from swgjoint.progress import Progress, silent
 
 Array = NDArray[np.float64]
@@ -36,8 +37,11 @@ LEVELS = (0.15, 0.45, 1.0)
 CHECKS = {"2d": 12, "3d": 3}
 """Positions that are solved without linearisation, too, to judge the map; in space one
 takes half a minute."""
+STAGES = ("equilibria", "linearised positions", "superposition", "full solves")
+"""Of the sampling of a drive with errors, as the progress counts them."""
 FREE = 100.0
 """Compliance, in the median of all positions, from which the output counts as free."""
+_PHASE = "superposition-{:04d}"
 
 
 def sample_tolerances(
@@ -48,6 +52,7 @@ def sample_tolerances(
     phases: int | None = None,
     model: str = "2d",
     progress: Progress = silent,
+    keep: Unfinished | None = None,
 ) -> ToleranceSamples:
     """Superposed equilibria over the cycle of the teeth.
 
@@ -57,7 +62,8 @@ def sample_tolerances(
         rated_torque: [N·m].
         phases: Positions within a pitch; fewer than usual for many pitches if None.
         model: Fidelity, ``2d`` or ``3d``.
-        progress: Called with the stage, the positions done and their number.
+        progress: Called with the stage, the parts done and their number.
+        keep: Where finished positions are kept and taken up again; None keeps none.
 
     Raises:
         ComputationError: If the drive without errors or without torque, or a torque
@@ -67,11 +73,13 @@ def sample_tolerances(
     if phases is None:
         most = PHASES if pitches_of(design) > 1 else ALONE
         phases = int(np.clip(POSITIONS // pitches_of(design), 2, most))
-    follow, linear = influences(design, phases=phases, model=model)
+    own_reference = has_errors(with_perfect_teeth(design))
+    tick = _stage(progress, design, 1, phases * (2 if own_reference else 1))
+    options: dict[str, Any] = {"phases": phases, "model": model, "tick": tick}
+    follow, linear = influences(design, **options)
     reference = linear
-    if has_errors(with_perfect_teeth(design)):
-        perfect_design = without_errors(design)
-        reference = influences(perfect_design, phases=phases, model=model)[1]
+    if own_reference:
+        reference = influences(without_errors(design), **options)[1]
     pitches = np.arange(pitches_of(design), dtype=np.int64)
     errors = gap_errors(design, pitches)
     none = tuple(np.zeros_like(one[:1]) for one in errors)
@@ -81,14 +89,23 @@ def sample_tolerances(
     if has_play:
         levels = np.append(small, levels)
     tables, perfect, free = [], [], 0
+    loads = 2 * levels.size + 1
+    tick = _stage(progress, design, 2, phases * loads)
     for k, (rest, flawless) in enumerate(zip(linear, reference, strict=True)):
-        found, count = _over_torque(rest, errors, levels, small)
+        there = _kept(keep, k, (3, loads, pitches.size))
+        if there is None:
+            found, count = _over_torque(rest, errors, levels, small, tick)
+        else:
+            found, count = there
+            tick(loads)
         if not np.isfinite(found).all():
             lost = np.isnan(found).any(axis=(0, 1)).sum()
             raise ComputationError(
                 f"{drive.name}: no equilibrium with the errors of the teeth at {lost}"
                 f" of {pitches.size} pitches; try smaller tolerances"
             )
+        if keep is not None and there is None:
+            keep.write(_PHASE.format(k), {"table": found, "free": count})
         alone, _ = _over_torque(flawless, none, levels, small)
         if has_play:
             found, alone = _with_onsets(found, small), _with_onsets(alone, small)
@@ -98,7 +115,6 @@ def sample_tolerances(
         tables.append(found)
         perfect.append(alone[:, :, 0])
         free += count
-        progress(f"{drive.name}: tolerances", k + 1, phases)
     # (3, n_torques, n_pitches, n_phases)
     table = np.stack(tables, axis=-1)
     # spread over the cycle and the phases of a pitch
@@ -106,7 +122,8 @@ def sample_tolerances(
     checks = CHECKS[model]
     chosen = np.arange(checks) * (count // checks) + np.arange(checks) % phases
     torques = (0.0, rated_torque)
-    solved = full_solves(design, follow, linear, chosen % count, torques)
+    tick = _stage(progress, design, 3, checks)
+    solved = full_solves(design, follow, linear, chosen % count, torques, tick)
     if has_play:
         levels = np.append(FAINT * small, levels)
     return ToleranceSamples(
@@ -126,6 +143,7 @@ def full_solves(
     rests: Sequence[Rest],
     positions: Index,
     torques: Sequence[float],
+    tick: Callable[[], None] = lambda: None,
 ) -> FullSolves:
     """Equilibria with errors at some positions of the cycle, without linearisation.
 
@@ -135,6 +153,7 @@ def full_solves(
         rests: It without load at positions in a pitch.
         positions: Numbers of positions in the cycle, ``len(rests)`` a pitch.
         torques: T at each of them [N·m].
+        tick: Called after every position.
     """
     rows = []
     step = pitch_of(design) / len(rests)
@@ -155,6 +174,7 @@ def full_solves(
             error = angle - step * phase[k] / follow.ratio
             moment = np.mean([flawed.input_torque(s) for s in found])
             rows.append((step * positions[k], torque, error, moment))
+        tick()
     table = np.array(rows).T
     table = table[:, np.isfinite(table[2])]
     return FullSolves(
@@ -166,11 +186,16 @@ def full_solves(
 
 
 def _over_torque(
-    rest: Rest, errors: tuple[Array, ...], levels: Array, small: float
+    rest: Rest,
+    errors: tuple[Array, ...],
+    levels: Array,
+    small: float,
+    tick: Callable[[], None] = lambda: None,
 ) -> tuple[Array, int]:
     """Output angle, strain energy, compliance at all torques (3, n_torques, n_sets).
 
-    And the number of sets whose unloaded output is free.
+    And the number of sets whose unloaded output is free. ``tick`` is called after each
+    torque.
     """
     gaps = [at.gap_change(*errors) for _, at in rest.sides]
 
@@ -195,15 +220,50 @@ def _over_torque(
         middle[1] -= 0.5 * small**2 * middle[2]  # what the small torque stores
         middle[2] = 0.5 * (ends[1][0] - ends[0][0]) / small
         unloaded[:, free] = middle
+    tick()
     sides = []
     for sign in (-1.0, 1.0):
         active, rows = at_rest, []
         for level in levels:
             found, active = row(sign * level, slice(None), active)
             rows.append(found)
+            tick()
         sides.append(rows)
     table = [*sides[0][::-1], unloaded, *sides[1]]
     return np.stack(table, axis=1), int(free.sum())
+
+
+def _stage(
+    progress: Progress, design: Design, number: int, total: int
+) -> Callable[..., None]:
+    """What counts the parts of one stage of the sampling."""
+    done = 0
+    name = f"{design.drive.name}: {STAGES[number]}, part {number + 1} of {len(STAGES)}"
+    progress(name, 0, total)
+
+    def tick(parts: int = 1) -> None:
+        nonlocal done
+        done += parts
+        progress(name, done, total)
+
+    return tick
+
+
+def _kept(
+    keep: Unfinished | None, phase: int, shape: tuple[int, ...]
+) -> tuple[Array, int] | None:
+    """Table and free sets of a phase of an interrupted run."""
+    arrays = None if keep is None else keep.read(_PHASE.format(phase))
+    if keep is None or arrays is None:
+        return None
+    try:
+        table, free = np.asarray(arrays["table"], float), int(arrays["free"])
+        if table.shape != shape:
+            raise ValueError(f"a table of shape {table.shape}")
+    except UNREADABLE as error:
+        keep.ignored(_PHASE.format(phase), error)
+        return None
+    return table, free
 
 
 def _with_onsets(table: Array, small: float) -> Array:

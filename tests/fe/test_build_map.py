@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from solved import coarse, few_teeth
 
+from swgjoint.fe import sampling, tolerance_sampling
 from swgjoint.fe.build_map import build_map
 from swgjoint.fe.sampling import sample_map
+from swgjoint.fe.tolerance_sampling import sample_tolerances
 from swgjoint.gear.design import Design
+from swgjoint.maps.file import map_bytes
 from swgjoint.maps.fit import fit_map
+from swgjoint.maps.unfinished import Unfinished
 
 LAYOUTS = ("circular_spline_fixed", "flexspline_fixed", "wave_generator_fixed")
 ANGLES = 8
@@ -83,3 +89,85 @@ def test_build_map_is_cached(tmp_path, monkeypatch):
     again = build_map(design, angles=2, progress=lambda *a: calls.append(a))
     assert len(calls) == count
     assert np.array_equal(first.potential, again.potential)
+
+
+class Stop(Exception):
+    """An interruption."""
+
+
+def stopping(after: int):
+    """A progress that interrupts the work after some calls."""
+    calls = 0
+
+    def progress(stage: str, done: int, total: int) -> None:
+        nonlocal calls
+        calls += 1
+        if calls > after:
+            raise Stop
+
+    return progress
+
+
+@pytest.mark.fe
+@pytest.mark.parametrize("spoil", [False, True], ids=["sound", "damaged"])
+def test_an_interrupted_map_goes_on_bit_for_bit(monkeypatch, tmp_path, spoil):
+    """Solved positions are taken up, damaged ones solved again; then they are gone."""
+    monkeypatch.setenv("SWGJOINT_CACHE", str(tmp_path))
+    monkeypatch.setattr(sampling, "LEVELS", (0.35, 1.0))
+    design = few_teeth()
+    whole = sampling.sample_map(design, angles=4)
+    # two positions of three solves, and some of the third
+    with pytest.raises(Stop):
+        build_map(design, angles=4, progress=stopping(7))
+    parts = sorted(tmp_path.rglob("*.npz"))
+    assert [part.stem for part in parts] == ["position-0000", "position-0001"]
+    if spoil:
+        parts[1].write_bytes(parts[1].read_bytes()[:-200])
+    seen = []
+    drive = build_map(design, angles=4, progress=lambda *call: seen.append(call[1:]))
+    assert seen[0] == ((3 if spoil else 6), 13)
+    assert seen[-1] == (13, 13)
+    assert list(tmp_path.rglob("*.npz")) == []
+    # all but the time that it took
+    wanted = fit_map(whole)
+    took = {"sampling_wall_s": 0.0}
+    assert map_bytes(replace(drive, info=drive.info | took)) == map_bytes(
+        replace(wanted, info=wanted.info | took)
+    )
+
+
+@pytest.mark.fe
+def test_the_superposition_of_errors_is_counted_and_goes_on(monkeypatch, tmp_path):
+    """Every torque of every position in the pitch is a step; finished ones are kept."""
+    monkeypatch.setattr(tolerance_sampling, "LEVELS", (1.0,))
+    monkeypatch.setitem(tolerance_sampling.CHECKS, "2d", 1)
+    design = few_teeth(**{"tolerances.circular_spline_eccentricity_um": 5.0})
+    options = {"repeated_peak": 20.0, "rated_torque": 10.0, "phases": 2}
+    whole = sample_tolerances(design, **options)
+    calls: list[tuple[str, int, int]] = []
+
+    def until_the_second(stage: str, done: int, total: int) -> None:
+        calls.append((stage, done, total))
+        if "superposition" in stage and done == total // 2 + 1:
+            raise Stop
+
+    keep = Unfinished(folder=tmp_path)
+    with pytest.raises(Stop):
+        sample_tolerances(design, **options, progress=until_the_second, keep=keep)
+    steps = [call[1:] for call in calls if "superposition" in call[0]]
+    total = 2 * (2 * (len(whole.torque) // 2) + 1)
+    assert steps == [(k, steps[0][1]) for k in range(len(steps))]
+    assert steps[0][1] in (total, total - 4)  # a clearance adds its ends afterwards
+    superposed = []
+    table = tolerance_sampling._over_torque
+
+    def counted(rest, errors, *others):
+        superposed.append(len(errors[0]))
+        return table(rest, errors, *others)
+
+    monkeypatch.setattr(tolerance_sampling, "_over_torque", counted)
+    found = sample_tolerances(design, **options, keep=keep)
+    # the drive without errors, twice; with them only what was not finished
+    assert sorted(superposed) == [1, 1, 62]
+    for key in ("torque", "table", "perfect"):
+        assert np.array_equal(getattr(found, key), getattr(whole, key))

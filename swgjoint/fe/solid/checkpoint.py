@@ -5,21 +5,21 @@ from __future__ import annotations
 import io
 import json
 import zipfile
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from swgjoint.errors import InputError, Outcome
+from swgjoint.errors import InputError
 from swgjoint.fe.solid.state import SolidState
-from swgjoint.fe.solid.teeth import ToothRows
-from swgjoint.fe.tooth_contact import Contacts
+from swgjoint.fe.state_arrays import packed, unpacked
 from swgjoint.files import write_whole
 from swgjoint.json_text import json_text
 
 RUN = "run.json"
-SCHEMA = 5
+SCHEMA = 6
+_STATE = "state"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,51 +68,19 @@ class Checkpoint:
             return None
         try:
             with np.load(path, allow_pickle=False) as arrays:
-                return _unpacked({key: arrays[key] for key in arrays.files})
+                found = unpacked({key: arrays[key] for key in arrays.files}, _STATE)
         except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile) as error:
             raise InputError(
                 f"--resume: {path} is damaged ({error}); remove it to compute it again"
             ) from None
+        if not isinstance(found, SolidState):
+            raise InputError(
+                f"--resume: {path} holds no state; remove it to compute it again"
+            )
+        return found
 
     def write(self, name: str, state: SolidState) -> None:
         """Keep a state, whole or not at all."""
         out = io.BytesIO()
-        np.savez(out, **_packed(state))
+        np.savez(out, **packed(state, _STATE))
         write_whole(self.folder / f"{name}.npz", out.getvalue())
-
-
-def _packed(state: SolidState) -> dict[str, Any]:
-    arrays: dict[str, Any] = {}
-    for item in fields(state):
-        value = getattr(state, item.name)
-        if item.name == "held" or value is None:
-            continue
-        arrays[item.name] = value.name if isinstance(value, Outcome) else value
-    if state.held is not None:
-        for item in fields(state.held):
-            if item.name != "contacts":
-                arrays[f"held.{item.name}"] = getattr(state.held, item.name)
-        for item in fields(state.held.contacts):
-            arrays[f"contacts.{item.name}"] = getattr(state.held.contacts, item.name)
-    return arrays
-
-
-def _unpacked(arrays: dict[str, Any]) -> SolidState:
-    def part(prefix: str) -> dict[str, Any]:
-        return {
-            key.removeprefix(prefix): value
-            for key, value in arrays.items()
-            if key.startswith(prefix)
-        }
-
-    held = None
-    if any(key.startswith("held.") for key in arrays):
-        contacts = Contacts(**part("contacts."))
-        held = ToothRows(contacts=contacts, **part("held."))
-    own = {key: value for key, value in arrays.items() if "." not in key}
-    own["outcome"] = Outcome[str(own["outcome"])]
-    own["history"] = tuple(float(value) for value in own["history"])
-    for item in fields(SolidState):
-        if item.type == "float":
-            own[item.name] = float(own[item.name])
-    return SolidState(held=held, **own)
