@@ -70,6 +70,24 @@ _TYPES = {
     "dict_type": "a table",
 }
 
+_OTHER_FILES = {
+    ".xml": "arm (MJCF)",
+    ".urdf": "arm (URDF)",
+    ".xacro": "template of an arm (URDF)",
+    ".swg": "map of a drive",
+    ".rrd": "recording",
+    ".csv": "table (CSV)",
+}
+"""Files of other formats, by their suffix."""
+_MARKS = {
+    "design": {"drive", "flexspline", "circular_spline", "wave_generator"},
+    "scene": {"arm", "trajectory", "simulation", "controller"},
+    "optimisation": {"plan", "objectives"},
+    "sweep": {"plan"},
+    "spec": {"spec"},
+}
+"""Tables and keys by which the files of each kind are known."""
+
 Model = TypeVar("Model", bound=BaseModel)
 
 
@@ -108,17 +126,40 @@ def read_toml(
     """Parse a TOML file; every failure is one line.
 
     Raises:
-        InputError: If the file is missing, too long, not UTF-8 or not TOML.
+        InputError: If the file is missing, too long, not UTF-8, not TOML, or a file of
+            another kind than ``what``.
     """
     try:
         size = path.stat().st_size
+        other = _OTHER_FILES.get(path.suffix.lower())
+        if other is not None:
+            raise error(f"{path}: this is {_a(other)}; {_a(what)} is needed, as TOML")
         if size > MAX_BYTES:
-            raise error(f"{path}: {size} bytes; a {what} has at most {MAX_BYTES}")
-        return parse_toml(path.read_bytes().decode(), where=str(path), error=error)
+            raise error(f"{path}: {size} bytes; {_a(what)} has at most {MAX_BYTES}")
+        data = parse_toml(path.read_bytes().decode(), where=str(path), error=error)
     except OSError as exc:
         raise error(f"{path}: cannot read the {what}: {exc.strerror}") from None
     except UnicodeDecodeError as exc:
         raise error(f"{path}: not UTF-8 text at byte {exc.start}") from None
+    kind = kind_of_file(data)
+    if kind is not None and what in _MARKS and kind != what:
+        raise error(f"{path}: this is {_a(kind)} file; {_a(what)} is needed")
+    return data
+
+
+def kind_of_file(data: Mapping[str, Any]) -> str | None:
+    """What kind of file the tables belong to; None where they do not tell."""
+    if set(data) == {"spec"}:
+        return "spec"
+    for kind in ("optimisation", "sweep"):
+        if _MARKS[kind] <= set(data):
+            return kind
+    found = [kind for kind in ("design", "scene") if len(_MARKS[kind] & set(data)) > 1]
+    return found[0] if len(found) == 1 else None
+
+
+def _a(noun: str) -> str:
+    return f"{'an' if noun[0] in 'aeiou' else 'a'} {noun}"
 
 
 def parse_toml(
@@ -186,10 +227,11 @@ def _lines(model: type[BaseModel], detail: ErrorDetails) -> list[str]:
     if kind == "too_long":
         return [f"{path} = {_shown(value, '')}: accepted: {_accepted(info, key)}"]
     if kind in _TYPES:
-        wanted = _TYPES[kind]
-        if info is not None and (limits := _limits(info, key)):
-            wanted += f" {limits}"
-        return [f"{path} = {_shown(value, '')}: accepted: {wanted}"]
+        example = _example(info, key, path, kind)
+        limits = _limits(info, key) if info is not None else ""
+        bounds = f"{', each' if example else ''} {limits}" if limits else ""
+        told = f"accepted: {_TYPES[kind]}{example}{bounds}"
+        return [f"{path} = {_shown(value, '')}: {told}"]
     return [f"{path} = {_shown(value, key)}: {detail['msg']}"]
 
 
@@ -256,6 +298,30 @@ def _limits(info: Any, key: str) -> str:
         if getattr(item, name, None) is not None
     ]
     return " and ".join(parts)
+
+
+def _example(info: Any, key: str, path: str, kind: str) -> str:
+    """How a list or a table is written, e.g. ``, e.g. [0, 0, 60]``; else empty."""
+    annotation = getattr(info, "annotation", None)
+    if annotation is None:
+        return ""
+    for part in (annotation, *get_args(annotation)):  # X | None
+        origin, items = get_origin(part), get_args(part)
+        if kind in ("tuple_type", "list_type") and origin in (tuple, list):
+            if models_in(part):
+                return f", one [[{path}]] table for each item"
+            several = origin is list or Ellipsis in items
+            texts = any(item is str for item in items)
+            one = '"a"' if texts else "1.5"
+            count = 2 if several else len(items)
+            return f", e.g. {key} = [{', '.join([one] * count)}]"
+        if kind == "dict_type" and origin is dict:
+            value = "{...}" if models_in(part) else "1.5"
+            return f" with one value for each name, e.g. {path}.NAME = {value}"
+    if kind == "dict_type" or not models_in(annotation):
+        return ""
+    keys = list(dict.fromkeys(k for m in models_in(annotation) for k in m.model_fields))
+    return f" [{path}] with {', '.join(keys)}"
 
 
 def _accepted(info: Any, key: str) -> str:

@@ -2,10 +2,44 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterable
 from difflib import get_close_matches
 from pathlib import Path
 
 from swgjoint.errors import InputError
+
+KINDS = {
+    "drives": (".toml", "a design"),
+    "arms": (".xml", "an arm"),
+    "scenes": (".toml", "a scene"),
+    "sweeps": (".toml", "a sweep"),
+    "optimisations": (".toml", "an optimisation"),
+}
+"""Folders below ``models/`` with files that a command takes by name: suffix, and what
+one of them is."""
+TOGETHER = {"scenes": ("arms",)}
+"""Kinds that are accepted as well wherever a kind is."""
+
+
+def near_names(text: str, names: Iterable[str], n: int = 3) -> list[str]:
+    """Names that a wrong one may have meant, the most likely first.
+
+    A name that begins with the text, or has all its parts, is nearer than any other
+    spelling: ``size-25`` means ``size-25-100`` rather than ``size-32-50``, ``tool_rms``
+    means ``tool_path_rms`` rather than ``tool_rp``.
+    """
+    known = {name.lower(): name for name in names}
+    wanted = text.lower()
+    begin = [key for key in known if wanted and key.startswith(wanted)]
+    parts = _parts(wanted)
+    within = [key for key in known if parts and parts <= _parts(key)]
+    close = get_close_matches(wanted, known, n=n)
+    return [known[key] for key in dict.fromkeys([*begin, *within, *close])][:n]
+
+
+def _parts(name: str) -> set[str]:
+    return set(re.findall(r"[^\W_]+", name))
 
 
 def models_path() -> Path:
@@ -50,9 +84,24 @@ def find(reference: str | Path, kind: str, suffix: str, *, what: str) -> Path:
             return models_path() / kind / f"{bare}{suffix}"
     if path.is_dir():
         raise InputError(f"{what} {text!r} is a folder; needed: a {suffix} file")
-    near = get_close_matches(text.removesuffix(suffix), names, n=1)
-    hint = f"; did you mean {near[0]}?" if near else ""
-    raise InputError(
-        f"{what} {text!r} is neither a file nor in models/{kind}{hint}"
-        f" (bundled: {', '.join(names)})"
-    )
+    bare = text.removesuffix(suffix)
+    accepted = (kind, *TOGETHER.get(kind, ()))
+    near = near_names(bare, [name for k in accepted for name in _names(k, suffix)])
+    other = named_kind(bare)
+    if other is not None and other not in accepted:
+        fault = f"{text!r} is the name of {KINDS[other][1]}; needed: a {what}"
+    else:
+        folders = " or ".join(f"models/{k}" for k in accepted)
+        fault = f"{what} {text!r} is neither a file nor in {folders}"
+    hint = f"; did you mean {' or '.join(near)}?" if near else ""
+    bundled = (f"{k}: {', '.join(_names(k, suffix))}" for k in accepted)
+    raise InputError(f"{fault}{hint} (bundled {'; '.join(bundled)})")
+
+
+def named_kind(name: str) -> str | None:
+    """Folder below ``models/`` that has a file of this name; None without one."""
+    return next((k for k in KINDS if name in bundled_names(k, KINDS[k][0])), None)
+
+
+def _names(kind: str, suffix: str) -> list[str]:
+    return bundled_names(kind, KINDS.get(kind, (suffix,))[0])

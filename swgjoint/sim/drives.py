@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import replace
-from difflib import get_close_matches
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from swgjoint.errors import InputError
+from swgjoint.gear.family import family_member
 from swgjoint.maps.catalogue_stated import LOSS_KEYS
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.friction_bending import without_friction
 from swgjoint.maps.from_catalogue import catalogue_names, is_catalogue_name
-from swgjoint.models_path import bundled_names
+from swgjoint.models_path import bundled_names, named_kind, near_names
 from swgjoint.progress import Progress, silent
 from swgjoint.sim.scene_sections import JointSection, LinearDrive
 
@@ -136,11 +137,28 @@ def find_drive(reference: str) -> DriveMap | Design:
         return DriveMap.from_catalogue(reference)
     try:
         return Design.load(reference)
-    except InputError as exc:
-        near = get_close_matches(reference.upper(), catalogue_names(), n=1, cutoff=0.8)
-        if file or not near:
+    except InputError:
+        if file or named_kind(reference) or not re.fullmatch(r"[\w-]+", reference):
             raise
-        raise InputError(f"{exc}; in the catalogue: {near[0]}") from None
+        if family_member(reference) is not None:
+            raise
+        raise InputError(_unknown(reference)) from None
+
+
+def _unknown(reference: str) -> str:
+    """Message for a name that is neither a design nor in the catalogue."""
+    designs = bundled_names("drives", ".toml")
+    near = near_names(reference, [*catalogue_names(), *designs])
+    hint = f"did you mean {' or '.join(near)}? " if near else ""
+    rows = [name.rsplit("-", 2)[:2] for name in catalogue_names()]
+    series = ", ".join(dict.fromkeys(name for name, _ in rows))
+    sizes = sorted({int(size) for _, size in rows})
+    return (
+        f"drive {reference!r} is neither a file nor in models/drives or"
+        f" models/catalogue; {hint}accepted: {series} of sizes {sizes[0]} to"
+        f" {sizes[-1]} (swgjoint list drives), a design (swgjoint list designs),"
+        " size-NN-RRR, a design file or a .swg map"
+    )
 
 
 def check_joint_names(

@@ -195,3 +195,76 @@ def test_scene_options(here, capsys, arguments, message):
     err = refused(capsys, "run", *arguments, "--out", "out")
     assert names(err, *message)
     assert err.count("\n") == 1
+
+
+MODELS = models_path()
+KINDS = {
+    "design": MODELS / "drives" / "reference-2d.toml",
+    "scene": MODELS / "scenes" / "bench.toml",
+    "sweep": MODELS / "sweeps" / "bench-speed.toml",
+    "optimisation": MODELS / "optimisations" / "qca-stress.toml",
+    "spec": None,
+    "arm (MJCF)": MODELS / "arms" / "two-link.xml",
+}
+TAKES = {
+    "design": ["profile"],
+    "scene": ["advise", "--error", "1arcmin"],
+    "sweep": ["sweep"],
+    "optimisation": ["optimise"],
+    "spec": ["compare", "CSG-25-100", "--spec"],
+}
+
+
+@pytest.mark.parametrize("needed", TAKES)
+@pytest.mark.parametrize("given", KINDS)
+def test_a_file_of_another_kind_is_named(here, capsys, given, needed):
+    """One line says what the file is and what is needed, whatever its keys."""
+    if given == needed or (given, needed) == ("arm (MJCF)", "scene"):
+        return
+    file = KINDS[given] or here / "spec.toml"
+    if given == "spec":
+        file.write_text("[spec]\nK1_Nm_rad = 1e4\n")
+    command, *options = TAKES[needed]
+    arguments = [*options, str(file)] if needed == "spec" else [str(file), *options]
+    err = refused(capsys, command, *arguments)
+    assert err.count("\n") == 1
+    assert names(err, file.name, f"this is a{'n' * (given[0] in 'ao')} {given}", needed)
+
+
+@pytest.mark.parametrize(
+    ("reference", "message"),
+    [
+        ("CSD-25-100", ("mean CSG-25-100", "CHA", "14 to 32", "swgjoint list drives")),
+        ("size-25", ("mean size-25-100", "size-NN-RRR")),
+        ("ur5e", ("'ur5e'", "an arm", "a design", "reference-2d")),
+        ("size-25-999", ("'size-25-999'", "999", "30 to 200")),
+    ],
+)
+def test_drives_are_suggested_from_all_sources(here, capsys, reference, message):
+    """Catalogue, bundled designs and the rule, each for its own spelling."""
+    err = refused(capsys, "spec", reference)
+    assert err.count("\n") == 1 and names(err, *message)
+
+
+def test_an_arm_is_suggested_where_a_scene_may_be_one(here, capsys):
+    """A wrong name has those of arms beside those of scenes."""
+    err = refused(capsys, "run", "ur10e")
+    assert err.count("\n") == 1
+    assert names(err, "'ur10e'", "mean ur5e", "ur5e-sweep", "two-link", "models/arms")
+
+
+@pytest.mark.parametrize(
+    ("override", "message"),
+    [
+        ("trajectory.speed_deg_s=0.6", ("trajectory.speed_deg_s.NAME =", "3600 deg/s")),
+        ("payload.centre_mm=0,0,60", ("'0,0,60'", "centre_mm = [1.5, 1.5, 1.5]")),
+        ("payload=3", ("[payload]", "mass_kg", "inertia_kgm2")),
+        ("disturbance=3", ("[[disturbance]]",)),
+    ],
+)
+def test_lists_and_tables_are_shown_as_they_are_written(
+    here, capsys, override, message
+):
+    """A value of another shape is answered with the syntax of the right one."""
+    err = refused(capsys, "run", "bench", "--set", override)
+    assert names(err, override.partition("=")[0], *message)
