@@ -21,7 +21,20 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="designs, .swg maps, catalogue drives, or levels such as full",
     )
     parser.add_argument(
-        "--scene", default="bench", help="scene file or bundled name; default bench"
+        "--scene",
+        metavar="SCENE|ARM",
+        default="bench",
+        help="scene file, MJCF or URDF file of an arm, or bundled name; an arm gets a"
+        " gentle sweep, and drives by rule where none is compared; default bench",
+    )
+    parser.add_argument(
+        "--joints",
+        "--joint",
+        metavar="PATTERN,...",
+        action="append",
+        default=[],
+        help="compare in these joints alone, such as shoulder_lift or 'wrist_*'; the"
+        " others keep what the scene gives them; repeatable",
     )
     parser.add_argument(
         "--set",
@@ -39,6 +52,13 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="TOML file with a table [spec] of limits; exit status 1 if one is missed",
     )
     parser.add_argument(
+        "--limit",
+        metavar="KEY=VALUE",
+        action="append",
+        default=[],
+        help="a limit without a file, e.g. tool_path_rms_mm=0.2; repeatable",
+    )
+    parser.add_argument(
         "--out",
         metavar="DIR",
         help="write compare.json, a picture, the report and a recording of all runs",
@@ -49,23 +69,32 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     """Run the scene for every argument.
 
     Returns:
-        ``scene``, ``rows``, ``spec``, ``passed`` (null without a spec), ``files``.
+        ``scene``, ``joints`` (those that are compared; null for all), ``rows``,
+        ``spec``, ``passed`` (null without a spec), ``kept_by`` (arguments that keep
+        every limit), ``files``.
     """
     folder = output_folder(args.out) if args.out else None
-    from swgjoint.sim.scene import Scene
-    from swgjoint.study.compare import LOWER, SLOW, SORTABLE, compare, read_spec
+    from swgjoint.models_path import near_names
+    from swgjoint.study.compare import LOWER, SLOW, SORTABLE, compare
+    from swgjoint.study.compare_scene import joints_named, scene_or_arm
     from swgjoint.study.compare_shown import columns, left_out_notes
 
     if args.sort is not None and args.sort not in SORTABLE:
-        raise InputError(f"--sort {args.sort}; accepted: {', '.join(SORTABLE)}")
-    spec = read_spec(args.spec) if args.spec else None
-    scene = Scene.load_file(args.scene, args.overrides)
+        near = near_names(args.sort, SORTABLE)
+        hint = f"; did you mean {' or '.join(near)}?" if near else ""
+        raise InputError(
+            f"--sort {args.sort}: unknown figure{hint} accepted: {', '.join(SORTABLE)}"
+        )
+    spec = _limits(args)
+    scene = scene_or_arm(args.scene, args.overrides)
+    joints = joints_named(scene, args.joints)
     rows = compare(
         args.arguments,
         scene,
         model=args.model,
         spec=spec,
         fatigue=SLOW in {args.sort, *(spec or {})},
+        joints=joints,
         progress=args.progress,
     )
     if args.sort is not None:
@@ -75,9 +104,13 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         rows = known + [row for row in rows if row not in known]
     result: dict[str, Any] = {
         "scene": scene.name,
+        "joints": list(joints) or None,
         "rows": [row.to_json() for row in rows],
         "spec": spec,
         "passed": None if spec is None else not any(row.missed for row in rows),
+        "kept_by": None
+        if spec is None
+        else [row.argument for row in rows if not row.missed],
         "columns": columns(rows),
         "notes": left_out_notes(rows),
         "files": [],
@@ -85,6 +118,18 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     if folder is not None:
         result["files"] = _write(folder, result, rows, spec, args.progress)
     return result
+
+
+def _limits(args: argparse.Namespace) -> dict[str, float] | None:
+    """Limits of the file and of the options, the options first; None without any."""
+    from swgjoint.sim.scene import parse_override
+    from swgjoint.study.compare import checked_limits, read_spec
+
+    if not args.spec and not args.limit:
+        return None
+    limits = read_spec(args.spec) if args.spec else {}
+    given = dict(map(parse_override, args.limit))
+    return limits | checked_limits(given, where="--limit ")
 
 
 def _write(
@@ -142,8 +187,11 @@ def report(result: dict[str, Any]) -> str:
         )
         for row in result["rows"]
     ]
+    which = "worst joint"
+    if result["joints"]:
+        which += f" of {', '.join(result['joints'])}"
     lines = [
-        f"scene {result['scene']}, worst joint; K1 and stress of the drive",
+        f"scene {result['scene']}, {which}; K1 and stress of the drive",
         table([units, *rows], header=header),
         *result["notes"],
     ]
@@ -153,6 +201,7 @@ def report(result: dict[str, Any]) -> str:
             lines.append(
                 f"{row['argument']}: {key} {cell(row, key)}, limit {spec[key]:g}"
             )
-    if result["passed"]:
-        lines.append("every limit of the spec is kept")
+    if spec is not None:
+        kept = ", ".join(result["kept_by"])
+        lines.append(f"every limit is kept by: {kept or 'none of them'}")
     return "\n".join([*lines, *(f"wrote {name}" for name in result["files"])])

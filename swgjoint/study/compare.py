@@ -1,8 +1,8 @@
 """Drives side by side in one scene: stiffness, ripple, error, stress, run time.
 
 Each argument is a design, a map, a catalogue drive or a level. A drive takes the place
-of that of every driven joint; a level keeps the scene's drives. Figures of the scene
-are those of its worst joint.
+of that of every driven joint, or of some chosen ones; a level keeps the scene's drives.
+Figures of the scene are those of its worst joint among them.
 """
 
 from __future__ import annotations
@@ -19,12 +19,15 @@ from swgjoint.errors import ComputationError, InputError
 from swgjoint.faults import read_toml
 from swgjoint.gear.design import Design
 from swgjoint.maps.drive_map import DriveMap
+from swgjoint.models_path import near_names
 from swgjoint.progress import Progress, silent
 from swgjoint.sim.drives import find_drive, load_drive
 from swgjoint.sim.metrics import drive_order, strongest_left_out
+from swgjoint.sim.rigid_arm import RigidArm
 from swgjoint.sim.run import Run, run_scene
 from swgjoint.sim.scene import Scene
-from swgjoint.sim.scene_sections import LEVELS, JointSection
+from swgjoint.sim.scene_sections import LEVELS
+from swgjoint.study.compare_scene import drives_of, with_drive, with_level
 
 STRESS_POSITIONS = 6
 """Over one pitch of the fixed member, after which the pattern repeats."""
@@ -54,6 +57,9 @@ RIPPLE = (
 SORTABLE = (*UPPER, *LOWER)
 SLOW = "fatigue_safety_factor"
 """Computed only where a spec or the order asks for it: minutes in space."""
+STIFFNESS = "K1_Nm_rad"
+UNYIELDING = ("rigid", "kinematic")
+"""Levels without compliance: they have no stiffness that could be compared."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -125,18 +131,40 @@ def read_spec(path: str | Path, accepted: Sequence[str] = SORTABLE) -> dict[str,
     table = read_toml(Path(path), what="spec").get("spec")
     if not isinstance(table, Mapping) or not table:
         raise InputError(f"{path}: accepted: a table [spec] with limits")
-    faults = [
-        f"{path}: spec.{key} = {value!r}; accepted: a positive number under"
-        f" {', '.join(accepted)}"
-        for key, value in table.items()
-        if key not in accepted
-        or isinstance(value, bool)
-        or not isinstance(value, int | float)
-        or not 0.0 < value < np.inf
-    ]
+    return checked_limits(table, accepted, where=f"{path}: spec.")
+
+
+def checked_limits(
+    limits: Mapping[str, Any], accepted: Sequence[str] = SORTABLE, *, where: str = ""
+) -> dict[str, float]:
+    """Limits by figure, all of them positive numbers.
+
+    Args:
+        limits: Values by figure.
+        accepted: Figures that may be limited.
+        where: What messages put before the name of a figure.
+
+    Raises:
+        InputError: With one line for every other figure or value.
+    """
+    faults = []
+    for key, value in limits.items():
+        if key not in accepted:
+            near = near_names(key, accepted)
+            hint = f"did you mean {' or '.join(near)}? " if near else ""
+            faults.append(
+                f"{where}{key} = {value!r}: unknown figure; {hint}accepted: a positive"
+                f" number under {', '.join(accepted)}"
+            )
+        elif (
+            isinstance(value, bool)
+            or not isinstance(value, int | float)
+            or not 0.0 < value < np.inf
+        ):
+            faults.append(f"{where}{key} = {value!r}; accepted: a positive number")
     if faults:
         raise InputError("\n".join(faults))
-    return {key: float(value) for key, value in table.items()}
+    return {key: float(value) for key, value in limits.items()}
 
 
 def compare(
@@ -146,6 +174,7 @@ def compare(
     model: str | None = None,
     spec: Mapping[str, float] | None = None,
     fatigue: bool = False,
+    joints: Sequence[str] = (),
     progress: Progress = silent,
 ) -> list[Compared]:
     """Run the scene once for every argument, in the order given.
@@ -153,28 +182,46 @@ def compare(
     Args:
         arguments: Designs, maps, catalogue drives or levels.
         scene: The scene.
-        model: Fidelity of designs; their default if None.
+        model: Fidelity of designs, those of the scene among them; their default if
+            None. Maps and catalogue drives have none.
         spec: Limits by figure; see :data:`UPPER` and :data:`LOWER`.
         fatigue: Whether to assess the fatigue of designs with a cup.
+        joints: Joints that get the drive or the level, and whose figures count; every
+            driven joint if empty.
         progress: Called with the stage, what is done and their number.
 
     Raises:
         InputError: If an argument is none of these.
     """
     sources = {name: None if name in LEVELS else find_drive(name) for name in arguments}
+    kept: dict[str, DriveMap] = {}  # drives that the scene keeps
+
+    def known(changed: Scene, own: Mapping[str, DriveMap]) -> dict[str, DriveMap]:
+        if model is not None:
+            for reference in drives_of(changed, RigidArm(scene.arm).joints):
+                if reference not in {*kept, *own} and _is_design(reference):
+                    kept[reference] = load_drive(
+                        reference, model=model, progress=progress
+                    )
+        return {**kept, **own}
+
     rows = []
     for number, name in enumerate(arguments):
         begin = time.perf_counter()
         source = sources[name]
         if source is None:
-            run = run_scene(_with_level(scene, name), name=name)
+            changed = with_level(scene, name, joints)
+            run = run_scene(changed, drives=known(changed, {}), name=name)
             drive, stress, safety = None, None, None
         else:
-            drive = load_drive(name, model=model, progress=progress)
-            run = run_scene(_with_drive(scene, name), drives={name: drive}, name=name)
+            fidelity = model if isinstance(source, Design) else None
+            drive = load_drive(name, model=fidelity, progress=progress)
+            changed = with_drive(scene, name, joints)
+            run = run_scene(changed, drives=known(changed, {name: drive}), name=name)
             stress = _stress(source, drive, model)
             safety = _safety(source, drive, progress) if fatigue else None
-        row = row_of(name, run, drive, level=name if source is None else None)
+        level = name if source is None else None
+        row = row_of(name, run, drive, level=level, of=joints)
         row = replace(row, von_mises_MPa=stress, fatigue_safety_factor=safety)
         row = replace(row, wall_s=time.perf_counter() - begin)
         rows.append(replace(row, missed=missed(row, spec or {})))
@@ -182,11 +229,20 @@ def compare(
     return rows
 
 
+def _is_design(reference: str) -> bool:
+    return isinstance(find_drive(reference), Design)
+
+
 def missed(row: Compared, spec: Mapping[str, float]) -> tuple[str, ...]:
-    """Limits that a row does not keep, a figure that is not known among them."""
+    """Limits that a row does not keep, a figure that is not known among them.
+
+    A level without compliance keeps every lower limit of the stiffness.
+    """
     found = []
     for key, limit in spec.items():
         value = row.told(key)
+        if key == STIFFNESS and value is None and row.level in UNYIELDING:
+            continue
         kept = value is not None and (
             value >= limit if key in LOWER else value <= limit
         )
@@ -195,37 +251,29 @@ def missed(row: Compared, spec: Mapping[str, float]) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _with_drive(scene: Scene, reference: str) -> Scene:
-    """The scene with another drive in every driven joint."""
-
-    def changed(section: JointSection) -> JointSection:
-        if section.drive is None and section.linear is None:
-            return section
-        return section.model_copy(update={"drive": reference, "linear": None})
-
-    return _changed(scene, changed)
-
-
-def _with_level(scene: Scene, level: str) -> Scene:
-    """The scene with another level in every driven joint."""
-    return _changed(scene, lambda s: s.model_copy(update={"level": level}))
-
-
-def _changed(scene: Scene, change: Any) -> Scene:
-    joints = {name: change(section) for name, section in scene.joints.items()}
-    return scene.model_copy(
-        update={"defaults": change(scene.defaults), "joints": joints}
-    )
-
-
 def row_of(
-    name: str, run: Run, drive: DriveMap | None, *, level: str | None
+    name: str,
+    run: Run,
+    drive: DriveMap | None,
+    *,
+    level: str | None,
+    of: Sequence[str] = (),
 ) -> Compared:
-    """Figures of one run; those of the design itself are filled in later."""
+    """Figures of one run; those of the design itself are filled in later.
+
+    Args:
+        name: The argument.
+        run: Its run.
+        drive: The drive that it names; None for a level, which has that of the scene.
+        level: The level that it names, None for a drive.
+        of: Joints whose figures count; all if empty.
+    """
     metrics = run.metrics()
     joints, tool = metrics["joints"], metrics["tool"]
+    if of:
+        joints = {name: figures for name, figures in joints.items() if name in of}
     if drive is None:  # the softest drive of the scene
-        drives = [t.drive for t in run.assembly.transmissions]
+        drives = [t.drive for t in run.assembly.transmissions if t.joint in joints]
         drive = min(drives, key=lambda d: d.mean_stiffness)
     worst = max(joints, key=lambda j: float(joints[j]["ripple_rms_percent"]))
     ratings = [joint["ratings"] for joint in joints.values()]
@@ -252,7 +300,9 @@ def row_of(
         tool_path_rms_mm=tool["path_rms_mm"],
         tool_ap_mm=tool["ap_mm"],
         tool_rp_mm=tool["rp_mm"],
-        K1_Nm_rad=drive.spec_sheet(("K1_Nm_rad",))["K1_Nm_rad"],
+        K1_Nm_rad=None
+        if level in UNYIELDING
+        else drive.spec_sheet((STIFFNESS,))[STIFFNESS],
         von_mises_MPa=None,
         fatigue_safety_factor=None,
         peak_torque_of_rating=max(
@@ -264,7 +314,9 @@ def row_of(
         real_time_factor=float(run.time[-1] / run.wall),
         joint=worst,
         strongest_order_left_out=tuple(
-            t.joint for t in run.assembly.transmissions if strongest_left_out(t)
+            t.joint
+            for t in run.assembly.transmissions
+            if t.joint in joints and strongest_left_out(t)
         ),
         wall_s=0.0,
         run=run,
@@ -279,6 +331,7 @@ def _error_ripple(run: Run, joints: Mapping[str, Any]) -> float:
     lines = [
         2.0 * float(line["amplitude_arcmin"])
         for j, name in enumerate(run.joints)
+        if name in joints
         for line in joints[name]["transmission_error_orders"]
         if drive_order(run, j, line["order"]) is not None
     ]

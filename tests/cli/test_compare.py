@@ -6,12 +6,19 @@ import json
 import re
 
 import pytest
-from messages import names
+from messages import names, naming
 from rerun.chunk import RrdReader
 from solved import coarse
 
 from swgjoint.cli.main import main
+from swgjoint.errors import InputError
+from swgjoint.models_path import models_path
+from swgjoint.sim.arm_scene import scene_of_arm
+from swgjoint.sim.rigid_arm import RigidArm
+from swgjoint.sim.run import run_scene
+from swgjoint.sim.scene import Scene
 from swgjoint.study.compare import LOWER, UPPER
+from swgjoint.study.compare_scene import joints_named, with_drive
 
 SHORT = ["--set", "simulation.duration_s=1.5", "--set", "trajectory.settle_s=0.3"]
 STIFF, SOFT = "CSG-32-100", "CSG-14-100"
@@ -45,6 +52,67 @@ def test_levels_keep_the_drives_of_the_scene(capsys):
     assert rigid["transmission_error_arcmin"] == 0.0
     assert rigid["transmission_error_ripple_arcmin"] == rigid["torsion_arcmin"] == 0.0
     assert full["torsion_arcmin"] > 0.1
+
+
+@pytest.mark.parametrize("level", ["rigid", "kinematic"])
+def test_what_does_not_yield_has_no_stiffness(level, tmp_path, capsys):
+    """K1 is null and a dash, and keeps any lower limit; the other row keeps its own."""
+    drive = ["--set", f"defaults.drive={STIFF}"]
+    result = found(capsys, level, STIFF, "--limit", "K1_Nm_rad=1e4", *drive)
+    none, stiff = result["rows"]
+    assert none["K1_Nm_rad"] is None and none["missed"] == []
+    assert stiff["K1_Nm_rad"] == pytest.approx(6.7e4, rel=0.02)
+    assert result["kept_by"] == [level, STIFF] and result["passed"] is True
+    assert main(["compare", level, STIFF, *SHORT, *drive]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    header = next(line for line in lines if "K1" in line and "torsion" in line)
+    (row,) = [line for line in lines if line.startswith(f"{level} ")]
+    end = header.index("K1") + 2
+    assert re.split(r"\s{2,}", row[:end].strip())[-1] == "-"
+    assert "real time" not in header
+
+
+def quick_scene(*more):
+    """Two joints that hardly move: the sections of a scene as overrides."""
+    keys = ("simulation.duration_s=0.6", "trajectory.hold_s=0.05", *more)
+    keys += ("trajectory.ramp_s=0.1", "trajectory.settle_s=0.05")
+    return [part for key in keys for part in ("--set", key)]
+
+
+def test_the_drive_replaces_that_of_the_named_joints_alone(capsys):
+    """An arm file is a scene, other joints keep their drive, figures are of the named.
+
+    The joint of the shoulder alone has the torsion of a run in which it has the drive
+    and all others are rigid.
+    """
+    arm = str(models_path() / "arms" / "two-link.xml")
+    joints = RigidArm(arm).joints
+    asked = ["compare", SOFT, STIFF, "--scene", arm, *quick_scene(), "--json"]
+    assert main([*asked, "--joints", joints[0]]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert result["joints"] == [joints[0]]
+    soft, stiff = result["rows"]
+    assert soft["joint"] == stiff["joint"] == joints[0]
+    assert (soft["design"], stiff["design"]) == (SOFT, STIFF)
+    scene = scene_of_arm(arm, overrides=quick_scene()[1::2])
+    before = [scene.of_joint(name).drive for name in joints]
+    changed = with_drive(scene, STIFF, joints[:1])
+    after = [changed.of_joint(name).drive for name in joints]
+    assert after == [STIFF, *before[1:]]
+    by_hand = run_scene(changed).metrics()["joints"][joints[0]]
+    assert stiff["torsion_arcmin"] == abs(by_hand["torsion_arcmin"]["mean"])
+    assert soft["torsion_arcmin"] > 3.0 * stiff["torsion_arcmin"]
+
+
+def test_joints_are_named_by_patterns():
+    """Names, patterns and names without their ending, in the order of the arm."""
+    scene = Scene.load_file("ur5e-sweep")
+    every = RigidArm("ur5e").joints
+    assert joints_named(scene, []) == ()
+    assert joints_named(scene, ["elbow,shoulder_lift"]) == every[1:3]
+    assert joints_named(scene, ["wrist_*", every[0]]) == (every[0], *every[3:])
+    with pytest.raises(InputError, match=naming("sholder_lift", every[1], "'ur5e'")):
+        joints_named(scene, ["sholder_lift"])
 
 
 def test_sorting_puts_the_best_first(capsys):
@@ -86,9 +154,10 @@ def test_the_picture_and_the_report_show_every_argument(tmp_path, capsys):
     assert main(["compare", *arguments, *SHORT]) == 1
     text = capsys.readouterr().out
     assert re.search(f"^{SOFT}: K1_Nm_rad 47.., limit 10000$", text, re.MULTILINE)
-    assert text.count("MISSED") == 2 and text.count("kept") == 1
-    names = ["compare.json", "compare.png", "report.html", "run.rrd"]
-    assert sorted(p.name for p in out.iterdir()) == names
+    assert text.count("MISSED") == 2 and text.count("kept\n") == 1
+    files = ["compare.json", "compare.png", "report.html", "run.rrd"]
+    assert sorted(p.name for p in out.iterdir()) == files
+    assert names(text, "kept by", STIFF)
     entities = {chunk.entity_path for chunk in RrdReader(out / "run.rrd").stream()}
     again = SOFT + r"\ \(again\ 1\)"
     assert {f"/{run}/joint/joint" for run in (SOFT, STIFF, again)} <= entities
@@ -155,8 +224,8 @@ def test_design_has_a_stress_and_a_picture(tmp_path, capsys, monkeypatch):
     (row,) = result["rows"]
     # 321 MPa at 20 N·m on the mesh of the thesis
     assert 280.0 < row["von_mises_MPa"] < 360.0
-    names = ["compare.json", "compare.png", "report.html", "run.rrd"]
-    assert sorted(p.name for p in out.iterdir()) == names
+    files = ["compare.json", "compare.png", "report.html", "run.rrd"]
+    assert sorted(p.name for p in out.iterdir()) == files
 
 
 @pytest.mark.parametrize(
@@ -170,6 +239,22 @@ def test_design_has_a_stress_and_a_picture(tmp_path, capsys, monkeypatch):
         (
             ["CSG-25-100", "--spec", "spec.toml"],
             ("spec.toml", "spec.beauty", "1", "positive", "wall_s"),
+        ),
+        (
+            ["CSG-25-100", "--limit", "tool_rms_mm=0.2"],
+            ("--limit", "tool_rms_mm", "0.2", "mean tool_path_rms_mm"),
+        ),
+        (
+            ["CSG-25-100", "--limit", "torsion_arcmin=-1"],
+            ("--limit", "torsion_arcmin", "-1", "positive"),
+        ),
+        (
+            ["CSG-25-100", "--sort", "tool_rms"],
+            ("--sort", "tool_rms", "mean tool_path_rms_mm"),
+        ),
+        (
+            ["CSG-25-100", "--scene", "ur5e-sweep", "--joint", "sholder_lift"],
+            ("sholder_lift", "'ur5e'", "mean shoulder_lift_joint"),
         ),
     ],
 )
