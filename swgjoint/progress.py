@@ -20,9 +20,14 @@ class StderrProgress:
     The time left follows from the items that were done while this object watched: what
     an interrupted run had already done says nothing about the speed of this one, and a
     single item says nothing at all.
+
+    Args:
+        verbose: Whether every step has a line of its own, with the time since the
+            stage began.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, *, verbose: bool = False) -> None:
+        self._verbose = verbose
         self._stage = ""
         self._start = 0.0
         self._first = 0
@@ -36,6 +41,10 @@ class StderrProgress:
             self.end_line()
             self._stage, self._start, self._first, self._shown = stage, now, done, 0.0
         last = done >= total
+        if self._verbose:
+            spent = now - self._start
+            print(f"{stage}: {done}/{total} after {spent:.1f} s", file=sys.stderr)
+            return
         live = sys.stderr.isatty()
         if not last and now - self._shown < (0.1 if live else 5.0):
             return

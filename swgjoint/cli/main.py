@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import os
 import sys
+import textwrap
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -21,11 +22,11 @@ from typing import Any, NoReturn
 
 from swgjoint import __version__
 from swgjoint.errors import InputError, SwgError
-from swgjoint.progress import StderrProgress
+from swgjoint.progress import StderrProgress, silent
 
 COMMANDS = {
     "demo": "the bundled scene, from finite elements to the recording and a picture",
-    "design": "whether designs can be built; their picture and outlines",
+    "design": "whether designs can be built; pictures, outlines, a new one to scale",
     "profile": "tooth profile of both members: report and picture",
     "meshing": "simulation of meshing with finite elements",
     "map": "build the map of a drive and save it",
@@ -41,6 +42,8 @@ COMMANDS = {
     "bench": "error against run time",
     "advise": "the cheapest level, integrator and step within a wanted error",
     "stability": "stiff and extreme joints: run, cut into sub-steps, or refused",
+    "list": "what is bundled: drives, designs, arms, scenes",
+    "schema": "keys of an input file with unit, range, default and meaning",
     "view": "open a recording",
     "doctor": "versions, engine plugin, cache, optional parts",
 }
@@ -49,6 +52,13 @@ BAD_INPUT = 2
 FAILED = 1
 INTERRUPTED = 130
 BROKEN_PIPE = 141
+STATUSES = (
+    "Exit status: 0 success; 1 a computation failed, or its result misses a limit or is"
+    " not valid; 2 bad input, or a design that cannot be built; 130 interrupted. Errors"
+    " are lines on stderr and leave stdout empty, with --json, too; a result is printed"
+    " whatever its status."
+)
+"""Epilog of every command."""
 
 
 class Parser(argparse.ArgumentParser):
@@ -93,7 +103,8 @@ def _top(arguments: list[str]) -> int:
         prog="swgjoint",
         usage="swgjoint COMMAND ... [--json]",
         description="From the tooth geometry of a strain wave gear to robot behaviour.",
-        epilog=f"commands:\n{listing}\n\n'swgjoint COMMAND --help' shows its options.",
+        epilog=f"commands:\n{listing}\n\n'swgjoint COMMAND --help' shows its options."
+        f"\n\n{textwrap.fill(STATUSES, 88)}",
         formatter_class=argparse.RawDescriptionHelpFormatter,
         allow_abbrev=False,
     )
@@ -123,8 +134,19 @@ def _command(name: str, arguments: list[str]) -> int:
     parser.add_argument(
         "--json", action="store_true", help="one JSON object on stdout, nothing else"
     )
+    loudness = parser.add_mutually_exclusive_group()
+    loudness.add_argument(
+        "--quiet", action="store_true", help="no progress on stderr; warnings stay"
+    )
+    loudness.add_argument(
+        "--verbose",
+        action="store_true",
+        help="every step of the progress as a line of its own",
+    )
+    parser.epilog = f"{parser.epilog or ''} {STATUSES}".strip()
     args = parser.parse_args(arguments)
-    args.progress = progress = StderrProgress()
+    progress = StderrProgress(verbose=args.verbose)
+    args.progress = silent if args.quiet else progress
     try:
         with warnings.catch_warnings(), _ended(progress):
             warnings.showwarning = _show_warning

@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 import time
+import warnings
 from importlib import import_module
 from types import SimpleNamespace
 
@@ -220,6 +221,57 @@ def test_terminal_report(command, capsys):
     out, err = capsys.readouterr()
     assert out == "report of {'size': 3.0}\n"
     assert "stage: 2/2" in err
+
+
+def stages(args):
+    """Work of three steps, two of them too soon after the first to be shown."""
+    for done in (1, 2, 3):
+        args.progress("stage", done, 3)
+    return {}
+
+
+@pytest.mark.parametrize(
+    ("options", "lines"), [([], 2), (["--quiet"], 0), (["--verbose"], 3)]
+)
+@pytest.mark.parametrize("form", [[], ["--json"]])
+def test_progress_is_as_loud_as_asked(command, capsys, options, lines, form):
+    """Every step with --verbose, none with --quiet; stdout is the result alone."""
+    command(stages)
+    assert main(["doctor", *options, *form]) == 0
+    out, err = capsys.readouterr()
+    assert err.count("stage: ") == err.count("\n") == lines
+    assert out.strip() == ("{}" if form else "report of {}")
+
+
+def test_quiet_and_verbose_exclude_each_other(command, capsys):
+    """Both at once is a wrong argument."""
+    command(stages)
+    with pytest.raises(SystemExit) as left:
+        main(["doctor", "--quiet", "--verbose"])
+    assert left.value.code == 2
+    assert names(capsys.readouterr().err, "--quiet", "--verbose")
+
+
+@pytest.mark.filterwarnings("default")
+def test_warnings_stay_when_it_is_quiet(command, capsys):
+    """What bears on the validity of a result is no progress."""
+
+    def work(args):
+        warnings.warn("bodies touch", stacklevel=1)
+        return {}
+
+    command(work)
+    assert main(["doctor", "--quiet"]) == 0
+    assert "bodies touch" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", [None, "run", "sweep"])
+def test_help_states_the_exit_statuses(name, capsys):
+    """0, 1, 2 and 130 with their meaning, and what stdout holds after an error."""
+    with pytest.raises(SystemExit):
+        main([*([name] if name else []), "--help"])
+    text = " ".join(capsys.readouterr().out.split())
+    assert names(text, "Exit status", "0", "1", "2", "130", "stdout empty", "--json")
 
 
 def test_status_of_a_result(command):
