@@ -8,10 +8,11 @@ with the unpacked distributions that ``manifest.toml`` names, each in a folder
 MJCF: included files are written in place. A mesh that collides becomes the box or
 capsule with the inertia of the mesh, smaller where it would touch at the reference
 position or at a keyframe a body that the original does not touch; a mesh that is only
-seen goes. Inertia that came from meshes becomes an explicit ``<inertial>``. Assets
-that are files go, and so do meshes that the distribution downloads later. URDF: shapes that are meshes go; the format states the inertia. All
-else is as its maker wrote it. Every MJCF file is compared with its original: the same
-numbers of all elements, mass matrix and bias forces within 1e-6 at random states.
+seen goes, and so does one that the distribution downloads later. Inertia that came from
+meshes becomes an explicit ``<inertial>``. Assets that are files go. URDF: shapes that
+are meshes go; the format states the inertia. All else is as its maker wrote it. Every
+MJCF file is compared with its original: the same numbers of all elements, mass matrix
+and bias forces within 1e-6 at random states.
 """
 
 from __future__ import annotations
