@@ -1,26 +1,33 @@
-"""Put a drive on a hinge of any MuJoCo model by editing its MjSpec."""
+"""Put drives on hinges of any MuJoCo model by editing its MjSpec."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+import warnings
+from collections.abc import Iterable, Mapping
 
 import mujoco
 import numpy as np
 
 from swgjoint.errors import InputError
 from swgjoint.joint import plugin
-from swgjoint.joint.drive import JointDrive, UnresolvedOrder, prune
-from swgjoint.joint.elements import add_native, add_rotor, add_tendon
-from swgjoint.joint.motors import clear_armature, move_to_rotor
-from swgjoint.joint.native import fit_native
-from swgjoint.joint.obstacles import actuators_on
-from swgjoint.joint.place import check_option, find_place
-from swgjoint.joint.prescribed import kinematic_part, ratio_variation
+from swgjoint.joint.callers import depth_of_caller
+from swgjoint.joint.drive import JointDrive
+from swgjoint.joint.elements import add_native, add_rotor, add_tendon, extend_keys
+from swgjoint.joint.fitting import LEVELS as LEVELS
+from swgjoint.joint.fitting import ROTORS as ROTORS
+from swgjoint.joint.fitting import Fitting, check_spec, fitted
+from swgjoint.joint.motors import clear_armature, misread_sensors, move_to_rotor
+from swgjoint.joint.place import Rotor, check_option, find_places, free_inertias
 from swgjoint.joint.variation import SIZE
+from swgjoint.joint.watch import add_watch, warn_outside
 from swgjoint.maps.drive_map import DriveMap
 
-LEVELS = ("rigid", "kinematic", "linear", "native", "full")
-ROTORS = ("gyroscopic", "lumped")
+INTEGRATORS = ("discrete", "keep")
+_DIVERGES = (
+    mujoco.mjtIntegrator.mjINT_EULER,
+    mujoco.mjtIntegrator.mjINT_IMPLICIT,
+    mujoco.mjtIntegrator.mjINT_IMPLICITFAST,
+)
 
 
 def attach(
@@ -31,11 +38,13 @@ def attach(
     level: str = "full",
     rotor_inertia: float,
     damping_ratio: float | None = None,
-    friction: bool = False,
+    friction: bool = True,
     rotor: str = "gyroscopic",
     variable: bool = False,
     max_input_speed: float | None = None,
     max_phase_step: float = 0.5,
+    integrator: str = "discrete",
+    watch: bool = False,
 ) -> JointDrive:
     """Turn a hinge into the output of a strain wave gear.
 
@@ -55,11 +64,14 @@ def attach(
     actuators. Actuators that act on the joint turn the rotor instead, in the units of
     the joint: the gear g becomes g/i, so that a motor's input is still torque at the
     link and a servo's still the angle of the link, as the motor's encoder tells it, see
-    :func:`~swgjoint.joint.motors.move_to_rotor`. All else stays with the link: damping,
-    friction loss, springs and limits of the joint, tendons, contacts, sensors (those of
-    an actuator are on the motor side, like it). Models that are put together with
-    ``MjSpec.attach`` may have their drives before or after, see
-    :meth:`JointDrive.with_prefix`; integrator and step are those of the outer one.
+    :func:`~swgjoint.joint.motors.move_to_rotor`. A sensor of the joint's actuator
+    torque reads the one actuator of gear 1 that the joint has; where there are several
+    or another gear, it reads the torque at the rotor, and a warning lists it. All else
+    stays with the link: damping, friction loss, springs and limits of the joint,
+    tendons, contacts, sensors (those of an actuator are on the motor side, like it).
+    Models that are put together with ``MjSpec.attach`` may have their drives before or
+    after, see :meth:`JointDrive.with_prefix`; integrator and step are those of the
+    outer one.
 
     With ``friction`` the friction of the map is in the model, too: friction loss and
     damping of the rotor at ``native``; at ``full`` the whole law, with a tendon
@@ -72,10 +84,12 @@ def attach(
         motor.trntype = mujoco.mjtTrn.mjTRN_JOINT
         motor.gear[0] = 1.0 if got.rotor else got.ratio     # rigid: on the joint
 
-    Levels with a rotor replace MuJoCo's default integrator Euler by ``discrete``;
-    another one is kept: RK4 is the reference below its step limit. Under ``discrete``
-    a native spring (``linear``, ``native``) is damped by the step itself, about h w/2
-    of critical at a torsion frequency w; ``full`` is not. Set the timestep first.
+    Levels with a rotor replace the integrators Euler (MuJoCo's default), ``implicit``
+    and ``implicitfast`` by ``discrete``, the latter two with a warning: they take the
+    drive as an explicit force. RK4 is the reference below its step limit and is kept.
+    Under ``discrete`` a native spring (``linear``, ``native``) is damped by the step
+    itself, about h w/2 of critical at a torsion frequency w; ``full`` is not. Set the
+    timestep first.
 
     Args:
         spec: Model to edit.
@@ -95,6 +109,9 @@ def attach(
         max_input_speed: Largest speed of the rotor [rad/s]; harmonics that the step
             cannot carry at it are left out. None keeps all.
         max_phase_step: Largest phase step h n |theta rate| that is kept [rad].
+        integrator: ``discrete`` replaces integrators as said above, ``keep`` none.
+        watch: Whether a step outside the integrator's region is warned of, here and
+            while the model runs; see :mod:`swgjoint.joint.watch`.
 
     Raises:
         InputError: If the joint, the level or a value cannot be used; the spec is
@@ -102,126 +119,196 @@ def attach(
         ComputationError: If the plugin cannot be loaded or the engine does not take
             its metric.
     """
-    if level not in LEVELS:
-        raise InputError(f"level {level!r} unknown; accepted: {', '.join(LEVELS)}")
-    _positive("rotor_inertia", rotor_inertia, "kg·m²")
-    if rotor not in ROTORS:
-        raise InputError(f"rotor {rotor!r} unknown; accepted: {', '.join(ROTORS)}")
-    if damping_ratio is None:
-        damping_ratio = drive.damping_ratio
-    if not (np.isfinite(damping_ratio) and 0.0 <= damping_ratio < 1.0):
-        raise InputError(
-            f"damping_ratio {damping_ratio} of {joint!r}; accepted: 0 to 1"
-        )
-    if max_input_speed is not None:
-        _positive("max_input_speed", max_input_speed, "rad/s")
-    _positive("max_phase_step", max_phase_step, "rad")
-    has_rotor = level not in ("rigid", "kinematic")
-    if has_rotor:
-        check_option(spec, level)
-    place = find_place(spec, joint, rotor_inertia)
+    fitting = Fitting(
+        drive=drive,
+        rotor_inertia=rotor_inertia,
+        level=level,
+        damping_ratio=damping_ratio,
+        friction=friction,
+        rotor=rotor,
+        variable=variable,
+        max_input_speed=max_input_speed,
+        max_phase_step=max_phase_step,
+    )
+    return attach_all(spec, {joint: fitting}, integrator=integrator, watch=watch)[joint]
 
-    if not friction:
-        drive = replace(drive, friction=None)
-    ratio = drive.ratio
-    stiffness = drive.mean_stiffness
-    reflected = ratio**2 * rotor_inertia
-    reduced = reflected * place.inertia / (reflected + place.inertia)
-    damping = 2.0 * damping_ratio * float(np.sqrt(stiffness * reduced))
-    unresolved: tuple[UnresolvedOrder, ...] = ()
-    if level == "full":
-        plugin.load()
-        if spec.option.integrator in (
-            mujoco.mjtIntegrator.mjINT_EULER,
-            mujoco.mjtIntegrator.mjINT_DISCRETE,
-        ):
-            plugin.require_metric()
-    if level == "kinematic":
-        drive = kinematic_part(drive)
-    if level in ("kinematic", "full") and max_input_speed is not None:
-        drive, unresolved = prune(
-            drive,
-            timestep=float(spec.option.timestep),
-            max_input_speed=max_input_speed,
-            max_phase_step=max_phase_step,
-        )
-    if level == "kinematic" and not ratio_variation(drive) < 1.0:
+
+def attach_all(
+    spec: mujoco.MjSpec,
+    fittings: Mapping[str, Fitting],
+    *,
+    integrator: str = "discrete",
+    watch: bool = False,
+) -> dict[str, JointDrive]:
+    """Give several hinges their drives at once.
+
+    The result is that of :func:`attach` joint by joint in the order of the model, for
+    the price of one compilation, or two where keyframes state positions.
+
+    Args:
+        spec: Model to edit.
+        fittings: What a joint gets, by its name.
+        integrator: See :func:`attach`.
+        watch: See :func:`attach`.
+
+    Returns:
+        What each joint has, in the order of the model.
+
+    Raises:
+        InputError: If a joint or a value cannot be used, a line for each joint; the
+            spec is then unchanged.
+        ComputationError: If the plugin cannot be loaded or the engine does not take
+            its metric.
+    """
+    check_spec(spec)
+    if integrator not in INTEGRATORS:
         raise InputError(
-            f"map {drive.name!r}: its kinematic error turns the ratio by up to"
-            f" {ratio_variation(drive):.3g} of itself; accepted at level kinematic:"
-            " below 1"
+            f"integrator {integrator!r}; accepted: {', '.join(INTEGRATORS)}"
         )
-    spring = fit_native(drive) if level == "native" else None
+    for name, fitting in fittings.items():
+        fitting.check(name)
+    if not fittings:
+        return {}
+    kept = mujoco.mjtIntegrator(spec.option.integrator)
+    used = kept
+    if any(fitting.has_rotor for fitting in fittings.values()):
+        if integrator == "discrete" and kept in _DIVERGES:
+            used = mujoco.mjtIntegrator.mjINT_DISCRETE
+        check_option(spec, used)
+
+    compiled, places = find_places(
+        spec, {name: fitting.rotor_inertia for name, fitting in fittings.items()}
+    )
+    timestep = float(spec.option.timestep)
+    drives = {
+        name: fitted(name, fittings[name], place, timestep=timestep)
+        for name, place in places.items()
+    }
+    if any(drive.plugin for drive in drives.values()):
+        plugin.load()
+        if used == mujoco.mjtIntegrator.mjINT_DISCRETE:
+            plugin.require_metric()
+    rotors = {
+        name: Rotor(
+            inertia=drive.rotor_inertia,
+            ratio=drive.ratio,
+            lumped=fittings[name].rotor == "lumped",
+            own=drive.rotor is not None,
+        )
+        for name, drive in drives.items()
+    }
+    free = free_inertias(compiled, places, rotors)
+    measured = compiled.around.measured
+    moved = {name: places[name] for name, rotor in rotors.items() if rotor.own}
+    texts = _configs(drives.values())
+
+    # warnings first: as errors they leave the spec unchanged
+    _warn_of_integrator(kept, used)
+    _warn_of_sensors(misread_sensors(moved, measured), drives)
+    if watch:
+        warn_outside(drives.values(), timestep=timestep, integrator=used)
 
     # nothing can fail from here on: the spec is edited whole or not at all
-    names: dict[str, str | None] = {"rotor": None, "tendon": None, "plugin": None}
-    hysteresis: tuple[str, ...] = ()
-    motors = tuple(a.name for a in actuators_on(spec, joint).values())
-    clear_armature(spec, joint)
-    if not has_rotor:
-        place.joint.armature = reflected
-        damping = 0.0
-    else:
-        names["rotor"] = hinge = f"{joint}_rotor"
-        names["tendon"] = tendon = f"{joint}_drive"
-        lumped = rotor == "lumped"
-        body = add_rotor(spec, place, hinge, rotor_inertia, ratio, lumped=lumped)
-        move_to_rotor(spec, place, spec.joint(hinge), ratio=ratio, reflected=reflected)
-        if level == "linear":
-            add_tendon(
-                spec, tendon, hinge, joint, ratio, (stiffness, 0.0, 0.0), damping
-            )
-        elif spring is not None:
-            hysteresis = add_native(spec, spring, tendon, hinge, joint, ratio, damping)
+    if texts:
+        spec.activate_plugin(plugin.NAME)
+    for name, drive in drives.items():
+        place, rotor = places[name], rotors[name]
+        clear_armature(place)
+        if not rotor.own:
+            place.joint.armature = rotor.reflected
+            continue
+        assert drive.rotor is not None
+        body, hinge = add_rotor(spec, place, drive.rotor, rotor)
+        move_to_rotor(
+            place,
+            hinge,
+            ratio=drive.ratio,
+            reflected=rotor.reflected,
+            free=free.get(name),
+            measured=measured,
+        )
+        if drive.level == "linear":
+            pair = hinge.name, name, drive.ratio
+            polynomial = drive.stiffness, 0.0, 0.0
+            add_tendon(spec, str(drive.tendon), *pair, polynomial, drive.damping)
+        elif drive.native is not None:
+            add_native(spec, drive, drive.native, hinge)
         else:
-            names["plugin"] = tendon
-            add_tendon(spec, tendon, hinge, joint, ratio, plugin.TENDON_STIFFNESS, 0.0)
-            spec.activate_plugin(plugin.NAME)
-            instance = spec.add_plugin(
-                name=tendon, plugin_name=plugin.NAME, active=True
-            )
-            instance.config = plugin.config(drive, damping=damping)
-            # an instance that no body refers to is lost when a spec is copied
-            body.plugin = instance
-            body.plugin.name = tendon
-            body.plugin.plugin_name = plugin.NAME
-            body.plugin.active = True
-            if variable:
-                spec.tendon(tendon).userdata = np.zeros(SIZE)
-                if spec.nuser_tendon >= 0:
-                    spec.nuser_tendon = max(spec.nuser_tendon, SIZE)
-            if drive.friction is not None:
-                add_tendon(
-                    spec,
-                    f"{joint}_friction",
-                    hinge,
-                    joint,
-                    ratio,
-                    plugin.FRICTION_STIFFNESS,
-                    0.0,
-                    coefficients=drive.friction_direction,
-                )
-        if spec.option.integrator == mujoco.mjtIntegrator.mjINT_EULER:
-            spec.option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
-    return JointDrive(
-        joint=joint,
-        rotor=names["rotor"],
-        tendon=names["tendon"],
-        plugin=names["plugin"],
-        level=level,
-        ratio=ratio,
-        rotor_inertia=float(rotor_inertia),
-        link_inertia=place.inertia,
-        stiffness=stiffness,
-        damping=damping,
-        drive=drive,
-        unresolved=unresolved,
-        native=spring,
-        hysteresis=hysteresis,
-        motors=motors,
+            _add_plugin(spec, drive, body, texts[name])
+    spec.option.integrator = used
+    extend_keys(spec, drives.values())
+    if watch:
+        add_watch(spec, drives.values())
+    return drives
+
+
+def _configs(drives: Iterable[JointDrive]) -> dict[str, dict[str, str]]:
+    """Attributes of the plugin's instances by joint, those of a map written once."""
+    texts: dict[int, dict[str, str]] = {}
+    found = {}
+    for drive in drives:
+        if drive.plugin is None:
+            continue
+        key = id(drive.drive)
+        if key not in texts:
+            texts[key] = plugin.config(drive.drive, damping=drive.damping)
+        found[drive.joint] = texts[key] | {"damping": repr(float(drive.damping))}
+    return found
+
+
+def _add_plugin(
+    spec: mujoco.MjSpec, drive: JointDrive, body: mujoco.MjsBody, text: dict[str, str]
+) -> None:
+    """Instance of the engine plugin with the tendons that carry its metric."""
+    assert drive.plugin is not None and drive.rotor is not None
+    pair = drive.rotor, drive.joint, drive.ratio
+    tendon = add_tendon(spec, drive.plugin, *pair, plugin.TENDON_STIFFNESS, 0.0)
+    instance = spec.add_plugin(name=drive.plugin, plugin_name=plugin.NAME, active=True)
+    instance.config = text
+    # an instance that no body refers to is lost when a spec is copied
+    body.plugin = instance
+    body.plugin.name = drive.plugin
+    body.plugin.plugin_name = plugin.NAME
+    body.plugin.active = True
+    if drive.variable:
+        tendon.userdata = np.zeros(SIZE)
+        if spec.nuser_tendon >= 0:
+            spec.nuser_tendon = max(spec.nuser_tendon, SIZE)
+    if drive.drive.friction is not None:
+        add_tendon(
+            spec,
+            f"{drive.joint}_friction",
+            *pair,
+            plugin.FRICTION_STIFFNESS,
+            0.0,
+            coefficients=drive.drive.friction_direction,
+        )
+
+
+def _warn_of_integrator(kept: mujoco.mjtIntegrator, used: mujoco.mjtIntegrator) -> None:
+    """Say that an integrator was replaced; MuJoCo's default, Euler, goes silently."""
+    if used == kept or kept == mujoco.mjtIntegrator.mjINT_EULER:
+        return
+    name = kept.name.removeprefix("mjINT_").lower()
+    warnings.warn(
+        f"integrator {name} replaced by discrete: {name} takes a drive as an explicit"
+        " force and diverges; integrator='keep' keeps it, RK4 is kept as the reference",
+        stacklevel=depth_of_caller(),
     )
 
 
-def _positive(name: str, value: float, unit: str) -> None:
-    if not (np.isfinite(value) and value > 0.0):
-        raise InputError(f"{name} {value} {unit}; accepted: a finite number > 0")
+def _warn_of_sensors(
+    sensors: Mapping[str, str], drives: Mapping[str, JointDrive]
+) -> None:
+    """List sensors of joint torque that read the motor's side from now on."""
+    if not sensors:
+        return
+    factors = ", ".join(
+        f"{sensor!r} (times {drives[joint].ratio:g} for joint {joint!r})"
+        for sensor, joint in sensors.items()
+    )
+    warnings.warn(
+        f"sensors of joint torque read the torque at the rotor from now on: {factors};"
+        " the torque on the link itself: JointDrive.observe(model, data).torque",
+        stacklevel=depth_of_caller(),
+    )

@@ -76,6 +76,8 @@ class JointDrive:
     """Tendons of the Jenkin elements of ``native``, in the order of the map's."""
     motors: tuple[str, ...] = ()
     """Actuators that the model had on the joint; with a rotor they turn that."""
+    variable: bool = False
+    """Whether the model has numbers by which the drive may deviate from its map."""
 
     def with_prefix(self, prefix: str) -> JointDrive:
         """The same drive in a model that ``MjSpec.attach`` took in under a prefix."""

@@ -2,24 +2,29 @@
 
 from __future__ import annotations
 
-import warnings
+from collections.abc import Mapping
 from typing import Any
 
 import mujoco
 import numpy as np
 
-from swgjoint.joint.obstacles import actuators_on
 from swgjoint.joint.place import Place
 
 
-def clear_armature(spec: mujoco.MjSpec, joint: str) -> None:
+def clear_armature(place: Place) -> None:
     """Let the rotor of the drive be the only one; actuators may bring theirs."""
-    for actuator in actuators_on(spec, joint).values():
+    for actuator in place.actuators.values():
         actuator.armature = 0.0
 
 
 def move_to_rotor(
-    spec: mujoco.MjSpec, place: Place, rotor: Any, *, ratio: float, reflected: float
+    place: Place,
+    rotor: Any,
+    *,
+    ratio: float,
+    reflected: float,
+    free: tuple[float, float] | None,
+    measured: set[str],
 ) -> None:
     r"""Let the actuators of a joint turn its rotor, in the units of the joint.
 
@@ -31,46 +36,88 @@ def move_to_rotor(
 
     What the compiler would take from the joint is written out: the range of
     ``inheritrange``, and the damping of ``dampratio`` for the inertia of rotor and
-    link on a rigid drive.
+    link on a rigid drive. Sensors of the joint's actuator torque follow, see
+    :func:`torque_is_actuators`.
 
     Args:
-        spec: Model to edit.
         place: Of the joint.
         rotor: Hinge of the rotor.
         ratio: Of the drive, signed.
         reflected: Inertia of the rotor at the joint, i²J [kg·m²].
+        free: See :func:`swgjoint.joint.place.free_inertias`; None without a damping
+            ratio.
+        measured: Actuators whose force a sensor of the file reads.
     """
     joint, model = place.joint, place.model
-    found = actuators_on(spec, joint.name)
-    for k, actuator in found.items():
+    exact = torque_is_actuators(place, measured)
+    for k, actuator in place.actuators.items():
         if actuator.inheritrange > 0.0:
             actuator.inheritrange = 0.0
             actuator.ctrlrange = model.actuator_ctrlrange[model.actuator_ctrladr[k]]
             actuator.actrange = model.actuator_actrange[k]
         damping = float(model.actuator_biasprm[k, 2])
         if actuator.biasprm[2] > 0.0 > damping:  # a damping ratio to the compiler
-            now = place.free_inertia - place.armature + reflected
-            actuator.biasprm[2] = damping * np.sqrt(now / place.free_inertia)
+            assert free is not None
+            actuator.biasprm[2] = damping * np.sqrt((free[1] + reflected) / free[0])
         # the engine reflects all three by the square of the gear
         actuator.damping = actuator.damping / np.abs(ratio) ** np.arange(3.0)
         actuator.gear[0] /= ratio
         actuator.target = rotor.name
-    if model.jnt_actfrclimited[place.index]:
-        limits = model.jnt_actfrcrange[place.index] / ratio
-        rotor.actfrclimited = mujoco.mjtLimited.mjLIMITED_TRUE
-        rotor.actfrcrange = np.sort(limits)
+    limited = bool(model.jnt_actfrclimited[place.index])
+    if limited:
         joint.actfrclimited = mujoco.mjtLimited.mjLIMITED_FALSE
-    if found:
-        _warn_of_sensors(spec, joint.name)
+    if exact:
+        [(k, actuator)] = place.actuators.items()
+        actuator.name = actuator.name or rotor.name
+        if limited:
+            actuator.forcelimited = mujoco.mjtLimited.mjLIMITED_TRUE
+            actuator.forcerange = _common_range(place, k)
+    elif limited:
+        rotor.actfrclimited = mujoco.mjtLimited.mjLIMITED_TRUE
+        rotor.actfrcrange = np.sort(model.jnt_actfrcrange[place.index] / ratio)
+    for sensor in place.sensors if place.actuators else ():
+        if exact:
+            sensor.type = mujoco.mjtSensor.mjSENS_ACTUATORFRC
+            sensor.objtype = mujoco.mjtObj.mjOBJ_ACTUATOR
+            sensor.objname = actuator.name
+        else:
+            sensor.objname = rotor.name
 
 
-def _warn_of_sensors(spec: mujoco.MjSpec, joint: str) -> None:
-    for sensor in spec.sensors:
-        on_joint = sensor.type == mujoco.mjtSensor.mjSENS_JOINTACTFRC
-        if on_joint and sensor.objname == joint:
-            warnings.warn(
-                f"sensor {sensor.name!r} reads the torque of actuators at joint"
-                f" {joint!r}, where none acts any more; use an actuatorfrc sensor or"
-                " JointDrive.observe",
-                stacklevel=4,
-            )
+def torque_is_actuators(place: Place, measured: set[str]) -> bool:
+    """Whether sensors of the joint's actuator torque can read an actuator instead.
+
+    That is so for a single actuator of gear 1, whose force is the torque; a limit of
+    the joint's actuator torque then becomes one of that force, unless another sensor
+    reads what the force was without it.
+    """
+    if not place.sensors or len(place.actuators) != 1:
+        return False
+    [(k, actuator)] = place.actuators.items()
+    model = place.model
+    if model.actuator_gear[k, 0] != 1.0:
+        return False
+    if not model.jnt_actfrclimited[place.index]:
+        return True
+    low, high = _common_range(place, k)
+    return actuator.name not in measured and bool(low < high)
+
+
+def _common_range(place: Place, k: int) -> Any:
+    """Range of an actuator's force within that of the joint's [N·m]."""
+    model = place.model
+    joint = model.jnt_actfrcrange[place.index]
+    if not model.actuator_forcelimited[k]:
+        return joint.copy()
+    low, high = model.actuator_forcerange[k]
+    return np.array([max(low, joint[0]), min(high, joint[1])])
+
+
+def misread_sensors(places: Mapping[str, Place], measured: set[str]) -> dict[str, str]:
+    """Sensors of joint torque that will read the motor's side, with their joint."""
+    return {
+        sensor.name or f"of joint {name}": name
+        for name, place in places.items()
+        if place.actuators and not torque_is_actuators(place, measured)
+        for sensor in place.sensors
+    }

@@ -2,129 +2,174 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
+from collections.abc import Iterable
+from difflib import get_close_matches
 from typing import Any
 
 import mujoco
 
 from swgjoint.errors import InputError
+from swgjoint.maps.hysteresis import MAX_ELEMENTS
 
 ON_JOINT = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)
 
 
-def driven_joint(spec: mujoco.MjSpec, name: str) -> Any:
-    """The hinge of that name, free to take a drive.
+class Surroundings:
+    """What a spec has at its joints, read once for any number of drives."""
 
-    Raises:
-        InputError: If there is none, or it is held or driven by something else.
-    """
-    found = spec.joint(name)
-    if found is None:
-        known = ", ".join(j.name for j in spec.joints if j.name) or "none"
-        raise InputError(f"joint {name!r} is not in the model; its joints: {known}")
-    if found.type != mujoco.mjtJoint.mjJNT_HINGE:
-        kind = mujoco.mjtJoint(found.type).name.removeprefix("mjJNT_").lower()
-        raise InputError(f"joint {name!r} is a {kind} joint; a drive needs a hinge")
-    _check_driven(spec, name)
-    _check_names(spec, name)
-    body = found.parent
-    if body.joints[0].name != name:
-        raise InputError(
-            f"joint {name!r} is not the first joint of body {body.name!r}; give it a "
-            "body of its own"
-        )
-    _check_equalities(spec, name)
-    _check_actuators(spec, name)
-    return found
+    def __init__(self, spec: mujoco.MjSpec) -> None:
+        self.joints: dict[str, Any] = {j.name: j for j in spec.joints if j.name}
+        bodies = list(spec.bodies)
+        self.bodies: set[str] = {body.name for body in bodies}
+        self.gravcomp = any(body.gravcomp for body in bodies)
+        self.plugins: set[str] = {instance.name for instance in spec.plugins}
+        self.tendons: dict[str, Any] = {}
+        self.wrapped: dict[str, list[str]] = {}
+        """Joints of the fixed tendons, by tendon."""
+        for tendon in spec.tendons:
+            self.tendons[tendon.name] = tendon
+            self.wrapped[tendon.name] = [
+                wrap.target.name
+                for wrap in tendon.path
+                if wrap.type == mujoco.mjtWrap.mjWRAP_JOINT
+            ]
+        self.actuators: dict[str, dict[int, Any]] = defaultdict(dict)
+        """Actuators that act on a joint, by their place in the model, by joint."""
+        self.pulled: dict[str, tuple[Any, str]] = {}
+        """Actuator and tendon that move a joint, by joint."""
+        self.held: dict[str, str] = {}
+        """Why an equality leaves a joint no freedom, by joint."""
+        self.sensors: dict[str, list[Any]] = defaultdict(list)
+        """Sensors of the torque of actuators, by joint."""
+        self.measured: set[str] = set()
+        """Actuators whose force a sensor reads."""
+        for k, actuator in enumerate(spec.actuators):
+            if actuator.trntype in ON_JOINT:
+                self.actuators[actuator.target][k] = actuator
+            elif actuator.trntype == mujoco.mjtTrn.mjTRN_TENDON:
+                for joint in self.wrapped.get(actuator.target, ()):
+                    self.pulled.setdefault(joint, (actuator, actuator.target))
+        for equality in spec.equalities:
+            self._hold(equality)
+        for sensor in spec.sensors:
+            if sensor.type == mujoco.mjtSensor.mjSENS_JOINTACTFRC:
+                self.sensors[sensor.objname].append(sensor)
+            elif sensor.type == mujoco.mjtSensor.mjSENS_ACTUATORFRC:
+                self.measured.add(sensor.objname)
 
-
-def actuators_on(spec: mujoco.MjSpec, joint: str) -> dict[int, Any]:
-    """Actuators that act on a joint, by their place in the model."""
-    return {
-        k: actuator
-        for k, actuator in enumerate(spec.actuators)
-        if actuator.trntype in ON_JOINT and actuator.target == joint
-    }
-
-
-def _is_drive(spec: mujoco.MjSpec, joint: str) -> bool:
-    """Whether a tendon of :func:`attach` ties the joint to its rotor."""
-    tendon = spec.tendon(f"{joint}_drive")
-    return tendon is not None and {f"{joint}_rotor", joint} == set(_wrapped(tendon))
-
-
-def _wrapped(tendon: Any) -> list[str]:
-    """Joints of a fixed tendon."""
-    return [w.target.name for w in tendon.path if w.type == mujoco.mjtWrap.mjWRAP_JOINT]
-
-
-def _check_driven(spec: mujoco.MjSpec, name: str) -> None:
-    if _is_drive(spec, name):
-        raise InputError(f"joint {name!r} has a drive already")
-    if name.endswith("_rotor") and _is_drive(spec, name.removesuffix("_rotor")):
-        raise InputError(
-            f"joint {name!r} is the rotor of a drive; a drive goes on the joint"
-            f" {name.removesuffix('_rotor')!r} of its link, which has one"
-        )
-
-
-def _check_names(spec: mujoco.MjSpec, name: str) -> None:
-    rotor = f"{name}_rotor"
-    taken = {"body": spec.body(rotor), "joint": spec.joint(rotor)}
-    for kind, element in taken.items():
-        if element is not None:
-            raise InputError(_clash(name, kind, rotor))
-    for tendon in spec.tendons:
-        rest = tendon.name.removeprefix(f"{name}_")
-        if rest != tendon.name and (
-            rest in ("drive", "friction") or rest.startswith("hysteresis")
-        ):
-            raise InputError(_clash(name, "tendon", tendon.name))
-    if any(instance.name == f"{name}_drive" for instance in spec.plugins):
-        raise InputError(_clash(name, "plugin instance", f"{name}_drive"))
-
-
-def _clash(joint: str, kind: str, taken: str) -> str:
-    return (
-        f"joint {joint!r}: its drive would be called {taken!r}, as a {kind} of the"
-        " model is already; rename that one"
-    )
-
-
-def _check_equalities(spec: mujoco.MjSpec, name: str) -> None:
-    for equality in spec.equalities:
+    def _hold(self, equality: Any) -> None:
         if not equality.active:
-            continue
-        if equality.type == mujoco.mjtEq.mjEQ_JOINT and equality.name1 == name:
+            return
+        if equality.type == mujoco.mjtEq.mjEQ_JOINT:
+            name = equality.name1
             does = f"follows {equality.name2!r}" if equality.name2 else "is locked"
-            raise InputError(
+            why = (
                 f"joint {name!r} {does} by equality {equality.name!r}, against which a"
                 " drive would work; accepted: the joint that leads, or an equality"
                 " that is not active"
             )
+            self.held.setdefault(name, why)
         if equality.type == mujoco.mjtEq.mjEQ_TENDON:
             for end in (equality.name1, equality.name2):
-                tendon = spec.tendon(end) if end else None
-                if tendon is not None and name in _wrapped(tendon):
-                    raise InputError(
+                for name in self.wrapped.get(end, ()) if end else ():
+                    why = (
                         f"joint {name!r} is held by equality {equality.name!r} of"
                         f" tendon {end!r}, against which a drive would work; accepted:"
                         " an equality that is not active"
                     )
+                    self.held.setdefault(name, why)
 
+    def known(self, name: str, joints: Iterable[str] | None = None) -> str:
+        """The joints that there are, or of many the nearest names."""
+        names = list(self.joints if joints is None else joints)
+        if len(names) > 20:
+            near = get_close_matches(name, names, n=5, cutoff=0.3)
+            if near:
+                return f"nearest of its {len(names)} joints: {', '.join(near)}"
+        return f"its joints: {', '.join(names) or 'none'}"
 
-def _check_actuators(spec: mujoco.MjSpec, name: str) -> None:
-    for actuator in actuators_on(spec, name).values():
-        if actuator.dyntype == mujoco.mjtDyn.mjDYN_MUSCLE:
+    def has_drive(self, joint: str) -> bool:
+        """Whether a tendon of :func:`attach` ties the joint to its rotor."""
+        return {f"{joint}_rotor", joint} == set(self.wrapped.get(f"{joint}_drive", ()))
+
+    def is_rotor(self, joint: str) -> bool:
+        """Whether the joint is the rotor of a drive."""
+        link = joint.removesuffix("_rotor")
+        return link != joint and self.has_drive(link)
+
+    def driven_joint(self, name: str) -> Any:
+        """The hinge of that name, free to take a drive.
+
+        Raises:
+            InputError: If there is none, or it is held or driven by something else.
+        """
+        found = self.joints.get(name)
+        if found is None:
+            raise InputError(f"joint {name!r} is not in the model; {self.known(name)}")
+        if found.type != mujoco.mjtJoint.mjJNT_HINGE:
+            kind = mujoco.mjtJoint(found.type).name.removeprefix("mjJNT_").lower()
+            raise InputError(f"joint {name!r} is a {kind} joint; a drive needs a hinge")
+        self._check_driven(name)
+        self._check_names(name)
+        body = found.parent
+        if body.joints[0].name != name:
             raise InputError(
-                f"joint {name!r} is moved by muscle {actuator.name!r}, which is no"
-                " motor; a drive needs another actuator or none"
+                f"joint {name!r} is not the first joint of body {body.name!r}; give it"
+                " a body of its own"
             )
-    for actuator in spec.actuators:
-        if actuator.trntype != mujoco.mjtTrn.mjTRN_TENDON:
-            continue
-        tendon = spec.tendon(actuator.target)
-        if tendon is not None and name in _wrapped(tendon):
+        if found.actgravcomp and self.gravcomp:
+            raise InputError(
+                f"joint {name!r} has actuatorgravcomp, a torque on the link past the"
+                " drive; accepted: false"
+            )
+        if name in self.held:
+            raise InputError(self.held[name])
+        self._check_actuators(name)
+        return found
+
+    def _check_driven(self, name: str) -> None:
+        if self.has_drive(name):
+            raise InputError(f"joint {name!r} has a drive already")
+        if self.is_rotor(name):
+            raise InputError(
+                f"joint {name!r} is the rotor of a drive; a drive goes on the joint"
+                f" {name.removesuffix('_rotor')!r} of its link, which has one"
+            )
+
+    def _check_names(self, name: str) -> None:
+        rotor, drive = f"{name}_rotor", f"{name}_drive"
+        taken = [
+            ("body", rotor, rotor in self.bodies),
+            ("joint", rotor, rotor in self.joints),
+            ("plugin instance", drive, drive in self.plugins),
+            *(
+                ("tendon", tendon, tendon in self.tendons)
+                for tendon in (drive, f"{name}_friction")
+            ),
+            *(
+                ("tendon", tendon, True)
+                for k in range(MAX_ELEMENTS)
+                if (tendon := f"{name}_hysteresis{k}") in self.tendons
+            ),
+        ]
+        for kind, element, is_taken in taken:
+            if is_taken:
+                raise InputError(
+                    f"joint {name!r}: its drive would be called {element!r}, as a"
+                    f" {kind} of the model is already; rename that one"
+                )
+
+    def _check_actuators(self, name: str) -> None:
+        for actuator in self.actuators.get(name, {}).values():
+            if actuator.dyntype == mujoco.mjtDyn.mjDYN_MUSCLE:
+                raise InputError(
+                    f"joint {name!r} is moved by muscle {actuator.name!r}, which is no"
+                    " motor; a drive needs another actuator or none"
+                )
+        if name in self.pulled:
+            actuator, tendon = self.pulled[name]
             raise InputError(
                 f"joint {name!r} is moved by actuator {actuator.name!r} through tendon"
-                f" {tendon.name!r}, past a drive; accepted: an actuator on the joint"
+                f" {tendon!r}, past a drive; accepted: an actuator on the joint"
             )

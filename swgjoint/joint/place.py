@@ -1,9 +1,11 @@
-"""Whether and where a model takes a drive: the checks before a spec is edited."""
+"""Where drives go: the checks before a spec is edited, from one compiled copy of it."""
 
 from __future__ import annotations
 
 import warnings
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import mujoco
@@ -11,63 +13,206 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.errors import InputError
-from swgjoint.joint.obstacles import actuators_on, driven_joint
+from swgjoint.joint.callers import depth_of_caller
+from swgjoint.joint.obstacles import Surroundings
+
+Array = NDArray[np.float64]
+
+ROTOR_MASS = 1e-9
+"""Mass of the rotor body [kg]; the arm's model already holds the motor's mass."""
+LUMPED_INERTIA = 1e-12
+"""Of the body of a lumped rotor [kg·m²]: the engine wants some."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Place:
     """Where a joint stands in the compiled model."""
 
     joint: Any
     parent: Any
     model: mujoco.MjModel
-    """The model before the drive."""
+    """The model before any drive."""
     index: int
     """Of the joint in it."""
-    pos: NDArray[np.float64]
-    quat: NDArray[np.float64]
-    axis: NDArray[np.float64]
+    actuators: dict[int, Any]
+    """Those that act on the joint, by their place in the model."""
+    sensors: tuple[Any, ...]
+    """Those of the torque of actuators at the joint."""
+    pos: Array
+    quat: Array
+    axis: Array
     ref: float
     armature: float
     """Of the joint and of the actuators on it [kg·m²]."""
     inertia: float
     """At qpos0, the other joints held, without armature [kg·m²]."""
-    free_inertia: float
-    """At qpos0, the other joints free, with armature [kg·m²]."""
+    has_damping_ratio: bool
+    """Whether an actuator on the joint states its damping as a ratio."""
 
 
-def check_option(spec: mujoco.MjSpec, level: str) -> None:
+class Compiled:
+    """A compiled copy of a spec at qpos0, from which places are read."""
+
+    def __init__(self, spec: mujoco.MjSpec, around: Surroundings) -> None:
+        copy = spec.copy()
+        copy.compiler.fusestatic = False  # keeps every body where the spec has it
+        try:
+            self.model = copy.compile()
+        except ValueError as error:
+            line = " ".join(str(error).split())
+            raise InputError(f"the model does not compile: {line}") from error
+        self.around = around
+        self.data = mujoco.MjData(self.model)
+        mujoco.mj_forward(self.model, self.data)
+
+    @cached_property
+    def mass(self) -> Array:
+        """Mass matrix with armature. Shape (nv, nv)."""
+        mass = np.zeros((self.model.nv, self.model.nv))
+        mujoco.mj_fullM(self.model, self.data, mass)
+        return mass
+
+    def place(self, joint: Any) -> Place:
+        """Where a hinge that can take a drive stands."""
+        model, name = self.model, joint.name
+        j = int(model.joint(name).id)
+        b, dof = int(model.jnt_bodyid[j]), int(model.jnt_dofadr[j])
+        actuators = dict(self.around.actuators.get(name, {}))
+        k = list(actuators)
+        armature = float(model.dof_armature[dof]) + float(
+            model.actuator_armature[k] @ model.actuator_gear[k, 0] ** 2
+        )
+        offset = np.zeros(3)
+        mujoco.mju_rotVecQuat(offset, model.jnt_pos[j], model.body_quat[b])
+        return Place(
+            joint=joint,
+            parent=joint.parent.parent,
+            model=model,
+            index=j,
+            actuators=actuators,
+            sensors=tuple(self.around.sensors.get(name, ())),
+            pos=model.body_pos[b] + offset,
+            quat=model.body_quat[b].copy(),
+            axis=model.jnt_axis[j].copy(),
+            ref=float(model.qpos0[model.jnt_qposadr[j]]),
+            armature=armature,
+            inertia=float(self.mass[dof, dof]) - armature,
+            has_damping_ratio=any(
+                actuators[i].biasprm[2] > 0.0 > model.actuator_biasprm[i, 2] for i in k
+            ),
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rotor:
+    """The rotor that a joint will have."""
+
+    inertia: float
+    """About its axis [kg·m²]."""
+    ratio: float
+    lumped: bool
+    own: bool
+    """Whether it has a joint of its own; else it is armature of the link's."""
+
+    @property
+    def body(self) -> float:
+        """Inertia that turns with the body that carries it, about any axis [kg·m²]."""
+        return min(LUMPED_INERTIA, 1e-3 * self.inertia) if self.lumped else self.inertia
+
+    @property
+    def reflected(self) -> float:
+        """At the link, i²J [kg·m²]."""
+        return self.ratio**2 * self.inertia
+
+
+def free_inertias(
+    compiled: Compiled, places: Mapping[str, Place], rotors: Mapping[str, Rotor]
+) -> dict[str, tuple[float, float]]:
+    """Inertia about joints with the others free, before any drive and with the rest.
+
+    The second has the drives of the joints before it in the model and neither drive
+    nor armature of its own. Only joints whose actuators state a damping ratio are
+    listed.
+
+    Args:
+        compiled: Model without drives.
+        places: By joint, in the order of the model.
+        rotors: The same joints.
+    """
+    if not any(place.has_damping_ratio for place in places.values()):
+        return {}
+    model, data = compiled.model, compiled.data
+    mass, found = compiled.mass.copy(), {}
+    before = np.linalg.inv(mass).diagonal()
+    for name, place in places.items():
+        dof, rotor = int(model.jnt_dofadr[place.index]), rotors[name]
+        if place.has_damping_ratio:
+            now = 1.0 / float(np.linalg.inv(mass)[dof, dof]) - place.armature
+            found[name] = 1.0 / float(before[dof]), now
+        mass[dof, dof] -= place.armature
+        if not rotor.own:
+            mass[dof, dof] += rotor.reflected
+            continue
+        # the body of the rotor turns with its parent, less what its own hinge yields
+        linear, angular = np.zeros((2, 3, model.nv))
+        parent = int(model.body_parentid[model.jnt_bodyid[place.index]])
+        anchor = data.xanchor[place.index]
+        mujoco.mj_jac(model, data, linear, angular, anchor, parent)
+        spin = data.xaxis[place.index] @ angular
+        mass += ROTOR_MASS * linear.T @ linear + rotor.body * angular.T @ angular
+        mass -= rotor.body**2 / rotor.inertia * np.outer(spin, spin)
+    return found
+
+
+def find_places(
+    spec: mujoco.MjSpec, rotors: Mapping[str, float]
+) -> tuple[Compiled, dict[str, Place]]:
+    """Find hinges that can take a drive, in the order of the model.
+
+    Args:
+        spec: Model; unchanged.
+        rotors: Inertia of the rotor by joint [kg·m²].
+
+    Raises:
+        InputError: If a joint is unknown or cannot take a drive, a line for each.
+    """
+    around = Surroundings(spec)
+    found, wrong = {}, []
+    for name in rotors:
+        try:
+            found[name] = around.driven_joint(name)
+        except InputError as error:
+            wrong.append(str(error))
+    if wrong:
+        raise InputError("\n".join(wrong))
+    _check_compiler(spec, min(rotors.values()))
+    compiled = Compiled(spec, around)
+    ordered = sorted(found, key=lambda name: int(compiled.model.joint(name).id))
+    return compiled, {name: compiled.place(found[name]) for name in ordered}
+
+
+def check_option(spec: mujoco.MjSpec, integrator: mujoco.mjtIntegrator) -> None:
     """Refuse or warn about options under which a drive does not hold.
+
+    Args:
+        spec: Model.
+        integrator: With which it will be simulated.
 
     Raises:
         InputError: For a solver that leaves the drive's stiffness out.
     """
-    integrator = mujoco.mjtIntegrator(spec.option.integrator)
-    name = integrator.name.removeprefix("mjINT_").lower()
-    if integrator in (
-        mujoco.mjtIntegrator.mjINT_EULER,
-        mujoco.mjtIntegrator.mjINT_DISCRETE,
-    ):
-        if spec.option.solver == mujoco.mjtSolver.mjSOL_PGS:
-            raise InputError(
-                "solver PGS leaves tendons out of the discrete integrator's metric and "
-                "would integrate the drive explicitly; accepted: Newton, CG"
-            )
-        if spec.option.noslip_iterations > 0:
-            warnings.warn(
-                "noslip_iterations > 0 solves contacts without the drives' stiffness; "
-                "set it to 0 with drives",
-                stacklevel=3,
-            )
-    elif integrator != mujoco.mjtIntegrator.mjINT_RK4:
-        what = (
-            "drops the rotor-link terms of the tendon's damping"
-            if level in ("linear", "native")
-            else "integrates the drive explicitly"
+    if integrator != mujoco.mjtIntegrator.mjINT_DISCRETE:
+        return
+    if spec.option.solver == mujoco.mjtSolver.mjSOL_PGS:
+        raise InputError(
+            "solver PGS leaves tendons out of the discrete integrator's metric and "
+            "would integrate the drive explicitly; accepted: Newton, CG"
         )
+    if spec.option.noslip_iterations > 0:
         warnings.warn(
-            f"integrator {name} {what}; use discrete, or RK4 as the reference",
-            stacklevel=3,
+            "noslip_iterations > 0 solves contacts without the drives' stiffness; "
+            "set it to 0 with drives",
+            stacklevel=depth_of_caller(),
         )
 
 
@@ -89,50 +234,3 @@ def _check_compiler(spec: mujoco.MjSpec, rotor_inertia: float) -> None:
             f"compiler boundinertia {compiler.boundinertia} kg·m² is above the rotor's "
             f"inertia {rotor_inertia} kg·m²; accepted: at most that"
         )
-
-
-def find_place(spec: mujoco.MjSpec, name: str, rotor_inertia: float) -> Place:
-    """Find a hinge that can take a drive, from a compiled copy of the spec.
-
-    Raises:
-        InputError: If the joint is unknown or cannot take a drive.
-    """
-    found = driven_joint(spec, name)
-    _check_compiler(spec, rotor_inertia)
-    copy = spec.copy()
-    copy.compiler.fusestatic = False  # keeps every body where the spec has it
-    try:
-        model = copy.compile()
-    except ValueError as error:
-        line = " ".join(str(error).split())
-        raise InputError(f"the model does not compile: {line}") from error
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    mass = np.zeros((model.nv, model.nv))
-    mujoco.mj_fullM(model, data, mass)
-    j = int(model.joint(name).id)
-    b, dof = int(model.jnt_bodyid[j]), int(model.jnt_dofadr[j])
-    if model.jnt_actgravcomp[j] and model.body_gravcomp.any():
-        raise InputError(
-            f"joint {name!r} has actuatorgravcomp, a torque on the link past the drive;"
-            " accepted: false"
-        )
-    motors = list(actuators_on(spec, name))
-    armature = float(model.dof_armature[dof]) + float(
-        model.actuator_armature[motors] @ model.actuator_gear[motors, 0] ** 2
-    )
-    offset = np.zeros(3)
-    mujoco.mju_rotVecQuat(offset, model.jnt_pos[j], model.body_quat[b])
-    return Place(
-        joint=found,
-        parent=found.parent.parent,
-        model=model,
-        index=j,
-        pos=model.body_pos[b] + offset,
-        quat=model.body_quat[b].copy(),
-        axis=model.jnt_axis[j].copy(),
-        ref=float(model.qpos0[model.jnt_qposadr[j]]),
-        armature=armature,
-        inertia=float(mass[dof, dof]) - armature,
-        free_inertia=float(1.0 / np.linalg.inv(mass)[dof, dof]),
-    )

@@ -54,6 +54,8 @@ from swgjoint.joint.drive import JointDrive, input_orders
 MAX_SUB_STEPS = 64
 """Parts of a step beyond which a run is refused instead of sub-stepped: an arm at 1 ms
 still runs in real time with that many, and who needs more should choose the step."""
+MAX_PHASE_STEP = 0.5
+"""Of the highest order in one step, h n |theta rate| [rad]."""
 MARGIN = 1.4
 """Longest step inside over one that is cut: cut steps would all lie at the edge."""
 
@@ -214,8 +216,8 @@ def _discrete_bounds(drive: JointDrive, h: float, speed: float) -> tuple[Bound, 
         Bound(
             what="phase step h n |theta rate| [rad]",
             value=h * order * speed,
-            limit=0.5,
-            timestep=0.5 / (order * speed) if order * speed else inf,
+            limit=MAX_PHASE_STEP,
+            timestep=MAX_PHASE_STEP / (order * speed) if order * speed else inf,
         ),
         Bound(
             what="h² C/(J + J_link/i²)",

@@ -164,6 +164,7 @@ def frequency_response(
         level=level,
         rotor_inertia=masses.rotor_inertia,
         damping_ratio=damping_ratio,
+        friction=False,
     )
     assert got.rotor is not None
     for name in (got.rotor, JOINT):

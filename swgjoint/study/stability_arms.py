@@ -117,6 +117,7 @@ def _fall(
             drive=drives[section.drive or ""],
             rotor_inertia=section.rotor_inertia_kgm2 or 0.0,
             damping_ratio=0.0,
+            friction=False,
         )
         attached.append(got)
         regions.append(check_region(got, timestep=step, max_input_speed=FALL_SPEED))

@@ -53,7 +53,12 @@ def drop_joint(drive: DriveMap, *, rotor: float, link: float, step: float) -> Jo
     )
     spec = mujoco.MjSpec.from_string(text)
     attached = attach(
-        spec, joint="joint", drive=drive, rotor_inertia=rotor, damping_ratio=0.0
+        spec,
+        joint="joint",
+        drive=drive,
+        rotor_inertia=rotor,
+        damping_ratio=0.0,
+        friction=False,
     )
     model = spec.compile()
     joints = [model.joint(name) for name in (attached.rotor, "joint")]

@@ -273,6 +273,7 @@ def make_joint(
         level=level,
         rotor_inertia=rotor,
         damping_ratio=0.0,
+        friction=False,
     )
     model = spec.compile()
     joints = [model.joint(name) for name in (attached.rotor, "joint")]

@@ -81,7 +81,8 @@ def chain(level):
         body = body.add_body(name=f"link{k}", pos=[0, 0, 0.1])
         body.add_joint(name=f"j{k}", axis=[[0, 0, 1], [0, 1, 0]][k % 2])
         body.mass, body.inertia, body.explicitinertial = 0.5, [0.05] * 3, True
-        attach(spec, joint=f"j{k}", drive=drive, level=level, rotor_inertia=1e-4)
+        attach(spec, joint=f"j{k}", drive=drive, level=level, rotor_inertia=1e-4,
+            friction=False)
     model = spec.compile()
     return model, mujoco.MjData(model)
 for level in ("rigid", "native", "full"):

@@ -24,7 +24,13 @@ def driven(spec: mujoco.MjSpec, drive: DriveMap):
     """Model of the engine, its drives and the symbolic arm, without friction."""
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_RK4
     drives = [
-        attach(spec, joint=joint.name, drive=drive, rotor_inertia=INERTIA)
+        attach(
+            spec,
+            joint=joint.name,
+            drive=drive,
+            rotor_inertia=INERTIA,
+            friction=False,
+        )
         for joint in list(spec.joints)
     ]
     model = spec.compile()

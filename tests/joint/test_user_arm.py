@@ -8,7 +8,8 @@ import pytest
 from messages import naming
 
 from swgjoint.errors import InputError
-from swgjoint.joint.attach import attach
+from swgjoint.joint.attach import attach, attach_all
+from swgjoint.joint.fitting import Fitting
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.units import deg
 
@@ -302,15 +303,86 @@ def test_limit_of_the_joints_actuators_goes_to_the_motor():
         assert link_torque(model, data, drives["j"]) == pytest.approx(expected)
 
 
-def test_a_torque_sensor_of_the_joint_says_that_it_reads_nothing():
-    """A jointactuatorfrc has no actuator left; the line names what to use."""
-    spec = one_joint(
-        '<motor joint="j"/>', more='<sensor><jointactuatorfrc joint="j"/></sensor>'
-    )
+SENSOR = '<sensor><jointactuatorfrc name="s" joint="j"/></sensor>'
+
+
+@pytest.mark.parametrize(
+    ("actuator", "joint"),
+    [
+        ('<motor joint="j"/>', ""),
+        ('<motor joint="j"/>', 'actuatorfrcrange="-7 11"'),
+        ('<motor joint="j" forcerange="-3 40"/>', 'actuatorfrcrange="-7 11"'),
+        ('<position name="a" joint="j" kp="30" kv="2"/>', 'actuatorfrcrange="-7 11"'),
+    ],
+)
+def test_a_torque_sensor_of_the_joint_keeps_its_meaning(actuator, joint):
+    """With one actuator of gear 1 it reads the same before and after, limits too."""
+    spec = one_joint(actuator, joint=joint, more=SENSOR)
+    before = spec.copy().compile()
+    drives = driven(spec, joints=["j"])
+    model = spec.compile()
+    data, bare = at_rest(model, drives, [0.1]), mujoco.MjData(before)
+    bare.joint("j").qpos = 0.1
+    for ctrl in (3.0, 40.0, -40.0):
+        data.ctrl[0] = bare.ctrl[0] = ctrl
+        mujoco.mj_forward(model, data)
+        mujoco.mj_forward(before, bare)
+        assert data.sensor("s").data == pytest.approx(bare.sensor("s").data)
+        assert data.sensor("s").data[0] == pytest.approx(
+            link_torque(model, data, drives["j"])
+        )
+
+
+@pytest.mark.parametrize(
+    ("actuator", "joint", "more"),
+    [
+        ('<motor joint="j" gear="3"/>', "", SENSOR),
+        ('<motor joint="j"/><velocity joint="j" kv="2"/>', "", SENSOR),
+        (
+            '<motor name="a" joint="j"/>',
+            'actuatorfrcrange="-7 11"',
+            SENSOR.replace("</", '<actuatorfrc actuator="a"/></'),
+        ),
+    ],
+)
+def test_a_torque_sensor_without_an_exact_form_is_listed(actuator, joint, more):
+    """It reads the torque at the rotor; one line names it, the factor and what to use.
+
+    A sensor of an actuator's own force keeps its meaning, too.
+    """
+    spec = one_joint(actuator, joint=joint, more=more)
+    before = spec.copy().compile()
     with pytest.warns(
-        UserWarning, match=naming("'j'", "actuatorfrc", "JointDrive.observe")
+        UserWarning, match=naming("'s'", "-100", "'j'", "JointDrive.observe")
     ):
-        driven(spec, joints=["j"])
+        drives = driven(spec, joints=["j"])
+    model = spec.compile()
+    data, bare = at_rest(model, drives, [0.0]), mujoco.MjData(before)
+    data.ctrl[:] = bare.ctrl[:] = 9.0
+    mujoco.mj_forward(model, data)
+    mujoco.mj_forward(before, bare)
+    factor = np.array([-100.0, *[1.0] * (model.nsensor - 1)])
+    np.testing.assert_allclose(factor * data.sensordata, bare.sensordata, rtol=1e-12)
+
+
+def test_one_line_lists_all_torque_sensors():
+    """Sensors of several joints give one warning; those with an exact form are left."""
+    spec = mujoco.MjSpec.from_string(
+        """<mujoco><worldbody>
+        <body><joint name="a"/><geom size=".1"/></body>
+        <body><joint name="b"/><geom size=".1"/></body>
+        <body><joint name="c"/><geom size=".1"/></body></worldbody>
+        <actuator><motor joint="a" gear="2"/><motor joint="b" gear="3"/>
+        <motor joint="c"/></actuator>
+        <sensor><jointactuatorfrc name="sa" joint="a"/>
+        <jointactuatorfrc name="sb" joint="b"/>
+        <jointactuatorfrc name="sc" joint="c"/></sensor></mujoco>"""
+    )
+    fitting = Fitting(drive=DriveMap.linear(1e4), rotor_inertia=INERTIA, level="linear")
+    with pytest.warns(UserWarning, match=naming("'sa'", "'sb'")) as caught:
+        attach_all(spec, dict.fromkeys("abc", fitting))
+    [line] = caught
+    assert "'sc'" not in str(line.message)
 
 
 LINKS = """

@@ -1,0 +1,16 @@
+"""Whose line a warning names: that of the user, not one of the package's own."""
+
+from __future__ import annotations
+
+import sys
+
+
+def depth_of_caller() -> int:
+    """``stacklevel`` for ``warnings.warn`` in the caller: the first line outside."""
+    depth, frame = 1, sys._getframe(1)
+    package = __name__.partition(".")[0]
+    while frame.f_back is not None:
+        if frame.f_globals.get("__name__", "").partition(".")[0] != package:
+            break
+        frame, depth = frame.f_back, depth + 1
+    return depth

@@ -1,0 +1,157 @@
+"""What a joint is to get, checked, and the drive that follows; the spec stays as is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import mujoco
+import numpy as np
+
+from swgjoint.errors import InputError
+from swgjoint.joint.drive import JointDrive, UnresolvedOrder, prune
+from swgjoint.joint.native import NativeSpring, fit_native
+from swgjoint.joint.place import Place
+from swgjoint.joint.prescribed import kinematic_part, ratio_variation
+from swgjoint.maps.drive_map import DriveMap
+
+LEVELS = ("rigid", "kinematic", "linear", "native", "full")
+ROTORS = ("gyroscopic", "lumped")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Fitting:
+    """A drive and how one joint gets it; see :func:`swgjoint.joint.attach.attach`."""
+
+    drive: DriveMap
+    rotor_inertia: float
+    """Rotor and wave generator about their axis [kg·m²]."""
+    level: str = "full"
+    damping_ratio: float | None = None
+    """Share of critical damping; that of the map if None [-]."""
+    friction: bool = True
+    rotor: str = "gyroscopic"
+    variable: bool = False
+    max_input_speed: float | None = None
+    """Largest speed of the rotor [rad/s]."""
+    max_phase_step: float = 0.5
+    """Largest phase step h n |theta rate| that is kept [rad]."""
+
+    @property
+    def has_rotor(self) -> bool:
+        """Whether the level gives the rotor a joint of its own."""
+        return self.level not in ("rigid", "kinematic")
+
+    def check(self, joint: str) -> None:
+        """Refuse a value outside its range.
+
+        Raises:
+            InputError: With the value, its unit and what is accepted.
+        """
+        if not isinstance(self.drive, DriveMap):
+            raise InputError(
+                f"drive of joint {joint!r}: {type(self.drive).__name__}"
+                f" {str(self.drive)[:60]!r}; accepted: a DriveMap"
+            )
+        if self.level not in LEVELS:
+            raise InputError(
+                f"level {self.level!r} unknown; accepted: {', '.join(LEVELS)}"
+            )
+        _positive("rotor_inertia", self.rotor_inertia, "kg·m²")
+        if self.rotor not in ROTORS:
+            raise InputError(
+                f"rotor {self.rotor!r} unknown; accepted: {', '.join(ROTORS)}"
+            )
+        ratio = self.damping_ratio
+        if ratio is not None and not (np.isfinite(ratio) and 0.0 <= ratio < 1.0):
+            raise InputError(f"damping_ratio {ratio} of {joint!r}; accepted: 0 to 1")
+        if self.max_input_speed is not None:
+            _positive("max_input_speed", self.max_input_speed, "rad/s")
+        _positive("max_phase_step", self.max_phase_step, "rad")
+
+
+def fitted(
+    joint: str, fitting: Fitting, place: Place, *, timestep: float
+) -> JointDrive:
+    """The drive that a joint will have.
+
+    Args:
+        joint: Its name.
+        fitting: What it gets.
+        place: Where it stands.
+        timestep: Step of the model [s].
+
+    Raises:
+        InputError: If the level cannot hold the map.
+    """
+    drive, level = fitting.drive, fitting.level
+    if not fitting.friction and drive.friction is not None:
+        drive = replace(drive, friction=None)
+    ratio, stiffness = drive.ratio, drive.mean_stiffness
+    damping_ratio = fitting.damping_ratio
+    if damping_ratio is None:
+        damping_ratio = drive.damping_ratio
+    reflected = ratio**2 * fitting.rotor_inertia
+    reduced = reflected * place.inertia / (reflected + place.inertia)
+    damping = 2.0 * damping_ratio * float(np.sqrt(stiffness * reduced))
+    if level == "kinematic":
+        drive = kinematic_part(drive)
+    unresolved: tuple[UnresolvedOrder, ...] = ()
+    if level in ("kinematic", "full") and fitting.max_input_speed is not None:
+        drive, unresolved = prune(
+            drive,
+            timestep=timestep,
+            max_input_speed=fitting.max_input_speed,
+            max_phase_step=fitting.max_phase_step,
+        )
+    if level == "kinematic" and not ratio_variation(drive) < 1.0:
+        raise InputError(
+            f"map {drive.name!r}: its kinematic error turns the ratio by up to"
+            f" {ratio_variation(drive):.3g} of itself; accepted at level kinematic:"
+            " below 1"
+        )
+    spring: NativeSpring | None = fit_native(drive) if level == "native" else None
+    elements = range(len(spring.hysteresis)) if spring else ()
+    own = fitting.has_rotor
+    return JointDrive(
+        joint=joint,
+        rotor=f"{joint}_rotor" if own else None,
+        tendon=f"{joint}_drive" if own else None,
+        plugin=f"{joint}_drive" if level == "full" else None,
+        level=level,
+        ratio=ratio,
+        rotor_inertia=float(fitting.rotor_inertia),
+        link_inertia=place.inertia,
+        stiffness=stiffness,
+        damping=damping if own else 0.0,
+        drive=drive,
+        unresolved=unresolved,
+        native=spring,
+        hysteresis=tuple(f"{joint}_hysteresis{k}" for k in elements),
+        motors=tuple(actuator.name for actuator in place.actuators.values()),
+        variable=fitting.variable and level == "full",
+    )
+
+
+def check_spec(spec: object) -> None:
+    """Refuse what is no ``MjSpec`` by name.
+
+    Raises:
+        InputError: With what was given and what to give.
+    """
+    if isinstance(spec, mujoco.MjSpec):
+        return
+    what = f"a {type(spec).__name__}"
+    if isinstance(spec, mujoco.MjModel):
+        what = "a compiled MjModel, which cannot be edited"
+    elif isinstance(spec, str):
+        what = f"the text {spec[:60]!r}"
+    raise InputError(
+        f"spec is {what}; accepted: a mujoco.MjSpec, e.g."
+        " mujoco.MjSpec.from_file('arm.xml')"
+    )
+
+
+def _positive(name: str, value: float, unit: str) -> None:
+    number = isinstance(value, int | float | np.integer | np.floating)
+    if not (number and np.isfinite(value) and value > 0.0):
+        raise InputError(f"{name} {value!s} {unit}; accepted: a finite number > 0")

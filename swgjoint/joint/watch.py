@@ -1,0 +1,73 @@
+"""A model in a loop of its user's own: says where it leaves the integrator's region.
+
+Attaching warns of a step that is outside at rest. The step, the integrator and the
+speed may change later; so the model carries a custom numeric :data:`NUMERIC` with the
+bounds, which the engine plugin compares in every step. It calls ``mju_warning`` once
+for a model and a step: on the console and in ``MUJOCO_LOG.TXT``, or in the handler that
+``mujoco.set_mju_user_warning`` names. A run of a scene checks its region itself and has
+no such numeric.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.joint.callers import depth_of_caller
+from swgjoint.joint.drive import JointDrive
+from swgjoint.joint.region import MAX_PHASE_STEP, check_region
+
+NUMERIC = "swgjoint_region"
+"""Name of the custom numeric: largest step under ``discrete``, under RK4 and under the
+other integrators [s], largest phase step [rad]."""
+SCHEMES = ("discrete", "RK4", "implicitfast")
+UNBOUNDED = 1e6
+"""A step that no bound limits [s]."""
+
+
+def limits(drives: Iterable[JointDrive]) -> NDArray[np.float64]:
+    """Largest steps at rest by :data:`SCHEMES` [s], and the phase step [rad]. (4,)."""
+    steps = np.full(len(SCHEMES), UNBOUNDED)
+    for drive in drives:
+        for k, scheme in enumerate(SCHEMES):
+            region = check_region(drive, timestep=UNBOUNDED, integrator=scheme)
+            steps[k] = min(
+                [steps[k]]
+                + [b.timestep for b in region.bounds if not b.ok and b.timestep]
+            )
+    return np.append(steps, MAX_PHASE_STEP)
+
+
+def add_watch(spec: mujoco.MjSpec, drives: Iterable[JointDrive]) -> None:
+    """Let the plugin compare the steps of a model with the bounds of its drives."""
+    bounds = limits(drive for drive in drives if drive.plugin is not None)
+    if (bounds[:-1] == UNBOUNDED).all():
+        return
+    for numeric in spec.numerics:
+        if numeric.name == NUMERIC:
+            numeric.data = np.minimum(numeric.data, bounds)
+            return
+    spec.add_numeric(name=NUMERIC, data=bounds, size=len(bounds))
+
+
+def warn_outside(
+    drives: Iterable[JointDrive], *, timestep: float, integrator: mujoco.mjtIntegrator
+) -> None:
+    """Warn, once for all joints, of a step that is outside the region at rest."""
+    name = integrator.name.removeprefix("mjINT_")
+    name = name if name == "RK4" else name.lower()
+    regions = [check_region(d, timestep=timestep, integrator=name) for d in drives]
+    outside = [region for region in regions if not region.ok]
+    if not outside:
+        return
+    steps = [region.suggested_timestep for region in outside]
+    worst = outside[int(np.argmin([-1.0 if s is None else s for s in steps]))]
+    warnings.warn(
+        worst.message
+        + (f" ({len(outside)} joints are outside)" if len(outside) > 1 else ""),
+        stacklevel=depth_of_caller(),
+    )
