@@ -12,13 +12,12 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
+from swgjoint.engine import MUJOCO_VERSION as MUJOCO_VERSION
+from swgjoint.engine import NAME as NAME
+from swgjoint.engine import library as library
 from swgjoint.errors import ComputationError
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.friction import Friction
-
-NAME = "swgjoint.drive"
-MUJOCO_VERSION = "4.0.0"
-"""The version whose libmujoco the plugin is linked to (soname and struct layout)."""
 
 NUMERICAL_DAMPING = 0.1
 """Share of a backward step mixed in for torsion modes that the step cannot resolve.
@@ -30,14 +29,10 @@ PASSES = 2
 """Evaluations of the map in a step: one prediction of the pair, then the force."""
 TENDON_STIFFNESS = (1e-9, 0.0, 1.0)
 """Polynomial of the carrier tendon; its cubic turns a length into a tangent."""
-FRICTION_STIFFNESS = (1e-9, 0.0, 1e-30)
+FRICTION_STIFFNESS = (1e-9, 0.0, 1e-19)
 """The same for the tendon of the friction, whose length is a rotation of many turns:
-with so small a cubic its own spring pulls with nothing. The plugin knows it by that."""
-
-
-def library() -> Path:
-    """Where the installed package keeps the plugin library."""
-    return Path(__file__).parents[1] / "plugin" / "libswgjoint_plugin.so"
+with so small a cubic its own spring pulls with nothing. The plugin recognises it by
+that, so it is a number that MuJoCo's XML keeps."""
 
 
 @cache
@@ -65,6 +60,22 @@ def load() -> None:
         raise ComputationError(
             f"MuJoCo {MUJOCO_VERSION} does not load {path}: {error}"
         ) from error
+
+
+def load_plugin() -> Path:
+    """Register the drive plugin with MuJoCo, so that saved models with drives load.
+
+    Importing swgjoint does this by itself; call it to be told what is missing, or for
+    the path that ``mj_loadPluginLibrary`` takes in C and C++.
+
+    Returns:
+        Path of the library.
+
+    Raises:
+        ComputationError: If MuJoCo has another version or the library is not built.
+    """
+    load()
+    return library()
 
 
 def _text(values: np.ndarray) -> str:
@@ -144,7 +155,7 @@ _SELF_TEST = """
   </worldbody>
   <tendon><fixed name="d" stiffness="1e-9 0 1" springlength="0">
     <joint joint="m" coef="{coef!r}"/><joint joint="l" coef="-1"/></fixed>
-    <fixed name="f" stiffness="1e-9 0 1e-30" springlength="0">
+    <fixed name="f" stiffness="1e-9 0 1e-19" springlength="0">
     <joint joint="m" coef="1"/><joint joint="l" coef="-1"/></fixed></tendon>
 </mujoco>
 """

@@ -2,7 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
+#include <mutex>
+#include <set>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -19,9 +23,12 @@ constexpr int kBristle = 2;        // where it is relaxed, whether that is known
 constexpr size_t kMaxElements = 64;
 constexpr int kDeviations = 5;           // user data of the tendon
 constexpr mjtNum kLeastLosses = 1e-6;    // the bristle keeps some stiffness
-// Cubic coefficient that marks the tendon of the friction: so small that the spring
-// pulls with nothing, for its length, unlike a torsion, is a rotation of many turns.
-constexpr mjtNum kFrictionCubic = 1e-30;
+// Largest cubic coefficient of the tendon of the friction, its mark: so small that the
+// spring pulls with nothing, for its length, unlike a torsion, is a rotation of many
+// turns. 1e-19 is written, as XML has nothing below 1e-20; older models have 1e-30.
+constexpr mjtNum kFrictionCubic = 1e-18;
+// Custom numeric with the bounds of the integrator's region, see joint/watch.py.
+constexpr char kRegion[] = "swgjoint_region";
 
 Drive* Get(const mjData* d, int instance) {
   return reinterpret_cast<Drive*>(d->plugin_data[instance]);
@@ -80,7 +87,56 @@ mjtNum NativeForce(const mjModel* m, const mjData* d, int tendon) {
               x * x * m->tendon_stiffnesspoly[mjNPOLY * tendon + 1]);
 }
 
+// Whether a model with this signature and step has not been warned of yet.
+bool First(uint64_t model, mjtNum step, int bound) {
+  static std::mutex mutex;
+  static std::set<std::tuple<uint64_t, mjtNum, int>> warned;
+  const std::lock_guard<std::mutex> lock(mutex);
+  return warned.emplace(model, step, bound).second;
+}
+
 }  // namespace
+
+Drive::Region Drive::Region::Find(const mjModel* m) {
+  Region found;
+  for (int n = 0; n < m->nnumeric; ++n) {
+    const char* name = mj_id2name(m, mjOBJ_NUMERIC, n);
+    // attaching may have put a prefix before the name
+    if (!name || !std::strstr(name, kRegion) || m->numeric_size[n] != 4) continue;
+    const mjtNum* bound = m->numeric_data + m->numeric_adr[n];
+    for (int k = 0; k < 3; ++k) {
+      if (bound[k] <= 0) continue;
+      found.step[k] = found.step[k] > 0 ? std::min(found.step[k], bound[k]) : bound[k];
+    }
+    found.phase = bound[3];
+  }
+  return found;
+}
+
+// Warns once for a model and a step when the region of the integrator is left.
+void Drive::Watch(const mjModel* m, const mjData* d, int instance, int scheme) {
+  const mjtNum h = m->opt.timestep, limit = region_.step[scheme];
+  const mjtNum speed = std::fabs(d->qvel[v_rotor_]);
+  const mjtNum phase = h * map_.top_order() * speed;
+  const bool turns = scheme == 0 && region_.phase > 0 && phase > region_.phase;
+  const bool steps = limit > 0 && h > limit * (1 + 1e-9);
+  if (!steps && !turns) return;
+  const mjtNum most = region_.phase;
+  (steps ? region_.step[scheme] : region_.phase) = 0;  // this one has said it
+  if (!First(m->signature, h, steps ? scheme : 3)) return;
+  const char* name = mj_id2name(m, mjOBJ_PLUGIN, instance);
+  if (steps) {
+    mju_warning("%s '%s': a step of %.4g ms is outside the region of its integration;"
+                " a step of %.4g ms would do%s", kName, name ? name : "", 1e3 * h,
+                1e3 * limit, scheme == 2 ? ", or integrator discrete" : "");
+  } else {
+    mju_warning("%s '%s': at %.4g rad/s the rotor turns a harmonic of order %.4g by"
+                " %.3g rad in a step of %.4g ms, more than %.3g; a step of %.4g ms would"
+                " do, or max_input_speed when attaching leaves it out", kName,
+                name ? name : "", speed, map_.top_order(), phase, 1e3 * h, most,
+                1e3 * h * most / phase);
+  }
+}
 
 std::unique_ptr<Drive> Drive::Create(const mjModel* m, int instance) {
   auto drive = std::make_unique<Drive>();
@@ -159,8 +215,9 @@ std::unique_ptr<Drive> Drive::Create(const mjModel* m, int instance) {
     return Refuse(m, instance,
                   "attribute 'friction' is not nine numbers 'b_theta b_psi stiffness "
                   "damping coulomb static stribeck_speed viscous load', or no tendon "
-                  "with these b and stiffness 'a 0 1e-30' carries it");
+                  "with these b and stiffness 'a 0 1e-19' carries it");
   }
+  drive->region_ = Region::Find(m);
   return drive;
 }
 
@@ -173,10 +230,11 @@ bool Drive::FindFriction(const mjModel* m, const char* text, int rotor, int link
   const int size = friction.b_psi() == 0 ? 1 : 2;
   for (int t = 0; t < m->ntendon; ++t) {
     const int wrap = m->tendon_adr[t];
+    const mjtNum cubic = m->tendon_stiffnesspoly[mjNPOLY * t + 1];
     if (m->tendon_num[t] != size || m->wrap_type[wrap] != mjWRAP_JOINT ||
         m->wrap_objid[wrap] != rotor || m->wrap_prm[wrap] != friction.b_theta() ||
         m->tendon_stiffness[t] <= 0 || m->tendon_damping[t] != 0 ||
-        m->tendon_stiffnesspoly[mjNPOLY * t + 1] != kFrictionCubic) {
+        cubic <= 0 || cubic > kFrictionCubic) {
       continue;
     }
     if (size == 2 && (m->wrap_objid[wrap + 1] != link ||
@@ -222,8 +280,10 @@ void Drive::Compute(const mjModel* m, mjData* d, int instance) {
 
   // PGS solves without the tendon part of the metric
   if (m->opt.integrator == mjINT_DISCRETE && m->opt.solver != mjSOL_PGS) {
+    Watch(m, d, instance, 0);
     AddScheme(m, d, instance);
   } else {
+    Watch(m, d, instance, m->opt.integrator == mjINT_RK4 ? 1 : 2);
     AddGradient(m, d, instance);
   }
 }

@@ -40,6 +40,14 @@ class Drive {
     FrictionStep friction;
   };
 
+  // Bounds within which the integration was tested, where the model states them; 0: any.
+  struct Region {
+    mjtNum step[3] = {0, 0, 0};  // discrete, RK4, other integrators
+    mjtNum phase = 0;            // of the highest order in a step
+    static Region Find(const mjModel* m);
+  };
+
+  void Watch(const mjModel* m, const mjData* d, int instance, int scheme);
   void AddGradient(const mjModel* m, mjData* d, int instance);
   void AddScheme(const mjModel* m, mjData* d, int instance);
   void Place(const mjtNum* rest);
@@ -58,6 +66,7 @@ class Drive {
   mjtNum losses_ = 1;  // scale of hysteresis and friction
   std::optional<Friction> friction_;
   int friction_tendon_ = -1;  // carries its part of the metric
+  Region region_;
   Step step_;
 };
 

@@ -137,6 +137,7 @@ bool DriveMap::Parse(const DriveText& text, std::string* error) {
       return Fail(error, "orders", "holds a number that is no integer below 1e6");
     }
     moves_psi_ |= psi != 0;
+    top_order_ = std::max(top_order_, std::fabs(theta + psi / ratio_));
     top_theta_ = std::max(top_theta_, std::fabs(theta));
     top_psi_ = std::max(top_psi_, std::fabs(psi));
   }

@@ -47,6 +47,7 @@ class DriveMap {
   bool Parse(const DriveText& text, std::string* error);
 
   double ratio() const { return ratio_; }
+  double top_order() const { return top_order_; }  // per turn of the rotor
 
   // From the next Begin or Gradient on: V times `potential`, e0 times `error`, and
   // both where rotor and link stand further by the two angles.
@@ -97,6 +98,7 @@ class DriveMap {
   double ratio_ = 1;
   double scale_ = 1, error_scale_ = 1, shift_theta_ = 0, shift_psi_ = 0;  // Vary
   double top_theta_ = 0, top_psi_ = 0;  // largest orders
+  double top_order_ = 0;                // largest |n_theta + n_psi/ratio|
   std::vector<double> knots_;
   std::vector<double> base_;   // (segments) torsion about which a segment expands
   std::vector<double> low_, high_;  // (segments) open interval of a segment

@@ -23,9 +23,9 @@ CXX = os.environ.get("CXX", "g++")
 RUN = """
 import sys
 from pathlib import Path
+from swgjoint import engine
+engine.library = lambda: Path(sys.argv[1])  # before mujoco is imported and takes it
 import pytest
-from swgjoint.joint import plugin
-plugin.library = lambda: Path(sys.argv[1])
 sys.exit(pytest.main(["-q", "-x", "-s", "-p", "no:cacheprovider", *sys.argv[2:]]))
 """
 LONG = "rk4 native coasting stiction spec_sheet loses swing one_step pushes".split()

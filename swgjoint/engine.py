@@ -1,0 +1,41 @@
+"""Library of the engine plugin and its registration with MuJoCo; imports nothing heavy.
+
+The package's entry point in the group ``mujoco.plugins`` is :func:`register`: MuJoCo's
+Python package calls it at the end of its own import, so that saved models with drives
+load wherever swgjoint is installed, ``python -m mujoco.viewer`` included.
+"""
+
+import sys
+from pathlib import Path
+
+NAME = "swgjoint.drive"
+MUJOCO_VERSION = "4.0.0"
+"""The version whose libmujoco the plugin is linked to (soname and struct layout)."""
+
+
+def library() -> Path:
+    """Where the installed package keeps the plugin library."""
+    return Path(__file__).parent / "plugin" / "libswgjoint_plugin.so"
+
+
+def register() -> bool:
+    """Register the plugin with MuJoCo if that is imported and everything fits.
+
+    Silent otherwise: ``swgjoint.load_plugin`` and ``swgjoint doctor`` say what is
+    missing.
+
+    Returns:
+        Whether the plugin is registered.
+    """
+    mujoco = sys.modules.get("mujoco")
+    # the plugin is registered while mujoco is still being imported
+    load = getattr(mujoco, "mj_loadPluginLibrary", None)
+    if mujoco is None or load is None or not library().exists():
+        return False
+    if mujoco.mj_versionString() != MUJOCO_VERSION:
+        return False
+    try:
+        load(str(library()))
+    except Exception:
+        return False
+    return True
