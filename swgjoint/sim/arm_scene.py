@@ -10,11 +10,10 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from swgjoint.errors import InputError
-from swgjoint.maps.catalogue import catalogue_rows, table
-from swgjoint.maps.from_catalogue import find_row, is_catalogue_name
+from swgjoint.maps.catalogue import catalogue_rows
 from swgjoint.models_path import bundled_names
 from swgjoint.sim.rigid_arm import RigidArm
+from swgjoint.sim.rotors import catalogue_rotor_inertia
 from swgjoint.sim.scene import Scene
 from swgjoint.units import deg
 
@@ -135,18 +134,7 @@ def _by_rule(arm: RigidArm, start: np.ndarray, end: np.ndarray) -> dict[str, str
 
 def _rotor(drive: str) -> float:
     """Rotor with wave generator of a drive [kg·m²]."""
-    if not is_catalogue_name(drive):
-        return ROTOR_INERTIA
-    try:
-        row = find_row(drive)
-    except InputError:
-        return ROTOR_INERTIA  # the scene will say what is wrong with the name
-    for rated in table("ratings"):
-        if (rated["size"], rated["ratio"]) == (row.size, row.ratio):
-            wave_generator = rated["input_inertia_1e-4kgm2"]
-            if isinstance(wave_generator, float):
-                return round(2e-4 * wave_generator, 12)
-    return ROTOR_INERTIA
+    return catalogue_rotor_inertia(drive) or ROTOR_INERTIA
 
 
 def _tool(arm: RigidArm) -> str:
