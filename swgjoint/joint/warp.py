@@ -8,11 +8,12 @@ can hand over direction and stiffness of the same step, see
     drive = swgjoint.attach(spec, joint="j", drive=drive_map, rotor_inertia=4e-5)
     model = without_plugin(spec)
     m, d = mjw.put_model(model), mjw.make_data(model, nworld=4096)
-    install(m, d, [drive])
+    install(m, d, model, [drive])
     mjw.step(m, d)  # also inside a captured graph
 
 The whole law is held: potential with all harmonics, kinematic error, hysteresis,
-friction, damping. Every integrator but ``discrete`` is refused.
+friction, damping. Every integrator but ``discrete`` is refused, and so are drives that
+were attached as ``variable``: all worlds have the same map.
 
 The law is evaluated in double precision, the engine's state is in single: a position
 is rounded by 6e-8 of itself, which is noise of about 1e-7 K in the torque at an output
@@ -170,11 +171,11 @@ def _place(model: mujoco.MjModel, drive: JointDrive) -> Any:
             f"joint {drive.joint!r}: its drive is not in the model: {error}; accepted:"
             " the model of without_plugin(spec)"
         ) from error
-    if model.tendon_user[tendon].any():
+    if drive.variable or model.tendon_user[tendon].any():
         raise InputError(
-            f"joint {drive.joint!r}: its drive deviates from its map by numbers in the"
-            " model, which MuJoCo Warp does not read; accepted: attach the map of"
-            " Variation.of"
+            f"joint {drive.joint!r}: its drive may deviate from its map by numbers in"
+            " the model, which MuJoCo Warp does not read; accepted: variable=False,"
+            " with the map of Variation.of for another specimen"
         )
     one = Drive()
     one.tendon = tendon
