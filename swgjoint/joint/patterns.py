@@ -80,10 +80,10 @@ def chosen_hinges(spec: mujoco.MjSpec, keys: Iterable[str]) -> dict[str, str]:
             )
     if wrong:
         raise InputError("\n".join(wrong))
-    reasons = [why for key in keys for why in left_out[key]]
-    if reasons:
+    skipped = [why for key in keys for why in left_out[key]]
+    if skipped:
         warnings.warn(
-            f"{len(reasons)} hinges get no drive: {'; '.join(reasons)}",
+            f"{len(skipped)} hinges get no drive: {'; '.join(skipped)}",
             stacklevel=depth_of_caller(),
         )
     return chosen

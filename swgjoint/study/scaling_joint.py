@@ -12,8 +12,9 @@ import mujoco
 import numpy as np
 
 from swgjoint.errors import ComputationError
-from swgjoint.joint.attach import attach
+from swgjoint.joint.attach import attach_all
 from swgjoint.joint.drive import JointDrive
+from swgjoint.joint.fitting import Fitting
 from swgjoint.maps.drive_map import DriveMap
 
 STEP = 1e-3
@@ -67,11 +68,9 @@ def chain_spec(
         # a place, too: without one a saved file would have no inertia
         body.mass, body.inertia, body.ipos = 0.5, [0.05, 0.05, 0.05], [0, 0, 0]
         body.explicitinertial = True
-    drives = [
-        attach(spec, joint=f"j{k}", drive=drive, level=level, rotor_inertia=ROTOR)
-        for k in range(joints)
-    ]
-    return spec, drives
+    fitting = Fitting(drive=drive, level=level, rotor_inertia=ROTOR, friction=False)
+    got = attach_all(spec, {f"j{k}": fitting for k in range(joints)})
+    return spec, list(got.values())
 
 
 def chain_model(
