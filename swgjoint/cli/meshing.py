@@ -29,9 +29,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--steps",
         type=int,
-        default=35,
         metavar="N",
-        help="wave-generator positions k TURNS/N, k = 0 to N-1; default 35",
+        help="wave-generator positions k TURNS/N, k = 0 to N-1; default 35, or the"
+        " nearest number whose positions spread over the tooth pitch",
     )
     parser.add_argument(
         "--turn",
@@ -123,7 +123,7 @@ def _check(args: argparse.Namespace) -> None:
     faults = []
     if args.torque is not None and not abs(args.torque) <= 1e6:
         faults.append(f"--torque {args.torque:g} N·m; accepted: -1e6 to 1e6 N·m")
-    if not 1 <= args.steps <= 100_000:
+    if args.steps is not None and not 1 <= args.steps <= 100_000:
         faults.append(f"--steps {args.steps}; accepted: 1 to 100000")
     if not math.isfinite(args.turn) or not 0 < abs(args.turn) <= 1000:
         faults.append(f"--turn {args.turn:g} turns; accepted: up to 1000, not 0")
@@ -140,6 +140,8 @@ def report(result: dict[str, Any]) -> str:
     """Stresses of the set-up and over the turn, what the run was, its outcome."""
     kinds = ("tensile", "compressive", "von_mises")
     rows = []
+    label = result.get("label") or {}
+    where = f", {label['positions']}" if label.get("positions") else ""
     for member in ("flexspline", "circular_spline"):
         for state in result["setup_MPa"]:
             if state.get(member):
@@ -148,8 +150,7 @@ def report(result: dict[str, Any]) -> str:
         mean = result.get(member) and result[member].get("average_max_MPa")
         values = [mean.get(kind) for kind in kinds] if mean else []
         if any(value is not None for value in values):  # null while it is rigid
-            rows.append((f"{member} mean of the maxima", *values))
-    label = result.get("label") or {}
+            rows.append((f"{member} mean of the maxima{where}", *values))
     lines = [
         f"meshing of {result.get('design', 'the design')}:"
         f" {result['nodes']} nodes, {result['elements']} elements,"
@@ -168,7 +169,7 @@ def report(result: dict[str, Any]) -> str:
     error = [v for v in steps.get("output_error_arcsec") or [] if v is not None]
     if error:
         lines.append(
-            f"output error, peak to peak: {max(error) - min(error):.4g} arcsec"
+            f"output error, peak to peak{where}: {max(error) - min(error):.4g} arcsec"
         )
     for state in result.get("coning_mm") or []:
         cone = "; ".join(
@@ -177,6 +178,7 @@ def report(result: dict[str, Any]) -> str:
             for axis in ("major", "minor")
         )
         lines.append(f"radial displacement [mm], {state['state']}: {cone}")
+    lines += [f"warning: {line}" for line in result.get("warnings") or []]
     lines.append(f"outcome: {result['outcome']}")
     failed = sum(name != "converged" for name in steps["outcome"])
     if failed:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from swgjoint.errors import ComputationError
 from swgjoint.fe.continuation import Continuation
 from swgjoint.fe.drive2d import check_modelled, ring_model
+from swgjoint.fe.meshing_phases import default_steps, overload
 from swgjoint.fe.meshing_run import MeshingRun, MeshingStep, SetupState
 from swgjoint.fe.ring import RingModel
 from swgjoint.fe.state import State
@@ -29,7 +30,7 @@ def simulate_meshing(
     *,
     model: str = "2d",
     torque: float = 0.0,
-    steps: int = 35,
+    steps: int | None = None,
     turn: float = 0.5,
     nonlinear: bool = True,
     half: bool = False,
@@ -45,7 +46,10 @@ def simulate_meshing(
         design: The drive.
         model: Fidelity, ``2d`` or, for a design with a cup, ``3d``.
         torque: T that the drive exerts on the output [N·m], constant over the turn.
-        steps: Wave-generator positions k turn/steps, k = 0 to steps - 1.
+        steps: Wave-generator positions k turn/steps, k = 0 to steps - 1. None chooses
+            35, or the nearest number whose positions spread over the tooth pitch, see
+            :mod:`swgjoint.fe.meshing_phases`; a given one that does not is kept, and
+            the ``warnings`` of the result say so.
         turn: Turns of the input.
         nonlinear: Large rotations of the sectors; False is the cheap linear level.
         half: Half model; needs even tooth counts.
@@ -63,6 +67,8 @@ def simulate_meshing(
             Without deflection, engagement and load there is nothing to go on from, so
             their failure is an error in any case.
     """
+    if steps is None:
+        steps = default_steps(design, turn)
     if model == "3d":
         from swgjoint.fe.solid.meshing import simulate_solid_meshing
 
@@ -107,7 +113,7 @@ def simulate_meshing(
         state = unloaded.state
     else:
         state = follow.to_torque(state, torque)
-    checked(state, f"loading to {torque:g} N·m")
+    checked(state, f"loading to {overload(design, torque) or f'{torque:g} N·m'}")
     setup.append(SetupState.at(ring, "torque", state))
 
     rows = []

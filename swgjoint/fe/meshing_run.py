@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import nan
+from math import nan, pi
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from swgjoint.errors import Outcome
 from swgjoint.fe.drive2d import left_out
 from swgjoint.fe.fields import root_stress, tooth_forces, wave_generator_contact
+from swgjoint.fe.meshing_phases import alike, overload, unspread
 from swgjoint.fe.ring import RingModel
 from swgjoint.fe.state import State
 from swgjoint.fe.stress import KINDS, MemberMaxima, StressMaxima
@@ -79,7 +80,29 @@ class MeshingStep(Position):
 class Positions:
     """What the runs of every model tell from their positions, ``steps``."""
 
+    design: Design
+    torque: float
     steps: tuple[Any, ...]
+
+    @property
+    def turn(self) -> float:
+        """Turns of the input; 0 of a single position."""
+        if len(self.steps) < 2:
+            return 0.0
+        return float(self.steps[1].input_angle * len(self.steps) / (2.0 * pi))
+
+    @property
+    def unspread(self) -> str | None:
+        """On how few tooth phases the positions fall; None if they spread."""
+        return unspread(self.design, len(self.steps), self.turn)
+
+    def warnings(self) -> list[str]:
+        """What makes the figures less than they seem; a line each."""
+        lines = [alike(self.design, len(self.steps), self.turn)]
+        over = overload(self.design, self.torque)
+        if over is not None:
+            lines.append(f"{over}: far beyond what a strain wave gear carries")
+        return [line for line in lines if line is not None]
 
     @property
     def outcome(self) -> Outcome:
@@ -177,6 +200,7 @@ class MeshingRun(Positions):
                 "tooth_friction": self.design.friction.tooth_coefficient or None,
                 "tolerances": has_errors(self.design) or None,
                 "left_out": left_out(self.design),
+                "positions": self.unspread,
             },
             "torque_Nm": self.torque,
             "nodes": self.nodes,
@@ -184,6 +208,7 @@ class MeshingRun(Positions):
             "steps": len(self.steps),
             "wall_s": self.wall_s,
             "outcome": self.outcome.name.lower(),
+            "warnings": self.warnings(),
             **self.averages(),
             "per_step": self.common_series()
             | {

@@ -94,6 +94,18 @@ def test_report(run):
     assert f"{mean:.4g}" in text
 
 
+def test_positions_on_one_tooth_phase_are_labelled(run):
+    """Warning and label of the result stand beside the means and the error."""
+    from swgjoint.cli.meshing import report
+
+    assert run[0]["warnings"] == [] and run[0]["label"]["positions"] is None
+    label = run[0]["label"] | {"positions": "on 1 tooth phase"}
+    text = report(run[0] | {"label": label, "warnings": ["4 positions"]})
+    means = [line for line in text.splitlines() if "mean of the maxima" in line]
+    assert means and all("on 1 tooth phase" in line for line in means)
+    assert "warning: 4 positions" in text.splitlines()
+
+
 def test_rated_torque_is_the_default(monkeypatch):
     """Without --torque the run is at the rated torque of the design."""
     from swgjoint.fe import meshing
@@ -114,7 +126,7 @@ def test_rated_torque_is_the_default(monkeypatch):
     assert seen == {
         "model": "2d",
         "torque": 20.0,
-        "steps": 35,
+        "steps": None,
         "turn": 0.5,
         "nonlinear": False,
         "half": False,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from functools import cache, partial
 
 import numpy as np
@@ -11,12 +12,14 @@ from solved import kept
 
 import swgjoint.fe.build_map as building
 from swgjoint.errors import ComputationError
+from swgjoint.fe import friction_loop
 from swgjoint.fe.continuation import Continuation
 from swgjoint.fe.drive2d import ring_model
 from swgjoint.fe.friction_loop import FIRST_STEPS, friction_loops, loop_torques
 from swgjoint.fe.sampling import sample_map
 from swgjoint.gear.design import Design
 from swgjoint.maps.fit import fit_map
+from swgjoint.maps.unfinished import Unfinished
 
 TOP = 40.0
 
@@ -46,6 +49,25 @@ def test_path_ends_with_a_round():
     assert torque[0] == 0.0 and torque[-1] == torque[-33] == TOP
     assert torque.max() == -torque.min() == TOP
     np.testing.assert_array_equal(torque[-33:-16][::-1], torque[-17:])
+
+
+def test_a_loop_that_is_kept_is_not_solved_again(monkeypatch, tmp_path):
+    """It comes back bit for bit; one along other torques does not count."""
+    one = loop(0.1)
+    keep = Unfinished(folder=tmp_path)
+    values = {item.name: getattr(one, item.name) for item in fields(one)}
+    keep.write("friction-loop-0000", values)
+
+    def unsolved(*args):
+        raise ComputationError("solved again")
+
+    monkeypatch.setattr(friction_loop, "_along", unsolved)
+    options = {"top": TOP, "positions": 1, "steps": 4, "keep": keep}
+    (found,) = friction_loops(rubbing(0.1), **options)
+    for key, value in values.items():
+        assert np.array_equal(getattr(found, key), value)
+    with pytest.raises(ComputationError, match="solved again"):
+        friction_loops(rubbing(0.1), **{**options, "top": 0.9 * TOP})
 
 
 def test_loop_closes_and_encloses_the_work_of_friction():

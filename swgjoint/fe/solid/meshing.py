@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.errors import ComputationError
+from swgjoint.fe.meshing_phases import default_steps, overload
 from swgjoint.fe.meshing_run import Position, Positions
 from swgjoint.fe.solid.axial_section import coning
 from swgjoint.fe.solid.checkpoint import Checkpoint
@@ -102,6 +103,7 @@ class SolidRun(Positions):
                 "stress": "largest nodal value; edges and the step from rim to cup"
                 " do not converge with the mesh",
                 "left_out": "wave_generator.bearing" if bearing else None,
+                "positions": self.unspread,
             },
             "torque_Nm": self.torque,
             "nodes": self.nodes,
@@ -109,6 +111,7 @@ class SolidRun(Positions):
             "steps": len(self.steps),
             "wall_s": self.wall_s,
             "outcome": self.outcome.name.lower(),
+            "warnings": self.warnings(),
             **self.averages(),
             "per_step": self.common_series()
             | {
@@ -133,7 +136,7 @@ def simulate_solid_meshing(
     design: Design,
     *,
     torque: float,
-    steps: int = 36,
+    steps: int | None = None,
     turn: float = 0.5,
     nonlinear: bool = True,
     half: bool = False,
@@ -148,7 +151,8 @@ def simulate_solid_meshing(
     Args:
         design: The drive, with a cup.
         torque: T that the drive exerts on the output [N·m].
-        steps: Wave-generator positions k turn/steps, k = 0 to steps - 1.
+        steps: Wave-generator positions k turn/steps, k = 0 to steps - 1; None chooses
+            as :func:`swgjoint.fe.meshing_phases.default_steps`.
         turn: Turns of the input.
         nonlinear: Large rotations of the segments.
         half: Half model; needs even tooth counts.
@@ -166,6 +170,8 @@ def simulate_solid_meshing(
     """
     begin = time.perf_counter()
     check_modelled(design)
+    if steps is None:
+        steps = default_steps(design, turn)
     kept = None
     if keep is not None:
         settings = {
@@ -221,7 +227,7 @@ def simulate_solid_meshing(
     meshed = set_up("meshed", "engagement of the teeth", lambda: follow.meshed(alone))
     state = set_up(
         "torque",
-        f"loading to {torque:g} N·m",
+        f"loading to {overload(design, torque) or f'{torque:g} N·m'}",
         lambda: follow.to_torque(meshed, torque),
     )
 
