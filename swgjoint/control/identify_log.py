@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.errors import InputError
-from swgjoint.maps.csv_columns import read_columns
+from swgjoint.maps.csv_columns import header_of, read_columns
 from swgjoint.units import arcmin, deg
 
 Array = NDArray[np.float64]
@@ -146,7 +145,7 @@ def read_log(path: str | Path) -> BenchLog:
     Raises:
         InputError: If the file cannot be used; names file, line and column.
     """
-    has = _header(path)
+    has = {*header_of(path)}
     torques = {key: names for key, names in TORQUES.items() if has & set(names)}
     data = read_columns(path, {**NEEDED, **torques})
     return BenchLog(**data, where=str(path))
@@ -171,13 +170,3 @@ def mean_acceleration(means: Array, step: float) -> Array:
     faces = (15.0 * (x[2:-1] - x[1:-2]) - (x[3:] - x[:-3])) / (12.0 * step)
     out[2:-2] = np.diff(faces) / step
     return np.asarray(out)
-
-
-def _header(path: str | Path) -> set[str]:
-    """Names of the columns; what is wrong with the file is told when it is read."""
-    try:
-        with Path(path).open(encoding="utf-8-sig") as file:
-            lines = (x for x in file if x.strip() and not x.lstrip().startswith("#"))
-            return {cell.strip() for cell in next(csv.reader(lines), [])}
-    except (OSError, ValueError, csv.Error):
-        return set()

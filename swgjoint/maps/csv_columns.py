@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import csv
+import re
 from collections.abc import Mapping
+from dataclasses import dataclass
 from difflib import get_close_matches
 from math import isfinite
 from pathlib import Path
@@ -17,10 +19,30 @@ MAX_BYTES = 200_000_000
 """Some million samples; a longer file is not a record of one turn or one loop."""
 
 
+HEAD_LINES = 10_000
+"""A header stands within these lines, comments included."""
+SEPARATORS = {",": "','", ";": "';'", "\t": "a tab"}
+"""Between the cells; which one, the header line says."""
+_DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Sheet:
+    """Cells of a file."""
+
+    header: list[str]
+    rows: list[tuple[int, list[str]]]
+    """Number of the line in the file, cells."""
+    separator: str
+
+
 def read_columns(
     path: str | Path, quantities: Mapping[str, Mapping[str, float]]
 ) -> dict[str, NDArray[np.float64]]:
-    """Columns in SI units; lines that begin with ``#`` are comments.
+    """Columns in SI units, separated by commas, semicolons or tabs.
+
+    Lines that begin with ``#`` are comments; the last one before the numbers may be the
+    header, as ``numpy.savetxt`` writes it.
 
     Args:
         path: File with one header line.
@@ -34,40 +56,15 @@ def read_columns(
             cell is no finite number; names file and line.
     """
     path = Path(path)
-    try:
-        size = path.stat().st_size
-        if size > MAX_BYTES:
-            raise InputError(f"{path}: {size} bytes; accepted: at most {MAX_BYTES}")
-        text = path.read_bytes().decode("utf-8-sig")
-    except OSError as exc:
-        raise InputError(f"{path}: cannot be read: {exc.strerror}") from None
-    except UnicodeDecodeError as exc:
-        raise InputError(f"{path}: not UTF-8 text at byte {exc.start}") from None
-    except ValueError:  # a null byte in the name
-        raise InputError(f"{str(path)[:60]!r} is not a path") from None
-    lines = [
-        (number, line)
-        for number, line in enumerate(text.splitlines(), 1)
-        if line.strip() and not line.lstrip().startswith("#")
-    ]
-    if not lines:
-        raise InputError(f"{path}: empty; {_wanted(quantities)}")
-    try:
-        rows = [
-            (number, row)
-            for (number, _), row in zip(
-                lines, csv.reader((line for _, line in lines), strict=True), strict=True
-            )
-        ]
-    except (csv.Error, ValueError) as exc:
-        raise InputError(f"{path}: not a CSV file: {exc}") from None
-    header = [cell.strip() for cell in rows[0][1]]
-    found = {name: _column(path, header, name, quantities) for name in quantities}
+    sheet = _sheet(path, _wanted(quantities))
+    header = sheet.header
+    found = {name: _column(path, sheet, name, quantities) for name in quantities}
     values: dict[str, list[float]] = {name: [] for name in quantities}
-    for number, row in rows[1:]:
+    for number, row in sheet.rows:
         if len(row) != len(header):
             raise InputError(
-                f"{path}, line {number}: {len(row)} cells; the header has {len(header)}"
+                f"{path}, line {number}: {len(row)} cells; the header has"
+                f" {len(header)}, separated by {SEPARATORS[sheet.separator]}"
             )
         for name, (index, factor) in found.items():
             try:
@@ -75,21 +72,104 @@ def read_columns(
             except ValueError:
                 value = float("nan")
             if not isfinite(value):
+                cell = row[index].strip()
+                comma = _DECIMAL_COMMA.fullmatch(cell)
                 raise InputError(
-                    f"{path}, line {number}: {header[index]} ="
-                    f" {row[index].strip()[:40]!r}; accepted: a finite number"
+                    f"{path}, line {number}: {header[index]} = {cell[:40]!r};"
+                    f" accepted: a finite number{' with a decimal point' * bool(comma)}"
                 )
             values[name].append(value * factor)
     return {name: np.array(column) for name, column in values.items()}
 
 
+def header_of(path: str | Path) -> list[str]:
+    """Names of the columns, none where :func:`read_columns` refuses the file."""
+    try:
+        return _sheet(Path(path), "", limit=HEAD_LINES).header
+    except InputError:
+        return []
+
+
+def _sheet(path: Path, wanted: str, limit: int | None = None) -> Sheet:
+    """Header and cells of a file, of the first lines only if there is a limit."""
+    lines = _text(path).splitlines()[:limit]
+    body = [
+        (number, line)
+        for number, line in enumerate(lines, 1)
+        if line.strip() and not _is_comment(line)
+    ]
+    if not body:
+        raise InputError(f"{path}: empty; {wanted}")
+    first, head = body[0]
+    if _is_numeric(head):
+        above = [line for line in lines[: first - 1] if _is_comment(line)]
+        named = above[-1].strip().strip('"').lstrip("# ") if above else ""
+        separator = _separator(head)
+        if named and named.count(separator) == head.count(separator):
+            body.insert(0, (0, named))
+            head = named
+    separator = _separator(head)
+    table = _cells(path, [line for _, line in body], separator)
+    numbers = [number for number, _ in body]
+    return Sheet(
+        header=[cell.strip() for cell in table[0]],
+        rows=list(zip(numbers[1:], table[1:], strict=True)),
+        separator=separator,
+    )
+
+
+def _text(path: Path) -> str:
+    try:
+        size = path.stat().st_size
+        if size > MAX_BYTES:
+            raise InputError(f"{path}: {size} bytes; accepted: at most {MAX_BYTES}")
+        return path.read_bytes().decode("utf-8-sig")
+    except OSError as exc:
+        raise InputError(f"{path}: cannot be read: {exc.strerror}") from None
+    except UnicodeDecodeError as exc:
+        raise InputError(f"{path}: not UTF-8 text at byte {exc.start}") from None
+    except InputError:
+        raise
+    except ValueError:  # a null byte in the name
+        raise InputError(f"{str(path)[:60]!r} is not a path") from None
+
+
+def _cells(path: Path, lines: list[str], separator: str) -> list[list[str]]:
+    try:
+        rows = list(csv.reader(lines, delimiter=separator, strict=True))
+    except (csv.Error, ValueError) as exc:
+        raise InputError(f"{path}: not a CSV file: {exc}") from None
+    if len(rows) != len(lines):
+        raise InputError(f"{path}: not a CSV file: a quoted cell over several lines")
+    return rows
+
+
+def _separator(line: str) -> str:
+    """What separates most cells of a line; a comma if nothing does."""
+    return max(SEPARATORS, key=line.count)
+
+
+def _is_comment(line: str) -> bool:
+    return line.lstrip().lstrip('"').startswith("#")
+
+
+def _is_numeric(line: str) -> bool:
+    """Whether a line holds numbers alone."""
+    try:
+        return all(
+            isfinite(float(cell.strip(' "'))) for cell in line.split(_separator(line))
+        )
+    except ValueError:
+        return False
+
+
 def _column(
     path: Path,
-    header: list[str],
+    sheet: Sheet,
     name: str,
     quantities: Mapping[str, Mapping[str, float]],
 ) -> tuple[int, float]:
-    units = quantities[name]
+    units, header = quantities[name], sheet.header
     indices = [k for k, cell in enumerate(header) if cell in units]
     if len(indices) == 1:
         return indices[0], units[header[indices[0]]]
@@ -97,7 +177,12 @@ def _column(
         raise InputError(f"{path}: {name} stands in {len(indices)} columns; needed one")
     near = [m for key in units for m in get_close_matches(key, header, n=1)]
     hint = f" (has {near[0][:40]!r})" if near else ""
-    raise InputError(f"{path}: no column {' or '.join(units)}{hint}")
+    read = ", ".join(repr(cell[:24]) for cell in header[:6])
+    more = f" and {len(header) - 6} more" if len(header) > 6 else ""
+    raise InputError(
+        f"{path}: no column {' or '.join(units)}{hint}; read as header, separated by"
+        f" {SEPARATORS[sheet.separator]}: {read}{more}"
+    )
 
 
 def _wanted(quantities: Mapping[str, Mapping[str, float]]) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.errors import InputError
-from swgjoint.maps.csv_columns import read_columns
+from swgjoint.maps.csv_columns import header_of, read_columns
 from swgjoint.sim.trajectory import Trajectory, smooth_ramp, window
 from swgjoint.units import deg
 
@@ -213,7 +213,7 @@ def read_points(
     accepted = {
         name: {f"{name}_deg": deg, f"{name}_rad": 1.0} for name in joints
     }  # fmt: skip
-    header = _header(Path(path))
+    header = header_of(path)
     unknown = [
         cell
         for cell in header
@@ -243,15 +243,3 @@ def read_points(
     for name in moved:
         points[:, joints.index(name)] = columns[name]
     return time, points
-
-
-def _header(path: Path) -> list[str]:
-    """Column names, empty where :func:`read_columns` has its own word to say."""
-    try:
-        with path.open(encoding="utf-8-sig") as lines:
-            for line in lines:
-                if line.strip() and not line.lstrip().startswith("#"):
-                    return [cell.strip() for cell in line.split(",")]
-    except (OSError, ValueError):
-        pass
-    return []
