@@ -1,4 +1,4 @@
-"""``swgjoint design``: whether designs can be built, their picture, their outlines."""
+"""``swgjoint design``: whether designs can be built, pictures, outlines, new ones."""
 
 from __future__ import annotations
 
@@ -9,14 +9,18 @@ from typing import TYPE_CHECKING, Any
 
 from swgjoint.cli.text import table
 from swgjoint.errors import DesignError, InputError
-from swgjoint.files import output_folder, write_whole
+from swgjoint.files import check_output_file, output_folder, write_whole
 
 if TYPE_CHECKING:
     from swgjoint.gear.check import Check
     from swgjoint.gear.design import Design
+    from swgjoint.gear.tooth_path import ToothPath
 
-ACTIONS = ("check", "show", "export")
+ACTIONS = ("check", "show", "export", "new")
+ONLY_NEW = ("teeth", "module", "name", "overrides", "output")
+"""Options that belong to ``new``."""
 MEMBERS = ("flexspline", "circular_spline")
+UNREAD = "design file can be read"
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -24,7 +28,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "action",
         choices=ACTIONS,
-        help="check: figures against their limits; show: picture; export: DXF and CSV",
+        help="check: figures against their limits; show: picture; export: DXF and CSV;"
+        " new: scale DESIGN to other teeth or another module and write its file",
     )
     parser.add_argument(
         "designs",
@@ -37,15 +42,37 @@ def configure(parser: argparse.ArgumentParser) -> None:
         metavar="DIR",
         help="show writes design.png there; export outlines.dxf and one CSV per part",
     )
+    new = parser.add_argument_group("new")
+    new.add_argument(
+        "--teeth", metavar="FS/CS", help="of flexspline and circular spline: 160/162"
+    )
+    new.add_argument("--module", type=float, metavar="MM", help="module [mm]")
+    new.add_argument("--name", help="name of the design; default: that of the file")
+    new.add_argument(
+        "--set",
+        metavar="KEY=VALUE",
+        action="append",
+        default=[],
+        dest="overrides",
+        help="a value after scaling, e.g. flexspline.rim_mm=0.5; repeatable",
+    )
+    new.add_argument("-o", "--output", metavar="FILE.toml", help="file to write")
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
-    """Check designs; draw or export one.
+    """Check designs; draw, export or scale one.
 
     Returns:
         ``feasible``, ``checks`` (list of name, ok, value, unit, limit; with several
-        designs also ``design``), ``design`` or ``designs``, ``files``.
+        designs also ``design``), ``design`` or ``designs``, ``tooth_path`` (passage of
+        a rigid tooth), ``defaults`` (values that the file does not state), ``files``;
+        of ``new`` also ``factors`` and ``moved`` (values that scaling alone made
+        infeasible).
     """
+    given = [name for name in ONLY_NEW if getattr(args, name)]
+    if args.action != "new" and given:
+        option = {"overrides": "set"}.get(given[0], given[0])
+        raise InputError(f"design {args.action} takes no --{option}: accepted by new")
     if args.action == "check":
         if args.out:
             raise InputError("design check writes nothing: leave out --out")
@@ -54,27 +81,83 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         raise InputError(
             f"design {args.action} takes one DESIGN, not {len(args.designs)}"
         )
+    if args.action == "new":
+        return _new(args)
     if not args.out:
         raise InputError(f"design {args.action} needs --out DIR")
     folder = output_folder(args.out)
     from swgjoint.gear.check import raise_faults
     from swgjoint.gear.design import Design
-    from swgjoint.gear.feasibility import design_checks
+    from swgjoint.gear.design_defaults import defaults_taken
 
     design = Design.load(args.designs[0])
-    checks = design_checks(design)
+    checks, path = _all_checks(design)
     raise_faults(checks)
     result: dict[str, Any] = {
         "action": args.action,
         "design": design.drive.name,
         "feasible": True,
         "checks": [_row(check) for check in checks],
+        "defaults": defaults_taken(design),
     }
     if args.action == "show":
-        result |= _show(design, folder)
+        result |= _show(design, path, folder)
     else:
         result |= _export(design, folder)
     return result
+
+
+def _new(args: argparse.Namespace) -> dict[str, Any]:
+    """Scale a design, make it feasible and write it."""
+    if args.out:
+        raise InputError("design new writes one file: --output FILE.toml, not --out")
+    if not args.output:
+        raise InputError("design new needs -o FILE.toml")
+    path = check_output_file(args.output, ".toml")
+    teeth = _teeth(args.teeth) if args.teeth else None
+    from swgjoint.gear.design import Design
+    from swgjoint.gear.design_scaling import scaled_design
+    from swgjoint.sim.scene import parse_override
+
+    found = scaled_design(
+        Design.load(args.designs[0]),
+        name=args.name or path.stem,
+        teeth=teeth,
+        module=args.module,
+        changes=dict(map(parse_override, args.overrides)),
+    )
+    checks, passage = _all_checks(found.design)
+    write_whole(path, found.design.to_toml())
+    return {
+        "action": "new",
+        "design": found.design.drive.name,
+        "feasible": True,
+        "checks": [_row(check) for check in checks],
+        "factors": found.factors,
+        "moved": [
+            {
+                "key": one.key,
+                "scaled": one.bound.rejected,
+                "value": one.value,
+                "at_most" if one.bound.sign == "<=" else "at_least": one.bound.accepted,
+                "text": str(one),
+            }
+            for one in found.moved
+        ],
+        "tooth_path": _path_numbers(passage),
+        "files": [str(path)],
+    }
+
+
+def _teeth(text: str) -> tuple[int, int]:
+    """Teeth of both members from ``160/162``."""
+    flexspline, slash, circular = text.partition("/")
+    if not slash or not (flexspline.isdecimal() and circular.isdecimal()):
+        raise InputError(
+            f"--teeth {text!r}; accepted: teeth of flexspline and circular spline, e.g."
+            " 160/162"
+        )
+    return int(flexspline), int(circular)
 
 
 def report(result: dict[str, Any]) -> str:
@@ -83,7 +166,11 @@ def report(result: dict[str, Any]) -> str:
     rows: list[tuple[object, ...]]
     if result["action"] != "check":
         count = len(result["checks"])
-        lines = [f"{result['design']}: feasible, {count} checks passed"]
+        lines = [
+            f"{result['design']}: feasible, {count} checks passed",
+            *(f"moved: {one['text']}" for one in result.get("moved", ())),
+            *_remarks(result),
+        ]
     elif "designs" in result:
         rows = [
             (
@@ -105,12 +192,37 @@ def report(result: dict[str, Any]) -> str:
                 "ok" if check["ok"] else "BAD",
             )
             for check in result["checks"]
+            if not (check["numerical"] and check["ok"])
         ]
         lines = [
             f"{result['design']}: {word}",
             table(rows, header=("", "value", "limit", "unit", "")),
+            *_remarks(result),
         ]
+        if all(check["name"] == UNREAD for check in result["checks"]):
+            lines = [f"{result['design']}: cannot be read"]
     return "\n".join([*lines, *(f"wrote {name}" for name in result["files"])])
+
+
+def _remarks(result: dict[str, Any]) -> list[str]:
+    """Overlap of the flanks, and values that the file does not state."""
+    lines = []
+    path = result.get("tooth_path", {})
+    if path.get("interference_um"):
+        lines.append(
+            f"rigid flanks overlap by {path['interference_um']:.3g} µm,"
+            f" {path['angle_deg']:.3g} deg from the lobe ({path['where']}): elasticity"
+            " must take it up"
+        )
+    if "missing" in path:
+        lines.append(f"clearance of the flanks over the engagement: {path['missing']}")
+    taken = result.get("defaults", {})
+    if set(taken) >= {"material.youngs_modulus_GPa", "material.poisson_ratio"}:
+        lines.append("material of the members not stated: steel")
+    if taken:
+        told = ", ".join(f"{key} = {value}" for key, value in taken.items())
+        lines.append(f"defaults taken: {told}")
+    return lines
 
 
 def status(result: dict[str, Any]) -> int:
@@ -125,6 +237,40 @@ def _row(check: Check) -> dict[str, Any]:
         "value": check.value,
         "unit": check.unit,
         "limit": check.limit,
+        "numerical": check.numerical,
+    }
+
+
+def _all_checks(design: Design) -> tuple[list[Check], ToothPath | str]:
+    """Checks with those of the engagement, and the passage of a rigid tooth.
+
+    Without a passage the reason: what cannot be built, or a rim without an outline.
+    """
+    from swgjoint.gear.feasibility import design_checks, engagement_checks
+    from swgjoint.gear.tooth_path import tooth_path
+
+    checks = design_checks(design)
+    if not all(check.ok for check in checks):
+        return checks, "not computed of a design that cannot be built"
+    try:
+        path = tooth_path(design)
+    except DesignError as error:  # a rim on rollers has no outline to follow
+        return checks, str(error)
+    return [*checks, *engagement_checks(design, path)], path
+
+
+def _path_numbers(path: ToothPath | str) -> dict[str, Any]:
+    """Figures of the passage of a rigid tooth, or why there are none."""
+    from swgjoint.units import deg, um
+
+    if isinstance(path, str):
+        return {"missing": path}
+    return {
+        "smallest_clearance_um": path.smallest_clearance / um,
+        "interference_um": path.interference / um,
+        "where": path.where[path.worst],
+        "angle_deg": float(path.theta[path.worst]) / deg,
+        "engaged_deg": path.engaged / deg,
     }
 
 
@@ -152,21 +298,21 @@ def _check(references: list[str]) -> dict[str, Any]:
 def _checked(reference: str) -> dict[str, Any]:
     """Checks of one design; a file that cannot be read is a failed check."""
     from swgjoint.gear.design import Design
-    from swgjoint.gear.feasibility import design_checks
+    from swgjoint.gear.design_defaults import defaults_taken
 
     try:
         design = Design.load(reference)
     except DesignError as error:
         faults = str(error).splitlines()
         unread = {"ok": False, "value": None, "unit": "", "limit": None}
-        checks = [{"name": "design file can be read", **unread}]
+        checks = [{"name": UNREAD, **unread, "numerical": False}]
         return {
             "design": reference,
             "feasible": False,
             "checks": checks,
             "faults": faults,
         }
-    found = design_checks(design)
+    found, path = _all_checks(design)
     return {
         "design": design.drive.name,
         "feasible": all(check.ok for check in found),
@@ -174,33 +320,22 @@ def _checked(reference: str) -> dict[str, Any]:
         "faults": [
             line for check in found if not check.ok for line in check.fault.splitlines()
         ],
+        "tooth_path": _path_numbers(path),
+        "defaults": defaults_taken(design),
     }
 
 
-def _show(design: Design, folder: Path) -> dict[str, Any]:
+def _show(design: Design, path: ToothPath | str, folder: Path) -> dict[str, Any]:
     """Pictures of the design and of the passage of a rigid tooth, with its numbers."""
-    from swgjoint.gear.tooth_path import tooth_path
-    from swgjoint.units import deg, um
     from swgjoint.view.design_plots import design_picture
     from swgjoint.view.tooth_path_plots import tooth_path_picture
 
     pictures = {"design.png": design_picture(design)}
-    try:
-        path = tooth_path(design)
-    except DesignError as error:  # a rim on rollers has no outline to follow
-        numbers: dict[str, Any] = {"missing": str(error)}
-    else:
+    if not isinstance(path, str):
         pictures["tooth-path.png"] = tooth_path_picture(design, path)
-        numbers = {
-            "smallest_clearance_um": path.smallest_clearance / um,
-            "interference_um": path.interference / um,
-            "where": path.where[path.worst],
-            "angle_deg": float(path.theta[path.worst]) / deg,
-            "engaged_deg": path.engaged / deg,
-        }
     folder.mkdir(parents=True, exist_ok=True)
     files = [str(write_whole(folder / name, data)) for name, data in pictures.items()]
-    return {"tooth_path": numbers, "files": files}
+    return {"tooth_path": _path_numbers(path), "files": files}
 
 
 def _export(design: Design, folder: Path) -> dict[str, Any]:

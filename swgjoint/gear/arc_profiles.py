@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from math import acos, atan2, cos, hypot, pi, sin, sqrt
 
-from swgjoint.gear.blank import Blank, blank
+from swgjoint.gear.blank import Blank, ToothFault, blank
 from swgjoint.gear.design import Design
 from swgjoint.gear.design_sections import (
     DoubleCircularArc,
@@ -17,6 +17,7 @@ from swgjoint.gear.design_sections import (
 )
 from swgjoint.gear.profile import ToothProfile
 from swgjoint.gear.segments import Piece, Point, arc, line
+from swgjoint.gear.tooth_bounds import with_bounds
 from swgjoint.units import deg, mm
 
 LARGEST_CORRECTED_ANGLE = 0.5 * pi
@@ -34,13 +35,22 @@ SHORTEST = 1e-9
 """A straight segment is at least that long [m]: shorter ones leave no direction."""
 
 
-def arc_profile(design: Design, member: str) -> ToothProfile:
+def arc_profile(design: Design, member: str, *, bounds: bool = True) -> ToothProfile:
     """Profile of a member whose kind is ``qca``, ``dca`` or ``two_arc``.
 
     Raises:
         DesignError: If the tooth cannot be built, in one line that names the key.
     """
     start = blank(design, member)
+    try:
+        return _built(start)
+    except ToothFault as fault:
+        if not bounds:
+            raise
+        raise with_bounds(fault, start, _built) from None
+
+
+def _built(start: Blank) -> ToothProfile:
     spec = start.spec.profile
     if isinstance(spec, QuadrupleCircularArc):
         return _quadruple_arc(start, spec)

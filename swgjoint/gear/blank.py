@@ -2,15 +2,36 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import pi
+from typing import Any
 
 from swgjoint.errors import DesignError
+from swgjoint.faults import unit_of
 from swgjoint.gear.design import Design
 from swgjoint.gear.design_sections import Member
 from swgjoint.gear.profile import ToothProfile
 from swgjoint.gear.segments import Piece, Segment, arc
 from swgjoint.units import deg, mm
+
+
+class ToothFault(DesignError):
+    """A tooth that cannot be built, and the key of the member that shows it."""
+
+    def __init__(self, where: str, key: str, shown: str, what: str) -> None:
+        super().__init__(f"{where}.{key} = {shown}: {what}")
+        self.where, self.key, self.shown, self.what = where, key, shown, what
+
+    def __reduce__(self) -> tuple[type[DesignError], tuple[str]]:
+        """What other processes get: the line."""
+        return DesignError, (str(self),)
+
+    def bounded(self, accepted: str) -> ToothFault:
+        """The same with what is accepted as values."""
+        cause = self.what.partition("; accepted")[0]
+        return ToothFault(
+            self.where, self.key, self.shown, f"{cause}; accepted: {accepted}"
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,14 +69,29 @@ class Blank:
         """Inclination of the flank to the radius at the pitch circle [rad]."""
         return self.spec.pressure_angle_deg * deg
 
-    def fault(self, key: str, what: str) -> DesignError:
+    def fault(self, key: str, what: str) -> ToothFault:
         """Error that names a key of the member, its value and unit."""
-        value: object = self.spec
+        value = self.value(key)
+        unit = f" {unit_of(key)}".rstrip()
+        shown = "its default" if value is None else f"{value}{unit}"
+        return ToothFault(self.where, key, shown, what)
+
+    def value(self, key: str) -> Any:
+        """Value of a dotted key of the member."""
+        value: Any = self.spec
         for name in key.split("."):
             value = getattr(value, name)
-        unit = " mm" if key.endswith("_mm") else " deg" if key.endswith("_deg") else ""
-        shown = "its default" if value is None else f"{value}{unit}"
-        return DesignError(f"{self.where}.{key} = {shown}: {what}")
+        return value
+
+    def changed(self, key: str, value: float) -> Blank:
+        """The blank of a member with another value for a dotted key, not checked."""
+        table, _, last = key.rpartition(".")
+        update = {last: value}
+        if table:
+            update = {table: getattr(self.spec, table).model_copy(update=update)}
+        spec = self.spec.model_copy(update=update)
+        tip, root = circles(spec, self.pitch, self.module, self.side)
+        return replace(self, spec=spec, tip=tip, root=root)
 
     def lands(self, top: float, bottom: float) -> tuple[list[Piece], list[Piece]]:
         """Top land out to the angle ``top`` and root land from ``bottom`` [rad]."""
@@ -112,7 +148,7 @@ def blank(design: Design, member: str) -> Blank:
     teeth = drive.teeth_circular_spline if internal else drive.teeth_flexspline
     module = drive.module_mm * mm
     pitch = teeth * module / 2.0  # (3.13)
-    side = -1.0 if internal else 1.0
+    tip, root = circles(spec, pitch, module, -1.0 if internal else 1.0)
     return Blank(
         member=member,
         where=f"{drive.name}: {member}",
@@ -121,6 +157,16 @@ def blank(design: Design, member: str) -> Blank:
         internal=internal,
         module=module,
         pitch=pitch,
-        tip=pitch + side * spec.addendum_coefficient * module,  # (3.16)
-        root=pitch - side * spec.dedendum_coefficient * module,  # (3.17)
+        tip=tip,
+        root=root,
+    )
+
+
+def circles(
+    spec: Member, pitch: float, module: float, side: float
+) -> tuple[float, float]:
+    """Radii of tip and root circle of a member [m]."""
+    return (
+        pitch + side * spec.addendum_coefficient * module,  # (3.16)
+        pitch - side * spec.dedendum_coefficient * module,  # (3.17)
     )

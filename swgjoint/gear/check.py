@@ -19,6 +19,8 @@ class Check:
     limit: float | None = None
     fault: str = ""
     """One line for a failed check: the key, its value, what is accepted."""
+    numerical: bool = False
+    """Whether the value is round-off that says nothing of a design which passes."""
 
     @classmethod
     def at_most(

@@ -201,8 +201,14 @@ class ToothProfile:
         return tuple(found)
 
 
-def tooth_profile(design: Design, member: str) -> ToothProfile:
+def tooth_profile(design: Design, member: str, *, bounds: bool = True) -> ToothProfile:
     """Tooth profile of ``flexspline`` or ``circular_spline``.
+
+    Args:
+        design: The drive.
+        member: Which of both.
+        bounds: Whether a refusal says which values would be accepted, which takes as
+            long as a thousand profiles of arcs.
 
     Raises:
         DesignError: If the tooth cannot be built; one line that names the key.
@@ -219,4 +225,4 @@ def tooth_profile(design: Design, member: str) -> ToothProfile:
         return conjugate_profile(design, member)
     from swgjoint.gear.arc_profiles import arc_profile
 
-    return arc_profile(design, member)
+    return arc_profile(design, member, bounds=bounds)

@@ -43,7 +43,7 @@ def test_check_lists_figures_against_limits(capsys):
     assert result["feasible"] is True
     assert result["design"] == "reference-2d-parabolic"
     for check in result["checks"]:
-        assert set(check) == {"name", "ok", "value", "unit", "limit"}
+        assert set(check) == {"name", "ok", "value", "unit", "limit", "numerical"}
         assert check["ok"] is True
         name, value, limit = (check[key] for key in ("name", "value", "limit"))
         if name.endswith("at most"):
@@ -55,9 +55,17 @@ def test_check_lists_figures_against_limits(capsys):
             assert value > limit
 
 
-def test_all_presets_in_one_call(capsys):
+@pytest.mark.parametrize(
+    "chosen",
+    [
+        ["reference-2d", "reference-2d-four-roller", "size-25-100"],
+        pytest.param(bundled_names("drives", ".toml"), marks=pytest.mark.slow),
+    ],
+    ids=["some", "all"],
+)
+def test_all_presets_in_one_call(capsys, chosen):
     """Several designs at once: all bundled ones are feasible."""
-    names = bundled_names("drives", ".toml")
+    names = chosen
     status, result, lines = outcome(capsys, "check", *names)
     assert status == 0
     assert lines == []
@@ -65,6 +73,63 @@ def test_all_presets_in_one_call(capsys):
     assert [one["design"] for one in result["designs"]] == names
     assert all(one["feasible"] for one in result["designs"])
     assert {check["design"] for check in result["checks"]} == set(names)
+
+
+def test_check_finds_what_show_draws(capsys):
+    """Clearance of the rigid flanks, the number that goes with the picture."""
+    from swgjoint.gear.tooth_path import tooth_path
+
+    least = tooth_path(Design.preset("size-25-100")).smallest_clearance * 1e6
+    assert least < 0.0
+    _, found, _ = outcome(capsys, "check", "size-25-100")
+    assert found["tooth_path"]["interference_um"] == pytest.approx(-least)
+    (row,) = [check for check in found["checks"] if "rigid flanks" in check["name"]]
+    assert (row["value"], row["unit"]) == (pytest.approx(least), "µm")
+    assert main(["design", "check", "size-25-100"]) == 0
+    assert names(capsys.readouterr().out, "overlap", f"{-least:.3g} µm")
+
+
+def test_round_off_is_shown_where_it_fails(tmp_path, capsys, monkeypatch):
+    """Gaps of 1e-15 mm are no lines of the table, unless they are too large."""
+    from swgjoint.gear import feasibility
+
+    def lines():
+        main(["design", "check", "reference-2d-four-roller"])
+        return capsys.readouterr().out.splitlines()
+
+    before = lines()
+    assert not any("gap between segments" in line for line in before)
+    monkeypatch.setattr(feasibility, "CLOSED", 0.0)
+    after = [line for line in lines() if "gap between segments" in line]
+    assert after and all(line.endswith("BAD") for line in after)
+
+
+def test_defaults_that_are_taken_are_told(tmp_path, capsys):
+    """A file without [material]: steel, with its numbers, in check and in show."""
+    text = Design.load("reference-2d-four-roller").to_toml()
+    head, _, rest = text.partition("[material]")
+    path = tmp_path / "bare.toml"
+    path.write_text(head + "[flexspline]" + rest.split("[flexspline]", 1)[1])
+    for arguments in (["check"], ["show", "--out", str(tmp_path / "out")]):
+        assert main(["design", arguments[0], str(path), *arguments[1:]]) == 0
+        out = capsys.readouterr().out
+        assert names(out, "steel", "material.youngs_modulus_GPa = 210.0")
+
+
+def test_new_writes_a_feasible_design(tmp_path, capsys):
+    """The file has teeth, module and name as asked, and can be built as it is."""
+    path = tmp_path / "my.toml"
+    asked = ["--teeth", "160/162", "--module", "0.4", "--set", "flexspline.rim_mm=0.6"]
+    status, result, lines = outcome(
+        capsys, "new", "reference-2d", *asked, "-o", str(path)
+    )
+    assert status == 0 and lines == [] and result["files"] == [str(path)]
+    assert result["design"] == "my" and result["feasible"] is True
+    drive = Design.load(path).drive
+    assert (drive.teeth_flexspline, drive.teeth_circular_spline) == (160, 162)
+    assert drive.module_mm == 0.4 and Design.load(path).flexspline.rim_mm == 0.6
+    status, result, lines = outcome(capsys, "check", str(path))
+    assert status == 0 and lines == [] and result["defaults"] == {}
 
 
 def test_infeasible_design_is_status_2_with_one_line_per_fault(tmp_path, capsys):
@@ -118,6 +183,20 @@ def test_infeasible_designs_write_nothing(action, tmp_path, capsys):
             ("design show", "one DESIGN", "2"),
         ),
         (("check", "reference-2d", "--out", "x"), ("design check", "--out")),
+        (
+            ("check", "reference-2d", "--module", "1"),
+            ("design check", "--module", "new"),
+        ),
+        (("new", "reference-2d"), ("design new", "-o FILE.toml")),
+        (("new", "reference-2d", "-o", "x.csv"), ("'x.csv'", ".toml")),
+        (
+            ("new", "reference-2d", "-o", "x.toml", "--teeth", "160"),
+            ("--teeth", "'160'", "160/162"),
+        ),
+        (
+            ("new", "reference-2d", "-o", "x.toml", "--module", "-1"),
+            ("module_mm", "-1 mm", "> 0 mm"),
+        ),
         (
             ("check", "no-such-design"),
             ("'no-such-design'", "models/drives", "reference-2d"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import pi
 
 import numpy as np
@@ -61,13 +62,16 @@ def wave_generator_checks(
     if isinstance(outline, Chain):
         corner = float(np.abs(outline.corners()).max())
         checks.append(
-            Check.at_most(
-                "wave generator: corner at its joints",
-                corner,
-                TANGENT,
-                "rad",
-                f"{where}.kind = {spec.kind!r}: a corner of {corner:.3g} rad;"
-                f" accepted: at most {TANGENT:g} rad",
+            replace(
+                Check.at_most(
+                    "wave generator: corner at its joints",
+                    corner,
+                    TANGENT,
+                    "rad",
+                    f"{where}.kind = {spec.kind!r}: a corner of {corner:.3g} rad;"
+                    f" accepted: at most {TANGENT:g} rad",
+                ),
+                numerical=True,
             )
         )
     if isinstance(outline, FourRoller):
