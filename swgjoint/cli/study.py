@@ -41,6 +41,8 @@ STUDIES = {
 compares; imported only when chosen."""
 
 MAX_JOBS = 256
+LEAST_INERTIA, MOST_INERTIA = 1e-9, 1e6
+"""Of a rotor or a load [kg·m²]."""
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -60,6 +62,25 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--jobs", type=int, default=2, metavar="N", help="processes; default 2"
     )
     parser.add_argument(
+        "--load-inertia",
+        type=float,
+        metavar="KGM2",
+        help="response: of the load about the output [kg·m²]; default: the rotor's,"
+        " seen from there",
+    )
+    parser.add_argument(
+        "--rotor-inertia",
+        type=float,
+        metavar="KGM2",
+        help="response: of motor rotor and wave generator about the input [kg·m²];"
+        " default 1e-4",
+    )
+    parser.add_argument(
+        "--closed-form",
+        action="store_true",
+        help="response: frequencies from stiffness and inertias alone, at once",
+    )
+    parser.add_argument(
         "--out", metavar="DIR", help="write the tables, the report and the plots there"
     )
 
@@ -75,6 +96,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     start = time.perf_counter()
     if not 1 <= args.jobs <= MAX_JOBS:
         raise InputError(f"--jobs {args.jobs}; accepted: 1 to {MAX_JOBS}")
+    _check_response_options(args)
     folder = output_folder(args.out) if args.out else None
     from swgjoint.study.rows import StudyOptions
 
@@ -85,6 +107,9 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
             model=args.model,
             jobs=args.jobs,
             folder=folder,
+            load_inertia=args.load_inertia,
+            rotor_inertia=args.rotor_inertia,
+            closed_form=args.closed_form,
             progress=args.progress,
         )
     )
@@ -96,6 +121,25 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         "files": list(found.files),
         "wall_s": time.perf_counter() - start,
     }
+
+
+def _check_response_options(args: argparse.Namespace) -> None:
+    """Inertias are positive, and options of the response belong to it."""
+    given = {
+        "load-inertia": args.load_inertia,
+        "rotor-inertia": args.rotor_inertia,
+        "closed-form": args.closed_form or None,
+    }
+    named = [key for key, value in given.items() if value is not None]
+    if named and args.name != "response":
+        raise InputError(f"--{named[0]} with {args.name}; accepted: with response")
+    for key in named:
+        value = given[key]
+        if value is not True and not LEAST_INERTIA <= value <= MOST_INERTIA:
+            raise InputError(
+                f"--{key} {value:g} kg·m²; accepted: {LEAST_INERTIA:g} to"
+                f" {MOST_INERTIA:g} kg·m²"
+            )
 
 
 def report(result: dict[str, Any]) -> str:

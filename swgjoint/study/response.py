@@ -28,11 +28,30 @@ from swgjoint.study.rows import Row, StudyOptions, StudyResult
 
 DRIVE = "CSG-25-100"
 LINK_RATIO = 1.0
-"""Link inertia over the reflected rotor's: both masses take part in the resonance."""
-ROTOR_INERTIA = 1e-4  # kg·m², a small motor with its wave generator
+"""Link inertia over the reflected rotor's where no load is given: both masses take part
+in the resonance."""
+ROTOR_INERTIA = 1e-4
+"""A small motor with its wave generator, where no rotor is given [kg·m²]."""
+PERIOD = 16.0, 128.0
+"""Of the chirp, and the longest that a low anti-resonance may ask for [s]."""
 AMPLITUDES = (0.002, 0.02, 0.1, 0.3)
 """Motor torque at the output over the rated torque; the resonance multiplies it."""
 STEP = 1e-4
+
+
+@dataclass(frozen=True, kw_only=True)
+class Predicted:
+    """Closed forms at one stiffness."""
+
+    key: str
+    stiffness: float
+    """[N·m/rad]."""
+    meaning: str
+    """Which of the stiffnesses of a drive it is."""
+    locked: float
+    """Load on the drive with the motor locked: the anti-resonance [Hz]."""
+    free: float
+    """Load and rotor against each other: the resonance [Hz]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -55,14 +74,23 @@ def run_response(options: StudyOptions) -> StudyResult:
     """
     references = options.only or (DRIVE,)
     drives = {name: load_drive(name, model=options.model) for name in references}
-    rows, summary, files = [], [], []
+    rows, files = [], []
+    summary: list[str] = []
+    predicted: list[dict[str, Any]] = []
     for number, (name, drive) in enumerate(drives.items()):
+        masses = _masses(drive, options)
+        closed = predictions(drive, masses)
+        rows += [row for one in closed for row in _closed_rows(name, one)]
+        predicted.append(_described(name, drive, masses, closed))
+        summary += _closed_summary(name, drive, masses, closed)
+        if options.closed_form:
+            continue
 
         def progress(done: int, first: int = number) -> None:
             each = 1 + len(AMPLITUDES)
             options.progress("chirps", first * each + done, len(drives) * each)
 
-        found = _measured(drive, progress)
+        found = _measured(drive, masses, progress)
         rows += [row for measured in found for row in _rows(name, measured)]
         summary += _summary(name, found)
         if options.folder is not None:
@@ -76,14 +104,90 @@ def run_response(options: StudyOptions) -> StudyResult:
     return StudyResult(
         rows=tuple(rows),
         summary=tuple(summary),
+        more={"drives": predicted},
         files=tuple(str(path) for path in files),
     )
 
 
-def _measured(drive: DriveMap, progress: Any) -> list[Measured]:
+def _masses(drive: DriveMap, options: StudyOptions) -> TwoMass:
+    """Rotor and load that are asked for, or those of the study."""
+    rotor = options.rotor_inertia or ROTOR_INERTIA
+    load = options.load_inertia or LINK_RATIO * drive.ratio**2 * rotor
+    return TwoMass(rotor_inertia=rotor, link_inertia=load)
+
+
+def predictions(drive: DriveMap, masses: TwoMass) -> list[Predicted]:
+    """Frequencies with the stiffness at small torque and up to the rated torque."""
+    K1 = drive.spec_sheet(("K1_Nm_rad",))["K1_Nm_rad"]
+    kinds = [
+        ("K1", K1, f"K1, up to {drive.ratings.T1:.4g} N·m"),
+        (
+            "mean",
+            drive.mean_stiffness,
+            f"mean stiffness up to the rated {drive.ratings.rated_torque:.4g} N·m",
+        ),
+    ]
+    return [
+        Predicted(
+            key=key,
+            stiffness=stiffness,
+            meaning=meaning,
+            locked=masses.antiresonance(stiffness),
+            free=masses.resonance(stiffness, drive.ratio),
+        )
+        for key, stiffness, meaning in kinds
+        if stiffness is not None
+    ]
+
+
+def _closed_rows(name: str, one: Predicted) -> list[Row]:
+    return [
+        Row(
+            case=f"{name}, {one.key}",
+            quantity=f"{quantity}, motor {state}",
+            unit="Hz",
+            source_value=getattr(one, state),
+            ours=None,
+            reason=f"closed form with {one.stiffness:.4g} N·m/rad, {one.meaning}",
+        )
+        for quantity, state in (("antiresonance", "locked"), ("resonance", "free"))
+    ]
+
+
+def _described(
+    name: str, drive: DriveMap, masses: TwoMass, closed: list[Predicted]
+) -> dict[str, Any]:
+    """Inertias and closed forms as keys of the JSON object."""
+    return {
+        "drive": name,
+        "ratio": drive.ratio,
+        "rotor_inertia_kgm2": masses.rotor_inertia,
+        "load_inertia_kgm2": masses.link_inertia,
+        "stiffness_Nm_rad": {one.key: one.stiffness for one in closed},
+        "locked_Hz": {one.key: one.locked for one in closed},
+        "free_Hz": {one.key: one.free for one in closed},
+    }
+
+
+def _closed_summary(
+    name: str, drive: DriveMap, masses: TwoMass, closed: list[Predicted]
+) -> list[str]:
+    reflected = drive.ratio**2 * masses.rotor_inertia
+    return [
+        f"{name}: load {masses.link_inertia:.4g} kg·m², rotor"
+        f" {masses.rotor_inertia:.4g} kg·m² ({reflected:.4g} kg·m² at the output, ratio"
+        f" {abs(drive.ratio):.4g})",
+        *(
+            f"{name}: motor locked {one.locked:.2f} Hz (anti-resonance), motor free"
+            f" {one.free:.2f} Hz (resonance) with {one.stiffness:.4g} N·m/rad,"
+            f" {one.meaning}"
+            for one in closed
+        ),
+    ]
+
+
+def _measured(drive: DriveMap, masses: TwoMass, progress: Any) -> list[Measured]:
     """The linear level at two steps, then ``full`` at every amplitude."""
-    reflected = drive.ratio**2 * ROTOR_INERTIA
-    masses = TwoMass(rotor_inertia=ROTOR_INERTIA, link_inertia=LINK_RATIO * reflected)
 
     def expected(stiffness: float) -> tuple[float, float]:
         resonance = masses.resonance(stiffness, drive.ratio)
@@ -91,13 +195,17 @@ def _measured(drive: DriveMap, progress: Any) -> list[Measured]:
 
     mean, ratings = drive.mean_stiffness, drive.ratings
     low, high = expected(mean)
-    chirp = Chirp(low=low / 6.0, high=min(4.0 * high, 0.05 / STEP))
-    if chirp.high < 1.5 * high:
+    top = min(4.0 * high, 0.05 / STEP)
+    period = max(PERIOD[0], 10.0 / low)
+    fits = top >= 1.5 * high and period <= PERIOD[1]
+    if not fits:
         raise InputError(
-            f"drive {drive.name!r}: its resonance with a rotor of {ROTOR_INERTIA:g}"
-            f" kg·m², {high:.0f} Hz, needs a step below {1e3 * STEP:g} ms; accepted: up"
-            f" to {0.05 / STEP / 1.5:.0f} Hz"
+            f"drive {drive.name!r} with a rotor of {masses.rotor_inertia:g} kg·m² and a"
+            f" load of {masses.link_inertia:g} kg·m²: {low:.3g} and {high:.3g} Hz;"
+            f" accepted in the simulation: {10.0 / PERIOD[1]:.2g} to"
+            f" {0.05 / STEP / 1.5:.0f} Hz; --closed-form needs none"
         )
+    chirp = Chirp(low=low / 6.0, high=top, period=period)
 
     def measure(level: str, amplitude: float, step: float) -> FrequencyResponse:
         torque = amplitude * ratings.rated_torque

@@ -23,6 +23,12 @@ class StudyOptions:
     """Processes."""
     folder: Path | None = None
     """Where tables, report and plots go; None writes nothing."""
+    load_inertia: float | None = None
+    """Of the load about the output [kg·m²]; None for the study's own."""
+    rotor_inertia: float | None = None
+    """Of rotor and wave generator about the input [kg·m²]; None for the study's own."""
+    closed_form: bool = False
+    """Whether closed forms are enough, without simulation."""
     progress: Progress = silent
 
     def chosen(self, parts: Sequence[str]) -> list[str]:
