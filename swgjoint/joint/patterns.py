@@ -35,49 +35,53 @@ def chosen_hinges(spec: mujoco.MjSpec, keys: Iterable[str]) -> dict[str, str]:
     """
     around = Surroundings(spec)
     keys = list(keys)
+    for key in keys:
+        if not isinstance(key, str):
+            raise InputError(f"joint {key!r}; accepted: a name or a pattern")
+    patterns = [key for key in keys if _is_pattern(key, around)]
+    place = {key: k for k, key in enumerate(keys)}
     hinges = [
         joint
         for joint in spec.joints
         if joint.type == mujoco.mjtJoint.mjJNT_HINGE and not around.is_rotor(joint.name)
     ]
     chosen: dict[str, str] = {}
+    meant: dict[str, list[str]] = {key: [] for key in keys}
     left_out: dict[str, list[str]] = {key: [] for key in keys}
     wrong = []
-    for key in keys:
-        if not isinstance(key, str):
-            raise InputError(f"joint {key!r}; accepted: a name or a pattern")
-        if not _is_pattern(key, around):
-            try:
-                around.driven_joint(key)
-            except InputError as error:
-                wrong.append(str(error))
     for joint in hinges:
-        first = next((key for key in keys if _means(key, joint.name, around)), None)
-        if first is None:
+        found = [key for key in patterns if fnmatchcase(joint.name, key)]
+        if joint.name in place:
+            found.append(joint.name)
+        for key in found:
+            meant[key].append(joint.name)
+        if not found:
             continue
-        why = _obstacle(joint, around) if _is_pattern(first, around) else ""
-        if why:
+        first = min(found, key=place.__getitem__)
+        why = _obstacle(joint, around)
+        if not why:
+            chosen[joint.name] = first
+        elif first != joint.name:
             left_out[first].append(why)
         else:
-            chosen[joint.name] = first
+            wrong.append(why)
+    taken = set(chosen.values())
     for key in keys:
-        if not _is_pattern(key, around) and key not in around.joints:
-            continue  # said above
-        matched = [j.name for j in hinges if _means(key, j.name, around)]
-        if _is_pattern(key, around) and not matched:
+        if key not in patterns and not meant[key]:
+            wrong.append(_no_hinge(key, around))
+        elif not meant[key]:
             known = around.known(key, [joint.name for joint in hinges if joint.name])
             wrong.append(f"pattern {key!r} matches no hinge; {known}")
-        elif left_out[key] and key not in chosen.values():
+        elif key not in taken and left_out[key]:
             reasons = "; ".join(left_out[key])
             wrong.append(f"pattern {key!r}: no hinge can take a drive: {reasons}")
-        elif matched and key not in chosen.values() and not left_out[key]:
-            before = ", ".join(sorted({repr(chosen.get(n, key)) for n in matched}))
-            if key in {chosen.get(n, key) for n in matched}:
-                continue  # a name that was refused above
-            wrong.append(
-                f"{key!r} is never reached: {before} before it matches the same joints;"
-                " put the narrower one first"
-            )
+        elif before := {chosen.get(name, key) for name in meant[key]} - {key}:
+            if key not in taken:
+                others = ", ".join(sorted(map(repr, before)))
+                wrong.append(
+                    f"{key!r} is never reached: {others} before it matches the same"
+                    " joints; put the narrower one first"
+                )
     if wrong:
         raise InputError("\n".join(wrong))
     skipped = [why for key in keys for why in left_out[key]]
@@ -93,10 +97,13 @@ def _is_pattern(key: str, around: Surroundings) -> bool:
     return key not in around.joints and any(sign in key for sign in "*?[")
 
 
-def _means(key: str, name: str, around: Surroundings) -> bool:
-    if _is_pattern(key, around):
-        return fnmatchcase(name, key)
-    return key == name
+def _no_hinge(name: str, around: Surroundings) -> str:
+    """Why a name is that of no hinge."""
+    try:
+        around.driven_joint(name)
+    except InputError as error:
+        return str(error)
+    raise AssertionError(name)
 
 
 def _obstacle(joint: Any, around: Surroundings) -> str:
