@@ -10,9 +10,10 @@ of them. Bounds, and why they are what they are:
 * Energy: nothing but actuators adds energy to a robot; gravity and springs only turn
   it over. :data:`ENERGY` is what soft contacts and a step of some ms may add.
 * Stiff drives: with 1e6 N·m/rad and the rotor as armature the links move as in the
-  file without drives within 1e-3 rad (:data:`SAME`). Robots with a free base fall and
-  hit the floor, hands hit themselves: there a difference of round-off grows to any
-  size, so that these are compared before, over :data:`SHORT`.
+  file without drives within 1e-3 rad (:data:`SAME`), from the first keyframe with its
+  controls and random speeds. A robot that falls is chaotic: compared is the first
+  second. Contacts, limits and friction of joints are off in both: the engine softens
+  them by the inertia of the link alone, without the rotor behind the spring.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ from typing import Any
 import mujoco
 import numpy as np
 import pytest
-from messages import names
+from messages import names, naming
 
 import swgjoint
 from swgjoint.cli.main import main
@@ -43,16 +44,28 @@ ROBOTS: dict[str, dict[str, Any]] = {
     for robot in tomllib.loads((HERE / "manifest.toml").read_text())["robot"]
 }
 DRIVE = "CSG-25-100"
-ROTOR = 1e-4
-"""Rotor with the wave generator of size 25 [kg·m²]: 2 x 0.413e-4, rounded up."""
 TIME = 2.0
 """Of a simulation in a loop of one's own [s]."""
-SHORT = 0.1
+SHORT = 1.0
+"""Of a comparison of links, before the motion of a falling robot is chaotic [s]."""
+SPEED = 0.5
+"""Of the joints at its start, at most [rad/s]."""
+SETTLED = 5
+"""Steps after which the integrator has let go of speeds that it was given."""
 SAME = 1e-3
-STIFF = 1e6
-"""Stiffness of a drive that is as good as rigid [N·m/rad]."""
+"""Distance of links that move alike [rad]."""
+STIFF = DriveMap.linear(1e6)
+"""A drive that is as good as rigid."""
+ARMATURE = 0.01
+"""Inertia of a rotor at its joint where a file states none [kg·m²]."""
+EVERY = 5
+"""Steps from one look at the drives to the next."""
 ENERGY = 0.02
 """Energy that may come from nowhere, of the largest that went to and fro [-]."""
+OVERLAP = 1e-3
+"""Depth of shapes in each other at the start whose energy counts [m]."""
+ROUND = 1e-6
+"""Torsion that is nothing, whatever the torque [rad]."""
 TOOL = 50.0
 """Error of the tool above which no arm is worth simulating [mm]."""
 
@@ -76,33 +89,19 @@ def path(name: str) -> str:
 
 @dataclass(frozen=True)
 class Driven:
-    """A model with drives, and the joints that took one."""
+    """A model with drives, and what was said when they were put in."""
 
     spec: mujoco.MjSpec
     drives: dict[str, Any]
-    refused: dict[str, str]
-    notes: list[str]
+    notes: str
 
 
-def attach_all(name: str, drive: DriveMap | dict[str, DriveMap], **keys: Any) -> Driven:
-    """Drives on all hinges that can take one, with the file's own integrator."""
-    spec = mujoco.MjSpec.from_file(path(name))
-    drives, refused = {}, {}
+def attach_all(spec: mujoco.MjSpec, drives: dict[str, Any], **keys: Any) -> Driven:
+    """Drives on hinges by name or pattern, with the file's own integrator."""
     with warnings.catch_warnings(record=True) as notes:
         warnings.simplefilter("always")
-        for joint in [j.name for j in spec.joints]:
-            own = drive[joint] if isinstance(drive, dict) else drive
-            settings = {
-                key: value[joint] if isinstance(value, dict) else value
-                for key, value in keys.items()
-            }
-            try:
-                drives[joint] = swgjoint.attach(
-                    spec, joint=joint, drive=own, **settings
-                )
-            except InputError as error:
-                refused[joint] = str(error)
-    return Driven(spec, drives, refused, sorted({str(n.message) for n in notes}))
+        got = swgjoint.attach(spec, drives, **keys)
+    return Driven(spec, got, "\n".join(str(note.message) for note in notes))
 
 
 def start(model: mujoco.MjModel, drives: dict[str, Any]) -> mujoco.MjData:
@@ -111,120 +110,122 @@ def start(model: mujoco.MjModel, drives: dict[str, Any]) -> mujoco.MjData:
     if model.nkey:
         mujoco.mj_resetDataKeyframe(model, data, 0)
     else:
-        for j in range(model.njnt):
-            if model.jnt_limited[j] and model.jnt_type[j] >= 2:
-                low, high = model.jnt_range[j]
-                q = model.jnt_qposadr[j]
-                data.qpos[q] = np.clip(data.qpos[q], low, high)
+        hinges = model.jnt_type == mujoco.mjtJoint.mjJNT_HINGE
+        for j in np.flatnonzero(hinges & model.jnt_limited.astype(bool)):
+            q = model.jnt_qposadr[j]
+            data.qpos[q] = np.clip(data.qpos[q], *model.jnt_range[j])
         for joint, drive in drives.items():
-            if drive.rotor:
-                data.joint(drive.rotor).qpos = drive.ratio * data.joint(joint).qpos
+            data.joint(drive.rotor).qpos = drive.ratio * data.joint(joint).qpos
     mujoco.mj_forward(model, data)
     return data
 
 
-def trouble(data: mujoco.MjData) -> list[str]:
-    """Warnings of the engine that mean that a simulation is lost."""
-    bad = ("BADQPOS", "BADQVEL", "BADQACC", "BADCTRL")
-    return [
-        kind
-        for kind in bad
-        if data.warning[getattr(mujoco.mjtWarning, f"mjWARN_{kind}")].number
-    ]
+def trouble(data: mujoco.MjData) -> dict[str, int]:
+    """Warnings of the engine that mean that its figures are wrong, and how many."""
+    kinds = ("INERTIA", "BADQPOS", "BADQVEL", "BADQACC", "BADCTRL")
+    counts = {
+        kind: int(data.warning[getattr(mujoco.mjtWarning, f"mjWARN_{kind}")].number)
+        for kind in kinds
+    }
+    return {kind: count for kind, count in counts.items() if count}
 
 
 def torsion_bound(drive: DriveMap, torque: float) -> float:
     """Largest torsion that a torque can make, hysteresis and error included [rad]."""
-    stated = drive.info["stated"]
     loss = sum(2.0 * element.torque for element in drive.hysteresis)
     error = float(np.hypot(*drive.kinematic_error.T).sum())
-    return (torque + loss) / stated["K1_Nm_rad"] + 2.0 * error
+    return (torque + loss) / drive.info["stated"]["K1_Nm_rad"] + 2.0 * error + ROUND
 
 
+@pytest.fixture
+def quiet_engine():
+    """Keep the engine's warnings off the terminal: the tests read their counts."""
+    mujoco.set_mju_user_warning(lambda message: None)
+    yield
+    mujoco.set_mju_user_warning(None)
+
+
+@pytest.mark.usefixtures("quiet_engine")
 @pytest.mark.parametrize("name", cases())
 def test_drives_on_every_hinge_hold_for_two_seconds(name):
     """From the first keyframe: no divergence, torsion as of the torque, no energy."""
     robot = ROBOTS[name]
-    drive = DriveMap.from_catalogue(robot.get("size", DRIVE))
-    driven = attach_all(name, drive, rotor_inertia=ROTOR)
-    assert len(driven.drives) == robot["hinges"], driven.refused
-    for joint, reason in driven.refused.items():
-        assert names(reason, joint), reason
+    spec = mujoco.MjSpec.from_file(path(name))
+    if "attach_refused" in robot:
+        with pytest.raises(InputError, match=naming(*robot["attach_refused"])):
+            swgjoint.attach(spec, {"*": DRIVE})
+        return
+    driven = attach_all(spec, {"*": DRIVE})
+    assert len(driven.drives) == robot["hinges"], driven.notes
+    assert names(driven.notes, *robot.get("left_out", [])), driven.notes
     model = driven.spec.compile()
     model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
     data = start(model, driven.drives)
 
-    first = float(data.energy.sum())
-    work, turnover = 0.0, 1.0
-    torsion = np.zeros(len(driven.drives))
-    torque = np.zeros(len(driven.drives))
-    excess = 0.0
-    steps = math.ceil(TIME / model.opt.timestep)
-    every = max(1, round(0.005 / model.opt.timestep))
-    for k in range(steps):
+    overlap = any(contact.dist < -OVERLAP for contact in data.contact)
+    torsion, torque = np.zeros((2, len(driven.drives)))
+    first, step = float(data.energy.sum()), float(model.opt.timestep)
+    work, excess, turnover = 0.0, 0.0, 1.0
+    for k in range(math.ceil(TIME / step)):
         before = data.qvel.copy()
         mujoco.mj_step(model, data)
-        power = data.qfrc_actuator @ (0.5 * (before + data.qvel))
-        work += power * model.opt.timestep
-        turnover = max(turnover, abs(work), abs(float(data.energy[0]) - first))
+        work += step * float(data.qfrc_actuator @ (0.5 * (before + data.qvel)))
         excess = max(excess, float(data.energy.sum()) - first - work)
-        if k % every == 0:
-            got = [d.observe(model, data) for d in driven.drives.values()]
+        turnover = max(turnover, abs(work), abs(float(data.energy[0]) - first))
+        if k % EVERY == 0:
+            got = [drive.observe(model, data) for drive in driven.drives.values()]
             torsion = np.maximum(torsion, [abs(float(g.torsion)) for g in got])
             torque = np.maximum(torque, [abs(float(g.torque)) for g in got])
-    assert trouble(data) == []
+    assert trouble(data) == {}
     assert np.isfinite(data.qpos).all()
-    assert excess < ENERGY * turnover
-    for joint, moved, most in zip(driven.drives, torsion, torque, strict=True):
-        assert moved < 2.0 * torsion_bound(drive, most), joint
+    if not (model.nmocap or overlap):  # a weld to one moves the robot
+        assert excess < ENERGY * turnover
+    for drive, moved, most in zip(driven.drives.values(), torsion, torque, strict=True):
+        assert moved < 2.0 * torsion_bound(drive.drive, most), drive.joint
 
 
-@pytest.mark.parametrize("name", cases())
+@pytest.mark.usefixtures("quiet_engine")
+@pytest.mark.parametrize("name", cases("hinges"))
 def test_stiff_drives_leave_the_robot_as_it_is(name):
     """Rotor as armature, 1e6 N·m/rad: links move as without drives."""
-    plain = mujoco.MjSpec.from_file(path(name))
+    spec, plain = (mujoco.MjSpec.from_file(path(name)) for _ in range(2))
     model = plain.compile()
-    reflected = {
-        joint.name: float(model.dof_armature[model.joint(joint.name).dofadr[0]])
-        for joint in plain.joints
-        if joint.type == mujoco.mjtJoint.mjJNT_HINGE
-    }
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    mass = np.zeros((model.nv, model.nv))
-    mujoco.mj_fullM(model, data, mass)
-    for joint in reflected:
-        dof = model.joint(joint).dofadr[0]
-        reflected[joint] = max(reflected[joint], 0.01 * mass[dof, dof])
-    drive = DriveMap.linear(STIFF)
-    ratio = drive.ratio
-    driven = attach_all(
-        name,
-        drive,
-        level="linear",
-        rotor="lumped",
-        rotor_inertia={j: a / ratio**2 for j, a in reflected.items()} | others(plain),
-    )
-    for joint in driven.drives:
-        plain.joint(joint).armature = reflected[joint]
-    plain.option.integrator = driven.spec.option.integrator
-    model, twin = plain.compile(), driven.spec.compile()
-    data, twin_data = start(model, {}), start(twin, driven.drives)
-    time = TIME if ROBOTS[name].get("kind") == "arm" else SHORT
+    takes = attach_all(spec.copy(), {"*": DRIVE}).drives
+    by_armature: dict[float, dict[str, DriveMap]] = {}
+    for joint in plain.joints:
+        if joint.name in takes:
+            own = float(model.dof_armature[model.joint(joint.name).dofadr[0]])
+            by_armature.setdefault(own or ARMATURE, {})[joint.name] = STIFF
+    drives = {}
+    for armature, joints in by_armature.items():
+        inertia = armature / STIFF.ratio**2
+        driven = attach_all(
+            spec, joints, level="linear", rotor="lumped", rotor_inertia=inertia
+        )
+        drives |= driven.drives
+        for joint in driven.drives:
+            plain.joint(joint).armature = armature
+    plain.option.integrator = spec.option.integrator
+    plain.option.iterations = spec.option.iterations
+    model, twin = plain.compile(), spec.compile()
+    for each in (model, twin):
+        each.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONSTRAINT
+    data, twin_data = start(model, {}), start(twin, drives)
+    speeds = SPEED * np.random.default_rng(1).uniform(-1.0, 1.0, len(drives))
+    for drive, speed in zip(drives.values(), speeds, strict=True):
+        data.joint(drive.joint).qvel = twin_data.joint(drive.joint).qvel = speed
+        twin_data.joint(drive.rotor).qvel = drive.ratio * speed
+    own = [model.joint(joint).qposadr[0] for joint in drives]
+    of_twin = [twin.joint(joint).qposadr[0] for joint in drives]
     worst = 0.0
-    for _ in range(math.ceil(time / model.opt.timestep)):
+    for k in range(math.ceil(SHORT / model.opt.timestep)):
         mujoco.mj_step(model, data)
         mujoco.mj_step(twin, twin_data)
-        for joint in driven.drives:
-            apart = data.joint(joint).qpos[0] - twin_data.joint(joint).qpos[0]
-            worst = max(worst, abs(apart))
-    assert trouble(twin_data) == trouble(data) == []
+        if k >= SETTLED:
+            apart = data.qpos[own] - twin_data.qpos[of_twin]
+            worst = max(worst, float(np.abs(apart).max()))
+    assert trouble(twin_data) == trouble(data) == {}
     assert worst < SAME
-
-
-def others(spec: mujoco.MjSpec) -> dict[str, float]:
-    """A rotor for joints that are no hinges and refuse it."""
-    return {j.name: 1e-6 for j in spec.joints if j.type != mujoco.mjtJoint.mjJNT_HINGE}
 
 
 # --- commands -----------------------------------------------------------------------
