@@ -132,7 +132,10 @@ def assemble(
         tool_site=scene.tool_site,
         payload=scene.payload,
         where=scene.where,
+        reading=scene.reading,
     )
+    named = scene.trajectory.named_joints
+    named["start_deg"] -= set(arm.held)  # where hinges without a drive are held
     check_joint_names(
         {
             "joints": set(scene.joints),
@@ -143,7 +146,7 @@ def assemble(
                 for k, d in enumerate(scene.disturbance)
                 if not isinstance(d, ToolForce)
             },
-            **{f"trajectory.{k}": v for k, v in scene.trajectory.named_joints.items()},
+            **{f"trajectory.{k}": v for k, v in named.items()},
         },
         arm.joints,
         where=scene.where,

@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 
 from swgjoint.errors import InputError
+from swgjoint.sim.arm_reading import ArmReading
 from swgjoint.sim.feature_sections import Payload
 from swgjoint.sim.rigid_arm import RigidArm
 from swgjoint.units import mm
@@ -19,19 +20,25 @@ class LoadedArm(RigidArm):
     """A rigid arm that carries a payload at its tool site."""
 
     def __init__(
-        self, reference: str, *, tool_site: str, payload: Payload, where: str
+        self,
+        reference: str,
+        *,
+        tool_site: str,
+        payload: Payload,
+        where: str,
+        reading: ArmReading | None = None,
     ) -> None:
         """Load an arm; ``where`` begins messages about the payload."""
         self._payload: Payload | None = None
         self._site, self._where = tool_site, where
-        super().__init__(reference, tool_site=tool_site)
+        super().__init__(reference, tool_site=tool_site, reading=reading)
         if self.tool < 0:
             raise InputError(
                 f"{where}: payload: arm {reference!r} has no site for the tool; needed:"
                 " tool_site"
             )
         self._payload = payload
-        super().__init__(reference, tool_site=tool_site)
+        super().__init__(reference, tool_site=tool_site, reading=reading)
 
     def spec(self) -> mujoco.MjSpec:
         """A fresh editable copy of the arm with its payload."""
@@ -55,13 +62,20 @@ class LoadedArm(RigidArm):
 
 
 def arms_of(
-    reference: str, *, tool_site: str, payload: Payload | None, where: str
+    reference: str,
+    *,
+    tool_site: str,
+    payload: Payload | None,
+    where: str,
+    reading: ArmReading | None = None,
 ) -> tuple[RigidArm, RigidArm]:
     """The arm of a scene, and what its controller takes it for."""
     if payload is None:
-        arm = RigidArm(reference, tool_site=tool_site)
+        arm = RigidArm(reference, tool_site=tool_site, reading=reading)
         return arm, arm
-    loaded = LoadedArm(reference, tool_site=tool_site, payload=payload, where=where)
+    loaded = LoadedArm(
+        reference, tool_site=tool_site, payload=payload, where=where, reading=reading
+    )
     if payload.known:
         return loaded, loaded
-    return loaded, RigidArm(reference, tool_site=tool_site)
+    return loaded, RigidArm(reference, tool_site=tool_site, reading=reading)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import warnings
+from copy import copy
+from functools import cached_property
 from pathlib import Path
 
 import mujoco
@@ -12,6 +14,8 @@ from numpy.typing import NDArray
 from swgjoint.errors import InputError
 from swgjoint.models_path import find
 from swgjoint.sim.arm_file import read_arm
+from swgjoint.sim.arm_reading import ArmReading
+from swgjoint.sim.compiling import compile_spec as compile_spec
 
 Array = NDArray[np.float64]
 
@@ -20,32 +24,45 @@ class RigidArm:
     """One MJCF or URDF arm with ideal joints; the reference for control and errors.
 
     Attributes:
+        reference: As it was given.
         path: The file.
+        reading: What moves, and where the rest is held.
         model: The compiled arm, see :class:`~swgjoint.sim.arm_file.ArmFile`.
         joints: Names of its joints, in the order of all arrays.
-        held: Joints of the file that do not move, and their type.
+        held: Joints of the file that do not move, and why: their type, or what ties
+            them.
+        keyframes: Poses that the file names: angles of all hinges, those that are held
+            included [rad].
         effort: Torque limits of joints that the file states [N·m].
     """
 
-    def __init__(self, reference: str, *, tool_site: str = "tool") -> None:
+    def __init__(
+        self,
+        reference: str,
+        *,
+        tool_site: str = "tool",
+        reading: ArmReading | None = None,
+    ) -> None:
         """Load an arm, given as a path or as the name of a bundled one.
 
         Args:
             reference: Path or bundled name.
             tool_site: Site whose place is the tool, or a body whose frame it is.
+            reading: What moves, and where the rest is held; None: every hinge.
 
         Raises:
             InputError: If the file is missing, neither MJCF nor URDF, or has no hinge.
         """
+        self.reference = reference
         self.path: Path = find(reference, "arms", ".xml", what="arm")
-        file = read_arm(self.path)
+        self.reading = reading or ArmReading()
+        file = read_arm(self.path, self.reading)
         self.held, self.effort = file.held, file.effort
+        self.keyframes = file.keyframes
         self._spec = file.spec
         self._mark_tool(tool_site)
         if not self._spec.joints:
-            others = ", ".join(
-                f"{name} is a {kind}" for name, kind in self.held.items()
-            )
+            others = ", ".join(f"{name} is a {why}" for name, why in self.held.items())
             raise InputError(
                 f"{self.path}: the arm has no hinge joint"
                 f"{f' ({others})' if others else ''}; a drive needs one"
@@ -109,6 +126,48 @@ class RigidArm:
         zero = np.zeros_like(position)
         return self.torques(position, zero, zero)
 
+    def contacts(
+        self, position: Array, *, within: float = 0.0
+    ) -> list[tuple[str, str, float]]:
+        """Pairs of bodies that touch on a motion, the deepest first.
+
+        Args:
+            position: [rad]. Shape (n, n_joints).
+            within: Distance at which bodies count as touching [m].
+
+        Returns:
+            Two bodies and how deep they are in each other at worst [m], negative for a
+            distance. Bodies that the model keeps from contact are not among them.
+        """
+        model, data = self._probe, self._probe_data
+        model.geom_margin[:] = np.maximum(self.model.geom_margin, within)
+        model.pair_margin[:] = np.maximum(self.model.pair_margin, within)
+        deepest: dict[tuple[int, int], float] = {}
+        for q in position:
+            data.qpos[:] = q
+            mujoco.mj_kinematics(model, data)
+            mujoco.mj_collision(model, data)
+            found = data.contact
+            near = found.dist < within
+            bodies = np.sort(model.geom_bodyid[found.geom[near]], axis=1)
+            for (a, b), distance in zip(bodies, found.dist[near], strict=True):
+                pair = (int(a), int(b))
+                deepest[pair] = max(deepest.get(pair, -np.inf), -float(distance))
+        pairs = [
+            (model.body(a).name, model.body(b).name, depth)
+            for (a, b), depth in deepest.items()
+        ]
+        return sorted(pairs, key=lambda pair: -pair[2])
+
+    @cached_property
+    def _probe(self) -> mujoco.MjModel:
+        """A copy whose margins may change."""
+        return copy(self.model)
+
+    @cached_property
+    def _probe_data(self) -> mujoco.MjData:
+        return mujoco.MjData(self._probe)
+
     def inertia(self, position: Array) -> Array:
         """Inertia about every joint, the others locked [kg·m²]. Shape (n_joints,)."""
         data, nv = self._data, self.model.nv
@@ -145,15 +204,3 @@ class RigidArm:
             mujoco.mj_kinematics(model, data)
             places[k], turns[k] = xpos, xquat
         return places, turns
-
-
-def compile_spec(spec: mujoco.MjSpec, *, where: str) -> mujoco.MjModel:
-    """Compile, with a failure as one line."""
-    try:
-        return spec.compile()
-    except ValueError as exc:
-        raise InputError(f"{where}: MuJoCo cannot compile it: {_line(exc)}") from None
-
-
-def _line(exc: Exception) -> str:
-    return " ".join(str(exc).split())

@@ -5,13 +5,14 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any, Self
+from typing import Annotated, Any, Self
 
 from pydantic import Field, PrivateAttr, model_validator
 
 from swgjoint.errors import InputError
 from swgjoint.faults import Fault, Section, parse_toml, read_toml, validated
 from swgjoint.models_path import find
+from swgjoint.sim.arm_reading import ArmReading
 from swgjoint.sim.feature_sections import (
     Disturbance,
     Payload,
@@ -26,9 +27,11 @@ from swgjoint.sim.scene_sections import (
     Load,
     Metrics,
     Recording,
+    Several,
     Simulation,
 )
-from swgjoint.sim.trajectory_sections import Chirp, TrajectorySection
+from swgjoint.sim.trajectory_sections import MOTIONS, Chirp, TrajectorySection
+from swgjoint.units import deg
 
 MAX_STEPS = 2_000_000
 """Steps of the engine in a run."""
@@ -43,6 +46,14 @@ class Scene(Section):
     """Path or bundled name of an MJCF file."""
     tool_site: str = "tool"
     """Site whose position is the tool; the arm may have none."""
+    driven: Annotated[tuple[str, ...], Several] = ()
+    """Names or patterns (``*``, ``?``) of the hinges that have drives; none: all. The
+    others are held, where ``trajectory.start_deg`` or ``pose`` has them."""
+    pose: str | None = None
+    """Keyframe of the arm's file at which joints without a drive are held; None: the
+    reference position."""
+    balance_inertia: bool = False
+    """Whether inertias that no rigid body has are repaired."""
     defaults: JointSection = JointSection()
     """Drive of every hinge joint that does not say otherwise."""
     joints: dict[str, JointSection] = Field(default_factory=dict)
@@ -60,6 +71,17 @@ class Scene(Section):
     metrics: Metrics = Metrics()
 
     _where: str = PrivateAttr(default="scene")
+
+    @property
+    def reading(self) -> ArmReading:
+        """How the file of the arm is read."""
+        angles = {name: q * deg for name, q in self.trajectory.start_deg.items()}
+        return ArmReading(
+            driven=self.driven,
+            pose=self.pose,
+            angles=angles,
+            balance_inertia=self.balance_inertia,
+        )
 
     @property
     def where(self) -> str:
@@ -251,11 +273,14 @@ def _merged(
 
     merged: dict[str, Any] = copied(data)
     pairs = (
-        overrides.items()
+        list(overrides.items())
         if isinstance(overrides, Mapping)
         else [parse_override(text) for text in overrides or ()]
     )
-    for key, value in pairs:
+    # another kind of motion first: keys that only the old one has go with it
+    for key, value in sorted(pairs, key=lambda pair: pair[0] != "trajectory.kind"):
+        if key == "trajectory.kind":
+            _switch_motion(merged.get("trajectory"), value)
         *tables, last = key.split(".")
         table = merged
         for name in tables:
@@ -266,6 +291,16 @@ def _merged(
         _make_room(table, last)
         table[last] = value
     return merged
+
+
+def _switch_motion(table: Any, kind: Any) -> None:
+    """Leave of a motion what a motion of another kind has, too."""
+    if not isinstance(table, dict) or table.get("kind") == kind:
+        return
+    model = MOTIONS.get(kind) if isinstance(kind, str) else None
+    if model is not None:
+        for key in set(table) - set(model.model_fields):
+            del table[key]
 
 
 def _make_room(table: dict[str, Any], key: str) -> None:

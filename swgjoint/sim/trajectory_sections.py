@@ -265,3 +265,18 @@ TrajectorySection = Annotated[
     | Iso9283,
     Field(discriminator="kind"),
 ]
+MOTIONS: dict[str, type[Motion]] = {
+    str(model.model_fields["kind"].default): model
+    for model in (
+        Sweep,
+        ConstantSpeed,
+        Step,
+        Trapezoid,
+        Chirp,
+        FromFile,
+        Line,
+        Circle,
+        Iso9283,
+    )
+}
+"""Kinds of motion by name."""

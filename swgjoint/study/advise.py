@@ -19,7 +19,6 @@ from swgjoint.maps.drive_map import DriveMap
 from swgjoint.progress import Progress, silent
 from swgjoint.sim.assembly import assemble
 from swgjoint.sim.drives import drive_of
-from swgjoint.sim.rigid_arm import RigidArm
 from swgjoint.sim.scene import Scene
 from swgjoint.study.advise_bound import Bound
 from swgjoint.study.advise_reference import settle
@@ -115,8 +114,8 @@ def _loaded(
 ) -> dict[str, DriveMap]:
     """Maps of all joints, built once; the scene is refused here if it must be."""
     known = dict(drives or {})
-    assemble(scene.with_level("rigid"), drives=known, progress=progress)
-    for name in RigidArm(scene.arm, tool_site=scene.tool_site).joints:
+    rigid = assemble(scene.with_level("rigid"), drives=known, progress=progress)
+    for name in rigid.joints:
         drive_of(scene.of_joint(name), known=known, progress=progress)
     return known
 

@@ -98,18 +98,22 @@ class Bases:
             None if self.scene is None else self.scene.with_changes(changes["scene"]),
         )
 
-    def arm(self, reference: str, tool_site: str) -> list[str]:
+    def arm(
+        self, reference: str, tool_site: str, *, balance_inertia: bool = False
+    ) -> list[str]:
         """Content of an arm: its file, and what the engine makes of what it includes.
 
         As it was when the sweep first asked: later sweeps read it again.
         """
         import mujoco
 
+        from swgjoint.sim.arm_reading import ArmReading
         from swgjoint.sim.rigid_arm import RigidArm
 
         named = (reference, tool_site)
         if named not in self._arms:
-            arm = RigidArm(reference, tool_site=tool_site)
+            reading = ArmReading(balance_inertia=balance_inertia)
+            arm = RigidArm(reference, tool_site=tool_site, reading=reading)
             compiled = np.empty(mujoco.mj_sizeModel(arm.model), np.uint8)
             mujoco.mj_saveModel(arm.model, None, compiled)
             made = hashlib.sha256(compiled.tobytes()).hexdigest()
@@ -212,7 +216,9 @@ def _parts(
     if scene is not None:
         parts["scene"] = scene.model_dump(exclude={"name", "description"})
         parts["engine"] = _engine_version()
-        parts["arm"] = bases.arm(scene.arm, scene.tool_site)
+        parts["arm"] = bases.arm(
+            scene.arm, scene.tool_site, balance_inertia=scene.balance_inertia
+        )
         if (motion := getattr(scene.trajectory, "file", None)) is not None:
             parts["motion"] = _content(Path(motion))
         if design is None:

@@ -1,0 +1,51 @@
+"""The engine's compiler, with its complaints as lines for the user."""
+
+from __future__ import annotations
+
+import mujoco
+
+from swgjoint.errors import InputError
+
+
+def compile_spec(spec: mujoco.MjSpec, *, where: str) -> mujoco.MjModel:
+    """Compile, with a failure as one line.
+
+    Raises:
+        InputError: If the engine refuses the model.
+    """
+    try:
+        return spec.compile()
+    except ValueError as exc:
+        line = " ".join(str(exc).split())
+        remedy = ""
+        if "balanceinertia" in line or "positive eigenvalues" in line:
+            remedy = (
+                "; accepted: moments of inertia of a rigid body, or the option"
+                " --balance-inertia (scene key balance_inertia), which takes their mean"
+            )
+        raise InputError(f"{where}: MuJoCo cannot compile it: {line}{remedy}") from None
+
+
+def skeleton(spec: mujoco.MjSpec, *, where: str) -> mujoco.MjModel:
+    """Bodies, joints and keyframes of a model alone: compiled without its shapes.
+
+    Every body has a mass of 1 kg: of the model only the kinematics holds.
+
+    Raises:
+        InputError: If the engine refuses the model.
+    """
+    bones = spec.copy()
+    for elements in (bones.tendons, bones.pairs, bones.flexes, bones.skins):
+        for element in list(elements):
+            bones.delete(element)
+    for equality in list(bones.equalities):
+        bones.delete(equality)
+    for geom in list(bones.geoms):
+        bones.delete(geom)
+    for mesh in list(bones.meshes):
+        bones.delete(mesh)
+    for body in bones.bodies[1:]:
+        body.explicitinertial = True
+        body.mass, body.inertia = 1.0, [1.0, 1.0, 1.0]
+        body.fullinertia = [float("nan")] * 6
+    return compile_spec(bones, where=where)
