@@ -25,6 +25,7 @@ from swgjoint.sim.payload import arms_of
 from swgjoint.sim.rigid_arm import RigidArm, compile_spec
 from swgjoint.sim.scene import MAX_STEPS, Scene
 from swgjoint.sim.scene_sections import JointSection
+from swgjoint.sim.start_check import check_link, check_ranges
 from swgjoint.sim.trajectory import Trajectory
 from swgjoint.sim.transmission import Transmission
 
@@ -160,6 +161,7 @@ def assemble(
             " controller that is given to run_scene"
         )
     trajectory = trajectory_of(scene, arm)
+    check_ranges(arm, trajectory, where=scene.where)
     known = dict(drives or {})
     spec = arm.spec()
     spec.option.timestep = scene.simulation.step_s
@@ -189,6 +191,7 @@ def assemble(
             # a joint at rest carries every order
             max_input_speed=float(abs(drive.ratio) * speed) or None,
         )
+        check_link(attached, arm, where=scene.where)
         region = check_region(
             attached,
             timestep=scene.simulation.step_s,
@@ -318,7 +321,8 @@ def _touching(arm: RigidArm, trajectory: Trajectory) -> NDArray[np.bool_]:
     model = arm.model
     collides = bool(model.geom_contype.any() and model.geom_conaffinity.any())
     low, high = model.jnt_range.T
-    beyond = (trajectory.position <= low) | (trajectory.position >= high)
+    path, slack = trajectory.position, 1e-3  # drives give way by minutes of arc [rad]
+    beyond = (path <= low + slack) | (path >= high - slack)
     return np.asarray(collides | (model.jnt_limited.astype(bool) & beyond.any(axis=0)))
 
 

@@ -8,7 +8,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from swgjoint.errors import ComputationError
+from swgjoint.errors import ComputationError, InputError
+from swgjoint.sim.start_check import touching_at
 from swgjoint.sim.transmission import Transmission
 
 if TYPE_CHECKING:
@@ -35,9 +36,23 @@ def start_state(assembly: Assembly) -> tuple[Array, Array]:
 
     Returns:
         qpos and qvel of the compiled model.
+
+    Raises:
+        InputError: If bodies press each other there, so that no drive can hold them.
+        ComputationError: If the drives find no balance.
     """
     path, h = assembly.trajectory, assembly.step
-    theta, psi = _balance(assembly, 0.0)
+    try:
+        theta, psi = _balance(assembly, 0.0)
+    except ComputationError as exc:
+        touching = touching_at(assembly.arm, path.position[0])
+        if not touching:
+            raise
+        raise InputError(
+            f"{assembly.scene.where}: trajectory.start_deg: bodies press each other"
+            f" where the arm starts: {touching}; accepted: a pose in which nothing"
+            f" touches, or an <exclude> of the pair in {assembly.arm.path}"
+        ) from exc
     link_rate = path.velocity[0].copy()
     if link_rate.any():
         # a tenth of a step: small against the period of every order that a step carries

@@ -168,7 +168,7 @@ def test_contacts_and_limits_cut_the_steps_of_a_light_link():
     free = assemble(Scene.load_file("ur5e-catalogue", keys))
     assert free.sub_steps == 1
     keys["trajectory.start_deg.wrist_3_joint"] = 300.0
-    keys["trajectory.end_deg.wrist_3_joint"] = 361.0
+    keys["trajectory.end_deg.wrist_3_joint"] = 360.0
     stopped = assemble(Scene.load_file("ur5e-catalogue", keys))
     assert stopped.sub_steps > 1
     assert list(stopped.outside) == ["wrist_3_joint"]
