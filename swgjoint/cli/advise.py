@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
+from swgjoint.cli.arm_arguments import add_arm_arguments, scene_of
 from swgjoint.cli.text import table
 
 
@@ -27,6 +28,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         metavar="KEY=VALUE",
         help="change a value of the scene; may be repeated",
     )
+    add_arm_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
@@ -39,14 +41,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     from swgjoint.study.advise_bound import parse_bound
 
     bound = parse_bound(args.error)
-    from swgjoint.sim.arm_scene import is_arm, scene_of_arm
-    from swgjoint.sim.scene import Scene
-
-    scene = (
-        scene_of_arm(args.scene, overrides=args.set)
-        if is_arm(args.scene)
-        else Scene.load_file(args.scene, args.set)
-    )
+    scene, _ = scene_of(args, args.set)
     return advise(scene, bound, progress=args.progress)
 
 

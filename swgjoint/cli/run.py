@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from swgjoint.cli.arm_arguments import add_arm_arguments, choice_lines, scene_of
 from swgjoint.cli.text import table
 from swgjoint.errors import InputError
 from swgjoint.files import output_folder, write_whole
-
-if TYPE_CHECKING:
-    from swgjoint.sim.scene import Scene
 
 JOINT_HEADER = (
     "joint",
@@ -77,6 +75,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="send the run to a viewer on this machine, at the pace of a clock; by"
         " default to one that is started",
     )
+    add_arm_arguments(parser)
 
 
 def run(args: argparse.Namespace) -> dict[str, Any]:
@@ -95,7 +94,8 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     folder = output_folder(args.out) if args.out else None
     from swgjoint.sim.run import run_scene
 
-    scene, of_arm = _scene(args)
+    scene, choice = scene_of(args, args.overrides)
+    of_arm = choice is not None
     recording = folder / "run.rrd" if folder is not None else None
     result = run_scene(scene, recording=recording, progress=args.progress)
     files = []
@@ -118,29 +118,15 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     arm = result.assembly.arm
     return {
         "scene": scene.name,
-        "arm": {"file": str(arm.path), "held": arm.held},
+        "arm": {"file": str(arm.path), "held": arm.held, "pose": scene.pose},
         "drives_by_rule": of_arm and args.drive is None,
         "strict": args.strict,
+        "drive_choice": choice or {},
         **result.metrics(),
         "contains": result.contains,
         "files": files,
         "live": live,
     }
-
-
-def _scene(args: argparse.Namespace) -> tuple[Scene, bool]:
-    """The scene that is asked for, and whether it was made around an arm."""
-    from swgjoint.sim.arm_scene import is_arm, scene_of_arm
-    from swgjoint.sim.scene import Scene
-
-    if is_arm(args.scene):
-        return scene_of_arm(
-            args.scene, drive=args.drive, overrides=args.overrides
-        ), True
-    if args.drive:
-        scene = Scene.load_file(args.scene).with_drive(args.drive)
-        return scene.with_changes(args.overrides), False
-    return Scene.load_file(args.scene, args.overrides), False
 
 
 def status(result: dict[str, Any]) -> int:
@@ -163,7 +149,7 @@ def report(result: dict[str, Any]) -> str:
         joint_table(result["joints"]),
         *notes(result["joints"]),
         tool_line(result["tool"], random="sensors" in contains),
-        _drives_line(result) if result.get("drives_by_rule") else "",
+        *(choice_lines(choice) if (choice := result.get("drive_choice")) else []),
         f"model: {contains['degrees_of_freedom']} degrees of freedom,"
         f" {contains['tendons']} tendons, {contains['plugin_instances']} plugin"
         f" instances, {contains['integrator']} at {1e3 * contains['step_s']:g} ms,"
@@ -291,15 +277,6 @@ def tool_line(tool: dict[str, Any], *, random: bool) -> str:
         if tool.get(key) is not None:
             parts.append(f"{name} {tool[key]:.4f} mm")
     return f"tool: {', '.join(parts)}" if parts else ""
-
-
-def _drives_line(result: dict[str, Any]) -> str:
-    """Drives that nobody has asked for."""
-    joints = result["contains"]["joints"].items()
-    return (
-        "drives by rule (others: --drive NAME, --set joints.JOINT.drive=NAME): "
-        + ", ".join(f"{name} {joint['drive']}" for name, joint in joints)
-    )
 
 
 def _orders(unresolved: list[dict[str, Any]]) -> str:

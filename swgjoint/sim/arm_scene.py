@@ -1,31 +1,43 @@
-"""A scene around any arm: a drive in every hinge and a gentle sweep."""
+"""A scene around any arm: a drive in every hinge and a gentle motion."""
 
 from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
-from swgjoint.maps.catalogue import catalogue_rows
+from swgjoint.errors import InputError
 from swgjoint.models_path import bundled_names
+from swgjoint.sim.arm_motions import TOOL_MOTIONS, tables_of
+from swgjoint.sim.arm_reading import ArmReading, patterns_of
+from swgjoint.sim.commanded import trajectory_of
+from swgjoint.sim.drive_choice import DriveChoice, choose_drives
+from swgjoint.sim.gentle_sweep import StartWarning, gentle_sweep, place_arm
+from swgjoint.sim.payload import arms_of
 from swgjoint.sim.rigid_arm import RigidArm
 from swgjoint.sim.rotors import catalogue_rotor_inertia
-from swgjoint.sim.scene import Scene
+from swgjoint.sim.scene import Scene, parse_override
 from swgjoint.units import deg
 
-SWEEP = 20.0 * deg
-"""Travel of every joint, less where its range is short [rad]."""
-MARGIN = 0.1
-"""Share of a joint's range that the sweep keeps from either end."""
-RATIO = 100
+Array = NDArray[np.float64]
+
 ROTOR_INERTIA = 1e-4
 """Where the drive is not of the catalogue [kg·m²]: assumed, as in scene ``bench``."""
-TIMING = {"hold_s": 0.25, "ramp_s": 0.5, "settle_s": 0.25}
-DURATION = 4.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class ArmScene:
+    """A scene made around an arm."""
+
+    scene: Scene
+    drive_choice: dict[str, DriveChoice]
+    """Drives that the rule chose; empty where a drive was given for all joints."""
 
 
 def is_arm(reference: str) -> bool:
@@ -43,93 +55,210 @@ def scene_of_arm(
     reference: str,
     *,
     drive: str | None = None,
+    joints: Iterable[str] = (),
+    pose: str | None = None,
+    motion: str | None = None,
+    balance_inertia: bool = False,
     overrides: Mapping[str, Any] | Iterable[str] | None = None,
 ) -> Scene:
-    """All hinges turn by up to 20 degrees within their limits, each with a drive.
+    """The scene of :func:`arm_scene` alone."""
+    return arm_scene(
+        reference,
+        drive=drive,
+        joints=joints,
+        pose=pose,
+        motion=motion,
+        balance_inertia=balance_inertia,
+        overrides=overrides,
+    ).scene
 
-    Without a drive each joint gets the smallest CSG of ratio 100 whose repeated peak
-    torque is at least what the file lets its motor exert or, where the file does not
-    say, whose rated torque is at least the weight on the sweep; the largest if none is.
-    A rule to start from, not the choice of the arm's maker. The rotor has twice the
-    inertia of the wave generator of its size: a motor of the same inertia is assumed.
+
+def arm_scene(
+    reference: str,
+    *,
+    drive: str | None = None,
+    joints: Iterable[str] = (),
+    pose: str | None = None,
+    motion: str | None = None,
+    balance_inertia: bool = False,
+    overrides: Mapping[str, Any] | Iterable[str] | None = None,
+) -> ArmScene:
+    """All hinges, or those that are named, turn gently, each with a drive.
+
+    Without a drive each joint gets the one that
+    :func:`swgjoint.sim.drive_choice.choose_drives` finds: a rule to start from, not the
+    choice of the arm's maker. The rotor has twice the inertia of the wave generator of
+    its size: a motor of the same inertia is assumed.
 
     Args:
         reference: Path of an MJCF or URDF file, or the name of a bundled arm.
         drive: Drive of all joints: design, map or catalogue name.
+        joints: Names or patterns of the hinges that move, each text one or several
+            after commas; none: all. The others are held in the start pose.
+        pose: Where the arm starts, see :func:`swgjoint.sim.gentle_sweep.place_arm`.
+        motion: Kind of the trajectory; None: ``trajectory.kind`` of the overrides, else
+            ``sweep``.
+        balance_inertia: Whether inertias that no rigid body has are repaired.
         overrides: Changes of the scene, as for :meth:`Scene.load_file`.
 
     Raises:
         InputError: If the arm cannot be used.
     """
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # the run says it
-        arm = RigidArm(reference)
-        start, end = gentle_sweep(arm)
-        by_rule = {} if drive else _by_rule(arm, start, end)
+    changes = _as_mapping(overrides)
+    kind = str(changes.get("trajectory.kind", motion or "sweep"))
+    reading = ArmReading(
+        driven=patterns_of(list(joints)), balance_inertia=balance_inertia
+    )
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        arm, start = place_arm(reference, reading=reading, pose=pose)
+        start = _started(arm, start, changes)
+        end = start if kind == "csv" else gentle_sweep(arm, start)[1]
+    _say_once(said)
     data: dict[str, Any] = {
-        "name": arm.path.stem,
-        "description": f"Sweep of all joints of {arm.path.name}",
+        "name": _name(arm.path),
+        "description": f"{kind.capitalize()} of {arm.path.name}",
         "arm": reference,
         "tool_site": _tool(arm),
         "defaults": {"level": "full"},
-        "trajectory": {
-            "kind": "sweep",
-            **TIMING,
-            "start_deg": dict(zip(arm.joints, (start / deg).tolist(), strict=True)),
-            "end_deg": dict(zip(arm.joints, (end / deg).tolist(), strict=True)),
-        },
         "controller": {"feedforward": "gravity_inertia"},
-        "simulation": {"duration_s": DURATION},
     }
+    if reading.driven:
+        data["driven"] = list(reading.driven)
+    if arm.reading.pose is not None:
+        data["pose"] = arm.reading.pose
+    if balance_inertia:
+        data["balance_inertia"] = True
+    held = {name: q / deg for name, q in arm.reading.angles.items()}
+    scene, rigid = _with_motion(data, kind, arm, start, end, held, changes)
     if drive is not None:
         data["defaults"] |= {"drive": drive, "rotor_inertia_kgm2": _rotor(drive)}
+        choice = {}
     else:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # the run says it
+            choice = choose_drives(rigid, trajectory_of(scene, rigid))
         data["joints"] = {
-            joint: {"drive": name, "rotor_inertia_kgm2": _rotor(name)}
-            for joint, name in by_rule.items()
+            joint: {"drive": one.drive, "rotor_inertia_kgm2": _rotor(one.drive)}
+            for joint, one in choice.items()
         }
-    return Scene.from_data(data, where=f"scene of {reference}", overrides=overrides)
+    where = f"scene of {reference}"
+    scene = Scene.from_data(data, where=where, overrides=changes)
+    kept = {
+        joint: one
+        for joint, one in choice.items()
+        if scene.of_joint(joint).drive == one.drive
+    }
+    return ArmScene(scene=scene, drive_choice=kept)
 
 
-def gentle_sweep(arm: RigidArm) -> tuple[np.ndarray, np.ndarray]:
-    """Where the joints start and end [rad]. Shapes (n_joints,).
+def _with_motion(
+    data: dict[str, Any],
+    kind: str,
+    arm: RigidArm,
+    start: Array,
+    end: Array,
+    held: dict[str, float],
+    changes: Mapping[str, Any],
+) -> tuple[Scene, RigidArm]:
+    """Put a motion into the data: the first of a kind that the arm can make freely.
 
-    From the reference position, or the nearest that keeps the margin, towards the
-    farther limit.
+    Returns:
+        The scene, still without drives, and its arm with its payload.
     """
-    model = arm.model
-    low, high = model.jnt_range.T.copy()
-    free = ~model.jnt_limited.astype(bool)
-    low[free], high[free] = -np.inf, np.inf
-    room = np.where(free, 0.0, MARGIN * (model.jnt_range[:, 1] - model.jnt_range[:, 0]))
-    low, high = low + room, high - room
-    start = np.clip(model.qpos0, low, high)
-    up = high - start >= start - low
-    return start, np.clip(start + np.where(up, SWEEP, -SWEEP), low, high)
+    where = f"scene of {data['arm']}"
+    tables, duration = tables_of(kind, arm, start, end)
+    data["simulation"] = {"duration_s": duration}
+    reachable: dict[str, Any] | None = None
+    refused: InputError | None = None
+    for candidate in tables:
+        candidate["start_deg"] |= held
+        data["trajectory"] = candidate
+        scene = Scene.from_data(data, where=where, overrides=changes)
+        rigid = arm
+        if scene.payload is not None or kind in TOOL_MOTIONS or _read_anew(scene, arm):
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # the run says it
+                rigid = rigid_arm_of(scene)
+        try:
+            path = trajectory_of(scene, rigid)
+        except InputError as exc:
+            refused = refused or exc
+            continue
+        if not _collides(rigid, path.position, start):
+            return scene, rigid
+        reachable = reachable or candidate
+    if reachable is None:
+        raise InputError(
+            f"{refused}; or another start: --pose NAME, --set"
+            " trajectory.start_deg.JOINT=ANGLE"
+        )
+    data["trajectory"] = reachable
+    return Scene.from_data(data, where=where, overrides=changes), rigid
 
 
-def _by_rule(arm: RigidArm, start: np.ndarray, end: np.ndarray) -> dict[str, str]:
-    """Catalogue drive of every joint."""
-    rows = sorted(
-        (row for row in catalogue_rows() if row.ratio == RATIO),
-        key=lambda row: row.rated_torque,
+def _read_anew(scene: Scene, arm: RigidArm) -> bool:
+    """Whether the changes of a user make it another arm."""
+    there, here = scene.reading, arm.reading
+    return scene.arm != arm.reference or (
+        there.driven,
+        there.pose,
+        there.balance_inertia,
+    ) != (here.driven, here.pose, here.balance_inertia)
+
+
+def rigid_arm_of(scene: Scene) -> RigidArm:
+    """The arm of a scene with its payload."""
+    arm, _ = arms_of(
+        scene.arm,
+        tool_site=scene.tool_site,
+        payload=scene.payload,
+        where=scene.where,
+        reading=scene.reading,
     )
-    path = np.linspace(start, end, 21)
-    weight = np.abs(arm.gravity(path)).max(axis=0)
-    names = {}
-    for joint, needed in zip(arm.joints, weight, strict=True):
-        effort = arm.effort.get(joint)
-        fits = [
-            row
-            for row in rows
-            if (
-                row.rated_torque >= needed
-                if effort is None
-                else row.repeated_peak >= effort
-            )
-        ]
-        names[joint] = (fits or rows[-1:])[0].name
-    return names
+    return arm
+
+
+def _collides(arm: RigidArm, path: Array, start: Array) -> bool:
+    """Whether bodies touch on a motion that do not where the arm starts."""
+    before = {pair[:2] for pair in arm.contacts(start[None])}
+    few = path[:: max(1, len(path) // 100)]
+    return any(pair[:2] not in before for pair in arm.contacts(few))
+
+
+def _as_mapping(
+    overrides: Mapping[str, Any] | Iterable[str] | None,
+) -> dict[str, Any]:
+    if isinstance(overrides, Mapping):
+        return dict(overrides)
+    return dict(parse_override(text) for text in overrides or ())
+
+
+def _started(arm: RigidArm, start: Array, changes: Mapping[str, Any]) -> Array:
+    """The start with the angles that a user sets; wrong ones are the scene's to say."""
+    start = start.copy()
+    for key, value in changes.items():
+        table, _, name = key.rpartition(".")
+        if (
+            table == "trajectory.start_deg"
+            and name in arm.joints
+            and isinstance(value, int | float)
+        ):
+            start[arm.joints.index(name)] = value * deg
+    return start
+
+
+def _say_once(said: list[warnings.WarningMessage]) -> None:
+    """Pass on what concerns the start; the run says again what concerns the file."""
+    for one in said:
+        if issubclass(one.category, StartWarning):
+            warnings.warn(one.message, stacklevel=3)
+
+
+def _name(path: Path) -> str:
+    """What a scene is called: its arm's file, or its folder where that says more."""
+    folder = path.resolve().parent.name
+    return folder if path.stem.lower() == "scene" and folder else path.stem
 
 
 def _rotor(drive: str) -> float:

@@ -13,7 +13,8 @@ from messages import names, naming
 
 from swgjoint.cli.main import main
 from swgjoint.errors import InputError
-from swgjoint.sim.arm_scene import MARGIN, SWEEP, gentle_sweep, is_arm, scene_of_arm
+from swgjoint.sim.arm_scene import is_arm, scene_of_arm
+from swgjoint.sim.gentle_sweep import MARGIN, SWEEP, gentle_sweep
 from swgjoint.sim.rigid_arm import RigidArm
 from swgjoint.sim.run import run_scene
 from swgjoint.sim.scene import Scene
@@ -122,8 +123,69 @@ def test_meshes_of_a_urdf_are_found_or_named(tmp_path):
         assert all("\n" not in str(w.message) for w in got)
 
 
+def test_a_mesh_of_another_kind_is_told_from_one_that_is_not_there(tmp_path):
+    """A file that lies there and cannot be read names its kind and those that can."""
+    (tmp_path / "link.dae").write_text("<COLLADA/>")
+    for reference, says in (
+        ("link.dae", ("two.urdf", ".dae", ".stl", ".obj", "link.dae")),
+        ("gone.stl", ("two.urdf", "1", "not found", "gone.stl")),
+    ):
+        shape = f'<geometry><mesh filename="package://any/{reference}"/></geometry>'
+        with (
+            pytest.warns(UserWarning, match=naming("finger", "slide")),
+            pytest.warns(UserWarning, match=naming(*says)),
+        ):
+            RigidArm(urdf(tmp_path, shape=shape))
+
+
+def test_a_suffix_in_upper_case_is_read(tmp_path):
+    """As the same file in lower case, with what it includes and meshes beside it."""
+    lower = quiet_arm(urdf(tmp_path))
+    upper = tmp_path / "TWO.URDF"
+    upper.write_text(lower.path.read_text())
+    mesh = (
+        "v 0 0 0\nv .3 0 0\nv 0 .05 0\nv 0 0 .05\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+    )
+    (tmp_path / "link.obj").write_text(mesh)
+    asset = '<asset><mesh name="link" file="link.obj"/></asset>'
+    mjcf = tmp_path / "OWN.XML"
+    own(tmp_path, asset=asset, more='<geom type="mesh" mesh="link"/>')
+    mjcf.write_text((tmp_path / "own.xml").read_text())
+    with pytest.warns(UserWarning, match=naming("TWO.URDF", "finger")):
+        same = RigidArm(str(upper))
+    assert same.joints == lower.joints and is_arm(str(upper))
+    np.testing.assert_array_equal(same.model.body_mass, lower.model.body_mass)
+    assert RigidArm(str(mjcf)).model.nmesh == 1
+
+
+@pytest.mark.parametrize(
+    "moments",
+    [
+        'ixx="0.01" iyy="0.05" izz="0.5" ixy="0" ixz="0" iyz="0"',
+        'ixx="0.01" iyy="0.05" izz="0.06" ixy="0.2" ixz="0" iyz="0"',
+    ],
+)
+def test_inertias_that_no_body_has_are_repaired_when_asked(moments, tmp_path, capsys):
+    """The line names the option; with it the trace stays and the arm runs."""
+    path = Path(urdf(tmp_path))
+    good = 'ixx="0.01" iyy="0.05" izz="0.06" ixy="0" ixz="0" iyz="0"'
+    path.write_text(path.read_text().replace(good, moments, 1))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        assert main(["run", str(path)]) == 2
+        err = capsys.readouterr().err
+        assert names(err, "two.urdf", "inertia", "--balance-inertia", "balance_inertia")
+        assert len(err.splitlines()) == 1
+        scene = scene_of_arm(str(path), balance_inertia=True)
+        arm = RigidArm(str(path), reading=scene.reading)
+    inertia = arm.model.body("upper").inertia
+    np.testing.assert_allclose(inertia, inertia.mean())
+    expected = {"0.5": 0.56, "0.06": 0.12}[moments.split('"')[5]]
+    assert inertia.sum() == pytest.approx(expected)
+
+
 def test_a_joint_that_mimics_another_is_refused(tmp_path):
-    """The line names both; a finger that mimics a finger is held like it."""
+    """Where no joint is left that moves on its own the line names both."""
     with pytest.raises(
         InputError, match=naming("two.urdf", "'joint'", "elbow", "lift", "scene")
     ):
@@ -172,10 +234,10 @@ def test_a_scene_takes_the_mechanics_of_a_file_and_no_more(tmp_path):
 
 
 def test_the_sweep_keeps_to_the_limits(tmp_path):
-    """It starts at the reference where that is allowed and turns 20 degrees."""
+    """Joints that may not be at the reference start in the middle of their range."""
     arm = RigidArm(own(tmp_path))
     start, end = gentle_sweep(arm)
-    np.testing.assert_allclose(start, [0.0, 15.0 * deg])
+    np.testing.assert_allclose(start, [0.0, 35.0 * deg])
     np.testing.assert_allclose(np.abs(end - start), SWEEP)
     panda = RigidArm("panda")
     low, high = panda.model.jnt_range.T
