@@ -23,6 +23,7 @@ from swgjoint.sim.payload import arms_of
 from swgjoint.sim.rigid_arm import RigidArm
 from swgjoint.sim.rotors import catalogue_rotor_inertia
 from swgjoint.sim.scene import Scene, parse_override
+from swgjoint.sim.step_choice import resolving_step
 from swgjoint.units import deg
 
 Array = NDArray[np.float64]
@@ -99,7 +100,9 @@ def arm_scene(
         motion: Kind of the trajectory; None: ``trajectory.kind`` of the overrides, else
             ``sweep``.
         balance_inertia: Whether inertias that no rigid body has are repaired.
-        overrides: Changes of the scene, as for :meth:`Scene.load_file`.
+        overrides: Changes of the scene, as for :meth:`Scene.load_file`. Unless they
+            state ``simulation.step_s``, the step carries the strongest order of every
+            drive, see :mod:`swgjoint.sim.step_choice`.
 
     Raises:
         InputError: If the arm cannot be used.
@@ -144,6 +147,9 @@ def arm_scene(
         }
     where = f"scene of {reference}"
     scene = Scene.from_data(data, where=where, overrides=changes)
+    if not changes.keys() & {"simulation", "simulation.step_s"}:
+        data["simulation"]["step_s"] = resolving_step(scene, rigid)
+        scene = Scene.from_data(data, where=where, overrides=changes)
     kept = {
         joint: one
         for joint, one in choice.items()

@@ -10,17 +10,20 @@ from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.commanded import trajectory_of
 from swgjoint.sim.drives import find_drive
 from swgjoint.sim.rigid_arm import RigidArm
+from swgjoint.sim.ripple_validity import SHARE
 from swgjoint.sim.scene import Scene
 
 STEPS = (1e-3, 5e-4, 2.5e-4, 2e-4, 1e-4, 5e-5)
 """Steps to choose from [s]."""
-PHASE_STEP = 0.1
-"""Phase of the strongest order in a step [rad]: half of what the step can carry, so
-that its amplitude is right to some percent and twice the order is carried, too."""
+PHASE_STEP = 0.25
+"""Phase of the highest order that matters in a step [rad]: half of what the step can
+carry, so that its amplitude is right to some percent."""
+TOOTH_ORDERS = 2
+"""Multiples of the tooth order of a design, whose map is not known yet."""
 
 
 def resolving_step(scene: Scene, arm: RigidArm) -> float:
-    """Largest of :data:`STEPS` that carries the strongest order of every drive [s].
+    """Largest of :data:`STEPS` that carries the ripple of every drive [s].
 
     The smallest of them where none does; the run then marks what it leaves out.
 
@@ -35,18 +38,25 @@ def resolving_step(scene: Scene, arm: RigidArm) -> float:
         if section.drive is None or section.level not in (None, "kinematic", "full"):
             continue
         source = find_drive(section.drive)
-        rate = strongest_order(source) * abs(source.ratio) * float(top)
+        rate = needed_order(source) * abs(source.ratio) * float(top)
         if rate > 0.0:
             needed = min(needed, PHASE_STEP / rate)
     return next((step for step in STEPS if step <= needed), STEPS[-1])
 
 
-def strongest_order(source: DriveMap | Design) -> float:
-    """Order per input turn with the most torque; of a design that of its teeth."""
+def needed_order(source: DriveMap | Design) -> float:
+    """Highest order per input turn that matters for the ripple; 0 without harmonics.
+
+    Its torque, as :mod:`swgjoint.sim.ripple_validity` estimates it, is at least
+    :data:`~swgjoint.sim.ripple_validity.SHARE` of the largest; low orders have less
+    ripple than that estimate, so the sum of all says little. Of a design, whose map is
+    not known yet, the second tooth order.
+    """
     if isinstance(source, Design):
-        return float(source.periodicity)
+        return float(TOOTH_ORDERS * source.periodicity)
     torsion = source.mean_torsion(source.ratings.rated_torque)
     torque = np.hypot(*source.coefficients(torsion, 1).T)
     torque = torque + source.mean_stiffness * np.hypot(*source.kinematic_error.T)
-    torque[0] = 0.0
-    return float(input_orders(source)[int(np.argmax(torque))])
+    orders, torque = input_orders(source)[1:], torque[1:]
+    matters = torque >= SHARE * torque.max(initial=0.0)
+    return float(orders[matters & (torque > 0.0)].max(initial=0.0))

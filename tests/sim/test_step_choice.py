@@ -6,13 +6,13 @@ from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.arm_scene import scene_of_arm
 from swgjoint.sim.rigid_arm import RigidArm
 from swgjoint.sim.run import run_scene
-from swgjoint.sim.step_choice import STEPS, resolving_step, strongest_order
+from swgjoint.sim.step_choice import STEPS, needed_order, resolving_step
 
 
-def test_the_strongest_order_is_that_with_the_most_torque(synthetic_map: DriveMap):
+def test_the_needed_order_leaves_little_above_it(synthetic_map: DriveMap):
     """Of the synthetic map the teeth; of a map without harmonics none."""
-    assert strongest_order(synthetic_map) == 122.0
-    assert strongest_order(DriveMap.linear(2e4)) == 0.0
+    assert needed_order(synthetic_map) == 122.0
+    assert needed_order(DriveMap.linear(2e4)) == 0.0
 
 
 def test_ripple_of_a_drive_of_ones_own_is_there_by_default(synthetic_map, tmp_path):
