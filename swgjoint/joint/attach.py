@@ -17,7 +17,16 @@ from swgjoint.joint.fitting import LEVELS as LEVELS
 from swgjoint.joint.fitting import ROTORS as ROTORS
 from swgjoint.joint.fitting import Fitting, check_spec, fitted
 from swgjoint.joint.motors import clear_armature, misread_sensors, move_to_rotor
-from swgjoint.joint.place import Rotor, check_option, find_places, free_inertias
+from swgjoint.joint.place import (
+    ITERATIONS,
+    LS_ITERATIONS,
+    Rotor,
+    allow_iterations,
+    check_option,
+    few_iterations,
+    find_places,
+    free_inertias,
+)
 from swgjoint.joint.variation import SIZE
 from swgjoint.joint.watch import add_watch, warn_outside
 from swgjoint.maps.drive_map import DriveMap
@@ -204,6 +213,9 @@ def attach_all(
 
     # warnings first: as errors they leave the spec unchanged
     _warn_of_integrator(kept, used)
+    few = used == mujoco.mjtIntegrator.mjINT_DISCRETE and few_iterations(spec)
+    if few:
+        _warn_of_iterations(spec)
     _warn_of_sensors(misread_sensors(moved, measured), drives)
     if watch:
         warn_outside(drives.values(), timestep=timestep, integrator=used)
@@ -236,6 +248,8 @@ def attach_all(
         else:
             _add_plugin(spec, drive, body, texts[name])
     spec.option.integrator = used
+    if few:
+        allow_iterations(spec)
     extend_keys(spec, drives.values())
     if watch:
         add_watch(spec, drives.values())
@@ -293,6 +307,17 @@ def _warn_of_integrator(kept: mujoco.mjtIntegrator, used: mujoco.mjtIntegrator) 
     warnings.warn(
         f"integrator {name} replaced by discrete: {name} takes a drive as an explicit"
         " force and diverges; integrator='keep' keeps it, RK4 is kept as the reference",
+        stacklevel=depth_of_caller(),
+    )
+
+
+def _warn_of_iterations(spec: mujoco.MjSpec) -> None:
+    """Say that limits of the engine's solvers are raised."""
+    option = spec.option
+    warnings.warn(
+        f"iterations {option.iterations} and ls_iterations {option.ls_iterations}"
+        f" raised to at least {ITERATIONS} and {LS_ITERATIONS}: the discrete integrator"
+        " solves for the drives' stiffness within them",
         stacklevel=depth_of_caller(),
     )
 

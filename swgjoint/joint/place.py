@@ -22,6 +22,8 @@ ROTOR_MASS = 1e-9
 """Mass of the rotor body [kg]; the arm's model already holds the motor's mass."""
 LUMPED_INERTIA = 1e-12
 """Of the body of a lumped rotor [kg·m²]: the engine wants some."""
+ITERATIONS, LS_ITERATIONS = 100, 50
+"""MuJoCo's default limits of its solvers."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -214,6 +216,23 @@ def check_option(spec: mujoco.MjSpec, integrator: mujoco.mjtIntegrator) -> None:
             "set it to 0 with drives",
             stacklevel=depth_of_caller(),
         )
+
+
+def few_iterations(spec: mujoco.MjSpec) -> bool:
+    """Whether the model stops the engine's solvers earlier than MuJoCo's defaults."""
+    option = spec.option
+    return option.iterations < ITERATIONS or option.ls_iterations < LS_ITERATIONS
+
+
+def allow_iterations(spec: mujoco.MjSpec) -> None:
+    """Let the engine's solvers converge.
+
+    The discrete integrator solves for mass and stiffness together, within the limit
+    that files for other solvers set to one or three.
+    """
+    option = spec.option
+    option.iterations = max(option.iterations, ITERATIONS)
+    option.ls_iterations = max(option.ls_iterations, LS_ITERATIONS)
 
 
 def _check_compiler(spec: mujoco.MjSpec, rotor_inertia: float) -> None:

@@ -13,6 +13,7 @@ from swgjoint.errors import InputError
 from swgjoint.joint.attach import attach
 from swgjoint.joint.drive import JointDrive
 from swgjoint.joint.native import native_map
+from swgjoint.joint.place import allow_iterations
 from swgjoint.joint.region import check_region
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.progress import Progress, silent
@@ -165,6 +166,7 @@ def assemble(
     known = dict(drives or {})
     spec = arm.spec()
     spec.option.timestep = scene.simulation.step_s
+    allow_iterations(spec)
     spec.option.integrator = getattr(
         mujoco.mjtIntegrator, f"mjINT_{scene.simulation.integrator.upper()}"
     )

@@ -265,6 +265,13 @@ def _check_finite(assembly: Assembly, data: mujoco.MjData, states: Array) -> Non
             " or a disturbance was asked for more than 1e10, which the engine does not"
             " apply; use lower gains of the controller"
         )
+    if data.warning[mujoco.mjtWarning.mjWARN_INERTIA].number:
+        raise ComputationError(
+            f"scene {assembly.scene.name!r}: before t = {states[-1, 0]:.3f} s the engine"
+            " could not solve for the accelerations: the masses of the arm are too far"
+            " apart, or its inertia is close to singular; see mjWARN_INERTIA in"
+            " MuJoCo's manual"
+        )
     bad = any(
         data.warning[kind].number
         for kind in (

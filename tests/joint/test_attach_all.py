@@ -250,3 +250,24 @@ def test_user_data_of_the_defaults_do_not_reach_a_drive(rubbing):
         mujoco.mj_step(one, data, 50)
         ends.append(data.qpos.copy())
     np.testing.assert_array_equal(*ends)
+
+
+def test_limits_of_iterations_are_raised_once(rubbing):
+    """Few iterations, as files for other solvers state them, would end the solve."""
+    spec = arm()
+    spec.option.iterations, spec.option.ls_iterations = 3, 200
+    fittings = {name: Fitting(drive=rubbing, rotor_inertia=1e-4) for name in JOINTS}
+    with pytest.warns(UserWarning, match=naming("3", "100", "discrete")) as said:
+        attach_all(spec, fittings)
+    assert len(said) == 1
+    assert (spec.option.iterations, spec.option.ls_iterations) == (100, 200)
+
+
+def test_limits_of_iterations_stay_without_the_discrete_integrator(rubbing):
+    """RK4 solves for no stiffness: the file's limits are the user's affair."""
+    spec = arm("RK4")
+    spec.option.iterations = 3
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        attach(spec, joint="elbow", drive=rubbing, rotor_inertia=1e-4)
+    assert spec.option.iterations == 3

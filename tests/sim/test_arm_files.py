@@ -396,3 +396,17 @@ def test_names_that_are_made_up_are_free(tmp_path):
     arm = RigidArm(str(path))
     assert len(set(arm.joints)) == 2
     assert "joint_1" in arm.joints
+
+
+def test_few_iterations_of_a_file_do_not_reach_a_scene(tmp_path):
+    """The same motion whatever limits the file sets for other solvers."""
+    text = RigidArm("two-link").path.read_text()
+    found = []
+    for limits in ("", 'iterations="1" ls_iterations="1"'):
+        arm = tmp_path / "arm.xml"
+        arm.write_text(text.replace("<option", f"<option {limits}"))
+        scene = scene_of_arm(str(arm), drive="CSG-25-100")
+        run = run_scene(scene.with_changes({"simulation.duration_s": 2.0}))
+        assert run.assembly.model.opt.iterations == 100
+        found.append(run.position)
+    np.testing.assert_array_equal(*found)
