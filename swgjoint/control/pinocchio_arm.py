@@ -4,7 +4,8 @@ Given to :func:`swgjoint.sim.run.run_scene` as ``known_arm`` it makes the torque
 links, weight and inertia, that every plan starts from, in place of the engine's inverse
 dynamics. From a compiled MuJoCo model the tree is built number by number, since MuJoCo
 writes MJCF with six digits; an arm that is known to Pinocchio by a URDF, or from an
-identification, comes as it is. Damping, springs and friction of joints are not in it.
+identification, comes as it is. Of its joints it has linear springs (of a MuJoCo model),
+viscous damping and dry friction; damping and springs that are polynomials are refused.
 """
 
 from __future__ import annotations
@@ -29,14 +30,15 @@ class PinocchioArm:
     """
 
     def __init__(self, model: Any) -> None:
-        """Take over tree, inertias, gravity and armature.
+        """Take over tree, inertias, gravity, armature, damping, friction and springs.
 
         Args:
             model: Of MuJoCo, for instance ``swgjoint.sim.rigid_arm.RigidArm("ur5e")
                 .model``, or of Pinocchio.
 
         Raises:
-            InputError: If a joint is not a hinge or a body has several.
+            InputError: If a joint is not a hinge, a body has several, or a spring or
+                damper is not linear.
             MissingExtraError: If Pinocchio is not installed.
         """
         self._pin = _pinocchio()
@@ -49,9 +51,18 @@ class PinocchioArm:
             )
         self._data = self.model.createData()
         self._zero = self._pin.neutral(self.model)
+        self._damping = np.array(self.model.damping)
+        self._friction = (
+            np.array(self.model.lowerDryFrictionLimit),
+            np.array(self.model.upperDryFrictionLimit),
+        )
+        none = np.zeros(len(self.joints))
+        self._spring = _springs(model, self.joints) if own else (none, none)
 
     def torques(self, position: Array, velocity: Array, acceleration: Array) -> Array:
-        """Joint torques that the motion needs, gravity included [N·m].
+        """Joint torques that the motion needs, gravity and joint losses included [N·m].
+
+        Dry friction is that of a joint that slides; at rest it is zero.
 
         Args:
             position: [rad]. Shape (n, n_joints).
@@ -62,7 +73,11 @@ class PinocchioArm:
         rnea, model, data = self._pin.rnea, self.model, self._data
         for row, q, v, a in zip(out, position, velocity, acceleration, strict=True):
             row[:] = rnea(model, data, self._place(q), v, a)
-        return out
+        low, high = self._friction
+        stiffness, centre = self._spring
+        dry = np.where(velocity > 0.0, high, np.where(velocity < 0.0, low, 0.0))
+        held = stiffness * (position - centre)
+        return np.asarray(out + self._damping * velocity + dry + held)
 
     def inertia(self, position: Array) -> Array:
         """Inertia about every joint, the others locked [kg·m²]. Shape (n_joints,)."""
@@ -92,7 +107,11 @@ def _tree(pin: Any, model: mujoco.MjModel) -> Any:
             anchor = pin.SE3(np.eye(3), model.jnt_pos[j])
             hinge = pin.JointModelRevoluteUnaligned(model.jnt_axis[j])
             joint = other.addJoint(joint, hinge, place * anchor, model.joint(j).name)
-            other.armature[other.joints[joint].idx_v] = model.dof_armature[j]
+            dof = other.joints[joint].idx_v
+            other.armature[dof] = model.dof_armature[j]
+            other.damping[dof] = model.dof_damping[j]
+            other.lowerDryFrictionLimit[dof] = -model.dof_frictionloss[j]
+            other.upperDryFrictionLimit[dof] = model.dof_frictionloss[j]
             place = anchor.inverse()
         holder[b] = joint, place
         inertia = pin.Inertia(
@@ -101,6 +120,22 @@ def _tree(pin: Any, model: mujoco.MjModel) -> Any:
         centre = place * _pose(pin, model.body_ipos[b], model.body_iquat[b])
         other.appendBodyToJoint(joint, inertia, centre)
     return other
+
+
+def _springs(model: mujoco.MjModel, joints: tuple[str, ...]) -> tuple[Array, Array]:
+    """Stiffness [N·m/rad] of the joints and where their springs rest [rad]."""
+    for what, higher in (
+        ("spring", model.jnt_stiffnesspoly),
+        ("damping", model.dof_dampingpoly),
+    ):
+        bent = [model.joint(k).name for k in np.flatnonzero(higher.any(axis=1))]
+        if bent:
+            raise InputError(
+                f"arm with a {what} that is a polynomial in joint"
+                f" {', '.join(bent)}; accepted: a linear one"
+            )
+    order = [int(model.joint(name).id) for name in joints]
+    return model.jnt_stiffness[order].copy(), model.qpos_spring[order].copy()
 
 
 def _pose(pin: Any, position: Array, quaternion: Array) -> Any:

@@ -68,6 +68,53 @@ def test_torques_agree_with_the_engine(name):
         np.testing.assert_allclose(other.inertia(q), arm.inertia(q), rtol=0, atol=1e-10)
 
 
+def test_losses_and_springs_of_joints_are_the_engines():
+    """Random damping, dry friction and springs, every joint sliding, to 1e-9 N·m."""
+    arm, rng = RigidArm("ur5e"), np.random.default_rng(5)
+    model, count = arm.model, len(arm.joints)
+    zero = np.zeros(count)
+    model.dof_damping[:] = rng.uniform(0.0, 3.0, count)
+    # of a light joint the engine's soft law would not slip yet at these speeds
+    model.dof_frictionloss[:] = rng.uniform(0.0, 1.0, count) * arm.inertia(zero)
+    model.jnt_stiffness[:] = rng.uniform(0.0, 30.0, count)
+    model.qpos_spring[:] = rng.uniform(-1.0, 1.0, count)
+    motion = rng.uniform(-1.0, 1.0, (3, 20, count))
+    motion[1] += np.sign(motion[1])
+    got = PinocchioArm(model).torques(*motion)
+    np.testing.assert_allclose(got, arm.torques(*motion), rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("read", ["pinocchio", "mujoco"])
+def test_a_hinge_rubs_as_its_file_says(read):
+    """Damping 2 and friction 3: 5 N·m at 1 rad/s, -5 N·m back, nothing at rest."""
+    text = """<robot name="one"><link name="base"/>
+      <joint name="hinge" type="revolute"><parent link="base"/><child link="arm"/>
+        <axis xyz="0 0 1"/><limit lower="-3" upper="3" effort="9" velocity="9"/>
+        <dynamics damping="2" friction="3"/></joint>
+      <link name="arm"><inertial><mass value="1"/>
+        <inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial>
+      </link></robot>"""
+    if read == "pinocchio":
+        arm = PinocchioArm(pinocchio.buildModelFromXML(text))
+    else:
+        arm = PinocchioArm(mujoco.MjSpec.from_string(text).compile())
+    zero = np.zeros((3, 1))
+    torque = arm.torques(zero, np.array([[1.0], [-1.0], [0.0]]), zero)
+    np.testing.assert_allclose(torque[:, 0], [5.0, -5.0, 0.0], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("attribute", "what"),
+    [("jnt_stiffnesspoly", "spring"), ("dof_dampingpoly", "damping")],
+)
+def test_curved_springs_and_dampers_are_refused(attribute, what):
+    """What Pinocchio cannot follow is named with its joint."""
+    model = RigidArm("two-link").model
+    getattr(model, attribute)[1, 0] = 0.5
+    with pytest.raises(InputError, match=naming(what, "polynomial", "elbow", "linear")):
+        PinocchioArm(model)
+
+
 class Spy(MotorPID):
     """The controller of the scene, which keeps its task."""
 
