@@ -45,7 +45,7 @@ from swgjoint.study.control_specimens import specimen
 from swgjoint.units import arcmin
 
 SEED = 4
-drive = DriveMap.from_catalogue("CSG-25-100")
+drive = DriveMap.from_catalogue("CSG-25-100", kinematic_error_arcmin=0.0)
 plant = specimen(drive, SEED)
 print(f"kinematic error: {peak_to_peak(plant) / arcmin:.2f} arcmin over one turn")
 print(f"friction: {plant.friction.coulomb / drive.friction.coulomb:.2f} of the nominal")

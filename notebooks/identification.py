@@ -37,7 +37,7 @@ from swgjoint.sim.run import run_scene
 from swgjoint.sim.scene import Scene
 from swgjoint.units import arcmin
 
-catalogue = DriveMap.from_catalogue("CSG-25-100")
+catalogue = DriveMap.from_catalogue("CSG-25-100", kinematic_error_arcmin=0.0)
 
 
 def true_drive() -> DriveMap:

@@ -27,8 +27,8 @@
 # angles among the inputs, learned little (ripple 1.05 to 0.72 %), and led to both. What
 # is stored is the best point of the curve below. Here its numbers are replayed with
 # numpy alone. When it was trained, the drive's error had the phases and peak to peak of
-# today, but amplitudes as 3, 3, 2, 2 (today those of finite elements, as 1, 0.98, 0.46,
-# 0.48), and the loop alone left a ripple of 1.07 %.
+# the drive here, but amplitudes as 3, 3, 2, 2 (here those of finite elements, as 1,
+# 0.98, 0.46, 0.48), and the loop alone left a ripple of 1.07 %.
 
 # %%
 import csv

@@ -6,10 +6,32 @@ from pathlib import Path
 
 import numpy as np
 
+from swgjoint.control.kinematic_error import KinematicErrorTable
+from swgjoint.maps.drive_map import DriveMap
+from swgjoint.maps.error_spectrum import AMPLITUDES
+from swgjoint.units import arcmin
+
+
+def drive_of_training():
+    """CSG-25-100 whose two members err: 1 arcmin at 2 and 4 per turn against either."""
+    drive = DriveMap.from_catalogue("CSG-25-100", kinematic_error_arcmin=0.0)
+    orders, phase = ((2, 0), (0, 2), (4, 0), (0, 4)), np.arange(1.0, 5.0)
+    size = np.array([[AMPLITUDES[pq]] for pq in orders])
+    table = KinematicErrorTable(
+        orders=np.array(orders),
+        amplitudes=size * np.stack([np.cos(phase), np.sin(phase)], axis=1),
+    )
+    return table.sized(drive, arcmin).on(drive)
+
+
 ENVIRONMENT = "swgjoint/RippleSuppression-v0"
-ARGUMENTS = {"sensors": {"torque_sensor": True}, "episode_s": 3.0}
+ARGUMENTS = {
+    "drive": drive_of_training(),
+    "sensors": {"torque_sensor": True},
+    "episode_s": 3.0,
+}
 RATIO, RATED = -100.0, 87.0
-"""Of the default drive, CSG-25-100; torque in N·m."""
+"""Of that drive; torque in N·m."""
 SHARE = 0.25
 """Of the environment's authority that the policy uses."""
 folder = Path(__file__).parent

@@ -255,7 +255,7 @@ def _write(
 def report(result: dict[str, Any]) -> str:
     """Figures with units, the strongest orders, what is missing and why."""
     from swgjoint.maps.catalogue_stated import LOSS_KEYS
-    from swgjoint.maps.spec_sheet import KEYS
+    from swgjoint.maps.spec_sheet import KEYS, TURN_KEYS
 
     keys = [key for key in KEYS if key in result and key != "orders"]
     stated = result.get("stated") or {}
@@ -284,6 +284,9 @@ def report(result: dict[str, Any]) -> str:
                 header=("", "no load [arcmin]", "rated load [arcmin]", "ripple [%]"),
             )
         )
+    error = result["validity"].get("kinematic_error", "none")
+    if error not in ("none", "given") and any(key in result for key in TURN_KEYS):
+        lines.append(f"kinematic error, of which accuracy and ripple follow, {error}")
     friction = result["validity"].get("friction", "none")
     if friction != "none" and any(key in result for key in LOSS_KEYS):
         speed = result["validity"]["running_speed_rpm"]

@@ -21,7 +21,7 @@ from swgjoint.errors import InputError
 from swgjoint.gear.kinematics import angle_coefficients
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.error_fit import ORDERS
-from swgjoint.maps.error_spectrum import peak_to_peak
+from swgjoint.maps.error_spectrum import peak_to_peak, with_error
 from swgjoint.sim.controller import Controller, Measured, Task
 from swgjoint.units import deg
 
@@ -68,23 +68,7 @@ class KinematicErrorTable:
 
     def on(self, drive: DriveMap) -> DriveMap:
         """The drive with this kinematic error in place of its own."""
-        own = [tuple(row) for row in drive.orders.tolist()]
-        new = [row for row in self.orders.tolist() if tuple(row) not in own]
-        count, old = len(own) + len(new), len(own)
-        orders = np.array([*own, *new], dtype=np.int64)
-        error = np.zeros((count, 2))
-        place = [orders.tolist().index(row) for row in self.orders.tolist()]
-        error[place] = self.amplitudes
-        potential = np.zeros((count, *drive.potential.shape[1:]))
-        ends = np.zeros((count, 2, 2))
-        potential[:old], ends[:old] = drive.potential, drive.end_stiffness
-        return replace(
-            drive,
-            orders=orders,
-            kinematic_error=error,
-            potential=potential,
-            end_stiffness=ends,
-        )
+        return with_error(drive, self.orders, self.amplitudes)
 
     def sized(self, drive: DriveMap, wanted: float) -> KinematicErrorTable:
         """The same in proportion: on a drive its peak to peak is that wanted [rad]."""

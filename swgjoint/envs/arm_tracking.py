@@ -13,17 +13,21 @@ from numpy.typing import NDArray
 
 from swgjoint.envs.api import BatchEnv, SingleEnv
 from swgjoint.envs.arguments import check_flag, check_number, shown
-from swgjoint.envs.bench import load_drive_once
 from swgjoint.envs.core import Core, Entry, Limits, ceiling
 from swgjoint.envs.loop import MotorLoop
 from swgjoint.envs.plant import Plant, specimen
 from swgjoint.envs.sensors import Sensors
-from swgjoint.envs.specimen import Tolerances, tolerances_of, with_assumed_error
+from swgjoint.envs.specimen import Tolerances, load_drive_once, tolerances_of
 from swgjoint.errors import InputError
 from swgjoint.joint.region import check_region
+from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.arm_scene import is_arm, scene_of_arm
 from swgjoint.sim.assembly import Assembly, assemble
+from swgjoint.sim.commanded import trajectory_of
+from swgjoint.sim.drives import names_catalogue
 from swgjoint.sim.equilibrium import start_state
+from swgjoint.sim.payload import arms_of
+from swgjoint.sim.rigid_arm import RigidArm
 from swgjoint.sim.scene import Scene
 from swgjoint.sim.task import task_of
 from swgjoint.units import arcmin
@@ -89,11 +93,7 @@ class ArmCore(Core):
         tolerances = tolerances_of(s.randomise, s.level)
         variable = tolerances is not None and s.level == "full"
         scene = _scene(s)
-        assembly = assemble(
-            scene,
-            drives=_drives(scene, s.kinematic_error_arcmin),
-            variable=variable,
-        )
+        assembly = assemble(scene, drives=_drives(scene), variable=variable)
         _check(scene, assembly)
         task = task_of(assembly)
         steps = min(round(s.episode_s / task.period), len(task.position) - 1)
@@ -268,35 +268,48 @@ class ArmCore(Core):
 
 
 def _scene(settings: ArmSettings) -> Scene:
-    """The scene at the level and with the friction that are asked for."""
+    """The scene with the level, friction and kinematic error that are asked for."""
     name = str(settings.scene)
     scene = scene_of_arm(name) if is_arm(name) else Scene.load_file(name)
-    return scene.with_friction(bool(settings.friction)).with_level(
-        settings.level  # type: ignore[arg-type]
-    )
+    scene = scene.with_level(settings.level)  # type: ignore[arg-type]
+    scene = scene.with_friction(bool(settings.friction))
+    return scene.with_kinematic_error(settings.kinematic_error_arcmin)
 
 
-def _drives(scene: Scene, error: float | None) -> dict[str, Any]:
-    """Maps of the scene's references, with the error that they may lack."""
+def _drives(scene: Scene) -> dict[str, DriveMap]:
+    """Maps that take finite elements or a file, once for all environments.
+
+    A scene that episodes cannot have is refused before any is built.
+    """
     sections = [scene.defaults, *scene.joints.values()]
-    size = None if error is None else error * arcmin
-    return {
-        name: with_assumed_error(load_drive_once(name), size)
-        for name in {section.drive for section in sections}
-        if name is not None
-    }
+    names = {s.drive for s in sections if s.drive is not None and s.model is None}
+    slow = sorted(name for name in names if not names_catalogue(name))
+    if slow:
+        arm, _ = arms_of(
+            scene.arm,
+            tool_site=scene.tool_site,
+            payload=scene.payload,
+            where=scene.where,
+        )
+        _check_motion(scene, arm, trajectory_of(scene, arm).velocity[0])
+    return {name: load_drive_once(name) for name in slow}
+
+
+def _check_motion(scene: Scene, arm: RigidArm, first: Array) -> None:
+    """Refuse disturbances, an arm without tool, a first velocity [rad/s]."""
+    where = f"scene {scene.name!r}"
+    if scene.disturbance:
+        raise InputError(f"{where} has disturbances; accepted: a scene without")
+    if arm.tool < 0:
+        raise InputError(f"{where}: the arm has no tool site; needed: one to judge by")
+    if np.abs(first).max() > 0.0:
+        raise InputError(f"{where} starts moving; accepted: a path that starts at rest")
 
 
 def _check(scene: Scene, assembly: Assembly) -> None:
     """Refuse what episodes do not have."""
-    where = f"scene {scene.name!r}"
-    if assembly.disturbances:
-        raise InputError(f"{where} has disturbances; accepted: a scene without")
-    if assembly.arm.tool < 0:
-        raise InputError(f"{where}: the arm has no tool site; needed: one to judge by")
-    if np.abs(assembly.trajectory.velocity[0]).max() > 0.0:
-        raise InputError(f"{where} starts moving; accepted: a path that starts at rest")
-    loops = assembly.loops
+    _check_motion(scene, assembly.arm, assembly.trajectory.velocity[0])
+    where, loops = f"scene {scene.name!r}", assembly.loops
     if loops.sampled or any(loops.setpoints(j) for j in range(len(assembly.joints))):
         raise InputError(
             f"{where}: controller {scene.controller.kind!r} with its sensors, period or"
@@ -386,7 +399,8 @@ class ArmTrackingEnv(SingleEnv):
         level: ``full`` or ``linear``.
         friction: Whether drives have the friction of their maps, whatever the scene
             says; True.
-        kinematic_error_arcmin: As in ``JointTracking-v0``.
+        kinematic_error_arcmin: As in ``JointTracking-v0``, whatever the scene says; the
+            joints' phases differ.
         action: ``torque`` or ``setpoint``.
         authority_of_rated: 0.2.
         shift_arcmin: 10.

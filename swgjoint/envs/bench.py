@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache
 from typing import Any
 
 import mujoco
@@ -16,16 +15,18 @@ from swgjoint.envs.core import Core, Entry, Limits, ceiling
 from swgjoint.envs.loop import MotorLoop
 from swgjoint.envs.plant import Plant, specimen
 from swgjoint.envs.sensors import Sensors
-from swgjoint.envs.specimen import Tolerances, tolerances_of, with_assumed_error
+from swgjoint.envs.specimen import (
+    Tolerances,
+    drive_of_environment,
+    tolerances_of,
+)
 from swgjoint.errors import InputError
 from swgjoint.joint.attach import attach
 from swgjoint.joint.drive import JointDrive
 from swgjoint.joint.region import check_region
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.controller import KnownJoints
-from swgjoint.sim.drives import load_drive
 from swgjoint.sim.rigid_arm import RigidArm, compile_spec
-from swgjoint.units import arcmin
 
 Array = NDArray[np.float64]
 
@@ -36,9 +37,6 @@ MAX_PERIOD = 0.05
 JOINT, BODY = "joint", "load"
 REACH = 0.5
 """Of the bench's bar, at whose end a payload sits [m]."""
-
-load_drive_once = cache(load_drive)
-"""Maps by reference: environments are made by the hundred."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -135,11 +133,7 @@ class BenchCore(Core):
         """
         self.settings = s = settings
         tolerances = tolerances_of(s.randomise, s.level)
-        drive = s.drive
-        if isinstance(drive, str):
-            drive = load_drive_once(drive)
-        error = s.kinematic_error_arcmin
-        drive = with_assumed_error(drive, None if error is None else error * arcmin)
+        drive = drive_of_environment(s.drive, s.kinematic_error_arcmin)
         ratio, ratings = drive.ratio, drive.ratings
         top_speed = 2.0 * s.max_speed_rad_s * abs(ratio)
         variable = tolerances is not None and s.level == "full"

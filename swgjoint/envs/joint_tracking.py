@@ -202,8 +202,9 @@ class JointTrackingEnv(SingleEnv):
         load_inertia_kgm2: About the joint; 1.0.
         payload_kg: At the end of the 0.5 m bar; 0.
         friction: Whether the drive has the friction of its map; True.
-        kinematic_error_arcmin: Peak to peak over one output turn, for a map without
-            error; None takes the transmission accuracy that its catalogue states.
+        kinematic_error_arcmin: Peak to peak over one output turn, for a drive without
+            error of its own; None takes the transmission accuracy that the catalogue
+            states, for a catalogue name, and leaves others as they are.
         torque_limit_Nm: Of the motor; None: repeated peak torque over the ratio.
         max_speed_rad_s: Of references, at the link; 0.6. Their acceleration is at most
             that speed in 12 ms.

@@ -1,19 +1,23 @@
-"""Drives of simulated joints: the error that a catalogue bounds, and their spread."""
+"""Drives of simulated joints and the spread of their specimens."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from functools import cache
 
 import numpy as np
 
-from swgjoint.control.kinematic_error import KinematicErrorTable
 from swgjoint.envs.arguments import is_flag, is_number, shown
 from swgjoint.errors import InputError
 from swgjoint.joint.variation import Variation
 from swgjoint.maps.drive_map import DriveMap
-from swgjoint.maps.error_spectrum import AMPLITUDES, EVEN
+from swgjoint.maps.error_spectrum import with_assumed_error
+from swgjoint.sim.drives import load_drive
 from swgjoint.units import arcmin
+
+load_drive_once = cache(load_drive)
+"""Maps by reference: environments are made by the hundred."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,41 +107,18 @@ def tolerances_of(
     return got
 
 
-def with_assumed_error(drive: DriveMap, peak_to_peak: float | None = None) -> DriveMap:
-    """A drive without kinematic error, given one of 2 and 4 cycles per turn.
-
-    A map that has an error keeps it, unless a value is given for one that has none.
-    Amplitudes are in proportion to :data:`swgjoint.maps.error_spectrum.AMPLITUDES`.
+def drive_of_environment(drive: str | DriveMap, error: float | None) -> DriveMap:
+    """The map of a drive with the kinematic error that an environment asks for.
 
     Args:
-        drive: Map.
-        peak_to_peak: Of the error over one output turn [rad]; None: the transmission
-            accuracy that the catalogue states for the drive, an upper bound, and
-            nothing where it states none. 0 leaves the map as it is.
+        drive: Reference, or a map, which is taken as it is.
+        error: Peak to peak of an assumed error [arcmin], for a drive without one; None:
+            what its catalogue states, of others nothing.
 
     Raises:
-        InputError: If the map has an error of its own and another one is asked for.
+        InputError: If there is no such drive, or it has an error of its own and another
+            one is asked for.
     """
-    has_own = bool(drive.kinematic_error[1:].any())
-    if peak_to_peak is None:
-        stated = drive.info.get("stated", {}).get("transmission_accuracy_arcmin")
-        peak_to_peak = 0.0 if has_own or stated is None else stated * arcmin
-    elif has_own and peak_to_peak > 0.0:
-        raise InputError(
-            f"kinematic_error_arcmin {peak_to_peak / arcmin:g} for map {drive.name!r},"
-            " which has its own; accepted: None"
-        )
-    if not (np.isfinite(peak_to_peak) and peak_to_peak >= 0.0):
-        raise InputError(
-            f"kinematic_error_arcmin {peak_to_peak / arcmin}; accepted: >= 0"
-        )
-    if peak_to_peak == 0.0:
-        return drive
-    # phases of the four harmonics: one drive among many, always the same
-    phase = np.arange(1.0, 1.0 + len(EVEN))
-    size = np.array([[AMPLITUDES[pq]] for pq in EVEN])
-    table = KinematicErrorTable(
-        orders=np.array(EVEN),
-        amplitudes=size * np.stack([np.cos(phase), np.sin(phase)], axis=1),
-    )
-    return table.sized(drive, peak_to_peak).on(drive)
+    if isinstance(drive, str):
+        return load_drive_once(drive, kinematic_error_arcmin=error)
+    return with_assumed_error(drive, (error or 0.0) * arcmin)

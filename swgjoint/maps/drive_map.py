@@ -178,20 +178,34 @@ class DriveMap:
         )
 
     @classmethod
-    def from_catalogue(cls, name: str) -> Self:
+    def from_catalogue(
+        cls, name: str, *, kinematic_error_arcmin: float | None = None, seed: int = 0
+    ) -> Self:
         """The map of a catalogue drive such as ``CSG-25-100``: series, size, ratio.
 
         Stiffness K1, K2, K3 and ratings of the shipped tables, and the hysteresis loss
         where a row states one (CHA), at the upper bound that it is; friction where
-        losses are stated (CSG, ratio 100, sizes 14 to 25); no kinematic error, of which
-        a catalogue gives a bound only (``info["stated"]``).
+        losses are stated (CSG, ratio 100, sizes 14 to 25). The kinematic error is that
+        of an assumed specimen, 2 and 4 cycles per turn of the input, whose peak to peak
+        is the transmission accuracy that the tables state: a bound that says nothing of
+        orders and phases. ``info["kinematic_error"]`` says what was assumed,
+        ``info["stated"]`` what the tables state.
+
+        Args:
+            name: Of the row.
+            kinematic_error_arcmin: Peak to peak over one output turn; None: the stated
+                transmission accuracy, no error where none is stated; 0: no error.
+            seed: Of the share of both orders and of their phases.
 
         Raises:
-            InputError: With the nearest names, if there is no such row.
+            InputError: With the nearest names, if there is no such row, or if an option
+                is out of range.
         """
         from swgjoint.maps.from_catalogue import map_from_catalogue
 
-        return map_from_catalogue(name, cls)
+        return map_from_catalogue(
+            name, cls, kinematic_error_arcmin=kinematic_error_arcmin, seed=seed
+        )
 
     @classmethod
     def from_measurement(

@@ -1,15 +1,41 @@
-"""Kinematic error of a drive whose map has none: amplitudes that tolerances leave.
+r"""Kinematic error of a drive whose source states a bound alone: an assumed specimen.
 
-A catalogue bounds the error of a drive and says nothing about its orders. They are
-taken from finite elements of one drive at the limits of its tolerances; how large the
-whole is comes from the catalogue, and phases are those of a specimen.
+A catalogue bounds the error of a drive, peak to peak over one turn of the output, and
+says nothing about its orders. Where position errors of teeth show when two opposite
+lobes average them is at 2 and 4 cycles per turn of the wave generator; so the specimen
+has
+
+.. math:: e_0 = a\left[\cos(2x + \phi_2) + r\cos(4x + \phi_4)\right]
+
+with x the angle of the wave generator against the fixed member, r and both phases
+drawn from a seed, and a such that the peak to peak is what is stated. It repeats with
+every turn of the input: each of them shows the whole error. The error of a real drive
+also swells and fades over the turn of the output, and stays below the bound.
+
+Studies of specimens take more orders, :data:`AMPLITUDES`: those of finite elements of
+one drive at the limits of its tolerances.
 """
 
 from __future__ import annotations
 
-import numpy as np
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, TypeVar
+from zlib import crc32
 
-from swgjoint.maps.drive_map import DriveMap
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from swgjoint.errors import InputError
+from swgjoint.gear.kinematics import angle_coefficients
+from swgjoint.units import arcmin
+
+if TYPE_CHECKING:
+    from swgjoint.maps.drive_map import DriveMap
+
+    Map = TypeVar("Map", bound=DriveMap)
+
+Array = NDArray[np.float64]
 
 AMPLITUDES: dict[tuple[int, int], float] = {
     (2, 0): 1.0,
@@ -25,10 +51,12 @@ AMPLITUDES: dict[tuple[int, int], float] = {
 ``reference-2d-tolerances`` (model 2d), whose teeth have errors of ISO 1328-1 class 4
 and whose members are as round and centred as ISO 286-1 IT3 and IT4 ask for. It is
 0.138 arcmin there."""
-EVEN = tuple(pq for pq in AMPLITUDES if 0 in pq and max(pq) > 1)
-"""Of these, 2 and 4 cycles per turn of the wave generator against either member: where
-position errors of teeth show when two opposite lobes average them. The others come of
-lobes that differ."""
+SHARE = (0.25, 0.75)
+"""Range of r, the amplitude of 4 over that of 2 cycles per turn: about the 0.46 and
+0.48 of :data:`AMPLITUDES`."""
+LARGEST = 60.0
+"""Of an assumed error [arcmin]: forty times the bound of any catalogue row."""
+_SAMPLES = 2**16  # of a period; the peak to peak then errs by less than 1e-8 of it
 
 
 def peak_to_peak(drive: DriveMap) -> float:
@@ -36,3 +64,97 @@ def peak_to_peak(drive: DriveMap) -> float:
     psi = np.linspace(0.0, 2.0 * np.pi, 40 * round(abs(drive.ratio)) + 1)
     phases = drive.phases(drive.ratio * psi, psi)
     return float(np.ptp(drive.error_at(phases)[0]))
+
+
+def with_error(drive: Map, orders: ArrayLike, amplitudes: ArrayLike) -> Map:
+    """The drive with another kinematic error in place of its own.
+
+    Args:
+        drive: Map; its potential stays, a label of its error goes.
+        orders: (p, q) of p alpha + q beta. Shape (n, 2).
+        amplitudes: Cosine and sine [rad]. Same shape.
+    """
+    wanted = np.array(orders, dtype=np.int64).reshape(-1, 2).tolist()
+    own = drive.orders.tolist()
+    every = own + [row for row in wanted if row not in own]
+    count, old = len(every), len(own)
+    error = np.zeros((count, 2))
+    error[[every.index(row) for row in wanted]] = amplitudes
+    potential = np.zeros((count, *drive.potential.shape[1:]))
+    ends = np.zeros((count, 2, 2))
+    potential[:old], ends[:old] = drive.potential, drive.end_stiffness
+    info = {key: one for key, one in drive.info.items() if key != "kinematic_error"}
+    return replace(
+        drive,
+        info=info,
+        orders=np.array(every, dtype=np.int64),
+        kinematic_error=error,
+        potential=potential,
+        end_stiffness=ends,
+    )
+
+
+def with_assumed_error(
+    drive: Map, peak_to_peak: float, *, seed: int = 0, joint: str = ""
+) -> Map:
+    """A drive without kinematic error, given that of one specimen.
+
+    ``info["kinematic_error"]`` says that it is assumed, how large it is and from which
+    seed; reasons in ``info["missing"]`` why there is none are taken out.
+
+    Args:
+        drive: Map without kinematic error.
+        peak_to_peak: Of the error over one output turn [rad]; 0 leaves the map as it
+            is.
+        seed: Of the share of both orders and of their phases, >= 0.
+        joint: Name of the joint that the drive is for: drives of several joints differ
+            by it, all of one seed.
+
+    Raises:
+        InputError: If the map has an error of its own, or a value is out of range.
+    """
+    wanted = peak_to_peak / arcmin
+    if not (np.isfinite(wanted) and 0.0 <= wanted <= LARGEST):
+        raise InputError(
+            f"kinematic_error_arcmin {wanted:g}; accepted: 0 to {LARGEST:g} arcmin"
+        )
+    integer = isinstance(seed, int | np.integer) and not isinstance(seed, bool)
+    if not (integer and seed >= 0):
+        raise InputError(f"seed {seed!r} of a kinematic error; accepted: integers >= 0")
+    if wanted == 0.0:
+        return drive
+    if drive.kinematic_error[1:].any():
+        raise InputError(
+            f"kinematic_error_arcmin {wanted:g} for map {drive.name!r}, which has its"
+            " own; accepted: none given, or 0"
+        )
+    rng = np.random.default_rng([seed, crc32(joint.encode())] if joint else seed)
+    share = float(rng.uniform(*SHARE))
+    phase = rng.uniform(0.0, 2.0 * np.pi, 2)
+    size = np.array([1.0, share])
+    angle = 2.0 * np.pi * np.arange(_SAMPLES) / _SAMPLES
+    wave = np.cos(angle + phase[0]) + share * np.cos(2.0 * angle + phase[1])
+    size = size * peak_to_peak / float(np.ptp(wave))
+    # a cos(n x + phase) as cosine and sine
+    pairs = size[:, None] * np.stack([np.cos(phase), -np.sin(phase)], axis=-1)
+    label = f"assumed: {wanted:g} arcmin at 2 and 4 per turn, seed {seed}"
+    label += f", joint {joint}" if joint else ""
+    missing = dict(drive.info.get("missing") or {})
+    missing = {key: why for key, why in missing.items() if key not in _ABSENT}
+    info = {**drive.info, "kinematic_error": label, "missing": missing}
+    return replace(with_error(drive, _orders(drive.layout), pairs), info=info)
+
+
+_ABSENT = (
+    "transmission_accuracy_arcmin",
+    "transmission_accuracy_rated_arcmin",
+    "orders",
+    "ripple_rms_percent",
+    "ripple_pp_percent",
+)
+
+
+def _orders(layout: str) -> Sequence[tuple[int, int]]:
+    """(p, q) of 2 and 4 cycles per turn of the input, whatever the output does."""
+    _, (_, by_psi) = angle_coefficients(layout)
+    return ((0, 2), (0, 4)) if by_psi == 0 else ((2, 0), (4, 0))

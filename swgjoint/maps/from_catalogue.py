@@ -2,10 +2,11 @@
 
 Torque against torsion has the slopes K1, K2, K3 on 0..T1, T1..T2 and above. The two
 corners are rounded by parabolas that end on the catalogue's lines (:data:`CORNER`), so
-torque and stiffness are continuous. What a catalogue states as an upper bound only,
-above all the kinematic error, is not in the map; its record says so. The exception is
-the hysteresis loss: where a row states it the map has it, at the bound, and the label
-says that a drive may have less. Where losses at speed are stated the map has friction.
+torque and stiffness are continuous. Two figures that a catalogue states as upper bounds
+are in the map at the bound, with a label that a drive may have less: the hysteresis
+loss and, as the kinematic error of an assumed specimen, the transmission accuracy; see
+:mod:`swgjoint.maps.error_spectrum`. Where losses at speed are stated the map has
+friction.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ from swgjoint.maps.catalogue_stated import (
     stiffness_of,
 )
 from swgjoint.maps.drive_map import DriveMap, Ratings
+from swgjoint.maps.error_spectrum import with_assumed_error
 from swgjoint.maps.friction_fit import friction_of_losses
 from swgjoint.maps.hysteresis import Jenkin
 from swgjoint.maps.loop import largest_torque, torque_loop
@@ -96,15 +98,56 @@ def find_row(name: str) -> CatalogueRow:
     raise InputError(f"catalogue drive {name[:60]!r} {why}; nearest: {', '.join(near)}")
 
 
-def map_from_catalogue(name: str, cls: type[Map]) -> Map:
+def map_from_catalogue(
+    name: str,
+    cls: type[Map],
+    *,
+    kinematic_error_arcmin: float | None = None,
+    seed: int = 0,
+) -> Map:
     """The map of a catalogue drive; see :meth:`DriveMap.from_catalogue`.
 
     Two-lobe gearing with the circular spline fixed: z_fs = 2 ratio, z_cs = z_fs + 2.
 
     Raises:
-        InputError: If the name is unknown or the tables contradict themselves.
+        InputError: If the name is unknown, the tables contradict themselves or an
+            option is out of range.
     """
-    row = find_row(name)
+    drive = _without_error(find_row(name), cls)
+    return with_stated_error(drive, kinematic_error_arcmin, seed=seed)
+
+
+def with_stated_error(
+    drive: Map,
+    kinematic_error_arcmin: float | None = None,
+    *,
+    seed: int = 0,
+    joint: str = "",
+) -> Map:
+    """A catalogue drive without kinematic error, given that of an assumed specimen.
+
+    Args:
+        drive: Map of a catalogue row.
+        kinematic_error_arcmin: Peak to peak over one output turn; None: the stated
+            transmission accuracy.
+        seed: Of the assumed error.
+        joint: That the drive is for, see
+            :func:`~swgjoint.maps.error_spectrum.with_assumed_error`.
+
+    Raises:
+        InputError: If an option is out of range.
+    """
+    wanted = kinematic_error_arcmin
+    if wanted is None:
+        wanted = drive.info["stated"]["transmission_accuracy_arcmin"]
+    if wanted is None:
+        label = f"none: the tables state no transmission accuracy of {drive.name}"
+        return replace(drive, info={**drive.info, "kinematic_error": label})
+    return with_assumed_error(drive, wanted * arcmin, seed=seed, joint=joint)
+
+
+def _without_error(row: CatalogueRow, cls: type[Map]) -> Map:
+    """The map of a row without kinematic error."""
     s = stiffness_of(row.size, row.ratio)
     stated = stated_figures(row)
     own = "" if row.series == "CSG" else f", the tables hold none of {row.series}"

@@ -342,8 +342,9 @@ def spec_sheet(drive: DriveMap, only: Collection[str] = ()) -> dict[str, Any]:
 def validity(drive: DriveMap) -> dict[str, Any]:
     """Level of the source, its range of torque, whether the loop leaves it.
 
-    ``hysteresis`` and ``friction`` tell where they come from; one output turn
-    (accuracy, ripple) is taken without both, the loop without friction.
+    ``kinematic_error``, ``hysteresis`` and ``friction`` tell where they come from; one
+    output turn (accuracy, ripple) is taken without the last two, the loop without
+    friction.
     """
     low, high = drive.torque_range
     slipping = sum(element.yield_torque for element in drive.hysteresis)
@@ -356,6 +357,9 @@ def validity(drive: DriveMap) -> dict[str, Any]:
         "loop_to_Nm": top,
         "beyond_range": bool(top > reach * high or -top < reach * low),
         "ratings": drive.ratings.source,
+        "kinematic_error": str(drive.info.get("kinematic_error", "given"))
+        if drive.kinematic_error[1:].any()
+        else "none",
         "hysteresis": str(drive.info.get("hysteresis", "given"))
         if drive.hysteresis
         else "none",

@@ -179,7 +179,7 @@ def assemble(
         _touching(arm, trajectory),
         strict=True,
     ):
-        drive = drive_of(section, known=known, progress=progress)
+        drive = drive_of(section, known=known, joint=name, progress=progress)
         attached = attach(
             spec,
             joint=name,
@@ -187,7 +187,7 @@ def assemble(
             level=section.level or "full",
             rotor_inertia=section.rotor_inertia_kgm2 or 0.0,
             damping_ratio=section.damping_ratio,
-            friction=bool(section.friction),
+            friction=section.friction is not False,
             rotor=section.rotor or "gyroscopic",
             variable=variable,
             # a joint at rest carries every order

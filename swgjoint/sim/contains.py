@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from swgjoint.sim.transmission import Transmission
 
 _LOSSY = ("native", "full")
+_ERRING = ("kinematic", "full")
 _LEFT_OUT = {
     "rigid": "torsion, kinematic error and torque ripple (level rigid)",
     "kinematic": "torsion and the torque ripple of the stiffness (level kinematic)",
@@ -117,6 +118,7 @@ def _joint(transmission: Transmission) -> dict[str, Any]:
         "orders": list(attached.kept_orders)
         if attached.level in ("kinematic", "full")
         else [],
+        "kinematic_error": _error(attached),
         "hysteresis_elements": len(attached.drive.hysteresis)
         if attached.level in _LOSSY
         else 0,
@@ -125,6 +127,26 @@ def _joint(transmission: Transmission) -> dict[str, Any]:
         else None,
         **_native(attached),
     }
+
+
+def _error(attached: JointDrive) -> str | None:
+    """Where the kinematic error that the model has comes from; None without one."""
+    drive = attached.drive
+    if attached.level not in _ERRING or not drive.kinematic_error[1:].any():
+        return None
+    return str(drive.info.get("kinematic_error", "of the map"))
+
+
+def _no_error(transmission: Transmission) -> str | None:
+    """Why a level that could carry one has no kinematic error of a catalogue drive."""
+    drive = transmission.drive
+    if (
+        transmission.level not in _ERRING
+        or drive.level != "catalogue"
+        or drive.kinematic_error[1:].any()
+    ):
+        return None
+    return str(drive.info.get("kinematic_error", "joints.*.kinematic_error_arcmin = 0"))
 
 
 def _native(attached: JointDrive) -> dict[str, Any]:
@@ -152,15 +174,18 @@ def _left_out(transmission: Transmission) -> list[dict[str, str]]:
         reason = (
             "no native form"
             if attached.level == "native"
-            else "the scene asks for no more"
+            else f"not at level {attached.level}; joints.*.level = 'full' has it"
         )
         items.append({"part": _LEFT_OUT[attached.level], "reason": reason})
+    lossless = f"not at level {attached.level}; native and full have it"
     if attached.drive.hysteresis and attached.level not in _LOSSY:
         part = f"hysteresis ({len(attached.drive.hysteresis)} elements)"
-        items.append({"part": part, "reason": "the scene asks for no more"})
+        items.append({"part": part, "reason": lossless})
     if count := transmission.drive.info.get("hysteresis_left_out"):
         part = f"hysteresis ({count} elements)"
-        items.append({"part": part, "reason": "the scene switches it off"})
+        items.append({"part": part, "reason": "joints.*.hysteresis = false"})
+    if why := _no_error(transmission):
+        items.append({"part": "kinematic error of the drive", "reason": why})
     if (pruned := transmission.drive.info.get("pruned")) and pruned["dropped"]:
         bounds = (
             f"at most {pruned['output_angle_bound_arcmin']:.3g} arcmin and"
@@ -171,7 +196,8 @@ def _left_out(transmission: Transmission) -> list[dict[str, str]]:
         items.append({"part": part, "reason": bounds})
     friction = transmission.drive.friction
     if friction and not (attached.drive.friction and attached.level in _LOSSY):
-        reason = "the scene asks for no more"
+        off = attached.level in _LOSSY
+        reason = "joints.*.friction = false" if off else lossless
         items.append({"part": "friction of the drive", "reason": reason})
     if attached.level == "kinematic" and attached.kept_orders:
         share = 100.0 * ratio_variation(attached.drive)

@@ -224,8 +224,8 @@ class Scene(Section):
         return self.from_data(data, where=self.where, overrides=overrides)
 
     def with_drive(self, drive: str) -> Self:
-        """A copy in which every joint has this drive."""
-        return self._with_all(drive=drive, linear=None)
+        """A copy in which every joint has this drive, at its default fidelity."""
+        return self._with_all(drive=drive, linear=None, model=None)
 
     def with_level(self, level: Level) -> Self:
         """A copy in which every joint has this level."""
@@ -234,6 +234,10 @@ class Scene(Section):
     def with_friction(self, friction: bool) -> Self:
         """A copy in which every joint has the friction of its drive, or none has."""
         return self._with_all(friction=friction)
+
+    def with_kinematic_error(self, arcmin: float | None) -> Self:
+        """A copy in which every joint has this assumed error; None: that stated."""
+        return self._with_all(kinematic_error_arcmin=arcmin)
 
     def _with_all(self, **values: Any) -> Self:
         defaults = self.defaults.model_copy(update=values)

@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 
 from swgjoint.faults import Fault, Section
 from swgjoint.joint.region import MAX_SUB_STEPS
+from swgjoint.maps.error_spectrum import LARGEST
 from swgjoint.sim.feature_sections import MotorLimits
 
 Level = Literal["rigid", "kinematic", "linear", "native", "full"]
@@ -44,17 +45,26 @@ class JointSection(Section):
     """Drive of one joint; what is absent comes from ``[defaults]``."""
 
     drive: str | None = None
-    """Design (path or bundled name) or ``.swg`` file."""
+    """Design (path or bundled name), ``.swg`` file or catalogue name."""
     linear: LinearDrive | None = None
+    model: Literal["ring", "2d", "3d"] | None = None
+    """Fidelity of the finite elements of a design; None: 3d with a cup, else 2d."""
+    kinematic_error_arcmin: Annotated[float, Field(ge=0, le=LARGEST)] | None = None
+    """Peak to peak over one output turn of the error that a catalogue drive is assumed
+    to have, see :mod:`swgjoint.maps.error_spectrum`, or another drive without error.
+    None: the transmission accuracy that the catalogue states. A drive with an error of
+    its own keeps it, and takes no other value than 0."""
+    seed: Annotated[int, Field(ge=0, lt=2**32)] | None = None
+    """Of that error; the joints of one seed differ by their names. None: 0."""
     level: Level | None = None
     rotor_inertia_kgm2: Annotated[float, Field(gt=0, le=1)] | None = None
     """Rotor with wave generator about the motor axis."""
     damping_ratio: Annotated[float, Field(ge=0, le=1)] | None = None
     """Of the torsional vibration; None takes that of the drive."""
     hysteresis: bool | None = None
-    """False leaves the hysteresis of the drive out."""
+    """False leaves the hysteresis of the drive out; native and full have it else."""
     friction: bool | None = None
-    """True takes the friction of the drive in, at the levels native and full."""
+    """False leaves the friction of the drive out; native and full have it else."""
     harmonics_tolerance_arcmin: Positive | None = None
     """Drops harmonics of the drive that together turn the output by less at a given
     torque, see :mod:`swgjoint.maps.pruning`; None keeps all. Without effect at the

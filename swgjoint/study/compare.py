@@ -21,7 +21,7 @@ from swgjoint.gear.design import Design
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.models_path import near_names
 from swgjoint.progress import Progress, silent
-from swgjoint.sim.drives import find_drive, load_drive
+from swgjoint.sim.drives import find_drive, given_drives, load_drive
 from swgjoint.sim.metrics import drive_order, strongest_left_out
 from swgjoint.sim.rigid_arm import RigidArm
 from swgjoint.sim.run import Run, run_scene
@@ -216,8 +216,8 @@ def compare(
         else:
             fidelity = model if isinstance(source, Design) else None
             drive = load_drive(name, model=fidelity, progress=progress)
-            changed = with_drive(scene, name, joints)
-            run = run_scene(changed, drives=known(changed, {name: drive}), name=name)
+            changed, own = with_drive(scene, name, joints), given_drives({name: drive})
+            run = run_scene(changed, drives=known(changed, own), name=name)
             stress = _stress(source, drive, model)
             safety = _safety(source, drive, progress) if fatigue else None
         level = name if source is None else None

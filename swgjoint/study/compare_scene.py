@@ -72,7 +72,8 @@ def with_drive(scene: Scene, reference: str, joints: Sequence[str] = ()) -> Scen
     def changed(section: JointSection) -> JointSection:
         if not joints and section.drive is None and section.linear is None:
             return section
-        return section.model_copy(update={"drive": reference, "linear": None})
+        changes = {"drive": reference, "linear": None, "model": None}
+        return section.model_copy(update=changes)
 
     return _changed(scene, changed, joints)
 

@@ -210,7 +210,11 @@ def run_control(options: StudyOptions) -> StudyResult:
     if options.folder is not None:
         options.folder.mkdir(parents=True, exist_ok=True)
     references = options.only or (DRIVE,)
-    drives = {name: load_drive(name, model=options.model) for name in references}
+    drives = {
+        # the errors of specimens are the study's own, of more orders
+        name: load_drive(name, model=options.model, kinematic_error_arcmin=0.0)
+        for name in references
+    }
     rows: list[Row] = []
     summary, files, more = [], [], {}
     for name, drive in drives.items():

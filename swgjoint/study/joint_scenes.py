@@ -80,7 +80,10 @@ def bench_scene(name: str) -> BenchScene:
     scene = scene.with_changes(short | timing | {"simulation.duration_s": DURATION})
     used = {joint.drive for joint in scene.joints.values() if joint.drive}
     drives = {
-        one: with_kinematic_error(DriveMap.from_catalogue(one)) for one in sorted(used)
+        one: with_kinematic_error(
+            DriveMap.from_catalogue(one, kinematic_error_arcmin=0.0)
+        )
+        for one in sorted(used)
     }
     return BenchScene(name=name, scene=scene, drives=drives)
 

@@ -73,7 +73,11 @@ def run_response(options: StudyOptions) -> StudyResult:
         InputError: If a drive is unknown or a fidelity does not fit it.
     """
     references = options.only or (DRIVE,)
-    drives = {name: load_drive(name, model=options.model) for name in references}
+    drives = {
+        # the closed forms are those of a drive without kinematic error
+        name: load_drive(name, model=options.model, kinematic_error_arcmin=0.0)
+        for name in references
+    }
     rows, files = [], []
     summary: list[str] = []
     predicted: list[dict[str, Any]] = []

@@ -33,7 +33,7 @@ SPEED = 1e-3
 
 def map_with(harmonics: int) -> DriveMap:
     """A catalogue drive with orders 1 to n, each of 2 %/n of ripple."""
-    base = DriveMap.from_catalogue(DRIVE)
+    base = DriveMap.from_catalogue(DRIVE, kinematic_error_arcmin=0.0)
     base = replace(base, hysteresis=())
     n = 1 + harmonics
     potential = np.zeros((n, *base.potential.shape[1:]))

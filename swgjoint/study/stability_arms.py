@@ -53,7 +53,10 @@ def run_arm(task: ArmTask) -> list[StabilityRow]:
     scene = Scene.load_file(task.scene)
     names = {scene.of_joint(joint).drive or "" for joint in RigidArm(scene.arm).joints}
     drives = {
-        name: with_kinematic_error(DriveMap.from_catalogue(name)) for name in names
+        name: with_kinematic_error(
+            DriveMap.from_catalogue(name, kinematic_error_arcmin=0.0)
+        )
+        for name in names
     }
     exact = run_scene(
         scene,

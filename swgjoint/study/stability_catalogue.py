@@ -47,7 +47,9 @@ def catalogue_drives() -> list[CatalogueDrive]:
 
 def run_drive(task: CatalogueDrive) -> list[StabilityRow]:
     """Free running and torque steps of one drive."""
-    drive = with_kinematic_error(DriveMap.from_catalogue(task.name))
+    drive = with_kinematic_error(
+        DriveMap.from_catalogue(task.name, kinematic_error_arcmin=0.0)
+    )
     rows = []
     for link in LINKS:
         for speed in FREE_SPEEDS:

@@ -76,7 +76,8 @@ def chain(level):
     spec.option.timestep, spec.option.gravity = 1e-3, [0, 0, 0]
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
     body = spec.worldbody
-    drive = with_harmonics(DriveMap.from_catalogue("CSG-25-100"), 16)
+    base = DriveMap.from_catalogue("CSG-25-100", kinematic_error_arcmin=0.0)
+    drive = with_harmonics(base, 16)
     for k in range(6):
         body = body.add_body(name=f"link{k}", pos=[0, 0, 0.1])
         body.add_joint(name=f"j{k}", axis=[[0, 0, 1], [0, 1, 0]][k % 2])

@@ -61,7 +61,8 @@ def test_catalogue_drive(capsys, tmp_path, monkeypatch):
     result = spec(capsys, "CSG-25-100", "--out", "out")
     assert set(CONTRACT) <= set(result)
     assert result["K1_Nm_rad"] == pytest.approx(3.1e4, rel=0.02)
-    assert result["transmission_accuracy_arcmin"] is None
+    assert result["transmission_accuracy_arcmin"] == pytest.approx(1.0, rel=1e-3)
+    assert "assumed: 1 arcmin" in result["validity"]["kinematic_error"]
     empty = {k for k in CONTRACT if result[k] is None}
     assert empty <= set(result["missing"])
     assert result["stated"]["transmission_accuracy_arcmin"] == 1.0
@@ -244,7 +245,7 @@ def test_report_of_losses(capsys):
     assert main(["spec", "CSG-25-100", "--only", keys]) == 0
     out = capsys.readouterr().out
     (row,) = (r for r in out.splitlines() if r.startswith("starting"))
-    assert row.split() == ["starting", "torque", "0.069", "0.069", "N·m"]
+    assert row.split() == ["starting", "torque", "0.06903", "0.069", "N·m"]
     assert "at 2000 rpm" in out and "prediction" in out
     assert main(["spec", "CSG-25-50", "--only", keys]) == 0
     assert "the map has no friction" in capsys.readouterr().out

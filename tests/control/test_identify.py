@@ -43,7 +43,7 @@ BENCH = """
 
 def true_drive(**changes) -> DriveMap:
     """CSG-25-100 with kinematic error of both members and hysteresis."""
-    drive = DriveMap.from_catalogue("CSG-25-100")
+    drive = DriveMap.from_catalogue("CSG-25-100", kinematic_error_arcmin=0)
     orders = np.array([(0, 0), (2, 0), (4, 0), (0, 2)])
     potential = np.zeros((4, *drive.potential.shape[1:]))
     potential[0] = drive.potential[0]

@@ -37,7 +37,7 @@ WEIGHTS = {"horizon": 20, "frequency": 20.0, "unit": 0.067}
 
 
 def known() -> DriveMap:
-    return DriveMap.from_catalogue("CSG-25-100")
+    return DriveMap.from_catalogue("CSG-25-100", kinematic_error_arcmin=0)
 
 
 def true_drive(stiffness: float) -> DriveMap:

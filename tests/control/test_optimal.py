@@ -38,7 +38,7 @@ def driven(spec: mujoco.MjSpec, drive: DriveMap):
 
 
 def catalogue() -> DriveMap:
-    return DriveMap.from_catalogue("CSG-25-100")
+    return DriveMap.from_catalogue("CSG-25-100", kinematic_error_arcmin=0)
 
 
 def with_error() -> DriveMap:

@@ -47,7 +47,8 @@ def conservative(request, synthetic_map) -> DriveMap:
     """Side bands and tooth orders, or three lines with rounded corners."""
     if request.param == "synthetic":
         return synthetic_map
-    return replace(DriveMap.from_catalogue("CSG-25-100"), friction=None, hysteresis=())
+    drive = DriveMap.from_catalogue("CSG-25-100", kinematic_error_arcmin=0)
+    return replace(drive, friction=None, hysteresis=())
 
 
 @pytest.fixture

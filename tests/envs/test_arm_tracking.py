@@ -6,15 +6,13 @@ import numpy as np
 import pytest
 from messages import naming
 
+from swgjoint.envs import arm_tracking
 from swgjoint.envs.arm_tracking import ArmTrackingEnv
-from swgjoint.envs.specimen import with_assumed_error
 from swgjoint.errors import InputError
-from swgjoint.maps.drive_map import DriveMap
 from swgjoint.models_path import models_path
 from swgjoint.sim.run import run_scene
+from swgjoint.sim.scene import Scene
 from swgjoint.units import arcmin
-
-NAMES = ("CSG-25-100", "CSG-14-100")
 
 
 def run(env, action):
@@ -35,8 +33,8 @@ def test_without_action_it_is_the_scene(scene):
     """Links, motors, torques and tool of ``run_scene`` on the same drives."""
     env = ArmTrackingEnv(scene=scene, episode_s=1.0, friction=False)
     got = run(env, np.zeros(6))
-    drives = {name: with_assumed_error(DriveMap.from_catalogue(name)) for name in NAMES}
-    want = run_scene(scene, drives=drives)
+    plain = Scene.load_file(scene).with_friction(False)
+    want = run_scene(plain.with_kinematic_error(None))
     n = len(got["time_s"])
     np.testing.assert_allclose(got["time_s"], want.time[:n], atol=1e-12)
     # the start is the scene's to the tolerance of its equilibrium
@@ -101,7 +99,11 @@ def test_reward_is_what_the_docstring_says():
 
 def test_sensors_know_the_load_from_the_first_instant():
     """Torque sensors read the weight at the start, link encoders the sag."""
-    env = ArmTrackingEnv(sensors={"torque_sensor": True, "link_encoder": True})
+    env = ArmTrackingEnv(
+        # an error of the drives moves the links, and with them their weight
+        kinematic_error_arcmin=0.0,
+        sensors={"torque_sensor": True, "link_encoder": True},
+    )
     observation, info = env.reset(seed=0)
     read = env.measured(observation)
     weight = env.task.link_torque[0]
@@ -151,6 +153,7 @@ def test_delayed_readings_begin_where_the_arm_stands():
 def test_friction_is_what_the_argument_says(own, tmp_path):
     """A scene and a joint with friction of their own say less than the argument."""
     text = (models_path() / "scenes" / "ur5e-catalogue.toml").read_text("utf-8")
+    text = text.replace("friction = false\n", "")
     said = f"friction = {str(own).lower()}\n"
     for table in ("[defaults]\n", "[joints.elbow_joint]\n"):
         text = text.replace(table, table + said)
@@ -205,3 +208,12 @@ def test_a_path_that_starts_moving_is_refused(tmp_path):
     path.write_text(text.replace('"reference-2d"', '"CSG-25-100"'), encoding="utf-8")
     with pytest.raises(InputError, match=naming("scene", "'bench'", "rest")):
         ArmTrackingEnv(scene=str(path))
+
+
+def test_a_start_in_motion_is_refused_before_drives_are_built(monkeypatch):
+    """A scene that no episode can have costs no finite elements."""
+    built = []
+    monkeypatch.setattr(arm_tracking, "load_drive_once", built.append)
+    with pytest.raises(InputError, match=naming("'bench'", "starts moving", "at rest")):
+        ArmTrackingEnv(scene="bench")
+    assert built == []

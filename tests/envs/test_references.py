@@ -7,9 +7,10 @@ import pytest
 from messages import naming
 
 from swgjoint.envs.references import KINDS, draw_motion
-from swgjoint.envs.specimen import with_assumed_error
+from swgjoint.envs.specimen import drive_of_environment
 from swgjoint.errors import InputError
 from swgjoint.maps.drive_map import DriveMap
+from swgjoint.maps.error_spectrum import peak_to_peak
 from swgjoint.units import arcmin
 
 TIME = np.arange(2001) * 1e-3
@@ -51,24 +52,24 @@ def test_fourth_derivative_is_continuous(kind):
     assert np.abs(np.diff(snap)).max() < 0.02 * np.abs(snap).max()
 
 
-def test_assumed_error_is_what_the_catalogue_states():
-    """Peak to peak over one output turn, as the spec sheet measures it."""
-    plain = DriveMap.from_catalogue("CSG-25-100")
-    for wanted, drive in (
-        (
-            plain.info["stated"]["transmission_accuracy_arcmin"],
-            with_assumed_error(plain),
-        ),
-        (2.5, with_assumed_error(plain, 2.5 * arcmin)),
+def test_an_environment_has_the_error_that_it_asks_for():
+    """That of the catalogue, one of its own, none; a map is taken as it is."""
+    whole = DriveMap.from_catalogue("CSG-25-100")
+    plain = DriveMap.from_catalogue("CSG-25-100", kinematic_error_arcmin=0)
+    for wanted, of, error in (
+        (1.0, "CSG-25-100", None),
+        (2.5, "CSG-25-100", 2.5),
+        (0.0, "CSG-25-100", 0.0),
+        (1.0, whole, None),
+        (0.0, plain, None),
+        (2.5, plain, 2.5),
     ):
-        got = drive.spec_sheet(only=["transmission_accuracy_arcmin"])
-        assert got["transmission_accuracy_arcmin"] == pytest.approx(wanted, rel=0.01)
-        np.testing.assert_array_equal(
-            drive.coefficients(1e-3, 1)[0], plain.coefficients(1e-3, 1)[0]
-        )
-    assert with_assumed_error(plain, 0.0) is plain
+        drive = drive_of_environment(of, error)
+        assert peak_to_peak(drive) / arcmin == pytest.approx(wanted, rel=0.05)
+    np.testing.assert_array_equal(
+        drive_of_environment("CSG-25-100", None).kinematic_error, whole.kinematic_error
+    )
     with pytest.raises(
-        InputError, match=naming("kinematic_error_arcmin", "1", "'CSG-25-100'", "None")
+        InputError, match=naming("kinematic_error_arcmin", "1", "'CSG-25-100'", "own")
     ):
-        with_assumed_error(drive, 1.0 * arcmin)
-    assert with_assumed_error(drive) is drive
+        drive_of_environment(whole, 1.0)

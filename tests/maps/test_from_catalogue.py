@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 from messages import names, naming
 
 from swgjoint.errors import InputError
+from swgjoint.gear.kinematics import LAYOUTS
 from swgjoint.maps import catalogue_stated
 from swgjoint.maps.catalogue import table
 from swgjoint.maps.catalogue_stated import (
@@ -17,12 +19,14 @@ from swgjoint.maps.catalogue_stated import (
     stated_figures,
 )
 from swgjoint.maps.drive_map import DriveMap
+from swgjoint.maps.error_spectrum import with_assumed_error
 from swgjoint.maps.file import map_bytes, map_from_bytes
 from swgjoint.maps.from_catalogue import (
     catalogue_names,
     find_row,
     is_catalogue_name,
     three_lines,
+    with_stated_error,
 )
 from swgjoint.maps.torsion_law import potential_of_stiffness, torque_at_knots
 
@@ -89,10 +93,96 @@ def test_map_is_sound_and_reaches_the_momentary_peak():
         assert drive.torque_range[1] >= drive.ratings.momentary_peak * (1 - 1e-12)
 
 
-def test_what_a_catalogue_bounds_is_not_in_the_map():
-    """No kinematic error; the sheet has null and the catalogue's bound as reason."""
-    drive = DriveMap.from_catalogue("CSG-14-50")
-    assert not drive.kinematic_error.any()
+def turn_of(drive: DriveMap) -> np.ndarray:
+    """e0 over one turn of the output, from the cosines and sines by hand [arcmin]."""
+    psi = np.linspace(0.0, 2.0 * np.pi, 400_001)
+    angle = np.outer(drive.angle_orders[:, 0], drive.ratio * psi)
+    angle += np.outer(drive.angle_orders[:, 1], psi)
+    a, b = drive.kinematic_error.T
+    return (a @ np.cos(angle) + b @ np.sin(angle)) * 10800.0 / np.pi
+
+
+@pytest.mark.parametrize("name", ["CSG-14-50", "CSG-25-100", "CHA-32-160"])
+def test_the_kinematic_error_is_the_stated_accuracy(name):
+    """Peak to peak of e0 over one output turn, and on the sheet, is what is stated."""
+    drive = drive_of(name)
+    stated = drive.info["stated"]["transmission_accuracy_arcmin"]
+    assert np.ptp(turn_of(drive)) == pytest.approx(stated, rel=2e-5)
+    per_input_turn = drive.angle_orders[1:]
+    assert sorted(map(tuple, per_input_turn.tolist())) == [(2, 0), (4, 0)]
+    sheet = drive.spec_sheet(["transmission_accuracy_arcmin", "ripple_pp_percent"])
+    assert sheet["transmission_accuracy_arcmin"] == pytest.approx(stated, rel=1e-3)
+    assert sheet["ripple_pp_percent"] > 1.0 and sheet["missing"] == {}
+    label = sheet["validity"]["kinematic_error"]
+    assert names(label, "assumed", f"{stated:g} arcmin", "2 and 4", "seed 0")
+    assert label == drive.info["kinematic_error"]
+
+
+def test_the_seed_draws_share_and_phases():
+    """Specimens of two seeds differ in both and agree in size, of one in nothing."""
+    one, same, other = (
+        DriveMap.from_catalogue("CSG-25-100", kinematic_error_arcmin=2.5, seed=seed)
+        for seed in (3, 3, 4)
+    )
+    assert np.array_equal(one.kinematic_error, same.kinematic_error)
+    sizes = [np.hypot(*drive.kinematic_error[1:].T) for drive in (one, other)]
+    assert all(0.25 <= size[1] / size[0] <= 0.75 for size in sizes)
+    assert abs(sizes[0][1] / sizes[0][0] - sizes[1][1] / sizes[1][0]) > 1e-3
+    for drive, seed in ((one, 3), (other, 4)):
+        assert np.ptp(turn_of(drive)) == pytest.approx(2.5, rel=2e-5)
+        assert names(drive.info["kinematic_error"], "2.5 arcmin", f"seed {seed}")
+
+
+@pytest.mark.parametrize("layout", LAYOUTS)
+def test_an_assumed_error_repeats_with_the_input(layout):
+    """Of any layout it depends on the input alone, and a joint's name moves it."""
+    plain = replace(DriveMap.linear(1e4), layout=layout)
+    drives = [
+        with_assumed_error(plain, 1e-4, seed=1, joint=joint)
+        for joint in ("", "elbow", "wrist")
+    ]
+    errors = [drive.kinematic_error for drive in drives]
+    assert not np.array_equal(errors[0], errors[1])
+    assert not np.array_equal(errors[1], errors[2])
+    theta = np.linspace(0.0, 2.0 * np.pi, 20_001)
+    for drive in drives:
+        e0 = [drive.error_at(drive.phases(theta, psi))[0] for psi in (0.0, 1.234)]
+        assert np.allclose(e0[0], e0[1], rtol=0, atol=1e-18)
+        assert np.ptp(e0[0]) == pytest.approx(1e-4, rel=1e-6)
+    assert names(drives[1].info["kinematic_error"], "assumed", "seed 1", "elbow")
+
+
+def test_without_a_stated_accuracy_there_is_no_error():
+    """The record says that the tables state none; a value of one's own is taken."""
+    drive = DriveMap.from_catalogue("CSG-25-100", kinematic_error_arcmin=0)
+    stated = drive.info["stated"] | {"transmission_accuracy_arcmin": None}
+    silent = replace(drive, info={**drive.info, "stated": stated})
+    left = with_stated_error(silent)
+    assert not left.kinematic_error.any()
+    assert names(left.info["kinematic_error"], "none", "accuracy", "CSG-25-100")
+    assert with_stated_error(silent, 2.0).kinematic_error.any()
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"kinematic_error_arcmin": -1.0}, ("-1", "0", "60 arcmin")),
+        ({"kinematic_error_arcmin": 61.0}, ("61", "0", "60 arcmin")),
+        ({"kinematic_error_arcmin": float("nan")}, ("nan", "60 arcmin")),
+        ({"seed": -1}, ("seed", "-1", ">= 0")),
+        ({"seed": 1.5}, ("seed", "1.5", ">= 0")),
+    ],
+)
+def test_options_out_of_range(options, words):
+    """A negative or absurd error and a seed that is none are refused in a line."""
+    with pytest.raises(InputError, match=naming(*words)):
+        DriveMap.from_catalogue("CSG-25-100", **options)
+
+
+def test_what_is_switched_off_is_told():
+    """Without error the sheet has null and the catalogue's bound as reason."""
+    drive = DriveMap.from_catalogue("CSG-14-50", kinematic_error_arcmin=0)
+    assert not drive.kinematic_error.any() and len(drive.orders) == 1
     assert drive.info["stated"]["transmission_accuracy_arcmin"] == 1.5
     sheet = drive.spec_sheet()
     assert sheet["transmission_accuracy_arcmin"] is None

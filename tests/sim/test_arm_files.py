@@ -226,6 +226,7 @@ def test_a_scene_takes_the_mechanics_of_a_file_and_no_more(tmp_path):
     assert not arm.model.dof_armature.any()
     np.testing.assert_array_equal(arm.model.dof_damping, 0.3)
     scene = scene_of_arm(str(arm.path), overrides=[STEADY])
+    scene = scene.with_friction(False).with_kinematic_error(0.0)
     run = run_scene(scene, overrides={"simulation.duration_s": 2.0})
     model = run.assembly.model
     assert (model.nu, model.nsensor, model.nkey) == (2, 0, 0)

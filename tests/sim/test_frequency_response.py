@@ -15,7 +15,7 @@ CHIRP = Chirp(low=8.0, high=100.0, period=4.0)
 
 @pytest.fixture(scope="module")
 def drive():
-    return DriveMap.from_catalogue("CSG-25-100")
+    return DriveMap.from_catalogue("CSG-25-100", kinematic_error_arcmin=0)
 
 
 @pytest.mark.parametrize("link", [0.3, 1.0, 3.0])

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from messages import names
 
-from swgjoint.cli.run import notes
+from swgjoint.cli.run import left_out_lines, notes
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.friction import Friction
 from swgjoint.maps.hysteresis import Jenkin
@@ -21,10 +22,10 @@ RUBBING = replace(LINEAR, friction=LAW)
 
 
 @pytest.mark.parametrize("level", ["full", "native"])
-def test_a_scene_asks_for_friction(bench, level):
-    """With the key the motor works against it, without it nothing is in the model."""
-    off = bench(RUBBING, defaults__level=level)
-    on = bench(RUBBING, defaults__level=level, defaults__friction=True)
+def test_a_scene_has_friction_unless_it_says_false(bench, level):
+    """The motor works against it; switched off nothing of it is in the model."""
+    off = bench(RUBBING, defaults__level=level, defaults__friction=False)
+    on = bench(RUBBING, defaults__level=level)
     torque = [run.motor_torque[run.steady, 0].mean() for run in (off, on)]
     # 20 N·m over i = -60; at level native no part of the load rubs
     rubs = 0.05 + (0.1 * 20.0 / 60.0 if level == "full" else 0.0)
@@ -40,6 +41,8 @@ def test_a_scene_asks_for_friction(bench, level):
     left = [item["part"] for item in off.contains["left_out"]]
     assert "friction of the drive" in left
     assert "friction of the drive" not in now
+    (line,) = (one for one in left_out_lines(off.contains) if "friction" in one)
+    assert names(line, "joints.*.friction", "false")
 
 
 def test_the_link_feels_the_friction_of_the_flexspline(bench):

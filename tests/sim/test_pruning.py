@@ -61,7 +61,7 @@ FEATURES: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
         {"defaults.harmonics_tolerance_arcmin": 1.0},
         {"defaults.harmonics_tolerance_arcmin": None},
     ),
-    "friction": ({"defaults.friction": True}, {"defaults.friction": None}),
+    "friction": ({"defaults.friction": True}, {"defaults.friction": False}),
     "plugin level": ({"defaults.level": "full"}, {"defaults.level": "linear"}),
     "native level": ({"defaults.level": "native"}, {"defaults.level": "linear"}),
 }

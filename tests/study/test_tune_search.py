@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from messages import naming
 
-from swgjoint.envs.bench import load_drive_once
+from swgjoint.envs.specimen import load_drive_once
 from swgjoint.errors import InputError
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.study.tune import tune
