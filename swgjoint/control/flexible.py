@@ -28,6 +28,7 @@ from scipy.interpolate import make_interp_spline
 
 from swgjoint.control.motor_side import MotorPlan, known_friction
 from swgjoint.errors import ComputationError
+from swgjoint.joint.prescribed import motor_of_link
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.controller import Task
 
@@ -50,7 +51,8 @@ def flexible_plan(task: Task) -> MotorPlan:
     encoder tells it and as the integrator ``discrete`` has it: half a period old, which
     would be an error of first order in the period. A motion whose torque jumps needs
     an impulse of the motor: ramps of scenes are smooth enough, steps and trapezoids
-    are not.
+    are not. A drive of level ``rigid`` has no torsion, its output moves by its
+    kinematic error alone.
 
     Raises:
         ComputationError: If a torque of the motion is not reached by the map.
@@ -79,6 +81,7 @@ def flexible_plan(task: Task) -> MotorPlan:
             task.position[..., j],
             speed[..., j],
             task.velocity[..., j],
+            torque=task.link_torque[..., j],
             damping=damping[..., j],
         )
     wanted = joints.rotor_inertia * bend + on_motor
@@ -145,6 +148,8 @@ def _motor_angle(
     period: float,
 ) -> Array:
     """Motor angles of one joint along motions, damping included. Shape (n, ...)."""
+    if drive.level == "rigid":
+        return motor_of_link(drive, psi)
     theta = motor_angle(drive, psi, torque)
     for _ in range(ROUNDS if damping.any() else 0):
         theta_rate = (
@@ -162,9 +167,12 @@ def _input_torque(
     theta_rate: Array,
     psi_rate: Array,
     *,
+    torque: Array,
     damping: Array,
 ) -> Array:
     """What the drive asks of the motor, potential and damping [N·m]."""
+    if drive.level == "rigid":
+        return np.asarray(torque / drive.ratio)
     shape = theta.shape
     flat = [x.reshape(-1) for x in (theta, psi, theta_rate, psi_rate)]
     out = np.concatenate(

@@ -27,6 +27,7 @@ from swgjoint.joint.region import check_region
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.controller import KnownJoints
 from swgjoint.sim.rigid_arm import RigidArm, compile_spec
+from swgjoint.sim.transmission import transmission_of
 
 Array = NDArray[np.float64]
 
@@ -155,7 +156,7 @@ class BenchCore(Core):
         limit = s.torque_limit_Nm or ratings.repeated_peak / abs(ratio)
         joints = KnownJoints(
             names=(JOINT,),
-            drives=(attached.drive,),
+            drives=(transmission_of(attached, drive).told,),
             rotor_inertia=s.rotor_inertia_kgm2 * one,
             link_inertia=s.link_inertia * one,
             damping=attached.damping * one,

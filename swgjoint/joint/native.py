@@ -95,7 +95,12 @@ def fit_native(drive: DriveMap) -> NativeSpring:
 
 
 def native_map(drive: DriveMap, spring: NativeSpring) -> DriveMap:
-    """The elastic part as a map: the law between motor and link of this level."""
+    """The law between motor and link of this level as a map.
+
+    The elastic part, hysteresis, and where the map has friction that of the elements:
+    constant and viscous. It acts against the housing, here as everywhere in maps
+    against the flexspline, which differs by the ratio.
+    """
     end = 4.0 * max(
         abs(drive.mean_torsion(sign * drive.ratings.momentary_peak)) for sign in (-1, 1)
     )
@@ -104,8 +109,13 @@ def native_map(drive: DriveMap, spring: NativeSpring) -> DriveMap:
     shifted = energy(np.polynomial.Polynomial([-end, 1.0])).coef
     potential[0, 0, 0, : shifted.size] = shifted
     stiffness = spring.linear + 3.0 * spring.cubic * end**2
+    friction = drive.friction
+    if friction is not None:
+        slip = spring.friction
+        friction = replace(friction, coulomb=slip, static=slip, load=0.0, bending=0.0)
     return replace(
         drive,
+        friction=friction,
         torsion_knots=np.array([-end, end]),
         orders=np.zeros((1, 2), dtype=np.int64),
         potential=potential,

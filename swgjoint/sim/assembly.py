@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 
 from swgjoint.errors import InputError
 from swgjoint.joint.attach import attach
-from swgjoint.joint.drive import JointDrive
-from swgjoint.joint.native import native_map
 from swgjoint.joint.place import allow_iterations
 from swgjoint.joint.region import check_region
 from swgjoint.maps.drive_map import DriveMap
@@ -28,7 +26,7 @@ from swgjoint.sim.scene import MAX_STEPS, Scene
 from swgjoint.sim.scene_sections import JointSection
 from swgjoint.sim.start_check import check_link, check_ranges
 from swgjoint.sim.trajectory import Trajectory
-from swgjoint.sim.transmission import Transmission
+from swgjoint.sim.transmission import Transmission, transmission_of
 
 Array = NDArray[np.float64]
 
@@ -326,25 +324,6 @@ def _touching(arm: RigidArm, trajectory: Trajectory) -> NDArray[np.bool_]:
     path, slack = trajectory.position, 1e-3  # drives give way by minutes of arc [rad]
     beyond = (path <= low + slack) | (path >= high - slack)
     return np.asarray(collides | (model.jnt_limited.astype(bool) & beyond.any(axis=0)))
-
-
-def transmission_of(attached: JointDrive, drive: DriveMap) -> Transmission:
-    """What the compiled model contains of one joint's drive."""
-    law: DriveMap | None = None
-    if attached.level == "full":
-        law = attached.drive
-    elif attached.native is not None:
-        law = native_map(drive, attached.native)
-    elif attached.level == "linear":
-        law = DriveMap.linear(
-            attached.stiffness,
-            layout=drive.layout,
-            teeth_flexspline=drive.teeth_flexspline,
-            teeth_circular_spline=drive.teeth_circular_spline,
-            rated_torque=drive.ratings.rated_torque,
-            name=drive.name,
-        )
-    return Transmission(attached=attached, drive=drive, law=law)
 
 
 def _check_length(scene: Scene, sub_steps: int) -> None:

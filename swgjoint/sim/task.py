@@ -22,8 +22,10 @@ def task_of(
     """The commanded motion at the instants of the control, and the nominal joints.
 
     The known torque is that of the arm as the controller knows it, with weight, inertia
-    and the constant load; drives are told as they are simulated, without the orders
-    that the step does not carry.
+    and the constant load; drives are told as they are simulated
+    (:attr:`~swgjoint.sim.transmission.Transmission.told`): without what their level
+    does not have, what the scene switches off and the orders that the step does not
+    carry.
 
     Args:
         assembly: The scene.
@@ -66,9 +68,7 @@ def task_of(
         reading_age=_reading_age(assembly),
         joints=KnownJoints(
             names=assembly.joints,
-            drives=tuple(
-                known.get(t.joint, t.law or t.drive) for t in assembly.transmissions
-            ),
+            drives=tuple(known.get(t.joint, t.told) for t in assembly.transmissions),
             rotor_inertia=assembly.rotor_inertia,
             link_inertia=link_inertia,
             damping=np.array([t.attached.damping for t in assembly.transmissions]),

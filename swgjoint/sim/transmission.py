@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.joint.drive import JointDrive, JointSignals
+from swgjoint.joint.native import native_map
 from swgjoint.maps.drive_map import DriveMap
+from swgjoint.maps.error_spectrum import with_error
 from swgjoint.maps.friction import play_friction
 from swgjoint.maps.hysteresis import play_hysteresis, stretches
 
 Array = NDArray[np.float64]
 
 _CHUNK = 1024  # samples at once: the coefficient table of a chunk stays in the cache
+STIFF = 1e3
+"""Stiffness of the map that stands for a drive without torsion, over that of the drive:
+0.01 arcmin at rated torque, and its torque is still told apart from round-off."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -37,7 +42,8 @@ class Transmission:
     law: DriveMap | None
     """The map that the model carries between motor and link: without unresolved
     harmonics, of constant stiffness at level ``linear``, the elastic polynomial at
-    ``native``; None at the levels without a rotor, ``rigid`` and ``kinematic``."""
+    ``native``; friction where the model has it. None at the levels without a rotor,
+    ``rigid`` and ``kinematic``."""
 
     @property
     def joint(self) -> str:
@@ -58,6 +64,22 @@ class Transmission:
     def rotor_inertia(self) -> float:
         """[kg·m²] about the motor axis."""
         return self.attached.rotor_inertia
+
+    @property
+    def told(self) -> DriveMap:
+        """The drive as it is simulated, for a controller.
+
+        :attr:`law`, and at the levels without a rotor a map of level ``rigid``: no
+        torsion (a spring :data:`STIFF` times as stiff stands for it), no friction, the
+        kinematic error at ``kinematic`` alone.
+        """
+        if self.law is not None:
+            return self.law
+        drive = self.attached.drive
+        spring = _linear(drive, STIFF * self.attached.stiffness)
+        if self.level == "kinematic":
+            spring = with_error(spring, drive.orders, drive.kinematic_error)
+        return replace(spring, level="rigid")
 
     def signals(
         self, theta: Array, psi: Array, theta_rate: Array, psi_rate: Array
@@ -123,3 +145,33 @@ class Transmission:
         ``native`` relaxed at zero torsion, ``full`` where it stands.
         """
         return float(torsion[0]) if self.level == "full" else 0.0
+
+
+def transmission_of(attached: JointDrive, drive: DriveMap) -> Transmission:
+    """What the compiled model contains of one joint's drive.
+
+    Args:
+        attached: What attaching left behind.
+        drive: The whole map.
+    """
+    law: DriveMap | None = None
+    if attached.level == "full":
+        law = attached.drive
+    elif attached.native is not None:
+        law = native_map(attached.drive, attached.native)
+    elif attached.level == "linear":
+        law = _linear(drive, attached.stiffness)
+    return Transmission(attached=attached, drive=drive, law=law)
+
+
+def _linear(drive: DriveMap, stiffness: float) -> DriveMap:
+    """A drive as a constant spring alone; name and ratings are its own."""
+    spring = DriveMap.linear(
+        stiffness,
+        layout=drive.layout,
+        teeth_flexspline=drive.teeth_flexspline,
+        teeth_circular_spline=drive.teeth_circular_spline,
+        rated_torque=drive.ratings.rated_torque,
+        name=drive.name,
+    )
+    return replace(spring, ratings=drive.ratings)
