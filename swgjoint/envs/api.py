@@ -12,6 +12,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from swgjoint.envs.arguments import shown
 from swgjoint.envs.bench import settings_of
 from swgjoint.envs.core import Core, Entry, bounds
 from swgjoint.envs.picture import Picture
@@ -19,6 +20,21 @@ from swgjoint.errors import InputError
 from swgjoint.sim.controller import Measured, Task
 
 Array = NDArray[np.float64]
+
+
+def _check_began(began: bool) -> None:
+    """Refuse what needs an episode."""
+    if not began:
+        raise InputError("no episode has begun; accepted: after reset()")
+
+
+def _check_options(options: dict[str, Any], known: tuple[str, ...]) -> None:
+    """Refuse options of ``reset`` that are not known."""
+    if unknown := [key for key in options if key not in known]:
+        raise InputError(
+            f"option {shown(unknown[0])} of reset; accepted:"
+            f" {', '.join(known) or 'no options'}"
+        )
 
 
 def _box(entries: tuple[Entry, ...]) -> Any:
@@ -49,6 +65,7 @@ class SingleEnv(gymnasium.Env[Array, Array]):
         core: Core = self.core_of(1, 1, settings)
         self.core, self.render_mode = core, render_mode
         self._picture: Picture | None = None
+        self._began = False
         self.observation_space = _box(core.observation_entries)
         self.action_space = _box(core.action_entries)
 
@@ -56,12 +73,15 @@ class SingleEnv(gymnasium.Env[Array, Array]):
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Array, dict[str, Any]]:
         """Begin an episode; ``options`` has no keys."""
+        _check_options(options or {}, ())
         super().reset(seed=seed)
+        self._began = True
         self.core.restart([0], [self.np_random])
         return self.core.observation()[0], self._info(0)
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
         """Hold an action over one control period."""
+        _check_began(self._began)
         core = self.core
         core.step(np.asarray(action)[None], None)
         broken = int(core.broken()[0])
@@ -118,9 +138,10 @@ class BatchEnv(VectorEnv[Array, Array, Array]):
     """Many episodes on the threads of the engine.
 
     An episode that has ended begins anew in the next step, whose action it ignores
-    (``autoreset_mode`` ``NextStep``), or at once, its last observation in
-    ``info["final_obs"]`` (``SameStep``): as in gymnasium's own vector environments,
-    with which this one agrees to the last bit.
+    (``autoreset_mode`` ``NextStep``), at once, its last observation in
+    ``info["final_obs"]`` (``SameStep``), or when ``reset`` is called with a
+    ``reset_mask`` (``Disabled``): as in gymnasium's own vector environments, with which
+    this one agrees to the last bit.
     """
 
     single: ClassVar[type[SingleEnv]]
@@ -133,14 +154,14 @@ class BatchEnv(VectorEnv[Array, Array, Array]):
         **arguments: Any,
     ) -> None:
         """Threads of the engine, 0 for one per core; the rest as the single one's."""
-        modes = (AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP)
+        modes = tuple(AutoresetMode)
         if autoreset_mode not in (*modes, *(mode.value for mode in modes)):
             raise InputError(
                 f"autoreset_mode {autoreset_mode!r}; accepted:"
                 f" {', '.join(mode.value for mode in modes)}"
             )
         mode = AutoresetMode(autoreset_mode)
-        self._same_step = mode is AutoresetMode.SAME_STEP
+        self._mode = mode
         settings = settings_of(self.single.settings_type, arguments)
         core: Core = self.single.core_of(num_envs, threads, settings)
         self.core, self.num_envs = core, core.plant.batch.nsim
@@ -161,13 +182,19 @@ class BatchEnv(VectorEnv[Array, Array, Array]):
         seed: int | list[int | None] | None = None,
         options: dict[str, Any] | None = None,
     ) -> tuple[Array, dict[str, Any]]:
-        """Begin all episodes, number k with ``seed + k``.
+        """Begin all episodes, or those of a mask, number k with ``seed + k``.
 
         Args:
             seed: The first, or one each; None goes on with the generators.
-            options: No keys.
+            options: ``reset_mask``, an array of truth values, one per episode: those
+                begin anew, the others go on. ``info`` then is that of the former.
+
+        Raises:
+            InputError: If a seed is missing or an option is not accepted.
         """
-        n = self.num_envs
+        options, n = dict(options or {}), self.num_envs
+        _check_options(options, ("reset_mask",))
+        chosen = self._chosen(options.get("reset_mask"))
         if isinstance(seed, int):
             seed = [seed + k for k in range(n)]
         seeds: list[int | None] = [None] * n if seed is None else list(seed)
@@ -175,17 +202,43 @@ class BatchEnv(VectorEnv[Array, Array, Array]):
             raise InputError(f"{len(seeds)} seeds; accepted: {n}, one per episode")
         old = self._rngs
         self._rngs = [
-            old[k] if old and one is None else seeding.np_random(one)[0]
-            for k, one in enumerate(seeds)
+            old[k] if old and (one is None or not mine) else seeding.np_random(one)[0]
+            for k, (one, mine) in enumerate(zip(seeds, chosen, strict=True))
         ]
-        self._ended = np.zeros(n, dtype=bool)
-        self.core.restart(range(n), self._rngs)
-        return self.core.observation(), self._info(np.zeros(n, dtype=np.int64))
+        self._ended = self._ended & ~chosen
+        self._restart(chosen)
+        info = self._info(np.zeros(n, dtype=np.int64))
+        return self.core.observation(), _of(chosen, info)
+
+    def _chosen(self, mask: Any) -> NDArray[np.bool_]:
+        """Episodes that a reset begins."""
+        if mask is None:
+            return self._all
+        n = self.num_envs
+        good = isinstance(mask, np.ndarray) and mask.dtype == np.bool_
+        if not (good and mask.shape == (n,) and mask.any()):
+            raise InputError(
+                f"reset_mask {shown(mask)}; accepted: an array of {n} truth values, at"
+                " least one of them True"
+            )
+        if not self._rngs:
+            raise InputError(
+                "reset_mask before any episode has begun; accepted: after reset()"
+            )
+        return np.array(mask)
 
     def step(self, actions: Array) -> tuple[Array, Array, Any, Any, dict[str, Any]]:
         """Hold actions over one control period. Shapes (n, ...)."""
+        _check_began(bool(self._rngs))
         core, ended = self.core, self._ended
         some = bool(ended.any())
+        if some and self._mode is AutoresetMode.DISABLED:
+            rows = ", ".join(map(str, np.flatnonzero(ended)[:8]))
+            raise InputError(
+                f"step of episodes that have ended ({rows}); accepted: after"
+                " reset(options={'reset_mask': ...}), which autoreset_mode Disabled"
+                " leaves to the caller"
+            )
         core.step(actions, ~ended if some else None)
         reward, broken, over = core.reward(), core.broken(), core.over
         if some:
@@ -193,7 +246,7 @@ class BatchEnv(VectorEnv[Array, Array, Array]):
             reward[ended], broken[ended], over[ended] = 0.0, 0, False
         terminated = broken > 0
         done, further = terminated | over, {}
-        if not self._same_step:
+        if self._mode is not AutoresetMode.SAME_STEP:
             self._ended = done
         elif done.any():
             further = self._final(done, self._info(broken))
@@ -208,16 +261,9 @@ class BatchEnv(VectorEnv[Array, Array, Array]):
         final = np.full(self.num_envs, None, dtype=object)
         for k in np.flatnonzero(done):
             final[k] = last[k]
-        among = {
-            key: np.where(done.reshape(-1, *[1] * (value.ndim - 1)), value, 0)
-            for key, value in info.items()
-        }
-        for key in info:
-            if key.startswith("_"):
-                among[key] = done
         return {
             "final_obs": final,
-            "final_info": among,
+            "final_info": _of(done, info),
             "_final_obs": done,
             "_final_info": done,
         }
@@ -238,3 +284,14 @@ class BatchEnv(VectorEnv[Array, Array, Array]):
     def measured(self, observation: Array) -> Measured:
         """What a controller reads from observations; shapes (n, n_joints)."""
         return self.core.measured(observation)
+
+
+def _of(rows: NDArray[np.bool_], info: dict[str, Any]) -> dict[str, Any]:
+    """The info of some episodes, as gymnasium has it: zeros and False for the rest."""
+    if rows.all():
+        return info
+    among = {
+        key: np.where(rows.reshape(-1, *[1] * (value.ndim - 1)), value, 0)
+        for key, value in info.items()
+    }
+    return among | {key: rows for key in info if key.startswith("_")}

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from swgjoint.envs.api import BatchEnv, SingleEnv
 from swgjoint.envs.arguments import check_flag, check_number, shown
-from swgjoint.envs.core import Core, Entry, Limits, ceiling
+from swgjoint.envs.core import Core, Entry, Limits, ceiling, error_bounds
 from swgjoint.envs.loop import MotorLoop
 from swgjoint.envs.plant import Plant, specimen
 from swgjoint.envs.sensors import Sensors
@@ -173,6 +173,18 @@ class ArmCore(Core):
         ratio = np.abs(self.joints.ratio)
         angle = float(np.max(ratio * reach))
         speed = 1.5 * float(limits.motor_speed.max())
+        off = np.array(
+            [
+                error_bounds(
+                    one,
+                    speed=float(np.abs(self._path[:, 1, j]).max()),
+                    acceleration=float(np.abs(self._path[:, 2, j]).max()),
+                    age=self.sensors.delay_periods * self.period,
+                    period=self.period,
+                )
+                for j, one in enumerate(self.joints.ratio)
+            ]
+        ).max(axis=0)
 
         def each(what: str, unit: str, top: float) -> Entry:
             top = ceiling(top)
@@ -195,8 +207,8 @@ class ArmCore(Core):
         return (
             each("motor angle, read,", "rad", 1.01 * angle),
             each("motor speed, change of the reading,", "rad/s", speed),
-            each("motor angle, ratio * reference - read,", "rad", 1.01 * angle),
-            each("motor speed, ratio * reference - read,", "rad/s", speed),
+            each("motor angle, ratio * reference - read,", "rad", float(off[0])),
+            each("motor speed, ratio * reference - read,", "rad/s", float(off[1])),
             each("reference speed of the link", "rad/s", link_speed),
             each("known torque of the link", "N·m", torque),
             each("last action", "1", 1.0),
@@ -371,14 +383,17 @@ class ArmTrackingEnv(SingleEnv):
     =====  =====================================================  =====  =============
     0-5    motor angle, read, of every joint                      rad    -230 to 230
     6-11   motor speed, change of the reading, of every joint     rad/s  -240 to 240
-    12-17  motor angle, ratio * reference - read, of every joint  rad    -230 to 230
-    18-23  motor speed, ratio * reference - read, of every joint  rad/s  -240 to 240
+    12-17  motor angle, ratio * reference - read, of every joint  rad    -1.6 to 1.6
+    18-23  motor speed, ratio * reference - read, of every joint  rad/s  -15 to 15
     24-29  reference speed of the link of every joint             rad/s  -0.69 to 0.69
     30-35  known torque of the link of every joint                N·m    -30 to 30
     36-41  last action of every joint                             1      -1 to 1
     42-47  link angle, read, of every joint                       rad    -2.3 to 2.3
     48-53  output torque, read, of every joint                    N·m    -410 to 410
     =====  =====================================================  =====  =============
+
+    Ranges of the tracking errors as in
+    :class:`~swgjoint.envs.joint_tracking.JointTrackingEnv`.
 
     Reward of a step, with the distance d of the tool from its reference (linearised
     about it) and the mean square of the actions a:

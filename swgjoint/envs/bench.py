@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.envs.arguments import check_flag, check_number, shown
-from swgjoint.envs.core import Core, Entry, Limits, ceiling
+from swgjoint.envs.core import Core, Entry, Limits, ceiling, error_bounds
 from swgjoint.envs.loop import MotorLoop
 from swgjoint.envs.plant import Plant, specimen
 from swgjoint.envs.sensors import Sensors
@@ -222,6 +222,34 @@ class BenchCore(Core):
             Entry(meaning="motor angle, read", unit="rad", low=-angle, high=angle),
             Entry(
                 meaning="motor speed, change of the reading",
+                unit="rad/s",
+                low=-speed,
+                high=speed,
+            ),
+        )
+
+    def error_entries(self, acceleration: float) -> tuple[Entry, ...]:
+        """Tracking errors of motor angle and speed, as they are read.
+
+        Args:
+            acceleration: Largest of references, at the link [rad/s²].
+        """
+        angle, speed = error_bounds(
+            self.joint.ratio,
+            speed=self.settings.max_speed_rad_s,
+            acceleration=acceleration,
+            age=self.sensors.delay_periods * self.period,
+            period=self.period,
+        )
+        return (
+            Entry(
+                meaning="motor angle, ratio * reference - read",
+                unit="rad",
+                low=-angle,
+                high=angle,
+            ),
+            Entry(
+                meaning="motor speed, ratio * reference - read",
                 unit="rad/s",
                 low=-speed,
                 high=speed,

@@ -29,6 +29,14 @@ from swgjoint.units import arcmin
 Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
 
+TRACKED = 50.0 * arcmin
+"""Error of a link to which the observed tracking error reaches [rad]: twenty times what
+a rigid plan leaves. A far larger range would hide from whoever scales by it what is to
+be controlled; beyond it the entry stays at its bound, and reference and reading are
+observed whole."""
+REGAINED = 0.1
+"""Time in which the largest observed speed error would make that error [s]."""
+
 LIMITS = ("none", "angle", "speed", "momentary_peak", "ratcheting")
 """What ``info["broken_limit"]`` counts."""
 
@@ -62,6 +70,28 @@ def bounds(entries: Sequence[Entry]) -> tuple[Array, Array]:
     """Of every number, low and high."""
     low, high = np.array([(e.low, e.high) for e in entries for _ in range(e.count)]).T
     return low, high
+
+
+def error_bounds(
+    ratio: float, *, speed: float, acceleration: float, age: float, period: float
+) -> tuple[float, float]:
+    """Ranges of observed errors of a motor's angle [rad] and speed [rad/s].
+
+    A reading is held against the reference of now, so what the reference does in its
+    age comes on top.
+
+    Args:
+        ratio: Of the drive.
+        speed: Largest of the reference, at the link [rad/s].
+        acceleration: Likewise [rad/s²].
+        age: Of the readings [s].
+        period: Of the control, over which a speed is the change of the angle [s].
+    """
+    i = abs(ratio)
+    return (
+        ceiling(i * (TRACKED + speed * age)),
+        ceiling(i * (TRACKED / REGAINED + acceleration * (age + 0.5 * period))),
+    )
 
 
 def ceiling(value: float) -> float:

@@ -78,8 +78,7 @@ class TrackingCore(BenchCore):
         return (
             angle,
             speed,
-            known("motor angle, ratio * reference - read", "rad", angle.high),
-            known("motor speed, ratio * reference - read", "rad/s", speed.high),
+            *self.error_entries(s.max_acceleration),
             known("reference angle of the link", "rad", reach),
             known("reference speed of the link", "rad/s", ceiling(s.max_speed_rad_s)),
             known("reference acceleration of the link", "rad/s^2", bend),
@@ -163,8 +162,8 @@ class JointTrackingEnv(SingleEnv):
     =====  =====================================  =======  ===========
     0      motor angle, read                      rad      -310 to 310
     1      motor speed, change of the reading     rad/s    -180 to 180
-    2      motor angle, ratio * reference - read  rad      -310 to 310
-    3      motor speed, ratio * reference - read  rad/s    -180 to 180
+    2      motor angle, ratio * reference - read  rad      -1.6 to 1.6
+    3      motor speed, ratio * reference - read  rad/s    -23 to 23
     4      reference angle of the link            rad      -1 to 1
     5      reference speed of the link            rad/s    -0.6 to 0.6
     6      reference acceleration of the link     rad/s^2  -50 to 50
@@ -174,7 +173,9 @@ class JointTrackingEnv(SingleEnv):
     10     output torque, read                    N·m      -410 to 410
     =====  =====================================  =======  ===========
 
-    Readings have resolution, noise and delay, see
+    The tracking errors, 2 and 3, end at 50 arcmin of the link and at that in 0.1 s, and
+    what the reference does in the age of a reading; beyond they stay there. Readings
+    have resolution, noise and delay, see
     :class:`swgjoint.envs.sensors.Sensors`; ranges depend on the arguments, those above
     belong to the default ones.
 

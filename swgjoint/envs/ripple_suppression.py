@@ -20,6 +20,9 @@ Array = NDArray[np.float64]
 
 RAMP = 0.5
 """Time in which speed and load grow; then the motion is steady [s]."""
+STEEPEST = 2.5
+"""Largest slope of :func:`~swgjoint.envs.references.smooth_step` over its mean, 2.46,
+rounded up."""
 SETTLE = 1.0
 """Time after that until the reward counts the motion [s]."""
 MEMORY = 0.15
@@ -102,8 +105,7 @@ class RippleCore(BenchCore):
         return (
             angle,
             speed,
-            known("motor angle, ratio * reference - read", "rad", angle.high),
-            known("motor speed, ratio * reference - read", "rad/s", speed.high),
+            *self.error_entries(STEEPEST * s.max_speed_rad_s / RAMP),
             known("sine of the wave generator's angle, read", "1", 1.0),
             known("cosine of the wave generator's angle, read", "1", 1.0),
             known("reference speed of the link", "rad/s", ceiling(s.max_speed_rad_s)),
@@ -225,8 +227,8 @@ class RippleSuppressionEnv(SingleEnv):
     =====  ==========================================  =====  ===========
     0      motor angle, read                           rad    -710 to 710
     1      motor speed, change of the reading          rad/s  -180 to 180
-    2      motor angle, ratio * reference - read       rad    -710 to 710
-    3      motor speed, ratio * reference - read       rad/s  -180 to 180
+    2      motor angle, ratio * reference - read       rad    -1.6 to 1.6
+    3      motor speed, ratio * reference - read       rad/s  -15 to 15
     4      sine of the wave generator's angle, read    1      -1 to 1
     5      cosine of the wave generator's angle, read  1      -1 to 1
     6      reference speed of the link                 rad/s  -0.6 to 0.6
@@ -235,6 +237,9 @@ class RippleSuppressionEnv(SingleEnv):
     9      link angle, read                            rad    -7.1 to 7.1
     10     output torque, read                         N·m    -410 to 410
     =====  ==========================================  =====  ===========
+
+    Ranges of the tracking errors as in
+    :class:`~swgjoint.envs.joint_tracking.JointTrackingEnv`.
 
     Reward of a step, from 1.5 s on (before: 0), with the ripple r of the torque, that
     of the drive less load and inertia of the link on the reference, the error e of the

@@ -63,7 +63,7 @@ def test_tables_are_those_of_the_code(name):
     blocks = inspect.cleandoc(type(env).__doc__).split("\n\n")
     assert table(env.core.action_entries) in blocks
     assert table(env.core.observation_entries) in blocks
-    joints = len(env.task.joints.names)
+    joints = len(env.core.joints.names)
     plain = make(name).unwrapped.observation_space.shape[0]
     assert env.observation_space.shape == (plain + 2 * joints,)
 
@@ -173,9 +173,109 @@ def test_episodes_that_restart_at_once():
         ended += int((got[2] | got[3]).sum())
     assert ended >= 3
     with pytest.raises(
-        InputError, match=naming("autoreset_mode", "'Disabled'", "NextStep", "SameStep")
+        InputError,
+        match=naming("autoreset_mode", "'Never'", "NextStep", "SameStep", "Disabled"),
     ):
-        gymnasium.make_vec(name, 1, autoreset_mode="Disabled")
+        gymnasium.make_vec(name, 1, autoreset_mode="Never")
+
+
+@pytest.mark.parametrize("mode", ["NextStep", "SameStep", "Disabled"])
+def test_some_episodes_begin_anew(mode):
+    """With a mask the batch is gymnasium's to the last bit, whatever the mode."""
+    name, count = "swgjoint/JointTracking-v0", 4
+    keys = {**SHORT[name], "period_s": 2e-3, "randomise": True}
+    sync = SyncVectorEnv(
+        [lambda: make(name, **keys).unwrapped] * count,
+        autoreset_mode=AutoresetMode(mode),
+    )
+    batch = gymnasium.make_vec(name, count, autoreset_mode=mode, **keys)
+    same(batch.reset(seed=1), sync.reset(seed=1))
+    rng, size, masked = np.random.default_rng(0), np.linspace(0.02, 1.0, count), 0
+    for k in range(275):
+        actions = size[:, None] * rng.uniform(-0.9, 0.9, (count, 1))
+        got, want = batch.step(actions), sync.step(actions)
+        same(got, want)
+        mask = got[2] | got[3]
+        if k == 40:
+            mask = np.array([True, False, True, False])
+        if mask.any() and (mode == "Disabled" or k == 40):
+            seed = 7 if k == 40 else None
+            again = [
+                one.reset(seed=seed, options={"reset_mask": mask})
+                for one in (batch, sync)
+            ]
+            same(*again)
+            masked += 1
+    assert masked >= (2 if mode == "Disabled" else 1)
+
+
+def test_manual_resets_are_asked_for():
+    """An episode that has ended does not go on where the caller has to reset it."""
+    batch = gymnasium.make_vec(
+        "swgjoint.envs:swgjoint/JointTracking-v0",
+        2,
+        autoreset_mode="Disabled",
+        **SHORT["swgjoint/JointTracking-v0"],
+    )
+    batch.reset(seed=0)
+    actions = np.array([[0.0], [1.0]])
+    while not batch.step(actions)[2].any():
+        pass
+    with pytest.raises(InputError, match=naming("ended", "1", "reset_mask")):
+        batch.step(actions)
+    batch.reset(options={"reset_mask": np.array([False, True])})
+    batch.step(actions)
+
+
+@pytest.mark.parametrize(
+    ("options", "match"),
+    [
+        ({"mask": 1}, ("option", "'mask'", "reset_mask")),
+        ({"reset_mask": [True, False]}, ("reset_mask", "[True, False]", "2", "True")),
+        ({"reset_mask": np.ones(3, bool)}, ("reset_mask", "2", "True")),
+        ({"reset_mask": np.zeros(2, bool)}, ("reset_mask", "2", "True")),
+        ({"reset_mask": np.ones(2)}, ("reset_mask", "2", "True")),
+    ],
+)
+def test_options_of_reset_are_checked(options, match):
+    """A batch takes a mask of its size alone, a single environment no option."""
+    name = "swgjoint.envs:swgjoint/JointTracking-v0"
+    batch, single = gymnasium.make_vec(name, 2), gymnasium.make(name)
+    batch.reset(seed=0)
+    with pytest.raises(InputError, match=naming(*match)):
+        batch.reset(options=options)
+    with pytest.raises(InputError, match=naming("option", repr(next(iter(options))))):
+        single.reset(options=options)
+
+
+@NAMES
+def test_an_episode_begins_with_a_reset(name):
+    """Before it a step and a mask are refused in one line."""
+    single, batch = make(name).unwrapped, gymnasium.make_vec(name, 2)
+    mask = {"reset_mask": np.array([True, False])}
+    for early in (
+        lambda: single.step(np.zeros(single.action_space.shape)),
+        lambda: batch.step(np.zeros(batch.action_space.shape)),
+        lambda: batch.reset(options=mask),
+    ):
+        with pytest.raises(InputError, match=naming("episode", "reset()")):
+            early()
+
+
+@NAMES
+@pytest.mark.parametrize("delay", [0, 5])
+def test_tracking_errors_fill_their_range(name, delay):
+    """No further than 50 arcmin of a link, and room for what a delay shows."""
+    period = {} if name.endswith("ArmTracking-v0") else {"period_s": 2e-3}
+    env = make(name, sensors={"delay_periods": delay}, **period).unwrapped
+    n = len(env.core.joints.names)
+    angle, speed = (env.observation_space.high[k * n : (k + 1) * n] for k in (2, 3))
+    ratio = np.abs(env.core.joints.ratio)
+    fastest = 0.6 if n == 1 else np.abs(env.core._path[:, 1]).max()
+    lag = ratio * fastest * delay * env.core.period
+    reach = ratio * np.deg2rad(50.0 / 60.0)
+    assert (angle >= reach + lag).all() and (angle <= 1.1 * (reach + lag)).all()
+    assert (speed >= reach / 0.1).all() and (speed < 0.5 * 180.0).all()
 
 
 @NAMES
