@@ -43,6 +43,7 @@ compares; imported only when chosen."""
 MAX_JOBS = 256
 LEAST_INERTIA, MOST_INERTIA = 1e-9, 1e6
 """Of a rotor or a load [kg·m²]."""
+MAX_SEEDS = 10_000
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -81,6 +82,12 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="response: frequencies from stiffness and inertias alone, at once",
     )
     parser.add_argument(
+        "--seeds",
+        type=int,
+        metavar="N",
+        help="control: specimens of a drive; default 10, a minute each",
+    )
+    parser.add_argument(
         "--out", metavar="DIR", help="write the tables, the report and the plots there"
     )
 
@@ -97,6 +104,13 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     if not 1 <= args.jobs <= MAX_JOBS:
         raise InputError(f"--jobs {args.jobs}; accepted: 1 to {MAX_JOBS}")
     _check_response_options(args)
+    if args.seeds is not None and args.name != "control":
+        raise InputError(
+            f"--seeds {args.seeds} of study {args.name}, which draws no specimens;"
+            " accepted: with study control"
+        )
+    if args.seeds is not None and not 1 <= args.seeds <= MAX_SEEDS:
+        raise InputError(f"--seeds {args.seeds}; accepted: 1 to {MAX_SEEDS}")
     folder = output_folder(args.out) if args.out else None
     from swgjoint.study.rows import StudyOptions
 
@@ -106,6 +120,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
             only=tuple(p.strip() for p in (args.only or "").split(",") if p.strip()),
             model=args.model,
             jobs=args.jobs,
+            seeds=args.seeds,
             folder=folder,
             load_inertia=args.load_inertia,
             rotor_inertia=args.rotor_inertia,

@@ -209,7 +209,7 @@ def run_control(options: StudyOptions) -> StudyResult:
 
     if options.folder is not None:
         options.folder.mkdir(parents=True, exist_ok=True)
-    references = options.only or (DRIVE,)
+    references, seeds = options.only or (DRIVE,), options.seeds or SEEDS
     drives = {
         # the errors of specimens are the study's own, of more orders
         name: load_drive(name, model=options.model, kinematic_error_arcmin=0.0)
@@ -218,10 +218,10 @@ def run_control(options: StudyOptions) -> StudyResult:
     rows: list[Row] = []
     summary, files, more = [], [], {}
     for name, drive in drives.items():
-        found = climb(drive, jobs=options.jobs, progress=options.progress)
+        found = climb(drive, seeds=seeds, jobs=options.jobs, progress=options.progress)
         rows += ladder_rows(name, found)
         summary += [
-            f"{name}, {SEEDS} specimens, readings {1e3 * DELAY:g} ms old,"
+            f"{name}, {seeds} specimens, readings {1e3 * DELAY:g} ms old,"
             " mean ± standard deviation:"
         ]
         summary += [*ladder_table(found), *ladder_claims(found)]

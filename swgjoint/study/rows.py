@@ -21,6 +21,8 @@ class StudyOptions:
     """Fidelity, ``2d`` or ``3d``; None for the study's own."""
     jobs: int = 1
     """Processes."""
+    seeds: int | None = None
+    """Specimens to draw; None for the study's own number."""
     folder: Path | None = None
     """Where tables, report and plots go; None writes nothing."""
     load_inertia: float | None = None

@@ -67,6 +67,8 @@ def test_report(instant, capsys):
             ["thesis", "--model", "3d", "--only", "4.4"],
             ("4.4", "7.9", "7.10", "table-7.4"),
         ),
+        (["thesis", "--seeds", "3"], ("--seeds", "3", "thesis", "control")),
+        (["control", "--seeds", "0"], ("--seeds", "0", "1", "10000")),
         (["thesis", "--out", "file/below"], ("folder", "'file/below'", "'file'")),
     ],
 )

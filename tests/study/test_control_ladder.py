@@ -113,14 +113,14 @@ def short(monkeypatch):
         "trajectory": fast, "simulation": {"duration_s": 5.2}})  # fmt: skip
     monkeypatch.setitem(MOTIONS, "even", {
         "trajectory": fast, "simulation": {"duration_s": 1.0}})  # fmt: skip
-    monkeypatch.setattr(study, "SEEDS", 2)
     monkeypatch.setattr(study, "climb", lambda drive, **keys: climb(
-        drive, seeds=2, rungs=("PD", "+ feed-forward"), **keys))  # fmt: skip
+        drive, rungs=("PD", "+ feed-forward"), **keys))  # fmt: skip
 
 
 def test_command_writes_table_picture_and_values(short, tmp_path, capsys):
     """Rows for every rung and figure, values by seed, one line for each claim."""
-    arguments = ["--json", "--jobs", "1", "--out", str(tmp_path / "new")]
+    arguments = ["--json", "--jobs", "1", "--seeds", "2"]
+    arguments += ["--out", str(tmp_path / "new")]
     assert main(["study", "control", *arguments]) == 0
     out, err = capsys.readouterr()
     found = json.loads(out)
@@ -142,7 +142,7 @@ def test_command_writes_table_picture_and_values(short, tmp_path, capsys):
 def test_ladder_of_a_drive_without_friction_or_errors(short):
     """A linear map is drawn errors of the default accuracy; the rungs still run."""
     linear = replace(CSG, friction=None)
-    found = study.climb(linear)
+    found = study.climb(linear, seeds=2)
     assert found.improvement(RUNGS[1])[1] == 2
     assert len(ladder_claims(found)) == 1
 
