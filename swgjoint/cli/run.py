@@ -96,6 +96,8 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
     scene, choice = scene_of(args, args.overrides)
     of_arm = choice is not None
+    if args.model is not None:
+        scene = scene.with_model(args.model)
     recording = folder / "run.rrd" if folder is not None else None
     result = run_scene(scene, recording=recording, progress=args.progress)
     files = []

@@ -61,6 +61,9 @@ def build_map(
     parts = {"design": design.content_hash(), "model": model, "angles": angles}
 
     def build() -> DriveMap:
+        if model == "3d":
+            hint = "takes some 20 min; 2d and ring are quicker"
+            progress(f"map of {design.drive.name} in 3D, {hint}", 0, 1)
         if model == "ring":
             given = thin_ring.sample_rings(design, angles=angles, progress=progress)
             return fit_map(given)

@@ -221,7 +221,7 @@ def check_option(spec: mujoco.MjSpec, integrator: mujoco.mjtIntegrator) -> None:
 def few_iterations(spec: mujoco.MjSpec) -> bool:
     """Whether the model stops the engine's solvers earlier than MuJoCo's defaults."""
     option = spec.option
-    return option.iterations < ITERATIONS or option.ls_iterations < LS_ITERATIONS
+    return bool(option.iterations < ITERATIONS or option.ls_iterations < LS_ITERATIONS)
 
 
 def allow_iterations(spec: mujoco.MjSpec) -> None:

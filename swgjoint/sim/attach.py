@@ -9,14 +9,18 @@ from typing import Any, TypedDict, Unpack, overload
 import mujoco
 
 from swgjoint.errors import InputError
+from swgjoint.faults import validated
 from swgjoint.gear.design import Design
 from swgjoint.joint.attach import attach_all
 from swgjoint.joint.drive import JointDrive
 from swgjoint.joint.fitting import Fitting, check_spec
 from swgjoint.joint.patterns import chosen_hinges
 from swgjoint.maps.drive_map import DriveMap
-from swgjoint.sim.drives import load_drive
+from swgjoint.maps.error_spectrum import with_assumed_error
+from swgjoint.sim.drives import drive_of
 from swgjoint.sim.rotors import catalogue_rotor_inertia
+from swgjoint.sim.scene_sections import JointSection
+from swgjoint.units import arcmin
 
 DriveSource = DriveMap | Design | str | Path
 
@@ -34,6 +38,8 @@ class Options(TypedDict, total=False):
     max_phase_step: float
     integrator: str
     model: str | None
+    kinematic_error_arcmin: float | None
+    seed: int
 
 
 @overload
@@ -70,6 +76,8 @@ def attach(
     max_phase_step: float = 0.5,
     integrator: str = "discrete",
     model: str | None = None,
+    kinematic_error_arcmin: float | None = None,
+    seed: int = 0,
 ) -> JointDrive | dict[str, JointDrive]:
     """Turn hinges of a model into outputs of strain wave gears.
 
@@ -110,6 +118,10 @@ def attach(
             latter two with a warning; ``keep`` replaces none.
         model: Fidelity of the map of a design: ``ring``, ``2d`` or ``3d``; its default
             if None.
+        kinematic_error_arcmin: Peak to peak over one output turn of the error that a
+            catalogue drive, or a map without any, is assumed to have, see
+            :mod:`swgjoint.maps.error_spectrum`. None: what the catalogue states.
+        seed: Of that error; joints differ by their names.
 
     Returns:
         What the joint has, or by joint in the order of the model.
@@ -136,11 +148,13 @@ def attach(
         )
     else:
         chosen, sources = chosen_hinges(spec, drives), dict(drives)
-    maps = _maps(sources, model)
-    fittings = {
-        name: Fitting(
-            drive=maps[key],
-            rotor_inertia=_rotor(name, maps[key], rotor_inertia),
+    known: dict[str, DriveMap] = {}
+    fittings = {}
+    for name, key in chosen.items():
+        found = _map(sources[key], name, known, model, kinematic_error_arcmin, seed)
+        fittings[name] = Fitting(
+            drive=found,
+            rotor_inertia=_rotor(name, found, rotor_inertia),
             level=level,
             damping_ratio=damping_ratio,
             friction=friction,
@@ -149,34 +163,43 @@ def attach(
             max_input_speed=max_input_speed,
             max_phase_step=max_phase_step,
         )
-        for name, key in chosen.items()
-    }
     got = attach_all(spec, fittings, integrator=integrator, watch=True)
     return got if joint is None else got[joint]
 
 
-def _maps(sources: Mapping[str, Any], model: str | None) -> dict[str, DriveMap]:
-    """Maps by key; what several keys name is loaded once."""
-    loaded: dict[str, DriveMap] = {}
-    found = {}
-    for key, source in sources.items():
-        if isinstance(source, DriveMap):
-            found[key] = source
-        elif isinstance(source, Design):
-            from swgjoint.fe.build_map import build_map
+def _map(
+    source: Any,
+    joint: str,
+    known: dict[str, DriveMap],
+    model: str | None,
+    error: float | None,
+    seed: int,
+) -> DriveMap:
+    """The map of one joint; ``known`` keeps what several joints share."""
+    if isinstance(source, Design):
+        from swgjoint.fe.build_map import build_map
 
-            found[key] = build_map(source, model=model)
-        elif isinstance(source, str | Path):
-            name = str(source)
-            if name not in loaded:
-                loaded[name] = load_drive(name, model=model)
-            found[key] = loaded[name]
-        else:
-            raise InputError(
-                f"drive of {key!r}: {type(source).__name__} {str(source)[:60]!r};"
-                " accepted: a catalogue name, a path, a Design or a DriveMap"
-            )
-    return found
+        key = f"{id(source)}"
+        if key not in known:
+            known[key] = build_map(source, model=model)
+        source = known[key]
+    if isinstance(source, DriveMap):
+        if not error:
+            return source
+        return with_assumed_error(source, error * arcmin, seed=seed, joint=joint)
+    if isinstance(source, str | Path):
+        keys = {
+            "drive": str(source),
+            "model": model,
+            "kinematic_error_arcmin": None if error is None else float(error),
+            "seed": seed,
+        }
+        section = validated(JointSection, keys, where=f"joint {joint!r}")
+        return drive_of(section, known=known, joint=joint)
+    raise InputError(
+        f"drive of {joint!r}: {type(source).__name__} {str(source)[:60]!r}; accepted: a"
+        " catalogue name, a path, a Design or a DriveMap"
+    )
 
 
 def _rotor(joint: str, drive: DriveMap, given: float | None) -> float:

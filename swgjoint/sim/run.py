@@ -267,10 +267,10 @@ def _check_finite(assembly: Assembly, data: mujoco.MjData, states: Array) -> Non
         )
     if data.warning[mujoco.mjtWarning.mjWARN_INERTIA].number:
         raise ComputationError(
-            f"scene {assembly.scene.name!r}: before t = {states[-1, 0]:.3f} s the engine"
-            " could not solve for the accelerations: the masses of the arm are too far"
-            " apart, or its inertia is close to singular; see mjWARN_INERTIA in"
-            " MuJoCo's manual"
+            f"scene {assembly.scene.name!r}: before t = {states[-1, 0]:.3f} s the"
+            " engine could not solve for the accelerations: the masses of the arm are"
+            " too far apart, or its inertia is close to singular; see mjWARN_INERTIA"
+            " in MuJoCo's manual"
         )
     bad = any(
         data.warning[kind].number

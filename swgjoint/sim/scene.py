@@ -227,6 +227,10 @@ class Scene(Section):
         """A copy in which every joint has this drive, at its default fidelity."""
         return self._with_all(drive=drive, linear=None, model=None)
 
+    def with_model(self, model: str) -> Self:
+        """A copy in which every drive, a design, has a map of this fidelity."""
+        return self._with_all(model=model)
+
     def with_level(self, level: Level) -> Self:
         """A copy in which every joint has this level."""
         return self._with_all(level=level)

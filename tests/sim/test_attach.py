@@ -127,3 +127,30 @@ def test_a_user_is_told_of_a_step_outside(spec):
         swgjoint.attach(fine, {"*": "CSG-25-100"})
     assert fine.compile().nnumeric == 1
     assert isinstance(mujoco.MjData(fine.compile()), mujoco.MjData)
+
+
+def test_joints_of_one_catalogue_drive_err_at_phases_of_their_own(spec):
+    """The stated accuracy by default; another size, another seed and none on request."""
+    stated = DriveMap.from_catalogue("CSG-25-100").info["stated"]
+    wanted = stated["transmission_accuracy_arcmin"]
+    got = swgjoint.attach(spec, {"shoulder_*": "CSG-25-100"})
+    pan, lift = (one.drive for one in got.values())
+    for drive in (pan, lift):
+        accuracy = drive.spec_sheet(["transmission_accuracy_arcmin"])
+        found = accuracy["transmission_accuracy_arcmin"]
+        assert found == pytest.approx(wanted, rel=1e-3)
+    assert not np.allclose(pan.kinematic_error, lift.kinematic_error)
+    more = swgjoint.attach(
+        spec, joint="elbow_joint", drive="CSG-25-100", kinematic_error_arcmin=2 * wanted
+    )
+    other = RigidArm("ur5e").spec()
+    again = swgjoint.attach(
+        other, joint="shoulder_pan_joint", drive="CSG-25-100", seed=1
+    )
+    none = swgjoint.attach(
+        other, joint="elbow_joint", drive="CSG-25-100", kinematic_error_arcmin=0.0
+    )
+    size = np.abs(more.drive.kinematic_error).max() / np.abs(pan.kinematic_error).max()
+    assert size > 1.3
+    assert not np.allclose(again.drive.kinematic_error, pan.kinematic_error)
+    assert not none.drive.kinematic_error.any()

@@ -49,7 +49,7 @@ def test_run_prints_a_table(tmp_path, capsys):
          ("bench.toml", "simulation.step", "step_s", "duration_s", "integrator")),
         (["run", "bench", "--set", "defaults.drive=x.swg"], ("x.swg", "No such file")),
         (["run", "bench", "--set", "defaults.drive=nope"],
-         ("'nope'", "models/drives", "reference-2d")),
+         ("'nope'", "models/drives", "swgjoint list drives", "size-NN-RRR")),
         (["run", "bench", "--set", "arm=nope"],
          ("arm", "'nope'", "models/arms", "bench", "panda", "ur5e")),
         (["run", "bench", "--set", LINEAR, "--set", "load.elbow.torque_Nm=1.0"],

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from messages import names
 
-from swgjoint.cli.run import left_out_lines, notes
+from swgjoint.cli.run import left_out_lines
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.friction import Friction
 from swgjoint.maps.hysteresis import Jenkin
@@ -68,13 +68,13 @@ def test_ratcheting_is_reported(bench):
     """Above the ratcheting torque a run says when and at which torque, and goes on."""
     ratings = replace(LINEAR.ratings, ratcheting_torque=19.0)
     run = bench(replace(LINEAR, ratings=ratings))
-    joints = run.metrics()["joints"]
-    use = joints["joint"]["ratings"]
+    metrics = run.metrics()
+    use = metrics["joints"]["joint"]["ratings"]
     assert use["ratcheting"]["time_s"] == 0.0
     assert use["ratcheting"]["torque_Nm"] == pytest.approx(20.0)
     assert use["ratcheting_margin"] == pytest.approx(0.95)
-    (line,) = [line for line in notes(joints) if "skip" in line]
-    assert "joint: teeth would skip at 0 s with 20 N·m" in line
+    (line,) = [line for line in metrics["reasons"] if "skip" in line]
+    assert names(line, "joint", "0 s", "20 N·m", "19 N·m")
     for limit, margin in ((21.0, 1.05), (None, None)):
         ratings = replace(LINEAR.ratings, ratcheting_torque=limit)
         use = bench(replace(LINEAR, ratings=ratings)).metrics()

@@ -284,14 +284,11 @@ def test_a_feature_that_was_taken_out_is_not_loaded(feature, used):
 
 
 def test_a_scene_loads_only_what_it_asks_for(used):
-    """No plugin below its level, no viewer without a recording, no gear without FE."""
-    has_plugin = {
-        case
-        for case, found in used.items()
-        if any("libswgjoint_plugin" in path for path in found["libraries"])
-    }
-    below = {feature for feature in FEATURES if feature.endswith("level")} | {"linear"}
-    assert has_plugin == set(used) - below
+    """No viewer without a recording, no gear without finite elements.
+
+    The engine plugin is registered wherever MuJoCo is imported, so that saved models
+    load; instances of it are counted by ``contains``.
+    """
     viewer = {"swgjoint.view.recording", "rerun"}
     for case, found in used.items():
         modules = set(found["modules"])
