@@ -8,7 +8,6 @@ from collections.abc import Iterable, Mapping
 import mujoco
 import numpy as np
 
-from swgjoint.errors import InputError
 from swgjoint.joint import plugin
 from swgjoint.joint.callers import depth_of_caller
 from swgjoint.joint.drive import JointDrive
@@ -17,26 +16,11 @@ from swgjoint.joint.fitting import LEVELS as LEVELS
 from swgjoint.joint.fitting import ROTORS as ROTORS
 from swgjoint.joint.fitting import Fitting, check_spec, fitted
 from swgjoint.joint.motors import clear_armature, misread_sensors, move_to_rotor
-from swgjoint.joint.place import (
-    ITERATIONS,
-    LS_ITERATIONS,
-    Rotor,
-    allow_iterations,
-    check_option,
-    few_iterations,
-    find_places,
-    free_inertias,
-)
+from swgjoint.joint.options import options_for
+from swgjoint.joint.place import Rotor, find_places, free_inertias
 from swgjoint.joint.variation import SIZE
 from swgjoint.joint.watch import add_watch, warn_outside
 from swgjoint.maps.drive_map import DriveMap
-
-INTEGRATORS = ("discrete", "keep")
-_DIVERGES = (
-    mujoco.mjtIntegrator.mjINT_EULER,
-    mujoco.mjtIntegrator.mjINT_IMPLICIT,
-    mujoco.mjtIntegrator.mjINT_IMPLICITFAST,
-)
 
 
 def attach(
@@ -96,6 +80,8 @@ def attach(
     Levels with a rotor replace the integrators Euler (MuJoCo's default), ``implicit``
     and ``implicitfast`` by ``discrete``, the latter two with a warning: they take the
     drive as an explicit force. RK4 is the reference below its step limit and is kept.
+    Solver iterations and a tolerance that would leave the drives' stiffness half solved
+    become MuJoCo's defaults with a warning, see :mod:`swgjoint.joint.options`.
     Under ``discrete`` a native spring (``linear``, ``native``) is damped by the step
     itself, about h w/2 of critical at a torsion frequency w; ``full`` is not. Set the
     timestep first.
@@ -118,7 +104,7 @@ def attach(
         max_input_speed: Largest speed of the rotor [rad/s]; harmonics that the step
             cannot carry at it are left out. None keeps all.
         max_phase_step: Largest phase step h n |theta rate| that is kept [rad].
-        integrator: ``discrete`` replaces integrators as said above, ``keep`` none.
+        integrator: ``discrete`` replaces these options as said above, ``keep`` none.
         watch: Whether a step outside the integrator's region is warned of, here and
             while the model runs; see :mod:`swgjoint.joint.watch`.
 
@@ -170,20 +156,12 @@ def attach_all(
             its metric.
     """
     check_spec(spec)
-    if integrator not in INTEGRATORS:
-        raise InputError(
-            f"integrator {integrator!r}; accepted: {', '.join(INTEGRATORS)}"
-        )
     for name, fitting in fittings.items():
         fitting.check(name)
     if not fittings:
         return {}
-    kept = mujoco.mjtIntegrator(spec.option.integrator)
-    used = kept
-    if any(fitting.has_rotor for fitting in fittings.values()):
-        if integrator == "discrete" and kept in _DIVERGES:
-            used = mujoco.mjtIntegrator.mjINT_DISCRETE
-        check_option(spec, used)
+    rotors = any(fitting.has_rotor for fitting in fittings.values())
+    options = options_for(spec, integrator, rotors=rotors)
 
     compiled, places = find_places(
         spec, {name: fitting.rotor_inertia for name, fitting in fittings.items()}
@@ -195,9 +173,9 @@ def attach_all(
     }
     if any(drive.plugin for drive in drives.values()):
         plugin.load()
-        if used == mujoco.mjtIntegrator.mjINT_DISCRETE:
+        if options.integrator == mujoco.mjtIntegrator.mjINT_DISCRETE:
             plugin.require_metric()
-    rotors = {
+    rotor_of = {
         name: Rotor(
             inertia=drive.rotor_inertia,
             ratio=drive.ratio,
@@ -206,25 +184,22 @@ def attach_all(
         )
         for name, drive in drives.items()
     }
-    free = free_inertias(compiled, places, rotors)
+    free = free_inertias(compiled, places, rotor_of)
     measured = compiled.around.measured
-    moved = {name: places[name] for name, rotor in rotors.items() if rotor.own}
+    moved = {name: places[name] for name, rotor in rotor_of.items() if rotor.own}
     texts = _configs(drives.values())
 
     # warnings first: as errors they leave the spec unchanged
-    _warn_of_integrator(kept, used)
-    few = used == mujoco.mjtIntegrator.mjINT_DISCRETE and few_iterations(spec)
-    if few:
-        _warn_of_iterations(spec)
+    options.warn()
     _warn_of_sensors(misread_sensors(moved, measured), drives)
     if watch:
-        warn_outside(drives.values(), timestep=timestep, integrator=used)
+        warn_outside(drives.values(), timestep=timestep, integrator=options.integrator)
 
     # nothing can fail from here on: the spec is edited whole or not at all
     if texts:
         spec.activate_plugin(plugin.NAME)
     for name, drive in drives.items():
-        place, rotor = places[name], rotors[name]
+        place, rotor = places[name], rotor_of[name]
         clear_armature(place)
         if not rotor.own:
             place.joint.armature = rotor.reflected
@@ -247,9 +222,7 @@ def attach_all(
             add_native(spec, drive, drive.native, hinge)
         else:
             _add_plugin(spec, drive, body, texts[name])
-    spec.option.integrator = used
-    if few:
-        allow_iterations(spec)
+    options.apply(spec)
     extend_keys(spec, drives.values())
     if watch:
         add_watch(spec, drives.values())
@@ -297,29 +270,6 @@ def _add_plugin(
             0.0,
             coefficients=drive.drive.friction_direction,
         )
-
-
-def _warn_of_integrator(kept: mujoco.mjtIntegrator, used: mujoco.mjtIntegrator) -> None:
-    """Say that an integrator was replaced; MuJoCo's default, Euler, goes silently."""
-    if used == kept or kept == mujoco.mjtIntegrator.mjINT_EULER:
-        return
-    name = kept.name.removeprefix("mjINT_").lower()
-    warnings.warn(
-        f"integrator {name} replaced by discrete: {name} takes a drive as an explicit"
-        " force and diverges; integrator='keep' keeps it, RK4 is kept as the reference",
-        stacklevel=depth_of_caller(),
-    )
-
-
-def _warn_of_iterations(spec: mujoco.MjSpec) -> None:
-    """Say that limits of the engine's solvers are raised."""
-    option = spec.option
-    warnings.warn(
-        f"iterations {option.iterations} and ls_iterations {option.ls_iterations}"
-        f" raised to at least {ITERATIONS} and {LS_ITERATIONS}: the discrete integrator"
-        " solves for the drives' stiffness within them",
-        stacklevel=depth_of_caller(),
-    )
 
 
 def _warn_of_sensors(

@@ -65,7 +65,7 @@ class Surroundings:
             name = equality.name1
             does = f"follows {equality.name2!r}" if equality.name2 else "is locked"
             why = (
-                f"joint {name!r} {does} by equality {equality.name!r}, against which a"
+                f"joint {name!r} {does} by {_named(equality)}, against which a"
                 " drive would work; accepted: the joint that leads, or an equality"
                 " that is not active"
             )
@@ -74,7 +74,7 @@ class Surroundings:
             for end in (equality.name1, equality.name2):
                 for name in self.wrapped.get(end, ()) if end else ():
                     why = (
-                        f"joint {name!r} is held by equality {equality.name!r} of"
+                        f"joint {name!r} is held by {_named(equality)} of"
                         f" tendon {end!r}, against which a drive would work; accepted:"
                         " an equality that is not active"
                     )
@@ -173,3 +173,7 @@ class Surroundings:
                 f"joint {name!r} is moved by actuator {actuator.name!r} through tendon"
                 f" {tendon!r}, past a drive; accepted: an actuator on the joint"
             )
+
+
+def _named(equality: Any) -> str:
+    return f"equality {equality.name!r}" if equality.name else "a nameless equality"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.errors import InputError
-from swgjoint.joint.callers import depth_of_caller
 from swgjoint.joint.obstacles import Surroundings
 
 Array = NDArray[np.float64]
@@ -22,8 +20,6 @@ ROTOR_MASS = 1e-9
 """Mass of the rotor body [kg]; the arm's model already holds the motor's mass."""
 LUMPED_INERTIA = 1e-12
 """Of the body of a lumped rotor [kg·m²]: the engine wants some."""
-ITERATIONS, LS_ITERATIONS = 100, 50
-"""MuJoCo's default limits of its solvers."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -191,48 +187,6 @@ def find_places(
     compiled = Compiled(spec, around)
     ordered = sorted(found, key=lambda name: int(compiled.model.joint(name).id))
     return compiled, {name: compiled.place(found[name]) for name in ordered}
-
-
-def check_option(spec: mujoco.MjSpec, integrator: mujoco.mjtIntegrator) -> None:
-    """Refuse or warn about options under which a drive does not hold.
-
-    Args:
-        spec: Model.
-        integrator: With which it will be simulated.
-
-    Raises:
-        InputError: For a solver that leaves the drive's stiffness out.
-    """
-    if integrator != mujoco.mjtIntegrator.mjINT_DISCRETE:
-        return
-    if spec.option.solver == mujoco.mjtSolver.mjSOL_PGS:
-        raise InputError(
-            "solver PGS leaves tendons out of the discrete integrator's metric and "
-            "would integrate the drive explicitly; accepted: Newton, CG"
-        )
-    if spec.option.noslip_iterations > 0:
-        warnings.warn(
-            "noslip_iterations > 0 solves contacts without the drives' stiffness; "
-            "set it to 0 with drives",
-            stacklevel=depth_of_caller(),
-        )
-
-
-def few_iterations(spec: mujoco.MjSpec) -> bool:
-    """Whether the model stops the engine's solvers earlier than MuJoCo's defaults."""
-    option = spec.option
-    return bool(option.iterations < ITERATIONS or option.ls_iterations < LS_ITERATIONS)
-
-
-def allow_iterations(spec: mujoco.MjSpec) -> None:
-    """Let the engine's solvers converge.
-
-    The discrete integrator solves for mass and stiffness together, within the limit
-    that files for other solvers set to one or three.
-    """
-    option = spec.option
-    option.iterations = max(option.iterations, ITERATIONS)
-    option.ls_iterations = max(option.ls_iterations, LS_ITERATIONS)
 
 
 def _check_compiler(spec: mujoco.MjSpec, rotor_inertia: float) -> None:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from swgjoint.errors import InputError
 from swgjoint.joint.attach import attach
-from swgjoint.joint.place import allow_iterations
+from swgjoint.joint.options import allow_iterations
 from swgjoint.joint.region import check_region
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.progress import Progress, silent

@@ -115,7 +115,8 @@ def attach(
             cannot carry at it are left out. None keeps all.
         max_phase_step: Largest phase step h n |theta rate| that is kept [rad].
         integrator: ``discrete`` replaces Euler, ``implicit`` and ``implicitfast``, the
-            latter two with a warning; ``keep`` replaces none.
+            latter two with a warning, and too few or too coarse iterations of the
+            solver; ``keep`` keeps them.
         model: Fidelity of the map of a design: ``ring``, ``2d`` or ``3d``; its default
             if None.
         kinematic_error_arcmin: Peak to peak over one output turn of the error that a

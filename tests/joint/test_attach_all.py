@@ -159,6 +159,62 @@ def test_an_integrator_that_diverges_is_replaced_with_one_line(integrator, level
         attach(kept, joint="wrist", integrator="euler", **keys)
 
 
+FLOOR = """
+<mujoco>
+  <option timestep="0.004" iterations="{iterations}" tolerance="{tolerance}"/>
+  <worldbody><geom type="plane" size="1 1 1"/>
+    <body pos="0 0 .9"><freejoint/><geom size=".1"/>
+      <body name="l" pos="0 .1 0"><joint name="l" axis="0 1 0"/>
+        <geom type="capsule" fromto="0 0 0 0 0 -.3" size=".03"/>
+        <body pos="0 0 -.3"><joint name="ll" axis="0 1 0"/>
+          <geom type="capsule" fromto="0 0 0 0 0 -.3" size=".03"/></body></body>
+      <body name="r" pos="0 -.1 0"><joint name="r" axis="0 1 0"/>
+        <geom type="capsule" fromto="0 0 0 0 0 -.3" size=".03"/>
+        <body pos="0 0 -.3"><joint name="rl" axis="0 1 0"/>
+          <geom type="capsule" fromto="0 0 0 0 0 -.3" size=".03"/></body></body>
+    </body></worldbody>
+  <keyframe><key qpos="0 0 .6 1 0 0 0 .2 -.3 -.1 .2"/></keyframe>
+</mujoco>
+"""
+
+
+@pytest.mark.parametrize(
+    ("iterations", "tolerance", "loud"),
+    [(1, 1e-8, True), (3, 1e-8, True), (100, 1e-3, True), (100, 1e-8, False)],
+)
+def test_a_solver_that_ends_too_early_is_given_more(iterations, tolerance, loud):
+    """The torques of few iterations are those of many, and the engine has no doubt.
+
+    One line says so; ``keep`` keeps them and says what to use.
+    """
+    told = {"iterations": iterations, "tolerance": tolerance}
+    fitting = Fitting(drive=DriveMap.linear(2e4), rotor_inertia=1e-4)
+    torques = []
+    for values in (told, {"iterations": 1000, "tolerance": 1e-14}):
+        spec = mujoco.MjSpec.from_string(FLOOR.format(**values))
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            got = attach_all(spec, dict.fromkeys(["l", "ll", "r", "rl"], fitting))
+        lines = [str(one.message) for one in caught]
+        assert len(lines) == (loud and values is told)
+        for line in lines:
+            assert names(line, f"iterations {iterations}", f"{tolerance:g}")
+            assert names(line, "100", "1e-08")
+        model = spec.compile()
+        data = mujoco.MjData(model)
+        mujoco.mj_resetDataKeyframe(model, data, 0)
+        mujoco.mj_step(model, data, 25)
+        assert not any(warning.number for warning in data.warning)
+        torques.append([float(one.observe(model, data).torque) for one in got.values()])
+    assert np.abs(torques).max() > 1.0
+    np.testing.assert_allclose(*torques, rtol=1e-4, atol=1e-4)
+    kept = mujoco.MjSpec.from_string(FLOOR.format(**told))
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        attach_all(kept, {"l": fitting}, integrator="keep")
+    assert (kept.option.iterations, kept.option.tolerance) == (iterations, tolerance)
+
+
 MENAGERIE = """
 <mujoco model="arm">
   <compiler angle="radian" autolimits="true"/>
