@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.errors import InputError
-from swgjoint.joint.attach import attach
+from swgjoint.joint.attach import attach_all
+from swgjoint.joint.fitting import Fitting
 from swgjoint.joint.options import allow_iterations
 from swgjoint.joint.region import check_region
 from swgjoint.maps.drive_map import DriveMap
@@ -169,18 +170,12 @@ def assemble(
         mujoco.mjtIntegrator, f"mjINT_{scene.simulation.integrator.upper()}"
     )
 
-    transmissions, sub_steps, outside = [], 1, {}
-    for name, section, speed, touches in zip(
-        arm.joints,
-        sections,
-        trajectory.top_speed,
-        _touching(arm, trajectory),
-        strict=True,
+    fittings: dict[str, Fitting] = {}
+    for name, section, speed in zip(
+        arm.joints, sections, trajectory.top_speed, strict=True
     ):
         drive = drive_of(section, known=known, joint=name, progress=progress)
-        attached = attach(
-            spec,
-            joint=name,
+        fittings[name] = Fitting(
             drive=drive,
             level=section.level or "full",
             rotor_inertia=section.rotor_inertia_kgm2 or 0.0,
@@ -191,18 +186,22 @@ def assemble(
             # a joint at rest carries every order
             max_input_speed=float(abs(drive.ratio) * speed) or None,
         )
+    got = attach_all(spec, fittings)
+    transmissions, sub_steps, outside = [], 1, {}
+    for name, touches in zip(arm.joints, _touching(arm, trajectory), strict=True):
+        attached, fitting = got[name], fittings[name]
         check_link(attached, arm, where=scene.where)
         region = check_region(
             attached,
             timestep=scene.simulation.step_s,
-            max_input_speed=float(abs(drive.ratio) * speed),
+            max_input_speed=fitting.max_input_speed or 0.0,
             contacts=bool(touches),
             integrator=scene.simulation.integrator,
         )
         sub_steps = max(sub_steps, region.require(scene.simulation.max_sub_steps))
         if not region.ok:
             outside[name] = region.exceeded
-        transmissions.append(transmission_of(attached, drive))
+        transmissions.append(transmission_of(attached, fitting.drive))
 
     # attach kept the harmonics that the scene's own step carries: what a run contains
     # follows from the step that its user chose, not from what the integrator needs

@@ -8,7 +8,8 @@ import pytest
 from messages import names
 
 from swgjoint.errors import InputError
-from swgjoint.joint.attach import attach
+from swgjoint.joint.attach import attach_all
+from swgjoint.joint.fitting import Fitting
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.actuators import control_inputs
 from swgjoint.sim.assembly import assemble
@@ -42,15 +43,15 @@ def test_a_plain_scene_has_no_trace_of_any_feature(name, synthetic_map):
     spec.option.timestep = 1e-3
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
     path = assembly.trajectory
-    for j, joint in enumerate(arm.joints):
-        attach(
-            spec,
-            joint=joint,
+    fittings = {
+        joint: Fitting(
             drive=synthetic_map,
-            level="full",
             rotor_inertia=scene.of_joint(joint).rotor_inertia_kgm2,
             max_input_speed=60.0 * float(path.top_speed[j]) or None,
         )
+        for j, joint in enumerate(arm.joints)
+    }
+    attach_all(spec, fittings)
     for j, joint in enumerate(arm.joints):
         motor = spec.add_actuator(name=f"{joint}_motor", target=f"{joint}_rotor")
         motor.trntype = mujoco.mjtTrn.mjTRN_JOINT
