@@ -302,6 +302,7 @@ def _drives(scene: Scene) -> dict[str, DriveMap]:
             tool_site=scene.tool_site,
             payload=scene.payload,
             where=scene.where,
+            reading=scene.reading,
         )
         _check_motion(scene, arm, trajectory_of(scene, arm).velocity[0])
     return {name: load_drive_once(name) for name in slow}

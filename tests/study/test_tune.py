@@ -142,6 +142,18 @@ def test_shares_of_one_are_the_plan_itself(trials):
         )
 
 
+@pytest.mark.parametrize(("level", "friction"), [("linear", True), ("full", False)])
+def test_a_search_knows_the_drive_that_is_simulated(level, friction):
+    """Gains are tuned about a plan without the friction that the episodes lack."""
+    arguments = {"level": level, "friction": friction, **SHORT}
+    made = Trials(NAME, arguments, seeds=(4,), candidates=1)
+    made.env.reset(seed=[4])
+    (drive,) = made.env.task.joints.drives
+    assert drive.friction is None
+    assert bool(drive.kinematic_error.any()) == (level == "full")
+    made.close()
+
+
 def test_old_readings_are_held_against_the_plan_of_then(trials):
     """An age of one period is the plan of one period before, to second order."""
     trials.env.reset(seed=[4, 9] * 3)
