@@ -21,9 +21,9 @@ from swgjoint.gear.design import Design
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.models_path import near_names
 from swgjoint.progress import Progress, silent
+from swgjoint.sim.arm_scene import rigid_arm_of
 from swgjoint.sim.drives import find_drive, given_drives, load_drive
 from swgjoint.sim.metrics import drive_order, strongest_left_out
-from swgjoint.sim.rigid_arm import RigidArm
 from swgjoint.sim.run import Run, run_scene
 from swgjoint.sim.scene import Scene
 from swgjoint.sim.scene_sections import LEVELS
@@ -198,7 +198,7 @@ def compare(
 
     def known(changed: Scene, own: Mapping[str, DriveMap]) -> dict[str, DriveMap]:
         if model is not None:
-            for reference in drives_of(changed, RigidArm(scene.arm).joints):
+            for reference in drives_of(changed, rigid_arm_of(scene).joints):
                 if reference not in {*kept, *own} and _is_design(reference):
                     kept[reference] = load_drive(
                         reference, model=model, progress=progress

@@ -7,8 +7,7 @@ from fnmatch import fnmatchcase
 
 from swgjoint.errors import InputError
 from swgjoint.models_path import near_names
-from swgjoint.sim.arm_scene import is_arm, scene_of_arm
-from swgjoint.sim.rigid_arm import RigidArm
+from swgjoint.sim.arm_scene import is_arm, rigid_arm_of, scene_of_arm
 from swgjoint.sim.scene import Scene
 from swgjoint.sim.scene_sections import JointSection
 
@@ -46,7 +45,7 @@ def joints_named(scene: Scene, patterns: Sequence[str]) -> tuple[str, ...]:
     wanted = [p.strip() for text in patterns for p in text.split(",") if p.strip()]
     if not wanted:
         return ()
-    joints = RigidArm(scene.arm).joints
+    joints = rigid_arm_of(scene).joints
     found = {p: [name for name in joints if _fits(name, p)] for p in wanted}
     faults = []
     for pattern in (p for p in wanted if not found[p]):
