@@ -75,8 +75,9 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     """
     folder = output_folder(args.out) if args.out else None
     from swgjoint.models_path import near_names
+    from swgjoint.sim.arm_scene import is_arm
     from swgjoint.study.compare import LOWER, SLOW, SORTABLE, compare
-    from swgjoint.study.compare_scene import joints_named, scene_or_arm
+    from swgjoint.study.compare_scene import joints_named, resolved, scene_or_arm
     from swgjoint.study.compare_shown import columns, left_out_notes
 
     if args.sort is not None and args.sort not in SORTABLE:
@@ -88,6 +89,9 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     spec = _limits(args)
     scene = scene_or_arm(args.scene, args.overrides)
     joints = joints_named(scene, args.joints)
+    stepped = any(text.startswith("simulation.step_s") for text in args.overrides)
+    if is_arm(args.scene) and not stepped:
+        scene = resolved(scene, args.arguments, joints)
     rows = compare(
         args.arguments,
         scene,

@@ -9,7 +9,8 @@ from swgjoint.errors import InputError
 from swgjoint.models_path import near_names
 from swgjoint.sim.arm_scene import is_arm, rigid_arm_of, scene_of_arm
 from swgjoint.sim.scene import Scene
-from swgjoint.sim.scene_sections import JointSection
+from swgjoint.sim.scene_sections import LEVELS, JointSection
+from swgjoint.sim.step_choice import resolving_step
 
 _END = "_joint"
 """Ending of a joint's name that a pattern may leave out."""
@@ -29,6 +30,28 @@ def scene_or_arm(reference: str, overrides: Iterable[str] = ()) -> Scene:
     if is_arm(reference):
         return scene_of_arm(reference, overrides=overrides)
     return Scene.load_file(reference, overrides)
+
+
+def resolved(
+    scene: Scene, arguments: Iterable[str], joints: Sequence[str] = ()
+) -> Scene:
+    """The scene at a step that carries the ripple of every drive that is compared.
+
+    Args:
+        scene: The scene; a step that is short enough stays.
+        arguments: Drives and levels that are compared.
+        joints: Joints that get them; every driven one if empty.
+    """
+    arm = rigid_arm_of(scene)
+    steps = [
+        resolving_step(with_drive(scene, name, joints), arm)
+        for name in arguments
+        if name not in LEVELS
+    ]
+    needed = min(steps, default=scene.simulation.step_s)
+    if needed >= scene.simulation.step_s:
+        return scene
+    return scene.with_changes({"simulation.step_s": needed})
 
 
 def joints_named(scene: Scene, patterns: Sequence[str]) -> tuple[str, ...]:

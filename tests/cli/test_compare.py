@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 
+import numpy as np
 import pytest
 from messages import names, naming
 from rerun.chunk import RrdReader
@@ -12,13 +13,14 @@ from solved import coarse
 
 from swgjoint.cli.main import main
 from swgjoint.errors import InputError
+from swgjoint.gear.design import Design
 from swgjoint.models_path import models_path
 from swgjoint.sim.arm_scene import scene_of_arm
 from swgjoint.sim.rigid_arm import RigidArm
 from swgjoint.sim.run import run_scene
 from swgjoint.sim.scene import Scene
 from swgjoint.study.compare import LOWER, UPPER
-from swgjoint.study.compare_scene import joints_named, with_drive
+from swgjoint.study.compare_scene import joints_named, resolved, with_drive
 
 SHORT = ["--set", "simulation.duration_s=1.5", "--set", "trajectory.settle_s=0.3"]
 STIFF, SOFT = "CSG-32-100", "CSG-14-100"
@@ -102,6 +104,23 @@ def test_the_drive_replaces_that_of_the_named_joints_alone(capsys):
     by_hand = run_scene(changed).metrics()["joints"][joints[0]]
     assert stiff["torsion_arcmin"] == abs(by_hand["torsion_arcmin"]["mean"])
     assert soft["torsion_arcmin"] > 3.0 * stiff["torsion_arcmin"]
+
+
+def test_the_step_of_an_arm_carries_every_drive_that_is_compared():
+    """A design with many teeth asks for a shorter step than the drives by rule.
+
+    At that step no order of it that matters is beyond half a radian a step; a level
+    asks for nothing.
+    """
+    arm = str(models_path() / "arms" / "two-link.xml")
+    scene = scene_of_arm(arm)
+    before = scene.simulation.step_s
+    assert resolved(scene, ["rigid", scene.joints["elbow"].drive]) == scene
+    finer = resolved(scene, ["reference-2d", STIFF])
+    assert finer.simulation.step_s < 0.5 * before
+    design, speed = Design.preset("reference-2d"), 20.0 / 2.5 * np.pi / 180.0
+    rate = design.periodicity * abs(design.ratio) * speed
+    assert rate * finer.simulation.step_s < 0.5
 
 
 def test_joints_are_named_by_patterns():
