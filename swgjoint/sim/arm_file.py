@@ -20,6 +20,13 @@ from swgjoint.sim.compiling import skeleton
 MESHES = (".stl", ".obj", ".msh")
 """What the engine reads."""
 _ON_JOINT = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)
+_OF_ACTUATORS = (
+    *("ctrllimited", "ctrlrange", "forcelimited", "forcerange", "actlimited"),
+    *("actrange", "actdim", "actearly", "inheritrange", "gear", "gaintype", "gainprm"),
+    *("biastype", "biasprm", "dyntype", "dynprm", "delay", "nsample", "interp"),
+    *("damping", "armature", "cranklength", "lengthrange"),
+)
+"""Of a default class."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -91,6 +98,8 @@ def read_arm(path: Path, reading: ArmReading | None = None) -> ArmFile:
         spec.delete(key)
     _tell_held(holding.held, reading, path, moves=bool(spec.joints))
     _let_weigh(spec, path)
+    _solve_well(spec)
+    _forget_actuators(spec)
     for joint in spec.joints:
         joint.armature = 0.0
         joint.actfrclimited = mujoco.mjtLimited.mjLIMITED_FALSE
@@ -192,6 +201,30 @@ def _effort(spec: mujoco.MjSpec) -> dict[str, float]:
         if force := max(map(abs, joint.actfrcrange)):
             limits[joint.name] = float(force)
     return limits
+
+
+def _solve_well(spec: mujoco.MjSpec) -> None:
+    """Let the engine iterate as much as it does by default.
+
+    Files made for learning allow it a few iterations. The drives are part of the system
+    that it solves in a step: unfinished, they exert wrong torques.
+    """
+    usual = mujoco.MjSpec().option
+    option = spec.option
+    option.solver = usual.solver
+    option.noslip_iterations = usual.noslip_iterations
+    for name in ("iterations", "ls_iterations"):
+        setattr(option, name, max(getattr(option, name), getattr(usual, name)))
+    for name in ("tolerance", "ls_tolerance"):
+        setattr(option, name, min(getattr(option, name), getattr(usual, name)))
+
+
+def _forget_actuators(spec: mujoco.MjSpec) -> None:
+    """Take out what the file says of every actuator: those of a scene are others."""
+    plain = mujoco.MjSpec()  # lives as long as its default is read
+    own, usual = spec.default.actuator, plain.default.actuator
+    for name in _OF_ACTUATORS:
+        setattr(own, name, getattr(usual, name))
 
 
 def _find_meshes(spec: mujoco.MjSpec, path: Path) -> None:
