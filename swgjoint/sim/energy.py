@@ -36,18 +36,22 @@ def run_energy(run: Run) -> dict[str, float]:
     """Energies of the whole arm over the whole run [J]."""
     joints = [joint_energy(run, j) for j in range(len(run.joints))]
     motor = sum(joint["motor_work_J"] for joint in joints)
-    dissipated = sum(joint["dissipated_J"] for joint in joints)
+    in_arm = arm_dissipation(run)
+    dissipated = in_arm + sum(joint["dissipated_J"] for joint in joints)
     load = load_work(run)
     kinetic, weight = _rigid_energies(run)
     elastic = sum(_elastic(run, j) for j in range(len(run.joints)))
-    stored = kinetic + weight + elastic
+    springs = _arm_springs(run)
+    stored = kinetic + weight + elastic + springs
     return {
         "motor_work_J": motor,
         "load_work_J": load,
         "dissipated_J": dissipated,
+        "arm_dissipated_J": in_arm,
         "kinetic_change_J": kinetic,
         "weight_change_J": weight,
         "elastic_change_J": elastic,
+        "spring_change_J": springs,
         "stored_J": stored,
         "balance_error_J": motor + load - stored - dissipated,
     }
@@ -120,6 +124,67 @@ def dissipation(run: Run, j: int) -> float:
         rotation = by_theta * run.motor_position[:, j] + by_psi * run.position[:, j]
         total += _work(run.friction_torque[:, j], rotation)
     return total
+
+
+def arm_dissipation(run: Run) -> float:
+    """What damping and dry friction of the arm's own joints and tendons take [J]."""
+    model = run.assembly.arm.model
+    step = run.assembly.scene.simulation.step_s
+    speeds = 0.5 * (run.velocity[1:] + run.velocity[:-1])
+    accelerations = np.diff(run.velocity, axis=0) / step
+    total = step * float(np.sum(_dry_friction(run, speeds, accelerations) * speeds))
+    damped = (model.dof_damping, model.dof_dampingpoly, model.tendon_damping)
+    if not any(values.any() for values in damped):
+        return total
+    data = mujoco.MjData(model)
+    middle = 0.5 * (run.position[1:] + run.position[:-1])
+    for q, v in zip(middle, speeds, strict=True):
+        data.qpos[:], data.qvel[:] = q, v
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        mujoco.mj_tendon(model, data)
+        mujoco.mj_comVel(model, data)
+        mujoco.mj_fwdVelocity(model, data)
+        total -= step * float(data.qfrc_damper @ v)
+    return total
+
+
+def _dry_friction(run: Run, speeds: Array, accelerations: Array) -> Array:
+    r"""Torque that dry friction of the arm's joints takes as the engine has it [N·m].
+
+    .. math:: \tau = \operatorname{clip}\left((b v + a)/R, \pm f\right), \quad
+        R = A (1 - d)/d, \quad b = 2/(d_\text{max} t_c)
+
+    with A the inverse inertia at the joint, d the impedance and t_c the time constant
+    of the constraint: it creeps where a rigid law would stick.
+
+    Source:
+        MuJoCo documentation, chapter Computation, "Constraint model".
+    """
+    assembly = run.assembly
+    model, dofs = assembly.model, assembly.link_velocity
+    impedance = model.dof_solimp[dofs, 0]
+    slip = model.dof_invweight0[dofs] * (1.0 - impedance) / impedance
+    constant = np.maximum(model.dof_solref[dofs, 0], 2.0 * assembly.step)
+    rate = 2.0 / (model.dof_solimp[dofs, 1] * constant)
+    most = model.dof_frictionloss[dofs]
+    asked = (rate * speeds + accelerations) / np.maximum(slip, 1e-15)
+    return np.asarray(np.clip(asked, -most, most))
+
+
+def _arm_springs(run: Run) -> float:
+    """Change of the energy in springs of the arm's joints and tendons [J]."""
+    model, found = run.assembly.arm.model, []
+    data = mujoco.MjData(model)
+    for q in run.position[[0, -1]]:
+        data.qpos[:] = q
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        mujoco.mj_tendon(model, data)
+        mujoco.mj_energyPos(model, data)
+        weight = -float(model.body_mass @ (data.xipos @ model.opt.gravity))
+        found.append(float(data.energy[0]) - weight)
+    return found[1] - found[0]
 
 
 def _motor_work(run: Run, j: int, part: slice) -> float:

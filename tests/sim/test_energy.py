@@ -8,6 +8,7 @@ import pytest
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.friction import Friction
 from swgjoint.maps.hysteresis import Jenkin
+from swgjoint.sim.arm_scene import scene_of_arm
 from swgjoint.sim.run import run_scene
 from swgjoint.sim.scene import Scene
 
@@ -185,3 +186,21 @@ def test_scene_bands_are_used():
     """A wider band is reached sooner."""
     scene = Scene.load_file("bench", {"metrics.settle_band_arcmin": 30.0})
     assert scene.metrics.settle_band_arcmin == 30.0
+
+
+@pytest.mark.parametrize(
+    "losses", ["", 'damping="2"', 'frictionloss="3"', 'stiffness="5" springref="0.4"']
+)
+def test_losses_and_springs_of_the_arm_are_in_the_balance(losses, tmp_path):
+    """Damping, dry friction and springs of a file balance within 1 % of the work."""
+    path = tmp_path / "arm.xml"
+    path.write_text(
+        f"""<mujoco><worldbody><body><joint name="lift" axis="0 1 0" {losses}/>
+        <inertial mass="2" pos=".3 0 0" diaginertia=".1 .1 .1"/></body></worldbody>
+        </mujoco>"""
+    )
+    energy = run_scene(scene_of_arm(str(path))).metrics()["energy"]
+    work = abs(energy["motor_work_J"]) + abs(energy["stored_J"])
+    assert abs(energy["balance_error_J"]) < 0.01 * work
+    assert (energy["arm_dissipated_J"] > 0.05) == (losses[:1] in ("d", "f"))
+    assert (abs(energy["spring_change_J"]) > 0.1) == losses.startswith("s")
