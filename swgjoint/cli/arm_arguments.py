@@ -115,9 +115,8 @@ def choice_lines(choice: dict[str, Any]) -> list[str]:
         ),
     ]
     if lacking:
-        lines.append(
-            f"NO DRIVE OF THE RULE CARRIES {', '.join(lacking)}: the largest stands in"
-        )
+        which = "any joint" if len(lacking) == len(choice) else ", ".join(lacking)
+        lines.append(f"no drive of the rule carries {which}: the largest stands in")
     return lines
 
 

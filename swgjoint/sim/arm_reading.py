@@ -12,7 +12,8 @@ class ArmReading:
     """Choices that the file of an arm leaves open."""
 
     driven: tuple[str, ...] = ()
-    """Names or patterns (``*``, ``?``) of the hinges that move; none: all."""
+    """Names or patterns (``*``, ``?``) of the hinges that move; none: all. The ending
+    ``_joint`` of a name may be left out."""
     pose: str | None = None
     """Keyframe of the file at which the other joints are held; None: the reference
     position."""
@@ -28,8 +29,12 @@ class ArmReading:
 
 
 def matches(name: str, patterns: Sequence[str]) -> bool:
-    """Whether a name fits one of the patterns; upper and lower case differ."""
-    return any(fnmatchcase(name, pattern) for pattern in patterns)
+    """Whether a joint fits one of the patterns, with or without its ending ``_joint``.
+
+    Upper and lower case differ.
+    """
+    names = {name, name.removesuffix("_joint")}
+    return any(fnmatchcase(one, pattern) for one in names for pattern in patterns)
 
 
 def patterns_of(texts: Sequence[str]) -> tuple[str, ...]:

@@ -140,7 +140,7 @@ def test_a_drive_of_the_user_is_not_the_rules(tmp_path, capsys):
 def test_only_chosen_joints_have_drives(tmp_path, capsys):
     """The scene that a run writes moves the same joints to the same figures."""
     out = tmp_path / "out"
-    options = ["--joints", "shoulder*,elbow_joint", "--out", str(out), *QUICK]
+    options = ["--joints", "shoulder*,elbow", "--out", str(out), *QUICK]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         assert main(["run", "ur5e", *options, "--json"]) in (0, 1)
