@@ -132,7 +132,7 @@ def _remark(one: dict[str, Any]) -> str:
             f" {_SOURCES[one['decided_by']]}, largest {one['drive']} ({others})"
         )
     if one["larger_than_needed"]:
-        return "smallest drive, larger than the joint needs"
+        return "smallest drive, over 10 times larger than what is asked"
     return ""
 
 
