@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,12 @@ from swgjoint.sim.arm_motions import TOOL_MOTIONS, tables_of
 from swgjoint.sim.arm_reading import ArmReading, patterns_of
 from swgjoint.sim.commanded import trajectory_of
 from swgjoint.sim.drive_choice import DriveChoice, choose_drives
-from swgjoint.sim.gentle_sweep import StartWarning, gentle_sweep, place_arm
+from swgjoint.sim.gentle_sweep import (
+    StartWarning,
+    bent_starts,
+    gentle_sweep,
+    place_arm,
+)
 from swgjoint.sim.payload import arms_of
 from swgjoint.sim.rigid_arm import RigidArm
 from swgjoint.sim.rotors import catalogue_rotor_inertia
@@ -98,7 +104,8 @@ def arm_scene(
             after commas; none: all. The others are held in the start pose.
         pose: Where the arm starts, see :func:`swgjoint.sim.gentle_sweep.place_arm`.
         motion: Kind of the trajectory; None: ``trajectory.kind`` of the overrides, else
-            ``sweep``.
+            ``sweep``. A motion of the tool that is out of reach from the start begins
+            where the joints are bent, unless a start is given.
         balance_inertia: Whether inertias that no rigid body has are repaired.
         overrides: Changes of the scene, as for :meth:`Scene.load_file`. Unless they
             state ``simulation.step_s``, the step carries the strongest order of every
@@ -116,7 +123,8 @@ def arm_scene(
         warnings.simplefilter("always")
         arm, start = place_arm(reference, reading=reading, pose=pose)
         start = _started(arm, start, changes)
-        end = start if kind == "csv" else gentle_sweep(arm, start)[1]
+        by_tool = kind in TOOL_MOTIONS
+        end = start if by_tool or kind == "csv" else gentle_sweep(arm, start)[1]
     _say_once(said)
     data: dict[str, Any] = {
         "name": _name(arm.path),
@@ -133,7 +141,17 @@ def arm_scene(
     if balance_inertia:
         data["balance_inertia"] = True
     held = {name: q / deg for name, q in arm.reading.angles.items()}
-    scene, rigid = _with_motion(data, kind, arm, start, end, held, changes)
+    try:
+        scene, rigid = _with_motion(data, kind, arm, start, end, held, changes)
+    except InputError:
+        own = pose or any(key.startswith("trajectory.start_deg") for key in changes)
+        bent = [] if own or not by_tool else bent_starts(arm, start)
+        for other in bent:  # stretched out, a tool cannot go every way
+            with suppress(InputError):
+                scene, rigid = _with_motion(data, kind, arm, other, end, held, changes)
+                break
+        else:
+            raise
     if drive is not None:
         data["defaults"] |= {"drive": drive, "rotor_inertia_kgm2": _rotor(drive)}
         choice = {}

@@ -28,6 +28,8 @@ DEEPER = 0.1 * mm
 """What bodies that touch where the arm starts may press on [m]."""
 SPACING = 1.0 * deg
 """Between two poses in which distances are checked [rad]."""
+BENDS = (45.0 * deg, 30.0 * deg, 60.0 * deg)
+"""Of joints that are stretched where a tool is to move [rad]."""
 SHARES = (1.0, 0.5, 0.25)
 """Of the sweep, tried one after the other where something is in the way."""
 REFERENCE, MIDDLE, HOME = "reference", "middle", "home"
@@ -129,6 +131,20 @@ def _poses(
                 f"{arm.path}: pose {asked!r}; accepted: {', '.join(found)}"
             )
     return [(name, *found[name]) for name in dict.fromkeys(names)]
+
+
+def bent_starts(arm: RigidArm, start: Array) -> list[Array]:
+    """Poses about a start in which the arm is not stretched and no bodies touch [rad].
+
+    Joints bend to either side in turn, each within its range.
+    """
+    model = arm.model
+    low, high = model.jnt_range.T
+    limited, pad = model.jnt_limited.astype(bool), MARGIN * np.ptp(model.jnt_range, 1)
+    turn = np.where(np.arange(start.size) % 2, -1.0, 1.0)
+    poses = [start + sign * bend * turn for bend in BENDS for sign in (1.0, -1.0)]
+    poses = [np.where(limited, np.clip(q, low + pad, high - pad), q) for q in poses]
+    return [q for q in poses if not arm.contacts(q[None])]
 
 
 def gentle_sweep(arm: RigidArm, start: Array | None = None) -> tuple[Array, Array]:

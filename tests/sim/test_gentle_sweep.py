@@ -210,6 +210,16 @@ def test_every_kind_of_motion_suits_an_arm(kind, how, tmp_path):
     assert arm.contacts(motion.position[::50]) == []
 
 
+@pytest.mark.parametrize("name", ["ur5e", "kinova", "iiwa14"])
+def test_a_stretched_arm_is_bent_before_its_tool_moves(name):
+    """An arm that points straight out or up makes a circle; its own start stays."""
+    scene = scene_of_arm(name, motion="circle")
+    path = trajectory_of(scene, rigid_arm_of(scene))
+    assert np.ptp(path.position, axis=0).max() > 0.5 * deg
+    with pytest.raises(InputError, match=naming("--pose", "start_deg")):
+        scene_of_arm(name, motion="circle", pose="reference")
+
+
 def test_another_kind_of_motion_takes_the_place_of_the_first():
     """Keys that only the old motion has go; those of the user count in any order."""
     scene = scene_of_arm("two-link")
