@@ -19,6 +19,12 @@ from swgjoint.sim.compiling import skeleton
 
 MESHES = (".stl", ".obj", ".msh")
 """What the engine reads."""
+_OF_ACTUATORS = (
+    *("ctrllimited", "forcelimited", "actlimited", "ctrlrange", "forcerange"),
+    *("actrange", "inheritrange", "gear", "gaintype", "biastype", "dyntype"),
+    *("gainprm", "biasprm", "dynprm", "actdim", "actearly", "cranklength", "armature"),
+)
+"""What a class may say of actuators."""
 _ON_JOINT = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)
 _OF_ACTUATORS = (
     *("ctrllimited", "ctrlrange", "forcelimited", "forcerange", "actlimited"),
@@ -85,6 +91,7 @@ def read_arm(path: Path, reading: ArmReading | None = None) -> ArmFile:
     limits = _effort(spec)
     for element in [*spec.sensors, *spec.actuators]:
         spec.delete(element)
+    _forget_actuators(spec)
     for key in spec.keys:
         key.ctrl, key.act = [], []  # of actuators that are gone
     bones = skeleton(spec, where=str(path))
@@ -106,6 +113,14 @@ def read_arm(path: Path, reading: ArmReading | None = None) -> ArmFile:
         joint.actfrcrange = [0.0, 0.0]
     effort = {name: limit for name, limit in limits.items() if name not in holding.held}
     return ArmFile(spec=spec, held=holding.held, keyframes=keyframes, effort=effort)
+
+
+def _forget_actuators(spec: mujoco.MjSpec) -> None:
+    """Undo what the main class says of actuators: those of the scene would take it."""
+    fresh = mujoco.MjSpec()
+    own, plain = spec.default.actuator, fresh.default.actuator
+    for key in _OF_ACTUATORS:
+        setattr(own, key, getattr(plain, key))
 
 
 def _spec_of(path: Path) -> mujoco.MjSpec:

@@ -234,6 +234,24 @@ def test_a_scene_takes_the_mechanics_of_a_file_and_no_more(tmp_path):
     assert np.abs(run.output_torque[run.steady] - needed).max() < 0.05
 
 
+CLASSES = """<default><motor ctrlrange="-1 1" ctrllimited="true" forcerange="-2 2"
+  forcelimited="true" gear="7 1"/></default>"""
+
+
+def test_classes_of_a_file_do_not_reach_the_motors_of_the_scene(tmp_path):
+    """A main class that limits motors of the file leaves those of the scene free."""
+    runs = []
+    for k, classes in enumerate(("", CLASSES)):
+        folder = tmp_path / str(k)
+        folder.mkdir()
+        scene = scene_of_arm(own(folder, asset=classes), overrides=[STEADY])
+        runs.append(run_scene(scene, overrides={"simulation.duration_s": 2.0}))
+    np.testing.assert_array_equal(runs[0].position, runs[1].position)
+    for name in ("ctrllimited", "forcelimited", "gear", "gainprm", "biasprm"):
+        first, second = (getattr(r.assembly.model, f"actuator_{name}") for r in runs)
+        np.testing.assert_array_equal(first, second)
+
+
 def test_the_sweep_keeps_to_the_limits(tmp_path):
     """Joints that may not be at the reference start in the middle of their range."""
     arm = RigidArm(own(tmp_path))
