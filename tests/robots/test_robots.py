@@ -8,7 +8,8 @@ of them. Bounds, and why they are what they are:
   go from one sign to the other, below twice that; hysteresis and kinematic error add
   what the catalogue states (:func:`torsion_bound`).
 * Energy: nothing but actuators adds energy to a robot; gravity and springs only turn
-  it over. :data:`ENERGY` is what soft contacts and a step of some ms may add.
+  it over. :data:`ENERGY` is what a step of some ms may add, and a soft contact gives
+  back the weight times its depth (:data:`OVERLAP`).
 * Stiff drives: with 1e6 N·m/rad and the rotor as armature the links move as in the
   file without drives within 1e-3 rad (:data:`SAME`), from the first keyframe with its
   controls and random speeds. A robot that falls is chaotic: compared is the first
@@ -58,16 +59,16 @@ STIFF = DriveMap.linear(1e6)
 """A drive that is as good as rigid."""
 ARMATURE = 0.01
 """Inertia of a rotor at its joint where a file states none [kg·m²]."""
-EVERY = 5
+EVERY = 20
 """Steps from one look at the drives to the next."""
 ENERGY = 0.02
 """Energy that may come from nowhere, of the largest that went to and fro [-]."""
 OVERLAP = 1e-3
-"""Depth of shapes in each other at the start whose energy counts [m]."""
+"""Depth of shapes in each other at the start that is that of soft contact [m]."""
 ROUND = 1e-6
 """Torsion that is nothing, whatever the torque [rad]."""
-TOOL = 50.0
-"""Error of the tool above which no arm is worth simulating [mm]."""
+TOOL = 10.0
+"""Error of the tool that drives within their ratings do not make [mm]."""
 
 
 def cases(*keys: str) -> list[Any]:
@@ -179,7 +180,8 @@ def test_drives_on_every_hinge_hold_for_two_seconds(name):
     assert trouble(data) == {}
     assert np.isfinite(data.qpos).all()
     if not (model.nmocap or overlap):  # a weld to one moves the robot
-        assert excess < ENERGY * turnover
+        weight = -float(model.body_mass.sum() * model.opt.gravity[2])
+        assert excess < ENERGY * turnover + OVERLAP * weight
     for drive, moved, most in zip(driven.drives.values(), torsion, torque, strict=True):
         assert moved < 2.0 * torsion_bound(drive.drive, most), drive.joint
 
@@ -267,13 +269,19 @@ def test_run_with_one_drive_everywhere(name, command):
     check_run(name, "run_drive", command("run", path(name), "--drive", DRIVE))
 
 
+@pytest.mark.parametrize("name", cases("balanced"))
+def test_repaired_inertia_lets_a_robot_run(name, command):
+    """What is refused for an inertia runs with ``--balance-inertia``."""
+    check_run(name, "balanced_run", command("run", path(name), "--balance-inertia"))
+
+
 @pytest.mark.parametrize("name", cases())
 def test_advise(name, command):
     """A setting within the error, or the refusal that the manifest predicts."""
     got = command("advise", path(name), "--error", "1arcmin")
     wanted = ROBOTS[name].get("advise", "VALID")
     if wanted != "VALID":
-        assert got.status == {"NOT VALID": 1, "refused": 2}[wanted], got.errors
+        assert got.status == {"stopped": 1, "refused": 2}[wanted], got.errors
         assert names(got.errors, *ROBOTS[name]["advise_names"]), got.errors
         return
     assert got.status == 0, got.errors
@@ -282,29 +290,28 @@ def test_advise(name, command):
 
 
 def check_run(name: str, key: str, got: Outcome) -> None:
-    """Hold what a run gave to the manifest."""
+    """Hold what a run gave to the manifest.
+
+    ``VALID``: figures within the bounds. ``NOT VALID``: status 1 and reasons that name
+    what the manifest says. ``stopped`` and ``refused``: status 1 and 2, and one line.
+    """
     robot = ROBOTS[name]
-    wanted = robot.get(key, "VALID")
-    said = robot.get(f"{key}_names", [])
-    if wanted == "refused":
-        assert got.status == 2, got.errors
-        lines = [
-            line
-            for line in got.errors.splitlines()
-            if not line.startswith("swgjoint: warning:")
-        ]
+    wanted, said = robot.get(key, "VALID"), robot.get(f"{key}_names", [])
+    if wanted in ("stopped", "refused"):
+        assert got.status == {"stopped": 1, "refused": 2}[wanted], got.errors
+        lines = [x for x in got.errors.splitlines() if x.startswith("swgjoint run:")]
         assert len(lines) == 1, got.errors
         assert names(lines[0], *said), got.errors
         return
     assert got.result, got.errors
-    assert got.result["verdict"] == wanted, got.result.get("reasons")
+    assert got.result["verdict"] == wanted, got.result["reasons"]
     if wanted == "NOT VALID":
         assert got.status == 1
-        reasons = "\n".join(map(str, got.result["reasons"]))
-        assert names(reasons, *said), reasons
+        assert names(json.dumps(got.result["reasons"]), *said), got.result["reasons"]
         return
     assert got.status == 0
-    assert set(got.result["joints"]) == set(robot["joints"])
+    if "hinges" in robot:
+        assert len(got.result["joints"]) == robot.get("moving", robot["hinges"])
     for joint, figures in got.result["joints"].items():
         check_joint(joint, figures)
     check_energy(got.result["energy"])
