@@ -130,7 +130,7 @@ def test_a_user_is_told_of_a_step_outside(spec):
 
 
 def test_joints_of_one_catalogue_drive_err_at_phases_of_their_own(spec):
-    """The stated accuracy by default; another size, another seed and none on request."""
+    """The stated accuracy by default; another size, seed or none on request."""
     stated = DriveMap.from_catalogue("CSG-25-100").info["stated"]
     wanted = stated["transmission_accuracy_arcmin"]
     got = swgjoint.attach(spec, {"shoulder_*": "CSG-25-100"})
