@@ -19,12 +19,6 @@ from swgjoint.sim.compiling import skeleton
 
 MESHES = (".stl", ".obj", ".msh")
 """What the engine reads."""
-_OF_ACTUATORS = (
-    *("ctrllimited", "forcelimited", "actlimited", "ctrlrange", "forcerange"),
-    *("actrange", "inheritrange", "gear", "gaintype", "biastype", "dyntype"),
-    *("gainprm", "biasprm", "dynprm", "actdim", "actearly", "cranklength", "armature"),
-)
-"""What a class may say of actuators."""
 _ON_JOINT = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)
 _OF_ACTUATORS = (
     *("ctrllimited", "ctrlrange", "forcelimited", "forcerange", "actlimited"),
@@ -32,7 +26,7 @@ _OF_ACTUATORS = (
     *("biastype", "biasprm", "dyntype", "dynprm", "delay", "nsample", "interp"),
     *("damping", "armature", "cranklength", "lengthrange"),
 )
-"""Of a default class."""
+"""What a class may say of actuators."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -91,7 +85,6 @@ def read_arm(path: Path, reading: ArmReading | None = None) -> ArmFile:
     limits = _effort(spec)
     for element in [*spec.sensors, *spec.actuators]:
         spec.delete(element)
-    _forget_actuators(spec)
     for key in spec.keys:
         key.ctrl, key.act = [], []  # of actuators that are gone
     bones = skeleton(spec, where=str(path))
@@ -232,14 +225,6 @@ def _solve_well(spec: mujoco.MjSpec) -> None:
         setattr(option, name, max(getattr(option, name), getattr(usual, name)))
     for name in ("tolerance", "ls_tolerance"):
         setattr(option, name, min(getattr(option, name), getattr(usual, name)))
-
-
-def _forget_actuators(spec: mujoco.MjSpec) -> None:
-    """Take out what the file says of every actuator: those of a scene are others."""
-    plain = mujoco.MjSpec()  # lives as long as its default is read
-    own, usual = spec.default.actuator, plain.default.actuator
-    for name in _OF_ACTUATORS:
-        setattr(own, name, getattr(usual, name))
 
 
 def _find_meshes(spec: mujoco.MjSpec, path: Path) -> None:

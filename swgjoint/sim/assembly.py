@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from swgjoint.errors import InputError
 from swgjoint.joint.attach import attach_all
 from swgjoint.joint.fitting import Fitting
-from swgjoint.joint.options import allow_iterations
 from swgjoint.joint.region import check_region
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.progress import Progress, silent
@@ -165,7 +164,6 @@ def assemble(
     known = dict(drives or {})
     spec = arm.spec()
     spec.option.timestep = scene.simulation.step_s
-    allow_iterations(spec)
     spec.option.integrator = getattr(
         mujoco.mjtIntegrator, f"mjINT_{scene.simulation.integrator.upper()}"
     )
