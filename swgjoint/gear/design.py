@@ -29,10 +29,10 @@ from swgjoint.gear.design_sections import (
     MicroGeometry,
     RatingsSection,
     Tolerances,
-    WaveGenerator,
 )
 from swgjoint.gear.family import family_design, family_member
 from swgjoint.gear.material import Material
+from swgjoint.gear.wave_generator_sections import WaveGenerator
 from swgjoint.models_path import bundled_names, find
 from swgjoint.toml_text import toml_text
 from swgjoint.units import GPa, MPa, mm

@@ -27,12 +27,19 @@ class Drive(Section):
     """Identity, layout, teeth and module."""
 
     name: Annotated[str, Field(min_length=1, max_length=100)]
+    """Name in results and files."""
     source: str = ""
+    """Where the numbers come from."""
     layout: Layout = "circular_spline_fixed"
+    """Member that is fixed; another one is the output."""
     teeth_flexspline: Annotated[int, Field(ge=40, le=400)]
+    """Teeth of the flexspline."""
     teeth_circular_spline: Annotated[int, Field(ge=42, le=412)]
+    """More than those of the flexspline by a multiple of the lobes, 2 or 3."""
     module_mm: Annotated[float, Field(gt=0, le=50)]
+    """Pitch diameter over teeth."""
     face_width_mm: Millimetre
+    """Width of the teeth along the axis."""
 
     @model_validator(mode="after")
     def _tooth_difference(self) -> Drive:
@@ -60,23 +67,35 @@ class MaterialOverride(Section):
     """Material keys of one member; absent ones come from ``[material]``."""
 
     youngs_modulus_GPa: Annotated[float, Field(gt=0, le=2_000)] | None = None
+    """Modulus of elasticity of this member."""
     poisson_ratio: Annotated[float, Field(ge=0, lt=0.5)] | None = None
+    """Of this member."""
     density_kg_m3: Annotated[float, Field(gt=0, le=30_000)] | None = None
+    """Of this member."""
     fatigue_limit_bending_MPa: Positive | None = None
+    """Endurance limit in reversed bending."""
     fatigue_limit_torsion_MPa: Positive | None = None
+    """Endurance limit in reversed torsion."""
 
 
 class MaterialSection(Section):
     """Material of both members; default: steel as in thesis Table 4.1."""
 
     youngs_modulus_GPa: Annotated[float, Field(gt=0, le=2_000)] = 210.0
+    """Modulus of elasticity; default that of steel."""
     poisson_ratio: Annotated[float, Field(ge=0, lt=0.5)] = 0.29
+    """Default that of steel."""
     # density of the steels of such drives, e.g. 34CrNiMo6 after EN 10083-3 practice
     density_kg_m3: Annotated[float, Field(gt=0, le=30_000)] = 7850.0
+    """Default that of steel."""
     fatigue_limit_bending_MPa: Positive | None = None
+    """Endurance limit in reversed bending."""
     fatigue_limit_torsion_MPa: Positive | None = None
+    """Endurance limit in reversed torsion."""
     flexspline: MaterialOverride = MaterialOverride()
+    """Values of the flexspline alone."""
     circular_spline: MaterialOverride = MaterialOverride()
+    """Values of the circular spline alone."""
 
 
 class QuadrupleCircularArc(Section):
@@ -84,11 +103,17 @@ class QuadrupleCircularArc(Section):
 
     kind: Literal["qca"] = "qca"
     tip_radius_mm: Millimetre
+    """Radius that rounds the tip; below that of the addendum."""
     addendum_radius_mm: Millimetre
+    """Radius of the convex arc above the pitch point."""
     straight_mm: Annotated[float, Field(ge=0, le=1_000)]
+    """Length of the straight segment through the pitch point."""
     dedendum_radius_mm: Millimetre
+    """Radius of the concave arc below the pitch point."""
     root_radius_mm: Millimetre
+    """Radius of the root fillet; below that of the dedendum."""
     straight_split: Annotated[float, Field(ge=0, le=1)] = 0.5
+    """Share of the straight segment above the pitch point."""
 
     @model_validator(mode="after")
     def _straight_is_none_or_real(self) -> QuadrupleCircularArc:
@@ -108,8 +133,11 @@ class DoubleCircularArc(Section):
 
     kind: Literal["dca"] = "dca"
     addendum_radius_mm: Millimetre
+    """Radius of the convex arc; it ends in an edge at the tip."""
     dedendum_radius_mm: Millimetre
+    """Radius of the concave arc, tangent to the root circle."""
     straight_split: Annotated[float, Field(ge=0, le=1)] = 0.5
+    """Share of the straight segment above the pitch point."""
 
 
 class Involute(Section):
@@ -121,7 +149,9 @@ class Involute(Section):
 
     kind: Literal["involute"] = "involute"
     cutter_tip_radius_mm: Millimetre | None = None
+    """Rounding of the cutter's tip."""
     cutter_teeth: Annotated[int, Field(ge=10, le=400)] | None = None
+    """Teeth of the shaper cutter of the circular spline."""
 
 
 class TwoArc(Section):
@@ -133,12 +163,19 @@ class TwoArc(Section):
 
     kind: Literal["two_arc"] = "two_arc"
     addendum_radius_mm: Millimetre | None = None
+    """Radius of the convex arc."""
     addendum_offset_mm: Millimetre | None = None
+    """Centre of the convex arc beyond the tooth axis."""
     addendum_shift_mm: Millimetre | None = None
+    """Centre of the convex arc below the pitch circle."""
     dedendum_radius_mm: Millimetre | None = None
+    """Radius of the concave arc."""
     dedendum_offset_mm: Millimetre | None = None
+    """Centre of the concave arc beside the tooth axis."""
     dedendum_shift_mm: Millimetre | None = None
+    """Centre of the concave arc above the pitch circle."""
     root_radius_mm: Millimetre | None = None
+    """Radius of the root fillet."""
 
 
 class Conjugate(Section):
@@ -149,6 +186,7 @@ class Conjugate(Section):
 
     kind: Literal["conjugate"] = "conjugate"
     root_radius_mm: Millimetre | None = None
+    """Radius of the root fillet."""
 
 
 Profile = Annotated[
@@ -161,229 +199,118 @@ class Member(Section):
     """Flexspline or circular spline."""
 
     rim_mm: Millimetre
+    """Thickness of the rim below the teeth."""
     addendum_coefficient: Coefficient = 0.6
+    """Height of the tip above the pitch circle over the module."""
     dedendum_coefficient: Coefficient = 0.8
+    """Depth of the root below the pitch circle over the module."""
     pressure_angle_deg: Annotated[float, Field(gt=0, lt=60)] = 20.0
+    """Inclination of the flank to the radius at the pitch circle."""
     thickness_coefficient: Annotated[float, Field(gt=0, le=1.5)] = 1.0
+    """Thickness at the pitch circle over half the pitch; below 1: backlash."""
     profile: Profile
+    """Shape of the flank, by kind."""
 
 
 class CircularSplineMember(Member):
     """The member whose outer diameter sits in a housing."""
 
     outer_rim: Literal["fixed", "free"] = "fixed"
-
-
-class Bearing(Section):
-    """Thin-race ball bearing between wave generator and flexspline.
-
-    Absent optional keys take what :class:`swgjoint.gear.ball_bearing.BallBearing` says.
-    """
-
-    balls: Annotated[int, Field(ge=3, le=200)]
-    ball_diameter_mm: Millimetre
-    race_thickness_mm: Millimetre
-    clearance_um: Micrometre = 0.0
-    race_width_mm: Millimetre | None = None
-    groove_inertia_factor: Reduction | None = None
-    groove_conformity: Annotated[float, Field(gt=0.5, le=1)] | None = None
-    fit_clearance_um: Micrometre | None = None
-    youngs_modulus_GPa: Annotated[float, Field(gt=0, le=2_000)] | None = None
-    poisson_ratio: Annotated[float, Field(ge=0, lt=0.5)] | None = None
-
-
-class WaveGeneratorBase(Section):
-    """What every wave generator may carry."""
-
-    bearing: Bearing | None = None
-
-
-class Elliptical(WaveGeneratorBase):
-    """Ellipse, thesis 3.2.2."""
-
-    kind: Literal["elliptical"] = "elliptical"
-    minor_axis_coefficient: Reduction = 1.0
-
-
-class Simplified(WaveGeneratorBase):
-    """Two semicircles joined by straight lines, thesis 3.2.1."""
-
-    kind: Literal["simplified"] = "simplified"
-    minor_axis_coefficient: Reduction
-
-
-class Parabolic(WaveGeneratorBase):
-    """Two parabolas joined by circular arcs, thesis 3.2.3."""
-
-    kind: Literal["parabolic"] = "parabolic"
-    minor_axis_coefficient: Reduction = 1.0
-    parabola_coefficient_per_mm: Positive
-    parabola_length_coefficient: Reduction
-    connector_radius_mm: Millimetre
-
-
-class ParabolaSide(Section):
-    """One side of a bilateral asymmetric parabolic wave generator."""
-
-    parabola_coefficient_per_mm: Positive
-    parabola_length_coefficient: Reduction
-    connector_radius_mm: Millimetre
-
-
-class AsymmetricParabolic(WaveGeneratorBase):
-    """Parabolic with turned lobes (``rotation_deg``) or with two different sides."""
-
-    kind: Literal["asymmetric_parabolic"] = "asymmetric_parabolic"
-    minor_axis_coefficient: Reduction = 1.0
-    rotation_deg: Annotated[float, Field(gt=-45, lt=45)] | None = None
-    parabola_coefficient_per_mm: Positive | None = None
-    parabola_length_coefficient: Reduction | None = None
-    connector_radius_mm: Millimetre | None = None
-    left: ParabolaSide | None = None
-    right: ParabolaSide | None = None
-
-    @model_validator(mode="after")
-    def _one_of_two_forms(self) -> AsymmetricParabolic:
-        keys = (
-            "parabola_coefficient_per_mm",
-            "parabola_length_coefficient",
-            "connector_radius_mm",
-        )
-        turned = ("rotation_deg", *keys)
-        sides = ("left", "right")
-        given = {key for key in (*turned, *sides) if getattr(self, key) is not None}
-        if given not in (set(turned), set(sides)):
-            raise Fault(
-                (
-                    "kind",
-                    "'asymmetric_parabolic' needs either rotation_deg with"
-                    f" {', '.join(keys)}, or both tables left and right",
-                )
-            )
-        return self
-
-
-class FourRoller(WaveGeneratorBase):
-    """Four rollers, thesis 3.2.4."""
-
-    kind: Literal["four_roller"] = "four_roller"
-    aperture_deg: Annotated[float, Field(gt=0, lt=45)]
-    roller_radius_mm: Millimetre
-
-
-class Cosine(WaveGeneratorBase):
-    """Cosine of the lobes about the neutral circle."""
-
-    kind: Literal["cosine"] = "cosine"
-    minor_axis_coefficient: Reduction = 1.0
-
-
-class Table(WaveGeneratorBase):
-    """Radius over the angle from the major axis, one turn."""
-
-    kind: Literal["table"] = "table"
-    angle_deg: Annotated[tuple[float, ...], Field(strict=False)]
-    radius_mm: Annotated[tuple[Millimetre, ...], Field(strict=False)]
-
-    @model_validator(mode="after")
-    def _same_length(self) -> Table:
-        if len(self.angle_deg) < 8:
-            raise Fault(
-                ("angle_deg", f"{len(self.angle_deg)} values; accepted: 8 or more")
-            )
-        if len(self.angle_deg) != len(self.radius_mm):
-            raise Fault(
-                (
-                    "radius_mm",
-                    f"{len(self.radius_mm)} values; accepted: as many as angle_deg,"
-                    f" {len(self.angle_deg)}",
-                )
-            )
-        steps = [b - a for a, b in pairwise(self.angle_deg)]
-        if min(steps) <= 0 or self.angle_deg[-1] - self.angle_deg[0] >= 360:
-            raise Fault(
-                ("angle_deg", "accepted: increasing angles within one turn, 360 deg")
-            )
-        return self
-
-
-WaveGenerator = Annotated[
-    Elliptical
-    | Simplified
-    | Parabolic
-    | AsymmetricParabolic
-    | FourRoller
-    | Cosine
-    | Table,
-    Field(discriminator="kind"),
-]
+    """Whether a housing holds the outside, or it is free to deform."""
 
 
 class Cup(Section):
     """Cup or hat behind the teeth of the flexspline."""
 
     kind: Literal["cup", "hat"] = "cup"
+    """Diaphragm inwards (cup) or flange outwards (hat)."""
     length_mm: Millimetre
+    """Of the wall behind the teeth."""
     thickness_coefficient: Coefficient = 0.8
+    """Thickness of the wall over that of the rim."""
     fillet_mm: Annotated[float, Field(ge=0, le=1_000)]
+    """Radius between wall and diaphragm."""
     bore_radius_mm: Millimetre
+    """Of the bore in the diaphragm, of a hat the outer radius of the flange."""
 
 
 class Boss(Section):
     """Spring between the flexspline's bore and its shaft or frame."""
 
     torsional_stiffness_Nm_rad: Annotated[float, Field(gt=0, le=1e12)]
+    """About the axis."""
 
 
 class Housing(Section):
     """Spring between the circular spline and its frame or shaft."""
 
     torsional_stiffness_Nm_rad: Annotated[float, Field(gt=0, le=1e12)]
+    """About the axis."""
 
 
 class Coupling(Section):
     """Spring between the wave generator and its shaft: Oldham coupling, hub, cam."""
 
     torsional_stiffness_Nm_rad: Annotated[float, Field(gt=0, le=1e12)]
+    """About the axis, at the input."""
 
 
 class MicroGeometry(Section):
     """Crowning and slope; all zero by default."""
 
     wave_generator_crowning_um: Micrometre = 0.0
+    """How much lower its surface is at both edges of the face."""
     wave_generator_slope_um: Annotated[float, Field(ge=-2_000, le=2_000)] = 0.0
+    """At the open edge: up at the major axis, down at the minor; follows the coning."""
     flexspline_crowning_um: Micrometre = 0.0
+    """How much the flanks are relieved at both edges of the face."""
     crowning_kind: Literal["parabolic", "circular"] = "parabolic"
+    """Shape of both crownings along the face."""
 
 
 class Tolerances(Section):
     """Manufacturing errors; all zero by default."""
 
     flexspline_cumulative_pitch_um: Micrometre = 0.0
+    """Peak to peak of the cumulative pitch error, harmonics 1 to 4."""
     circular_spline_cumulative_pitch_um: Micrometre = 0.0
+    """Peak to peak of the cumulative pitch error, harmonics 1 to 4."""
     random_pitch_um: Micrometre = 0.0
+    """Standard deviation of the pitch error of single teeth, both members."""
     wave_generator_ovality_um: Micrometre = 0.0
+    """Out-of-roundness of its outline."""
     wave_generator_eccentricity_um: Micrometre = 0.0
+    """Shift of its outline."""
     circular_spline_eccentricity_um: Micrometre = 0.0
+    """Shift of all its teeth."""
     circular_spline_ovality_um: Micrometre = 0.0
+    """Largest less smallest radius of its teeth."""
     misalignment_arcmin: Annotated[float, Field(ge=0, le=600)] = 0.0
+    """Tilt of the axes to each other; models in space alone."""
     seed: Annotated[int, Field(ge=0, le=2**31 - 1)] = 1
+    """Of all random parts."""
 
 
 class Friction(Section):
     """Coulomb friction of the teeth."""
 
     tooth_coefficient: Annotated[float, Field(ge=0, le=1)] = 0.0
+    """Coefficient of friction of the flanks."""
 
 
 class RatingsSection(Section):
     """Catalogue torques at the output; absent ones follow the default rule."""
 
     rated_torque_Nm: Positive | None = None
+    """Rated torque at the output."""
     repeated_peak_Nm: Positive | None = None
+    """Limit for repeated peak torque."""
     momentary_peak_Nm: Positive | None = None
+    """Limit for momentary peak torque."""
     T1_Nm: Positive | None = None
+    """End of the first line of the torsion curve, with slope K1."""
     T2_Nm: Positive | None = None
+    """End of the second line, with slope K2."""
 
     @model_validator(mode="after")
     def _increasing(self) -> RatingsSection:
@@ -407,9 +334,11 @@ class JointSection(Section):
     """Damping of the drive in a robot joint."""
 
     damping_ratio: Annotated[float, Field(ge=0, le=2)] = 0.02
+    """Share of critical damping of rotor against link."""
 
 
 class MeshSection(Section):
     """Mesh of the finite elements; 1 is the mesh of the thesis, 0.5 a coarse one."""
 
     refinement: Annotated[float, Field(ge=0.5, le=16)] = 1.0
+    """Multiplies the elements in every direction."""

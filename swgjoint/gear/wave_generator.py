@@ -11,7 +11,7 @@ import numpy as np
 from swgjoint.errors import DesignError
 from swgjoint.gear.check import Check, raise_faults
 from swgjoint.gear.design import Design
-from swgjoint.gear.design_sections import (
+from swgjoint.gear.wave_generator_sections import (
     AsymmetricParabolic,
     ParabolaSide,
     Parabolic,

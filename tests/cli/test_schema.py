@@ -101,6 +101,13 @@ def test_a_range_is_that_of_the_check(capsys):
     assert rows["wave_generator.minor_axis_coefficient"]["default"] == 1.0
 
 
+def test_every_key_of_a_design_has_a_meaning(capsys):
+    """Of all tables and kinds, but for the kind itself."""
+    rows = source.described_keys(asked(capsys, "design"))
+    without = [row["key"] for row in rows if not row["meaning"]]
+    assert {key.rpartition(".")[2] for key in without} <= {"kind"}
+
+
 @pytest.mark.parametrize("kind", ["design", "scene"])
 def test_every_key_is_described(kind, capsys):
     """The keys are those that a sweep may vary; units follow their endings."""
