@@ -63,7 +63,10 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
     Returns:
         ``residual``, ``energy_check`` and ``harmonics`` of the map's record,
-        ``stiffness_Nm_rad``, ``torque_range_Nm``, ``level``, ``files``, ``wall_s``.
+        ``stiffness_Nm_rad``, ``torque_range_Nm``, ``level``, ``files``, ``wall_s``;
+        of a measured loop ``fit``: ``hysteresis_loss_arcmin`` and
+        ``lost_motion_arcmin`` of the loop and of the map, ``rms_arcmin`` between them,
+        ``warnings``.
     """
     start = time.perf_counter()
     path = check_output_file(args.output, ".swg")
@@ -81,6 +84,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         or [{"alpha": int(p), "beta": int(q)} for p, q in drive.orders],
         "stiffness_Nm_rad": drive.mean_stiffness,
         "torque_range_Nm": drive.torque_range,
+        "fit": (info.get("fit") or {}).get("loop"),
         "info": info,
         "files": [str(path)],
         "wall_s": time.perf_counter() - start,
@@ -142,7 +146,22 @@ def report(result: dict[str, Any]) -> str:
         *_flat("energy check", result["energy_check"]),
         ("wall time [s]", result["wall_s"]),
     ]
-    return f"map of {result['design']}: {result['files'][0]}\n{table(rows)}"
+    lines = [f"map of {result['design']}: {result['files'][0]}", table(rows)]
+    fit = result.get("fit")
+    if fit:
+        pairs = [
+            (
+                key.removesuffix("_arcmin").replace("_", " "),
+                pair["measured"],
+                pair["predicted"],
+            )
+            for key, pair in fit.items()
+            if isinstance(pair, dict)
+        ]
+        pairs.append(("rms between the loops", None, fit["rms_arcmin"]))
+        lines.append(table(pairs, header=("arcmin", "measured", "map")))
+        lines += [f"warning: {line}" for line in fit["warnings"]]
+    return "\n".join(lines)
 
 
 def _flat(name: str, value: Any) -> list[tuple[str, Any]]:

@@ -99,10 +99,14 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         result["validity"] = {"level": "design", "ratings": ratings.source}
     laid = None
     if loop is not None:
+        from swgjoint.maps.loop_units import check_units
         from swgjoint.maps.overlay import overlay
 
+        doubts = check_units(args.measured, loop, drive.ratings.rated_torque)
         laid = overlay(drive, loop)
-        result["measured"] = {"file": args.measured, **laid.as_dict()}
+        found = laid.as_dict()
+        found["warnings"] = [*doubts, *found["warnings"]]
+        result["measured"] = {"file": args.measured, **found}
     result["files"] = []
     if folder is not None:
         _write(folder, result, sheet, laid, start)
@@ -382,7 +386,8 @@ def _laid(found: dict[str, Any]) -> list[str]:
         (words(key)[0], *(found[key][which] for which in ("measured", "predicted")))
         for key in ("hysteresis_loss_arcmin", "lost_motion_arcmin")
     ]
-    return [*lines, table(pairs, header=("arcmin", "measured", "predicted"))]
+    lines.append(table(pairs, header=("arcmin", "measured", "predicted")))
+    return [*lines, *(f"warning: {line}" for line in found["warnings"])]
 
 
 def _source(result: dict[str, Any]) -> str:

@@ -45,6 +45,7 @@ from swgjoint.control.identify_model import Model
 from swgjoint.errors import ComputationError, InputError
 from swgjoint.gear.kinematics import LAYOUTS
 from swgjoint.maps.drive_map import DriveMap, Ratings
+from swgjoint.maps.loop_units import TORSION_AT_RATED
 from swgjoint.units import arcmin
 
 Array = NDArray[np.float64]
@@ -66,12 +67,6 @@ PHASE_STEP = 1.0
 
 Torques of mean angles are then no longer mean torques: on a simulated bench without
 noise hysteresis and viscous friction were 0.4 % off at 0.9 rad, 2 % at 2.1 rad.
-"""
-TORSION_AT_RATED = (0.3, 60.0)
-"""Torsion at rated torque of a strain wave gear [arcmin], else a note.
-
-models/catalogue: 4.9 to 7.4 arcmin for the 22 sets of CSG with rating and stiffness
-(sizes 14 to 32); the range reaches about ten times beyond on both sides.
 """
 
 

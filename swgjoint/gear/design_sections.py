@@ -22,6 +22,9 @@ Micrometre = Annotated[float, Field(ge=0, le=2_000)]
 Coefficient = Annotated[float, Field(gt=0, le=5)]
 Reduction = Annotated[float, Field(gt=0, le=1)]
 
+SMALLEST_MODULE = 0.005
+"""[mm]; micro strain wave gears with pitch diameters of 6 mm have 0.03 mm."""
+
 
 class Drive(Section):
     """Identity, layout, teeth and module."""
@@ -40,6 +43,19 @@ class Drive(Section):
     """Pitch diameter over teeth."""
     face_width_mm: Millimetre
     """Width of the teeth along the axis."""
+
+    @model_validator(mode="after")
+    def _module_in_millimetres(self) -> Drive:
+        if self.module_mm < SMALLEST_MODULE:
+            raise Fault(
+                (
+                    "module_mm",
+                    f"{self.module_mm:g} mm: is it in metres? accepted:"
+                    f" {SMALLEST_MODULE:g} to 50 mm ({self.module_mm:g} m are"
+                    f" {1e3 * self.module_mm:g} mm)",
+                )
+            )
+        return self
 
     @model_validator(mode="after")
     def _tooth_difference(self) -> Drive:

@@ -15,7 +15,10 @@ from swgjoint.maps.csv_columns import read_columns
 from swgjoint.maps.drive_map import DriveMap, Ratings
 from swgjoint.maps.error_fit import ORDERS, fit_error
 from swgjoint.maps.loop import TorqueLoop, torque_loop
-from swgjoint.maps.torsion_fit import INTERVALS, fit_torsion
+from swgjoint.maps.loop_match import matched
+from swgjoint.maps.loop_units import check_direction, check_units
+from swgjoint.maps.overlay import COMPARED, overlay
+from swgjoint.maps.torsion_fit import INTERVALS, TorsionFit, fit_torsion
 from swgjoint.maps.torsion_law import potential_of_stiffness
 from swgjoint.units import arcmin, deg
 
@@ -57,6 +60,7 @@ def read_loop(path: str | Path) -> TorqueLoop:
         raise InputError(
             f"{path}: torsion does not grow with the torque; accepted: both of one sign"
         )
+    check_direction(path, loop)
     return loop
 
 
@@ -85,7 +89,28 @@ def map_from_measurement(
     if intervals < 1:
         raise InputError(f"intervals {intervals}; accepted: 1 and more")
     loop = read_loop(path)
-    fit = fit_torsion(loop, intervals=intervals)
+    rated = _ratings(ratings, float(np.abs(loop.torque).max()))
+    doubts = check_units(path, loop, rated.rated_torque)
+
+    def play(tried: TorsionFit) -> DriveMap:
+        """The map of a spring and elements alone."""
+        potential, ends = potential_of_stiffness(tried.knots, tried.stiffness)
+        return DriveMap(
+            name=name or Path(path).stem,
+            level="measurement",
+            layout=layout,
+            teeth_flexspline=teeth_flexspline,
+            teeth_circular_spline=teeth_circular_spline,
+            torsion_knots=tried.knots,
+            orders=np.zeros((1, 2), dtype=np.int64),
+            potential=potential,
+            end_stiffness=ends,
+            kinematic_error=np.zeros((1, 2)),
+            ratings=rated,
+            hysteresis=tried.hysteresis,
+        )
+
+    fit = matched(fit_torsion(loop, intervals=intervals), play, rated.rated_torque)
     info: dict[str, Any] = {
         "source": f"measurement {Path(path).name}",
         "fit": {"torsion": fit.report},
@@ -140,21 +165,24 @@ def map_from_measurement(
         potential=potential,
         end_stiffness=ends,
         kinematic_error=amplitudes,
-        ratings=_ratings(ratings, float(np.abs(loop.torque).max())),
+        ratings=rated,
         damping_ratio=damping_ratio,
         hysteresis=fit.hysteresis,
         info=info,
     )
-    if not fit.hysteresis:
-        return drive
-    # a loop that is no Maxwell slip is followed as a whole, not at zero torque
-    played = torque_loop(drive).hysteresis_loss() / arcmin
-    report = {**fit.report, "hysteresis_loss_map_arcmin": played}
-    info["fit"] = {**info["fit"], "torsion": report}
-    info["hysteresis"] = (
-        f"measured loop {Path(path).name}, {width:.4g} arcmin wide; that of the map"
-        f" {played:.4g} arcmin"
-    )
+    laid = overlay(replace(drive, kinematic_error=0.0 * amplitudes), loop).as_dict()
+    compared = {key: laid[key] for key in ("rms_arcmin", *COMPARED)}
+    compared["warnings"] = [*doubts, *laid["warnings"]]
+    info["fit"] = {**info["fit"], "loop": compared}
+    if fit.hysteresis:
+        # a loop that is no Maxwell slip is followed as a whole, not under every load
+        played = torque_loop(drive).hysteresis_loss() / arcmin
+        report = {**fit.report, "hysteresis_loss_map_arcmin": played}
+        info["fit"] = {**info["fit"], "torsion": report}
+        info["hysteresis"] = (
+            f"measured loop {Path(path).name}, {width:.4g} arcmin wide; that of the map"
+            f" {played:.4g} arcmin"
+        )
     return replace(drive, info=info)
 
 

@@ -19,10 +19,15 @@ from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.equilibrium import output_angle
 from swgjoint.maps.hysteresis import Sliders
 from swgjoint.maps.loop import NO_WIDTH, REST, TorqueLoop
+from swgjoint.maps.loop_match import readings
 from swgjoint.units import arcmin
 
 Array = NDArray[np.float64]
 
+COMPARED = ("hysteresis_loss_arcmin", "lost_motion_arcmin")
+"""What is read about zero torque from both loops."""
+APART = 0.1
+"""Part by which such a reading may be off without a warning."""
 _GRID = 9
 """Torques from zero to T1 over which the zeros of the loops are compared."""
 
@@ -98,6 +103,27 @@ class Overlay:
             if side.max() >= high
         )
 
+    def warnings(self) -> list[str]:
+        """Readings of the prediction that are more than a tenth off; a line each.
+
+        A prediction without hysteresis has no loss that could be off.
+        """
+        ours, theirs = (
+            readings(loop, self.rated_torque)
+            for loop in (self.predicted, self.measured)
+        )
+        pairs = {
+            "hysteresis loss": (ours.hysteresis_loss, theirs.hysteresis_loss),
+            "lost motion": (ours.lost_motion, theirs.lost_motion),
+        }
+        least = NO_WIDTH * float(np.ptp(self.predicted.torsion))
+        return [
+            f"{name} predicted {own / arcmin:.4g} arcmin, measured"
+            f" {value / arcmin:.4g} arcmin: {abs(own / value - 1.0):.0%} apart"
+            for name, (own, value) in pairs.items()
+            if own > least and value > 0.0 and abs(own / value - 1.0) > APART
+        ]
+
     def as_dict(self) -> dict[str, Any]:
         """Plain values: figures of both loops, residuals in all and by segment.
 
@@ -125,6 +151,7 @@ class Overlay:
             "rms_arcmin": float(np.sqrt(np.mean(rest**2))),
             "largest_arcmin": float(np.abs(rest).max()),
             "segments": self.segments(),
+            "warnings": self.warnings(),
             "hysteresis_loss_arcmin": of_both(
                 {name: _width(loop) for name, loop in pair.items()}
             ),

@@ -29,6 +29,23 @@ _SIGNIFICANT = 20.0  # of an F test: far beyond what noise does
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class Record:
+    """What of a loop the least squares see."""
+
+    loop: TorqueLoop
+    torque: Array
+    """Of the samples that count [N·m]. Shape (n,)."""
+    torsion: Array
+    """[rad]. Shape (n,)."""
+    knots: Array
+    """[rad]. Shape (n_knots,)."""
+    reaches: Array
+    """Yield torsions that are tried [rad]. Shape (n_elements,)."""
+    signals: Array
+    """Torque of each of these elements over its yield torque (n, n_elements)."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class TorsionFit:
     """Monotone spring and hysteresis of a measured loop."""
 
@@ -38,6 +55,16 @@ class TorsionFit:
     """At the knots, positive [N·m/rad]."""
     hysteresis: tuple[Jenkin, ...]
     report: dict[str, Any]
+    record: Record
+    yields: Array
+    """Yield torques of the elements that were tried [N·m]."""
+
+    def with_yields(self, yields: Array) -> TorsionFit:
+        """The spring that follows the loop best with these yield torques [N·m]."""
+        record = self.record
+        rest = record.torque - record.signals @ yields
+        found = _solve(record.torsion, rest, record.knots, record.signals[:, :0])
+        return _fit_of(record, found, yields, self.report)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -77,23 +104,41 @@ def fit_torsion(loop: TorqueLoop, *, intervals: int = INTERVALS) -> TorsionFit:
         known[:] = True
     torque, x = loop.torque[known], loop.torsion[known]
     count = max(1, min(intervals, np.unique(torque).size // 3))
-    knots = np.linspace(x.min(), x.max(), count + 1)
-    signals = np.column_stack([stretches(loop.torsion, d)[known] / d for d in reaches])
-
-    plain = _solve(x, torque, knots, signals[:, :0])
+    record = Record(
+        loop=loop,
+        torque=torque,
+        torsion=x,
+        knots=np.linspace(x.min(), x.max(), count + 1),
+        reaches=reaches,
+        signals=np.column_stack(
+            [stretches(loop.torsion, d)[known] / d for d in reaches]
+        ),
+    )
+    plain = _solve(x, torque, record.knots, record.signals[:, :0])
     found = plain
     if width > 0.0 and torque.size > count + 2 + reaches.size:
-        slipping = _solve(x, torque, knots, signals)
+        slipping = _solve(x, torque, record.knots, record.signals)
         better = plain.rms**2 > slipping.rms**2 * (
             1.0 + _SIGNIFICANT * reaches.size / torque.size
         )
         yields = slipping.values[count + 2 :]
         if better and yields.sum() > FAINT * np.abs(torque).max():
             found = slipping
-    stiffness, yields = found.values[1 : count + 2], found.values[count + 2 :]
+    yields = np.zeros(reaches.size)
+    yields[: found.values.size - (count + 2)] = found.values[count + 2 :]
+    report = {"residual_rms_without_hysteresis_Nm": plain.rms}
+    return _fit_of(record, found, yields, report)
+
+
+def _fit_of(
+    record: Record, found: _Solution, yields: Array, report: dict[str, Any]
+) -> TorsionFit:
+    """Spring and elements of a solution, and how well they follow the loop."""
+    loop, knots, x = record.loop, record.knots, record.torsion
+    stiffness = found.values[1 : knots.size + 1]
     elements = tuple(
         Jenkin(stiffness=float(f / d), yield_torque=float(f))
-        for f, d in zip(yields, reaches, strict=False)
+        for f, d in zip(yields, record.reaches, strict=True)
         if f > FAINT * yields.sum()
     )
     steps = 0.5 * np.diff(knots) * (stiffness[1:] + stiffness[:-1])
@@ -101,28 +146,31 @@ def fit_torsion(loop: TorqueLoop, *, intervals: int = INTERVALS) -> TorsionFit:
     zero = _inverse(0.0, knots, stiffness, at_knots)
     shifted = knots - zero
     turned = np.abs(found.error / np.interp(x, knots, stiffness)) / arcmin
+    width = loop.hysteresis_loss()
     return TorsionFit(
         knots=shifted,
         stiffness=stiffness,
         hysteresis=elements,
-        report={
+        record=record,
+        yields=yields,
+        report=report
+        | {
             "samples": int(loop.torque.size),
-            "samples_used": int(torque.size),
+            "samples_used": int(record.torque.size),
             "branches": "one" if np.isnan(width) else "both",
-            "intervals": count,
+            "intervals": knots.size - 1,
             "elements": len(elements),
             "yield_torque_Nm": float(sum(e.yield_torque for e in elements)),
             "residual_rms_Nm": found.rms,
             "residual_max_Nm": float(np.abs(found.error).max()),
             "residual_rms_arcmin": float(np.sqrt(np.mean(turned**2))),
             "residual_max_arcmin": float(turned.max()),
-            "residual_rms_without_hysteresis_Nm": plain.rms,
             "torsion_at_zero_torque_arcmin": zero / arcmin,
             "hysteresis_loss_arcmin": None if np.isnan(width) else width / arcmin,
             "torque_range_Nm": [
                 float(v) for v in torque_at_knots(shifted, stiffness)[[0, -1]]
             ],
-            "at_softest": int((found.bounded[1 : count + 2] != 0).sum()),
+            "at_softest": int((found.bounded[1 : knots.size + 1] != 0).sum()),
         },
     )
 

@@ -109,6 +109,14 @@ def test_measured_loop_becomes_a_map(tmp_path, capsys):
     assert result["stiffness_Nm_rad"] == pytest.approx(secant, rel=0.05)
     assert result["info"]["fit"]["torsion"]["samples"] == 11
     assert DriveMap.load(path).ratio == -100
+    fit = result["fit"]
+    for key in ("hysteresis_loss_arcmin", "lost_motion_arcmin"):
+        assert fit[key].keys() == {"measured", "predicted"}
+    assert fit["rms_arcmin"] > 0.0
+    assert main(["map", str(loop), "-o", str(path), *measured]) == 0
+    out = capsys.readouterr().out.splitlines()
+    assert any(names(line, "measured", "map") for line in out)
+    assert sum(line.startswith("warning: ") for line in out) == len(fit["warnings"])
 
 
 @pytest.mark.parametrize(

@@ -487,3 +487,12 @@ def test_catalogue_tables_are_sound():
     for line in table("stiffness"):
         k1, k2, k3 = (line[f"K{n}_1e4Nm_rad"] for n in (1, 2, 3))
         assert k1 < k2 < k3
+
+
+@pytest.mark.parametrize("module", [0.001, 5e-4])
+def test_a_module_in_metres_is_called_one(reference, module):
+    """Before any other key: the value, the millimetres that it would be."""
+    (line,) = faults(reference, {"drive.module_mm": module})
+    assert names(
+        line, "drive.module_mm", f"{module:g} mm", "metres", f"{1e3 * module:g} mm"
+    )

@@ -13,7 +13,7 @@ from swgjoint.maps.drive_map import DriveMap, Ratings
 from swgjoint.maps.equilibrium import output_angle
 from swgjoint.maps.file import map_bytes
 from swgjoint.maps.hysteresis import Jenkin
-from swgjoint.maps.loop import torque_loop
+from swgjoint.maps.loop import TorqueLoop, torque_loop
 from swgjoint.units import arcmin, deg
 
 TEETH = {"teeth_flexspline": 120, "teeth_circular_spline": 122}
@@ -318,3 +318,108 @@ def test_bad_options(synthetic_map, tmp_path):
     )
     found = DriveMap.from_measurement(loop, ratings=given, name="rig", **TEETH)
     assert (found.name, found.ratings) == ("rig", given)
+
+
+def three_line_loop(kind: str, *, width: float, n: int, sine: bool, noise: float = 0.0):
+    """Torque and torsion of a loop about three lines, twice around; width in arcmin.
+
+    ``constant`` and ``load`` have no Maxwell slip: the branches do not meet at the tip.
+    """
+    top, corners = 100.0, (14.0, 48.0)
+    lap = np.concatenate(
+        [np.linspace(-top, top, n)[:-1], np.linspace(top, -top, n)[:-1]]
+    )
+    if sine:
+        lap = top * np.sin(np.pi * np.arange(2 * n) / n)
+    torque = np.tile(lap, 2)
+    size = np.abs(torque)
+    x = np.minimum(size, corners[0]) / 31e3
+    x += np.clip(size - corners[0], 0.0, corners[1] - corners[0]) / 50e3
+    x += np.maximum(size - corners[1], 0.0) / 57e3
+    shape = {
+        "constant": np.ones_like(size),
+        "load": 1.0 + 2.0 * size / top,
+        "closing": 1.0 - (size / top) ** 2,
+    }[kind]
+    x = np.sign(torque) * x
+    x -= 0.5 * width * arcmin * shape * np.sign(np.gradient(torque))
+    rng = np.random.default_rng(8)
+    return torque, x + noise * arcmin * rng.standard_normal(x.size)
+
+
+DRIVE = {"teeth_flexspline": 200, "teeth_circular_spline": 202, "ratings": 67.0}
+
+
+@pytest.mark.parametrize(
+    ("kind", "width", "n", "sine", "noise"),
+    [
+        ("constant", 1.0, 300, False, 0.0),
+        ("constant", 1.0, 300, False, 0.02),
+        ("constant", 0.3, 40, False, 0.0),
+        ("constant", 1.0, 300, True, 0.0),
+        ("load", 1.0, 300, False, 0.0),
+        ("closing", 1.0, 300, True, 0.02),
+        ("closing", 0.3, 300, False, 0.0),
+    ],
+)
+def test_the_map_reads_as_its_loop(tmp_path, kind, width, n, sine, noise):
+    """Hysteresis loss and lost motion within 5 % of the loop, whatever its form."""
+    torque, x = three_line_loop(kind, width=width, n=n, sine=sine)
+    wanted = TorqueLoop(torque=torque, torsion=x)
+    torque, x = three_line_loop(kind, width=width, n=n, sine=sine, noise=noise)
+    path = write(tmp_path / "loop.csv", "torque_Nm,torsion_arcmin", torque, x / arcmin)
+    drive = DriveMap.from_measurement(path, **DRIVE)
+    played = torque_loop(drive)
+    assert played.hysteresis_loss() == pytest.approx(wanted.hysteresis_loss(), rel=0.05)
+    assert played.lost_motion(67.0) == pytest.approx(wanted.lost_motion(67.0), rel=0.05)
+    told = drive.info["fit"]["loop"]
+    assert told["warnings"] == []
+    for key in ("hysteresis_loss_arcmin", "lost_motion_arcmin"):
+        pair = told[key]
+        assert pair["predicted"] == pytest.approx(pair["measured"], rel=0.08)
+    # most of what is left is where the branches of a drive meet
+    assert noise < told["rms_arcmin"] < {"load": 1.5}.get(kind, 0.35)
+    # the mid-line under load is what it was
+    mid = played.mid_line([-60.0, 60.0]) / arcmin
+    assert np.diff(mid)[0] == pytest.approx(
+        np.diff(wanted.mid_line([-60.0, 60.0]) / arcmin)[0],
+        # three times as wide at the tips, where elements have one width
+        rel=0.12 if kind == "load" else 0.03,
+    )
+
+
+@pytest.mark.parametrize(
+    ("torque", "torsion", "head", "parts"),
+    [
+        (1e3, 1.0, "torsion_rad", ("1e+05 N·m", "1493 x", "67 N·m", "mN·m")),
+        (1e-3, 1.0, "torsion_rad", ("0.1 N·m", "0.001493 x", "67 N·m", "kN·m")),
+        (1.0, 1.0 / arcmin, "torsion_rad", ("arcmin under torsion_rad",)),
+        (1.0, 1.0, "torsion_arcmin", ("rad under torsion_arcmin",)),
+    ],
+)
+def test_a_loop_in_another_unit_is_refused(tmp_path, torque, torsion, head, parts):
+    """A thousand times the rated torque, arcmin as rad: one line with a likely unit."""
+    T, x = three_line_loop("closing", width=1.0, n=40, sine=False)
+    path = write(tmp_path / "a.csv", f"torque_Nm,{head}", torque * T, torsion * x)
+    with pytest.raises(InputError, match=naming("a.csv", *parts)) as caught:
+        DriveMap.from_measurement(path, **DRIVE)
+    assert "\n" not in str(caught.value)
+
+
+def test_an_unlikely_torsion_is_doubted(tmp_path):
+    """Degrees as rad, fifty times as soft as a catalogue drive: a map, a warning."""
+    T, x = three_line_loop("closing", width=1.0, n=40, sine=False)
+    path = write(tmp_path / "a.csv", "torque_Nm,torsion_rad", T, x / deg)
+    (line,) = DriveMap.from_measurement(path, **DRIVE).info["fit"]["loop"]["warnings"]
+    assert names(line, "arcmin", "67 N·m", "60 arcmin")
+
+
+def test_a_loop_that_runs_backwards_is_named(tmp_path):
+    """Rows in reverse give energy: refused with the sign; noise has no direction."""
+    T, x = three_line_loop("constant", width=1.0, n=300, sine=False, noise=0.02)
+    path = write(tmp_path / "a.csv", "torque_Nm,torsion_rad", T[::-1], x[::-1])
+    with pytest.raises(InputError, match=naming("a.csv", "arcmin", "sign", "-0.9974")):
+        DriveMap.from_measurement(path, **DRIVE)
+    T, x = three_line_loop("constant", width=-1e-3, n=300, sine=False, noise=0.02)
+    path = write(tmp_path / "b.csv", "torque_Nm,torsion_rad", T, x)
+    assert DriveMap.from_measurement(path, **DRIVE).hysteresis == ()

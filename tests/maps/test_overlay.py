@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from messages import names
 
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.hysteresis import Jenkin
@@ -143,3 +145,19 @@ def test_no_figure_is_read_where_there_are_no_samples(synthetic_map):
     one_sided = overlay(synthetic_map, TorqueLoop(torque=torque, torsion=torque / 2e4))
     assert one_sided.segments()[0]["K_measured_Nm_rad"] is None
     assert one_sided.as_dict()[FIGURES[1]]["measured"] is None
+
+
+def test_readings_more_than_a_tenth_off_are_said(synthetic_map):
+    """Torsion 12 % more: loss and lost motion are named with both values; 8 %: none."""
+    drive = replace(synthetic_map, hysteresis=RUBBING)
+    once = torque_loop(drive)
+    loop = TorqueLoop(torque=np.tile(once.torque, 2), torsion=np.tile(once.torsion, 2))
+    assert overlay(drive, loop).warnings() == []
+    near = overlay(drive, replace(loop, torsion=1.08 * loop.torsion))
+    assert near.as_dict()["warnings"] == []
+    loss, motion = overlay(drive, replace(loop, torsion=1.12 * loop.torsion)).warnings()
+    sheet = drive.spec_sheet([*FIGURES])
+    for line, key in ((loss, FIGURES[0]), (motion, FIGURES[1])):
+        told = [float(value) for value in re.findall(r"([\d.]+) arcmin", line)]
+        assert told == pytest.approx([sheet[key], 1.12 * sheet[key]], rel=0.02)
+        assert names(line, "11%")
