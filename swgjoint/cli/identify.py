@@ -75,7 +75,8 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         ``estimates`` (per name ``value``, ``unit``, ``low`` and ``high`` of the
         interval of 95 %), ``kinematic_error`` (``alpha``, ``beta``, ``error_arcmin``),
         ``residuals`` per channel (``rms_Nm``, ``share`` of the rms torque),
-        ``samples``, ``correlation``, ``notes``, ``files``, ``wall_s``.
+        ``samples``, ``correlation``, ``notes``, ``doubts`` (why the parameters may not
+        be those of the drive), ``files``, ``wall_s``.
     """
     start = time.perf_counter()
     out = None if args.out is None else output_folder(args.out)
@@ -147,6 +148,7 @@ def result_of(found: Identified) -> dict[str, Any]:
         "samples": len(next(iter(measured.values()))),
         "correlation": found.correlation,
         "notes": list(found.notes),
+        "doubts": list(found.doubts),
     }
 
 
@@ -162,7 +164,14 @@ def report(result: dict[str, Any]) -> str:
         f"{key}: {r['rms_Nm']:.3g} N·m rms left, {100 * r['share']:.3g} % of it"
         for key, r in result["residuals"].items()
     ]
-    return "\n".join([*lines, *result["notes"], *result["files"]])
+    doubts = result["doubts"]
+    lines += [note for note in result["notes"] if note not in doubts]
+    return "\n".join([*lines, *(f"doubt: {line}" for line in doubts), *result["files"]])
+
+
+def status(result: dict[str, Any]) -> int:
+    """1 where something says that the parameters are not those of the drive."""
+    return int(bool(result["doubts"]))
 
 
 def _pair(text: str, option: str, form: str, mark: str, kind: type) -> tuple[Any, Any]:

@@ -16,6 +16,12 @@ harmonics of :math:`e_0` and zero of the motor angle are found at once by least
 squares of the torques; every channel is weighted with the root mean square of its own
 residual, mean included, so that one with an offset does not count as precise.
 
+Clocks of encoders are apart: the link angles may be late by a time s, found as the
+other parameters are where the torque behind the drive was logged,
+:math:`\Delta = \theta/i + e_0 - \psi - s\dot\psi`; the log is then moved by it and
+fitted again. With the motor torque alone s cannot be told from viscous friction; friction
+below zero then ends as a doubt. A late torque channel passes for damping.
+
 Samples are averaged over a window first: noise of the encoders would else push the
 slider of the element, and acceleration is a difference of averages. Intervals are those
 of Gauss and Newton,
@@ -33,20 +39,26 @@ Source:
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from swgjoint.control.identify_checks import (
+    SURE,
+    check_ratio,
+    doubts_of,
+    remarks,
+    without_skew,
+)
 from swgjoint.control.identify_log import FEWEST, Averaged, BenchLog
 from swgjoint.control.identify_map import map_of
 from swgjoint.control.identify_model import Model
 from swgjoint.errors import ComputationError, InputError
 from swgjoint.gear.kinematics import LAYOUTS
 from swgjoint.maps.drive_map import DriveMap, Ratings
-from swgjoint.maps.loop_units import TORSION_AT_RATED
-from swgjoint.units import arcmin
 
 Array = NDArray[np.float64]
 
@@ -62,12 +74,7 @@ _TURN = 0.95  # of an output turn
 _ROUNDS = 2  # of weights
 _CORRELATED = 200  # samples over which residuals may be alike
 _SINGULAR = 1e-10
-PHASE_STEP = 1.0
-"""Of a harmonic per window, beyond which a note says so [rad].
-
-Torques of mean angles are then no longer mean torques: on a simulated bench without
-noise hysteresis and viscous friction were 0.4 % off at 0.9 rad, 2 % at 2.1 rad.
-"""
+_SKEW_LEAST = 1e-6  # s, below which a skew moves no torque
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,7 +112,12 @@ class Identified:
     """Measured minus modelled torque of each channel [N·m]. Shape (n,)."""
     correlation: float
     """kappa of the covariance [-]."""
+    skew: float = 0.0
+    """By which the link angles were moved before this fit [s]; the samples are those
+    after it."""
     notes: tuple[str, ...] = field(default_factory=tuple)
+    doubts: tuple[str, ...] = field(default_factory=tuple)
+    """Why the parameters may not be those of the drive; empty where nothing says so."""
 
 
 def identify(
@@ -155,6 +167,69 @@ def identify(
         )
     if rotor_inertia is not None and not 0.0 < rotor_inertia < np.inf:
         raise InputError(f"rotor inertia {rotor_inertia:g} kg·m²; accepted: > 0 kg·m²")
+    teeth = (teeth_flexspline, teeth_circular_spline)
+    check_ratio(log, layout, teeth)
+    options: dict[str, Any] = {
+        "teeth_flexspline": teeth_flexspline,
+        "teeth_circular_spline": teeth_circular_spline,
+        "ratings": ratings,
+        "corners": corners,
+        "layout": layout,
+        "spring": spring,
+        "rotor_inertia": rotor_inertia,
+        "orders": orders,
+        "window": window,
+        "name": name,
+    }
+    found = _identified(log, hysteresis=hysteresis, skew=True, **options)
+    late = found.estimates.get("link_skew")
+    if late is None or abs(late.value) < max(SURE * late.deviation, _SKEW_LEAST):
+        return found
+    # once more with the angles of one instant: harmonics and rates are theirs, too
+    again = without_skew(log, late.value)
+    found = _identified(again, hysteresis=hysteresis, skew=True, **options)
+    rest = found.estimates.get("link_skew")
+    if rest is None:
+        return found
+    whole = replace(rest, value=late.value + rest.value)
+    note = (
+        f"link_angle was {1e3 * whole.value:.4g} ms behind the other channels"
+        f" ({1e3 * whole.low:.4g} to {1e3 * whole.high:.4g}); corrected"
+    )
+    estimates = {**found.estimates, "link_skew": whole}
+    return replace(
+        found,
+        estimates=estimates,
+        notes=(*found.notes, note),
+        doubts=_doubts_of(found, estimates),
+        skew=late.value,
+    )
+
+
+def _doubts_of(found: Identified, estimates: Mapping[str, Estimate]) -> tuple[str, ...]:
+    measured = found.model.measured()
+    left = {key: rms(r) / rms(measured[key]) for key, r in found.residuals.items()}
+    units = [note for note in found.notes if "plausible: " in note]
+    return (*doubts_of(estimates, left, found.model.step), *units)
+
+
+def _identified(
+    log: BenchLog,
+    *,
+    teeth_flexspline: int,
+    teeth_circular_spline: int,
+    ratings: Ratings | float,
+    corners: tuple[float, float] | None,
+    layout: str,
+    spring: str,
+    rotor_inertia: float | None,
+    orders: Sequence[tuple[int, int]] | None,
+    hysteresis: bool,
+    window: float,
+    name: str,
+    skew: bool,
+) -> Identified:
+    """Find the parameters from a log as it is."""
     samples = log.averaged(window)
     whole_turn = np.ptp(samples.link_angle) >= _TURN * 2.0 * np.pi
     if orders is None:
@@ -173,6 +248,7 @@ def identify(
         rotor_inertia=rotor_inertia,
         orders=orders,
         hysteresis=hysteresis,
+        skew=skew,
     )
     if model.kept.sum() < FEWEST:
         raise InputError(
@@ -183,8 +259,8 @@ def identify(
     values, residuals, jacobian = _solve(model)
     kappa = max(_correlation(r) for r in residuals.values())
 
-    def without_element(why: str) -> Identified:
-        found = identify(
+    def without(element: bool, link_skew: bool) -> Identified:
+        return _identified(
             log,
             teeth_flexspline=teeth_flexspline,
             teeth_circular_spline=teeth_circular_spline,
@@ -194,12 +270,15 @@ def identify(
             spring=spring,
             rotor_inertia=rotor_inertia,
             orders=orders,
-            hysteresis=False,
+            hysteresis=hysteresis and not element,
             window=window,
             name=name,
+            skew=skew and not link_skew,
         )
-        notes = (*found.notes, f"no hysteresis: {why}")
-        return Identified(**{**vars(found), "notes": notes})
+
+    def without_element(why: str) -> Identified:
+        found = without(element=True, link_skew=False)
+        return replace(found, notes=(*found.notes, f"no hysteresis: {why}"))
 
     information = jacobian.T @ jacobian
     scale = np.sqrt(np.diag(information))
@@ -209,6 +288,8 @@ def identify(
         worst = names[int(np.argmin(scale))]
         if normal is not None:
             worst = names[int(np.abs(np.linalg.eigh(normal)[1][:, 0]).argmax())]
+        if worst == "link_skew":
+            return without(element=False, link_skew=True)
         if worst.startswith("hysteresis"):
             return without_element(f"the log does not tell {worst}")
         raise InputError(
@@ -228,55 +309,21 @@ def identify(
             f"an element of {lost.value:.3g} N·m is within its noise"
         )
     drive, notes = map_of(model, values, name=name, source=Path(log.where).name)
-    return Identified(
+    found = Identified(
         estimates=estimates,
         drive=drive,
         samples=samples,
         model=model,
         residuals=residuals,
         correlation=kappa,
-        notes=(*notes, *_doubts(model, drive, residuals)),
+        notes=(*notes, *remarks(model, drive, residuals)),
     )
+    return replace(found, doubts=_doubts_of(found, estimates))
 
 
 def rms(x: Array) -> float:
     """Root mean square, mean included."""
     return float(np.sqrt(np.mean(x**2)))
-
-
-def _doubts(model: Model, drive: DriveMap, residuals: Mapping[str, Array]) -> list[str]:
-    """What makes one doubt the figures: offsets of sensors, window, units."""
-    offset = [
-        f"{key} {r.mean():.3g} N·m (deviation {r.std():.3g} N·m)"
-        for key, r in residuals.items()
-        if abs(r.mean()) > r.std()
-    ]
-    notes = []
-    if offset:
-        notes.append(
-            f"measured less modelled in the mean: {', '.join(offset)}; offset of a"
-            " sensor? The intervals do not tell it"
-        )
-    phase = model.phase_step
-    if phase > PHASE_STEP:
-        notes.append(
-            f"kinematic error turns by up to {phase:.2g} rad in a window of"
-            f" {model.step:.3g} s, which the intervals do not tell; better: at most"
-            f" {PHASE_STEP:g} rad, --window {model.step * PHASE_STEP / phase:.2g}"
-        )
-    rated = drive.ratings.rated_torque
-    low, high = TORSION_AT_RATED
-    try:
-        torsion = drive.mean_torsion(rated) / arcmin
-    except ValueError:  # the spring softens before
-        return notes
-    if not low <= torsion <= high:
-        notes.append(
-            f"torsion at the rated {rated:g} N·m is {torsion:.3g} arcmin; plausible:"
-            f" {low:g} to {high:g} arcmin (the catalogue's are 5 to 7): see the units"
-            " of the angles and the rated torque"
-        )
-    return notes
 
 
 def _solve(model: Model) -> tuple[Array, dict[str, Array], Array]:

@@ -36,6 +36,7 @@ SLIDES = 10.0 * PRESLIDING
 _MOVES = 0.05  # of the largest speed, below which the wave generator may stick
 _ROUND_OFF = 1e-12  # of the largest
 _LEAST = 1e-6  # of the scales, stiffness and yield torque of an element
+_TOLD, _SHOWS = 1e-4, 1e-3  # a skew [s] that matters, its part of the torsion
 _SOFTEST = 1e-3  # of the mean stiffness: slopes stay positive on the way to the fit
 
 
@@ -66,6 +67,14 @@ class Model:
     orders: NDArray[np.int64]
     """(p, q). Shape (n_harmonics, 2)."""
     hysteresis: bool
+    skew: bool
+    """Whether the link angles may be of other instants than the rest."""
+    first_skew: float
+    """Of a straight line through the log [s]."""
+    link_rate: Array
+    """[rad/s]."""
+    link_acceleration: Array
+    """[rad/s²]."""
     torsion: Array
     """theta/i - psi of the log [rad]."""
     mean_stiffness: float
@@ -96,6 +105,7 @@ class Model:
         rotor_inertia: float | None,
         orders: Sequence[tuple[int, int]],
         hysteresis: bool,
+        skew: bool,
     ) -> Model:
         """Prepare what does not depend on the parameters."""
         if spring not in SPRINGS:
@@ -129,7 +139,11 @@ class Model:
                     f"{log.where}: the {what} is {x[0] + 0.0:.3g} {unit} all along;"
                     " accepted: one that changes"
                 )
-        slope = float(np.polyfit(torsion, torque, 1)[0])
+        # with the torque of the motor alone a skew looks as viscous friction does
+        skew = skew and samples.output_torque is not None
+        skew = skew and _tells_skew(torsion, link_rate)
+        late = _line_skew(torsion, torque, link_rate) if skew else 0.0
+        slope = float(np.polyfit(torsion - late * link_rate, torque, 1)[0])
         if not slope > 0.0:
             raise InputError(
                 f"torque falls by {-slope:.3g} N·m/rad as the torsion theta/i - psi"
@@ -147,6 +161,10 @@ class Model:
             rotor_inertia=rotor_inertia,
             orders=pairs,
             hysteresis=hysteresis,
+            skew=skew,
+            first_skew=late,
+            link_rate=link_rate,
+            link_acceleration=mean_acceleration(psi, step),
             torsion=torsion,
             mean_stiffness=slope,
             motor_acceleration=mean_acceleration(theta, step),
@@ -199,6 +217,10 @@ class Model:
         slopes = (self.cos * ab[:, 1] - self.sin * ab[:, 0]) @ n
         by_theta, by_psi = 1.0 / i + slopes[:, 0], -1.0 + slopes[:, 1]
         torsion = self.torsion + p["zero"] + error
+        if self.skew:
+            late = p["link_skew"]
+            torsion = torsion - late * self.link_rate
+            torsion = torsion - 0.5 * late**2 * self.link_acceleration
         elastic = self._spring(p, torsion)
         if self.hysteresis:
             k, f = p["hysteresis_stiffness"], p["hysteresis_yield_torque"]
@@ -300,8 +322,15 @@ def _unknowns(model: Model) -> list[Parameter]:
         for p, q in model.orders
         for part in ("cos", "sin")
     ]
+    if model.skew:
+        skew = Parameter(
+            name="link_skew",
+            unit="s",
+            start=model.first_skew,
+            scale=x / _spread(model.link_rate),
+        )
     if model.samples.motor_torque is None:
-        return found
+        return [*found, skew] if model.skew else found
     at_motor, speed = T / i, _spread(model.relative_rate)
     found += [
         Parameter(
@@ -317,7 +346,20 @@ def _unknowns(model: Model) -> list[Parameter]:
         found.append(
             Parameter(name="rotor_inertia", unit="kg·m²", start=0.0, scale=inertia)
         )
-    return found
+    return [*found, skew] if model.skew else found
+
+
+def _tells_skew(torsion: Array, link_rate: Array) -> bool:
+    """Whether a skew of :data:`_TOLD` would show in the torsion."""
+    return _TOLD * _spread(link_rate) > _SHOWS * _spread(torsion)
+
+
+def _line_skew(torsion: Array, torque: Array, link_rate: Array) -> float:
+    """By which the link is late, the drive taken as a straight line [s]."""
+    columns = np.column_stack([torque, link_rate, np.ones_like(torque)])
+    scale = np.abs(columns).max(axis=0)
+    found = np.linalg.lstsq(columns / scale, torsion, rcond=None)[0] / scale
+    return float(found[1])
 
 
 def _spread(values: Array) -> float:

@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 import pytest
 from messages import names, naming
+from scipy.interpolate import CubicSpline
 
 from swgjoint.cli.identify import result_of
 from swgjoint.cli.main import main
@@ -135,6 +136,7 @@ def truth_of(drive: DriveMap, damping: float) -> dict[str, float]:
         "friction_load": law.load,
         "friction_viscous": law.viscous,
         "rotor_inertia": INERTIA,
+        "link_skew": 0.0,
     }
 
 
@@ -145,7 +147,7 @@ def settings(drive: DriveMap) -> dict:
 
 def assert_recovers(found, truth: dict[str, float], part: float) -> None:
     """Damping and zero are no parameters of a drive that a log of this kind tells."""
-    for name in truth.keys() - {"damping", "zero"}:
+    for name in truth.keys() - {"damping", "zero", "link_skew"}:
         size = abs(truth[name])
         if name.startswith("error"):  # of the amplitude
             size = np.hypot(truth[f"{name[:-3]}cos"], truth[f"{name[:-3]}sin"])
@@ -471,7 +473,7 @@ def test_command(bench, csv_file, tmp_path, capsys):
         ),
         (
             {"--layout": "flexspline_fixed"},
-            ("N·m/rad", "i = 101", "signs", "layout", "teeth"),
+            ("flexspline_fixed", "101", "circular_spline_fixed", "ratio -100"),
         ),
         ({"--orders": "2:x"}, ("--orders", "2:x", "P:Q")),
         ({"--orders": "2:0,2:0"}, ("orders", "2:0, 2:0", "0:0")),
@@ -554,3 +556,76 @@ def test_bad_logs_are_one_line(tmp_path):
             BenchLog(
                 time=times, motor_angle=zero, link_angle=zero, output_torque=zero
             ).averaged(0.01)
+
+
+def late_by(rows: np.ndarray, seconds: float) -> np.ndarray:
+    """The same samples with late link angles; the ends, where none are, are cut."""
+    rows = rows.copy()
+    rows[:, 2] = CubicSpline(rows[:, 0], rows[:, 2])(rows[:, 0] - seconds)
+    return rows[20:-20]
+
+
+@pytest.mark.parametrize("late", [1e-4, 5e-4, 1e-3, -2e-3])
+def test_a_late_link_encoder_is_found_and_corrected(bench, late):
+    """Its delay comes back within its interval or 5 µs, the drive as without it."""
+    drive, rows, truth = bench
+    log = log_of(late_by(rows, late), np.random.default_rng(1))
+    found = identify(log, **settings(drive))
+    skew = found.estimates["link_skew"]
+    assert abs(skew.value - late) < max(3.0 * skew.deviation, 5e-6)
+    assert_recovers(found, truth, 0.05)
+    assert any("link_angle" in note and "ms" in note for note in found.notes)
+    assert found.doubts == ()
+
+
+def test_a_good_log_has_no_doubts(bench):
+    """Neither a skew beyond its interval nor a line of doubt."""
+    drive, rows, _ = bench
+    found = identify(log_of(rows, np.random.default_rng(4)), **settings(drive))
+    skew = found.estimates["link_skew"]
+    assert abs(skew.value) < max(3.0 * skew.deviation, 5e-6)
+    assert found.notes == () and found.doubts == ()
+
+
+def test_a_late_link_without_torque_behind_the_drive_is_doubted(bench):
+    """The motor cannot tell it from viscous friction: below zero, and said so."""
+    drive, rows, _ = bench
+    log = log_of(late_by(rows, 1e-3), np.random.default_rng(1), output_torque=None)
+    found = identify(log, **{**settings(drive), "rotor_inertia": INERTIA})
+    assert "link_skew" not in found.estimates
+    assert any("friction_viscous" in line for line in found.doubts)
+    assert "clocks" in " ".join(found.doubts)
+
+
+def test_torque_that_is_not_explained_ends_with_status_one(csv_file, tmp_path, capsys):
+    """More than a few percent left: a doubt with the share, map written, status 1."""
+    rows = np.genfromtxt(csv_file, delimiter=",", skip_header=2)
+    rng = np.random.default_rng(3)
+    rows[:, 3] += 80.0 * np.sign(rng.standard_normal(len(rows)))
+    head = csv_file.read_text().splitlines()[1]
+    path = tmp_path / "noisy.csv"
+    np.savetxt(path, rows, delimiter=";", header=head.replace(",", ";"))
+    out = tmp_path / "out"
+    options = ["--teeth", "200/202", "--rated", "67", "--orders", "2:0"]
+    assert main(["identify", str(path), *options, "--out", str(out), "--json"]) == 1
+    result = json.loads(capsys.readouterr().out)
+    assert any(names(line, "output_torque", "5%") for line in result["doubts"])
+    assert (out / "identified.swg").exists()
+    assert main(["identify", str(csv_file), *options, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["doubts"] == []
+
+
+@pytest.mark.parametrize(
+    ("layout", "sign", "parts"),
+    [
+        ("flexspline_fixed", 1.0, ("101", "layout circular_spline_fixed", "-100")),
+        ("circular_spline_fixed", -1.0, ("-100", "sign", "layout flexspline_fixed")),
+        ("wave_generator_fixed", 1.0, ("1.01", "layout circular_spline_fixed")),
+    ],
+)
+def test_another_layout_or_sign_is_told_from_the_angles(bench, layout, sign, parts):
+    """The slope of link over motor angle, and what would fit it."""
+    drive, rows, _ = bench
+    rows = rows * np.array([1.0, 1.0, sign, sign, 1.0])
+    with pytest.raises(InputError, match=naming("log", layout, *parts)):
+        identify(log_of(rows), **{**settings(drive), "layout": layout})
