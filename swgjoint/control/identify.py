@@ -19,8 +19,8 @@ residual, mean included, so that one with an offset does not count as precise.
 Clocks of encoders are apart: the link angles may be late by a time s, found as the
 other parameters are where the torque behind the drive was logged,
 :math:`\Delta = \theta/i + e_0 - \psi - s\dot\psi`; the log is then moved by it and
-fitted again. With the motor torque alone s cannot be told from viscous friction; friction
-below zero then ends as a doubt. A late torque channel passes for damping.
+fitted again. With the motor torque alone s cannot be told from viscous friction, and
+ends as a doubt where that comes out below zero. A late torque passes for damping.
 
 Samples are averaged over a window first: noise of the encoders would else push the
 slider of the element, and acceleration is a difference of averages. Intervals are those

@@ -67,7 +67,8 @@ class Checkpoint:
         if not path.exists():
             return None
         try:
-            with np.load(path, allow_pickle=False) as arrays:
+            content = io.BytesIO(path.read_bytes())
+            with np.load(content, allow_pickle=False) as arrays:
                 found = unpacked({key: arrays[key] for key in arrays.files}, _STATE)
         except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile) as error:
             raise InputError(
