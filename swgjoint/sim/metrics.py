@@ -21,7 +21,7 @@ from swgjoint.sim.orders import OrderLine, resample, strongest_lines
 from swgjoint.sim.ripple_validity import HARMONIC_LEVELS, ripple_label
 from swgjoint.sim.tool_metrics import joint_settling, tool_metrics
 from swgjoint.sim.verdict import PHASE_STEP, judged
-from swgjoint.units import arcmin, mm, rpm
+from swgjoint.units import arcmin, deg, mm, rpm
 
 if TYPE_CHECKING:
     from swgjoint.sim.run import Run
@@ -98,6 +98,7 @@ def joint_metrics(run: Run, j: int) -> dict[str, Any]:
         "phase_step_rad": phase_step(run, j),
         "transmission_error_arcmin": spread(error),
         "torsion_arcmin": spread(run.torsion[window, j] / arcmin),
+        "off_command_deg": _off_command(run, j),
         "input_turns": float(abs(angle[-1] - angle[0]) / (2.0 * np.pi)),
         "ratings": use_of_ratings(run, j),
         "motor": use_of_motor(run, j),
@@ -105,6 +106,14 @@ def joint_metrics(run: Run, j: int) -> dict[str, Any]:
         "settling": joint_settling(run, j),
         **({} if untold is None else {"missing": {"orders": untold}}),
     }
+
+
+def _off_command(run: Run, j: int) -> float | None:
+    """Largest distance of a link from its command; None without a constant speed."""
+    if not _any_steady(run):
+        return None
+    off = run.position[run.steady, j] - run.reference[run.steady, j]
+    return float(np.abs(off).max() / deg)
 
 
 def orders_untold(angle: Array, highest: float | None) -> str | None:

@@ -28,6 +28,8 @@ STEP_KEYS = {
     "torsion_arcmin": ("torsion_arcmin", "mean"),
 }
 """Figures whose change is given, by their place in the metrics of a joint."""
+OFF_COMMAND = 1.0
+"""Distance of a link from its command at constant speed that is said [deg]."""
 MAX_STEPS = 400_000
 """Of the finer run: some seconds."""
 
@@ -130,6 +132,13 @@ def warnings_of(joints: Mapping[str, Any]) -> list[str]:
                 f" {carries['order']:.4g} needs a step of"
                 f" {1e3 * carries['step_s']:.2g} ms or a speed of"
                 f" {carries['speed_deg_s']:.2g} deg/s"
+            )
+        off = joint["off_command_deg"]
+        if off is not None and off > OFF_COMMAND:
+            lines.append(
+                f"{name}: the link is up to {off:.3g} deg off its command at constant"
+                " speed: more than a drive does; look at the controller and the limits"
+                " of the motor"
             )
         ratings = joint["ratings"]
         if not ratings["within"]:

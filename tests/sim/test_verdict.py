@@ -109,6 +109,19 @@ def test_strict_turns_the_status_for_an_overloaded_drive(capsys):
     assert main([*arguments, "--strict"]) == 1
 
 
+def test_a_motor_that_does_not_follow_is_told(bench, synthetic_map):
+    """Without feed-forward and almost without gains the link lags by degrees."""
+    from swgjoint.view.validity import warnings_of
+
+    slack = {"stiffness_Nm_rad": 1e-3, "damping_Nms_rad": 1e-3, "feedforward": "none"}
+    told = bench(synthetic_map, controller=slack).metrics()["joints"]
+    assert told["joint"]["off_command_deg"] > 1.0
+    assert any(names(line, "joint", "command", "deg") for line in warnings_of(told))
+    fine = bench(synthetic_map).metrics()["joints"]
+    assert fine["joint"]["off_command_deg"] < 0.5
+    assert not any("command" in line for line in warnings_of(fine))
+
+
 def test_ripple_without_orders_of_the_drive_is_a_lower_bound(bench, synthetic_map):
     """Too fast for the tooth order: marked; at the named step it is there."""
     fast = {"trajectory__speed_deg_s__joint": 40.0, "simulation__duration_s": 0.25}
