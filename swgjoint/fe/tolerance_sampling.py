@@ -41,6 +41,9 @@ STAGES = ("equilibria", "linearised positions", "superposition", "full solves")
 """Of the sampling of a drive with errors, as the progress counts them."""
 FREE = 100.0
 """Compliance, in the median of all positions, from which the output counts as free."""
+CHUNK = 128
+"""Sets of errors that are superposed between two calls of the progress: of drives with
+many teeth a torque takes minutes."""
 _PHASE = "superposition-{:04d}"
 
 
@@ -90,14 +93,15 @@ def sample_tolerances(
         levels = np.append(small, levels)
     tables, perfect, free = [], [], 0
     loads = 2 * levels.size + 1
-    tick = _stage(progress, design, 2, phases * loads)
+    steps = loads * -(-pitches.size // CHUNK)  # rounded up
+    tick = _stage(progress, design, 2, phases * steps)
     for k, (rest, flawless) in enumerate(zip(linear, reference, strict=True)):
         there = _kept(keep, k, (3, loads, pitches.size))
         if there is None:
             found, count = _over_torque(rest, errors, levels, small, tick)
         else:
             found, count = there
-            tick(loads)
+            tick(steps)
         if not np.isfinite(found).all():
             lost = np.isnan(found).any(axis=(0, 1)).sum()
             raise ComputationError(
@@ -194,40 +198,51 @@ def _over_torque(
 ) -> tuple[Array, int]:
     """Output angle, strain energy, compliance at all torques (3, n_torques, n_sets).
 
-    And the number of sets whose unloaded output is free. ``tick`` is called after each
-    torque.
+    And the number of sets whose unloaded output is free. ``tick`` is called after
+    :data:`CHUNK` sets at a torque.
     """
     gaps = [at.gap_change(*errors) for _, at in rest.sides]
 
-    def row(torque: float, chosen: Any, start: Any) -> tuple[Array, Any]:
+    def row(
+        torque: float, chosen: Any, start: Any, tick: Callable[[], None]
+    ) -> tuple[Array, Any]:
         side = 0 if torque >= 0.0 else 1
         state, at = rest.sides[side]
-        found = at.respond(gaps[side][chosen], torque, start)
-        # of the equilibrium at which it is linearised
-        potential = found.potential + state.energy + at.torque * at.angle
-        energy = potential - torque * found.output_angle
-        return np.stack([found.output_angle, energy, found.compliance]), found.active
+        change = gaps[side][chosen]
+        tables, active = [], []
+        for k in range(0, len(change), CHUNK):
+            part = slice(k, k + CHUNK)
+            begin = None if start is None else start[part]
+            found = at.respond(change[part], torque, begin)
+            # of the equilibrium at which it is linearised
+            potential = found.potential + state.energy + at.torque * at.angle
+            energy = potential - torque * found.output_angle
+            tables.append(np.stack([found.output_angle, energy, found.compliance]))
+            active.append(found.active)
+            tick()
+        return np.concatenate(tables, axis=1), np.concatenate(active)
 
     unloaded, at_rest = np.zeros((3, len(gaps[0]))), None
     free = np.ones(len(gaps[0]), dtype=bool)
     if rest.opposite is None:
-        unloaded, at_rest = row(0.0, slice(None), None)
+        unloaded, at_rest = row(0.0, slice(None), None, tick)
         # a few free positions leave the median as it is
         free = ~(unloaded[2] < FREE * np.nanmedian(unloaded[2]))
     if free.any():
-        ends = [row(t, free, None)[0] for t in (small, -small)]
+        ends = [row(t, free, None, lambda: None)[0] for t in (small, -small)]
         middle = 0.5 * (ends[0] + ends[1])
         middle[1] -= 0.5 * small**2 * middle[2]  # what the small torque stores
         middle[2] = 0.5 * (ends[1][0] - ends[0][0]) / small
         unloaded[:, free] = middle
-    tick()
+    if rest.opposite is not None:
+        for _ in range(0, len(gaps[0]), CHUNK):
+            tick()
     sides = []
     for sign in (-1.0, 1.0):
         active, rows = at_rest, []
         for level in levels:
-            found, active = row(sign * level, slice(None), active)
+            found, active = row(sign * level, slice(None), active, tick)
             rows.append(found)
-            tick()
         sides.append(rows)
     table = [*sides[0][::-1], unloaded, *sides[1]]
     return np.stack(table, axis=1), int(free.sum())

@@ -141,6 +141,7 @@ def test_the_superposition_of_errors_is_counted_and_goes_on(monkeypatch, tmp_pat
     """Every torque of every position in the pitch is a step; finished ones are kept."""
     monkeypatch.setattr(tolerance_sampling, "LEVELS", (1.0,))
     monkeypatch.setitem(tolerance_sampling.CHECKS, "2d", 1)
+    monkeypatch.setattr(tolerance_sampling, "CHUNK", 62)
     design = few_teeth(**{"tolerances.circular_spline_eccentricity_um": 5.0})
     options = {"repeated_peak": 20.0, "rated_torque": 10.0, "phases": 2}
     whole = sample_tolerances(design, **options)
