@@ -60,8 +60,10 @@ def ripple_label(run: Run, j: int, ripple: Array) -> dict[str, Any]:
     missing = None
     if not any(has_harmonics(run, k) for k in range(len(run.joints))):
         missing = "no drive of the run has a kinematic error or harmonics at its level"
-    elif not left and rms < max(ABOVE_NOISE * noise, ROUND_OFF * rated):
+    elif rms < max(ABOVE_NOISE * noise, ROUND_OFF * rated):
         missing = "below the noise of the integration"
+        if left:
+            missing = "the step carries none of its orders"
     whole = float(np.hypot(rms, left))
     return {
         "ripple_missing": missing,

@@ -181,7 +181,7 @@ def test_map_without_a_loop_says_why(monkeypatch, synthetic_map):
         raise ComputationError("no equilibrium at 3 N·m")
 
     monkeypatch.setattr(building, "friction_loops", fails)
-    drive = building._with_friction(rubbing(0.1), synthetic_map, lambda *_: None)
+    drive = building._with_friction(rubbing(0.1), synthetic_map, lambda *_: None, None)
     sheet = drive.spec_sheet(only=["hysteresis_loss_arcmin"])
     assert sheet["hysteresis_loss_arcmin"] is None
     assert "no equilibrium at 3 N·m" in sheet["missing"]["hysteresis_loss_arcmin"]

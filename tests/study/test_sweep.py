@@ -114,8 +114,8 @@ def test_a_bad_design_is_reported_and_the_rest_finishes(counted):
     assert (result["done"], result["failed"]) == (1, 3)
     reasons = [row["reason"] for row in result["rows"]]
     assert reasons[0] == ""
-    tip = ("flexspline.profile.addendum_radius_mm", "1.0 mm", "tip_radius_mm")
-    assert names(reasons[1], *tip, "straight_mm")
+    tip = ("flexspline.profile.addendum_radius_mm", "1.0 mm", "pressure_angle_deg")
+    assert names(reasons[1], *tip, "27.68 deg")
     assert names(reasons[2], "ratings.rated_torque_Nm", "-1 N·m", "> 0 N·m")
     assert result["rows"][1]["rated_torque_Nm"] is None
 
