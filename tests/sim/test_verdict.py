@@ -128,9 +128,8 @@ def test_ripple_without_orders_of_the_drive_is_a_lower_bound(bench, synthetic_ma
     joint = bench(synthetic_map, **fast).metrics()["joints"]["joint"]
     assert [item["order"] for item in joint["unresolved"]] == [122.0]
     assert joint["ripple_is_lower_bound"] and not joint["ripple_missing"]
-    faster = fast | {"trajectory__speed_deg_s__joint": 4000.0}
-    none = bench(synthetic_map, **faster, simulation__duration_s=0.05).metrics()
-    none = none["joints"]["joint"]
+    faster = fast | {"trajectory__speed_deg_s__joint": 400.0}
+    none = bench(synthetic_map, **faster).metrics()["joints"]["joint"]
     assert none["ripple_is_lower_bound"]
     carries = joint["resolving"]
     assert carries["order"] == 122.0
