@@ -41,14 +41,15 @@ def run_metrics(run: Run) -> dict[str, Any]:
     """Figures of all joints and of the tool under the keys of the JSON output."""
     steady = _any_steady(run)
     joints = {name: joint_metrics(run, j) for j, name in enumerate(run.joints)}
+    energy = run_energy(run)
     return {
-        **judged(run, joints),
+        **judged(run, joints, energy),
         "joints": joints,
         "tool": tool_metrics(run),
         "window_s": [float(t) for t in run.time[run.steady][[0, -1]]],
         "window_of": "constant speed" if steady else "motion",
         "ripple_of": RIPPLE_OF if steady else f"{RIPPLE_OF}; {NOT_STEADY}",
-        "energy": run_energy(run),
+        "energy": energy,
         "sub_steps": run.assembly.sub_steps,
         "steps_per_s": run.steps_per_second,
     }

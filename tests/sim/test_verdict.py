@@ -11,6 +11,7 @@ from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.ripple_validity import integration_noise
 from swgjoint.sim.run import run_scene
 from swgjoint.sim.scene import Scene
+from swgjoint.sim.verdict import energy_reasons
 
 LINEAR = "defaults.linear={stiffness_Nm_rad=2e4,rated_torque_Nm=50.0}"
 SHORT = ["--set", LINEAR, "--set", "simulation.duration_s=1.0"]
@@ -76,6 +77,19 @@ def test_torque_beyond_the_map_makes_a_run_invalid(bench, synthetic_map):
     over = bench(synthetic_map, **settled, load__joint__torque_Nm=1.5 * end).metrics()
     assert over["verdict"] == "NOT VALID"
     assert names(over["reasons"][0], "joint", f"{end:.4g} N·m")
+
+
+def test_missing_energy_makes_a_run_invalid(bench, synthetic_map):
+    """A balance that misses a tenth of the works, not one that misses a percent."""
+    energy = bench(synthetic_map).metrics()["energy"]
+    assert energy_reasons(energy, 50.0) == []
+    work = abs(energy["motor_work_J"])
+    (line,) = energy_reasons(energy | {"balance_error_J": work}, 50.0)
+    assert names(line, f"{work:.3g} J", "simulation.step_s")
+    assert energy_reasons(energy | {"balance_error_J": 0.01 * work}, 50.0) == []
+    # works of nothing: round-off of it is no reason
+    nothing = dict.fromkeys(energy, 0.0) | {"balance_error_J": 1e-6}
+    assert energy_reasons(nothing, 50.0) == []
 
 
 def test_the_verdict_stands_above_the_figures(capsys):
