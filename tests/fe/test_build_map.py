@@ -6,8 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from messages import names
 from solved import coarse, few_teeth
 
+from swgjoint.errors import ComputationError
+from swgjoint.fe import build_map as building
 from swgjoint.fe import sampling, tolerance_sampling
 from swgjoint.fe.build_map import build_map
 from swgjoint.fe.sampling import sample_map
@@ -172,3 +175,22 @@ def test_the_superposition_of_errors_is_counted_and_goes_on(monkeypatch, tmp_pat
     assert sorted(superposed) == [1, 1, 62]
     for key in ("torque", "table", "perfect"):
         assert np.array_equal(getattr(found, key), getattr(whole, key))
+
+
+def test_a_map_in_3d_says_at_once_that_it_takes_long(monkeypatch):
+    """Before the first equilibrium, with the quicker fidelities."""
+    said = []
+
+    def stopped(*_: object, **__: object) -> None:
+        raise ComputationError("stopped")
+
+    monkeypatch.setattr(building, "sample_map", stopped)
+    with pytest.raises(ComputationError, match="stopped"):
+        build_map(
+            Design.load("size-25-100"),
+            model="3d",
+            progress=lambda *step: said.append(step),
+            cache=False,
+        )
+    (first,) = said
+    assert names(first[0], "size-25-100", "3D", "min", "2d", "ring")

@@ -7,6 +7,7 @@ import pytest
 from messages import names
 
 from swgjoint.cli.main import main
+from swgjoint.cli.run import tool_line
 from swgjoint.maps.drive_map import DriveMap
 
 LINEAR = "defaults.linear={stiffness_Nm_rad=2e4,rated_torque_Nm=50.0}"
@@ -131,3 +132,28 @@ def test_run_goes_to_a_viewer_on_this_machine_only(capsys, monkeypatch):
     elsewhere = "rerun+http://192.0.2.1:9876/proxy"
     assert main(["run", "bench", *SHORT, "--live", elsewhere]) == 2
     assert names(capsys.readouterr().err, f"'{elsewhere}'", "127.0.0.1")
+
+
+def test_the_fidelity_of_designs_is_an_option(capsys, monkeypatch, synthetic_map):
+    """``--model`` reaches the map of every design; a catalogue drive has none."""
+    asked = []
+
+    def load(name: str, *, model: str | None, progress: object) -> DriveMap:
+        asked.append((name, model))
+        return synthetic_map
+
+    monkeypatch.setattr("swgjoint.sim.drives.load_drive", load)
+    short = ["--set", "simulation.duration_s=1.0"]
+    assert main(["run", "bench", "--model", "ring", *short]) == 0
+    assert asked == [("reference-2d", "ring")]
+    capsys.readouterr()
+    arguments = ["run", "bench", "--drive", "CSG-25-100", "--model", "ring", *short]
+    assert main(arguments) == 2
+    assert names(capsys.readouterr().err, "'ring'", "'CSG-25-100'", "design")
+
+
+def test_repeatability_of_a_scene_without_chance_is_a_dash():
+    """What never differs has no spread to tell; accuracy stays."""
+    tool = {"path_rms_mm": None, "rp_mm": 1e-12, "ap_mm": 0.58}
+    assert names(tool_line(tool, random=False), "AP 0.5800 mm", "RP -", "random")
+    assert names(tool_line(tool | {"rp_mm": 0.01}, random=True), "RP 0.0100 mm")
