@@ -267,10 +267,18 @@ def check_joint_names(
 ) -> None:
     """Refuse keys that name a joint which the arm does not have, all at once."""
     lines = [
-        f"{where}: {key}.{name}: no such joint in arm {arm!r}; accepted:"
-        f" {', '.join(joints)}"
+        f"{where}: {key}.{name}: no such joint in arm {arm!r}"
+        f"{_meant(key, name, joints)}; accepted: {', '.join(joints)}"
         for key, names in named.items()
         for name in sorted(names - set(joints))
     ]
     if lines:
         raise InputError("\n".join(lines))
+
+
+def _meant(key: str, name: str, joints: tuple[str, ...]) -> str:
+    """What a name that no joint has may have meant."""
+    if key == "joints" and name == "*":
+        return "; keys of all joints are under 'defaults', e.g. defaults.friction"
+    near = near_names(name, joints)
+    return f"; did you mean {' or '.join(near)}?" if near else ""

@@ -194,3 +194,16 @@ def test_contents_say_where_the_error_comes_from():
     lines = left_out_lines(contents(assemble(Scene.from_data(SCENE, overrides=one))))
     (line,) = (text for text in lines if "friction" in text)
     assert names(line, "(shoulder)")
+
+
+@pytest.mark.parametrize(
+    ("name", "hint"),
+    [
+        ("shoulder_", "did you mean shoulder?"),
+        ("*", "'defaults', e.g. defaults.friction"),
+    ],
+)
+def test_a_wrong_joint_points_to_what_was_meant(name, hint):
+    scene = Scene.from_data(SCENE | {"joints": {name: {"friction": False}}})
+    with pytest.raises(InputError, match=hint.replace("?", r"\?")):
+        assemble(scene)
