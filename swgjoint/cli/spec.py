@@ -263,7 +263,7 @@ def report(result: dict[str, Any]) -> str:
 
     keys = [key for key in KEYS if key in result and key != "orders"]
     stated = result.get("stated") or {}
-    header = ("", "measured", *(["stated"] if stated else []), "")
+    header = ("", "predicted", *(["stated"] if stated else []), "")
     rows = []
     for key in keys:
         name, unit = words(key)

@@ -478,3 +478,10 @@ def test_ratcheting_torque_of_a_design(capsys, monkeypatch, passes):
     if not passes:
         where = "the search ended with the torque largest after 0.3 of a pitch with 3"
     assert f"ratcheting: {where}" in out
+
+
+def test_the_sheet_does_not_call_predictions_measured(capsys):
+    assert main(["spec", "CSG-25-100", "--only", "K1_Nm_rad"]) == 0
+    header = capsys.readouterr().out.splitlines()[1]
+    assert "predicted" in header
+    assert "measured" not in header
