@@ -247,7 +247,7 @@ def notes(joints: dict[str, Any]) -> list[str]:
 
     lines = warnings_of(joints)
     whys = {joint["ripple_missing"] for joint in joints.values()} - {None}
-    lines += [f"-: no torque ripple: {why}" for why in sorted(whys)]
+    lines += [f"-: no figure for the torque ripple: {why}" for why in sorted(whys)]
     if any(not line["drive_order"] for j in joints.values() for line in j["orders"]):
         lines.insert(
             0,

@@ -7,6 +7,7 @@ import pytest
 from messages import names
 
 from swgjoint.cli.main import main
+from swgjoint.cli.run import notes
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.ripple_validity import integration_noise
 from swgjoint.sim.run import run_scene
@@ -192,3 +193,14 @@ def test_a_run_of_a_catalogue_drive_in_an_arm_is_valid():
     )
     assert run.metrics()["reasons"] == []
     assert isinstance(run.assembly.transmissions[0].drive, DriveMap)
+
+
+def test_a_ripple_that_the_step_cannot_carry_is_unknown_rather_than_none(
+    bench, synthetic_map
+):
+    joints = bench(synthetic_map).metrics()["joints"]
+    joints["joint"]["ripple_missing"] = "the step carries none of its orders"
+    (line,) = [text for text in notes(joints) if text.startswith("-:")]
+    assert line == (
+        "-: no figure for the torque ripple: the step carries none of its orders"
+    )
