@@ -61,8 +61,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--strict",
         action="store_true",
-        help="exit status 1 for a drive above its ratings and for a ripple that is a"
-        " lower bound, too",
+        help="exit status 1 wherever a line doubts a figure: a drive above its ratings,"
+        " a ripple that is a lower bound, a link off its command",
     )
     parser.add_argument(
         "--report", action="store_true", help="write report.html into DIR, too"

@@ -132,7 +132,8 @@ def arm_scene(
         "arm": reference,
         "tool_site": _tool(arm),
         "defaults": {"level": "full"},
-        "controller": {"feedforward": "gravity_inertia"},
+        # the integral carries the friction of the drives, which would else be a lag
+        "controller": {"kind": "pid", "feedforward": "gravity_inertia"},
     }
     if reading.driven:
         data["driven"] = list(reading.driven)

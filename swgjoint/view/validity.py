@@ -15,7 +15,7 @@ import numpy as np
 from swgjoint.errors import SwgError
 from swgjoint.sim.run import run_scene
 from swgjoint.sim.scene import Scene
-from swgjoint.units import arcmin
+from swgjoint.units import arcmin, deg
 
 if TYPE_CHECKING:
     from swgjoint.maps.drive_map import DriveMap
@@ -28,8 +28,9 @@ STEP_KEYS = {
     "torsion_arcmin": ("torsion_arcmin", "mean"),
 }
 """Figures whose change is given, by their place in the metrics of a joint."""
-OFF_COMMAND = 1.0
-"""Distance of a link from its command at constant speed that is said [deg]."""
+OFF_COMMAND, LAG = 0.1, 3.0
+"""Distance of a link from its command that is said [deg], where it is also that many
+times the transmission error of its drive."""
 MAX_STEPS = 400_000
 """Of the finer run: some seconds."""
 
@@ -133,12 +134,13 @@ def warnings_of(joints: Mapping[str, Any]) -> list[str]:
                 f" {1e3 * carries['step_s']:.2g} ms or a speed of"
                 f" {carries['speed_deg_s']:.2g} deg/s"
             )
-        off = joint["off_command_deg"]
-        if off is not None and off > OFF_COMMAND:
+        off, drive = joint["off_command_deg"], joint["transmission_error_arcmin"]
+        share = (abs(drive["mean"]) + drive["pp"]) * arcmin / deg
+        if off is not None and off > max(OFF_COMMAND, LAG * share):
             lines.append(
-                f"{name}: the link is up to {off:.3g} deg off its command at constant"
-                " speed: more than a drive does; look at the controller and the limits"
-                " of the motor"
+                f"{name}: the link is up to {off:.2g} deg off its command at constant"
+                f" speed, of which the drive errs by {60.0 * share:.2g} arcmin; the"
+                " rest is the controller's: friction, gains, limits of the motor"
             )
         ratings = joint["ratings"]
         if not ratings["within"]:

@@ -218,6 +218,9 @@ def own(folder: Path, **parts: str) -> str:
     return str(file)
 
 
+SHORT = {"simulation.duration_s": 2.0, "controller.kind": "pd"}
+
+
 def test_a_scene_takes_the_mechanics_of_a_file_and_no_more(tmp_path):
     """Motors, sensors, keyframes, armature go; the model has those of the scene."""
     arm = RigidArm(own(tmp_path))
@@ -227,7 +230,7 @@ def test_a_scene_takes_the_mechanics_of_a_file_and_no_more(tmp_path):
     np.testing.assert_array_equal(arm.model.dof_damping, 0.3)
     scene = scene_of_arm(str(arm.path), overrides=[STEADY])
     scene = scene.with_friction(False).with_kinematic_error(0.0)
-    run = run_scene(scene, overrides={"simulation.duration_s": 2.0})
+    run = run_scene(scene, overrides=SHORT)
     model = run.assembly.model
     assert (model.nu, model.nsensor, model.nkey) == (2, 0, 0)
     needed = run.assembly.link_torque[run.steady]

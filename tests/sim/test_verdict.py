@@ -133,7 +133,7 @@ def test_a_motor_that_does_not_follow_is_told(bench, synthetic_map):
     assert told["joint"]["off_command_deg"] > 1.0
     assert any(names(line, "joint", "command", "deg") for line in warnings_of(told))
     fine = bench(synthetic_map).metrics()["joints"]
-    assert fine["joint"]["off_command_deg"] < 0.5
+    assert fine["joint"]["off_command_deg"] < 0.1
     assert not any("command" in line for line in warnings_of(fine))
 
 
