@@ -150,6 +150,9 @@ def report(result: dict[str, Any]) -> str:
         f" {result['window_s'][0]:.3g} to {result['window_s'][1]:.3g} s",
         joint_table(result["joints"]),
         *notes(result["joints"]),
+        ""
+        if result["window_of"] == "constant speed"
+        else f"ripple: {result['ripple_of']}",
         tool_line(result["tool"], random="sensors" in contains),
         *(choice_lines(choice) if (choice := result.get("drive_choice")) else []),
         f"model: {contains['degrees_of_freedom']} degrees of freedom,"
@@ -157,6 +160,7 @@ def report(result: dict[str, Any]) -> str:
         f" instances, {contains['integrator']} at {1e3 * contains['step_s']:g} ms,"
         f" {result['steps_per_s']:.3g} steps/s",
         sub_step_line(contains),
+        *assumed_lines(contains),
         *left_out_lines(contains),
         *[f"wrote {path}" for path in result["files"]],
     ]
@@ -172,6 +176,20 @@ def verdict_lines(metrics: dict[str, Any]) -> list[str]:
     return [
         f"{metrics['verdict']}: the figures below do not describe this scene",
         *(f"  {reason}" for reason in metrics["reasons"]),
+    ]
+
+
+def assumed_lines(contains: dict[str, Any]) -> list[str]:
+    """Kinematic errors that nobody measured, joints with the same together."""
+    found: dict[str, list[str]] = {}
+    for name, joint in contains["joints"].items():
+        what, _, _ = str(joint["kinematic_error"]).partition(", joint ")
+        if what.startswith("assumed"):
+            found.setdefault(what, []).append(name)
+    return [
+        f"kinematic error {what}"
+        + ("" if len(names) == len(contains["joints"]) else f" ({', '.join(names)})")
+        for what, names in found.items()
     ]
 
 

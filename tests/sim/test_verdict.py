@@ -168,6 +168,21 @@ def test_a_drive_without_harmonics_has_no_ripple(bench, plain_map, synthetic_map
     assert level["joints"]["joint"]["ripple_missing"]
 
 
+def test_an_assumed_error_is_said(capsys):
+    """Its size, orders and seed; none where the scene has none."""
+    assert main(["run", "bench", *loaded(20.0)]) == 0
+    assert names(capsys.readouterr().out, "assumed", "1 arcmin", "2 and 4", "seed 0")
+    none = ["--set", "defaults.kinematic_error_arcmin=0"]
+    assert main(["run", "bench", *loaded(20.0), *none]) == 0
+    assert "assumed" not in capsys.readouterr().out
+
+
+def test_ripple_of_a_motion_without_constant_speed_is_explained(capsys):
+    """It holds the dynamics of the motion, too."""
+    assert main(["run", "bench-chirp", "--set", "simulation.duration_s=9.8"]) == 0
+    assert names(capsys.readouterr().out, "ripple", "dynamics")
+
+
 def test_ripple_that_is_none_is_a_dash(capsys):
     """In the table of the joints, with the reason below."""
     assert main(["run", "bench", *SHORT]) == 0
