@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 from messages import names, naming
 from scipy.interpolate import CubicSpline
+from scipy.signal import lfilter
 
 from swgjoint.cli.identify import result_of
 from swgjoint.cli.main import main
-from swgjoint.control.identify import identify, rms
+from swgjoint.control.identify import _correlation, identify, rms
 from swgjoint.control.identify_log import (
     BenchLog,
     mean_acceleration,
@@ -162,6 +163,14 @@ def test_log_with_noise_gives_all_parameters(bench):
     found = identify(log_of(rows, np.random.default_rng(1)), **settings(drive))
     assert found.estimates.keys() == truth.keys()
     assert_recovers(found, truth, 0.05)
+
+
+def test_residuals_that_are_alike_widen_the_intervals():
+    """Of x_k = a x_(k-1) + noise the factor is (1 + a)/(1 - a); 1 of white noise."""
+    noise = np.random.default_rng(1).normal(size=40_000)
+    assert _correlation(noise) == pytest.approx(1.0, abs=0.05)
+    alike = lfilter([1.0], [1.0, -0.6], noise)
+    assert _correlation(alike) == pytest.approx(4.0, rel=0.1)
 
 
 @pytest.mark.slow
