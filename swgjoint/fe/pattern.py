@@ -296,7 +296,7 @@ def _read(keep: Unfinished, name: str, *, like: AnyState) -> AnyState | None:
 
 
 def _check_like(state: Any, like: Any) -> None:
-    """Refuse what is no equilibrium of the same model."""
+    """Refuse a state that is not an equilibrium of the same model."""
     if type(state) is not type(like) or state.faces.shape != like.faces.shape:
         raise ValueError("a state of another model")
     if not np.isfinite(state.faces).all():

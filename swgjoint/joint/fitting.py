@@ -133,7 +133,7 @@ def fitted(
 
 
 def check_spec(spec: object) -> None:
-    """Refuse what is no ``MjSpec`` by name.
+    """Refuse an argument that is not an ``MjSpec``, naming its type.
 
     Raises:
         InputError: With what was given and what to give.

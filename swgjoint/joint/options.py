@@ -110,12 +110,6 @@ def options_for(spec: mujoco.MjSpec, wanted: str, *, rotors: bool) -> Options:
     )
 
 
-def allow_iterations(spec: mujoco.MjSpec) -> None:
-    """Let the engine's solvers converge, without a word."""
-    option = spec.option
-    option.iterations, option.ls_iterations, option.tolerance = _converging(spec)
-
-
 def _converging(spec: mujoco.MjSpec) -> tuple[int, int, float]:
     """Iterations, iterations of the line search and tolerance that do."""
     option = spec.option

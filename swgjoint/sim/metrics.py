@@ -20,7 +20,7 @@ from swgjoint.sim.energy import joint_energy, run_energy
 from swgjoint.sim.orders import OrderLine, resample, strongest_lines
 from swgjoint.sim.ripple_validity import HARMONIC_LEVELS, ripple_label
 from swgjoint.sim.tool_metrics import joint_settling, tool_metrics
-from swgjoint.sim.verdict import PHASE_STEP, judged
+from swgjoint.sim.verdict import PHASE_STEP, judge_run
 from swgjoint.units import arcmin, deg, mm, rpm
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ def run_metrics(run: Run) -> dict[str, Any]:
     joints = {name: joint_metrics(run, j) for j, name in enumerate(run.joints)}
     energy = run_energy(run)
     return {
-        **judged(run, joints, energy),
+        **judge_run(run, joints, energy),
         "joints": joints,
         "tool": tool_metrics(run),
         "window_s": [float(t) for t in run.time[run.steady][[0, -1]]],

@@ -31,13 +31,13 @@ HARMONIC_LEVELS = ("kinematic", "full")
 SHARE = 0.05
 """Part of the ripple that may be left out before the figure is a lower bound."""
 ABOVE_NOISE = 3.0
-"""Ripple over the noise of the integration from which on it is told."""
+"""Smallest ratio of ripple to integration noise at which the ripple is reported."""
 ROUND_OFF = 1e-6
-"""Share of the rated torque below which nothing is told."""
+"""Share of the rated torque below which no ripple is reported."""
 
 
 def ripple_label(run: Run, j: int, ripple: Array) -> dict[str, Any]:
-    """What stands beside the ripple of one joint.
+    """Validity of the ripple of one joint.
 
     Args:
         run: The run.

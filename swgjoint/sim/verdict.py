@@ -90,7 +90,7 @@ def collisions(run: Run) -> list[Collision]:
     )
 
 
-def judged(
+def judge_run(
     run: Run, joints: Mapping[str, Any], energy: Mapping[str, float]
 ) -> dict[str, Any]:
     """``verdict``, ``reasons`` and ``collisions`` of a run.
@@ -144,7 +144,7 @@ def energy_reasons(energy: Mapping[str, float], rated: float) -> list[str]:
     """One line where more energy is missing than integration and sums can explain.
 
     Args:
-        energy: See :func:`judged` [J].
+        energy: See :func:`judge_run` [J].
         rated: Sum of the rated torques [N·m].
     """
     works = ("motor_work_J", "load_work_J", "dissipated_J", "arm_dissipated_J")

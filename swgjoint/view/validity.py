@@ -139,8 +139,8 @@ def warnings_of(joints: Mapping[str, Any]) -> list[str]:
         if off is not None and off > max(OFF_COMMAND, LAG * share):
             lines.append(
                 f"{name}: the link is up to {off:.2g} deg off its command at constant"
-                f" speed, of which the drive errs by {60.0 * share:.2g} arcmin; the"
-                " rest is the controller's: friction, gains, limits of the motor"
+                f" speed; the drive accounts for {60.0 * share:.2g} arcmin, the"
+                " controller for the rest (friction, gains, motor limits)"
             )
         ratings = joint["ratings"]
         if not ratings["within"]:
