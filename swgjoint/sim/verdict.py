@@ -147,7 +147,7 @@ def energy_reasons(energy: Mapping[str, float], rated: float) -> list[str]:
         energy: See :func:`judge_run` [J].
         rated: Sum of the rated torques [N·m].
     """
-    works = ("motor_work_J", "load_work_J", "dissipated_J", "arm_dissipated_J")
+    works = ("motor_work_J", "load_work_J", "dissipated_J")
     turnover = sum(abs(energy[key]) for key in works) + abs(energy["stored_J"])
     missing = energy["balance_error_J"]
     if abs(missing) <= max(ENERGY_SHARE * turnover, ENERGY_FLOOR * rated):
