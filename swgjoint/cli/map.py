@@ -7,6 +7,7 @@ import time
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from swgjoint.cli.map_validity_text import validation_of_map, validation_table
 from swgjoint.cli.text import table
 from swgjoint.errors import InputError
 from swgjoint.files import check_output_file
@@ -63,6 +64,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
     Returns:
         ``residual``, ``energy_check`` and ``harmonics`` of the map's record,
+        ``validation`` against unseen solves (null with ``validation_reason``),
         ``stiffness_Nm_rad``, ``torque_range_Nm``, ``level``, ``files``, ``wall_s``;
         of a measured loop ``fit``: ``hysteresis_loss_arcmin`` and
         ``lost_motion_arcmin`` of the loop and of the map, ``rms_arcmin`` between them,
@@ -75,11 +77,13 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         drive = replace(drive, fields=None)
     drive.save(path)
     info = dict(drive.info)
+    info.pop("validation", None)
     return {
         "design": drive.name,
         "level": drive.level,
         "residual": info.pop("residual", None),
         "energy_check": info.pop("energy_check", None),
+        **validation_of_map(drive),
         "harmonics": info.pop("harmonics", None)
         or [{"alpha": int(p), "beta": int(q)} for p, q in drive.orders],
         "stiffness_Nm_rad": drive.mean_stiffness,
@@ -147,6 +151,7 @@ def report(result: dict[str, Any]) -> str:
         ("wall time [s]", result["wall_s"]),
     ]
     lines = [f"map of {result['design']}: {result['files'][0]}", table(rows)]
+    lines += validation_table(result)
     fit = result.get("fit")
     if fit:
         pairs = [

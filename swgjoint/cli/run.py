@@ -62,7 +62,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--strict",
         action="store_true",
         help="exit status 1 wherever a line doubts a figure: a drive above its ratings,"
-        " a ripple that is a lower bound, a link off its command",
+        " a ripple that is a lower bound or uncertain, a link off its command",
     )
     parser.add_argument(
         "--report", action="store_true", help="write report.html into DIR, too"
@@ -226,6 +226,8 @@ def joint_table(joints: dict[str, Any]) -> str:
 
 def joint_row(item: tuple[str, dict[str, Any]]) -> tuple[str, ...]:
     """Figures of one joint as the table shows them."""
+    from swgjoint.maps.map_validity import joint_mark
+
     name, joint = item
     torsion, error = joint["torsion_arcmin"], joint["transmission_error_arcmin"]
     return (
@@ -234,24 +236,37 @@ def joint_row(item: tuple[str, dict[str, Any]]) -> tuple[str, ...]:
         fixed(torsion["mean"]),
         fixed(torsion["pp"]),
         fixed(error["mean"]),
-        fixed(error["pp"]),
+        _signed(joint_mark(joint, ("output_error",)), fixed(error["pp"])),
         ripple_cell(joint, "ripple_pp_percent"),
         ripple_cell(joint, "ripple_rms_percent"),
-        "  ".join(
-            f"{line['order']:.1f}{'' if line['drive_order'] else '*'}"
-            f" ({line['amplitude_percent']:.3f})"
-            for line in joint["orders"]
-        )
-        or "-",
+        _signed(
+            joint_mark(joint),
+            "  ".join(
+                f"{line['order']:.1f}{'' if line['drive_order'] else '*'}"
+                f" ({line['amplitude_percent']:.3f})"
+                for line in joint["orders"]
+            )
+            or "-",
+        ),
         _orders(joint["unresolved"]),
     )
 
 
 def ripple_cell(joint: dict[str, Any], key: str) -> str:
-    """A figure of the ripple: a dash for none, marked where it is a lower bound."""
+    """A figure of the ripple: a dash for none, marked where it says less.
+
+    > where it is a lower bound, ~ and ! where the map differs from unseen solves.
+    """
+    from swgjoint.maps.map_validity import joint_mark
+
     if joint["ripple_missing"]:
         return "-"
-    return f"{'> ' if joint['ripple_is_lower_bound'] else ''}{fixed(joint[key])}"
+    bound = "> " if joint["ripple_is_lower_bound"] else ""
+    return _signed(joint_mark(joint), f"{bound}{fixed(joint[key])}")
+
+
+def _signed(sign: str, text: str) -> str:
+    return text if not sign or text == "-" else f"{sign} {text}"
 
 
 def fixed(value: float, digits: int = 3) -> str:
@@ -261,10 +276,13 @@ def fixed(value: float, digits: int = 3) -> str:
 
 def notes(joints: dict[str, Any]) -> list[str]:
     """What marks in the table mean, and warnings about the validity of figures."""
+    from swgjoint.maps.map_validity import joint_mark, mark_legend
     from swgjoint.view.validity import warnings_of
 
     lines = warnings_of(joints)
     whys = {joint["ripple_missing"] for joint in joints.values()} - {None}
+    if marks := {joint_mark(joint) for joint in joints.values()} - {""}:
+        lines.insert(0, mark_legend(marks))
     lines += [f"-: no figure for the torque ripple: {why}" for why in sorted(whys)]
     if any(not line["drive_order"] for j in joints.values() for line in j["orders"]):
         lines.insert(

@@ -6,6 +6,7 @@ import argparse
 import time
 from typing import TYPE_CHECKING, Any
 
+from swgjoint.cli.map_validity_text import doubts, marked, validation_of_sheet
 from swgjoint.cli.text import table
 from swgjoint.files import output_folder, write_whole
 from swgjoint.json_text import json_text
@@ -62,7 +63,9 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         Every key of :data:`swgjoint.maps.spec_sheet.KEYS` (or those of ``--only``),
         None where the source cannot tell, with the reason in ``missing``; ``design``,
         ``validity``, ``files``, ``wall_s``; ``radial_stiffness`` and ``fatigue`` with
-        what stands behind these two figures, where they were computed; ``ratcheting``
+        what stands behind these two figures, where they were computed; ``uncertain``
+        by key what the map misses, ``validation`` of the map against unseen solves
+        (null with ``validation_reason``) and ``validation_notes``; ``ratcheting``
         with the path to the largest torque, or to where it ended; ``running`` with
         what rubs in a design that turns without load; ``measured`` with --measured,
         see :meth:`swgjoint.maps.overlay.Overlay.as_dict`.
@@ -89,6 +92,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     result: dict[str, Any] = {"design": name, **sheet.as_dict(), **details}
     if drive is not None:
         result["validity"] = validity(drive)
+        result |= validation_of_sheet(drive, keys)
         if "manufacturing_errors" in drive.info:
             result["validity"]["manufacturing_errors"] = drive.info[
                 "manufacturing_errors"
@@ -97,6 +101,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         result["stated"] = stated if isinstance(stated, dict) else None
     else:
         result["validity"] = {"level": "design", "ratings": ratings.source}
+        result |= validation_of_sheet(None, keys)
     laid = None
     if loop is not None:
         from swgjoint.maps.loop_units import check_units
@@ -268,7 +273,7 @@ def report(result: dict[str, Any]) -> str:
     for key in keys:
         name, unit = words(key)
         more = [stated.get(key)] if stated else []
-        rows.append((name, result[key], *more, unit))
+        rows.append((name, marked(result, key), *more, unit))
     lines = [f"spec sheet of {result['design']} ({_source(result)})"]
     if rows:
         lines.append(table(rows, header=header))
@@ -299,6 +304,7 @@ def report(result: dict[str, Any]) -> str:
             f" efficiency at {speed:g} rpm, efficiency at rated torque; friction from"
             f" {friction}"
         )
+    lines += [*result["validation_notes"], *doubts(result)]
     lines += _details(result)
     if "measured" in result:
         lines += _laid(result["measured"])
@@ -393,6 +399,8 @@ def _laid(found: dict[str, Any]) -> list[str]:
 def _source(result: dict[str, Any]) -> str:
     validity = result["validity"]
     text = f"level {validity['level']}"
+    if result["validation"] is None and validity["level"] != "design":
+        text += f"; {result['validation_reason'].partition(':')[0]}"
     if validity.get("beyond_range"):
         low, high = validity["torque_range_Nm"]
         text += f"; loop leaves the sampled {low:.4g} to {high:.4g} N·m: continued"

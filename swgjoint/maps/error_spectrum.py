@@ -70,7 +70,8 @@ def with_error(drive: Map, orders: ArrayLike, amplitudes: ArrayLike) -> Map:
     """The drive with another kinematic error in place of its own.
 
     Args:
-        drive: Map; its potential stays, a label of its error goes.
+        drive: Map; its potential stays, a label of its error and a validation of its
+            ripple go.
         orders: (p, q) of p alpha + q beta. Shape (n, 2).
         amplitudes: Cosine and sine [rad]. Same shape.
     """
@@ -83,7 +84,7 @@ def with_error(drive: Map, orders: ArrayLike, amplitudes: ArrayLike) -> Map:
     potential = np.zeros((count, *drive.potential.shape[1:]))
     ends = np.zeros((count, 2, 2))
     potential[:old], ends[:old] = drive.potential, drive.end_stiffness
-    info = {key: one for key, one in drive.info.items() if key != "kinematic_error"}
+    info = {key: one for key, one in drive.info.items() if key not in _OF_OWN_ERROR}
     return replace(
         drive,
         info=info,
@@ -145,6 +146,7 @@ def with_assumed_error(
     return replace(with_error(drive, _orders(drive.layout), pairs), info=info)
 
 
+_OF_OWN_ERROR = ("kinematic_error", "validation")
 _ABSENT = (
     "transmission_accuracy_arcmin",
     "transmission_accuracy_rated_arcmin",

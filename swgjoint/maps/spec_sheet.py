@@ -28,6 +28,8 @@ from swgjoint.maps.loop import (
     largest_torque,
     torque_loop,
 )
+from swgjoint.maps.map_validity import Difference, validation_json
+from swgjoint.maps.spec_validity import judge_figures
 from swgjoint.maps.turn import Turn, error_turn, ripple_turn, strongest_orders
 from swgjoint.units import arcmin, rpm
 
@@ -104,10 +106,13 @@ class SpecSheet:
     """``no_load`` and ``rated``: transmission error [rad]; ``ripple``: torque [N·m]."""
     losses: LossCurve | None = None
     """Efficiency over the load; None without friction, or where it is not asked for."""
+    uncertain: dict[str, Difference] = field(default_factory=dict)
+    """By key what makes a figure uncertain, see :mod:`swgjoint.maps.map_validity`."""
 
     def as_dict(self) -> dict[str, Any]:
-        """Figures, then ``missing``."""
-        return {**self.figures, "missing": self.missing}
+        """Figures, then ``missing`` and ``uncertain``."""
+        uncertain = {key: one.to_json() for key, one in self.uncertain.items()}
+        return {**self.figures, "missing": self.missing, "uncertain": uncertain}
 
 
 def check_keys(only: Collection[str]) -> tuple[str, ...]:
@@ -184,6 +189,7 @@ def measure_spec(
     }
     missing = ABSENT_KEYS | dict.fromkeys(LOSS_KEYS, _NO_FRICTION)
     loop, turns, losses = None, {}, None
+    uncertain: dict[str, Difference] = {}
     if drive is not None:
         if set(keys) & set(LOOP_KEYS):
             loop = torque_loop(drive)
@@ -199,6 +205,7 @@ def measure_spec(
         own = drive.info.get("missing")
         if isinstance(own, dict):
             missing |= {k: str(own[k]) for k in missing if k in own}
+        uncertain = judge_figures(drive, values, missing)
     missing |= dict(unknown or {})
     return SpecSheet(
         figures={key: values.get(key) for key in keys},
@@ -206,6 +213,11 @@ def measure_spec(
         loop=loop,
         turns=turns,
         losses=losses,
+        uncertain={
+            k: uncertain[k]
+            for k in keys
+            if k in uncertain and values.get(k) is not None
+        },
     )
 
 
@@ -323,7 +335,7 @@ def _loss_curve(drive: DriveMap) -> LossCurve:
 
 
 def spec_sheet(drive: DriveMap, only: Collection[str] = ()) -> dict[str, Any]:
-    """Figures, ``missing``, ``validity`` and ``wall_s``: plain values.
+    """Figures, ``missing``, ``uncertain``, ``validity``, ``validation``, ``wall_s``.
 
     Args:
         drive: The map.
@@ -335,6 +347,7 @@ def spec_sheet(drive: DriveMap, only: Collection[str] = ()) -> dict[str, Any]:
         "design": drive.name,
         **sheet.as_dict(),
         "validity": validity(drive),
+        **validation_json(drive),
         "wall_s": time.perf_counter() - start,
     }
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from swgjoint.sim.energy import joint_energy, run_energy
 from swgjoint.sim.orders import OrderLine, resample, strongest_lines
-from swgjoint.sim.ripple_validity import HARMONIC_LEVELS, ripple_label
+from swgjoint.sim.ripple_validity import HARMONIC_LEVELS, map_label, ripple_label
 from swgjoint.sim.tool_metrics import joint_settling, tool_metrics
 from swgjoint.sim.verdict import PHASE_STEP, judge_run
 from swgjoint.units import arcmin, deg, mm, rpm
@@ -67,13 +67,15 @@ def joint_metrics(run: Run, j: int) -> dict[str, Any]:
     lines = _lines(angle, ripple, highest, floor=NOISE * rated)
     error_lines = _lines(angle, error, highest, floor=NOISE)
     untold = orders_untold(angle, highest)
+    label = ripple_label(run, j, ripple)
     return {
         "level": transmission.level,
         "drive": drive.name,
         "source": drive.level,
         "ripple_rms_percent": float(100.0 * np.sqrt(np.mean(ripple**2)) / rated),
         "ripple_pp_percent": float(100.0 * np.ptp(ripple) / rated),
-        **ripple_label(run, j, ripple),
+        **label,
+        **map_label(run, j, told=label["ripple_missing"] is None),
         "orders": [
             {
                 "order": line.order,

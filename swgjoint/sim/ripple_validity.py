@@ -1,10 +1,10 @@
 r"""How far the torque ripple of a joint may be believed.
 
-The ripple comes from the harmonics of the maps. A run without any harmonics has no
-ripple, only vibration and round-off. A run that leaves harmonics out, because its step
-cannot carry them, has less ripple than the drive. The missing part is estimated from
-the map: inertia on either side resists fast orders, so that order n of the kinematic
-error, :math:`e_n`, becomes torsion, with the torque
+The ripple comes from the harmonics of the maps, which :func:`map_label` judges. A run
+without any harmonics has no ripple, only vibration and round-off. A run that leaves
+harmonics out, because its step cannot carry them, has less ripple than the drive. The
+missing part is estimated from the map: inertia on either side resists fast orders, so
+that order n of the kinematic error, :math:`e_n`, becomes torsion, with the torque
 
 .. math:: T_n = K e_n + |\partial_\Delta V_n|
 
@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from swgjoint.maps.map_validity import LIMIT, map_validation
 from swgjoint.sim.verdict import PHASE_STEP
 from swgjoint.units import deg
 
@@ -71,6 +72,50 @@ def ripple_label(run: Run, j: int, ripple: Array) -> dict[str, Any]:
         "ripple_left_out_percent": 100.0 * left / rated,
         "ripple_is_lower_bound": bool(left > 0.0 and whole > (1.0 + SHARE) * rms),
         "resolving": resolving(run, j),
+    }
+
+
+def map_label(run: Run, j: int, *, told: bool) -> dict[str, Any]:
+    """What the map of one joint misses at the torques of the figures.
+
+    The validation of the map is read over the torques of the part of the motion that
+    the figures are taken from.
+
+    Args:
+        run: The run.
+        j: Number of the joint.
+        told: Whether the run tells a ripple of the joint.
+
+    Returns:
+        ``ripple_valid``: whether the map is within the limit there, None where it has
+        no ripple to judge or no record. ``map_difference``: the largest differences
+        under ``input_torque`` and ``output_error``, and ``torque_range_Nm``; None with
+        the reason in ``map_difference_missing``.
+    """
+    transmission = run.assembly.transmissions[j]
+    level = transmission.level
+    found, reason = (
+        map_validation(transmission.drive)
+        if level == "full"
+        else (None, f"level {level} has no ripple of a map")
+    )
+    if found is None:
+        return {
+            "ripple_valid": None,
+            "map_difference": None,
+            "map_difference_missing": reason,
+        }
+    torque = run.output_torque[run.steady, j]
+    low, high = float(torque.min()), float(torque.max())
+    differences = found.between(low, high)
+    worst = max(one.largest for one in differences.values())
+    return {
+        "ripple_valid": worst <= LIMIT if told else None,
+        "map_difference": {
+            **{key: one.to_json() for key, one in differences.items()},
+            "torque_range_Nm": [low, high],
+        },
+        "map_difference_missing": None,
     }
 
 

@@ -3,20 +3,22 @@
 A run is ``NOT VALID`` where it left what its model covers: bodies collide, so that the
 torque ripple and the tool error have no reference; a torque leaves the map of its
 drive; teeth would skip; a rotor turns too fast for the orders that the step carries;
-the energies do not add up.
+the ripple of a map differs too much from unseen finite elements at the torques of the
+run; the energies do not add up.
 A drive above its ratings is a fault of the design and not of the figures: it is a
 warning.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import mujoco
 import numpy as np
 
+from swgjoint.maps.map_validity import LIMIT, joint_doubt, percent
 from swgjoint.units import mm
 
 if TYPE_CHECKING:
@@ -131,6 +133,14 @@ def joint_reasons(name: str, joint: Mapping[str, Any]) -> list[str]:
             f" {skips['torque_Nm']:.4g} N·m; ratcheting torque"
             f" {ratings['ratcheting_Nm']:.4g} N·m"
         )
+    if joint["ripple_valid"] is False and (doubt := joint_doubt(joint)):
+        seen = _range(joint["map_difference"]["torque_range_Nm"])
+        lines.append(
+            f"{name}: torque ripple not valid from {seen}: the map of {joint['drive']}"
+            f" {doubt}; accepted: {percent(LIMIT)}; 'swgjoint meshing DESIGN --torque"
+            " NM' computes the ripple of the drive itself, level 'linear' runs without"
+            " ripple"
+        )
     if joint["phase_step_rad"] > FAST * PHASE_STEP:
         lines.append(
             f"{name}: its rotor turned faster than commanded, the highest order of its"
@@ -138,6 +148,12 @@ def joint_reasons(name: str, joint: Mapping[str, Any]) -> list[str]:
             f" {PHASE_STEP:g} rad; use a smaller simulation.step_s"
         )
     return lines
+
+
+def _range(torques: Sequence[float]) -> str:
+    """Torques from the smallest to the largest."""
+    low, high = torques
+    return f"{low:.4g} to {high:.4g} N·m"
 
 
 def energy_reasons(energy: Mapping[str, float], rated: float) -> list[str]:

@@ -14,6 +14,15 @@ from typing import TYPE_CHECKING, Any
 from swgjoint import __version__
 from swgjoint.files import write_whole
 from swgjoint.json_text import json_text, plain
+from swgjoint.maps.map_validity import (
+    NOT_VALIDATED,
+    joint_mark,
+    map_validation,
+    mark,
+    mark_legend,
+    validation_summary,
+    worst_mark,
+)
 from swgjoint.maps.spec_sheet import measure_spec, validity
 from swgjoint.progress import Progress, silent
 from swgjoint.sim.verdict import NOT_VALID, VALID
@@ -220,12 +229,9 @@ def summary_table(runs: Mapping[str, Run]) -> Table:
                 Cell(metrics["verdict"], "good" if valid else "bad"),
                 ripple_cell(joints, "ripple_rms_percent"),
                 ripple_cell(joints, "ripple_pp_percent"),
-                *_cells(
-                    max(torsion),
-                    max(error),
-                    metrics["tool"]["path_rms_mm"],
-                    max(peaks),
-                ),
+                *_cells(max(torsion)),
+                error_cell(joints, max(error)),
+                *_cells(metrics["tool"]["path_rms_mm"], max(peaks)),
                 Cell(shown(within), "good" if within else "bad"),
                 *_cells(run.time[-1] / run.wall),
             ]
@@ -244,18 +250,42 @@ def summary_table(runs: Mapping[str, Run]) -> Table:
             ("speed", "times real time"),
         ],
         rows=rows,
-        notes=[f"Largest of all joints, {WINDOWS[window]}."],
+        notes=[
+            f"Largest of all joints, {WINDOWS[window]}.",
+            *_legend(
+                joint
+                for run in runs.values()
+                for joint in run.metrics()["joints"].values()
+            ),
+        ],
     )
 
 
 def ripple_cell(joints: Iterable[Mapping[str, Any]], key: str) -> Cell:
-    """Largest ripple of some joints: a dash for none, > where orders are left out."""
+    """Largest ripple of some joints: a dash for none, > where orders are left out.
+
+    ~ and ! where the map of a joint among them differs from unseen solves.
+    """
     told = [joint for joint in joints if joint["ripple_missing"] is None]
     if not told:
         return Cell("-")
     most = max(told, key=lambda joint: float(joint[key]))
-    bound = most["ripple_is_lower_bound"]
-    return Cell(f"{'> ' if bound else ''}{shown(most[key])}", "bad" if bound else "")
+    bound = "> " if most["ripple_is_lower_bound"] else ""
+    sign = worst_mark(told)
+    text = f"{sign} {bound}{shown(most[key])}".strip()
+    return Cell(text, "bad" if bound or sign else "")
+
+
+def error_cell(joints: Iterable[Mapping[str, Any]], value: float) -> Cell:
+    """Peak to peak of a transmission error, marked as :func:`ripple_cell` does."""
+    sign = worst_mark(joints, ("output_error",))
+    return Cell(f"{sign} {shown(value)}".strip(), "bad" if sign else "")
+
+
+def _legend(joints: Iterable[Mapping[str, Any]]) -> list[str]:
+    """What the marks of figures mean; none without marks."""
+    marks = {joint_mark(joint) for joint in joints} - {""}
+    return [f"{mark_legend(marks)}."] if marks else []
 
 
 def _label(label: str, run: Run, step: dict[str, Any] | None) -> dict[str, Any]:
@@ -339,15 +369,11 @@ def _joint_table(runs: Mapping[str, Run], joint: str) -> Table:
         rows.append(
             [
                 Cell(label, "text"),
-                *_cells(
-                    torsion["mean"],
-                    torsion["pp"],
-                    error["mean"],
-                    error["pp"],
-                ),
+                *_cells(torsion["mean"], torsion["pp"], error["mean"]),
+                error_cell([figures], error["pp"]),
                 ripple_cell([figures], "ripple_rms_percent"),
                 ripple_cell([figures], "ripple_pp_percent"),
-                Cell(orders or "-"),
+                Cell(f"{joint_mark(figures)} {orders}".strip() if orders else "-"),
                 *_cells(
                     ratings["peak_Nm"],
                     ratings["cubed_mean_Nm"],
@@ -372,7 +398,10 @@ def _joint_table(runs: Mapping[str, Run], joint: str) -> Table:
             ("within ratings", ""),
         ],
         rows=rows,
-        notes=["* no order of this joint's drive: vibration or another joint."],
+        notes=[
+            "* no order of this joint's drive: vibration or another joint.",
+            *_legend(run.metrics()["joints"][joint] for run in runs.values()),
+        ],
     )
 
 
@@ -386,13 +415,16 @@ def _sheet(drive: DriveMap) -> dict[str, Any]:
         if key == "orders":
             continue
         name, unit = words(key)
+        doubt = sheet.uncertain.get(key) if value is not None else None
+        sign = "" if doubt is None else mark(doubt.largest)
+        why = "" if doubt is None else f"the map {doubt}"
         rows.append(
             [
                 Cell(name, "text"),
-                *_cells(value),
+                Cell(f"{sign} {shown(plain(value))}".strip(), "bad" if sign else ""),
                 *(_cells(stated.get(key)) if stated else []),
                 Cell(unit, "text"),
-                Cell(sheet.missing.get(key, ""), "text"),
+                Cell(sheet.missing.get(key, why), "text"),
             ]
         )
     label = validity(drive)
@@ -401,7 +433,7 @@ def _sheet(drive: DriveMap) -> dict[str, Any]:
         f"Level {label['level']}, {low:.4g} to {high:.4g} N·m"
         f"{'; the loop leaves that range' if label['beyond_range'] else ''}; ratings:"
         f" {label['ratings']}; hysteresis: {label['hysteresis']}; friction:"
-        f" {label['friction']}."
+        f" {label['friction']}; {_validated(drive)}."
     )
     return {
         "title": drive.name,
@@ -418,6 +450,12 @@ def _sheet(drive: DriveMap) -> dict[str, Any]:
             rows=rows,
         ),
     }
+
+
+def _validated(drive: DriveMap) -> str:
+    """The validation of a map in one phrase."""
+    found, _ = map_validation(drive)
+    return NOT_VALIDATED if found is None else validation_summary(found)
 
 
 def _provenance(drives: Sequence[DriveMap]) -> Table:
@@ -442,7 +480,7 @@ def _provenance(drives: Sequence[DriveMap]) -> Table:
                 Cell(method, "text"),
                 Cell(str(info.get("design_hash", "-"))[:16], "text"),
                 Cell(str(info.get("ratings_source", drive.ratings.source)), "text"),
-                Cell("; ".join(map_error(drive)) or "not known", "text"),
+                Cell("; ".join(map_error(drive)), "text"),
             ]
         )
     names = ("drive", "level", "map from", "design hash", "ratings", "error of the map")

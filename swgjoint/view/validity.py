@@ -13,6 +13,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from swgjoint.errors import SwgError
+from swgjoint.maps.map_validity import (
+    joint_doubt,
+    map_validation,
+    validation_summary,
+)
 from swgjoint.sim.run import run_scene
 from swgjoint.sim.scene import Scene
 from swgjoint.units import arcmin, deg
@@ -93,26 +98,45 @@ def _at(joint: Mapping[str, Any], path: tuple[str, ...]) -> float:
 def map_error(drive: DriveMap) -> list[str]:
     """What is known of the error of a map, one line each; empty if nothing is."""
     info = drive.info
+    found, reason = map_validation(drive)
+    lines = [reason or ""] if found is None else [validation_summary(found)]
+    if found is not None and found.reason:
+        lines.append(f"sampling ended before its goal: {found.reason}")
     perfect = info.get("perfect_teeth")
     source = perfect if isinstance(perfect, Mapping) else info
-    lines = []
-    energy, residual = source.get("energy_check"), source.get("residual")
-    if isinstance(energy, Mapping) and "relative" in energy:
+    told = _numbers(source.get("energy_check"), "relative")
+    if told is not None:
         lines.append(
-            "input torque of the finite elements, which the fit has not seen:"
-            f" {100.0 * float(energy['relative']):.2g} % of its ripple missed"
+            "input torque of the finite elements at the samples, which the fit has not"
+            f" seen: {100.0 * told[0]:.2g} % of its ripple missed"
         )
-    if isinstance(residual, Mapping) and "torque_Nm" in residual:
+    keys = ("threshold", "torque_Nm", "kinematic_error_rad")
+    told = _numbers(source.get("residual"), *keys)
+    if told is not None:
         lines.append(
-            f"harmonics below {100.0 * float(residual['threshold']):.2g} % dropped:"
-            f" {float(residual['torque_Nm']):.2g} N·m,"
-            f" {float(residual['kinematic_error_rad']) / arcmin:.2g} arcmin"
+            f"harmonics below {100.0 * told[0]:.2g} % dropped: {told[1]:.2g} N·m,"
+            f" {told[2] / arcmin:.2g} arcmin"
         )
     stiffness = info.get("stiffness_range_Nm_rad")
     if isinstance(stiffness, list | tuple) and len(stiffness) == 2:
-        low, high = (float(value) for value in stiffness)
-        lines.append(f"tangent stiffness {low:.4g} to {high:.4g} N·m/rad in its range")
+        told = _numbers(dict(enumerate(stiffness)), 0, 1)
+        if told is not None:
+            low, high = told
+            lines.append(
+                f"tangent stiffness {low:.4g} to {high:.4g} N·m/rad in its range"
+            )
     return lines
+
+
+def _numbers(table: Any, *keys: Any) -> list[float] | None:
+    """Values of a table that came with a map; None where one is no finite number."""
+    values = [table.get(key) for key in keys] if isinstance(table, Mapping) else []
+    numbers = [
+        float(one)
+        for one in values
+        if isinstance(one, float | int) and abs(one) < 1e300
+    ]
+    return numbers if len(numbers) == len(keys) else None
 
 
 def warnings_of(joints: Mapping[str, Any]) -> list[str]:
@@ -126,6 +150,13 @@ def warnings_of(joints: Mapping[str, Any]) -> list[str]:
     """
     lines = []
     for name, joint in joints.items():
+        doubt = joint_doubt(joint)
+        if doubt is not None and joint["ripple_valid"]:
+            low, high = joint["map_difference"]["torque_range_Nm"]
+            lines.append(
+                f"{name}: torque ripple uncertain from {low:.4g} to {high:.4g} N·m: the"
+                f" map of {joint['drive']} {doubt}"
+            )
         if joint["ripple_is_lower_bound"] and (carries := joint["resolving"]):
             lines.append(
                 f"{name}: ripple is a lower bound: the step leaves out orders of about"

@@ -8,11 +8,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from messages import names
+from validation_record import made_record
 
 from swgjoint.cli.main import main
 from swgjoint.fe import build_map as builder
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.file import map_bytes
+from swgjoint.maps.map_validity import NOT_VALIDATED
 
 
 @pytest.fixture
@@ -144,3 +146,42 @@ def test_measured_loop_needs_its_drive(
     err = capsys.readouterr().err
     assert err.count("\n") == 1 and names(err, *message)
     assert not (tmp_path / "a.swg").exists()
+
+
+@pytest.mark.parametrize(
+    ("rows", "parts"),
+    [
+        ({5.0: (0.02, 0.03)}, ()),
+        ({5.0: (0.02, 0.13)}, ("warning", "13 %", "loaded output error", "5 N·m")),
+        ({5.0: (0.52, 0.13)}, ("not valid", "52 %", "input torque", "5 N·m")),
+    ],
+)
+def test_validation_is_printed_and_judged(built, tmp_path, capsys, rows, parts):
+    """The table, one line above 10 % and another above 30 %; the record in the JSON."""
+    drive, _ = built
+    record = made_record(rows)
+    object.__setattr__(drive, "info", {**drive.info, "validation": record})
+    path = tmp_path / "a.swg"
+    assert main(["map", "reference-2d", "-o", str(path)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    (head,) = [line for line in lines if line.startswith("validation")]
+    table = lines[lines.index(head) + 1 :]
+    assert names(head, "11", "5 N·m")
+    assert all(names(line, "5") for line in table[1:4])
+    assert [names(line, *parts) for line in table[4:]] == [True] * bool(parts)
+    assert main(["map", "reference-2d", "-o", str(path), "--json"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert result["validation"] == record and result["validation_reason"] is None
+    assert result["energy_check"] == {"relative": 0.01}
+    assert "validation" not in result["info"]
+
+
+def test_a_map_without_validation_says_so_once(built, tmp_path, capsys):
+    """One phrase in the terminal, null with a reason in the JSON."""
+    path = tmp_path / "a.swg"
+    assert main(["map", "reference-2d", "-o", str(path)]) == 0
+    assert capsys.readouterr().out.count(NOT_VALIDATED) == 1
+    assert main(["map", "reference-2d", "-o", str(path), "--json"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert result["validation"] is None
+    assert names(result["validation_reason"], NOT_VALIDATED)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from messages import names
+from validation_record import validated_map
 
 from swgjoint.cli.main import main
 from swgjoint.errors import DesignError, Outcome
@@ -26,6 +28,7 @@ from swgjoint.gear.shell_theory import (
 from swgjoint.gear.tolerances import has_errors
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.loop import torque_loop
+from swgjoint.maps.map_validity import NOT_VALIDATED
 from swgjoint.sim.drives import load_drive
 from swgjoint.units import arcmin
 
@@ -485,3 +488,39 @@ def test_the_sheet_does_not_call_predictions_measured(capsys):
     header = capsys.readouterr().out.splitlines()[1]
     assert "predicted" in header
     assert "measured" not in header
+
+
+def test_figures_that_a_map_misses_are_marked(capsys, tmp_path, synthetic_map):
+    """Uncertain accuracy and stiffness with a sign, a ripple that is not valid none."""
+    path = tmp_path / "a.swg"
+    validated_map(synthetic_map, {50.0: (0.4, 0.2)}, 0.12).save(path)
+    assert main(["spec", str(path)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+
+    def row(start: str) -> list[str]:
+        return next(line for line in lines if line.startswith(start)).split()
+
+    assert row("K1")[1] == "~" and row("transmission accuracy rated")[3] == "~"
+    assert row("ripple rms")[2] == "-"
+    assert any(names(line, "not valid", "50 N·m", "40 %") for line in lines)
+    assert any(names(line, "~", "12 %", "K1", "K2", "K3") for line in lines)
+    result = spec(capsys, str(path), "--only", "K1_Nm_rad")
+    assert set(result["uncertain"]) == {"K1_Nm_rad"}
+    assert result["validation_notes"] == []
+
+
+def test_a_good_map_says_against_what_it_was_validated(capsys, tmp_path, synthetic_map):
+    """One line, no mark; a map without a record has the phrase in the head."""
+    path = tmp_path / "a.swg"
+    validated_map(synthetic_map, {50.0: (0.04, 0.02)}).save(path)
+    assert main(["spec", str(path)]) == 0
+    text = capsys.readouterr().out
+    assert text.count("unseen") == 1 and "~" not in text and "!" not in text
+    replace(synthetic_map, info={"validation": {"solves": -1}}).save(path)
+    assert main(["spec", str(path)]) == 0
+    assert names(capsys.readouterr().out, NOT_VALIDATED, "validation.rows")
+    synthetic_map.save(path)
+    assert main(["spec", str(path)]) == 0
+    head, *rest = capsys.readouterr().out.splitlines()
+    assert NOT_VALIDATED in head and not any("unseen" in line for line in rest)
+    assert main(["spec", str(path), "--only", "T1_Nm"]) == 0

@@ -7,7 +7,8 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from messages import naming
+from messages import names, naming
+from validation_record import validated_map
 
 from swgjoint.errors import ComputationError, InputError
 from swgjoint.maps import spec_sheet as sheets
@@ -273,3 +274,37 @@ def test_high_orders_are_not_aliased():
         ComputationError, match=naming("'linear'", "909000", "10000000", "harmonics")
     ):
         error_turn(beyond)
+
+
+def test_ripple_that_the_map_cannot_tell_at_rated_torque_is_no_figure(synthetic_map):
+    """Rated 50 N·m: a bad row there takes the ripple out, one at 15 N·m does not."""
+    there = validated_map(synthetic_map, {15.0: (0.0, 0.0), 50.0: (0.4, 0.02)})
+    sheet = there.spec_sheet()
+    for key in ("ripple_rms_percent", "ripple_pp_percent"):
+        assert sheet[key] is None
+        assert names(sheet["missing"][key], "40 %", "input torque", "50 N·m")
+    assert {line["ripple_percent"] for line in sheet["orders"]} == {None}
+    assert sheet["transmission_accuracy_rated_arcmin"] > 0.0
+    assert set(sheet["uncertain"]) == {"orders"}
+    elsewhere = validated_map(synthetic_map, {15.0: (0.4, 0.02), 50.0: (0.0, 0.0)})
+    own, good = elsewhere.spec_sheet(), synthetic_map.spec_sheet()
+    assert own["ripple_rms_percent"] == good["ripple_rms_percent"]
+    assert own["uncertain"] == {} and own["validation"]["worst"] == 0.4
+
+
+def test_figures_are_uncertain_by_the_quantity_that_they_depend_on(synthetic_map):
+    """Accuracy by the output error, K by the stiffness, ripple by both."""
+    ripple = {"ripple_rms_percent", "ripple_pp_percent", "orders"}
+    accuracy = {f"transmission_accuracy{load}_arcmin" for load in ("", "_rated")}
+    K = {"K1_Nm_rad", "K2_Nm_rad", "K3_Nm_rad"}
+    for row, stiffness, keys in (
+        ((0.05, 0.05), 0.01, set()),
+        ((0.2, 0.05), 0.01, ripple),
+        ((0.05, 0.2), 0.01, ripple | accuracy),
+        ((0.05, 0.05), 0.2, K),
+    ):
+        drive = validated_map(synthetic_map, {50.0: row}, stiffness)
+        sheet = drive.spec_sheet()
+        assert set(sheet["uncertain"]) == keys
+        assert all(one["largest"] == 0.2 for one in sheet["uncertain"].values())
+        assert sheet["ripple_rms_percent"] is not None

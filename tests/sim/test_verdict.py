@@ -5,14 +5,17 @@ import json
 import numpy as np
 import pytest
 from messages import names
+from validation_record import validated_map
 
 from swgjoint.cli.main import main
-from swgjoint.cli.run import notes
+from swgjoint.cli.run import joint_row, notes
 from swgjoint.maps.drive_map import DriveMap
+from swgjoint.maps.map_validity import NOT_VALIDATED
 from swgjoint.sim.ripple_validity import integration_noise
 from swgjoint.sim.run import run_scene
 from swgjoint.sim.scene import Scene
 from swgjoint.sim.verdict import energy_reasons
+from swgjoint.view.validity import warnings_of
 
 LINEAR = "defaults.linear={stiffness_Nm_rad=2e4,rated_torque_Nm=50.0}"
 SHORT = ["--set", LINEAR, "--set", "simulation.duration_s=1.0"]
@@ -126,8 +129,6 @@ def test_strict_turns_the_status_for_an_overloaded_drive(capsys):
 
 def test_a_motor_that_does_not_follow_is_told(bench, synthetic_map):
     """Without feed-forward and almost without gains the link lags by degrees."""
-    from swgjoint.view.validity import warnings_of
-
     slack = {"stiffness_Nm_rad": 1e-3, "damping_Nms_rad": 1e-3, "feedforward": "none"}
     told = bench(synthetic_map, controller=slack).metrics()["joints"]
     assert told["joint"]["off_command_deg"] > 1.0
@@ -219,3 +220,90 @@ def test_a_ripple_that_the_step_cannot_carry_is_unknown_rather_than_none(
     assert line == (
         "-: no figure for the torque ripple: the step carries none of its orders"
     )
+
+
+def judged(bench, drive, **changes):
+    """Figures of a bench run at 20 N·m that begins at rest under its load."""
+    return bench(drive, **{"trajectory__settle_s": 0.3, **changes}).metrics()
+
+
+def test_ripple_that_the_map_misses_at_these_torques_makes_a_run_invalid(
+    bench, synthetic_map
+):
+    """Joint, drive, quantity, share and torque are named; a row far away is not."""
+    bad = validated_map(synthetic_map, {5.0: (0.0, 0.0), 20.0: (0.5, 0.1)})
+    found = judged(bench, bad)
+    assert found["verdict"] == "NOT VALID"
+    (reason,) = found["reasons"]
+    assert names(reason, "joint", "synthetic", "input torque", "20 N·m", "30 %")
+    assert found["joints"]["joint"]["ripple_valid"] is False
+    far = {10.0: (0.0, 0.0), 40.0: (0.05, 0.05), 80.0: (0.9, 0.9)}
+    found = judged(bench, validated_map(synthetic_map, far))
+    joint = found["joints"]["joint"]
+    assert (found["verdict"], joint["ripple_valid"]) == ("VALID", True)
+    low, high = joint["map_difference"]["torque_range_Nm"]
+    assert 15.0 < low < high < 25.0
+    assert not warnings_of(found["joints"])
+
+
+def test_only_the_torques_of_the_figures_count(bench, synthetic_map):
+    """The same bad row near 30 N·m: valid under 10 N·m of load, not under 30 N·m."""
+    rows = {0.0: (0.0, 0.0), 20.0: (0.0, 0.0), 30.0: (0.6, 0.0), 40.0: (0.0, 0.0)}
+    drive = validated_map(synthetic_map, rows)
+    light = judged(bench, drive, load__joint__torque_Nm=10.0)
+    heavy = judged(bench, drive, load__joint__torque_Nm=30.0)
+    assert (light["verdict"], heavy["verdict"]) == ("VALID", "NOT VALID")
+
+
+def test_uncertain_ripple_is_a_warning_at_its_figures(bench, synthetic_map):
+    """Above 10 %: valid, a line with the torque, ~ at ripple, orders and error."""
+    drive = validated_map(synthetic_map, {20.0: (0.05, 0.2)})
+    long = {"simulation__duration_s": 2.0}
+    found = judged(bench, drive, **long)
+    assert (found["verdict"], found["reasons"]) == ("VALID", [])
+    (line,) = warnings_of(found["joints"])
+    assert names(line, "joint", "synthetic", "output error", "20 %", "N·m")
+    cells = joint_row(("joint", found["joints"]["joint"]))
+    assert [k for k, cell in enumerate(cells) if cell.startswith("~ ")] == [5, 6, 7, 8]
+    # the input torque says nothing of the transmission error
+    drive = validated_map(synthetic_map, {20.0: (0.4, 0.05)})
+    cells = joint_row(("joint", judged(bench, drive, **long)["joints"]["joint"]))
+    assert [k for k, cell in enumerate(cells) if cell.startswith("! ")] == [6, 7, 8]
+
+
+@pytest.mark.parametrize("level", ["rigid", "linear", "native", "kinematic"])
+def test_levels_without_ripple_of_the_map_are_not_judged(bench, synthetic_map, level):
+    """A useless map under load does not matter where its ripple is not used."""
+    drive = validated_map(synthetic_map, {20.0: (0.9, 0.9)})
+    joint = judged(bench, drive, defaults__level=level)["joints"]["joint"]
+    assert joint["ripple_valid"] is None and joint["map_difference"] is None
+    assert names(joint["map_difference_missing"], level)
+    cells = joint_row(("joint", joint))
+    assert not any(cell.startswith(("!", "~")) for cell in cells)
+
+
+def test_maps_without_validation_run_as_before(bench, synthetic_map):
+    """No warning and no mark; the reason stands in the figures of the joint."""
+    found = judged(bench, synthetic_map)
+    assert found["verdict"] == "VALID" and not warnings_of(found["joints"])
+    joint = found["joints"]["joint"]
+    assert joint["ripple_valid"] is None
+    assert names(joint["map_difference_missing"], NOT_VALIDATED)
+
+
+def test_run_prints_the_judgement_and_turns_the_status(synthetic_map, tmp_path, capsys):
+    """Exit status 1 above 30 %, with --strict above 10 %; the signs are explained."""
+    path = tmp_path / "a.swg"
+    load = ["--set", "load.joint={torque_Nm=20.0}", "--drive", str(path)]
+    short = ["--set", "simulation.duration_s=0.5", "--set", "trajectory.settle_s=0.2"]
+    arguments = ["run", "bench", *load, *short]
+    validated_map(synthetic_map, {20.0: (0.5, 0.1)}).save(path)
+    assert main(arguments) == 1
+    first, reason, *lines = capsys.readouterr().out.splitlines()
+    assert first.startswith("NOT VALID") and names(reason, "joint", "50 %", "20 N·m")
+    assert any(line.startswith("! not valid") for line in lines)
+    validated_map(synthetic_map, {20.0: (0.2, 0.1)}).save(path)
+    assert main(arguments) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert any(line.startswith("~ uncertain") for line in lines)
+    assert main([*arguments, "--strict"]) == 1

@@ -7,7 +7,8 @@ from html.parser import HTMLParser
 
 import numpy as np
 import pytest
-from messages import naming
+from messages import names, naming
+from validation_record import validated_map
 
 from swgjoint.errors import InputError
 from swgjoint.maps.drive_map import DriveMap
@@ -218,3 +219,20 @@ def test_figures_read_as_people_write_them():
         "2.00e-06",
         "x",
     ]
+
+
+@pytest.mark.usefixtures("without_pictures")
+def test_figures_of_a_map_that_misses_unseen_solves_are_marked(synthetic_map, tmp_path):
+    """Alert, ripple and orders with their sign, its meaning, error of the map."""
+    drive = validated_map(synthetic_map, {20.0: (0.5, 0.2)})
+    load = {"load.joint": {"torque_Nm": 20.0}}
+    run = run_scene("bench", overrides=SHORT | load, drives={"reference-2d": drive})
+    path = write_report({"": run}, tmp_path / "report.html", check_step=False)
+    texts = Page(path.read_text(encoding="utf-8")).texts
+    figures = run.metrics()["joints"]["joint"]
+    assert f"! {shown(figures['ripple_rms_percent'])}" in texts
+    assert f"~ {shown(figures['transmission_error_arcmin']['pp'])}" in texts
+    assert any(names(text, "NOT VALID", "joint", "50 %", "20 N·m") for text in texts)
+    assert any(names(text, "! not valid", "30 %") for text in texts)
+    (error,) = [text for text in texts if text.startswith("validated")]
+    assert names(error, "11 unseen", "50 %", "20 %")
