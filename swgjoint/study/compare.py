@@ -19,6 +19,7 @@ from swgjoint.errors import ComputationError, InputError
 from swgjoint.faults import read_toml
 from swgjoint.gear.design import Design
 from swgjoint.maps.drive_map import DriveMap
+from swgjoint.maps.map_validity import joints_judged
 from swgjoint.models_path import near_names
 from swgjoint.progress import Progress, silent
 from swgjoint.sim.arm_scene import rigid_arm_of
@@ -79,6 +80,11 @@ class Compared:
     """Why there is no ripple to tell: its figures are vibration and round-off."""
     ripple_is_lower_bound: bool
     """Whether the step leaves orders out that matter, in the joint with most ripple."""
+    ripple_valid: bool | None
+    """Whether the maps of all joints are within the limit of their validation at the
+    torques of the run; None where no map has one."""
+    map_difference: dict[str, Any] | None
+    """Worst differences of these maps from unseen solves by quantity, as of a joint."""
     transmission_error_arcmin: float
     """Peak to peak."""
     transmission_error_ripple_arcmin: float
@@ -234,7 +240,7 @@ def _is_design(reference: str) -> bool:
 
 
 def missed(row: Compared, spec: Mapping[str, float]) -> tuple[str, ...]:
-    """Limits that a row does not keep, a figure that is not known among them.
+    """Limits that a row does not keep: figures not known or not valid among them.
 
     A level without compliance keeps every lower limit of the stiffness.
     """
@@ -243,8 +249,11 @@ def missed(row: Compared, spec: Mapping[str, float]) -> tuple[str, ...]:
         value = row.told(key)
         if key == STIFFNESS and value is None and row.level in UNYIELDING:
             continue
-        kept = value is not None and (
-            value >= limit if key in LOWER else value <= limit
+        valid = key not in RIPPLE or row.ripple_valid is not False
+        kept = (
+            valid
+            and value is not None
+            and (value >= limit if key in LOWER else value <= limit)
         )
         if not kept:
             found.append(key)
@@ -292,6 +301,7 @@ def row_of(
         ripple_pp_percent=largest("ripple_pp_percent"),
         ripple_missing=joints[worst]["ripple_missing"],
         ripple_is_lower_bound=bool(joints[worst]["ripple_is_lower_bound"]),
+        **joints_judged(joints.values()),
         transmission_error_arcmin=max(float(error["pp"]) for error in errors),
         transmission_error_ripple_arcmin=_error_ripple(run, joints),
         torsion_arcmin=max(

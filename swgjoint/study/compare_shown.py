@@ -6,6 +6,7 @@ import io
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from swgjoint.maps.map_validity import QUANTITIES, joint_mark, mark_legend
 from swgjoint.study.compare import LOWER, RIPPLE, Compared
 from swgjoint.view.entities import COLORS
 from swgjoint.view.report import Cell, Table
@@ -25,6 +26,13 @@ HEADER = {
     "wall_s": ("computed in", "s"),
 }
 """Figures of a row as people read them: name and unit."""
+JUDGED_BY = {
+    "ripple_rms_percent": tuple(QUANTITIES),
+    "ripple_pp_percent": tuple(QUANTITIES),
+    "transmission_error_ripple_arcmin": ("output_error",),
+    "transmission_error_arcmin": ("output_error",),
+}
+"""Quantities of the validation of a map that a figure depends on."""
 PANELS = (
     "ripple_rms_percent",
     "transmission_error_ripple_arcmin",
@@ -39,12 +47,15 @@ _WIDE = 30.0
 
 
 def cell(row: Mapping[str, Any], key: str) -> str:
-    """A figure as text: a dash for none, > before a ripple that lacks orders."""
-    if key not in RIPPLE:
-        return shown(row[key])
-    if row["ripple_missing"]:
+    """A figure as text: a dash for none, > before a ripple that lacks orders.
+
+    ~ and ! where the map differs from unseen solves.
+    """
+    if key in RIPPLE and row["ripple_missing"]:
         return "-"
-    return f"{'> ' if row['ripple_is_lower_bound'] else ''}{shown(row[key])}"
+    bound = "> " if key in RIPPLE and row["ripple_is_lower_bound"] else ""
+    sign = joint_mark(row, JUDGED_BY[key]) if key in JUDGED_BY else ""
+    return f"{sign} {bound}{shown(row[key])}".strip()
 
 
 def columns(rows: Sequence[Compared]) -> dict[str, tuple[str, str]]:
@@ -90,16 +101,18 @@ def comparison_table(
 
 
 def left_out_notes(rows: Sequence[Compared]) -> list[str]:
-    """Where ripple says less than it seems: strongest order beyond the step."""
+    """Where ripple says less than it seems: orders beyond the step, doubtful maps."""
     found: dict[tuple[str, ...], list[str]] = {}
     for row in rows:
         found.setdefault(row.strongest_order_left_out, []).append(row.argument)
-    return [
+    notes = [
         f"too fast for the step, strongest order left out: {', '.join(joints)}"
         + ("" if len(names) == len(rows) else f" ({', '.join(names)})")
         for joints, names in found.items()
         if joints
     ]
+    marks = {joint_mark(row.to_json()) for row in rows} - {""}
+    return [*notes, mark_legend(marks)] if marks else notes
 
 
 def comparison_picture(

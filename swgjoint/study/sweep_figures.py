@@ -174,7 +174,9 @@ def _figures(asked: Asked) -> tuple[dict[str, float | None], str]:
         figures |= _size(asked.design, asked.size)
     if asked.run is not None:
         assert asked.scene is not None
-        figures |= _run(asked.scene, asked.design, asked.run)
+        found, doubts = _run(asked.scene, asked.design, asked.run)
+        figures |= found
+        reasons = reasons | doubts
     return figures, "\n".join(f"{name}: {why}" for name, why in reasons.items())
 
 
@@ -277,10 +279,13 @@ def _size(design: Design, task: SizeTask) -> dict[str, float | None]:
     return {name: found[name] for name in task.figures}
 
 
-def _run(scene: Scene, design: Design | None, task: RunTask) -> dict[str, float | None]:
-    """Figures of the worst joint of a run."""
+def _run(
+    scene: Scene, design: Design | None, task: RunTask
+) -> tuple[dict[str, float | None], dict[str, str]]:
+    """Figures of the worst joint of a run, and why some of them are not valid."""
+    from swgjoint.maps.map_validity import joint_doubt
     from swgjoint.sim.run import run_scene
-    from swgjoint.study.compare import row_of
+    from swgjoint.study.compare import RIPPLE, row_of
 
     drive = None
     if design is None:
@@ -290,4 +295,9 @@ def _run(scene: Scene, design: Design | None, task: RunTask) -> dict[str, float 
         name = design.drive.name
         run = run_scene(scene.with_drive(name), drives={name: drive})
     row = row_of(scene.name, run, drive, level=None)
-    return {name: getattr(row, name) for name in task.figures}
+    found = {name: getattr(row, name) for name in task.figures}
+    lost = [name for name in task.figures if name in RIPPLE]
+    if row.ripple_valid is not False or not lost:
+        return found, {}
+    why = f"not valid: the map {joint_doubt(row.to_json())}"
+    return found | dict.fromkeys(lost), dict.fromkeys(lost, why)

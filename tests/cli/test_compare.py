@@ -10,6 +10,7 @@ import pytest
 from messages import names, naming
 from rerun.chunk import RrdReader
 from solved import coarse
+from validation_record import validated_map
 
 from swgjoint.cli.main import main
 from swgjoint.errors import InputError
@@ -285,3 +286,24 @@ def test_bad_input_is_one_line(arguments, message, tmp_path, monkeypatch, capsys
     out, err = capsys.readouterr()
     assert out == "" and err.count("\n") == 1
     assert names(err, *message)
+
+
+def test_a_ripple_that_is_not_valid_is_marked_and_misses_its_limit(
+    synthetic_map, tmp_path, capsys
+):
+    """Good and bad map of one drive: sign, verdict and limit tell them apart."""
+    good, bad = tmp_path / "good.swg", tmp_path / "bad.swg"
+    validated_map(synthetic_map, {20.0: (0.04, 0.04)}).save(good)
+    validated_map(synthetic_map, {20.0: (0.6, 0.04)}).save(bad)
+    load = ["--set", "load.joint={torque_Nm=20.0}"]
+    limit = ["--limit", "ripple_rms_percent=99"]
+    result = found(capsys, str(good), str(bad), *load, *limit, status=1)
+    rows = result["rows"]
+    assert [row["ripple_valid"] for row in rows] == [True, False]
+    assert [row["verdict"] for row in rows] == ["VALID", "NOT VALID"]
+    assert result["kept_by"] == [str(good)]
+    assert main(["compare", str(good), str(bad), *load, *SHORT]) == 1
+    lines = capsys.readouterr().out.splitlines()
+    marked = [line for line in lines if " ! " in line and "synthetic" not in line]
+    assert len(marked) == 1 and marked[0].startswith(str(bad))
+    assert any(line.startswith("! not valid") for line in lines)

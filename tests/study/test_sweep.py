@@ -9,10 +9,13 @@ from dataclasses import dataclass, replace
 
 import pytest
 from messages import names, naming
+from validation_record import validated_map
 
 from swgjoint.errors import ComputationError, InputError, MissingExtraError
 from swgjoint.faults import parse_toml, validated
+from swgjoint.sim.scene import Scene
 from swgjoint.study import sweep as sweep_module
+from swgjoint.study import sweep_figures
 from swgjoint.study.pool import LocalPool, Lost
 from swgjoint.study.sweep import run_sweep
 from swgjoint.study.sweep_figures import Record, compute
@@ -20,6 +23,7 @@ from swgjoint.study.sweep_file import SweepFile
 from swgjoint.study.sweep_plots import label_of, sweep_picture
 from swgjoint.study.sweep_points import points_of
 from swgjoint.study.sweep_results import csv_text, parquet_bytes, place_of
+from swgjoint.study.sweep_tasks import RunTask
 
 SHEET = """
 design = "reference-2d"
@@ -466,3 +470,21 @@ def test_processes_give_what_this_process_gives(tmp_path):
         return [{k: v for k, v in row.items() if k != "work_s"} for row in found]
 
     assert rows(LocalPool(2)) == rows(LocalPool(1))
+
+
+@pytest.mark.parametrize(("share", "lost"), [(0.04, False), (0.6, True)])
+def test_a_ripple_that_is_not_valid_is_no_figure_of_a_sweep(
+    synthetic_map, tmp_path, share, lost
+):
+    """Its reason names figure and torque; other figures of the run stay."""
+    path = tmp_path / "a.swg"
+    validated_map(synthetic_map, {20.0: (share, 0.01)}).save(path)
+    short = {"simulation.duration_s": 0.5, "trajectory.settle_s": 0.2}
+    load = {"load.joint": {"torque_Nm": 20.0}, "defaults.drive": str(path)}
+    scene = Scene.load_file("bench", short | load)
+    task = RunTask(figures=("ripple_rms_percent", "torsion_arcmin"))
+    figures, reasons = sweep_figures._run(scene, None, task)
+    assert (figures["ripple_rms_percent"] is None) == lost
+    assert figures["torsion_arcmin"] > 0.0
+    assert set(reasons) == ({"ripple_rms_percent"} if lost else set())
+    assert all(names(why, "60 %", "20 N·m") for why in reasons.values())
