@@ -88,7 +88,7 @@ def validation_table(result: dict[str, Any]) -> list[str]:
 
 def marked(result: dict[str, Any], key: str) -> Any:
     """A figure of a spec sheet, marked where its map misses unseen solves."""
-    from swgjoint.maps.map_validity import mark
+    from swgjoint.maps.validity_marks import mark
 
     value, doubt = result[key], result["uncertain"].get(key)
     if doubt is None or value is None:
@@ -98,7 +98,8 @@ def marked(result: dict[str, Any], key: str) -> Any:
 
 def doubts(result: dict[str, Any]) -> list[str]:
     """What the marks of a spec sheet mean, figures of the same reason together."""
-    from swgjoint.maps.map_validity import Difference, mark
+    from swgjoint.maps.map_validity import Difference
+    from swgjoint.maps.validity_marks import mark
 
     found: dict[str, list[str]] = {}
     for key, doubt in result["uncertain"].items():

@@ -226,7 +226,7 @@ def joint_table(joints: dict[str, Any]) -> str:
 
 def joint_row(item: tuple[str, dict[str, Any]]) -> tuple[str, ...]:
     """Figures of one joint as the table shows them."""
-    from swgjoint.maps.map_validity import joint_mark
+    from swgjoint.maps.validity_marks import error_mark, joint_mark
 
     name, joint = item
     torsion, error = joint["torsion_arcmin"], joint["transmission_error_arcmin"]
@@ -236,7 +236,7 @@ def joint_row(item: tuple[str, dict[str, Any]]) -> tuple[str, ...]:
         fixed(torsion["mean"]),
         fixed(torsion["pp"]),
         fixed(error["mean"]),
-        _signed(joint_mark(joint, ("output_error",)), fixed(error["pp"])),
+        _signed(error_mark(joint, error["pp"]), fixed(error["pp"])),
         ripple_cell(joint, "ripple_pp_percent"),
         ripple_cell(joint, "ripple_rms_percent"),
         _signed(
@@ -257,7 +257,7 @@ def ripple_cell(joint: dict[str, Any], key: str) -> str:
 
     > where it is a lower bound, ~ and ! where the map differs from unseen solves.
     """
-    from swgjoint.maps.map_validity import joint_mark
+    from swgjoint.maps.validity_marks import joint_mark
 
     if joint["ripple_missing"]:
         return "-"
@@ -276,12 +276,17 @@ def fixed(value: float, digits: int = 3) -> str:
 
 def notes(joints: dict[str, Any]) -> list[str]:
     """What marks in the table mean, and warnings about the validity of figures."""
-    from swgjoint.maps.map_validity import joint_mark, mark_legend
+    from swgjoint.maps.validity_marks import error_mark, joint_mark, mark_legend
     from swgjoint.view.validity import warnings_of
 
     lines = warnings_of(joints)
     whys = {joint["ripple_missing"] for joint in joints.values()} - {None}
-    if marks := {joint_mark(joint) for joint in joints.values()} - {""}:
+    marks = {joint_mark(joint) for joint in joints.values()}
+    marks |= {
+        error_mark(joint, joint["transmission_error_arcmin"]["pp"])
+        for joint in joints.values()
+    }
+    if marks - {""}:
         lines.insert(0, mark_legend(marks))
     lines += [f"-: no figure for the torque ripple: {why}" for why in sorted(whys)]
     if any(not line["drive_order"] for j in joints.values() for line in j["orders"]):

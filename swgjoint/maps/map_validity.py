@@ -12,9 +12,9 @@ with a reason, and the map counts as not validated.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import isfinite
+from math import isfinite, nan
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -26,8 +26,6 @@ WARNING = 0.1
 """Difference over the peak to peak from which a figure is marked as uncertain."""
 LIMIT = 0.3
 """The same from which ripple figures are not valid."""
-UNCERTAIN, NOT_VALID = "~", "!"
-"""Marks of figures above :data:`WARNING` and above :data:`LIMIT`."""
 NOT_VALIDATED = "not validated against unseen solves"
 QUANTITIES = {
     "input_torque": "input torque",
@@ -35,10 +33,11 @@ QUANTITIES = {
 }
 """Quantities of the ripple and their names."""
 STIFFNESS = "secant_stiffness"
+_UNITS = {"input_torque": "Nm", "output_error": "rad"}
 MAX_ROWS = 1000
 """Of a record; a thorough one has some tens."""
 
-Rows = tuple[tuple[float, float], ...]
+Rows = tuple[tuple[float, float, float], ...]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,6 +52,8 @@ class Difference:
     """Where it is [N·m]."""
     rms: float | None = None
     """Over the same peak to peak; None where it is not known."""
+    peak_to_peak: float | None = None
+    """Of the solves at that torque [N·m] or [rad]; None where it is not known."""
     from_rows: tuple[float, ...] = ()
     """Two torques of unseen solves, if the difference is on the line through them."""
 
@@ -67,6 +68,7 @@ class Difference:
             "quantity": self.quantity,
             "largest": self.largest,
             "torque_Nm": self.torque,
+            "peak_to_peak": self.peak_to_peak,
             "interpolated_from_Nm": list(self.from_rows),
         }
 
@@ -77,6 +79,7 @@ class Difference:
             quantity=given["quantity"],
             largest=given["largest"],
             torque=given["torque_Nm"],
+            peak_to_peak=given["peak_to_peak"],
             from_rows=tuple(given["interpolated_from_Nm"]),
         )
 
@@ -105,7 +108,8 @@ class MapValidation:
     totals: dict[str, Difference]
     """The worst of each quantity, by key."""
     rows: dict[str, Rows]
-    """Largest differences by quantity: increasing torque [N·m], difference [-]."""
+    """By quantity increasing torques [N·m], largest differences [-], peak to peak of
+    the solves [N·m] or [rad], nan where it is not known."""
     reason: str
     """Why sampling ended before its goal; empty where it was reached."""
 
@@ -117,7 +121,7 @@ class MapValidation:
     def bad_torques(self, limit: float) -> tuple[float, ...]:
         """Torques of the record at which the ripple is off by more than that [N·m]."""
         rows = [row for key in QUANTITIES for row in self.rows[key]]
-        return tuple(sorted({torque for torque, largest in rows if largest > limit}))
+        return tuple(sorted({row[0] for row in rows if row[1] > limit}))
 
     def between(self, low: float, high: float) -> dict[str, Difference]:
         """Largest differences over a range of torques.
@@ -140,95 +144,21 @@ class MapValidation:
             ends[0] = 0.0 if crosses else ends[0]
         found = {}
         for key, rows in self.rows.items():
-            torque, largest = np.array(rows).T
+            torque, largest, wave = np.array(rows).T
             inside = (torque >= ends[0]) & (torque <= ends[1])
             at = np.concatenate([torque[inside], np.clip(ends, *torque[[0, -1]])])
             values = np.concatenate([largest[inside], np.interp(ends, torque, largest)])
             k = int(values.argmax())
             after = int(np.searchsorted(torque, at[k]))
-            row = torque[after] == at[k]
+            row, height = torque[after] == at[k], float(np.interp(at[k], torque, wave))
             found[key] = Difference(
                 quantity=key,
                 largest=float(values[k]),
                 torque=float(at[k]),
+                peak_to_peak=height if isfinite(height) else None,
                 from_rows=() if row else tuple(torque[after - 1 : after + 1].tolist()),
             )
         return found
-
-
-def mark(largest: float | None) -> str:
-    """The sign of a figure that depends on a quantity which is off by that much."""
-    if largest is None or largest <= WARNING:
-        return ""
-    return UNCERTAIN if largest <= LIMIT else NOT_VALID
-
-
-def joint_doubt(
-    joint: Mapping[str, Any], quantities: Sequence[str] = tuple(QUANTITIES)
-) -> Difference | None:
-    """The worst difference of a joint's map where it exceeds :data:`WARNING`.
-
-    None where the run tells no ripple of the joint.
-
-    Args:
-        joint: Figures of a joint, see :func:`swgjoint.sim.metrics.joint_metrics`.
-        quantities: Keys of :data:`QUANTITIES` that count.
-    """
-    found = joint["map_difference"]
-    if found is None or joint["ripple_valid"] is None:
-        return None
-    worst = max(
-        (Difference.from_json(found[key]) for key in quantities),
-        key=lambda one: one.largest,
-    )
-    return worst if worst.largest > WARNING else None
-
-
-def joints_judged(joints: Iterable[Mapping[str, Any]]) -> dict[str, Any]:
-    """``ripple_valid`` and ``map_difference`` of several joints: the worst of them."""
-    judged = [joint for joint in joints if joint["ripple_valid"] is not None]
-    if not judged:
-        return {"ripple_valid": None, "map_difference": None}
-    return {
-        "ripple_valid": all(joint["ripple_valid"] for joint in judged),
-        "map_difference": {
-            key: max(
-                (joint["map_difference"][key] for joint in judged),
-                key=lambda one: float(one["largest"]),
-            )
-            for key in QUANTITIES
-        },
-    }
-
-
-def joint_mark(
-    joint: Mapping[str, Any], quantities: Sequence[str] = tuple(QUANTITIES)
-) -> str:
-    """The sign of a figure of a joint that depends on some quantities, or nothing."""
-    doubt = joint_doubt(joint, quantities)
-    return "" if doubt is None else mark(doubt.largest)
-
-
-def worst_mark(
-    joints: Iterable[Mapping[str, Any]],
-    quantities: Sequence[str] = tuple(QUANTITIES),
-) -> str:
-    """The gravest sign of several joints."""
-    marks = {joint_mark(joint, quantities) for joint in joints}
-    return next((sign for sign in (NOT_VALID, UNCERTAIN) if sign in marks), "")
-
-
-def mark_legend(marks: Collection[str]) -> str:
-    """What the signs of figures mean, those that are there."""
-    meaning = {
-        UNCERTAIN: f"uncertain, the map differs by more than {percent(WARNING)}",
-        NOT_VALID: f"not valid, the map differs by more than {percent(LIMIT)}",
-    }
-    told = [f"{sign} {text}" for sign, text in meaning.items() if sign in marks]
-    return (
-        f"{'; '.join(told)} of the peak to peak from finite-element solves that it has"
-        " not seen"
-    )
 
 
 def percent(share: float) -> str:
@@ -338,7 +268,7 @@ def _read(record: Any) -> MapValidation:
         for key in (*QUANTITIES, STIFFNESS)
         if key in QUANTITIES or given.get(key) is not None
     }
-    found: dict[str, dict[float, float]] = {key: {} for key in QUANTITIES}
+    found: dict[str, dict[float, tuple[float, float]]] = {key: {} for key in QUANTITIES}
     torques = set()
     for k, row in enumerate(rows):
         where = f".rows.{k}"
@@ -347,16 +277,19 @@ def _read(record: Any) -> MapValidation:
         torques.add(torque)
         for key, of in found.items():
             # where the solves have no ripple there is no part of it
-            if table.get(f"{key}_largest") is not None:
-                value = _share(table, f"{key}_largest", where)
-                of[torque] = max(value, of.get(torque, 0.0))
+            if table.get(f"{key}_largest") is None:
+                continue
+            value, height = _share(table, f"{key}_largest", where), nan
+            if table.get(f"{key}_pp_{_UNITS[key]}") is not None:
+                height = _share(table, f"{key}_pp_{_UNITS[key]}", where)
+            of[torque] = max((value, height), of.get(torque, (0.0, nan)))
     return MapValidation(
         solves=solves,
         torques=tuple(sorted(torques)),
         totals=totals,
         rows={
-            key: tuple(sorted(of.items()))
-            or ((totals[key].torque, totals[key].largest),)
+            key: tuple((torque, *of[torque]) for torque in sorted(of))
+            or ((totals[key].torque, totals[key].largest, nan),)
             for key, of in found.items()
         },
         reason=_text(given.get("reason", "")),

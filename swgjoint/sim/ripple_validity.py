@@ -93,12 +93,11 @@ def map_label(run: Run, j: int, *, told: bool) -> dict[str, Any]:
         the reason in ``map_difference_missing``.
     """
     transmission = run.assembly.transmissions[j]
-    level = transmission.level
-    found, reason = (
-        map_validation(transmission.drive)
-        if level == "full"
-        else (None, f"level {level} has no ripple of a map")
-    )
+    found, reason = map_validation(transmission.drive)
+    if transmission.level != "full":
+        found, reason = None, f"level {transmission.level} has no ripple of a map"
+    elif not transmission.attached.kept_orders:
+        found, reason = None, "the step carries no order of the map"
     if found is None:
         return {
             "ripple_valid": None,

@@ -18,7 +18,8 @@ from typing import TYPE_CHECKING, Any
 import mujoco
 import numpy as np
 
-from swgjoint.maps.map_validity import LIMIT, joint_doubt, percent
+from swgjoint.maps.map_validity import LIMIT, percent
+from swgjoint.maps.validity_marks import joint_doubt
 from swgjoint.units import mm
 
 if TYPE_CHECKING:

@@ -19,7 +19,7 @@ from swgjoint.errors import ComputationError, InputError
 from swgjoint.faults import read_toml
 from swgjoint.gear.design import Design
 from swgjoint.maps.drive_map import DriveMap
-from swgjoint.maps.map_validity import joints_judged
+from swgjoint.maps.validity_marks import joints_judged
 from swgjoint.models_path import near_names
 from swgjoint.progress import Progress, silent
 from swgjoint.sim.arm_scene import rigid_arm_of

@@ -6,7 +6,8 @@ import io
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from swgjoint.maps.map_validity import QUANTITIES, joint_mark, mark_legend
+from swgjoint.maps.map_validity import QUANTITIES
+from swgjoint.maps.validity_marks import error_mark, joint_mark, mark_legend
 from swgjoint.study.compare import LOWER, RIPPLE, Compared
 from swgjoint.view.entities import COLORS
 from swgjoint.view.report import Cell, Table
@@ -30,9 +31,9 @@ JUDGED_BY = {
     "ripple_rms_percent": tuple(QUANTITIES),
     "ripple_pp_percent": tuple(QUANTITIES),
     "transmission_error_ripple_arcmin": ("output_error",),
-    "transmission_error_arcmin": ("output_error",),
 }
 """Quantities of the validation of a map that a figure depends on."""
+_ERROR = "transmission_error_arcmin"
 PANELS = (
     "ripple_rms_percent",
     "transmission_error_ripple_arcmin",
@@ -54,7 +55,10 @@ def cell(row: Mapping[str, Any], key: str) -> str:
     if key in RIPPLE and row["ripple_missing"]:
         return "-"
     bound = "> " if key in RIPPLE and row["ripple_is_lower_bound"] else ""
-    sign = joint_mark(row, JUDGED_BY[key]) if key in JUDGED_BY else ""
+    if key in JUDGED_BY:
+        sign = joint_mark(row, JUDGED_BY[key])
+    else:
+        sign = error_mark(row, row[key]) if key == _ERROR else ""
     return f"{sign} {bound}{shown(row[key])}".strip()
 
 
@@ -111,8 +115,11 @@ def left_out_notes(rows: Sequence[Compared]) -> list[str]:
         for joints, names in found.items()
         if joints
     ]
-    marks = {joint_mark(row.to_json()) for row in rows} - {""}
-    return [*notes, mark_legend(marks)] if marks else notes
+    marks = set()
+    for row in rows:
+        told = row.to_json()
+        marks |= {joint_mark(told), error_mark(told, row.transmission_error_arcmin)}
+    return [*notes, mark_legend(marks)] if marks - {""} else notes
 
 
 def comparison_picture(

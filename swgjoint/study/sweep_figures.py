@@ -283,7 +283,7 @@ def _run(
     scene: Scene, design: Design | None, task: RunTask
 ) -> tuple[dict[str, float | None], dict[str, str]]:
     """Figures of the worst joint of a run, and why some of them are not valid."""
-    from swgjoint.maps.map_validity import joint_doubt
+    from swgjoint.maps.validity_marks import joint_doubt
     from swgjoint.sim.run import run_scene
     from swgjoint.study.compare import RIPPLE, row_of
 

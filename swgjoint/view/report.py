@@ -16,14 +16,17 @@ from swgjoint.files import write_whole
 from swgjoint.json_text import json_text, plain
 from swgjoint.maps.map_validity import (
     NOT_VALIDATED,
-    joint_mark,
     map_validation,
-    mark,
-    mark_legend,
     validation_summary,
-    worst_mark,
 )
 from swgjoint.maps.spec_sheet import measure_spec, validity
+from swgjoint.maps.validity_marks import (
+    error_mark,
+    joint_mark,
+    mark,
+    mark_legend,
+    worst,
+)
 from swgjoint.progress import Progress, silent
 from swgjoint.sim.verdict import NOT_VALID, VALID
 from swgjoint.toml_text import toml_text
@@ -271,21 +274,24 @@ def ripple_cell(joints: Iterable[Mapping[str, Any]], key: str) -> Cell:
         return Cell("-")
     most = max(told, key=lambda joint: float(joint[key]))
     bound = "> " if most["ripple_is_lower_bound"] else ""
-    sign = worst_mark(told)
+    sign = worst([joint_mark(joint) for joint in told])
     text = f"{sign} {bound}{shown(most[key])}".strip()
     return Cell(text, "bad" if bound or sign else "")
 
 
 def error_cell(joints: Iterable[Mapping[str, Any]], value: float) -> Cell:
     """Peak to peak of a transmission error, marked as :func:`ripple_cell` does."""
-    sign = worst_mark(joints, ("output_error",))
+    sign = worst([error_mark(joint, value) for joint in joints])
     return Cell(f"{sign} {shown(value)}".strip(), "bad" if sign else "")
 
 
 def _legend(joints: Iterable[Mapping[str, Any]]) -> list[str]:
     """What the marks of figures mean; none without marks."""
-    marks = {joint_mark(joint) for joint in joints} - {""}
-    return [f"{mark_legend(marks)}."] if marks else []
+    marks = set()
+    for joint in joints:
+        error = joint["transmission_error_arcmin"]["pp"]
+        marks |= {joint_mark(joint), error_mark(joint, error)}
+    return [f"{mark_legend(marks)}."] if marks - {""} else []
 
 
 def _label(label: str, run: Run, step: dict[str, Any] | None) -> dict[str, Any]:

@@ -13,11 +13,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from swgjoint.errors import SwgError
-from swgjoint.maps.map_validity import (
-    joint_doubt,
-    map_validation,
-    validation_summary,
-)
+from swgjoint.maps.map_validity import map_validation, validation_summary
+from swgjoint.maps.validity_marks import joint_doubt
 from swgjoint.sim.run import run_scene
 from swgjoint.sim.scene import Scene
 from swgjoint.units import arcmin, deg

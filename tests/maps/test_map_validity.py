@@ -19,10 +19,11 @@ from swgjoint.maps.map_validity import (
     Difference,
     MapValidation,
     map_validation,
-    mark,
     validation_json,
     validation_lines,
 )
+from swgjoint.maps.validity_marks import error_mark, mark
+from swgjoint.units import arcmin
 from swgjoint.view.validity import map_error
 
 ROWS = {5.0: (0.02, 0.01), 15.0: (0.5, 0.04), 30.0: (0.1, 0.2)}
@@ -89,6 +90,18 @@ def test_marks_follow_the_two_limits():
         "~",
         "!",
     ]
+
+
+def test_a_transmission_error_is_marked_by_what_the_difference_is_of_it(synthetic_map):
+    """20 % of 1 arcmin: all of 0.2, a fifth of 1, a fiftieth of 10 arcmin."""
+    drive = validated_map(synthetic_map, {20.0: (0.0, 0.2)}, error=arcmin)
+    found = read(drive).between(15.0, 25.0)
+    joint = {
+        "ripple_valid": True,
+        "map_difference": {key: one.to_json() for key, one in found.items()},
+    }
+    assert [error_mark(joint, value) for value in (0.2, 1.0, 10.0)] == ["!", "~", ""]
+    assert error_mark(joint | {"ripple_valid": None}, 1.0) == ""
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,9 @@ from swgjoint.maps.drive_map import DriveMap
 
 
 def made_record(
-    rows: Mapping[float, tuple[float, float]], stiffness: float = 0.01
+    rows: Mapping[float, tuple[float, float]],
+    stiffness: float = 0.01,
+    error: float = 3e-4,
 ) -> dict[str, Any]:
     """A record with the given largest differences.
 
@@ -18,6 +20,7 @@ def made_record(
         rows: By torque [N·m] the parts of the peak to peak that input torque and
             loaded output error miss.
         stiffness: The same of the secant stiffness, relative.
+        error: Peak to peak of the loaded output error [rad].
     """
     totals = {}
     for k, key in enumerate(("input_torque", "output_error")):
@@ -37,7 +40,7 @@ def made_record(
                 "input_torque_pp_Nm": 5e-3,
                 "input_torque_largest": first,
                 "input_torque_rms": 0.3 * first,
-                "output_error_pp_rad": 5e-6,
+                "output_error_pp_rad": error,
                 "output_error_largest": second,
                 "output_error_rms": 0.3 * second,
             }
@@ -50,7 +53,8 @@ def validated_map(
     drive: DriveMap,
     rows: Mapping[float, tuple[float, float]],
     stiffness: float = 0.01,
+    error: float = 3e-4,
 ) -> DriveMap:
     """The map with such a record."""
-    record = made_record(rows, stiffness)
+    record = made_record(rows, stiffness, error)
     return replace(drive, info={**drive.info, "validation": record})
