@@ -74,6 +74,13 @@ class JointDrive:
     """What ``native`` holds of the map; None at other levels."""
     hysteresis: tuple[str, ...] = ()
     """Tendons of the Jenkin elements of ``native``, in the order of the map's."""
+    corners: tuple[str, ...] = ()
+    """Tendons with a dead band of ``native``, in the order of the spring's corners."""
+    compensated: float = 0.0
+    """Of the integrator's damping of the native spring, taken out of the model
+    [N·m·s/rad]; see :mod:`swgjoint.joint.step_damping`."""
+    compensated_at: float | None = None
+    """Step at which that holds [s]; None where nothing is taken out."""
     motors: tuple[str, ...] = ()
     """Actuators that the model had on the joint; with a rotor they turn that."""
     variable: bool = False
@@ -92,6 +99,7 @@ class JointDrive:
             tendon=renamed(self.tendon),
             plugin=renamed(self.plugin),
             hysteresis=tuple(prefix + name for name in self.hysteresis),
+            corners=tuple(prefix + name for name in self.corners),
             motors=tuple(prefix + name for name in self.motors),
         )
 
@@ -115,9 +123,13 @@ class JointDrive:
         """Torsion mode of rotor against link, both else free [rad/s]; 0 if rigid."""
         if self.rotor is None:
             return 0.0
+        return float(np.sqrt(self.stiffness * self.mobility))
+
+    @property
+    def mobility(self) -> float:
+        """Inverse inertia of rotor against link, at the output [1/(kg·m²)]."""
         rotor = self.ratio**2 * self.rotor_inertia
-        reduced = rotor * self.link_inertia / (rotor + self.link_inertia)
-        return float(np.sqrt(self.stiffness / reduced))
+        return 1.0 / rotor + 1.0 / self.link_inertia
 
     def signals(
         self,

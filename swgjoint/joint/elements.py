@@ -54,16 +54,18 @@ def add_tendon(
     stiffness: tuple[float, float, float],
     damping: float,
     springyield: float = 0.0,
+    dead_band: float = 0.0,
     coefficients: tuple[float, float] | None = None,
 ) -> Any:
     """Fixed tendon of length theta/i - psi, nothing inherited from defaults.
 
-    With ``coefficients`` its length is that sum of theta and psi instead.
+    With ``coefficients`` its length is that sum of theta and psi instead. Its spring
+    begins at a length of ``dead_band`` either way [rad].
     """
     tendon = spec.add_tendon(name=name)
     tendon.stiffness = np.array(stiffness)
     tendon.damping = np.array([damping, 0.0, 0.0])
-    tendon.springlength = np.zeros(2)
+    tendon.springlength = np.array([-dead_band, dead_band])
     tendon.springyield = springyield
     tendon.armature = 0.0
     tendon.frictionloss = 0.0
@@ -83,11 +85,14 @@ def add_native(
     spring: NativeSpring,
     rotor: Any,
 ) -> None:
-    """Polynomial spring, Jenkin tendons and rotor friction; only what there is."""
+    """Springs, Jenkin tendons and rotor friction; only what there is."""
     assert drive.tendon is not None
     pair = rotor.name, drive.joint, drive.ratio
     polynomial = spring.linear, 0.0, spring.cubic
     add_tendon(spec, drive.tendon, *pair, polynomial, drive.damping)
+    for one, corner in zip(drive.corners, spring.corners, strict=True):
+        lines = corner.stiffness, 0.0, 0.0
+        add_tendon(spec, one, *pair, lines, 0.0, dead_band=corner.torsion)
     if spring.friction:
         rotor.frictionloss = spring.friction
     if spring.viscous:

@@ -111,6 +111,7 @@ def fitted(
         )
     spring: NativeSpring | None = fit_native(drive) if level == "native" else None
     elements = range(len(spring.hysteresis)) if spring else ()
+    corners = range(len(spring.corners)) if spring else ()
     own = fitting.has_rotor
     return JointDrive(
         joint=joint,
@@ -127,6 +128,7 @@ def fitted(
         unresolved=unresolved,
         native=spring,
         hysteresis=tuple(f"{joint}_hysteresis{k}" for k in elements),
+        corners=tuple(f"{joint}_corner{k}" for k in corners),
         motors=tuple(actuator.name for actuator in place.actuators.values()),
         variable=fitting.variable and level == "full",
     )

@@ -286,7 +286,7 @@ def _explicit_bounds(drive: JointDrive, h: float, integrator: str) -> tuple[Boun
         stiffness += sum(element.stiffness for element in drive.drive.hysteresis)
     elif drive.native is not None:
         peak = drive.drive.mean_torsion(drive.drive.ratings.momentary_peak)
-        stiffness = drive.native.linear + 3.0 * drive.native.cubic * peak**2
+        stiffness = drive.native.largest_slope(abs(peak))
         stiffness += sum(element.stiffness for element in drive.native.hysteresis)
     rotor = drive.ratio**2 * drive.rotor_inertia
     frequency = sqrt(stiffness * (1.0 / rotor + 1.0 / drive.link_inertia))

@@ -12,7 +12,9 @@ from swgjoint.joint.native import fit_native, native_map
 from swgjoint.joint.region import check_region
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.friction import Friction
+from swgjoint.maps.from_catalogue import catalogue_names
 from swgjoint.maps.hysteresis import Jenkin, play_hysteresis
+from swgjoint.maps.spec_sheet import spec_sheet
 
 
 def with_mean(drive, torque):
@@ -50,24 +52,62 @@ def test_linear_map_stays_linear():
     assert spring.cubic == 0.0
 
 
-def test_softening_curve_falls_back_with_a_note(synthetic_map):
-    """A curve that softens is taken with its mean stiffness, and that is said."""
+def test_softening_curve_is_followed(synthetic_map):
+    """A curve that softens gets dead bands of negative stiffness, slopes stay > 0."""
     x0 = synthetic_map.torsion_knots[-1]
     soft = with_mean(synthetic_map, [0, 2e4, 0, -0.1 * 2e4 / x0**2])
     soft = replace(soft, ratings=replace(soft.ratings, repeated_peak=80.0))
     spring = fit_native(soft)
-    assert (spring.linear, spring.cubic) == (soft.mean_stiffness, 0.0)
-    assert "softens" in spring.note
-    assert spring.residual > 0.1
+    assert spring.corners and all(c.stiffness < 0.0 for c in spring.corners)
+    x = np.linspace(0.0, soft.mean_torsion(80.0), 50)
+    torque = soft.coefficients(x, 1)[:, 0, 0]
+    assert np.abs(spring.torque(x) - torque).max() < 0.01 * soft.ratings.rated_torque
+    assert spring.slope(10.0) > 0.0 and spring.note == ""
 
 
 def test_curve_with_clearance_keeps_a_little_stiffness(synthetic_map):
-    """Where the stiffness about zero vanishes the spring is cubic and still > 0."""
+    """Where the stiffness about zero vanishes a thousandth of the mean stays."""
     x0 = synthetic_map.torsion_knots[-1]
     loose = with_mean(synthetic_map, [0, -500.0, 0, 120.0 / x0**3])
     spring = fit_native(loose)
-    assert spring.linear > 0.0 and spring.cubic > 0.0
+    assert spring.linear == pytest.approx(1e-3 * loose.mean_stiffness)
     assert "no stiffness about zero" in spring.note
+
+
+@pytest.mark.parametrize("name", [n for n in catalogue_names() if "-25-" in n])
+def test_catalogue_lines_are_three_tendons(name):
+    """K1, K2, K3 of the level's own loop are the catalogue's within 2 %."""
+    drive = DriveMap.from_catalogue(name, kinematic_error_arcmin=0.0)
+    law = native_map(drive, fit_native(drive))
+    keys = ["K1_Nm_rad", "K2_Nm_rad", "K3_Nm_rad"]
+    found = spec_sheet(law, only=keys)
+    for key in keys:
+        assert found[key] == pytest.approx(drive.info["stated"][key], rel=0.02)
+
+
+@pytest.mark.slow
+def test_every_catalogue_row_has_its_slopes():
+    """K1, K2, K3 of every row are the catalogue's within 2 %."""
+    for name in catalogue_names():
+        test_catalogue_lines_are_three_tendons(name)
+
+
+def test_engine_has_the_torque_that_a_controller_is_told(bench):
+    """Torque on the link, energy and told map agree to round-off, across corners."""
+    drive = DriveMap.from_catalogue("CSG-25-100", kinematic_error_arcmin=0.0)
+    b = bench(drive, level="native")
+    law = native_map(b.drive.drive, b.drive.native)
+    assert len(b.drive.corners) == 2 and b.model.ntendon == 3
+    b.model.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_ENERGY)
+    for torque in np.linspace(-250.0, 250.0, 41):
+        x = law.mean_torsion(torque)
+        b.place(b.drive.ratio * x, 0.0, 0.0, 0.0)
+        mujoco.mj_forward(b.model, b.data)
+        assert b.data.qfrc_passive[b.v[1]] == pytest.approx(torque, abs=1e-9)
+        assert b.data.energy[0] == pytest.approx(float(law.energy(x, 0.0, 0.0)))
+        signals = b.drive.observe(b.model, b.data)
+        assert signals.torque == pytest.approx(torque, abs=1e-9)
+        assert b.drive.native.torsion(torque) == pytest.approx(x, abs=1e-12)
 
 
 @pytest.mark.parametrize("integrator", ["RK4", "discrete"])
