@@ -15,3 +15,4 @@ deg = pi / 180.0
 arcmin = pi / 10800.0
 arcsec = pi / 648000.0
 rpm = pi / 30.0
+hertz = 2.0 * pi

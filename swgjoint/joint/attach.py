@@ -48,10 +48,10 @@ def attach(
     ``linear``, ``native`` and ``full`` add a rotor (body ``<joint>_rotor`` with a hinge
     of the same name, beside the link under the same parent) and a tendon
     ``<joint>_drive`` with the length theta/i - psi: a native spring and damper, the
-    same with a cubic part (and tendons ``<joint>_hysteresis<k>`` where the map has
-    hysteresis), or the carrier of the engine plugin's instance of the same name, which
-    evaluates ``drive``, hysteresis included. Keyframes grow by the rotor, at the
-    position without torsion.
+    same with a cubic part or tendons ``<joint>_corner<k>`` with dead bands (and
+    ``<joint>_hysteresis<k>`` where the map has hysteresis), or the carrier of the
+    engine plugin's instance of the same name, which evaluates ``drive``, hysteresis
+    included. Keyframes grow by the rotor, at the position without torsion.
 
     The rotor takes the place of the armature that the file gives the joint or its
     actuators. Actuators that act on the joint turn the rotor instead, in the units of
@@ -83,8 +83,10 @@ def attach(
     Solver iterations and a tolerance that would leave the drives' stiffness half solved
     become MuJoCo's defaults with a warning, see :mod:`swgjoint.joint.options`.
     Under ``discrete`` a native spring (``linear``, ``native``) is damped by the step
-    itself, about h w/2 of critical at a torsion frequency w; ``full`` is not. Set the
-    timestep first.
+    itself, about h w/2 of critical at a torsion frequency w; ``full`` is not.
+    :func:`~swgjoint.joint.step_damping.step_mode` says what results, and
+    :func:`~swgjoint.joint.step_damping.damp_as_asked` takes it out for one step. Set
+    the timestep first.
 
     Args:
         spec: Model to edit.

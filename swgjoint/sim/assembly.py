@@ -13,6 +13,7 @@ from swgjoint.errors import InputError
 from swgjoint.joint.attach import attach_all
 from swgjoint.joint.fitting import Fitting
 from swgjoint.joint.region import check_region
+from swgjoint.joint.step_damping import damp_as_asked, is_implicit
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.progress import Progress, silent
 from swgjoint.sim.actuators import Loops, add_actuators
@@ -207,6 +208,9 @@ def assemble(
         _check_length(scene, sub_steps)
         spec.option.timestep = scene.simulation.step_s / sub_steps
         trajectory = trajectory_of(scene, arm, sub_steps=sub_steps)
+    if is_implicit(spec):
+        got = damp_as_asked(spec, got)
+        transmissions = [replace(t, attached=got[t.joint]) for t in transmissions]
     load = np.array(
         [
             _load_torque(scene, name, t.drive)

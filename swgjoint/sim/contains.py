@@ -6,12 +6,16 @@ from typing import TYPE_CHECKING, Any
 
 from swgjoint.faults import Section
 from swgjoint.joint.prescribed import ratio_variation
+from swgjoint.joint.step_damping import StepMode, step_mode
+from swgjoint.units import hertz
 
 if TYPE_CHECKING:
     from swgjoint.joint.drive import JointDrive
     from swgjoint.sim.assembly import Assembly
     from swgjoint.sim.transmission import Transmission
 
+OFF_DAMPING = 0.02
+"""Damping ratio by steps from which the model is said to be without the drive's."""
 _LOSSY = ("native", "full")
 _ERRING = ("kinematic", "full")
 _LEFT_OUT = {
@@ -34,12 +38,12 @@ def contents(assembly: Assembly) -> dict[str, Any]:
         "step_s": assembly.scene.simulation.step_s,
         "sub_steps": assembly.sub_steps,
         "sub_stepped_for": dict(assembly.outside),
-        "joints": {t.joint: _joint(t) for t in assembly.transmissions},
+        "joints": {t.joint: _joint(assembly, t) for t in assembly.transmissions},
         **_features(assembly),
         "left_out": [
             {"joint": t.joint, **item}
             for t in assembly.transmissions
-            for item in _left_out(t)
+            for item in (*_left_out(t), *_off_damping(assembly, t))
         ],
         "absent": _absent(assembly),
     }
@@ -101,7 +105,7 @@ def _given(section: Section) -> dict[str, Any]:
     return section.model_dump(exclude_none=True)
 
 
-def _joint(transmission: Transmission) -> dict[str, Any]:
+def _joint(assembly: Assembly, transmission: Transmission) -> dict[str, Any]:
     attached = transmission.attached
     return {
         "level": attached.level,
@@ -114,7 +118,8 @@ def _joint(transmission: Transmission) -> dict[str, Any]:
         "rotor_inertia_kgm2": attached.rotor_inertia,
         "stiffness_Nm_rad": None if attached.rotor is None else attached.stiffness,
         "damping_Nms_rad": attached.damping,
-        "natural_frequency_Hz": attached.natural_frequency / 6.283185307179586,
+        "natural_frequency_Hz": attached.natural_frequency / hertz,
+        **_at_step(assembly, transmission),
         "orders": list(attached.kept_orders)
         if attached.level in ("kinematic", "full")
         else [],
@@ -127,6 +132,53 @@ def _joint(transmission: Transmission) -> dict[str, Any]:
         else None,
         **_native(attached),
     }
+
+
+def _at_step(assembly: Assembly, transmission: Transmission) -> dict[str, Any]:
+    """Damping and frequency of the torsion as the steps leave them."""
+    mode, loaded = _modes(assembly, transmission)
+    if mode is None or loaded is None:
+        return {}
+    return {
+        "damping_ratio": mode.own_damping_ratio,
+        "step_damping_ratio": mode.damping_ratio,
+        "step_damping_ratio_rated": loaded.damping_ratio,
+        "step_frequency_Hz": mode.frequency / hertz,
+    }
+
+
+def _modes(
+    assembly: Assembly, transmission: Transmission
+) -> tuple[StepMode | None, StepMode | None]:
+    """Torsional vibration about zero and about the rated torque."""
+    if assembly.scene.simulation.integrator != "discrete":
+        return None, None
+    rated = transmission.drive.ratings.rated_torque
+    zero, loaded = (
+        step_mode(transmission.attached, timestep=assembly.step, torque=torque)
+        for torque in (0.0, rated)
+    )
+    return zero, loaded
+
+
+def _off_damping(
+    assembly: Assembly, transmission: Transmission
+) -> list[dict[str, str]]:
+    """Where steps damp the torsion much more than the drive does."""
+    for mode, where in zip(
+        _modes(assembly, transmission), ("", " at rated torque"), strict=True
+    ):
+        if mode is None or mode.damping_ratio < mode.own_damping_ratio + OFF_DAMPING:
+            continue
+        own, got = mode.own_damping_ratio, mode.damping_ratio
+        part = f"the damping ratio {own:.2g} of the drive: {got:.2g} results{where}"
+        reason = (
+            f"steps of {1e3 * assembly.step:.3g} ms damp the torsion at"
+            f" {mode.own_frequency / hertz:.3g} Hz; a shorter simulation.step_s, or"
+            " joints.*.level = 'full'"
+        )
+        return [{"part": part, "reason": reason}]
+    return []
 
 
 def _error(attached: JointDrive) -> str | None:
@@ -158,6 +210,10 @@ def _native(attached: JointDrive) -> dict[str, Any]:
         "native": {
             "linear_Nm_rad": spring.linear,
             "cubic_Nm_rad3": spring.cubic,
+            "corners": [
+                {"torsion_rad": c.torsion, "stiffness_Nm_rad": c.stiffness}
+                for c in spring.corners
+            ],
             "residual_Nm": spring.residual,
             "fitted_to_Nm": spring.fitted_to,
             "hysteresis": list(attached.hysteresis),

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from swgjoint.errors import ComputationError, InputError
 from swgjoint.joint.attach import attach
+from swgjoint.joint.step_damping import damp_as_asked, is_implicit
 from swgjoint.maps.drive_map import DriveMap
 
 Array = NDArray[np.float64]
@@ -167,6 +168,8 @@ def frequency_response(
         friction=False,
     )
     assert got.rotor is not None
+    if is_implicit(spec):
+        damp_as_asked(spec, {JOINT: got})
     for name in (got.rotor, JOINT):
         motor = spec.add_actuator(name=name, target=name)
         motor.trntype = mujoco.mjtTrn.mjTRN_JOINT

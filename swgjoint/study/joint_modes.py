@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.joint.drive import ACCELERATIONS
+from swgjoint.joint.step_damping import restore_damping
 from swgjoint.sim.actuators import control_inputs
 from swgjoint.sim.assembly import Assembly
 from swgjoint.sim.equilibrium import set_start
@@ -143,6 +144,7 @@ def own_modes(whole: Assembly) -> Modes:
     exact = replace(whole, model=copy.copy(whole.model))
     exact.model.opt.integrator = mujoco.mjtIntegrator.mjINT_RK4
     exact.model.opt.timestep = EXACT_STEP
+    restore_damping(exact.model, [t.attached for t in exact.transmissions])
     found = modes(exact)
     low, high = 2.0 * np.pi * LOWEST, 2.0 * np.pi * HIGHEST
     size = np.abs(found.s)
