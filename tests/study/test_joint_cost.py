@@ -135,7 +135,7 @@ def test_a_coarse_run_lacks_the_upper_lines(reference_run):
 
 
 def test_damping_that_steps_add(bench):
-    """The scheme adds none, a native spring half of h w, at the known frequency."""
+    """Neither the scheme nor a compensated native spring adds any; frequencies known."""
     step = 5e-4
     drives = {"hardening": DriveMap.linear(3e4, rated_torque=100.0)}
     found = {}
@@ -149,8 +149,9 @@ def test_damping_that_steps_add(bench):
     for frequency, own, _ in found.values():
         assert frequency == pytest.approx(w / (2.0 * pi), rel=1e-3)
         assert own == pytest.approx(0.02, abs=1e-4)
-    assert abs(found["full"][2]) < 2e-4
-    assert found["linear"][2] == pytest.approx(0.5 * step * w, rel=0.1)
+    # without compensation a native spring has half of h w = 0.12
+    for level in found:
+        assert abs(found[level][2]) < 2e-4
 
 
 def test_splits_of_a_linear_drive(bench, monkeypatch):
