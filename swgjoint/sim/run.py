@@ -346,9 +346,16 @@ def _recorded(
     output = ratio * (motor - assembly.rotor_inertia * slowing)
     torsion, slipping, friction = np.zeros((3, *position.shape))
     error = assembly.prescribed.copy()
+    # the discrete integrator's positions are half a step ahead of its velocities
+    ahead = 0.0
+    if assembly.scene.simulation.integrator == "discrete":
+        ahead = 0.5 * whole.step
     for j in np.flatnonzero(flexible):
         got = assembly.transmissions[j].signals(
-            theta[:, j], position[:, j], theta_rate[:, j], velocity[:, j]
+            theta[:, j] - ahead * theta_rate[:, j],
+            position[:, j] - ahead * velocity[:, j],
+            theta_rate[:, j],
+            velocity[:, j],
         )
         torsion[:, j], error[:, j] = got.torsion, got.transmission_error
         output[:, j] = got.torque
