@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from swgjoint.joint.step_error import MotorLoop, step_error
 from swgjoint.sim.energy import joint_energy, run_energy
 from swgjoint.sim.orders import OrderLine, resample, strongest_lines
 from swgjoint.sim.ripple_validity import HARMONIC_LEVELS, map_label, ripple_label
@@ -82,6 +83,7 @@ def joint_metrics(run: Run, j: int) -> dict[str, Any]:
                 "amplitude_Nm": line.amplitude,
                 "amplitude_percent": 100.0 * line.amplitude / rated,
                 "drive_order": drive_order(run, j, line.order),
+                "step_error": line_error(run, j, line.order),
             }
             for line in lines
         ],
@@ -208,6 +210,33 @@ def drive_order(run: Run, j: int, order: float) -> float | None:
     near = min(attached.kept_orders, key=lambda kept: abs(kept - order))
     turns = np.ptp(run.motor_position[run.steady, j]) / (2.0 * np.pi)
     return near if abs(near - order) <= 0.5 / turns else None
+
+
+def line_error(run: Run, j: int, order: float) -> float | None:
+    """Relative error of a torque line by the step, the joint moving alone.
+
+    See :mod:`swgjoint.joint.step_error`; None for lines that are not of the drive.
+    """
+    if run.assembly.scene.simulation.integrator != "discrete":
+        return None
+    known = drive_order(run, j, order)
+    if known is None:
+        return None
+    loops = run.assembly.loops
+    time, angle = run.time[run.steady], run.motor_position[run.steady, j]
+    return step_error(
+        run.assembly.transmissions[j].attached,
+        order=known,
+        speed=float((angle[-1] - angle[0]) / (time[-1] - time[0])),
+        torque=float(run.output_torque[run.steady, j].mean()),
+        timestep=run.assembly.step,
+        link_inertia=float(run.assembly.link_inertia[j]),
+        loop=MotorLoop(
+            stiffness=float(loops.stiffness[j]),
+            damping=float(loops.damping[j]),
+            sampled=loops.sampled,
+        ),
+    )
 
 
 def strongest_left_out(transmission: Transmission) -> bool:
