@@ -17,6 +17,7 @@ import swgjoint
 from swgjoint.errors import InputError
 from swgjoint.joint.attach import attach
 from swgjoint.joint.reference import Motion, scheme_force
+from swgjoint.joint.step_damping import damp_as_asked
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.hysteresis import Jenkin
 
@@ -308,3 +309,31 @@ def test_the_example_of_the_module_runs():
     with wp.ScopedDevice("cpu"):
         exec(code.replace("4096", "2"), names)
     assert names["d"].time.numpy() == pytest.approx(2 * [1e-3])
+
+
+@pytest.mark.parametrize("taken_out", [False, True])
+def test_native_corners_and_damper_move_as_in_mujoco(taken_out):
+    """Dead bands and the compensating damper are in MuJoCo Warp what they are here."""
+    drive = DriveMap.from_catalogue("CSG-25-100", kinematic_error_arcmin=0.0)
+    spec = mujoco.MjSpec.from_string(PAIR)
+    got = {
+        "j": attach(spec, joint="j", drive=drive, level="native", rotor_inertia=4e-5)
+    }
+    if taken_out:
+        got = damp_as_asked(spec, got)
+    one, model = got["j"], spec.compile()
+    data = mujoco.MjData(model)
+    with wp.ScopedDevice("cpu"):
+        m, d = mjw.put_model(model), mjw.make_data(model, nworld=1)
+    q = [int(model.joint(name).qposadr[0]) for name in (one.rotor, "j")]
+    data.qpos[q] = 0.0, -3e-3  # beyond both corners
+    d.qpos.assign(np.float32(data.qpos)[None])
+    twist = np.array([1.0 / one.ratio, -1.0])
+    here, there = [], []
+    for _ in range(100):
+        mujoco.mj_step(model, data)
+        mjw.step(m, d)
+        here.append(data.qpos[q] @ twist)
+        there.append(d.qpos.numpy()[0][q].astype(float) @ twist)
+    assert np.ptp(here) > 3e-3
+    np.testing.assert_allclose(here, there, atol=1e-8)

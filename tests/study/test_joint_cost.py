@@ -135,7 +135,7 @@ def test_a_coarse_run_lacks_the_upper_lines(reference_run):
 
 
 def test_damping_that_steps_add(bench):
-    """Neither the scheme nor a compensated native spring adds any; frequencies known."""
+    """Neither scheme nor compensated native spring adds any, at known frequencies."""
     step = 5e-4
     drives = {"hardening": DriveMap.linear(3e4, rated_torque=100.0)}
     found = {}
