@@ -5,7 +5,8 @@ loop on every motor (``--bare``: no actuators and no gravity), slowly enough for
 step to carry all harmonics, as `attach` sees to. One thread, `mj_step` in C, CPU time
 of the process; per level the median over interleaved pairs rigid, level of the ratio of
 their steps per second. ``+friction`` is a level with friction that slips,
-``+hysteresis`` one with three elements. Not a test: nothing is asserted.
+``+hysteresis`` one with three elements, ``+corners`` one with the three lines of a
+catalogue. Not a test: nothing is asserted.
 """
 
 from __future__ import annotations
@@ -24,7 +25,9 @@ from mujoco.batch import Batch
 from swgjoint.joint.attach import LEVELS, attach
 from swgjoint.maps.drive_map import DriveMap, Ratings
 from swgjoint.maps.friction import Friction
+from swgjoint.maps.from_catalogue import three_lines
 from swgjoint.maps.hysteresis import Jenkin
+from swgjoint.maps.torsion_law import potential_of_stiffness
 from swgjoint.sim.rigid_arm import RigidArm
 
 STIFFNESS = (4e4, 4e4, 3e4, 3e4, 1.5e4, 8e3, 8e3)
@@ -87,6 +90,15 @@ def drive(stiffness: float, orders: tuple[int, ...]) -> DriveMap:
     )
 
 
+def cornered(stiffness: float, orders: tuple[int, ...]) -> DriveMap:
+    """The same with the three lines of a catalogue as its mean curve, no harmonics."""
+    slopes = (0.7 * stiffness, 1.05 * stiffness, 1.2 * stiffness)
+    knots, slope = three_lines(14.0, 48.0, *slopes, largest=200.0)
+    potential, ends = potential_of_stiffness(knots, slope)
+    plain = drive(stiffness, ())
+    return replace(plain, torsion_knots=knots, potential=potential, end_stiffness=ends)
+
+
 def build(
     level: str, *, step: float, orders: tuple[int, ...], bare: bool
 ) -> tuple[mujoco.MjModel, mujoco.MjData]:
@@ -99,11 +111,12 @@ def build(
     names = [joint.name for joint in spec.joints]
     base, _, lossy = level.partition("+")
     elements = HYSTERESIS if lossy == "hysteresis" else ()
+    shape = cornered if lossy == "corners" else drive
     drives = [
         attach(
             spec,
             joint=name,
-            drive=replace(drive(stiffness, orders), hysteresis=elements),
+            drive=replace(shape(stiffness, orders), hysteresis=elements),
             level=base,
             rotor_inertia=rotor,
             damping_ratio=0.02,
@@ -195,7 +208,7 @@ def main() -> None:
     """Print the table, or JSON."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     losses = [f"{level}+{loss}" for loss in LOSSES for level in ("native", "full")]
-    levels = (*LEVELS, *losses)
+    levels = (*LEVELS, "native+corners", *losses)
     parser.add_argument("--levels", nargs="+", choices=levels, default=levels)
     parser.add_argument("--pairs", type=int, default=9)
     parser.add_argument("--steps", type=int, default=4_000)
