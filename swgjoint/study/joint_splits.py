@@ -20,6 +20,7 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 
+from swgjoint.joint.step_damping import restore_damping
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.assembly import Assembly
 from swgjoint.sim.scene import Scene
@@ -56,6 +57,8 @@ def split(
             for t in full.transmissions
         ),
     )
+    # a split has the integrator's own damping of its tendon
+    restore_damping(whole.model, [t.attached for t in linear.transmissions])
     joints = []
     for j, t in enumerate(linear.transmissions):
         tendon = whole.model.tendon(t.attached.tendon).id

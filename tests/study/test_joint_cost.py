@@ -14,6 +14,7 @@ from messages import names
 
 from swgjoint.cli import bench_joint
 from swgjoint.cli.main import main
+from swgjoint.joint.step_damping import restore_damping
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.study import joint_cost
 from swgjoint.study.joint_modes import numerical_damping
@@ -155,16 +156,17 @@ def test_damping_that_steps_add(bench):
 
 
 def test_splits_of_a_linear_drive(bench, monkeypatch):
-    """Without kinematic error nothing is left to split: both are the native spring.
+    """Without kinematic error nothing is left to split: both are a plain native spring.
 
     The corrected one with mu = 1 puts in what it takes out.
     """
     monkeypatch.setitem(SPLITS, "corrected split", 1.0)
     drives = {"hardening": DriveMap.linear(3e4, rated_torque=100.0)}
     scene = bench.scene.with_changes({"defaults.damping_ratio": 0.0})
-    native = attempt(
-        scene, Setting(level="linear", integrator="discrete", step=2e-3), drives
-    )
+    setting = Setting(level="linear", integrator="discrete", step=2e-3)
+    plain = assemble_setting(scene, setting, drives)
+    restore_damping(plain.model, [t.attached for t in plain.transmissions])
+    native = attempt_assembled(plain)
     for name in SPLITS:
         with split(
             scene, Setting(level="full", integrator=name, step=2e-3), drives
