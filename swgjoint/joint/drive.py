@@ -219,6 +219,9 @@ class JointDrive:
     def observe(self, model: mujoco.MjModel, data: mujoco.MjData) -> JointSignals:
         """The same from an ``MjData`` after a step; arrays of shape ().
 
+        Under ``discrete`` at the positions half a step back: those of the engine are
+        that much ahead of its velocities.
+
         A drive without rotor has no torsion, and as error that of its map at the
         motor angle that belongs to the link (``rigid``: none). Its torque on the link
         is the torque at the joint less what the reflected rotor inertia takes.
@@ -235,11 +238,14 @@ class JointDrive:
                 torque=np.asarray(torque),
             )
         rotor = model.joint(self.rotor)
+        speeds = data.qvel[int(rotor.dofadr[0])], data.qvel[v]
+        ahead = 0.0
+        if model.opt.integrator == mujoco.mjtIntegrator.mjINT_DISCRETE:
+            ahead = 0.5 * float(model.opt.timestep)
         state = (
-            data.qpos[int(rotor.qposadr[0])],
-            data.qpos[q],
-            data.qvel[int(rotor.dofadr[0])],
-            data.qvel[v],
+            data.qpos[int(rotor.qposadr[0])] - ahead * speeds[0],
+            data.qpos[q] - ahead * speeds[1],
+            *speeds,
         )
         got, friction = self.signals(*state), 0.0
         torsion = float(got.torsion)

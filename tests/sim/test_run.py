@@ -238,6 +238,34 @@ def test_contents_name_what_is_in_the_model(bench, synthetic_map):
     assert found["full"]["left_out"] == []
 
 
+def test_contents_state_the_damping_that_steps_leave(bench):
+    """Damped as asked at linear; what the corners of native add is listed, at its step.
+
+    RK4 damps nothing, and the model is without compensation.
+    """
+    drive = DriveMap.from_catalogue("CSG-25-100", kinematic_error_arcmin=0.0)
+    found = {}
+    for level in ("linear", "native"):
+        run = bench(drive, defaults__level=level, simulation__duration_s=0.02)
+        joint, left = run.contains["joints"]["joint"], run.contains["left_out"]
+        found[level] = joint["step_damping_ratio_rated"]
+        assert joint["step_damping_ratio"] == pytest.approx(0.022, abs=0.004)
+        assert joint["step_frequency_Hz"] < joint["natural_frequency_Hz"]
+        told = [item for item in left if "damping ratio" in item["part"]]
+        assert len(told) == (level == "native")
+    assert found["linear"] < 0.02 < 0.05 < found["native"] < 0.15
+    fixed = bench(
+        drive,
+        defaults__level="native",
+        simulation__integrator="RK4",
+        simulation__step_s=1e-4,
+        simulation__duration_s=0.02,
+    )
+    assert "step_damping_ratio" not in fixed.contains["joints"]["joint"]
+    (one,) = fixed.assembly.transmissions
+    assert one.attached.compensated == 0.0
+
+
 def test_unknown_joints_are_refused_together():
     """Every key that names a joint the arm does not have gives one line."""
     scene = Scene.load_file(
