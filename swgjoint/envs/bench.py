@@ -24,6 +24,7 @@ from swgjoint.errors import InputError
 from swgjoint.joint.attach import attach
 from swgjoint.joint.drive import JointDrive
 from swgjoint.joint.region import check_region
+from swgjoint.joint.step_damping import damp_as_asked
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.controller import KnownJoints
 from swgjoint.sim.rigid_arm import RigidArm, compile_spec
@@ -152,6 +153,7 @@ class BenchCore(Core):
             for kind in kinds
         )
         spec.option.timestep = s.period_s / sub_steps
+        attached = damp_as_asked(spec, {JOINT: attached})[JOINT]
         one = np.ones(1)
         limit = s.torque_limit_Nm or ratings.repeated_peak / abs(ratio)
         joints = KnownJoints(

@@ -10,6 +10,7 @@ import pytest
 from messages import names, naming
 
 from swgjoint.errors import ComputationError, InputError
+from swgjoint.joint.step_damping import compensation
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.assembly import assemble
 from swgjoint.sim.run import run_scene
@@ -244,3 +245,24 @@ def test_every_nth_sample_of_a_motion_is_the_motion_at_that_step():
         np.testing.assert_allclose(
             getattr(kept, name), getattr(coarse, name), atol=1e-12
         )
+
+
+def test_native_springs_are_compensated_for_the_step_that_is_run():
+    """The negative damper of a native joint belongs to the sub-steps of the others.
+
+    That of a longer step would give energy.
+    """
+    scene = Scene.load_file("ur5e-catalogue").with_changes(
+        {
+            "simulation.step_s": 0.005,
+            "joints.elbow_joint.drive": "erring",
+            "joints.wrist_3_joint.level": "native",
+        }
+    )
+    whole = assemble(scene, drives={"erring": erring(1e5, error=1e-3)})
+    assert whole.sub_steps > 1
+    (native,) = (t.attached for t in whole.transmissions if t.level == "native")
+    assert native.compensated_at == whole.step == 0.005 / whole.sub_steps
+    tendon = whole.model.tendon(native.tendon).id
+    left = native.damping - whole.model.tendon_damping[tendon]
+    assert left == pytest.approx(compensation(native, whole.step))

@@ -164,9 +164,9 @@ def test_the_error_estimate_falls_with_the_step(synthetic_map):
                 drives={"reference-2d": synthetic_map},
             )
         )
-        for step in (0.001, 0.000125)
+        for step in (0.001, 0.0000625)
     ]
-    assert [found["step_s"] for found in changes] == [0.0005, 0.0000625]
+    assert [found["step_s"] for found in changes] == [0.0005, 0.00003125]
     coarse, fine = (found["joints"]["joint"] for found in changes)
     for key in STEP_KEYS:
         assert fine[key] < 0.5 * coarse[key] or coarse[key] < 1e-9
