@@ -27,7 +27,7 @@ CC, CXX = os.environ.get("CC", "gcc"), os.environ.get("CXX", "g++")
 JOINTS = 6
 # as counted where they were written; a change that lowers one lowers it here
 NATIVE_INSTRUCTIONS = 42_936
-"""Of a step of six native drives, the engine's included; each has tendons for three lines."""
+"""Of a step of six native drives, the engine's included; each has three tendons."""
 FULL_INSTRUCTIONS = 60_730
 EVALUATION_TABLES = 8.6
 """Memory of an evaluation in Python over that of a table of all its cos and sin."""
