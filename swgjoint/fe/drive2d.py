@@ -14,6 +14,7 @@ from swgjoint.fe.friction import STICK_STIFFNESS, Friction
 from swgjoint.fe.race import PlaneRace
 from swgjoint.fe.ring import RingModel
 from swgjoint.fe.sector_mesh import sector_mesh
+from swgjoint.fe.stress_state import confinement
 from swgjoint.fe.superelement import Superelement, condense
 from swgjoint.gear.bearing_checks import bearing_checks
 from swgjoint.gear.check import raise_faults
@@ -207,4 +208,5 @@ def sector(design: Design, member: MemberName, profile: ToothProfile) -> Superel
         youngs_modulus=material.youngs_modulus,
         poisson_ratio=material.poisson_ratio,
         width=design.drive.face_width_mm * mm,
+        confinement=confinement(design, member, profile),
     )

@@ -1,4 +1,7 @@
-"""Plane-stress linear elasticity on quadrilaterals: forms and stress recovery."""
+"""Plane linear elasticity on quadrilaterals: forms and stress recovery.
+
+Plane stress, plane strain, or a stated share of the way between them.
+"""
 
 from __future__ import annotations
 
@@ -15,26 +18,62 @@ from swgjoint.fe.element import ElementQuadIncompatible
 Array = NDArray[np.float64]
 
 
-def plane_stress_basis(mesh: MeshQuad) -> Basis:
+def plane_basis(mesh: MeshQuad) -> Basis:
     """Vector basis of incompatible-mode quadrilaterals, 2 x 2 Gauss points."""
     return Basis(mesh, ElementVector(ElementQuadIncompatible()), intorder=3)
 
 
+def in_plane_constants(
+    youngs_modulus: float, poisson_ratio: float, confinement: float
+) -> tuple[float, float]:
+    r"""Constants with which the equations of plane stress hold for a confined section.
+
+    The axial stress is a share c of what plane strain demands,
+    :math:`\sigma_{zz} = c\nu(\sigma_{xx} + \sigma_{yy})`. Hooke's law in the plane
+    then has
+
+    .. math:: E' = \frac{E}{1 - c\nu^2}, \quad
+        \nu' = \frac{\nu(1 + c\nu)}{1 - c\nu^2}, \quad
+        \frac{E'}{2(1 + \nu')} = \frac{E}{2(1 + \nu)} .
+
+    Args:
+        youngs_modulus: E [Pa].
+        poisson_ratio: nu [-].
+        confinement: c [-]; 0 is plane stress, 1 plane strain.
+
+    Returns:
+        E' [Pa] and nu' [-].
+    """
+    share = 1.0 - confinement * poisson_ratio**2
+    constrained = poisson_ratio * (1.0 + confinement * poisson_ratio)
+    return youngs_modulus / share, constrained / share
+
+
 def stiffness_matrix(
-    basis: Basis, youngs_modulus: float, poisson_ratio: float, width: float
+    basis: Basis,
+    youngs_modulus: float,
+    poisson_ratio: float,
+    width: float,
+    confinement: float = 0.0,
 ) -> sparse.csr_matrix:
-    r"""Stiffness of a disc of the given width in plane stress.
+    r"""Stiffness of a disc of the given width.
 
     .. math:: a(u, v) = w \int \sigma(u) : \varepsilon(v), \quad
         \sigma = 2\mu\varepsilon + \lambda^*\,\mathrm{tr}\,\varepsilon\,I, \quad
-        \lambda^* = \frac{2\mu\lambda}{\lambda + 2\mu} = \frac{E\nu}{1-\nu^2}
+        \lambda^* = \frac{E'\nu'}{1-\nu'^2}
+
+    In plane stress :math:`\lambda^* = 2\mu\lambda/(\lambda + 2\mu)`.
 
     Args:
-        basis: From :func:`plane_stress_basis`.
+        basis: From :func:`plane_basis`.
         youngs_modulus: [Pa].
         poisson_ratio: [-].
         width: [m].
+        confinement: See :func:`in_plane_constants` [-].
     """
+    youngs_modulus, poisson_ratio = in_plane_constants(
+        youngs_modulus, poisson_ratio, confinement
+    )
     lame = youngs_modulus * poisson_ratio / (1.0 - poisson_ratio**2)
     shear = youngs_modulus / (2.0 * (1.0 + poisson_ratio))
 
@@ -48,7 +87,10 @@ def stiffness_matrix(
 
 
 def nodal_stress_operator(
-    basis: Basis, youngs_modulus: float, poisson_ratio: float
+    basis: Basis,
+    youngs_modulus: float,
+    poisson_ratio: float,
+    confinement: float = 0.0,
 ) -> sparse.csr_matrix:
     """Stress at the nodes as a linear operator on the degrees of freedom.
 
@@ -69,6 +111,9 @@ def nodal_stress_operator(
         return np.stack([np.ones_like(x[0]), x[0], x[1], x[0] * x[1]], axis=-1)
 
     extrapolate = bilinear(corners) @ np.linalg.inv(bilinear(gauss))
+    youngs_modulus, poisson_ratio = in_plane_constants(
+        youngs_modulus, poisson_ratio, confinement
+    )
     factor = youngs_modulus / (1.0 - poisson_ratio**2)
     law = factor * np.array(
         [
@@ -97,15 +142,22 @@ def nodal_stress_operator(
 
 
 def stress_maxima(stress: Array) -> tuple[Array, Array, Array]:
-    """Tensile, compressive (as a magnitude) and von Mises stress in plane stress.
+    """Tensile, compressive (as a magnitude) and von Mises stress.
+
+    The axial stress of a confined section lies between the principal stresses of the
+    plane and zero, so it decides neither maximum.
 
     Args:
-        stress: xx, yy, xy in the last axis [Pa].
+        stress: xx, yy, xy and, unless it is zero, zz in the last axis [Pa].
     """
     xx, yy, xy = stress[..., 0], stress[..., 1], stress[..., 2]
     middle, radius = 0.5 * (xx + yy), np.hypot(0.5 * (xx - yy), xy)
+    squared = xx**2 + yy**2 - xx * yy + 3.0 * xy**2
+    if stress.shape[-1] == 4:
+        zz = stress[..., 3]
+        squared = squared + zz * (zz - xx - yy)
     return (
         np.maximum(middle + radius, 0.0),
         np.maximum(radius - middle, 0.0),
-        np.sqrt(xx**2 + yy**2 - xx * yy + 3.0 * xy**2),
+        np.sqrt(squared),
     )

@@ -17,6 +17,7 @@ from swgjoint.fe.meshing_phases import alike, overload, unspread
 from swgjoint.fe.ring import RingModel
 from swgjoint.fe.state import State
 from swgjoint.fe.stress import KINDS, MemberMaxima, StressMaxima
+from swgjoint.fe.stress_state import stress_state_label
 from swgjoint.fe.superelement import Superelement
 from swgjoint.gear.design import Design
 from swgjoint.gear.mounting import springs_of
@@ -196,6 +197,7 @@ class MeshingRun(Positions):
                 "bearing": None if self.model.race is None else "balls roll",
                 "half": self.model.half,
                 "cup": cup,
+                "stress_state": stress_state_label(self.design),
                 "springs_Nm_rad": springs_of(self.design),
                 "tooth_friction": self.design.friction.tooth_coefficient or None,
                 "tolerances": has_errors(self.design) or None,

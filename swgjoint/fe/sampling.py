@@ -18,6 +18,7 @@ from swgjoint.fe.shape_fields import drive_fields, plane_fields, plane_surface
 from swgjoint.fe.solid.continuation import SolidContinuation
 from swgjoint.fe.solid.drive3d import solid_ring
 from swgjoint.fe.solid.shape_fields import solid_fields, solid_surface
+from swgjoint.fe.stress_state import stress_state_label
 from swgjoint.fe.tolerance_rest import SMALL
 from swgjoint.fe.tolerance_sampling import STAGES, sample_tolerances
 from swgjoint.gear.design import Design
@@ -175,6 +176,7 @@ def sample_map(
                 "bearing": "balls at rest on the cam, their passage left out"
                 if model == "2d" and on_bearing(design)
                 else None,
+                "stress_state": stress_state_label(design) if model == "2d" else None,
                 "springs_Nm_rad": springs_of(design),
                 "friction": "left out of the potential"
                 if design.friction.tooth_coefficient

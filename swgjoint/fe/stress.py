@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 
 def flexspline_stress(model: RingModel, state: State) -> Array:
-    """Stress xx, yy, xy at the nodes, in the sector frames [Pa]. (N, n_nodes, 3)."""
+    """Stress xx, yy, xy, zz at the nodes, sector frames (N, n_nodes, 4) [Pa]."""
     frames = model.frames(state)
     return _nodal_stress(
         model.element, frames.deformation, state.flank_force, frames.angle
@@ -52,16 +52,21 @@ def _nodal_stress(
     mean = 0.5 * (stress[:, last] + turned_stress(after, step))
     stress[:, last] = mean
     stress[:, first] = np.roll(turned_stress(mean, -step), 1, axis=0)
-    return stress
+    axial = element.axial_stress * (stress[..., :1] + stress[..., 1:2])
+    return np.concatenate([stress, axial], axis=-1)
 
 
 def turned_stress(stress: Array, angle: Array) -> Array:
-    """Components in a frame from which the given one is turned by ``angle``."""
+    """Components in a frame from which the given one is turned by ``angle``.
+
+    What follows xx, yy and xy in the last axis, the axial stress, stays as it is.
+    """
     xx, yy, xy = stress[..., 0], stress[..., 1], stress[..., 2]
     middle, half = 0.5 * (xx + yy), 0.5 * (xx - yy)
     cos, sin = np.cos(2.0 * angle), np.sin(2.0 * angle)
     turned = half * cos - xy * sin
-    return np.stack([middle + turned, middle - turned, half * sin + xy * cos], axis=-1)
+    plane = [middle + turned, middle - turned, half * sin + xy * cos]
+    return np.concatenate([np.stack(plane, axis=-1), stress[..., 3:]], axis=-1)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,7 +79,7 @@ class StressMaxima:
 
     @classmethod
     def of(cls, stress: Array) -> StressMaxima:
-        """Maxima over all nodes of stresses (..., 3)."""
+        """Maxima over all nodes of stresses (..., 4)."""
         tensile, compressive, von_mises = stress_maxima(stress)
         return cls(
             tensile=float(tensile.max()),

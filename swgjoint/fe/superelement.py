@@ -13,7 +13,7 @@ from scipy.sparse.linalg import splu
 from swgjoint.fe.contact_patch import averaged_spline
 from swgjoint.fe.elasticity import (
     nodal_stress_operator,
-    plane_stress_basis,
+    plane_basis,
     stiffness_matrix,
 )
 from swgjoint.fe.sector_mesh import SectorMesh
@@ -55,6 +55,9 @@ class Superelement:
     """Of all nodes, like the stress [-]. Shape (n_nodes, 2, 2 n_a)."""
     displacement_from_flank: Array
     """[m/N]. Shape (n_nodes, 2, 2 n_b)."""
+    axial_stress: float = 0.0
+    """Axial stress over the sum of the normal stresses in the plane, c nu [-]; see
+    :func:`swgjoint.fe.elasticity.in_plane_constants`."""
     mesh: SectorMesh
     profile: ToothProfile
     spline: CubicSpline
@@ -111,6 +114,7 @@ def condense(
     youngs_modulus: float,
     poisson_ratio: float,
     width: float,
+    confinement: float = 0.0,
 ) -> Superelement:
     """Condense a sector mesh, in real arithmetic, once per member.
 
@@ -120,9 +124,10 @@ def condense(
         youngs_modulus: [Pa].
         poisson_ratio: [-].
         width: Face width [m].
+        confinement: 0 in plane stress, 1 in plane strain [-].
     """
-    basis = plane_stress_basis(mesh.mesh)
-    matrix = stiffness_matrix(basis, youngs_modulus, poisson_ratio, width)
+    basis = plane_basis(mesh.mesh)
+    matrix = stiffness_matrix(basis, youngs_modulus, poisson_ratio, width, confinement)
     skeleton = np.concatenate([mesh.face_first, mesh.bore[1:-1], mesh.face_last])
     flank = np.concatenate([mesh.flank_right[:-1], mesh.flank_left[:-1]])
 
@@ -156,7 +161,7 @@ def condense(
     recovery[inner] = inner_from_kept
     all_from_a = recovery[:, :n] + recovery[:, n:] @ flank_from_skeleton
     all_from_flank = recovery[:, n:] @ compliance
-    operator = nodal_stress_operator(basis, youngs_modulus, poisson_ratio)
+    operator = nodal_stress_operator(basis, youngs_modulus, poisson_ratio, confinement)
     from_a, from_flank = operator @ all_from_a, operator @ all_from_flank
     at_nodes = basis.nodal_dofs.T.ravel()
     # sectors travel a thousand times farther than they strain: make rigid translation
@@ -181,6 +186,7 @@ def condense(
         stress_from_flank=from_flank.reshape(nodes, 3, -1),
         displacement_from_skeleton=all_from_a[at_nodes].reshape(nodes, 2, -1),
         displacement_from_flank=all_from_flank[at_nodes].reshape(nodes, 2, -1),
+        axial_stress=confinement * poisson_ratio,
         mesh=mesh,
         profile=profile,
         spline=averaged_spline(stations),

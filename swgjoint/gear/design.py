@@ -195,10 +195,16 @@ class Design(Section):
         return toml_text(self.model_dump(exclude_none=True))
 
     def content_hash(self) -> str:
-        """SHA-256 of everything that a result depends on: all but name and source."""
+        """SHA-256 of everything that a result depends on: all but name and source.
+
+        Keys that are younger than kept results are left out where these results hold:
+        without a coupling, and in plane stress.
+        """
         data = self.model_dump(exclude={"drive": {"name", "source"}})
-        if self.coupling is None:  # younger than kept results, which hold without it
+        if self.coupling is None:
             del data["coupling"]
+        if self.mesh.stress_state == "plane_stress":
+            del data["mesh"]["stress_state"]
         text = json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)
         return hashlib.sha256(text.encode()).hexdigest()
 

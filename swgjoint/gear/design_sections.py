@@ -358,3 +358,5 @@ class MeshSection(Section):
 
     refinement: Annotated[float, Field(ge=0.5, le=16)] = 1.0
     """Multiplies the elements in every direction."""
+    stress_state: Literal["auto", "plane_stress", "plane_strain"] = "auto"
+    """Across the face width, 2d and ring models; auto: between, by the face width."""

@@ -1,4 +1,4 @@
-"""Plane-stress elements against exact solutions."""
+"""Plane elements against exact solutions."""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ from skfem import Basis, FacetBasis, Functional, LinearForm, MeshQuad, condense
 from skfem.helpers import eye, sym_grad, trace
 
 from swgjoint.fe.elasticity import (
+    in_plane_constants,
     nodal_stress_operator,
-    plane_stress_basis,
+    plane_basis,
     stiffness_matrix,
     stress_maxima,
 )
@@ -45,7 +46,7 @@ def test_patch_test_on_the_tooth_mesh():
     """A linear displacement field is in equilibrium and gives its exact stress."""
     profile = tooth_profile(Design.load("reference-2d"), "flexspline")
     mesh = sector_mesh(profile, 1e-3, 1).mesh
-    basis = plane_stress_basis(mesh)
+    basis = plane_basis(mesh)
     matrix = stiffness_matrix(basis, E, NU, WIDTH)
     u = np.zeros(basis.N)
     u[basis.nodal_dofs[0]] = 1e-3 * mesh.p[0] + 2e-3 * mesh.p[1]
@@ -134,7 +135,7 @@ def test_thick_ring_converges_with_its_orders():
     errors, energies = [], []
     for n in (8, 16, 32):
         mesh = quarter_ring(inner, outer, n, 3 * n)
-        basis = plane_stress_basis(mesh)
+        basis = plane_basis(mesh)
         outside = mesh.facets_satisfying(
             lambda x: np.hypot(*x) > outer * 0.995, boundaries_only=True
         )
@@ -160,7 +161,7 @@ def test_thin_ring_under_two_point_forces():
     """Deflection under and across two opposite forces as in thin-ring theory."""
     radius, thickness, force = 0.05, 0.001, 10.0
     mesh = quarter_ring(radius - thickness / 2, radius + thickness / 2, 4, 240)
-    basis = plane_stress_basis(mesh)
+    basis = plane_basis(mesh)
     matrix = stiffness_matrix(basis, E, NU, WIDTH)
     x, y = mesh.p
     loaded = np.flatnonzero((x < 1e-9) & (np.abs(y - radius) < thickness / 100))[0]
@@ -185,3 +186,62 @@ def test_stress_maxima_of_pure_shear():
     tensile, compressive, mises = stress_maxima(np.array([0.0, 0.0, 2.0]))
     assert (tensile, compressive) == (2.0, 2.0)
     assert mises == pytest.approx(2.0 * np.sqrt(3.0))
+
+
+def test_von_mises_counts_the_axial_stress():
+    """The same stress in all directions yields nothing; zero zz is plane stress."""
+    equal = stress_maxima(np.array([5.0, 5.0, 0.0, 5.0]))
+    assert equal[2] == pytest.approx(0.0, abs=1e-12)
+    flat = np.array([3.0, -1.0, 0.5])
+    assert stress_maxima(np.r_[flat, 0.0]) == stress_maxima(flat)
+
+
+def test_constants_of_plane_strain():
+    """E/(1 - nu^2) and nu/(1 - nu); a mixture shears as both limits do."""
+    assert in_plane_constants(E, NU, 0.0) == (E, NU)
+    assert in_plane_constants(E, NU, 1.0) == pytest.approx(
+        (E / (1 - NU**2), NU / (1 - NU))
+    )
+    modulus, ratio = in_plane_constants(E, NU, 0.4)
+    assert modulus / (1 + ratio) == pytest.approx(E / (1 + NU))
+
+
+@pytest.mark.parametrize("confinement", [0.0, 1.0])
+def test_lame_ring(confinement):
+    """A thick ring under inner pressure, free ends or held between plates (Lame).
+
+    Timoshenko and Goodier, Theory of Elasticity, section 28: hoop and radial stress are
+    A (1 +- b^2/r^2) in both; the displacement and the axial stress 2 nu A are not.
+    """
+    inner, outer, pressure = 0.03, 0.06, 1e6
+    mesh = quarter_ring(inner, outer, 24, 48)
+    basis = plane_basis(mesh)
+
+    @LinearForm
+    def push(v, w):
+        radius = np.hypot(*w.x)
+        return WIDTH * pressure * (v[0] * w.x[0] + v[1] * w.x[1]) / radius
+
+    bore = mesh.facets_satisfying(
+        lambda x: np.hypot(*x) < inner * 1.001, boundaries_only=True
+    )
+    load = push.assemble(FacetBasis(mesh, basis.elem, facets=bore))
+    load[basis.interior_dofs] = 0.0  # incompatible modes carry no load
+    matrix = stiffness_matrix(basis, E, NU, WIDTH, confinement)
+    u = np.zeros(basis.N)
+    matrix, rhs, u, keep = condense(matrix, load, x=u, D=symmetric_supports(basis))
+    u[keep] = spsolve(matrix.tocsc(), rhs)
+    radius = np.hypot(*mesh.p)
+    radial = np.einsum("in,in->n", u[basis.nodal_dofs], mesh.p) / radius
+    level = pressure * inner**2 / (outer**2 - inner**2)
+    if confinement:
+        inside = (1 - 2 * NU) * (1 + NU)
+    else:
+        inside = 1 - NU
+    exact = level / E * (inside * radius + (1 + NU) * outer**2 / radius)
+    assert radial == pytest.approx(exact, rel=1e-3)
+    stress = nodal_stress_operator(basis, E, NU, confinement) @ u
+    trace_of = stress.reshape(-1, 3)[:, :2].sum(axis=1)
+    inside = (radius > 1.1 * inner) & (radius < 0.95 * outer)
+    # uniform, so that zz = 2 nu A; 0.5 %: extrapolation to the nodes of this mesh
+    assert trace_of[inside] == pytest.approx(2.0 * level, rel=5e-3)

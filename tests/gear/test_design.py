@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import re
 import tomllib
@@ -124,6 +125,18 @@ def test_hash_tells_content_apart(reference):
     }
     hashes = {reference.with_changes({k: v}).content_hash() for k, v in changes.items()}
     assert len(hashes | {reference.content_hash()}) == len(changes) + 1
+
+
+def test_results_of_before_hold_in_plane_stress(reference):
+    """Plane stress has the hash it had before there was a choice; others differ."""
+    kinds = ("auto", "plane_stress", "plane_strain")
+    hashes = {
+        reference.with_changes(mesh__stress_state=kind).content_hash() for kind in kinds
+    }
+    assert len(hashes) == 3
+    # the design of results that are kept with the project
+    stored = json.loads((models_path() / "studies/bench-fe-reference.json").read_text())
+    assert Design.preset(stored["design"]).content_hash() == stored["design_hash"]
 
 
 def test_changes_leave_the_original(reference):

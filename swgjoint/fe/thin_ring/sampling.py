@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from swgjoint.errors import ComputationError, DesignError
 from swgjoint.fe.drive2d import can_halve, left_out
 from swgjoint.fe.pattern import across_clearance
+from swgjoint.fe.stress_state import stress_state_label
 from swgjoint.fe.thin_ring import model as thin
 from swgjoint.fe.thin_ring.contacts import race_on_balls
 from swgjoint.fe.thin_ring.equilibrium import RingSolver
@@ -159,6 +160,7 @@ def sample_rings(
                 "level": "nonlinear",
                 "circular_spline": "rigid but for its teeth",
                 "cup": None if design.cup is None else "closed-form torsion in series",
+                "stress_state": stress_state_label(design),
                 "springs_Nm_rad": springs_of(design),
                 "friction": None,
                 "tolerances": None,
