@@ -97,6 +97,9 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
             result["validity"]["manufacturing_errors"] = drive.info[
                 "manufacturing_errors"
             ]
+        label = drive.info.get("label")
+        if isinstance(label, dict) and label.get("stress_state"):
+            result["validity"]["stress_state"] = label["stress_state"]
         stated = drive.info.get("stated")
         result["stated"] = stated if isinstance(stated, dict) else None
     else:
@@ -404,6 +407,8 @@ def _source(result: dict[str, Any]) -> str:
     if validity.get("beyond_range"):
         low, high = validity["torque_range_Nm"]
         text += f"; loop leaves the sampled {low:.4g} to {high:.4g} N·m: continued"
+    if "stress_state" in validity:
+        text += f"; {validity['stress_state']}"
     if "manufacturing_errors" in validity:
         text += "; manufacturing errors left out"
     return text

@@ -84,10 +84,9 @@ def stress_state_label(design: Design) -> str:
     if chosen != "auto":
         return chosen.replace("_", " ")
     members: tuple[MemberName, ...] = ("flexspline", "circular_spline")
-    shares = {
-        name: confinement(design, name, tooth_profile(design, name)) for name in members
-    }
-    told = ", ".join(
-        f"{name.replace('_', ' ')} {share:.2f}" for name, share in shares.items()
+    told = " and ".join(
+        f"{confinement(design, name, tooth_profile(design, name)):.2f}"
+        f" ({name.replace('_', ' ')})"
+        for name in members
     )
-    return f"between plane stress (0) and plane strain (1): {told}"
+    return f"{told} of the way from plane stress to plane strain"

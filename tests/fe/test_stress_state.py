@@ -107,4 +107,4 @@ def test_label_names_what_was_assumed():
     told = stress_state_label(design)
     for member in ("flexspline", "circular_spline"):
         share = confinement(design, member, tooth_profile(design, member))
-        assert f"{member.replace('_', ' ')} {share:.2f}" in told
+        assert f"{share:.2f} ({member.replace('_', ' ')})" in told
