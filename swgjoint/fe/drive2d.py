@@ -194,6 +194,9 @@ def ring_model(
         lobe_height=height,
         half=half,
         nonlinear=nonlinear,
+        layer=design.material_of("flexspline").youngs_modulus
+        * design.drive.face_width_mm
+        * mm,
         race=race,
     )
 

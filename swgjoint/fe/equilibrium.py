@@ -1,7 +1,7 @@
 """Equilibrium of the flexspline between wave generator and circular spline.
 
 Newton's method on the corotational ring. Contact with the wave generator is a
-primal-dual active set on the normal displacement of the bore nodes; tooth contact is a
+primal-dual active set of stations of the bore; tooth contact is a
 small complementarity problem on the frozen tangent, in contact forces alone.
 """
 
@@ -147,13 +147,13 @@ class _Step:
     ring_turn: float
     """Increment of the circular spline's rotation [rad]."""
     increment: Array
-    """In the node bases (N, n) [m]."""
+    """Of every sector (N, n) [m]."""
     shift: Array
     """Of the skeleton in the global frame (N, n_a, 2) [m]."""
     race_shift: Array
     """Of the race's nodes (N, m, 2, 2) [m]; empty without a race."""
     pressure: Array
-    """Force of the wave generator on each of its nodes (N, n_bore + 1) [N]."""
+    """Force of the wave generator at each station of the bore (N, q) [N]."""
 
     @property
     def largest(self) -> float:
@@ -194,11 +194,11 @@ def _solve_linear(
     levers[:, :, n] = ring.anchor
     levers[:, :, n + 1] = ring.rotation_gradient
 
-    rhs = -ring.gradient - np.einsum("sij,sj->si", ring.hessian, ring.value)
+    rhs = -ring.gradient
     columns = np.concatenate([rhs[:, :, None], levers], axis=2)
-    columns[ring.known] = 0.0
+    columns[ring.fixed] = 0.0
     solved = CyclicFactor(ring.anchored(), ring.face_dofs).solve(columns)
-    base, response = solved[:, :, 0] + ring.value, solved[:, :, 1:]
+    base, response = solved[:, :, 0], solved[:, :, 1:]
 
     # forces on the lines, displacement of the anchor, rotation of the circular spline,
     # multiplier of the flexspline's rotation
@@ -271,9 +271,6 @@ def _solve_linear(
 
     solution = np.concatenate([force, [anchor, multiplier]])
     increment = base + response @ solution
-    residual = ring.gradient + np.einsum("sij,sj->si", ring.hessian, increment)
-    np.subtract.at(residual, lines.sector, force[:, None] * rows)
-    residual -= multiplier * ring.rotation_gradient
     holding = model.copies * float(multiplier)
     return _Step(
         lines=lines,
@@ -289,9 +286,7 @@ def _solve_linear(
         race_shift=increment[:, model.race_dofs[:-NODE]].reshape(
             model.sectors, -1, 2, 2
         ),
-        pressure=np.where(
-            state.touching, ring.pressure_after(increment, residual), 0.0
-        ),
+        pressure=np.where(state.touching, -ring.press * ring.gap_after(increment), 0.0),
     )
 
 
@@ -327,7 +322,7 @@ def _advance(
 ) -> tuple[State, bool]:
     """Move, exchange tooth forces, update the wave generator's active set."""
     after = ring.gap_after(damping * step.increment)
-    wrong = np.where(state.touching, -step.pressure / ring.contact_stiffness, -after)
+    wrong = np.where(state.touching, -step.pressure / ring.press, -after)
     bad = wrong > 1e-15
     # without any contact the rim springs back: let go of the worst node only
     if bad.any() and (one_at_a_time or not (state.touching ^ bad).any()):
@@ -396,10 +391,11 @@ def _finished(
         energy += race.energy
         input_torque, balls = race.balls.input_torque, race.balls.force
     else:
-        arm = np.einsum(
-            "sni,sni->sn", turned(nodes), model.wave_generator_normal(state)
-        )
+        normal = model.wave_generator_normal(state)
+        arm = np.einsum("sqi,sqi->sq", turned(model.bore_points(state)), normal)
         input_torque = model.copies * float(np.sum(state.pressure * arm))
+        layer = 0.5 * state.pressure**2 / model.stations.stiffness
+        energy += model.copies * float(np.sum(layer))
     work, law = 0.0, model.friction
     if law is not None and state.candidates is not None:
         energy += model.copies * spring_energy(law, state.candidates)

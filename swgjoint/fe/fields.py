@@ -142,7 +142,8 @@ class WaveGeneratorContact:
     """Where the wave generator carries the flexspline."""
 
     angle: Array
-    """Of the bore nodes from the first lobe, increasing, -pi to pi (n,) [rad]."""
+    """Of the stations of the bore, from the first lobe, increasing, -pi to pi (n,)
+    [rad]."""
     force: Array
     """Normal force at each of them (n,) [N]."""
     line_load: Array
@@ -163,15 +164,15 @@ def wave_generator_contact(
         state: An equilibrium.
         lobes: Lobes of the wave generator.
     """
-    nodes = model.skeleton(state)[:, model.bore_nodes].reshape(-1, 2)
-    polar = np.arctan2(-nodes[:, 0], nodes[:, 1]) - state.wave_generator_angle
+    points = model.bore_points(state).reshape(-1, 2)
+    polar = np.arctan2(-points[:, 0], points[:, 1]) - state.wave_generator_angle
     angle = _wrapped((polar + _turns(model)[:, None]).ravel(), 2.0 * pi)
     force = np.tile(np.where(state.touching, state.pressure, 0.0).ravel(), model.copies)
     order = np.argsort(angle)
     angle, force = angle[order], force[order]
 
-    per_pitch = nodes.shape[0] // model.sectors
-    bore = float(np.hypot(*nodes.T).mean())
+    per_pitch = points.shape[0] // model.sectors
+    bore = float(np.hypot(*points.T).mean())
     pitch = 2.0 * pi / model.element.sectors
     mean = force
     for _ in range(2):

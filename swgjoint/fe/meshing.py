@@ -167,7 +167,7 @@ def _step(
         energy=state.energy + 0.5 * series * torque**2,
         friction_work=state.friction_work,
         pairs_in_contact=_pairs(ring, state),
-        contact_nodes=ring.copies * int(state.touching.sum()),
+        contact_nodes=ring.copies * ring.stations.nodes_touching(state.touching),
         stress=MemberMaxima.at(ring, state),
         iterations=len(state.history),
         state=state,

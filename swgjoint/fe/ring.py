@@ -12,6 +12,7 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
+from swgjoint.fe.bore_contact import BoreStations
 from swgjoint.fe.circular_spline import CircularSpline
 from swgjoint.fe.corotation import Frames, rotate, sector_frames, turned
 from swgjoint.fe.friction import Friction
@@ -49,6 +50,8 @@ class RingModel:
     """The same of the circular spline, which must be elastic (N_c, 2) [m]."""
     wave_generator_offset: Array | None = None
     """Centre of the outline in the frame of the wave generator (2,) [m]."""
+    layer: float = 0.0
+    """E b of the bore's layer that a rigid wave generator presses [N/m]."""
     race: PlaneRace | None = None
     """Outer race on balls in place of the rigid wave generator."""
 
@@ -93,17 +96,61 @@ class RingModel:
         size = self.element.face_size
         return np.arange(size - 1, size + self.element.bore_size)
 
+    @cached_property
+    def stations(self) -> BoreStations:
+        """Where the bore presses: between its nodes, on a race at them."""
+        if self.race is not None:
+            return BoreStations.at_nodes(self.race.press)
+        skeleton = self.element.skeleton
+        own = skeleton[np.append(self.bore_nodes, len(skeleton) - 1)]
+        pitch = 2.0 * pi / self.element.sectors
+        before, after = rotate(own[-2], -pitch), rotate(own[1], pitch)
+        return BoreStations.between_nodes(
+            np.stack([before, *own, after]), layer=self.layer
+        )
+
+    @cached_property
+    def contact_dofs(self) -> Index:
+        """Degrees of freedom of a sector that move the gaps of its stations."""
+        nodes = self.bore_nodes
+        if self.race is not None:
+            return np.concatenate([self.dofs[_pairs(nodes)], self.race_dofs])
+        # one node of either neighbour; the last corner ends the skeleton
+        last = len(self.element.skeleton)
+        return _pairs(np.concatenate([[0], nodes + 1, [last, last + 1]]))
+
+    def station_nodes(self, skeleton: Array) -> Array:
+        """The nodes that carry the stations (N, m, 2) [m] from skeletons."""
+        nodes = skeleton[:, self.bore_nodes]
+        if self.race is not None:
+            return nodes
+        before = np.roll(nodes[:, -1:], 1, axis=0)
+        after = np.roll(nodes[:, 1:2], -1, axis=0)
+        before[0] *= self.closure
+        after[-1] *= self.closure
+        return np.concatenate([before, nodes, skeleton[:, -1:], after], axis=1)
+
+    def bore_points(self, state: State) -> Array:
+        """Stations of the bore (N, q, 2) [m]."""
+        return self.stations.positions(self.station_nodes(self.skeleton(state)))
+
     @property
     def face_dofs(self) -> int:
-        """Degrees of freedom of a face; its node of the race comes last."""
-        return 2 * self.element.face_size + (0 if self.race is None else NODE)
+        """Degrees of freedom that neighbours share.
+
+        Those of a face and of the bore nodes next to its corner; on a race those of a
+        face and of its node of the race.
+        """
+        if self.race is None:
+            return 2 * (self.element.face_size + 2)
+        return 2 * self.element.face_size + NODE
 
     @cached_property
     def dofs(self) -> Index:
         """Those of the skeleton among the degrees of freedom of a sector (2 n_a,)."""
         own, face = 2 * len(self.element.skeleton), 2 * self.element.face_size
         if self.race is None:
-            return np.arange(own)
+            return 2 + np.arange(own)
         inside = self.race.size - 2 * NODE
         return np.concatenate(
             [
@@ -112,11 +159,28 @@ class RingModel:
             ]
         )
 
+    @property
+    def sector_dofs(self) -> int:
+        """Degrees of freedom of a sector.
+
+        Those of its skeleton and of the race below it, or of the bore nodes next to it.
+        """
+        beside = 2 * 2 if self.race is None else self.race.size
+        return 2 * len(self.element.skeleton) + beside
+
+    @cached_property
+    def signs(self) -> Array:
+        """-1 where half a ring ends and its start follows, 1 elsewhere (N, n)."""
+        signs = np.ones((self.sectors, self.sector_dofs))
+        signs[-1, -self.face_dofs :] = self.closure
+        return signs
+
     @cached_property
     def race_dofs(self) -> Index:
         """Those of the race's nodes, first face to last; empty without."""
-        size = len(self.dofs) + (0 if self.race is None else self.race.size)
-        return np.setdiff1d(np.arange(size), self.dofs)
+        if self.race is None:
+            return np.zeros(0, dtype=np.int64)
+        return np.setdiff1d(np.arange(self.sector_dofs), self.dofs)
 
     def skeleton(self, state: State) -> Array:
         """Positions of all skeleton nodes per sector (N, n_a, 2) [m]."""
@@ -152,10 +216,10 @@ class RingModel:
         moved = x + radial[..., None] * unit + tangential[..., None] * turned(unit)
         moved = rotate(moved, rotation)
         size, inside = element.face_size, element.bore_size
-        nodes = moved[:, self.bore_nodes]
         race = None
         if self.race is None:
-            gap, _, _ = self.wave_generator_gap(nodes, alpha)
+            points = self.stations.positions(self.station_nodes(moved))
+            gap, _, _ = self.wave_generator_gap(points, alpha)
             touching = gap < 0.01 * w0
         else:
             race = self.race.at_rest(alpha, rotation)
@@ -176,7 +240,7 @@ class RingModel:
     def wave_generator_gap(
         self, nodes: Array, alpha: float
     ) -> tuple[Array, Array, Array]:
-        """Gap, outward normal and curvature of parallel curves at the bore nodes.
+        """Gap, outward normal and curvature of parallel curves at points of the bore.
 
         Args:
             nodes: Positions (..., 2) [m].
@@ -193,14 +257,26 @@ class RingModel:
         )
 
     def wave_generator_normal(self, state: State) -> Array:
-        """Outward normal of what the bore lies on, at its nodes (N, n_bore + 1, 2)."""
-        nodes, alpha = (
-            self.skeleton(state)[:, self.bore_nodes],
-            state.wave_generator_angle,
-        )
+        """Outward normal of what the bore lies on, at its stations (N, q, 2)."""
+        points, alpha = self.bore_points(state), state.wave_generator_angle
         if self.race is None or state.race is None:
-            return self.wave_generator_gap(nodes, alpha)[1]
-        return self.race.forces(state.race, alpha, nodes, state.touching).normal
+            return self.wave_generator_gap(points, alpha)[1]
+        return self.race.forces(state.race, alpha, points, state.touching).normal
+
+    def wave_generator_force(self, state: State) -> Array:
+        """Force of a rigid wave generator on the bore nodes (N, n_bore + 1, 2) [N]."""
+        vectors = state.pressure[..., None] * self.wave_generator_normal(state)
+        nodal = np.einsum("sqi,qin->sn", vectors, self.stations.weights)
+        nodal = nodal.reshape(self.sectors, -1, 2)
+        # what stations exert on the neighbours: their last inner node, the shared
+        # corner and the first inner node
+        found = nodal[:, 1:-2].copy()
+        before, after = np.roll(nodal[:, 0], -1, axis=0), np.roll(nodal[:, -2:], 1, 0)
+        before[-1] *= self.closure
+        after[0] *= self.closure
+        found[:, -1] += before
+        found[:, :2] += after
+        return np.asarray(found)
 
     def best_fit_rotation(self, nodes: Array) -> tuple[float, Array]:
         """Best-fit rotation of the bore nodes and its gradient (N, n_bore + 1, 2)."""
@@ -266,6 +342,11 @@ class RingModel:
         if compliance is None:
             return state.ring_force
         return compliance.displacement(state.ring_force)
+
+
+def _pairs(nodes: Index) -> Index:
+    """Degrees of freedom x, y of nodes."""
+    return np.asarray((2 * nodes[:, None] + np.arange(2)).ravel())
 
 
 def travelled(values: Array, shift: float) -> Array:

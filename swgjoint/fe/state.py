@@ -53,9 +53,10 @@ class State(StateFigures):
     bores: Array
     """Positions of the bore nodes inside the sectors (N, n_bore, 2) [m]."""
     pressure: Array
-    """Normal force of the wave generator on its nodes (N, n_bore + 1) [N]."""
+    """Normal force of the wave generator on the stations of the bore (N, q) [N], see
+    :mod:`swgjoint.fe.bore_contact`."""
     touching: Mask
-    """Which of those nodes touch."""
+    """Which of those stations touch."""
     flank_force: Array
     """Tooth forces as nodal forces in the sector frames (N, 2 n_b) [N]."""
     ring_force: Array

@@ -23,7 +23,7 @@ def samples():
     """Teeth 5 % thinner than their spaces."""
     thin = {"flexspline.thickness_coefficient": 0.95}
     design = few_teeth("reference-2d-simplified", **thin)
-    return kept("clearance map", lambda: sample_map(design, angles=6))
+    return kept("clearance map", lambda: sample_map(design, angles=7))
 
 
 @cache
@@ -78,7 +78,7 @@ def test_loaded_outputs_come_back(part):
     given, found = samples(), drive()
     row = at(part * found.ratings.rated_torque)
     torque = given.torque[row]
-    error = output_angle(found, given.input_angle, np.full(6, torque))
+    error = output_angle(found, given.input_angle, np.full(7, torque))
     error -= given.input_angle / found.ratio
     wanted = given.output_error[row] - given.output_error[at(0.0)].mean()
     # a percent of the rated torque over the stiffness beside the clearance

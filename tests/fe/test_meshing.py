@@ -13,7 +13,8 @@ from solved import coarse, kept
 
 from swgjoint.errors import DesignError
 from swgjoint.fe.continuation import Continuation
-from swgjoint.fe.corotation import turned
+from swgjoint.fe.corotation import elastic_energy
+from swgjoint.fe.cyclic import CyclicFactor
 from swgjoint.fe.drive2d import left_out, ring_model
 from swgjoint.fe.linearise import linearise
 from swgjoint.fe.meshing import simulate_meshing
@@ -132,14 +133,15 @@ def test_mirrored_load_gives_mirrored_error():
 
 
 def test_nothing_penetrates():
-    """No flank point lies inside the circular spline, no bore node inside the cam."""
+    """Teeth overlap nowhere, the bore as far as its layer yields: below 0.05 um."""
     model = follow().model
     state = follow().to_torque(meshed(), TORQUE)
-    nodes = model.skeleton(state)[:, model.bore_nodes]
-    gap, _, _ = model.wave_generator_gap(nodes, state.wave_generator_angle)
-    assert gap.min() > -1e-11
-    assert np.abs(gap[state.touching]).max() < 1e-11
-    assert state.pressure[state.touching].min() > 0.0
+    points, on = model.bore_points(state), state.touching
+    gap, _, _ = model.wave_generator_gap(points, state.wave_generator_angle)
+    assert gap[~on].min() > 0.0 > gap[on].max()
+    assert gap[on].min() > -5e-8
+    layer = np.broadcast_to(model.stations.stiffness, gap.shape)[on]
+    assert -layer * gap[on] == pytest.approx(state.pressure[on], abs=1e-6)
     assert state.tooth_force.min() > 0.0
     ring = linearise(model, state, TORQUE)
     found = ring.search.search(ring.flank, 1e-6, None)
@@ -159,28 +161,50 @@ def test_nothing_penetrates():
     assert ours == pytest.approx(slope, rel=1e-4, abs=1e-5)
 
 
-def test_sliding_turns_the_force_of_the_wave_generator():
-    """What a contact force adds to the tangent against differences of its normal."""
-    model, h = follow().model, 1e-6
-    state = follow().to_torque(meshed(), TORQUE)
-    bare = replace(state, pressure=np.zeros_like(state.pressure))
-    slide = 2 * model.bore_nodes + 1
-    tangents = [
-        linearise(model, s, None).hessian[:, slide, slide] for s in (state, bare)
-    ]
-    nodes, angle = (
-        model.skeleton(state)[:, model.bore_nodes],
-        state.wave_generator_angle,
+def test_gradient_and_tangent_are_derivatives_of_the_energy():
+    """Rim and layer below the bore against differences, with half a ring closed."""
+    model, h = follow().model, 1e-8
+    state = replace(
+        follow().to_torque(meshed(), TORQUE),
+        flank_force=np.zeros((model.sectors, 4 * model.element.flank_size)),
     )
-    along = turned(model.wave_generator_gap(nodes, angle)[1])
-    ahead, behind = (
-        model.wave_generator_gap(nodes + s * along, angle)[1] for s in (h, -h)
-    )
-    bend = np.einsum("sni,sni->sn", ahead - behind, along) / (2 * h)
-    pressed = np.where(state.touching, state.pressure, 0.0)
-    assert (pressed * bend).max() > 100.0
-    # the force pushes the bore outward, its turn along the slide is in the residual
-    assert tangents[0] - tangents[1] == pytest.approx(-pressed * bend, abs=0.1)
+    here = linearise(model, state, None)
+    rng = np.random.default_rng(3)
+    increment = CyclicFactor(here.anchored(), here.face_dofs).solve(
+        rng.normal(size=(*here.gradient.shape, 1))
+    )[..., 0]
+    increment *= 1.0 / np.abs(increment).max()
+    shift = here.in_global_frame(increment)
+    size, inside = model.element.face_size, model.element.bore_size
+
+    def moved(way):
+        return replace(
+            state,
+            faces=state.faces + way * shift[:, :size],
+            bores=state.bores + way * shift[:, size : size + inside],
+        )
+
+    def energy(state):
+        gap, _, _ = model.wave_generator_gap(
+            model.bore_points(state), state.wave_generator_angle
+        )
+        layer = 0.5 * model.stations.stiffness * np.where(state.touching, gap, 0.0) ** 2
+        rim = elastic_energy(model.element, model.frames(state), state.flank_force)
+        return layer.sum() + rim.sum()
+
+    gain = (energy(moved(h)) - energy(moved(-h))) / (2.0 * h)
+    assert np.sum(here.gradient * increment) == pytest.approx(gain, rel=1e-5)
+    turn = (
+        linearise(model, moved(h), None).gradient
+        - linearise(model, moved(-h), None).gradient
+    ) / (2.0 * h)
+    bend = np.einsum("si,sij,sj->", increment, here.hessian, increment)
+    assert bend == pytest.approx(np.sum(turn * increment), rel=1e-5)
+    # at single nodes of the bore, too: contributions of both sectors to a face add up
+    face = here.face_dofs
+    wrong = np.einsum("sij,sj->si", here.hessian, increment) - turn
+    wrong[:, :face] += np.roll(wrong[:, -face:], 1, axis=0)
+    assert np.abs(wrong[:, :-face]).max() < 1e-5 * np.abs(turn).max()
 
 
 def test_stress_is_continuous_across_the_faces():

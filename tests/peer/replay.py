@@ -43,10 +43,7 @@ class Forces:
     def of(cls, model: RingModel, state: State) -> Forces:
         """Forces of a converged state."""
         mesh = model.element.mesh
-        nodes = model.skeleton(state)[:, model.bore_nodes]
-        _, normal, _ = model.wave_generator_gap(nodes, state.wave_generator_angle)
-        bore = state.pressure[..., None] * normal
-        bore += load_on_bore(model, state)
+        bore = model.wave_generator_force(state) + load_on_bore(model, state)
         flank = state.flank_force.reshape(model.sectors, 2, -1, 2)
         x, y = mesh.mesh.p[:, mesh.bore[:-1]]
         return cls(

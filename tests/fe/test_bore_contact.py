@@ -1,0 +1,96 @@
+"""Contact between bore and wave generator, between the nodes of the bore, too."""
+
+from math import pi
+
+import numpy as np
+import pytest
+
+from swgjoint.fe.bore_contact import DEPTH, BoreStations
+from swgjoint.fe.continuation import Continuation
+from swgjoint.fe.corotation import rotate
+from swgjoint.fe.drive2d import ring_model
+from swgjoint.gear.design import Design
+
+RADIUS, STEP = 0.03, 0.01
+"""Of a circle of nodes [m] and the angle between them [rad]."""
+
+
+def chain(count=8):
+    angle = STEP * np.arange(count)
+    return RADIUS * np.stack([-np.sin(angle), np.cos(angle)], axis=-1)
+
+
+def stations():
+    return BoreStations.between_nodes(chain(), layer=2.1e9)
+
+
+def test_stations_of_the_undeformed_bore_lie_on_its_circle():
+    """Chords leave no facets: radius to 1e-12, in order, inside their intervals."""
+    points = stations().positions(chain()[None])[0]
+    assert np.hypot(*points.T) == pytest.approx(RADIUS, rel=1e-14)
+    angle = np.arctan2(-points[:, 0], points[:, 1]) / STEP
+    assert (np.diff(angle) > 0.0).all()
+    interval = np.floor(angle).astype(int)
+    assert (interval == 1 + np.arange(len(angle)) // stations().per_interval).all()
+
+
+def test_stations_travel_with_their_nodes():
+    """A rigid motion of the nodes is that of the stations."""
+    turn, shift = 0.7, np.array([1e-3, -2e-3])
+    moved = stations().positions(rotate(chain(), turn)[None] + shift)[0]
+    there = rotate(stations().positions(chain()[None])[0], turn) + shift
+    assert moved == pytest.approx(there, abs=1e-15)
+
+
+def test_layer_yields_to_a_uniform_pressure_as_a_bar_of_its_depth():
+    """Force of the stations of an interval under 1 um: E b h / (depth h) times that."""
+    own = stations()
+    per_interval = own.stiffness.reshape(-1, own.per_interval).sum(axis=1)
+    assert per_interval == pytest.approx(2.1e9 / DEPTH, rel=1e-12)
+    assert (own.stiffness > 0.0).all()
+
+
+def test_force_between_nodes_meets_the_compliance_of_a_node():
+    """The compliance below a force varies by a tenth of that along straight lines.
+
+    The nodes yield like those of a half-space.
+    """
+    count = 40
+    own = BoreStations.between_nodes(chain(count), layer=2.1e9)
+    apart = np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
+    yielding = 4.0 - np.log(apart + 0.5)
+    normal = own.positions(chain(count)[None]) / RADIUS
+    rows = own.along(normal)[0].reshape(own.stiffness.size, count, 2)
+    radial = np.einsum("qni,ni->qn", rows, chain(count) / RADIUS)
+    inner = radial[20 * own.per_interval : 21 * own.per_interval]
+    part = np.linspace(0.0, 1.0, 21)
+    straight = np.zeros((21, count))
+    straight[:, 20], straight[:, 21] = 1.0 - part, part
+    varies = [
+        np.ptp(np.einsum("qn,nm,qm->q", share, yielding, share))
+        for share in (inner, straight)
+    ]
+    assert varies[0] < 0.1 * varies[1]
+
+
+@pytest.mark.fe
+def test_input_torque_does_not_feel_the_nodes_of_the_bore():
+    """On four rollers the torque has no line of the passage of bore nodes.
+
+    Contact at the nodes alone gave a sawtooth five times as high as all the rest.
+    """
+    design = Design.preset("reference-2d-four-roller").with_changes(
+        {"mesh.refinement": 0.6}
+    )
+    model = ring_model(design, half=True)
+    follow = Continuation(model=model, ratio=design.ratio)
+    state = follow.to_torque(follow.meshed(follow.deflected()), 20.0)
+    per_tooth, angles = model.element.bore_size + 1, 40
+    torque = []
+    for angle in 2.0 * pi / 122 * np.arange(angles) / angles:
+        state = follow.to_angle(state, float(angle))
+        assert state.outcome.ok
+        torque.append(follow.input_torque(state))
+    line = 2.0 * np.abs(np.fft.rfft(torque)) / angles
+    assert per_tooth < angles // 2
+    assert line[per_tooth] < 0.03 * np.ptp(torque)
