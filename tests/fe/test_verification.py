@@ -27,7 +27,7 @@ def loaded():
 
 
 def contact_set(state):
-    """Stations of the bore that touch, and the arcs of the profile on which teeth touch."""
+    """Stations of the bore that touch, and arcs of the profile where teeth touch."""
     c = state.contacts
     arc = np.searchsorted(follow().model.element.profile.stations, c.station)
     teeth = set(zip(c.sector.tolist(), c.side.tolist(), arc.tolist(), strict=True))
