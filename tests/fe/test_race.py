@@ -328,14 +328,16 @@ def test_thin_rings_tell_the_same():
             )
         follow = Continuation(model=ring_model(design), ratio=design.ratio)
         state, rings = follow.meshed(follow.deflected()), thin_ring(design)
-        twin, found = unloaded(rings, 0.0), []
+        twin, found, theirs = unloaded(rings, 0.0), [], []
         for torque in (5.0, 14.0, 48.0, 100.0):
             state, twin = follow.to_torque(state, torque), loaded(rings, twin, torque)
             assert state.outcome.ok and twin.outcome.ok
             # 3 % where one pair of teeth more or less comes in, else below 1.5 %
             assert state.rotation == pytest.approx(twin.rotation, rel=0.035)
-            assert state.compliance == pytest.approx(twin.compliance, rel=0.07)
             found.append(state.rotation)
+            theirs.append(twin.rotation)
+        # between the torques: a tangent jumps by 15 % where a pair comes in
+        assert np.diff(found) == pytest.approx(np.diff(theirs), rel=0.05)
         softness = np.diff(found) / [9.0, 34.0, 52.0]
         rise.append(softness[0] / softness[-1])
     assert rise[0] > 1.5 and rise[1] < 1.0
