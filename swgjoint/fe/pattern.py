@@ -1,8 +1,8 @@
-"""Equilibria of a drive over torque and input angle, row by row."""
+"""Equilibria of a drive over torque and input angle, torques as each angle asks."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Generic
 
@@ -11,44 +11,80 @@ from numpy.typing import NDArray
 
 from swgjoint.errors import ComputationError
 from swgjoint.fe.following import AnyState, Follower, Unloaded
+from swgjoint.fe.load_path import LoadPath
 from swgjoint.fe.state_arrays import packed, settled, unpacked
+from swgjoint.maps.samples import FullSolves
 from swgjoint.maps.unfinished import UNREADABLE, Unfinished
 
 Array = NDArray[np.float64]
 
 EVERY = 4
-"""Of the positions are solved in the second pitch, too."""
+"""Of the first positions are solved in the second pitch, too."""
 FAINT = 1e-8
 """Part of the torque that takes up a clearance, that acts at its ends: no stiffness is
 zero."""
-_POSITION, _REST, _TORQUES, _STATE = "position-{:04d}", "rest", "torques", "state"
+ANGLE_GOAL = 0.03
+"""Difference at unseen angles, in the peak to peak, at which their number suffices."""
+TORQUE_GOAL = 0.025
+"""Estimated error between torques, in the same, at which they suffice."""
+LEAST_PEAK = 0.05
+"""Peak to peak that counts at least, in the largest one over the torques."""
+MOST_TORQUES = 60
+"""Of one sign in the table."""
+FEWEST_TORQUES = 16
+"""The same."""
+_SOLVES, _REST, _TORQUES, _STATE = "solves-{:04d}", "rest", "torques", "state"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Effort:
+    """How many equilibria a map may take."""
+
+    angles: int
+    """Input positions over one pitch to begin with."""
+    most_angles: int
+    """To which they may be doubled; ``angles`` times a power of two."""
+    solves: int
+    """Equilibria of the samples and of those that judge the map."""
+    unseen: tuple[int, int]
+    """Torques of one sign, and angles of each, that judge the map."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Pattern(Generic[AnyState]):
     """Equilibria over one pitch, torques of either sign."""
 
+    theta: Array
+    """Input positions, equally spaced over the pitch [rad]. Shape (n_angles,)."""
     torque: Array
     """T, increasing, zero included [N·m]. Shape (n_torques,)."""
     table: Array
     """Output error, energy, tangent compliance, input torque. Shape (4, n_torques,
     n_angles)."""
+    solved: NDArray[np.bool_]
+    """Torques that were solved at every angle; the others lie on the load paths, their
+    input torque on a straight line. Shape (n_torques,)."""
+    unseen: FullSolves
+    """Equilibria at other angles and torques."""
+    shortfall: str
+    """What the solves did not suffice for; empty if they did."""
     free: bool
     """Whether clearance leaves the output free without torque; the torques next to zero
     are then added, see :func:`across_clearance`."""
     truncated: bool
     """Whether torques are left out at which a solve failed, and those beyond."""
     states: dict[float, list[AnyState]]
-    """Solved positions by torque, those without torque included."""
+    """Positions at the torques that were solved everywhere, that without torque
+    included."""
     info: dict[str, Any]
-    """How well the pattern repeats and is its own mirror image."""
+    """How well the pattern repeats and is its own mirror image, and what was solved."""
 
 
 def solve_pattern(
     follow: Follower[AnyState],
-    theta: Array,
     period: float,
     torques: list[float],
+    effort: Effort,
     *,
     small: float,
     rated: float,
@@ -57,13 +93,18 @@ def solve_pattern(
     keep: Unfinished | None = None,
     restored: Callable[[int], None] = lambda solves: None,
 ) -> Pattern[AnyState]:
-    """Solve all positions; the claims that the map rests on are checked at one torque.
+    """Solve as many angles and torques as the drive asks for.
+
+    First the given torques at every angle. Angles are doubled until they predict others
+    at these torques; then the load path of every angle is divided where its estimated
+    error is largest, see :class:`swgjoint.fe.load_path.LoadPath`. The claims that the
+    map rests on are checked at one torque.
 
     Args:
         follow: The drive.
-        theta: Input angles over one pitch (n_angles,) [rad].
         period: Of the pattern [rad].
-        torques: To sample, zero excluded; positive ones if ``symmetric`` [N·m].
+        torques: To begin with, zero excluded; positive ones if ``symmetric`` [N·m].
+        effort: Angles and solves.
         small: Torque that takes up a clearance [N·m].
         rated: Next to it the claims are checked [N·m].
         symmetric: Whether the negative torques are the mirror image.
@@ -74,211 +115,591 @@ def solve_pattern(
     Raises:
         ComputationError: If the unloaded drive or all torques cannot be solved.
     """
-    rows = _Rows(follow=follow, small=small, tick=tick)
-    done, solves = _restored(rows, keep, len(theta), torques)
-    if done:
-        restored(solves)
-    for k in range(done, len(theta)):
-        if k:
-            rows.advance(float(theta[k]))
-        else:
-            rows.start(torques)
-        if keep is not None:
-            keep.write(_POSITION.format(k), rows.last())
-    if not rows.states:
+    grid = _Grid(
+        follow=follow,
+        period=period,
+        finest=effort.most_angles,
+        levels=sorted(torques),
+        small=small,
+        tick=tick,
+        keep=keep,
+        restored=restored,
+    )
+    count = effort.angles
+    grid.solve_columns(count)
+    if not grid.levels:
         raise ComputationError(
             "no torque can be solved; the smallest is"
             f" {min(torques, key=abs):g} N·m of {max(torques, key=abs):g} N·m"
         )
-    tables = rows.tables(theta)
-    check = min(rows.states, key=lambda t: abs(t - rated))
-    state, second = rows.states[check][-1], []
-    for k, angle in enumerate(theta[::EVERY]):
-        name = f"second-pitch-{k:04d}"
-        there = None if keep is None else _read(keep, name, like=state)
-        if there is None:
-            there = settled(follow.to_angle(state, period + float(angle)))
-            if keep is not None:
-                keep.write(name, packed(there, _STATE))
-        state = there
-        ok = state.outcome.ok
-        second.append(follow.output_angle(state) if ok else np.nan)
-        tick()
-    again = np.array(second) - (period + theta[::EVERY]) / follow.ratio
-    apart = np.abs(again - tables[check][0, ::EVERY]).max()
-    info: dict[str, Any] = {
-        "second_pitch": {
-            "torque_Nm": check,
-            "largest_difference_rad": float(apart),
-            "peak_to_peak_rad": float(np.ptp(tables[check][0])),
-        }
-    }
+    # the claims, at the angles that every map has
+    check = min(grid.levels, key=lambda t: abs(t - rated))
+    info: dict[str, Any] = {"second_pitch": _second_pitch(grid, check, count)}
     if symmetric:
-        opposite = {-t: _mirrored(values) for t, values in tables.items() if t}
-        solved = follow.to_torque(rows.rest[1].state, -check)
-        image = follow.output_angle(solved) - theta[1] / follow.ratio
-        image -= opposite[-check][0, 1]
-        info["mirror"] = {
-            "torque_Nm": -check,
-            "difference_rad": float(image) if solved.outcome.ok else None,
-        }
-        tables |= opposite
+        info["mirror"] = _mirror(grid, check, count)
+    # angles that no sample has, first at the torques that all have
+    places = _unseen_places(effort.unseen[1], effort.most_angles)
+    others = [grid.unseen_column(place) for place in places]
+    missed = grid.missed(count, others)
+    reserved = len(others) * effort.unseen[0] * len(grid.signs)
+    while missed > ANGLE_GOAL and 2 * count <= effort.most_angles:
+        needed = count * (len(grid.levels) + 1)
+        if grid.solves + needed + reserved > effort.solves:
+            break
+        count *= 2
+        grid.solve_columns(count)
+        missed = grid.missed(count, others)
+    doubt = grid.divide(count, effort.solves - reserved)
+    shortfall = []
+    if missed > ANGLE_GOAL:
+        shortfall.append(
+            f"angles between {count} a pitch are off by up to {100.0 * missed:.2g} %"
+        )
+    if doubt > TORQUE_GOAL:
+        shortfall.append(
+            f"torques between the samples by an estimated {100.0 * doubt:.2g} %"
+        )
+    unseen = grid.unseen(others, effort.unseen[0])
+    tables, solved = grid.tables(count)
+    if symmetric:
+        tables |= {-t: _mirrored(values) for t, values in tables.items() if t}
+        solved |= {-t for t in solved}
     used = np.array(sorted(tables))
+    info["sampling"] = {
+        "angles": count,
+        "solves": grid.solves,
+        "solves_per_angle": [
+            len(column.states) + 1 for _, column in grid.chosen(count)
+        ],
+        "missed_at_unseen_angles": missed,
+        "estimated_between_torques": doubt,
+    }
     return Pattern(
+        theta=grid.angles(count),
         torque=used,
         table=np.array([tables[t] for t in used]).swapaxes(0, 1),
-        free=rows.free,
-        truncated=len(rows.states) < len(torques),
-        states={0.0: [one.state for one in rows.rest]} | rows.states,
+        solved=np.isin(used, sorted(solved)),
+        unseen=unseen,
+        shortfall=", ".join(shortfall),
+        free=grid.free,
+        truncated=len(grid.levels) < len(torques),
+        states=grid.states(count),
         info=info,
     )
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Rows(Generic[AnyState]):
-    """Solved positions of each torque; the table grows position by position."""
+@dataclass(kw_only=True, eq=False)
+class _Column(Generic[AnyState]):
+    """Equilibria at one angle."""
+
+    theta: float
+    rest: Unloaded[AnyState]
+    states: dict[float, AnyState] = field(default_factory=dict)
+    """By torque, that without torque excluded."""
+    failed: set[float] = field(default_factory=set)
+    """Torques that were tried in vain."""
+
+    def towards(self, torque: float) -> AnyState:
+        """Where a torque of this sign begins."""
+        if self.rest.sides is None:
+            return self.rest.state
+        return self.rest.sides[0 if torque > 0.0 else 1]
+
+    def nearest(self, torque: float) -> AnyState:
+        """The equilibrium of the same sign at the nearest torque."""
+        near = {t: s for t, s in self.states.items() if t * torque > 0.0}
+        near[0.0] = self.towards(torque)
+        return near[min(near, key=lambda t: abs(t - torque))]
+
+
+@dataclass(kw_only=True, eq=False)
+class _Grid(Generic[AnyState]):
+    """Columns of equilibria, added to until they suffice.
+
+    Angles are numbers on the finest grid of the pitch. All solves come in an order that
+    the results alone decide: an interrupted run repeats it and reads what it has.
+    """
 
     follow: Follower[AnyState]
+    period: float
+    finest: int
+    levels: list[float]
+    """Torques of every column; those that fail, and those beyond, are taken out."""
     small: float
-    """Torque that takes up a clearance [N·m]."""
     tick: Callable[[], None]
-    rest: list[Unloaded[AnyState]] = field(default_factory=list)
-    states: dict[float, list[AnyState]] = field(default_factory=dict)
+    keep: Unfinished | None
+    restored: Callable[[int], None]
+    columns: dict[float, _Column[AnyState]] = field(default_factory=dict)
+    solves: int = 0
+    parts: int = 0
+    """Kept so far."""
 
     @property
     def free(self) -> bool:
         """Whether clearance leaves the output free without torque somewhere."""
-        return any(one.sides is not None for one in self.rest)
+        return any(one.rest.sides is not None for one in self.columns.values())
 
-    def start(self, torques: list[float]) -> None:
+    @property
+    def signs(self) -> list[float]:
+        """Of the torques."""
+        return [s for s in (1.0, -1.0) if any(t * s > 0.0 for t in self.levels)]
+
+    def angles(self, count: int) -> Array:
+        """Input positions of so many columns (count,) [rad]."""
+        return self.period * np.arange(count) / count
+
+    def chosen(self, count: int) -> Iterator[tuple[int, _Column[AnyState]]]:
+        """So many columns, equally spaced, with their numbers."""
+        for k in range(count):
+            yield k, self.columns[k * (self.finest // count)]
+
+    def states(self, count: int) -> dict[float, list[AnyState]]:
+        """At the torques that all columns have."""
+        columns = [column for _, column in self.chosen(count)]
+        found = {0.0: [one.rest.state for one in columns]}
+        return found | {t: [one.states[t] for one in columns] for t in self.levels}
+
+    # -- solving -----------------------------------------------------------------------
+
+    def solve_columns(self, count: int) -> None:
+        """Make sure of so many columns, equally spaced."""
+        step = self.finest // count
+        for place in range(0, self.finest, step):
+            if place not in self.columns:
+                self.columns[place] = self._column(place)
+
+    def unseen_column(self, place: float) -> _Column[AnyState]:
+        """A column between those of the samples; it is none of them."""
+        return self._column(place)
+
+    def _column(self, place: float) -> _Column[AnyState]:
+        """Rest and the common torques, from the column before, if there is one."""
+        theta = self.period * place / self.finest
+        before = max((p for p in self.columns if p < place), default=None)
+        column = self._read(theta, self.levels)
+        if column is None:
+            if before is None:
+                column = self._first()
+            else:
+                column = self._beside(self.columns[before], theta)
+            self._write(column, list(column.states), rest=True)
+        lost = [t for t in self.levels if t not in column.states]
+        for sign in (1.0, -1.0):
+            first = min((abs(t) for t in lost if t * sign > 0.0), default=np.inf)
+            self.levels = [
+                t for t in self.levels if t * sign < 0.0 or abs(t) < first
+            ]
+        return column
+
+    def _first(self) -> _Column[AnyState]:
         """Load the first position from zero torque outwards until a solve fails."""
         state = self.follow.meshed(self.follow.deflected())
         if not state.outcome.ok:
             raise _no_rest(0.0, state)
-        self._stand(self.follow.unloaded(state, self.small), 0.0)
+        column = self._rest(self.follow.unloaded(state, self.small), 0.0)
         for sign in (1.0, -1.0):
-            state = self._towards(sign)
-            for torque in sorted((t for t in torques if t * sign > 0.0), key=abs):
+            state = column.towards(sign)
+            for torque in sorted((t for t in self.levels if t * sign > 0.0), key=abs):
                 state = self.follow.to_torque(state, torque)
                 if not state.outcome.ok:
                     break
                 state = settled(state)
-                self.states[torque] = [state]
-                self.tick()
+                column.states[torque] = state
+                self._count()
+        return column
 
-    def advance(self, theta: float) -> None:
-        """Add a position to every torque; drop those that fail and those beyond."""
-        self._stand(self.follow.unloaded_to(self.rest[-1], theta), theta)
+    def _beside(self, before: _Column[AnyState], theta: float) -> _Column[AnyState]:
+        """The same torques a step on; none beyond one that fails."""
+        column = self._rest(self.follow.unloaded_to(before.rest, theta), theta)
         lost = set()
-        for torque in sorted(self.states, key=abs):
+        for torque in sorted(self.levels, key=abs):
             if (torque > 0.0) not in lost:
-                state = self.follow.to_angle(self.states[torque][-1], theta)
+                state = self.follow.to_angle(before.states[torque], theta)
                 if not state.outcome.ok:
-                    state = self.follow.to_torque(self._towards(torque), torque)
+                    state = self.follow.to_torque(column.nearest(torque), torque)
                 if state.outcome.ok:
-                    self.states[torque].append(settled(state))
-                    self.tick()
+                    column.states[torque] = settled(state)
+                    self._count()
                     continue
             lost.add(torque > 0.0)
-            del self.states[torque]
+        return column
 
-    def tables(self, theta: Array) -> dict[float, Array]:
-        """Output error, energy, tangent compliance, input torque of every torque.
-
-        Shape (4, n) each. Clearance adds rows, see :func:`across_clearance`.
-        """
-        found = {torque: self._table(row, theta) for torque, row in self.states.items()}
-        found[0.0] = self._table([one.state for one in self.rest], theta)
-        if self.free:
-            for side, sign in ((0, 1.0), (1, -1.0)):
-                if not any(torque * sign > 0.0 for torque in self.states):
-                    continue
-                row = [
-                    one.sides[side]
-                    if one.sides is not None
-                    else self.follow.to_torque(one.state, sign * self.small)
-                    for one in self.rest
-                ]
-                taken_up = self._table(row, theta)
-                begin, onset = across_clearance(found[0.0], taken_up, sign * self.small)
-                found |= {sign * self.small: taken_up, begin: onset}
-            # the same stiffness on both sides of the middle
-            found[0.0][2] = onset[2]
-        return found
-
-    def _stand(self, unloaded: Unloaded[AnyState], theta: float) -> None:
+    def _rest(self, unloaded: Unloaded[AnyState], theta: float) -> _Column[AnyState]:
         if not unloaded.state.outcome.ok:
             raise _no_rest(theta, unloaded.state)
-        self.rest.append(settled(unloaded))
+        self._count()
+        return _Column(theta=theta, rest=settled(unloaded))
+
+    def _more(self, column: _Column[AnyState], torques: list[float]) -> None:
+        """Solve other torques of a column, each from the nearest one there."""
+        there = self._read(column.theta, torques, column)
+        if there is None:
+            found = []
+            for torque in sorted(torques, key=lambda t: (t < 0.0, abs(t))):
+                state = self.follow.to_torque(column.nearest(torque), torque)
+                if state.outcome.ok:
+                    column.states[torque] = settled(state)
+                    found.append(torque)
+                self._count()
+            self._write(column, found, rest=False)
+        column.failed |= {t for t in torques if t not in column.states}
+
+    def _count(self) -> None:
+        self.solves += 1
         self.tick()
 
-    def last(self) -> dict[str, Any]:
-        """Arrays of the last position, all torques that could be solved there."""
-        arrays = packed(self.rest[-1], _REST) | {_TORQUES: np.array([*self.states])}
-        for j, row in enumerate(self.states.values()):
-            arrays |= packed(row[-1], f"{_STATE}-{j}")
-        return arrays
+    # -- interruptions -----------------------------------------------------------------
 
-    def take(self, arrays: Mapping[str, Any], torques: list[float]) -> int:
-        """Add a position as :meth:`last` gave it; the number of its solves.
+    def _write(
+        self, column: _Column[AnyState], torques: list[float], *, rest: bool
+    ) -> None:
+        if self.keep is not None:
+            arrays = packed(column.rest, _REST) if rest else {}
+            arrays |= {_TORQUES: np.array(torques), "theta": np.array(column.theta)}
+            for j, t in enumerate(torques):
+                arrays |= packed(column.states[t], f"{_STATE}-{j}")
+            self.keep.write(_SOLVES.format(self.parts), arrays)
+        self.parts += 1
+
+    def _read(
+        self,
+        theta: float,
+        torques: list[float],
+        column: _Column[AnyState] | None = None,
+    ) -> _Column[AnyState] | None:
+        """The next part of an interrupted run, added to a column if one is given."""
+        if self.keep is None:
+            return None
+        name = _SOLVES.format(self.parts)
+        arrays = self.keep.read(name)
+        if arrays is None:
+            return None
+        try:
+            found, solves = self._taken(arrays, theta, torques, column)
+        except UNREADABLE as error:
+            self.keep.ignored(name, error)
+            return None
+        self.parts += 1
+        self.solves += solves
+        self.restored(solves)
+        return found
+
+    def _taken(
+        self,
+        arrays: Mapping[str, Any],
+        theta: float,
+        torques: list[float],
+        column: _Column[AnyState] | None,
+    ) -> tuple[_Column[AnyState], int]:
+        """A column from the arrays of a part, and the number of its solves.
 
         Raises:
-            ValueError: If it does not follow the positions before.
+            ValueError: If it does not follow the parts before.
         """
-        rest: Any = unpacked(arrays, _REST)
-        torque: list[float] = np.asarray(arrays[_TORQUES]).tolist()
+        if float(arrays["theta"]) != theta:
+            raise ValueError("a position at another angle")
+        solved: list[float] = np.asarray(arrays[_TORQUES]).tolist()
+        if not {*solved} <= {*torques}:
+            raise ValueError(f"other torques: {solved}")
         found: dict[float, Any] = {
-            t: unpacked(arrays, f"{_STATE}-{j}") for j, t in enumerate(torque)
+            t: unpacked(arrays, f"{_STATE}-{j}") for j, t in enumerate(solved)
         }
+        if column is not None:
+            for state in found.values():
+                _check_like(state, column.rest.state)
+            column.states |= found
+            return column, len(torques)
+        rest: Any = unpacked(arrays, _REST)
         if not isinstance(rest, Unloaded):
             raise ValueError("no position without torque")
-        if not found.keys() <= (self.states.keys() if self.rest else {*torques}):
-            raise ValueError(f"other torques: {torque}")
-        like = self.rest[0].state if self.rest else rest.state
+        like = self.columns[0].rest.state if self.columns else rest.state
         for state in (rest.state, *(rest.sides or ()), *found.values()):
             _check_like(state, like)
-        self.rest.append(rest)
-        for t in [t for t in self.states if t not in found]:
-            del self.states[t]
-        for t, state in found.items():
-            self.states.setdefault(t, []).append(state)
-        return 1 + len(found)
+        return _Column(theta=theta, rest=rest, states=found), 1 + len(found)
 
-    def _towards(self, torque: float) -> AnyState:
-        """Where a torque of this sign begins at the last position."""
-        rest = self.rest[-1]
-        if rest.sides is None:
-            return rest.state
-        return rest.sides[0 if torque > 0.0 else 1]
+    # -- figures -----------------------------------------------------------------------
 
-    def _table(self, states: list[AnyState], theta: Array) -> Array:
+    def figures(self, state: AnyState, theta: float) -> Array:
+        """Output error, energy, compliance, input torque (4,)."""
         follow = self.follow
-        rows = [
-            (follow.output_angle(s), s.energy, s.compliance, follow.input_torque(s))
-            for s in states
-        ]
-        values = np.array(rows).T
-        values[0] -= theta / follow.ratio
-        return values
+        error = follow.output_angle(state) - theta / follow.ratio
+        return np.array(
+            [error, state.energy, state.compliance, follow.input_torque(state)]
+        )
+
+    def _path(self, column: _Column[AnyState], sign: float) -> tuple[Array, Array]:
+        """Torques [N·m] and figures (4, n) of one sign, outwards from zero."""
+        top = max(abs(t) for t in self.levels if t * sign > 0.0)
+        outward = sorted(
+            (t for t in column.states if t * sign > 0.0 and abs(t) <= top), key=abs
+        )
+        # a free output has no curve before its clearance is taken up
+        first = 0.0 if column.rest.sides is None else sign * self.small
+        states = [column.towards(sign), *(column.states[t] for t in outward)]
+        table = np.array([self.figures(s, column.theta) for s in states]).T
+        return np.array([first, *outward]), table
+
+    def path(
+        self, column: _Column[AnyState], sign: float
+    ) -> tuple[LoadPath, tuple[Array, Array]]:
+        """The curve of one sign, and torque and input torque that were solved.
+
+        Of negative torques it is the curve of the mirrored drive.
+        """
+        torque, (error, energy, compliance, moment) = self._path(column, sign)
+        curve = LoadPath(
+            torque=sign * torque,
+            output_error=sign * error,
+            energy=energy,
+            compliance=compliance,
+        )
+        return curve, (sign * torque, sign * moment)
+
+    def missed(self, count: int, others: list[_Column[AnyState]]) -> float:
+        """Largest part of the peak to peak that other angles are off by.
+
+        At the common torques: output error, and input torque as the derivative of the
+        complementary potential by the angle.
+        """
+        worst, columns = 0.0, [column for _, column in self.chosen(count)]
+        for torque in [0.0, *self.levels]:
+            if torque == 0.0 and self.free:
+                continue
+
+            def row(
+                chosen: list[_Column[AnyState]], torque: float = torque
+            ) -> tuple[Array, Array, Array]:
+                states = [one.states[torque] if torque else one.rest.state
+                          for one in chosen]
+                table = np.array(
+                    [
+                        self.figures(state, one.theta)
+                        for state, one in zip(states, chosen, strict=True)
+                    ]
+                ).T
+                return table[0], table[1] + torque * table[0], table[3]
+
+            error, potential, moment = row(columns)
+            e, _, m = row(others)
+            parts = np.array([one.theta for one in others]) / self.period
+            predicted, _ = _periodic(error, parts)
+            _, slope = _periodic(potential, parts)
+            slope = slope / self.period + torque / self.follow.ratio
+            for own, there, told in ((error, e, predicted), (moment, m, slope)):
+                height = np.ptp(np.concatenate([own, there]))
+                worst = max(worst, float(np.abs(told - there).max() / height))
+        return worst
+
+    def peaks(self, count: int, sign: float) -> tuple[Array, Array, Array]:
+        """Torques, peak to peak over the angle of e and of the input torque there.
+
+        Positive torques also where ``sign`` is negative.
+        """
+        paths = [self.path(column, sign) for _, column in self.chosen(count)]
+        first = max(curve.torque[0] for curve, _ in paths)
+        top = max(abs(t) for t in self.levels if t * sign > 0.0)
+        torque = np.linspace(first, top, 49)
+        errors = np.array([curve.at(torque)[0] for curve, _ in paths])
+        moments = np.array([np.interp(torque, *solved) for _, solved in paths])
+        heights = []
+        for table in (errors, moments):
+            height = np.ptp(table, axis=0)
+            heights.append(np.maximum(height, LEAST_PEAK * height.max()))
+        return torque, heights[0], heights[1]
+
+    def divide(self, count: int, most: int) -> float:
+        """Divide load paths until their estimated errors meet the goal.
+
+        Args:
+            count: Of the columns.
+            most: Solves in all.
+
+        Returns:
+            The largest estimate that is left, in the peak to peak.
+        """
+        step = self.period / count
+        while True:
+            wanted: list[tuple[float, int, float]] = []
+            for sign in self.signs:
+                at, error, moment = self.peaks(count, sign)
+                for k, column in self.chosen(count):
+                    curve, _ = self.path(column, sign)
+                    of_error, of_potential = curve.doubt
+                    there = curve.division
+                    # the input torque is the difference of G from angle to angle
+                    part = np.maximum(
+                        of_error / np.interp(there, at, error),
+                        of_potential / step / np.interp(there, at, moment),
+                    )
+                    tried = sign * np.array(sorted(column.failed))
+                    for j, torque in enumerate(there):
+                        low, high = curve.torque[j], curve.torque[j + 1]
+                        if not ((tried > low) & (tried < high)).any():
+                            wanted.append((float(part[j]), k, sign * float(torque)))
+            wanted.sort(reverse=True)
+            worst = wanted[0][0] if wanted else 0.0
+            chosen = [w for w in wanted if w[0] > TORQUE_GOAL]
+            chosen = chosen[: max(0, most - self.solves)]
+            if not chosen:
+                return worst
+            for k, column in self.chosen(count):
+                torques = [torque for _, number, torque in chosen if number == k]
+                if torques:
+                    self._more(column, torques)
+
+    def unseen(self, others: list[_Column[AnyState]], count: int) -> FullSolves:
+        """Equilibria at other angles, without torque and at so many other torques.
+
+        Args:
+            others: Columns at these angles.
+            count: Torques of one sign.
+        """
+        rows = []
+        for number, column in enumerate(others):
+            theta = column.theta
+            error, _, _, moment = self.figures(column.rest.state, theta)
+            rows.append((theta, 0.0, error, moment))
+            torques = []
+            for sign in self.signs:
+                top = max(abs(t) for t in self.levels if t * sign > 0.0)
+                torques += [sign * top * part for part in _unseen_parts(count)]
+            self._more(column, torques)
+            for torque in torques:
+                if torque in column.states:
+                    error, _, _, moment = self.figures(column.states[torque], theta)
+                    rows.append((theta, torque, error, moment))
+        angle, torque, errors, moments = np.array(rows).T
+        return FullSolves(
+            input_angle=angle,
+            torque=torque,
+            output_error=errors,
+            input_torque=moments,
+        )
+
+    def tables(self, count: int) -> tuple[dict[float, Array], set[float]]:
+        """Figures (4, count) by torque, and the torques that all columns solved.
+
+        Clearance adds rows, see :func:`across_clearance`.
+        """
+        columns = [column for _, column in self.chosen(count)]
+        rest = np.array([self.figures(c.rest.state, c.theta) for c in columns]).T
+        found = {0.0: rest}
+        for sign in self.signs:
+            paths = [self.path(column, sign) for column in columns]
+            own = {abs(t) for t in self.levels if t * sign > 0.0}
+            least = self.small if self.free else 0.0
+            torque = _common_torques([curve for curve, _ in paths], own, least)
+            if self.free:
+                torque = np.concatenate([[least], torque])
+            values = np.array(
+                [
+                    np.vstack([curve.at(torque), np.interp(torque, *solved)])
+                    for curve, solved in paths
+                ]
+            )  # (count, 4, n)
+            values *= np.array([sign, 1.0, 1.0, sign])[:, None]
+            found |= {
+                sign * float(t): values[:, :, j].T for j, t in enumerate(torque)
+            }
+            if self.free:
+                taken_up = found[sign * self.small]
+                begin, onset = across_clearance(rest, taken_up, sign * self.small)
+                found[begin] = onset
+                # the same stiffness on both sides of the middle
+                rest[2] = onset[2]
+        return found, {0.0, *self.levels}
 
 
-def _restored(
-    rows: _Rows[Any], keep: Unfinished | None, count: int, torques: list[float]
-) -> tuple[int, int]:
-    """Take up the positions of an interrupted run: how many, and their solves."""
-    solves = 0
-    for k in range(count if keep is not None else 0):
-        assert keep is not None
-        name = _POSITION.format(k)
-        arrays = keep.read(name)
-        if arrays is None:
-            return k, solves
-        try:
-            solves += rows.take(arrays, torques)
-        except UNREADABLE as error:
-            keep.ignored(name, error)
-            return k, solves
-    return (count, solves) if keep is not None else (0, 0)
+def _common_torques(paths: list[LoadPath], own: set[float], least: float) -> Array:
+    """Torques of the table, closer together where the load paths have their events.
+
+    Args:
+        paths: Of all angles.
+        own: Torques that all of them solved [N·m].
+        least: Torque that all must exceed [N·m].
+    """
+    top = max(own)
+    pool = np.concatenate([np.concatenate([p.torque, p.events]) for p in paths])
+    pool = np.sort(pool[(pool > least) & (pool <= top)])
+    count = int(
+        np.clip(3 * len(pool) // (2 * len(paths)), FEWEST_TORQUES, MOST_TORQUES)
+    )
+    fine = np.linspace(least, top, 4001)
+    rank = np.searchsorted(pool, fine, side="right") / pool.size
+    share = (fine - least) / (top - least)
+    # a half follows the events, a half is spread out, small torques a little closer
+    measure = 0.5 * rank + 0.25 * share + 0.25 * np.sqrt(share)
+    spread = np.interp((np.arange(count) + 0.5) / count, measure, fine)
+    levels = np.array(sorted(own))
+    # torques that nearly are one of those that were solved give way to it
+    gap = np.abs(spread[:, None] - levels).min(axis=1)
+    near = gap < 0.35 * np.gradient(spread)
+    return np.sort(np.concatenate([spread[~near], levels]))
+
+
+def _periodic(values: Array, parts: Array) -> tuple[Array, Array]:
+    """Trigonometric interpolation over a period, and its slope by the part of it.
+
+    Args:
+        values: At equal steps (n,).
+        parts: Of the period (m,).
+    """
+    n = len(values)
+    modes = np.fft.rfft(values)[: (n + 1) // 2] / n
+    modes[1:] *= 2.0
+    wave = 2.0j * np.pi * np.arange(len(modes))
+    phase = np.exp(parts[:, None] * wave)
+    return (phase @ modes).real, (phase @ (wave * modes)).real
+
+
+def _unseen_places(count: int, finest: int) -> list[float]:
+    """Angles on the finest grid that no grid has, spread over the pitch."""
+    # the golden section of a step, so that no grid comes near all of them
+    return [finest * (k + 0.381966) / count for k in range(count)]
+
+
+def _unseen_parts(count: int) -> Array:
+    """Unseen torques in parts of the largest one, geometrically spaced."""
+    return np.geomspace(0.02, 0.97, count)
+
+
+def _second_pitch(grid: _Grid[AnyState], torque: float, count: int) -> dict[str, float]:
+    """How well the pattern repeats at some angles of the next pitch."""
+    follow, theta = grid.follow, grid.angles(count)
+    columns = [column for _, column in grid.chosen(count)]
+    state, again = columns[-1].states[torque], []
+    for k, angle in enumerate(theta[::EVERY]):
+        name = f"second-pitch-{k:04d}"
+        there = None if grid.keep is None else _read(grid.keep, name, like=state)
+        if there is None:
+            there = settled(follow.to_angle(state, grid.period + float(angle)))
+            if grid.keep is not None:
+                grid.keep.write(name, packed(there, _STATE))
+        state = there
+        ok = state.outcome.ok
+        again.append(follow.output_angle(state) if ok else np.nan)
+        grid._count()
+    first = np.array([grid.figures(c.states[torque], c.theta)[0] for c in columns])
+    apart = np.array(again) - (grid.period + theta[::EVERY]) / follow.ratio
+    return {
+        "torque_Nm": torque,
+        "largest_difference_rad": float(np.abs(apart - first[::EVERY]).max()),
+        "peak_to_peak_rad": float(np.ptp(first)),
+    }
+
+
+def _mirror(grid: _Grid[AnyState], torque: float, count: int) -> dict[str, Any]:
+    """How well the drive is its own mirror image, at the second angle."""
+    step = grid.finest // count
+    one, image = grid.columns[step], grid.columns[grid.finest - step]
+    solved = grid.follow.to_torque(one.rest.state, -torque)
+    error = grid.figures(solved, one.theta)[0]
+    wanted = -grid.figures(image.states[torque], image.theta)[0]
+    ok = solved.outcome.ok
+    return {
+        "torque_Nm": -torque,
+        "difference_rad": float(error - wanted) if ok else None,
+    }
 
 
 def _read(keep: Unfinished, name: str, *, like: AnyState) -> AnyState | None:

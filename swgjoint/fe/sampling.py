@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from functools import partial
 from math import pi
 from typing import Any
@@ -13,7 +14,8 @@ from numpy.typing import NDArray
 from swgjoint.errors import ComputationError
 from swgjoint.fe.continuation import Continuation
 from swgjoint.fe.drive2d import can_halve, carries_bearing, left_out, ring_model
-from swgjoint.fe.pattern import EVERY, Pattern, solve_pattern
+from swgjoint.fe.equilibrium import NewtonSolver
+from swgjoint.fe.pattern import Effort, Pattern, solve_pattern
 from swgjoint.fe.shape_fields import drive_fields, plane_fields, plane_surface
 from swgjoint.fe.solid.continuation import SolidContinuation
 from swgjoint.fe.solid.drive3d import solid_ring
@@ -32,13 +34,29 @@ from swgjoint.progress import Progress, silent
 
 Array = NDArray[np.float64]
 
-ANGLES = 96
-"""Input positions over one pitch: contact events leave corners in the error, and 24
-positions alias them into a tenth of the ripple, 48 into a few percent, 96 into 2 %."""
-SOLID_ANGLES = 24
-"""The same in space, where a position takes fifty times longer."""
+ANGLES = 24
+"""Input positions over one pitch to begin with, doubled up to :data:`MOST_ANGLES`:
+contact events leave corners in the error, which some wave generators pass in a few
+torques and others at every angle."""
+MOST_ANGLES = 96
+SOLVES = 1100
+"""Equilibria of a map in the plane: one and a half times the time of 96 angles at five
+torques, of which most maps take a half."""
+UNSEEN = (8, 7)
+"""Torques of one sign and angles of each that judge the map."""
+SOLID_ANGLES = 16
+"""The same in space, where an equilibrium takes fifty times longer."""
+SOLID_MOST_ANGLES = 16
+SOLID_SOLVES = 220
+SOLID_UNSEEN = (2, 2)
+FIXED_SOLVES = 14
+"""Equilibria per angle where the number of angles is given."""
 LEVELS = (0.05, 0.15, 0.35, 0.65, 1.0)
-"""Sampled torques, of both signs, as parts of the repeated peak torque."""
+"""Torques of every angle, of both signs, as parts of the repeated peak torque; others
+are added angle by angle."""
+SOLVER = NewtonSolver(step_tolerance=1e-9, thorough_below=1e-6)
+"""A map needs no more: the output error moves by 1e-9 rad and the input torque by 2e-6
+N·m, in little more than half the iterations."""
 SYMMETRIC = ("elliptical", "simplified", "parabolic", "four_roller", "cosine")
 """Wave generators that are their own mirror image; the teeth always are."""
 
@@ -53,7 +71,9 @@ def sample_map(
 ) -> MapSamples:
     """Equilibria over one pitch and both signs of torque, by the nonlinear models.
 
-    One pitch suffices with perfect teeth, and with a symmetric wave generator the
+    Angles and torques are added until they predict others, as far as the budget of
+    equilibria goes, see :func:`swgjoint.fe.pattern.solve_pattern`; a few equilibria at
+    other angles and torques are left to judge the map. One pitch suffices with perfect teeth, and with a symmetric wave generator the
     negative torques are the mirror image of the positive ones; both claims are checked
     at rated torque and recorded. Torques at which a solve fails, and those beyond, are
     left out, and the record says so. Manufacturing errors are superposed, see
@@ -66,8 +86,9 @@ def sample_map(
     Args:
         design: The drive.
         model: Fidelity, ``2d`` or ``3d``.
-        angles: Input positions over one pitch of the fixed member; by default
-            :data:`ANGLES`, in space :data:`SOLID_ANGLES`.
+        angles: Input positions over one pitch of the fixed member, with
+            :data:`FIXED_SOLVES` equilibria each; by default as many as the drive asks
+            for, from :data:`ANGLES`, in space :data:`SOLID_ANGLES`.
         progress: Called with the stage, the solves done and their number.
         keep: Where solved positions are kept and taken up again after an interruption;
             the samples are the same, bit for bit. None keeps none.
@@ -77,14 +98,12 @@ def sample_map(
     """
     begin = time.perf_counter()
     drive, ratings = design.drive, ratings_of(design)
-    if angles is None:
-        angles = SOLID_ANGLES if model == "3d" else ANGLES
     symmetric = design.wave_generator.kind in SYMMETRIC
     parts = [part * ratings.repeated_peak for part in LEVELS]
     torques = parts if symmetric else [-t for t in parts[::-1]] + parts
     period = 2.0 * pi / design.periodicity
-    theta = period * np.arange(angles) / angles
-    total, done = angles * (len(torques) + 1) + len(theta[::EVERY]), 0
+    effort = effort_of(model, angles, both_signs=not symmetric)
+    total, done = effort.solves, 0
 
     stages = len(STAGES) if has_errors(design) else 1
     stage = f"{drive.name}: equilibria" + (f", part 1 of {stages}" * (stages > 1))
@@ -107,12 +126,12 @@ def sample_map(
         found: Pattern[Any]
         if model == "3d":
             solid = _in_space(design)
-            found = solve_pattern(solid, theta, period, torques, **settings)
+            found = solve_pattern(solid, period, torques, effort, **settings)
             surface = solid_surface(solid.ring)
             shown = partial(solid_fields, solid.ring, surface=surface)
         else:
             plane = _in_plane(design)
-            found = solve_pattern(plane, theta, period, torques, **settings)
+            found = solve_pattern(plane, period, torques, effort, **settings)
             surface = plane_surface(plane.model)
             shown = partial(plane_fields, plane.model, surface=surface)
     except ComputationError as failure:
@@ -129,6 +148,12 @@ def sample_map(
     error = error - (used * series)[:, None]
     energy = energy + (0.5 * used**2 * series)[:, None]
     compliance = compliance + series
+    unseen = replace(
+        found.unseen,
+        output_error=found.unseen.output_error - found.unseen.torque * series,
+    )
+    # progress may have counted more solves than were needed
+    progress(stage, total, total)
     tolerances = None
     if has_errors(design):
         tolerances = sample_tolerances(
@@ -153,7 +178,7 @@ def sample_map(
         ratings=ratings,
         damping_ratio=design.joint.damping_ratio,
         order=(cycles, 0) if alpha == (1, 0) else (0, cycles * beta[0]),
-        input_angle=theta,
+        input_angle=found.theta,
         torque=used,
         output_error=error,
         energy=energy,
@@ -161,6 +186,9 @@ def sample_map(
         input_torque=input_torque,
         tolerances=tolerances,
         free=found.free,
+        solved=found.solved,
+        unseen=unseen,
+        shortfall=found.shortfall,
         fields=drive_fields(design, found.states, shown, surface, symmetric=symmetric),
         info=found.info
         | {
@@ -192,6 +220,33 @@ def sample_map(
     )
 
 
+def effort_of(model: str, angles: int | None, *, both_signs: bool) -> Effort:
+    """Equilibria that a map may take.
+
+    Args:
+        model: Fidelity.
+        angles: Input positions over one pitch; as many as the drive asks for if None.
+        both_signs: Whether negative torques are sampled, too.
+    """
+    solid = model == "3d"
+    unseen = SOLID_UNSEEN if solid else UNSEEN
+    if angles is not None:
+        # a quick map is judged by as many torques at fewer angles
+        unseen = unseen[0], min(unseen[1], max(2, angles // 4))
+        solves = angles * FIXED_SOLVES + unseen[0] * unseen[1]
+        most = angles
+    else:
+        solves = SOLID_SOLVES if solid else SOLVES
+        angles = SOLID_ANGLES if solid else ANGLES
+        most = SOLID_MOST_ANGLES if solid else MOST_ANGLES
+    return Effort(
+        angles=angles,
+        most_angles=most,
+        solves=solves * (2 if both_signs else 1),
+        unseen=unseen,
+    )
+
+
 def _in_plane(design: Design) -> Continuation:
     perfect, bearing = without_errors(design), on_bearing(design)
     return Continuation(
@@ -204,6 +259,7 @@ def _in_plane(design: Design) -> Continuation:
         ),
         ratio=design.ratio,
         layout=design.drive.layout,
+        solver=SOLVER,
     )
 
 

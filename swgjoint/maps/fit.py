@@ -27,6 +27,7 @@ from swgjoint.maps.equilibrium import output_angle
 from swgjoint.maps.samples import FullSolves, MapSamples
 from swgjoint.maps.tolerance_modes import combined
 from swgjoint.maps.torsion_table import on_knots
+from swgjoint.maps.validation import validation
 
 Array = NDArray[np.float64]
 
@@ -162,6 +163,9 @@ def fit_map(samples: MapSamples, *, keep: float = KEEP) -> DriveMap:
         "stiffness_range_Nm_rad": stiffness_range(fitted),
         "torque_range_Nm": [float(v) for v in fitted.torque_range],
     }
+    record = validation(fitted, samples)
+    if record is not None:
+        info["validation"] = record
     return replace(fitted, info=info)
 
 
@@ -339,6 +343,8 @@ def energy_check(drive: DriveMap, samples: MapSamples) -> dict[str, float]:
     inside = (samples.torque > drive.torque_range[0]) & (
         samples.torque < drive.torque_range[1]
     )
+    if samples.solved is not None:
+        inside &= samples.solved
     if samples.free:  # the corner at the end of the clearance
         inside[[zero - 2, zero - 1, zero + 1, zero + 2]] = False
     ripple = np.ptp(samples.input_torque, axis=1)

@@ -33,7 +33,7 @@ QUANTITIES = {
 }
 """Quantities of the ripple and their names."""
 STIFFNESS = "secant_stiffness"
-_UNITS = {"input_torque": "Nm", "output_error": "rad"}
+UNITS = {"input_torque": "Nm", "output_error": "rad"}
 MAX_ROWS = 1000
 """Of a record; a thorough one has some tens."""
 
@@ -280,8 +280,8 @@ def _read(record: Any) -> MapValidation:
             if table.get(f"{key}_largest") is None:
                 continue
             value, height = _share(table, f"{key}_largest", where), nan
-            if table.get(f"{key}_pp_{_UNITS[key]}") is not None:
-                height = _share(table, f"{key}_pp_{_UNITS[key]}", where)
+            if table.get(f"{key}_pp_{UNITS[key]}") is not None:
+                height = _share(table, f"{key}_pp_{UNITS[key]}", where)
             of[torque] = max((value, height), of.get(torque, (0.0, nan)))
     return MapValidation(
         solves=solves,

@@ -116,6 +116,13 @@ class MapSamples:
     free: bool = False
     """Whether clearance leaves the output free without torque. The torques next to zero
     are then no equilibria: they stand at the ends of the clearance."""
+    solved: NDArray[np.bool_] | None = None
+    """Torques at which all angles were solved; between them the tables follow the load
+    paths, and the input torque a straight line. None: all. Shape (n_torques,)."""
+    unseen: FullSolves | None = None
+    """Equilibria at other angles and torques, those without torque included."""
+    shortfall: str = ""
+    """What the solves did not suffice for; empty if they did."""
     fields: DriveFields | None = None
     """Of the flexspline with perfect teeth, to be shown."""
     info: dict[str, Any] = field(default_factory=dict)
@@ -125,6 +132,12 @@ class MapSamples:
         torque = frozen_array(self.torque, "torque [N·m]", ndim=1)
         if (np.diff(torque) <= 0).any() or not (torque == 0.0).any():
             raise ValueError("torque [N·m] must increase and contain zero")
+        solved = np.ones(torque.size) if self.solved is None else self.solved
+        solved = np.array(solved, dtype=bool)
+        if solved.shape != torque.shape:
+            raise ValueError(f"solved has shape {solved.shape}, needs {torque.shape}")
+        solved.flags.writeable = False
+        object.__setattr__(self, "solved", solved)
         object.__setattr__(self, "input_angle", angle)
         object.__setattr__(self, "torque", torque)
         for key, unit in (
