@@ -286,9 +286,7 @@ class _Grid(Generic[AnyState]):
         lost = [t for t in self.levels if t not in column.states]
         for sign in (1.0, -1.0):
             first = min((abs(t) for t in lost if t * sign > 0.0), default=np.inf)
-            self.levels = [
-                t for t in self.levels if t * sign < 0.0 or abs(t) < first
-            ]
+            self.levels = [t for t in self.levels if t * sign < 0.0 or abs(t) < first]
         return column
 
     def _first(self) -> _Column[AnyState]:
@@ -469,8 +467,9 @@ class _Grid(Generic[AnyState]):
             def row(
                 chosen: list[_Column[AnyState]], torque: float = torque
             ) -> tuple[Array, Array, Array]:
-                states = [one.states[torque] if torque else one.rest.state
-                          for one in chosen]
+                states = [
+                    one.states[torque] if torque else one.rest.state for one in chosen
+                ]
                 table = np.array(
                     [
                         self.figures(state, one.theta)
@@ -598,9 +597,7 @@ class _Grid(Generic[AnyState]):
                 ]
             )  # (count, 4, n)
             values *= np.array([sign, 1.0, 1.0, sign])[:, None]
-            found |= {
-                sign * float(t): values[:, :, j].T for j, t in enumerate(torque)
-            }
+            found |= {sign * float(t): values[:, :, j].T for j, t in enumerate(torque)}
             if self.free:
                 taken_up = found[sign * self.small]
                 begin, onset = across_clearance(rest, taken_up, sign * self.small)

@@ -1,0 +1,169 @@
+"""The load path between equilibria: jumps of the compliance against closed forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from messages import naming
+
+from swgjoint.fe.load_path import CHANCE, LoadPath
+
+ERROR, ENERGY, COMPLIANCE = 1e-4, 1e-3, 6e-5
+
+
+def drive(torque, jumps=(), slope=0.0):
+    """Error, energy, compliance of C = C0 + slope T + jumps; shape (3, n).
+
+    The energy is the integral of T C.
+    """
+    t = np.asarray(torque, float)
+    error = ERROR - COMPLIANCE * t - 0.5 * slope * t**2
+    energy = ENERGY + 0.5 * COMPLIANCE * t**2 + slope * t**3 / 3.0
+    compliance = COMPLIANCE + slope * t
+    for place, jump in jumps:
+        beyond = t > place
+        error = error - jump * np.maximum(t - place, 0.0)
+        energy = energy + 0.5 * jump * np.where(beyond, t**2 - place**2, 0.0)
+        compliance = compliance + jump * beyond
+    return np.stack([error, energy, compliance])
+
+
+def path(torque, jumps=(), slope=0.0):
+    error, energy, compliance = drive(torque, jumps, slope)
+    return LoadPath(
+        torque=np.asarray(torque, float),
+        output_error=error,
+        energy=energy,
+        compliance=compliance,
+    )
+
+
+TORQUES = np.array([0.0, 10.0, 22.0, 30.0, 47.0])
+FINE = np.linspace(0.0, 47.0, 942) + 1e-3 * np.pi * np.r_[0.0, np.ones(940), 0.0]
+EVENTS = ((3.0, -1e-5), (17.3, 2e-5), (29.0, -5e-6))
+ROUND_OFF = np.array([1e-12, 1e-11, 1e-12])
+"""Of error, energy and compliance, next to 1e-3 rad, 1e-1 J and 1e-4 rad/(N·m)."""
+
+
+def test_one_event_in_each_interval_is_exact():
+    """Error, energy and compliance between the samples, to round-off."""
+    apart = np.abs(path(TORQUES, EVENTS).at(FINE) - drive(FINE, EVENTS)).max(axis=1)
+    assert (apart < ROUND_OFF).all()
+
+
+def test_events_are_found_where_they_are():
+    """One place in each interval that has an event, none in the others."""
+    found = path(TORQUES, EVENTS).events
+    assert found == pytest.approx([place for place, _ in EVENTS], abs=1e-6)
+
+
+def test_what_one_event_explains_leaves_only_the_chance_in_doubt():
+    """A hundredth of the length times the change of the compliance."""
+    curve = path(TORQUES, EVENTS)
+    error, potential = curve.doubt
+    chance = CHANCE * np.diff(TORQUES) * np.abs(np.diff(curve.compliance))
+    assert error == pytest.approx(chance, abs=1e-11)
+    assert np.abs(potential).max() < 1e-9 * ENERGY
+
+
+def test_one_event_on_a_slope_is_exact():
+    """Compliance that grows steadily and jumps once."""
+    given = (((4.0, -8e-6),), 2e-7)
+    one = path([0.0, 10.0], *given)
+    explained = one._explained[0]
+    assert explained.power[0, 1] / 10.0 == pytest.approx(2e-7, rel=1e-6)
+    assert explained.place[0, 0] == pytest.approx(0.4, rel=1e-6)
+    # two equal jumps explain it as well: the curve lies between, the doubt says so
+    x = np.linspace(0.0, 10.0, 101)
+    apart = np.abs(one.at(x) - drive(x, *given))[0].max()
+    assert apart <= one.doubt[0][0]
+
+
+def test_two_equal_events_are_among_the_explanations():
+    """Their places come out, and the doubt covers what one event would say."""
+    events = ((2.0, -6e-6), (7.0, -6e-6))
+    one = path([0.0, 10.0], events)
+    places = np.sort(one._explained[1].place[0]) * 10.0
+    assert places == pytest.approx([2.0, 7.0], rel=1e-6)
+    x = np.linspace(0.0, 10.0, 101)
+    assert np.abs(one.at(x) - drive(x, events))[0].max() <= one.doubt[0][0]
+
+
+def test_a_smooth_path_is_that_of_its_compliance():
+    """Compliance in proportion to the torque, no jump: exact, and no events."""
+    given = ((), 5e-7)
+    curve = path(TORQUES, *given)
+    error, energy, _ = np.abs(curve.at(FINE) - drive(FINE, *given)).max(axis=1)
+    # both explanations count, two jumps of a half of the change at a fifth from the ends
+    assert error <= curve.doubt[0].max()
+    assert error < 0.02 * (5e-7 * 17.0) * 17.0
+    assert energy < 47.0 * error
+
+
+def test_the_potential_balances_between_the_samples():
+    """dG/dT = e and de/dT = -C along the curve, three events in one interval too."""
+    events = ((3.0, -1e-5), (12.0, 2e-5), (14.0, -7e-6), (19.0, 3e-6))
+    curve = path(TORQUES, events)
+    places = np.concatenate(
+        [
+            np.linspace(a + 0.1, b - 0.1, 200)
+            for a, b in zip(TORQUES[:-1], TORQUES[1:], strict=True)
+        ]
+    )
+    step = 1e-4
+    error, _, compliance = curve.at(places)
+    up, down = curve.at(places + step), curve.at(places - step)
+    potential = [
+        v[1] + t * v[0] for v, t in ((up, places + step), (down, places - step))
+    ]
+    assert (potential[0] - potential[1]) / (2 * step) == pytest.approx(error, abs=1e-9)
+    smooth = np.abs(up[2] - down[2]) < 1e-8
+    slope = (down[0] - up[0])[smooth] / (2 * step)
+    assert smooth.sum() > 700
+    assert slope == pytest.approx(compliance[smooth], abs=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_equilibria_come_back_bit_for_bit(seed):
+    """Whatever the samples, the curve passes through them."""
+    rng = np.random.default_rng(seed)
+    given = path(np.cumsum(rng.uniform(0.5, 9.0, 7)), EVENTS)
+    own = np.stack([given.output_error, given.energy, given.compliance])
+    assert np.array_equal(given.at(given.torque), own)
+
+
+def test_the_doubt_tells_how_far_off_the_curve_is():
+    """Random events: the worst interval is foretold within a factor of three."""
+    rng = np.random.default_rng(5)
+    told, true = [], []
+    for _ in range(40):
+        events = [(p, 1e-5 * rng.normal()) for p in rng.uniform(0.0, 47.0, 12)]
+        curve, x = path(TORQUES, events), np.linspace(0.0, 47.0, 800)
+        apart = np.abs(curve.at(x)[0] - drive(x, events)[0])
+        told.append(curve.doubt[0].max())
+        true.append(apart.max())
+    ratio = np.array(true) / np.array(told)
+    assert np.median(ratio) < 1.0
+    assert np.quantile(ratio, 0.9) < 3.0
+    assert np.quantile(ratio, 0.1) > 0.1
+
+
+def test_dividing_where_it_says_makes_the_curve_exact():
+    """Halved interval by interval, three events end in intervals of their own."""
+    events = ((3.0, -1e-5), (12.0, 2e-5), (14.0, -7e-6))
+    torque = np.array([0.0, 47.0])
+    x = np.linspace(0.0, 47.0, 800)
+    for _ in range(40):
+        curve = path(torque, events)
+        part = curve.doubt[0]
+        torque = np.sort(np.append(torque, curve.division[part.argmax()]))
+    assert np.abs(path(torque, events).at(x) - drive(x, events))[0].max() < 1e-9
+
+
+def test_torques_outside_are_refused():
+    """No extrapolation; the range is named."""
+    curve = path(TORQUES, EVENTS)
+    with pytest.raises(ValueError, match=naming("47.1", "47 N·m")):
+        curve.at([47.1])
+    with pytest.raises(ValueError, match=naming("torque", "increase")):
+        path([1.0, 1.0])
