@@ -23,13 +23,18 @@ EVERY = 4
 FAINT = 1e-8
 """Part of the torque that takes up a clearance, that acts at its ends: no stiffness is
 zero."""
-ANGLE_GOAL = 0.03
+ANGLE_GOAL = 0.01
 """Difference at unseen angles, in the peak to peak, at which their number suffices."""
-TORQUE_GOAL = 0.025
+TORQUE_GOAL = 0.02
 """Estimated error between torques, in the same, at which they suffice."""
+POTENTIAL_WEIGHT = 0.3
+"""Of the estimated error of the complementary potential over a step of the angle, as
+one of the input torque: errors of neighbouring angles are partly alike."""
 LEAST_PEAK = 0.05
 """Peak to peak that counts at least, in the largest one over the torques."""
-MOST_TORQUES = 60
+SNAP = 0.2
+"""Part of an interval by which its division may move to a torque of a column beside."""
+MOST_TORQUES = 100
 """Of one sign in the table."""
 FEWEST_TORQUES = 16
 """The same."""
@@ -142,14 +147,16 @@ def solve_pattern(
     others = [grid.unseen_column(place) for place in places]
     missed = grid.missed(count, others)
     reserved = len(others) * effort.unseen[0] * len(grid.signs)
+    budget = effort.solves - reserved
     while missed > ANGLE_GOAL and 2 * count <= effort.most_angles:
-        needed = count * (len(grid.levels) + 1)
-        if grid.solves + needed + reserved > effort.solves:
+        # no better between the torques than between the angles
+        grid.divide(count, budget, max(TORQUE_GOAL, missed))
+        if grid.solves + grid.cost(count) > budget:
             break
         count *= 2
         grid.solve_columns(count)
         missed = grid.missed(count, others)
-    doubt = grid.divide(count, effort.solves - reserved)
+    doubt = grid.divide(count, budget, TORQUE_GOAL)
     shortfall = []
     if missed > ANGLE_GOAL:
         shortfall.append(
@@ -328,13 +335,25 @@ class _Grid(Generic[AnyState]):
         self._count()
         return _Column(theta=theta, rest=settled(unloaded))
 
-    def _more(self, column: _Column[AnyState], torques: list[float]) -> None:
-        """Solve other torques of a column, each from the nearest one there."""
+    def _more(
+        self,
+        column: _Column[AnyState],
+        torques: list[float],
+        before: _Column[AnyState] | None = None,
+    ) -> None:
+        """Solve other torques of a column, each from the nearest equilibrium.
+
+        That is one at the same angle, or at the same torque in the column before.
+        """
         there = self._read(column.theta, torques, column)
         if there is None:
             found = []
             for torque in sorted(torques, key=lambda t: (t < 0.0, abs(t))):
-                state = self.follow.to_torque(column.nearest(torque), torque)
+                if before is not None and torque in before.states:
+                    start = before.states[torque]
+                    state = self.follow.to_angle(start, column.theta)
+                else:
+                    state = self.follow.to_torque(column.nearest(torque), torque)
                 if state.outcome.ok:
                     column.states[torque] = settled(state)
                     found.append(torque)
@@ -506,12 +525,17 @@ class _Grid(Generic[AnyState]):
             heights.append(np.maximum(height, LEAST_PEAK * height.max()))
         return torque, heights[0], heights[1]
 
-    def divide(self, count: int, most: int) -> float:
-        """Divide load paths until their estimated errors meet the goal.
+    def cost(self, count: int) -> int:
+        """Solves of so many columns: what as many others between them would take."""
+        return sum(1 + len(column.states) for _, column in self.chosen(count))
+
+    def divide(self, count: int, most: int, goal: float) -> float:
+        """Divide load paths until their estimated errors meet a goal.
 
         Args:
             count: Of the columns.
             most: Solves in all.
+            goal: Largest estimated error, in the peak to peak.
 
         Returns:
             The largest estimate that is left, in the peak to peak.
@@ -528,7 +552,7 @@ class _Grid(Generic[AnyState]):
                     # the input torque is the difference of G from angle to angle
                     part = np.maximum(
                         of_error / np.interp(there, at, error),
-                        of_potential / step / np.interp(there, at, moment),
+                        POTENTIAL_WEIGHT * of_potential / step / np.interp(there, at, moment),
                     )
                     tried = sign * np.array(sorted(column.failed))
                     for j, torque in enumerate(there):
@@ -537,14 +561,21 @@ class _Grid(Generic[AnyState]):
                             wanted.append((float(part[j]), k, sign * float(torque)))
             wanted.sort(reverse=True)
             worst = wanted[0][0] if wanted else 0.0
-            chosen = [w for w in wanted if w[0] > TORQUE_GOAL]
+            chosen = [w for w in wanted if w[0] > goal]
             chosen = chosen[: max(0, most - self.solves)]
             if not chosen:
                 return worst
-            for k, column in self.chosen(count):
-                torques = [torque for _, number, torque in chosen if number == k]
+            columns = [column for _, column in self.chosen(count)]
+            for k, column in enumerate(columns):
+                # the column before, and after the last one the first
+                beside = (columns[k - 1], columns[(k + 1) % count])
+                torques = [
+                    _as_beside(torque, column, beside)
+                    for _, number, torque in chosen
+                    if number == k
+                ]
                 if torques:
-                    self._more(column, torques)
+                    self._more(column, torques, beside[0] if k else None)
 
     def unseen(self, others: list[_Column[AnyState]], count: int) -> FullSolves:
         """Equilibria at other angles, without torque and at so many other torques.
@@ -605,6 +636,31 @@ class _Grid(Generic[AnyState]):
                 # the same stiffness on both sides of the middle
                 rest[2] = onset[2]
         return found, {0.0, *self.levels}
+
+
+def _as_beside(
+    torque: float,
+    column: _Column[AnyState],
+    beside: tuple[_Column[AnyState], ...],
+) -> float:
+    """A torque near the wanted one that a column beside has, else the wanted one.
+
+    To go on from there takes half the iterations of a change of the torque, and events
+    move little from column to column.
+    """
+    own = [0.0, *(t for t in column.states if t * torque > 0.0)]
+    low = max(t for t in map(abs, own) if t < abs(torque))
+    high = min(t for t in map(abs, own) if t > abs(torque))
+    part = SNAP * (high - low)
+    near = [
+        t
+        for one in beside
+        for t in one.states
+        if t * torque > 0.0
+        and abs(t - torque) < part
+        and low + 0.5 * part < abs(t) < high - 0.5 * part
+    ]
+    return min(near, key=lambda t: abs(t - torque), default=torque)
 
 
 def _common_torques(paths: list[LoadPath], own: set[float], least: float) -> Array:
