@@ -35,7 +35,7 @@ _NEAR_END = 0.1
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LoadPath:
-    """Equilibria of a drive at one angle over its torque, and the curve through them."""
+    """Equilibria of a drive at one angle over its torque, and their curve."""
 
     torque: Array
     """T, increasing [N·m]. Shape (n,)."""

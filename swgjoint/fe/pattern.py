@@ -34,10 +34,8 @@ LEAST_PEAK = 0.05
 """Peak to peak that counts at least, in the largest one over the torques."""
 SNAP = 0.2
 """Part of an interval by which its division may move to a torque of a column beside."""
-MOST_TORQUES = 100
-"""Of one sign in the table."""
 FEWEST_TORQUES = 16
-"""The same."""
+"""Of one sign in the table."""
 _SOLVES, _REST, _TORQUES, _STATE = "solves-{:04d}", "rest", "torques", "state"
 
 
@@ -53,6 +51,8 @@ class Effort:
     """Equilibria of the samples and of those that judge the map."""
     unseen: tuple[int, int]
     """Torques of one sign, and angles of each, that judge the map."""
+    torques: int
+    """Most torques of one sign in the table."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -167,7 +167,7 @@ def solve_pattern(
             f"torques between the samples by an estimated {100.0 * doubt:.2g} %"
         )
     unseen = grid.unseen(others, effort.unseen[0])
-    tables, solved = grid.tables(count)
+    tables, solved = grid.tables(count, effort.torques)
     if symmetric:
         tables |= {-t: _mirrored(values) for t, values in tables.items() if t}
         solved |= {-t for t in solved}
@@ -447,12 +447,13 @@ class _Grid(Generic[AnyState]):
     def _path(self, column: _Column[AnyState], sign: float) -> tuple[Array, Array]:
         """Torques [N·m] and figures (4, n) of one sign, outwards from zero."""
         top = max(abs(t) for t in self.levels if t * sign > 0.0)
-        outward = sorted(
+        outward: list[float] = sorted(
             (t for t in column.states if t * sign > 0.0 and abs(t) <= top), key=abs
         )
         # a free output has no curve before its clearance is taken up
         first = 0.0 if column.rest.sides is None else sign * self.small
-        states = [column.towards(sign), *(column.states[t] for t in outward)]
+        states: list[AnyState] = [column.towards(sign)]
+        states += [column.states[t] for t in outward]
         table = np.array([self.figures(s, column.theta) for s in states]).T
         return np.array([first, *outward]), table
 
@@ -463,7 +464,8 @@ class _Grid(Generic[AnyState]):
 
         Of negative torques it is the curve of the mirrored drive.
         """
-        torque, (error, energy, compliance, moment) = self._path(column, sign)
+        torque, table = self._path(column, sign)
+        error, energy, compliance, moment = table
         curve = LoadPath(
             torque=sign * torque,
             output_error=sign * error,
@@ -552,7 +554,10 @@ class _Grid(Generic[AnyState]):
                     # the input torque is the difference of G from angle to angle
                     part = np.maximum(
                         of_error / np.interp(there, at, error),
-                        POTENTIAL_WEIGHT * of_potential / step / np.interp(there, at, moment),
+                        POTENTIAL_WEIGHT
+                        * of_potential
+                        / step
+                        / np.interp(there, at, moment),
                     )
                     tried = sign * np.array(sorted(column.failed))
                     for j, torque in enumerate(there):
@@ -585,7 +590,7 @@ class _Grid(Generic[AnyState]):
             count: Torques of one sign.
         """
         rows = []
-        for number, column in enumerate(others):
+        for column in others:
             theta = column.theta
             error, _, _, moment = self.figures(column.rest.state, theta)
             rows.append((theta, 0.0, error, moment))
@@ -606,8 +611,10 @@ class _Grid(Generic[AnyState]):
             input_torque=moments,
         )
 
-    def tables(self, count: int) -> tuple[dict[float, Array], set[float]]:
+    def tables(self, count: int, most: int) -> tuple[dict[float, Array], set[float]]:
         """Figures (4, count) by torque, and the torques that all columns solved.
+
+        At most so many torques of one sign, next to those that all columns solved.
 
         Clearance adds rows, see :func:`across_clearance`.
         """
@@ -618,7 +625,7 @@ class _Grid(Generic[AnyState]):
             paths = [self.path(column, sign) for column in columns]
             own = {abs(t) for t in self.levels if t * sign > 0.0}
             least = self.small if self.free else 0.0
-            torque = _common_torques([curve for curve, _ in paths], own, least)
+            torque = _common_torques([curve for curve, _ in paths], own, least, most)
             if self.free:
                 torque = np.concatenate([[least], torque])
             values = np.array(
@@ -663,19 +670,22 @@ def _as_beside(
     return min(near, key=lambda t: abs(t - torque), default=torque)
 
 
-def _common_torques(paths: list[LoadPath], own: set[float], least: float) -> Array:
+def _common_torques(
+    paths: list[LoadPath], own: set[float], least: float, most: int
+) -> Array:
     """Torques of the table, closer together where the load paths have their events.
 
     Args:
         paths: Of all angles.
         own: Torques that all of them solved [N·m].
         least: Torque that all must exceed [N·m].
+        most: Torques at most, next to those.
     """
     top = max(own)
     pool = np.concatenate([np.concatenate([p.torque, p.events]) for p in paths])
     pool = np.sort(pool[(pool > least) & (pool <= top)])
     count = int(
-        np.clip(3 * len(pool) // (2 * len(paths)), FEWEST_TORQUES, MOST_TORQUES)
+        np.clip(3 * len(pool) // (2 * len(paths)), min(FEWEST_TORQUES, most), most)
     )
     fine = np.linspace(least, top, 4001)
     rank = np.searchsorted(pool, fine, side="right") / pool.size

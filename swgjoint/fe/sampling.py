@@ -39,7 +39,7 @@ ANGLES = 24
 contact events leave corners in the error, which some wave generators pass in a few
 torques and others at every angle."""
 MOST_ANGLES = 96
-SOLVES = 1200
+SOLVES = 1050
 """Equilibria of a map in the plane: one and a half times the time of 96 angles at five
 torques, of which most maps take a half."""
 UNSEEN = (12, 9)
@@ -49,6 +49,10 @@ SOLID_ANGLES = 16
 SOLID_MOST_ANGLES = 16
 SOLID_SOLVES = 220
 SOLID_UNSEEN = (2, 2)
+TORQUES = 100
+"""Most torques of one sign in the table of a map."""
+TOLERANCED_TORQUES = 24
+"""The same with errors of the teeth, which give it ten times the harmonics."""
 FIXED_SOLVES = 14
 """Equilibria per angle where the number of angles is given."""
 LEVELS = (0.05, 0.15, 0.35, 0.65, 1.0)
@@ -73,10 +77,10 @@ def sample_map(
 
     Angles and torques are added until they predict others, as far as the budget of
     equilibria goes, see :func:`swgjoint.fe.pattern.solve_pattern`; a few equilibria at
-    other angles and torques are left to judge the map. One pitch suffices with perfect teeth, and with a symmetric wave generator the
-    negative torques are the mirror image of the positive ones; both claims are checked
-    at rated torque and recorded. Torques at which a solve fails, and those beyond, are
-    left out, and the record says so. Manufacturing errors are superposed, see
+    other angles and torques are left to judge the map. One pitch suffices with perfect
+    teeth, and with a symmetric wave generator the negative torques are the mirror image
+    of the positive ones; both claims are checked at rated torque and recorded. Torques
+    at which a solve fails, and those beyond, are left out, and the record says so. Manufacturing errors are superposed, see
     :mod:`swgjoint.fe.tolerance_sampling`; a map with them has a rigid wave generator.
 
     In the plane the balls of a bearing stand still on the cam, the first one on the
@@ -102,7 +106,9 @@ def sample_map(
     parts = [part * ratings.repeated_peak for part in LEVELS]
     torques = parts if symmetric else [-t for t in parts[::-1]] + parts
     period = 2.0 * pi / design.periodicity
-    effort = effort_of(model, angles, both_signs=not symmetric)
+    effort = effort_of(
+        model, angles, both_signs=not symmetric, errors=has_errors(design)
+    )
     total, done = effort.solves, 0
 
     stages = len(STAGES) if has_errors(design) else 1
@@ -220,13 +226,16 @@ def sample_map(
     )
 
 
-def effort_of(model: str, angles: int | None, *, both_signs: bool) -> Effort:
+def effort_of(
+    model: str, angles: int | None, *, both_signs: bool, errors: bool
+) -> Effort:
     """Equilibria that a map may take.
 
     Args:
         model: Fidelity.
         angles: Input positions over one pitch; as many as the drive asks for if None.
         both_signs: Whether negative torques are sampled, too.
+        errors: Whether errors of the teeth are superposed.
     """
     solid = model == "3d"
     unseen = SOLID_UNSEEN if solid else UNSEEN
@@ -238,12 +247,15 @@ def effort_of(model: str, angles: int | None, *, both_signs: bool) -> Effort:
     else:
         solves = SOLID_SOLVES if solid else SOLVES
         angles = SOLID_ANGLES if solid else ANGLES
-        most = SOLID_MOST_ANGLES if solid else MOST_ANGLES
+        most = angles
+        while 2 * most <= (SOLID_MOST_ANGLES if solid else MOST_ANGLES):
+            most *= 2
     return Effort(
         angles=angles,
         most_angles=most,
         solves=solves * (2 if both_signs else 1),
         unseen=unseen,
+        torques=TOLERANCED_TORQUES if errors else TORQUES,
     )
 
 

@@ -15,7 +15,6 @@ come out as the derivative of V.
 from __future__ import annotations
 
 from dataclasses import replace
-from math import comb
 from typing import Any
 
 import numpy as np
@@ -24,6 +23,7 @@ from scipy.interpolate import PchipInterpolator
 
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.equilibrium import output_angle
+from swgjoint.maps.quartic import quartic_chain
 from swgjoint.maps.samples import FullSolves, MapSamples
 from swgjoint.maps.tolerance_modes import combined
 from swgjoint.maps.torsion_table import on_knots
@@ -35,53 +35,12 @@ KEEP = 0.005
 """Harmonics are kept whose kinematic error, or input-torque ripple at some load,
 reaches this part of the largest one."""
 
+BETWEEN = (0.05, 0.15, 0.35, 0.65)
+"""Parts of the repeated peak torque at which harmonics are weighed, too: contact that
+moves with the torque has other harmonics at each."""
+
 LADDER = 12
 """Most knots across the end of a clearance."""
-
-
-def quartic_chain(knots: Array, values: Array) -> tuple[Array, Array]:
-    """Piecewise quartics with given value, slope and second derivative at the knots.
-
-    Every interval is cut in half; the two quartics share value and three derivatives
-    in the middle.
-
-    Args:
-        knots: Shape (n,).
-        values: V, V' and V'' at the knots. Shape (3, n).
-
-    Returns:
-        Breakpoints (2 n - 1,) and ascending coefficients (2 n - 2, 5).
-    """
-    # on [0, 2] with the cut at 1: left a0..a4, right in powers of (x - 1); the right
-    # one follows from the left by continuity of order three, up to its b4
-    condition = np.zeros((3, 3))
-    known = np.zeros((3, 3))
-    for row in range(3):  # derivative at x = 2
-        fall = [np.prod(np.arange(k, k - row, -1)) for k in range(5)]
-        for k in range(3):
-            known[row, k] = fall[k] * 2.0 ** (k - row) if k >= row else 0.0
-        for column, k in enumerate((3, 4)):
-            # (x)^k continued to order three beyond the cut
-            taylor = [comb(k, j) for j in range(4)]
-            condition[row, column] = sum(
-                t * np.prod(np.arange(j, j - row, -1))
-                for j, t in enumerate(taylor)
-                if j >= row
-            )
-        condition[row, 2] = fall[4]
-    half = 0.5 * np.diff(knots)
-    scale = half ** np.arange(3)[:, None]
-    start, end = values[:, :-1] * scale, values[:, 1:] * scale
-    low = start / np.array([[1.0], [1.0], [2.0]])  # a0, a1, a2
-    a3, a4, b4 = np.linalg.solve(condition, end - known @ low)
-    left = np.stack([*low, a3, a4])
-    right = np.stack(
-        [sum(comb(k, j) * left[k] for k in range(j, 5)) for j in range(4)] + [b4]
-    )
-    pieces = np.stack([left, right], axis=-1)  # (5, n - 1, 2)
-    pieces = pieces / (half[:, None] ** np.arange(5)[:, None, None])
-    breaks = np.sort(np.concatenate([knots, knots[:-1] + half]))
-    return breaks, pieces.reshape(5, -1).T
 
 
 def fit_map(samples: MapSamples, *, keep: float = KEEP) -> DriveMap:
@@ -105,7 +64,9 @@ def fit_map(samples: MapSamples, *, keep: float = KEEP) -> DriveMap:
     orders = np.arange(len(modes))[:, None] * np.array([samples.order])
     toleranced = None
     if samples.tolerances is not None:
-        toleranced = combined(samples, knots, modes, error_modes, keep=keep)
+        toleranced = combined(
+            samples, knots, modes, error_modes, coarse=_coarse(samples), keep=keep
+        )
         orders, modes = toleranced.orders, toleranced.potential
         error_modes = toleranced.error
     count = len(modes)
@@ -195,6 +156,17 @@ def _knots(samples: MapSamples, torsion: Array) -> Array:
     return np.asarray(knots)
 
 
+def _coarse(samples: MapSamples) -> NDArray[np.bool_]:
+    """Knots at which errors of the teeth are compared: they have few torques."""
+    assert samples.solved is not None
+    coarse = np.array(samples.solved)
+    if samples.free:  # the ends of the clearance
+        zero = int(np.flatnonzero(samples.torque == 0.0)[0])
+        coarse[zero - 2 : zero + 3] = True
+    coarse[[0, -1]] = True
+    return coarse
+
+
 def _clearance_knots(beyond: Array, ends: Array) -> Array:
     """Knots of one side with a ladder across the end of the clearance.
 
@@ -239,11 +211,12 @@ def harmonic_strength(drive: DriveMap) -> Array:
     """Kinematic error [rad] and input-torque ripple [N·m] of each harmonic.
 
     The ripple is the amplitude of T de0/dtheta + dV/dtheta, at zero, rated and repeated
-    peak torque of either sign. Shape (n_harmonics, 6).
+    peak torque and :data:`BETWEEN` of it, of either sign. Shape (n_harmonics, 14).
     """
     columns = [np.hypot(*drive.kinematic_error.T)]
     n_theta = np.abs(drive.angle_orders[:, 0])
-    peaks = (drive.ratings.rated_torque, drive.ratings.repeated_peak)
+    peak = drive.ratings.repeated_peak
+    peaks = (drive.ratings.rated_torque, peak, *(part * peak for part in BETWEEN))
     for load in (0.0, *peaks, *(-peak for peak in peaks)):
         x = drive.mean_torsion(load)
         both = load * drive.kinematic_error + drive.coefficients(x)

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from swgjoint.maps.quartic import evaluated, quartic_chain
 from swgjoint.maps.samples import MapSamples
 from swgjoint.maps.torsion_table import on_knots
 
@@ -122,7 +123,13 @@ class Combined:
 
 
 def combined(
-    samples: MapSamples, knots: Array, potential: Array, error: Array, *, keep: float
+    samples: MapSamples,
+    knots: Array,
+    potential: Array,
+    error: Array,
+    *,
+    coarse: NDArray[np.bool_],
+    keep: float,
 ) -> Combined:
     """Add the harmonics of the errors to those of the perfect pattern.
 
@@ -131,17 +138,18 @@ def combined(
         knots: Torsions [rad].
         potential: Of the perfect pattern, as in :class:`Combined`.
         error: The same of e0.
+        coarse: Knots at which the errors are compared, both ends among them (n_knots,).
         keep: Harmonics are kept whose e0 reaches this part of the largest one, or
             whose input torque reaches :data:`KEEP_TORQUE`, if ``keep`` is not zero.
     """
     found, count = samples.tolerances, len(potential)
     assert found is not None
-    modes = tolerance_modes(samples, knots)
+    modes = tolerance_modes(samples, knots[coarse])
     cycle = found.pitches
     # what repeats with every pitch belongs to the perfect pattern
     whole = modes.waves[: count * cycle : cycle]
     potential, error = potential.copy(), error.copy()
-    potential[: whole.size] += modes.potential[whole]
+    potential[: whole.size] += _refined(modes.potential[whole], knots, coarse)
     error[: whole.size] += modes.error[whole]
     potential[0, 0, 0] -= np.interp(0.0, knots, potential[0, 0, 0])
     error[0] = 0.0
@@ -151,16 +159,17 @@ def combined(
     orders = np.concatenate(
         [pattern[:, None] * np.array([samples.order]), modes.orders[others]]
     )
-    potential = np.concatenate([potential, modes.potential[others]])
+    # at the coarse knots: there are thousands of harmonics before most are dropped
+    weighed = np.concatenate([potential[..., coarse], modes.potential[others]])
     error = np.concatenate([error, modes.error[others]])
 
     # amplitudes of e0 and of the input torque T de0/dtheta + dV/dtheta at every knot
     per_turn = waves * abs(sum(samples.order)) / cycle
-    work = potential[:, :, 0] + potential[0, 0, 1] * error[:, :, None]
+    work = weighed[:, :, 0] + weighed[0, 0, 1] * error[:, :, None]
     ripple = per_turn[:, None] * np.hypot(work[:, 0], work[:, 1])
     size = np.hypot(*error.T)
     kept = size > keep * size.max()
-    middle = int(np.argmin(np.abs(knots)))
+    middle = int(np.argmin(np.abs(knots[coarse])))
     if keep:
         large = ripple > KEEP_TORQUE * ripple.max(axis=0)
         # between the torques that were solved, which all positions share at rest
@@ -168,6 +177,10 @@ def combined(
         large[:count] = large[:count, middle][:, None]
         kept |= large.any(axis=1)
     kept[0] = True
+    chosen = modes.potential[others[kept[count:]]]
+    potential = np.concatenate(
+        [potential[kept[:count]], _refined(chosen, knots, coarse)]
+    )
 
     def left(power: Array) -> float:
         """Root mean square of what is dropped, in that of everything."""
@@ -175,7 +188,7 @@ def combined(
 
     return Combined(
         orders=orders[kept],
-        potential=potential[kept],
+        potential=potential,
         error=error[kept],
         record={
             "cycle_pitches": cycle,
@@ -191,3 +204,16 @@ def combined(
             ],
         },
     )
+
+
+def _refined(potential: Array, knots: Array, coarse: NDArray[np.bool_]) -> Array:
+    """V, V', V'' of harmonics at all knots, from the coarse ones (n, 2, 3, n_knots)."""
+    found = np.empty((*potential.shape[:3], knots.size))
+    for one, given in zip(
+        found.reshape(-1, 3, knots.size),
+        potential.reshape(-1, *potential.shape[2:]),
+        strict=True,
+    ):
+        one[:] = evaluated(*quartic_chain(knots[coarse], given), knots)
+        one[:, coarse] = given
+    return found

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from messages import naming
@@ -94,7 +96,7 @@ def test_a_smooth_path_is_that_of_its_compliance():
     given = ((), 5e-7)
     curve = path(TORQUES, *given)
     error, energy, _ = np.abs(curve.at(FINE) - drive(FINE, *given)).max(axis=1)
-    # both explanations count, two jumps of a half of the change at a fifth from the ends
+    # both explanations count, a slope and two jumps a fifth from the ends
     assert error <= curve.doubt[0].max()
     assert error < 0.02 * (5e-7 * 17.0) * 17.0
     assert energy < 47.0 * error
@@ -105,10 +107,7 @@ def test_the_potential_balances_between_the_samples():
     events = ((3.0, -1e-5), (12.0, 2e-5), (14.0, -7e-6), (19.0, 3e-6))
     curve = path(TORQUES, events)
     places = np.concatenate(
-        [
-            np.linspace(a + 0.1, b - 0.1, 200)
-            for a, b in zip(TORQUES[:-1], TORQUES[1:], strict=True)
-        ]
+        [np.linspace(a + 0.1, b - 0.1, 200) for a, b in pairwise(TORQUES)]
     )
     step = 1e-4
     error, _, compliance = curve.at(places)

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from swgjoint.maps.drive_map import DriveMap, Ratings
-from swgjoint.maps.fit import fit_map, quartic_chain
+from swgjoint.maps.fit import fit_map
+from swgjoint.maps.quartic import quartic_chain
 from swgjoint.maps.samples import MapSamples
 
 RATINGS = Ratings(rated_torque=20, repeated_peak=50, momentary_peak=90, T1=5, T2=15)

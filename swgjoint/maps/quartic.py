@@ -1,0 +1,73 @@
+"""Piecewise quartics through value, slope and second derivative."""
+
+from __future__ import annotations
+
+from math import comb
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+def quartic_chain(knots: Array, values: Array) -> tuple[Array, Array]:
+    """Piecewise quartics with given value, slope and second derivative at the knots.
+
+    Every interval is cut in half; the two quartics share value and three derivatives
+    in the middle.
+
+    Args:
+        knots: Shape (n,).
+        values: V, V' and V'' at the knots. Shape (3, n).
+
+    Returns:
+        Breakpoints (2 n - 1,) and ascending coefficients (2 n - 2, 5).
+    """
+    # on [0, 2] with the cut at 1: left a0..a4, right in powers of (x - 1); the right
+    # one follows from the left by continuity of order three, up to its b4
+    condition = np.zeros((3, 3))
+    known = np.zeros((3, 3))
+    for row in range(3):  # derivative at x = 2
+        fall = [np.prod(np.arange(k, k - row, -1)) for k in range(5)]
+        for k in range(3):
+            known[row, k] = fall[k] * 2.0 ** (k - row) if k >= row else 0.0
+        for column, k in enumerate((3, 4)):
+            # (x)^k continued to order three beyond the cut
+            taylor = [comb(k, j) for j in range(4)]
+            condition[row, column] = sum(
+                t * np.prod(np.arange(j, j - row, -1))
+                for j, t in enumerate(taylor)
+                if j >= row
+            )
+        condition[row, 2] = fall[4]
+    half = 0.5 * np.diff(knots)
+    scale = half ** np.arange(3)[:, None]
+    start, end = values[:, :-1] * scale, values[:, 1:] * scale
+    low = start / np.array([[1.0], [1.0], [2.0]])  # a0, a1, a2
+    a3, a4, b4 = np.linalg.solve(condition, end - known @ low)
+    left = np.stack([*low, a3, a4])
+    right = np.stack(
+        [sum(comb(k, j) * left[k] for k in range(j, 5)) for j in range(4)] + [b4]
+    )
+    pieces = np.stack([left, right], axis=-1)  # (5, n - 1, 2)
+    pieces = pieces / (half[:, None] ** np.arange(5)[:, None, None])
+    breaks = np.sort(np.concatenate([knots, knots[:-1] + half]))
+    return breaks, pieces.reshape(5, -1).T
+
+
+def evaluated(breaks: Array, pieces: Array, at: Array) -> Array:
+    """Value and two derivatives of a chain at places inside it.
+
+    Args:
+        breaks: As of :func:`quartic_chain` (m + 1,).
+        pieces: The same (m, 5).
+        at: Places (n,).
+
+    Returns:
+        Shape (3, n).
+    """
+    k = np.clip(np.searchsorted(breaks, at, side="right") - 1, 0, len(pieces) - 1)
+    a, x = pieces[k].T, at - breaks[k]
+    value = a[0] + x * (a[1] + x * (a[2] + x * (a[3] + x * a[4])))
+    slope = a[1] + x * (2 * a[2] + x * (3 * a[3] + x * 4 * a[4]))
+    return np.stack([value, slope, 2 * a[2] + x * (6 * a[3] + x * 12 * a[4])])
