@@ -485,22 +485,9 @@ class _Grid(Generic[AnyState]):
             if torque == 0.0 and self.free:
                 continue
 
-            def row(
-                chosen: list[_Column[AnyState]], torque: float = torque
-            ) -> tuple[Array, Array, Array]:
-                states = [
-                    one.states[torque] if torque else one.rest.state for one in chosen
-                ]
-                table = np.array(
-                    [
-                        self.figures(state, one.theta)
-                        for state, one in zip(states, chosen, strict=True)
-                    ]
-                ).T
-                return table[0], table[1] + torque * table[0], table[3]
-
-            error, potential, moment = row(columns)
-            e, _, m = row(others)
+            error, energy, _, moment = self._row(columns, torque)
+            potential = energy + torque * error
+            e, _, _, m = self._row(others, torque)
             parts = np.array([one.theta for one in others]) / self.period
             predicted, _ = _periodic(error, parts)
             _, slope = _periodic(potential, parts)
@@ -509,6 +496,15 @@ class _Grid(Generic[AnyState]):
                 height = np.ptp(np.concatenate([own, there]))
                 worst = max(worst, float(np.abs(told - there).max() / height))
         return worst
+
+    def _row(self, columns: list[_Column[AnyState]], torque: float) -> Array:
+        """Figures of some columns at a torque that all of them have (4, n)."""
+        return np.array(
+            [
+                self.figures(c.states[torque] if torque else c.rest.state, c.theta)
+                for c in columns
+            ]
+        ).T
 
     def peaks(self, count: int, sign: float) -> tuple[Array, Array, Array]:
         """Torques, peak to peak over the angle of e and of the input torque there.

@@ -80,8 +80,9 @@ def sample_map(
     other angles and torques are left to judge the map. One pitch suffices with perfect
     teeth, and with a symmetric wave generator the negative torques are the mirror image
     of the positive ones; both claims are checked at rated torque and recorded. Torques
-    at which a solve fails, and those beyond, are left out, and the record says so. Manufacturing errors are superposed, see
-    :mod:`swgjoint.fe.tolerance_sampling`; a map with them has a rigid wave generator.
+    at which a solve fails, and those beyond, are left out, and the record says so.
+    Manufacturing errors are superposed, see :mod:`swgjoint.fe.tolerance_sampling`; a
+    map with them has a rigid wave generator.
 
     In the plane the balls of a bearing stand still on the cam, the first one on the
     major axis: they pass at another rate than teeth, and what repeats after a pitch and

@@ -132,12 +132,18 @@ def fit_map(samples: MapSamples, *, keep: float = KEEP) -> DriveMap:
 
 def _knots(samples: MapSamples, torsion: Array) -> Array:
     """Torsions at which the curves of all angles are compared [rad]."""
-    zero = int(np.flatnonzero(samples.torque == 0.0)[0])
+    zero = at = int(np.flatnonzero(samples.torque == 0.0)[0])
     found = samples.tolerances
     if found is None:
         # the mean torsions, ends inside the sampled range of every angle
         knots = torsion.mean(axis=1)
         knots[0], knots[-1] = torsion[0].max(), torsion[-1].min()
+        # the ends of stiff angles may lie before the mean of torques close to the last
+        least = 0.3 * np.abs(np.diff(torsion.mean(axis=1))[[0, -1]])
+        inside = (knots > knots[0] + least[0]) & (knots < knots[-1] - least[1])
+        inside[[0, -1]] = True
+        at -= int((~inside[:zero]).sum())
+        knots = knots[inside]
     else:
         # with errors of the teeth stiffness varies so much that stiff places would end
         # the range far below the largest torque: there the curves are continued
@@ -146,11 +152,11 @@ def _knots(samples: MapSamples, torsion: Array) -> Array:
         mean = PchipInterpolator(found.torque, (rest - error).mean(axis=1))
         ends = found.torque[[0, -1]]
         knots = mean(np.clip(samples.torque, *ends))
-    knots[zero] = 0.0
+    knots[at] = 0.0
     if found is None and samples.free:
-        up = _clearance_knots(knots[zero + 3 :], torsion[zero + 1 : zero + 3])
+        up = _clearance_knots(knots[at + 3 :], torsion[zero + 1 : zero + 3])
         down = _clearance_knots(
-            -knots[: zero - 2][::-1], -torsion[zero - 2 : zero][::-1]
+            -knots[: at - 2][::-1], -torsion[zero - 2 : zero][::-1]
         )
         knots = np.concatenate([-down[::-1], [0.0], up])
     return np.asarray(knots)

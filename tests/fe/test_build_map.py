@@ -55,8 +55,9 @@ def test_map_of_a_design(samples):
     assert mean == pytest.approx(wanted, rel=0.01, abs=1e-4)
     record = drive.info["validation"]
     assert not set(record["torques_Nm"]) & set(samples.torque)
-    # eight angles alias the corners; the record must say what is off
-    assert record["output_error"]["rms"] < 0.2
+    # so few angles alias the corners of the ripple, and the record says so
+    assert 0.0 < record["output_error"]["rms"] < record["output_error"]["largest"]
+    assert names(record["reason"], "angles", "off")
 
 
 @pytest.mark.fe
