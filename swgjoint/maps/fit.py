@@ -155,9 +155,7 @@ def _knots(samples: MapSamples, torsion: Array) -> Array:
     knots[at] = 0.0
     if found is None and samples.free:
         up = _clearance_knots(knots[at + 3 :], torsion[zero + 1 : zero + 3])
-        down = _clearance_knots(
-            -knots[: at - 2][::-1], -torsion[zero - 2 : zero][::-1]
-        )
+        down = _clearance_knots(-knots[: at - 2][::-1], -torsion[zero - 2 : zero][::-1])
         knots = np.concatenate([-down[::-1], [0.0], up])
     return np.asarray(knots)
 

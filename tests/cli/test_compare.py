@@ -209,6 +209,9 @@ def test_wave_generators_come_out_in_the_known_order(capsys, monkeypatch):
     monkeypatch.setenv("SWGJOINT_CACHE", "")  # coarser maps than the cache may hold
     monkeypatch.setattr("swgjoint.study.compare.STRESS_POSITIONS", 1)
     monkeypatch.setattr("swgjoint.fe.sampling.ANGLES", 6)
+    monkeypatch.setattr("swgjoint.fe.sampling.MOST_ANGLES", 6)
+    monkeypatch.setattr("swgjoint.fe.sampling.SOLVES", 84)
+    monkeypatch.setattr("swgjoint.fe.sampling.UNSEEN", (4, 2))
     assert main(["compare", *DRIVES.values(), "--scene", "ur5e-sweep", "--json"]) == 0
     rows = json.loads(capsys.readouterr().out)["rows"]
     of = dict(zip(DRIVES, rows, strict=True))
@@ -237,6 +240,9 @@ def test_design_has_a_stress_and_a_picture(tmp_path, capsys, monkeypatch):
     monkeypatch.setenv("SWGJOINT_CACHE", "")  # a coarser map than the cache may hold
     monkeypatch.setattr("swgjoint.study.compare.STRESS_POSITIONS", 1)
     monkeypatch.setattr("swgjoint.fe.sampling.ANGLES", 4)
+    monkeypatch.setattr("swgjoint.fe.sampling.MOST_ANGLES", 4)
+    monkeypatch.setattr("swgjoint.fe.sampling.SOLVES", 56)
+    monkeypatch.setattr("swgjoint.fe.sampling.UNSEEN", (4, 2))
     out = tmp_path / "out"
     path = tmp_path / "design.toml"
     path.write_text(coarse().to_toml(), encoding="utf-8")

@@ -53,6 +53,8 @@ def test_micro_geometry_shows_with_the_sign_of_the_contact_pattern(
     monkeypatch.setattr(Orders.__init__, "__kwdefaults__", ORDERS)
     monkeypatch.setattr("swgjoint.study.compare.STRESS_POSITIONS", 1)
     monkeypatch.setattr("swgjoint.fe.sampling.SOLID_ANGLES", 3)
+    monkeypatch.setattr("swgjoint.fe.sampling.SOLID_MOST_ANGLES", 3)
+    monkeypatch.setattr("swgjoint.fe.sampling.SOLID_SOLVES", 12)
     monkeypatch.setattr("swgjoint.fe.sampling.LEVELS", (0.15, 1.0))
     runs = []
     monkeypatch.setattr(

@@ -62,13 +62,19 @@ def test_map_of_a_design(samples):
 
 @pytest.mark.fe
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["reference-2d", "reference-2d-simplified"])
-def test_derivative_is_the_unseen_input_torque(name):
-    """The map of a design gives the input torque within 2 % of its ripple."""
-    # a whole map on the mesh of the thesis: 2 % are 3 % on half the elements
-    check = build_map(Design.load(name)).info["energy_check"]
-    # at the worst torque, that of no-load cogging among them
-    assert check["relative"] < 0.02
+@pytest.mark.parametrize(
+    ("name", "largest", "rms"),
+    # bore nodes that touch one by one leave corners below 6 N·m with the simplified one
+    [("reference-2d", 0.05, 0.01), ("reference-2d-simplified", 0.15, 0.03)],
+)
+def test_unseen_solves_are_predicted(name, largest, rms):
+    """Input torque and output error at torques and angles that no sample has."""
+    record = build_map(Design.load(name)).info["validation"]
+    for key in ("input_torque", "output_error"):
+        assert record[key]["largest"] < largest
+        assert record[key]["rms"] < rms
+    assert record["secant_stiffness"]["largest"] < 0.01
+    assert record["solves"] > 100
 
 
 @pytest.mark.fe

@@ -28,7 +28,7 @@ from swgjoint.gear.design import Design
 from swgjoint.gear.mounting import series_compliance, springs_of
 from swgjoint.gear.tolerances import has_errors
 from swgjoint.maps.catalogue import ratings_of
-from swgjoint.maps.samples import MapSamples
+from swgjoint.maps.samples import FullSolves, MapSamples
 from swgjoint.progress import Progress, silent
 
 Array = NDArray[np.float64]
@@ -38,6 +38,11 @@ PHASES = 12
 LEVELS = (0.03, 0.06, 0.1, 0.15, 0.22, 0.31, 0.43, 0.58, 0.78, 1.01)
 """Sampled torques, of both signs, as parts of the repeated peak torque; closer where
 balls join the loaded arc, and so far that every position reaches the peak."""
+
+UNSEEN = (0.04, 0.12, 0.26, 0.5, 0.9)
+"""Torques that judge the map, between those that are sampled."""
+UNSEEN_PHASES = 3
+"""Positions of the balls of each, between those that are sampled."""
 
 
 def check_modelled(design: Design) -> None:
@@ -120,6 +125,21 @@ def sample_rings(
         rows.append(row)
         free |= alone
         progress(f"{drive.name}: ball passage", k + 1, count)
+    series = series_compliance(design, cup=True)
+    others: list[tuple[float, float, float, float]] = []
+    for j in range(UNSEEN_PHASES):
+        # off the middle of a step, on another place in each
+        place = count * (j + 0.381966) / UNSEEN_PHASES
+        phase = -2.0 * pi / passage.per_cage_turn * place / count
+        levels = [part * ratings.repeated_peak for part in UNSEEN]
+        row, _ = _position(model, phase, passage, levels, small)
+        at = 2.0 * pi / passage.carried_as * place / count
+        others += [
+            (at, t, v[0] - t * series, v[3])
+            for t, v in row.items()
+            if t == 0.0 or t in levels
+        ]
+        progress(f"{drive.name}: unseen positions", j + 1, UNSEEN_PHASES)
     kept = sorted(set.intersection(*(set(row) for row in rows)))
     tables = {t: np.array([row[t] for row in rows]).T for t in kept}
     # the same drive under the opposite torque, seen in a mirror
@@ -136,7 +156,7 @@ def sample_rings(
     error, energy, compliance, input_torque = np.array(
         [found[t] for t in used]
     ).swapaxes(0, 1)
-    series = series_compliance(design, cup=True)
+    angle, torque, errors, moments = np.array(others).reshape(-1, 4).T
     return MapSamples(
         name=drive.name,
         level="ring",
@@ -153,6 +173,14 @@ def sample_rings(
         compliance=compliance + series,
         input_torque=input_torque,
         free=free,
+        unseen=FullSolves(
+            input_angle=angle,
+            torque=torque,
+            output_error=errors,
+            input_torque=moments,
+        )
+        if others
+        else None,
         info={
             "design_hash": design.content_hash(),
             "label": {

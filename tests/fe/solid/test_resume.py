@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from swgjoint.errors import InputError
-from swgjoint.fe.pattern import solve_pattern
+from swgjoint.fe.pattern import Effort, solve_pattern
 from swgjoint.fe.solid.checkpoint import Checkpoint
 from swgjoint.fe.state_arrays import packed, settled, unpacked
 from swgjoint.maps.unfinished import Unfinished
@@ -53,7 +53,7 @@ class Stop(Exception):
 def test_a_pattern_in_space_goes_on_bit_for_bit(small_drive, tmp_path):
     """Interrupted at the second position, which alone is solved again."""
     period = 2.0 * np.pi / 42
-    theta = period * np.arange(2) / 2
+    effort = Effort(angles=2, most_angles=2, solves=0, unseen=(1, 1), torques=4)
     solves = 0
 
     def tick() -> None:
@@ -68,9 +68,9 @@ def test_a_pattern_in_space_goes_on_bit_for_bit(small_drive, tmp_path):
     def solve(tick, **options):
         return solve_pattern(
             small_drive,
-            theta,
             period,
             [5.0],
+            effort,
             small=0.05,
             rated=5.0,
             symmetric=True,
@@ -83,7 +83,8 @@ def test_a_pattern_in_space_goes_on_bit_for_bit(small_drive, tmp_path):
         solve(stop, keep=keep)
     solves, restored = 0, []
     found = solve(tick, keep=keep, restored=restored.append)
-    assert (solves, restored) == (3, [2])
+    # the second position, one of the next pitch, one to judge with its torque
+    assert (solves, restored) == (6, [2])
     whole = solve(tick)
     np.testing.assert_array_equal(found.table, whole.table)
     assert found.info == whole.info
