@@ -1,0 +1,86 @@
+"""The record of a map against unseen equilibria: differences that are put in."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from known_samples import N, samples_of
+
+from swgjoint.maps.equilibrium import output_angle
+from swgjoint.maps.fit import fit_map
+from swgjoint.maps.map_validity import map_validation
+from swgjoint.maps.samples import FullSolves
+from swgjoint.maps.validation import validation
+
+OFFSET = 5e-6
+"""Mean unloaded error of ``samples_of`` [rad]."""
+
+
+def judged(error=0.0, moment=0.0, shortfall=""):
+    """A map and samples whose unseen equilibria are those of the map, or off by these.
+
+    At 11 and 33 N·m; what is off is off at one angle of 33 N·m.
+    """
+    samples = samples_of()
+    drive = fit_map(samples)
+    theta = np.tile(2.0 * np.pi / N * (np.arange(5) + 0.38) / 5, 3)
+    torque = np.repeat([0.0, 11.0, 33.0], 5)
+    psi = output_angle(drive, theta, torque)
+    on_input, _ = drive.forces(theta, psi)
+    wrong = np.zeros(15)
+    wrong[12] = 1.0
+    unseen = FullSolves(
+        input_angle=theta,
+        torque=torque,
+        output_error=psi - theta / drive.ratio + OFFSET + error * wrong,
+        input_torque=-on_input + moment * wrong,
+    )
+    return drive, replace(samples, unseen=unseen, shortfall=shortfall)
+
+
+def test_equilibria_of_the_map_itself_are_met():
+    """Nothing is off but round-off; zero torque, which was sampled, has no row."""
+    record = validation(*judged())
+    assert record["torques_Nm"] == [11.0, 33.0]
+    assert record["solves"] == 15
+    for key in ("input_torque", "output_error"):
+        assert record[key]["largest"] < 1e-9
+    assert record["secant_stiffness"]["largest"] < 1e-9
+
+
+@pytest.mark.parametrize("part", [0.1, 0.5])
+def test_what_is_off_counts_in_the_peak_to_peak_at_its_torque(part):
+    """Largest at 33 N·m, its root mean square over five angles; 11 N·m is clean."""
+    _, given = judged()
+    clean = validation(*judged())["rows"][1]
+    heights = clean["input_torque_pp_Nm"], clean["output_error_pp_rad"]
+    # half of the peak to peak widens it; the share is of what the solves then have
+    drive, samples = judged(error=part * heights[1], moment=-part * heights[0])
+    record = validation(drive, samples)
+    at_11, at_33 = record["rows"]
+    for key, unit in (("input_torque", "Nm"), ("output_error", "rad")):
+        wanted = part * clean[f"{key}_pp_{unit}"] / at_33[f"{key}_pp_{unit}"]
+        assert record[key]["at_Nm"] == 33.0
+        assert record[key]["largest"] == pytest.approx(wanted, rel=1e-6)
+        assert at_33[f"{key}_rms"] == pytest.approx(wanted / 5**0.5, rel=1e-6)
+        assert at_11[f"{key}_largest"] < 1e-9
+    assert given.unseen is not None
+
+
+def test_a_fitted_map_carries_a_record_that_can_be_read():
+    """With the reason why sampling ended."""
+    _, samples = judged(error=1e-6, shortfall="angles are off by 7 %")
+    found, reason = map_validation(fit_map(samples))
+    assert reason is None and found is not None
+    assert found.reason == "angles are off by 7 %"
+    assert found.totals["output_error"].torque == 33.0
+
+
+def test_torques_beyond_the_map_do_not_judge_it():
+    """An equilibrium above the range has no row; without any there is no record."""
+    drive, samples = judged()
+    beyond = replace(samples.unseen, torque=np.full(15, 90.0))
+    assert validation(drive, replace(samples, unseen=beyond)) is None
+    assert validation(drive, replace(samples, unseen=None)) is None
