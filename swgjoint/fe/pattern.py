@@ -34,7 +34,7 @@ LEAST_PEAK = 0.05
 """Peak to peak that counts at least, in the largest one over the torques."""
 SNAP = 0.2
 """Part of an interval by which its division may move to a torque of a column beside."""
-FEWEST_TORQUES = 16
+FEWEST_TORQUES = 40
 """Of one sign in the table."""
 _SOLVES, _REST, _TORQUES, _STATE = "solves-{:04d}", "rest", "torques", "state"
 
