@@ -28,10 +28,10 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-POINTS = 10
-"""Stations between neighbouring nodes. On rollers a contact is narrower than the nodes
-are apart, and its steps from one station to the next are a ripple of the input torque:
-at 20 N·m, of the rest of that ripple, 0.6 with six stations and 0.15 with ten."""
+POINTS = 24
+"""Stations between neighbouring nodes. On rollers and parabolas a contact is narrower
+than the nodes are apart, and its steps from one station to the next are a ripple of the
+input torque: with ten stations half of all there is on parabolas at 1 N·m."""
 DEPTH = 0.5
 """Depth of the layer over the distance of the nodes. The kinematic error of
 ``reference-2d`` is 0.1 % off that of a mesh twice as fine, with a depth of two 4 %;
@@ -40,25 +40,78 @@ shallower layers need more stations."""
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class BoreStations:
-    """Stations of a sector, q of them on m nodes."""
+    """Stations of a sector, p of them in each of i equal intervals: q = i p.
+
+    Those of an interval are carried by s neighbouring nodes, of m in all.
+    """
 
     weights: Array
-    """Positions from those of the nodes (q, 2, 2 m) [-]."""
+    """Positions from those of the nodes of an interval (p, 2, 2 s) [-]."""
     stiffness: Array
     """k (q,) [N/m]."""
-    per_interval: int = 1
-    """Stations between neighbouring nodes."""
+
+    @property
+    def per_interval(self) -> int:
+        """Stations of an interval."""
+        return len(self.weights)
 
     def positions(self, nodes: Array) -> Array:
         """Stations of all sectors (N, q, 2) [m] from their nodes (N, m, 2)."""
         by_node = self.weights.reshape(-1, self.weights.shape[2])
-        found = nodes.reshape(len(nodes), -1) @ by_node.T
-        return np.asarray(found.reshape(len(nodes), -1, 2))
+        return np.asarray((self._windows(nodes) @ by_node.T).reshape(len(nodes), -1, 2))
 
     def along(self, direction: Array) -> Array:
         """Displacements along directions (N, q, 2), by the nodes (N, q, 2 m)."""
-        x, y = direction[..., 0, None], direction[..., 1, None]
+        local = self._local(direction)
+        count, intervals, p, width = local.shape
+        rows = np.zeros((count, intervals, p, width + 2 * (intervals - 1)))
+        for k in range(intervals):
+            rows[:, k, :, 2 * k : 2 * k + width] = local[:, k]
+        return rows.reshape(count, intervals * p, -1)
+
+    def forces_of(self, forces: Array) -> Array:
+        """Nodal forces (N, m, 2) [N] of forces on the stations (N, q, 2) [N]."""
+        by_node = self.weights.reshape(-1, self.weights.shape[2])
+        shaped = forces.reshape(len(forces), -1, len(by_node))
+        return self._assembled(shaped @ by_node).reshape(len(forces), -1, 2)
+
+    def stiffness_of(self, direction: Array, stiffness: Array) -> Array:
+        """Stiffness matrices (N, 2 m, 2 m) [N/m] of springs along directions.
+
+        Args:
+            direction: At the stations (N, q, 2).
+            stiffness: Of their springs (N, q) [N/m].
+        """
+        local = self._local(direction)
+        count, intervals, p, width = local.shape
+        springs = stiffness.reshape(count, intervals, p, 1)
+        blocks = np.swapaxes(local, 2, 3) @ (springs * local)
+        size = width + 2 * (intervals - 1)
+        matrix = np.zeros((count, size, size))
+        for k in range(intervals):
+            own = slice(2 * k, 2 * k + width)
+            matrix[:, own, own] += blocks[:, k]
+        return matrix
+
+    def _windows(self, nodes: Array) -> Array:
+        """Coordinates of the nodes of every interval (N, i, 2 s)."""
+        s = self.weights.shape[2] // 2
+        intervals = len(self.stiffness) // len(self.weights)
+        return np.concatenate([nodes[:, k : k + intervals] for k in range(s)], axis=2)
+
+    def _local(self, direction: Array) -> Array:
+        """Displacements along directions, by their own nodes (N, i, p, 2 s)."""
+        shaped = direction.reshape(len(direction), -1, len(self.weights), 2)
+        x, y = shaped[..., 0, None], shaped[..., 1, None]
         return np.asarray(x * self.weights[:, 0] + y * self.weights[:, 1])
+
+    def _assembled(self, local: Array) -> Array:
+        """Sums at the nodes (N, 2 m) of values of every interval (N, i, 2 s)."""
+        count, intervals, width = local.shape
+        total = np.zeros((count, width + 2 * (intervals - 1)))
+        for k in range(intervals):
+            total[:, 2 * k : 2 * k + width] += local[:, k]
+        return total
 
     def nodes_touching(self, touching: NDArray[np.bool_]) -> int:
         """Touching stations (N, q) in intervals between nodes, rounded up."""
@@ -67,17 +120,15 @@ class BoreStations:
     @classmethod
     def at_nodes(cls, stiffness: Array) -> Self:
         """The nodes themselves, with their stiffnesses (m,) [N/m]."""
-        count = len(stiffness)
-        weights = np.eye(2 * count).reshape(count, 2, 2 * count)
-        return cls(weights=weights, stiffness=stiffness)
+        return cls(weights=np.eye(2)[None], stiffness=stiffness)
 
     @classmethod
     def between_nodes(cls, nodes: Array, *, layer: float) -> Self:
         """Equal steps through the intervals, all but the first and the last.
 
         Args:
-            nodes: Undeformed, on a circle around the origin, from one before the
-                intervals to one after them (m, 2) [m].
+            nodes: Undeformed, equally spaced on a circle around the origin, from one
+                before the intervals to one after them (m, 2) [m].
             layer: E b of the bore [N/m].
         """
         # equal shares: those of Gauss points do not add up over a part of an interval
@@ -91,23 +142,19 @@ class BoreStations:
             ],
             axis=-1,
         )
-        radius = float(np.hypot(*nodes[1]))
-        intervals = len(nodes) - 3
-        weights = np.zeros((intervals, POINTS, 2, len(nodes), 2))
-        for first in range(intervals):
-            near = nodes[first : first + 4]
-            chord = complex(*(near[2] - near[1]))
-            for own, spline in zip(weights[first], splines / 6.0, strict=True):
-                for k in range(4):
-                    own[:, first + k] += spline[k] * np.eye(2)
-                # what the spline lacks to the circle, turned and scaled with the chord
-                mean = spline @ near
-                lack = complex(*mean) * (radius / float(np.hypot(*mean)) - 1.0) / chord
-                carried = np.array([[lack.real, -lack.imag], [lack.imag, lack.real]])
-                own[:, first + 1] -= carried
-                own[:, first + 2] += carried
+        radius, near = float(np.hypot(*nodes[1])), nodes[:4]
+        chord = complex(*(near[2] - near[1]))
+        weights = np.zeros((POINTS, 2, 4, 2))
+        for own, spline in zip(weights, splines / 6.0, strict=True):
+            own += spline[:, None] * np.eye(2)[:, None, :]
+            # what the spline lacks to the circle, turned and scaled with the chord
+            mean = spline @ near
+            lack = complex(*mean) * (radius / float(np.hypot(*mean)) - 1.0) / chord
+            carried = np.array([[lack.real, -lack.imag], [lack.imag, lack.real]])
+            own[:, 1] -= carried
+            own[:, 2] += carried
+        count = POINTS * (len(nodes) - 3)
         return cls(
-            weights=weights.reshape(intervals * POINTS, 2, -1),
-            stiffness=np.full(intervals * POINTS, layer / (DEPTH * POINTS)),
-            per_interval=POINTS,
+            weights=weights.reshape(POINTS, 2, -1),
+            stiffness=np.full(count, layer / (DEPTH * POINTS)),
         )

@@ -286,7 +286,9 @@ def _solve_linear(
         race_shift=increment[:, model.race_dofs[:-NODE]].reshape(
             model.sectors, -1, 2, 2
         ),
-        pressure=np.where(state.touching, -ring.press * ring.gap_after(increment), 0.0),
+        pressure=np.where(
+            state.touching, -model.stations.stiffness * ring.gap_after(increment), 0.0
+        ),
     )
 
 

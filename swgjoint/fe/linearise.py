@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from swgjoint.fe.bore_contact import BoreStations
 from swgjoint.fe.corotation import (
     Frames,
     elastic_force,
@@ -49,10 +50,12 @@ class Linearised:
     """Of the stations of the bore (N, q) [m]."""
     gap_dofs: Index
     """Degrees of freedom that move them (k,)."""
-    gap_rows: Array
-    """Derivative of the gaps by these (N, q, k)."""
-    press: Array
-    """Stiffness under the stations (q,) [N/m]."""
+    stations: BoreStations
+    """Of the bore."""
+    normal: Array
+    """Out of what it lies on, at the stations (N, q, 2)."""
+    race_rows: Array | None
+    """Derivative of the gaps to a race by ``gap_dofs`` (N, q, k)."""
     fixed: Mask
     """Coordinates of a race that do not move (N, n)."""
     rotation: float
@@ -105,8 +108,18 @@ class Linearised:
 
     def gap_after(self, increment: Array) -> Array:
         """Gaps of the stations after an increment (N, q) [m]."""
-        moved = self.gap_rows @ increment[:, self.gap_dofs, None]
-        return np.asarray(self.gap + moved[..., 0])
+        moved = (increment * self.sign)[:, self.gap_dofs]
+        if self.race_rows is not None:
+            return np.asarray(self.gap + (self.race_rows @ moved[..., None])[..., 0])
+        shift = self.stations.positions(moved.reshape(len(moved), -1, 2))
+        return np.asarray(self.gap + np.einsum("sqi,sqi->sq", shift, self.normal))
+
+    def gap_gradients(self) -> Array:
+        """Derivative of the gaps of the stations by ``gap_dofs`` (N, q, k)."""
+        rows = self.race_rows
+        if rows is None:
+            rows = self.stations.along(self.normal)
+        return np.asarray(rows * self.sign[:, None, self.gap_dofs])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -114,10 +127,11 @@ class _Bore:
     """What the bore lies on, by the k degrees of freedom of ``contact_dofs``."""
 
     gap: Array
-    rows: Array
+    normal: Array
     gradient: Array
     hessian: Array
     fixed: Mask | bool = False
+    rows: Array | None = None
 
 
 def linearise(model: RingModel, state: State, torque: float | None) -> Linearised:
@@ -149,6 +163,7 @@ def linearise(model: RingModel, state: State, torque: float | None) -> Linearise
         )
         bore = _Bore(
             gap=race.gap,
+            normal=race.normal,
             rows=race.rows,
             gradient=race.gradient,
             hessian=race.hessian,
@@ -187,8 +202,9 @@ def linearise(model: RingModel, state: State, torque: float | None) -> Linearise
         hessian=sign[:, :, None] * hessian * sign[:, None, :],
         gap=bore.gap,
         gap_dofs=into,
-        gap_rows=bore.rows * sign[:, None, into],
-        press=model.stations.stiffness,
+        stations=model.stations,
+        normal=bore.normal,
+        race_rows=bore.rows,
         fixed=fixed,
         rotation=rotation,
         rotation_gradient=sign * rotation_gradient,
@@ -214,15 +230,16 @@ def _on_surface(model: RingModel, state: State) -> _Bore:
         model.bore_points(state), state.wave_generator_angle
     )
     k = np.where(state.touching, stations.stiffness, 0.0)
-    rows, aside = stations.along(normal), stations.along(turned(normal))
     # sliding over a curved outline turns the contact force
     bend = k * gap * curvature
     return _Bore(
         gap=gap,
-        rows=rows,
-        gradient=((k * gap)[:, None] @ rows)[:, 0],
-        hessian=np.swapaxes(rows, 1, 2) @ (k[:, :, None] * rows)
-        + np.swapaxes(aside, 1, 2) @ (bend[:, :, None] * aside),
+        normal=normal,
+        gradient=stations.forces_of((k * gap)[..., None] * normal).reshape(
+            model.sectors, -1
+        ),
+        hessian=stations.stiffness_of(normal, k)
+        + stations.stiffness_of(turned(normal), bend),
     )
 
 

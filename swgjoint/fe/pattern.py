@@ -25,6 +25,9 @@ FAINT = 1e-8
 zero."""
 ANGLE_GOAL = 0.01
 """Difference at unseen angles, in the peak to peak, at which their number suffices."""
+STALLED = 0.7
+"""Part of that difference which is left after a doubling that was worth it: more angles
+do not cure what comes from the mesh."""
 TORQUE_GOAL = 0.02
 """Estimated error between torques, in the same, at which they suffice."""
 POTENTIAL_WEIGHT = 0.3
@@ -153,9 +156,11 @@ def solve_pattern(
         grid.divide(count, budget, max(TORQUE_GOAL, missed))
         if grid.solves + grid.cost(count) > budget:
             break
-        count *= 2
+        count, before = 2 * count, missed
         grid.solve_columns(count)
         missed = grid.missed(count, others)
+        if missed > STALLED * before:
+            break
     doubt = grid.divide(count, budget, TORQUE_GOAL)
     shortfall = []
     if missed > ANGLE_GOAL:

@@ -266,8 +266,7 @@ class RingModel:
     def wave_generator_force(self, state: State) -> Array:
         """Force of a rigid wave generator on the bore nodes (N, n_bore + 1, 2) [N]."""
         vectors = state.pressure[..., None] * self.wave_generator_normal(state)
-        nodal = np.einsum("sqi,qin->sn", vectors, self.stations.weights)
-        nodal = nodal.reshape(self.sectors, -1, 2)
+        nodal = self.stations.forces_of(vectors)
         # what stations exert on the neighbours: their last inner node, the shared
         # corner and the first inner node
         found = nodal[:, 1:-2].copy()

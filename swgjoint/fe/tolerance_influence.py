@@ -177,7 +177,7 @@ class _Supports:
         used[:, spread] |= near
         sector, interval = np.nonzero(used)
         there = touching[sector, interval] | ~closed[sector, interval][:, None]
-        k = there * ring.press.reshape(shape[1:])[interval]
+        k = there * model.stations.stiffness.reshape(shape[1:])[interval]
         stiffness = k.sum(axis=1)
         share = k / stiffness[:, None]
 
@@ -189,7 +189,7 @@ class _Supports:
             )
 
         rows = np.zeros((len(sector), ring.gradient.shape[1]))
-        rows[:, ring.gap_dofs] = mean(ring.gap_rows)
+        rows[:, ring.gap_dofs] = mean(ring.gap_gradients())
         is_closed = closed[sector, interval]
         start = np.where(is_closed, -stiffness, 1.0) * mean(ring.gap)
         return cls(
