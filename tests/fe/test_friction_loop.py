@@ -146,7 +146,7 @@ def test_map_has_the_hysteresis_of_its_teeth(monkeypatch):
         return given[-1]
 
     monkeypatch.setattr(building, "sample_map", sampled)
-    few = partial(friction_loops, positions=2, steps=4)
+    few = partial(friction_loops, positions=2)
     monkeypatch.setattr(building, "friction_loops", few)
     drive = building.build_map(design, angles=4, cache=False)
     smooth = fit_map(given[0])
