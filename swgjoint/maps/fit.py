@@ -325,6 +325,7 @@ def energy_check(drive: DriveMap, samples: MapSamples) -> dict[str, float]:
     if samples.free:  # the corner at the end of the clearance
         inside[[zero - 2, zero - 1, zero + 1, zero + 2]] = False
     ripple = np.ptp(samples.input_torque, axis=1)
+    inside &= ripple > 0.0
     energy = drive.energy(drive.torsion(theta, psi), theta, psi)
     gain = samples.energy - samples.energy[zero]
     wrong = (energy - energy[zero]) - gain

@@ -70,8 +70,10 @@ def test_micro_geometry_shows_with_the_sign_of_the_contact_pattern(
     files = [str(tmp_path / f"{name}.toml") for name in designs]
     short = ["simulation.duration_s=1.5", "trajectory.settle_s=0.3"]
     options = [part for change in short for part in ("--set", change)]
-    assert main(["compare", *files, *options, "--json"]) == 0
+    status = main(["compare", *files, *options, "--json"])
     before, after = json.loads(capsys.readouterr().out)["rows"]
+    # maps of three angles are judged by unseen solves
+    assert status == int(not (before["ripple_valid"] and after["ripple_valid"]))
 
     # the pattern: a straight cup bears on its edges, a relieved one inside
     (teeth, wave), (teeth_after, wave_after) = map(at_edges, runs)

@@ -380,7 +380,7 @@ def test_map_carries_the_bearing():
     soft, hard = (max(m.info["stiffness_range_Nm_rad"]) for m in (found, rigid))
     assert soft < 0.3 * hard
     again = found.info["second_pitch"]
-    assert again["largest_difference_rad"] < 1e-6 * again["peak_to_peak_rad"]
+    assert again["largest_difference_rad"] < 1e-9  # samples are solved to that
     # of a rotation of 2e-4 rad
     assert abs(found.info["mirror"]["difference_rad"]) < 2e-9
     label = found.info["label"]

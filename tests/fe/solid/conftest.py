@@ -103,7 +103,7 @@ def loaded(small_design, small_drive, deflected, kept_once):
 def small_pattern(few_masters_everywhere, kept_once):
     """Samples of the small drive for its map, its teeth perfect or not.
 
-    Equilibria of the perfect teeth at eight angles and two torques are solved once.
+    Equilibria of the perfect teeth, eight angles by three torques, are solved once.
     """
     from swgjoint.fe import sampling
 
@@ -120,7 +120,7 @@ def small_pattern(few_masters_everywhere, kept_once):
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(sampling, "solve_pattern", pattern)
-        patch.setattr(sampling, "LEVELS", (0.35, 1.0))
+        patch.setattr(sampling, "LEVELS", (0.1, 0.35, 1.0))
         patch.setattr(sampling, "FIXED_SOLVES", 4)
         yield sample
 
