@@ -23,7 +23,7 @@ EVERY = 4
 FAINT = 1e-8
 """Part of the torque that takes up a clearance, that acts at its ends: no stiffness is
 zero."""
-ANGLE_GOAL = 0.01
+ANGLE_GOAL = 0.02
 """Difference at unseen angles, in the peak to peak, at which their number suffices."""
 STALLED = 0.7
 """Part of that difference which is left after a doubling that was worth it: more angles
@@ -723,8 +723,13 @@ def _unseen_places(count: int, finest: int) -> list[float]:
 
 
 def _unseen_parts(count: int) -> Array:
-    """Unseen torques in parts of the largest one, geometrically spaced."""
-    return np.geomspace(0.02, 0.97, count)
+    """Unseen torques in parts of the largest one, a half of them small ones.
+
+    None is next to a torque at which all maps begin.
+    """
+    small = count // 2
+    parts = [np.geomspace(0.021, 0.28, small), np.linspace(0.37, 0.97, count - small)]
+    return np.concatenate(parts)
 
 
 def _second_pitch(grid: _Grid[AnyState], torque: float, count: int) -> dict[str, float]:

@@ -42,7 +42,7 @@ MOST_ANGLES = 96
 SOLVES = 1050
 """Equilibria of a map in the plane: one and a half times the time of 96 angles at five
 torques, of which most maps take a half."""
-UNSEEN = (12, 9)
+UNSEEN = (16, 7)
 """Torques of one sign and angles of each that judge the map."""
 SOLID_ANGLES = 16
 """The same in space, where an equilibrium takes fifty times longer."""
@@ -137,7 +137,7 @@ def sample_map(
             surface = solid_surface(solid.ring)
             shown = partial(solid_fields, solid.ring, surface=surface)
         else:
-            plane = _in_plane(design)
+            plane = follower_in_plane(design)
             found = solve_pattern(plane, period, torques, effort, **settings)
             surface = plane_surface(plane.model)
             shown = partial(plane_fields, plane.model, surface=surface)
@@ -260,7 +260,8 @@ def effort_of(
     )
 
 
-def _in_plane(design: Design) -> Continuation:
+def follower_in_plane(design: Design) -> Continuation:
+    """The drive in the plane as maps sample it, its teeth perfect."""
     perfect, bearing = without_errors(design), on_bearing(design)
     return Continuation(
         model=ring_model(

@@ -1,0 +1,176 @@
+"""Maps against finite elements at torques and angles that no map has seen."""
+
+from __future__ import annotations
+
+from math import pi
+
+import numpy as np
+import pytest
+from solved import coarse
+
+from swgjoint.fe.sampling import SYMMETRIC, follower_in_plane, sample_map
+from swgjoint.gear.design import Design
+from swgjoint.gear.mounting import series_compliance
+from swgjoint.maps.catalogue import ratings_of
+from swgjoint.maps.equilibrium import output_angle
+from swgjoint.maps.fit import fit_map
+
+PARTS = (0.02, 0.045, 0.1, 0.19, 0.31, 0.47, 0.63, 0.87)
+"""Torques in parts of the repeated peak torque; no record of a map has any of them."""
+ANGLES = 12
+GOAL = (0.05, 0.02)
+"""Largest and rms difference, in the peak to peak at the torque."""
+SHORT = {
+    "reference-2d-simplified": (0.12, 0.05),
+    "reference-2d-parabolic": (0.15, 0.08),
+    "reference-2d-asymmetric": (0.15, 0.08),
+    "reference-2d-four-roller": (0.07, 0.03),
+    "dca-80-to-1": (0.16, 0.08),
+    "own 140/142": (0.25, 0.08),
+    "own 100/102": (0.25, 0.1),
+}
+"""Designs that miss the goal, and what they reach: their events of contact are more
+than the budget of a map covers, their ripple is that small, or, at 100/102 teeth, the
+torsion of soft positions near the largest torque lies beyond that of stiff ones, where
+a map ends. Their records say so."""
+DESIGNS = (
+    "reference-2d",
+    "reference-2d-dca",
+    "reference-2d-dca-improved",
+    "reference-2d-qca-improved",
+    "reference-2d-involute",
+    "reference-2d-flexspline-fixed",
+    "dca-80-to-1",
+    "reference-2d-simplified",
+    "reference-2d-four-roller",
+    "reference-2d-parabolic",
+    "reference-2d-asymmetric",
+)
+OTHERS = {
+    "own 100/102": {
+        "drive.teeth_flexspline": 100,
+        "drive.teeth_circular_spline": 102,
+        "drive.module_mm": 0.4,
+        "drive.face_width_mm": 6.5,
+        "flexspline.rim_mm": 0.47,
+        "wave_generator.kind": "cosine",
+        "circular_spline.thickness_coefficient": 0.98,
+        "ratings.rated_torque_Nm": 3.0,
+    },
+    "own 80/82": {
+        "drive.teeth_flexspline": 80,
+        "drive.teeth_circular_spline": 82,
+        "drive.module_mm": 0.8,
+        "flexspline.rim_mm": 0.7,
+        "ratings.rated_torque_Nm": 6.0,
+    },
+    "own 140/142": {
+        "drive.teeth_flexspline": 140,
+        "drive.teeth_circular_spline": 142,
+        "drive.module_mm": 0.5,
+        "flexspline.rim_mm": 0.8,
+        "wave_generator.kind": "simplified",
+        "wave_generator.minor_axis_coefficient": 0.97,
+        "ratings.rated_torque_Nm": 8.0,
+    },
+}
+"""Other tooth counts, modules, wave generators, clearance."""
+
+
+def scaled(changes: dict[str, object]) -> Design:
+    """The reference design with changes, its arcs in proportion to the module."""
+    lengths = {
+        "tip_radius_mm": 0.3,
+        "addendum_radius_mm": 1.0,
+        "straight_mm": 0.2,
+        "dedendum_radius_mm": 2.0,
+        "root_radius_mm": 0.3,
+    }
+    module = float(changes["drive.module_mm"])  # type: ignore[arg-type]
+    arcs = {
+        f"{member}.profile.{key}": value * module
+        for member in ("flexspline", "circular_spline")
+        for key, value in lengths.items()
+    }
+    rim = {"circular_spline.rim_mm": 2.0 * module}
+    return Design.load("reference-2d").with_changes({**arcs, **rim, **changes})
+
+
+def differences(design: Design) -> tuple[np.ndarray, dict[str, dict[str, float]]]:
+    """Differences of a map at unseen torques and angles.
+
+    Returns:
+        Rows of torque [N·m], then largest and rms difference of the loaded error and of
+        the input torque, in the peak to peak of the finite elements at that torque (n,
+        5); and the record that the map carries.
+    """
+    drive = fit_map(sample_map(design))
+    follow, rows = follower_in_plane(design), []
+    theta = 2.0 * pi / design.periodicity * (np.arange(ANGLES) + 0.37) / ANGLES
+    series = series_compliance(design, cup=True)
+    peak = ratings_of(design).repeated_peak
+    signs = (1.0,) if design.wave_generator.kind in SYMMETRIC else (1.0, -1.0)
+    rest = follow.meshed(follow.deflected())
+    for sign in signs:
+        state = rest
+        for part in PARTS:
+            torque = sign * part * peak
+            state = follow.to_torque(state, torque)
+            error, moment, at = [], [], state
+            for angle in theta:
+                at = follow.to_angle(at, float(angle))
+                assert at.outcome.ok
+                error.append(follow.output_angle(at) - angle / follow.ratio)
+                moment.append(follow.input_torque(at))
+            psi = output_angle(drive, theta, np.full(ANGLES, torque))
+            on_input, on_output = drive.forces(theta, psi)
+            # a constant angle has no meaning: each code counts from its own zero
+            apart = psi - theta / drive.ratio - (np.array(error) - torque * series)
+            apart -= apart.mean()
+            predicted = -on_input - (on_output - torque) / drive.ratio
+            missed = predicted - np.array(moment)
+            row = [torque]
+            for values, wrong in ((error, apart), (moment, missed)):
+                height = np.ptp(values)
+                rms = np.sqrt(np.mean(wrong**2))
+                row += [np.abs(wrong).max() / height, rms / height]
+            rows.append(row)
+    return np.array(rows), drive.info["validation"]
+
+
+def check(design: Design, name: str) -> None:
+    """Hold a map to the goal, or to what is known to be reached, and its record too."""
+    found, record = differences(design)
+    largest, rms = SHORT.get(name, GOAL)
+    assert found[:, [1, 3]].max() < largest
+    assert found[:, [2, 4]].max() < rms
+    for key, column in (("output_error", 1), ("input_torque", 3)):
+        # the equilibria of the record see as much as these, where it matters
+        worst = found[:, column].max()
+        assert worst < 0.5 * GOAL[0] or record[key]["largest"] > 0.4 * worst
+    if name in SHORT:
+        worst = max(record[key]["largest"] for key in ("output_error", "input_torque"))
+        assert worst > GOAL[0]
+
+
+@pytest.mark.fe
+@pytest.mark.parametrize("name", ["reference-2d", "reference-2d-dca"])
+def test_coarse_maps_meet_unseen_solves(name):
+    """Between their samples two maps are as true as at them."""
+    check(coarse(name), name)
+
+
+@pytest.mark.fe
+@pytest.mark.slow
+@pytest.mark.parametrize("name", DESIGNS)
+def test_bundled_maps_meet_unseen_solves(name):
+    """So are all designs in the plane, or miss it by no more than is known."""
+    check(Design.load(name), name)
+
+
+@pytest.mark.fe
+@pytest.mark.slow
+@pytest.mark.parametrize("name", OTHERS)
+def test_other_maps_meet_unseen_solves(name):
+    """So are drives of other sizes, with other wave generators and with clearance."""
+    check(scaled(OTHERS[name]), name)
