@@ -24,7 +24,8 @@ FAINT = 1e-8
 """Part of the torque that takes up a clearance, that acts at its ends: no stiffness is
 zero."""
 ANGLE_GOAL = 0.02
-"""Difference at unseen angles, in the peak to peak, at which their number suffices."""
+"""Difference at unseen angles, in the peak to peak, at which the first angles suffice;
+it grows with the root of their number: each doubling takes solves from the torques."""
 STALLED = 0.7
 """Part of that difference which is left after a doubling that was worth it: more angles
 do not cure what comes from the mesh."""
@@ -151,7 +152,11 @@ def solve_pattern(
     missed = grid.missed(count, others)
     reserved = len(others) * effort.unseen[0] * len(grid.signs)
     budget = effort.solves - reserved
-    while missed > ANGLE_GOAL and 2 * count <= effort.most_angles:
+
+    def angle_goal() -> float:
+        return float(ANGLE_GOAL * np.sqrt(count / effort.angles))
+
+    while missed > angle_goal() and 2 * count <= effort.most_angles:
         # no better between the torques than between the angles
         grid.divide(count, budget, max(TORQUE_GOAL, missed))
         if grid.solves + grid.cost(count) > budget:
@@ -163,7 +168,7 @@ def solve_pattern(
             break
     doubt = grid.divide(count, budget, TORQUE_GOAL)
     shortfall = []
-    if missed > ANGLE_GOAL:
+    if missed > angle_goal():
         shortfall.append(
             f"angles between {count} a pitch are off by up to {100.0 * missed:.2g} %"
         )
