@@ -87,12 +87,23 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         "harmonics": info.pop("harmonics", None)
         or [{"alpha": int(p), "beta": int(q)} for p, q in drive.orders],
         "stiffness_Nm_rad": drive.mean_stiffness,
-        "torque_range_Nm": drive.torque_range,
+        "torque_range_Nm": _sampled(drive),
         "fit": (info.get("fit") or {}).get("loop"),
         "info": info,
         "files": [str(path)],
         "wall_s": time.perf_counter() - start,
     }
+
+
+def _sampled(drive: DriveMap) -> tuple[float, float]:
+    """Range of torque that the map covers and that was sampled [N·m].
+
+    With errors of the teeth the mean torque at the ends of the map is not that of the
+    last samples.
+    """
+    low, high = drive.torque_range
+    first, last = drive.info.get("sampled_torque_Nm", (low, high))
+    return max(low, first), min(high, last)
 
 
 def _built(args: argparse.Namespace) -> DriveMap:

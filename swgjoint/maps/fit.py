@@ -123,6 +123,7 @@ def fit_map(samples: MapSamples, *, keep: float = KEEP) -> DriveMap:
     info |= {
         "stiffness_range_Nm_rad": stiffness_range(fitted),
         "torque_range_Nm": [float(v) for v in fitted.torque_range],
+        "sampled_torque_Nm": [float(v) for v in samples.torque[[0, -1]]],
     }
     record = validation(fitted, samples)
     if record is not None:

@@ -185,3 +185,15 @@ def test_a_map_without_validation_says_so_once(built, tmp_path, capsys):
     result = json.loads(capsys.readouterr().out)
     assert result["validation"] is None
     assert names(result["validation_reason"], NOT_VALIDATED)
+
+
+def test_the_torque_range_ends_where_samples_do(built, tmp_path, capsys):
+    """The mean curve of a map with errors goes on beyond its last sample."""
+    drive, _ = built
+    sampled = [0.8 * drive.torque_range[0], 2.0 * drive.torque_range[1]]
+    info = {**drive.info, "sampled_torque_Nm": sampled}
+    object.__setattr__(drive, "info", info)
+    options = ["-o", str(tmp_path / "a.swg"), "--json"]
+    assert main(["map", "reference-2d", *options]) == 0
+    found = json.loads(capsys.readouterr().out)["torque_range_Nm"]
+    assert found == pytest.approx([sampled[0], drive.torque_range[1]])
