@@ -179,7 +179,7 @@ def solve_pattern(
     unseen = grid.unseen(others, effort.unseen[0])
     tables, solved = grid.tables(count, effort.torques)
     if symmetric:
-        tables = _with_mirrored(tables)
+        tables = with_mirrored_torques(tables)
         solved |= {-t for t in solved}
     used = np.array(sorted(tables))
     info["sampling"] = {
@@ -834,7 +834,7 @@ def across_clearance(
     return begin, onset
 
 
-def _with_mirrored(tables: dict[float, Array]) -> dict[float, Array]:
+def with_mirrored_torques(tables: dict[float, Array]) -> dict[float, Array]:
     """Tables of positive torques and their mirror images, around one rest.
 
     Without load the drive is its own mirror image but for round-off, which exceeds the

@@ -13,6 +13,7 @@ from swgjoint.errors import ComputationError
 from swgjoint.fe import build_map as building
 from swgjoint.fe import sampling, tolerance_sampling
 from swgjoint.fe.build_map import build_map
+from swgjoint.fe.pattern import with_mirrored_torques
 from swgjoint.fe.sampling import sample_map
 from swgjoint.fe.tolerance_sampling import sample_tolerances
 from swgjoint.gear.design import Design
@@ -58,6 +59,21 @@ def test_map_of_a_design(samples):
     # so few angles alias the corners of the ripple, and the record says so
     assert 0.0 < record["output_error"]["rms"] < record["output_error"]["largest"]
     assert names(record["reason"], "angles", "off")
+
+
+def test_mirrored_torques_count_from_the_same_rest():
+    """Both signs keep their difference from rest, which is its own mirror image."""
+    rng = np.random.default_rng(3)
+    given = {0.0: rng.normal(size=(4, 6)), 2.0: rng.normal(size=(4, 6))}
+    found = with_mirrored_torques(given)
+    opposite = np.array([-1.0, 1.0, 1.0, -1.0])[:, None]
+    at_minus_theta = -np.arange(6)
+    for torque, values in found.items():
+        image = opposite * values[:, at_minus_theta]
+        assert found[-torque] == pytest.approx(image)
+    # output error and energy: what the torque adds
+    gain, wanted = found[2.0] - found[0.0], given[2.0] - given[0.0]
+    assert gain[:2] == pytest.approx(wanted[:2])
 
 
 @pytest.mark.fe

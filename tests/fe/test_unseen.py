@@ -29,10 +29,10 @@ SHORT = {
     "own 140/142": (0.25, 0.08),
     "own 100/102": (0.25, 0.1),
 }
-"""Designs that miss the goal, and what they reach: their events of contact are more
-than the budget of a map covers, their ripple is that small, or, at 100/102 teeth, the
-torsion of soft positions near the largest torque lies beyond that of stiff ones, where
-a map ends. Their records say so."""
+"""Designs that miss the goal, with bounds above what they reach. Most have more contact
+events than the budget of a map covers, or almost no ripple at small torques. At 100/102
+teeth the soft positions leave the map near the largest torque: it ends at the torsion
+that the stiffest position reaches."""
 DESIGNS = (
     "reference-2d",
     "reference-2d-dca",
@@ -148,16 +148,14 @@ def check(design: Design, name: str) -> dict[str, dict[str, float]]:
         # the equilibria of the record see as much as these, where it matters
         worst = found[:, column].max()
         assert worst < 0.5 * GOAL[0] or record[key]["largest"] > 0.4 * worst
-    if name in SHORT:
-        worst = max(record[key]["largest"] for key in ("output_error", "input_torque"))
-        assert worst > GOAL[0]
+    assert record["solves"] > 100
     return record
 
 
 @pytest.mark.fe
 @pytest.mark.parametrize("name", ["reference-2d", "reference-2d-dca"])
 def test_coarse_maps_meet_unseen_solves(name):
-    """Between their samples two maps are as true as at them."""
+    """Two maps meet the goal at torques and angles between their samples."""
     record = check(coarse(name), name)
     assert record["secant_stiffness"]["largest"] < GOAL[0]
 
@@ -166,7 +164,7 @@ def test_coarse_maps_meet_unseen_solves(name):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", DESIGNS)
 def test_bundled_maps_meet_unseen_solves(name):
-    """So are all designs in the plane, or miss it by no more than is known."""
+    """All bundled 2D designs meet the goal, or miss it by a known amount."""
     check(Design.load(name), name)
 
 
@@ -174,5 +172,5 @@ def test_bundled_maps_meet_unseen_solves(name):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", OTHERS)
 def test_other_maps_meet_unseen_solves(name):
-    """So are drives of other sizes, with other wave generators and with clearance."""
+    """Drives of other sizes do so, too: other wave generators, teeth with clearance."""
     check(scaled(OTHERS[name]), name)
