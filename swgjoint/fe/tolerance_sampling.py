@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.errors import ComputationError
+from swgjoint.fe.clearance import FAINT, across_clearance
 from swgjoint.fe.following import Follower
-from swgjoint.fe.pattern import FAINT, across_clearance
 from swgjoint.fe.tolerance_cycle import gap_errors, pitch_of, pitches_of
 from swgjoint.fe.tolerance_rest import PHASES, SMALL, Rest, influences
 from swgjoint.gear.design import Design

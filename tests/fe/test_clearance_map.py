@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from solved import FEW_PITCH, FEW_TEETH, few_teeth, kept
 
-from swgjoint.fe.pattern import across_clearance
+from swgjoint.fe.clearance import across_clearance
 from swgjoint.fe.sampling import sample_map
 from swgjoint.maps.equilibrium import output_angle
 from swgjoint.maps.fit import fit_map

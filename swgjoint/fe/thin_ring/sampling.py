@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.errors import ComputationError, DesignError
+from swgjoint.fe.clearance import across_clearance
 from swgjoint.fe.drive2d import can_halve, left_out
-from swgjoint.fe.pattern import across_clearance
 from swgjoint.fe.stress_state import stress_state_label
 from swgjoint.fe.thin_ring import model as thin
 from swgjoint.fe.thin_ring.contacts import race_on_balls
