@@ -138,7 +138,7 @@ def differences(design: Design) -> tuple[np.ndarray, dict[str, dict[str, float]]
     return np.array(rows), drive.info["validation"]
 
 
-def check(design: Design, name: str) -> dict[str, dict[str, float]]:
+def check(design: Design, name: str) -> None:
     """Hold a map to the goal, or to what is known to be reached, and its record too."""
     found, record = differences(design)
     largest, rms = SHORT.get(name, GOAL)
@@ -149,15 +149,15 @@ def check(design: Design, name: str) -> dict[str, dict[str, float]]:
         worst = found[:, column].max()
         assert worst < 0.5 * GOAL[0] or record[key]["largest"] > 0.4 * worst
     assert record["solves"] > 100
-    return record
+    if name not in SHORT:
+        assert record["secant_stiffness"]["largest"] < GOAL[0]
 
 
 @pytest.mark.fe
 @pytest.mark.parametrize("name", ["reference-2d", "reference-2d-dca"])
 def test_coarse_maps_meet_unseen_solves(name):
     """Two maps meet the goal at torques and angles between their samples."""
-    record = check(coarse(name), name)
-    assert record["secant_stiffness"]["largest"] < GOAL[0]
+    check(coarse(name), name)
 
 
 @pytest.mark.fe
