@@ -45,6 +45,8 @@ class Effort:
     """Torques of one sign, and angles of each, that judge the map."""
     torques: int
     """Most torques of one sign in the table."""
+    beyond: bool = False
+    """Whether one torque of each sign beyond the largest one is solved at the end."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -94,8 +96,9 @@ def solve_pattern(
 
     First the given torques at every angle. Angles are doubled until they predict others
     at these torques; then the load path of every angle is divided where its estimated
-    error is largest, see :class:`swgjoint.fe.load_path.LoadPath`. The claims that the
-    map rests on are checked at one torque.
+    error is largest, see :class:`swgjoint.fe.load_path.LoadPath`. Last comes a torque
+    beyond the largest one, see :meth:`ColumnGrid.go_beyond`. The claims that the map
+    rests on are checked at one torque.
 
     Args:
         follow: The drive.
@@ -139,22 +142,28 @@ def solve_pattern(
     others = [grid.unseen_column(place) for place in places]
     missed = grid.missed(count, others)
     reserved = len(others) * effort.unseen[0] * len(grid.signs)
-    budget = effort.solves - reserved
+
+    def budget() -> int:
+        """What the samples may take; a torque beyond the largest one comes last."""
+        last = count * len(grid.signs) if effort.beyond else 0
+        return effort.solves - reserved - last
 
     def angle_goal() -> float:
         return float(ANGLE_GOAL * np.sqrt(count / effort.angles))
 
     while missed > angle_goal() and 2 * count <= effort.most_angles:
         # no better between the torques than between the angles
-        grid.divide(count, budget, max(TORQUE_GOAL, missed))
-        if grid.solves + grid.cost(count) > budget:
+        grid.divide(count, budget(), max(TORQUE_GOAL, missed))
+        if grid.solves + grid.cost(count) > budget():
             break
         count, before = 2 * count, missed
         grid.solve_columns(count)
         missed = grid.missed(count, others)
         if missed > STALLED * before:
             break
-    doubt = grid.divide(count, budget, TORQUE_GOAL)
+    doubt = grid.divide(count, budget(), TORQUE_GOAL)
+    if effort.beyond:
+        grid.go_beyond(count)
     shortfall = []
     if missed > angle_goal():
         shortfall.append(

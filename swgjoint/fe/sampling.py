@@ -257,6 +257,9 @@ def effort_of(
         solves=solves * (2 if both_signs else 1),
         unseen=unseen,
         torques=TOLERANCED_TORQUES if errors else TORQUES,
+        # in space a torque costs as much as the map gains from it elsewhere, and with
+        # errors of the teeth a map is continued beyond its samples anyway
+        beyond=not solid and not errors,
     )
 
 

@@ -30,6 +30,11 @@ POTENTIAL_WEIGHT = 0.3
 one of the input torque: errors of neighbouring angles are partly alike."""
 LEAST_PEAK = 0.05
 """Peak to peak that counts at least, in the largest one over the torques."""
+REACH = 1.1
+"""Torque beyond the largest one at which the stiffest angle is turned as far as the
+softest one at the largest torque, in parts of the linear estimate."""
+BEYOND = (0.02, 0.15)
+"""Least and most of that torque, in parts of the largest one."""
 _SOLVES, _REST, _TORQUES = "solves-{:04d}", "rest", "torques"
 STATE = "state"
 """Name of a state in the arrays of an interrupted run."""
@@ -77,6 +82,8 @@ class ColumnGrid(Generic[AnyState]):
     keep: Unfinished | None
     restored: Callable[[int], None]
     columns: dict[float, AngleColumn[AnyState]] = field(default_factory=dict)
+    beyond: list[float] = field(default_factory=list)
+    """Torques of every column beyond the levels, at most one of each sign."""
     solves: int = 0
     parts: int = 0
     """Kept so far."""
@@ -290,7 +297,7 @@ class ColumnGrid(Generic[AnyState]):
 
     def _path(self, column: AngleColumn[AnyState], sign: float) -> tuple[Array, Array]:
         """Torques [N·m] and figures (4, n) of one sign, outwards from zero."""
-        top = max(abs(t) for t in self.levels if t * sign > 0.0)
+        top = max(abs(t) for t in [*self.levels, *self.beyond] if t * sign > 0.0)
         outward: list[float] = sorted(
             (t for t in column.states if t * sign > 0.0 and abs(t) <= top), key=abs
         )
@@ -422,6 +429,29 @@ class ColumnGrid(Generic[AnyState]):
                 if torques:
                     self._more(column, torques, beside[0] if k else None)
 
+    def go_beyond(self, count: int) -> None:
+        """Solve one torque of each sign beyond the largest one in every column.
+
+        A map ends at the torsion that the stiffest angle reaches. With this torque that
+        is as far as the softest angle turns under the largest torque, so that no angle
+        leaves the map below it. Where one of the solves fails, the map ends at the
+        largest torque as before.
+        """
+        columns = [column for _, column in self.chosen(count)]
+        for sign in self.signs:
+            top = max((t for t in self.levels if t * sign > 0.0), key=abs)
+            rest = self._row(columns, 0.0)[0]
+            error, _, compliance, _ = self._row(columns, top)
+            apart = REACH * float(np.ptp(rest - error) / compliance.mean())
+            low, high = (abs(top) * part for part in BEYOND)
+            torque = top + sign * min(max(apart, low), high)
+            for k, column in enumerate(columns):
+                self._more(column, [torque], columns[k - 1] if k else None)
+                if torque in column.failed:
+                    break
+            else:
+                self.beyond.append(torque)
+
     def unseen(self, others: list[AngleColumn[AnyState]], count: int) -> FullSolves:
         """Equilibria at other angles, without torque and at so many other torques.
 
@@ -463,7 +493,7 @@ class ColumnGrid(Generic[AnyState]):
         found = {0.0: rest}
         for sign in self.signs:
             paths = [self.path(column, sign) for column in columns]
-            own = {abs(t) for t in self.levels if t * sign > 0.0}
+            own = {abs(t) for t in [*self.levels, *self.beyond] if t * sign > 0.0}
             least = self.small if self.free else 0.0
             torque = common_torques([curve for curve, _ in paths], own, least, most)
             if self.free:
@@ -482,7 +512,7 @@ class ColumnGrid(Generic[AnyState]):
                 found[begin] = onset
                 # the same stiffness on both sides of the middle
                 rest[2] = onset[2]
-        return found, {0.0, *self.levels}
+        return found, {0.0, *self.levels, *self.beyond}
 
 
 def check_like(state: Any, like: Any) -> None:
