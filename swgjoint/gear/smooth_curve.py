@@ -73,17 +73,24 @@ class SmoothCurve:
     def _derivatives(self, s: Array) -> tuple[Array, Array, Array]:
         """Points and their first two derivatives by arc length, each (n, 2)."""
         k = np.searchsorted(self.stations[1:-1], s, side="right")
-        h = self._steps[k][:, None]
-        t = (s - self.stations[k])[:, None] / h
-        c = self.coefficients[k]
-        value = c[:, 5]
-        first = np.zeros_like(value)
-        second = np.zeros_like(value)
-        for j in (4, 3, 2, 1, 0):  # Horner's scheme with its derivatives
-            second = second * t + 2.0 * first
-            first = first * t + value
-            value = value * t + c[:, j]
-        return value, first / h, second / h**2
+        h = self._steps[k]
+        t = (s - self.stations[k]) / h
+        # Horner's scheme with its derivatives in place, coordinates as rows; the first
+        # steps, in which the derivatives are still zero, are left out
+        c = self._rows.take(k, axis=2)
+        first = c[5]
+        value = first * t + c[4]
+        second = 2.0 * first
+        first = first * t + value
+        value = value * t + c[3]
+        for j in (2, 1, 0):
+            second *= t
+            second += 2.0 * first
+            first *= t
+            first += value
+            value *= t
+            value += c[j]
+        return value.T, (first / h).T, (second / h**2).T
 
     def at(self, s: Array, side: float) -> tuple[Array, Array, Array]:
         """Points, outward normals and curvatures at arc length s from the start."""
@@ -95,6 +102,11 @@ class SmoothCurve:
     @cached_property
     def _steps(self) -> Array:
         return np.diff(self.stations)
+
+    @cached_property
+    def _rows(self) -> Array:
+        """Coefficients by power and coordinate (6, 2, n - 1)."""
+        return np.ascontiguousarray(self.coefficients.transpose(1, 2, 0))
 
     @cached_property
     def _coarse(self) -> tuple[Array, Array]:
