@@ -52,6 +52,8 @@ class Difference:
     """Where it is [N·m]."""
     rms: float | None = None
     """Over the same peak to peak; None where it is not known."""
+    expected: float | None = None
+    """Estimate of the largest one at more angles, over the same; None where unknown."""
     peak_to_peak: float | None = None
     """Of the solves at that torque [N·m] or [rad]; None where it is not known."""
     from_rows: tuple[float, ...] = ()
@@ -216,7 +218,7 @@ def validation_summary(found: MapValidation) -> str:
     """Solves and largest differences in one line."""
     told = [
         f"{one.name} within {percent(one.largest)}"
-        + ("" if one.rms is None else f" (rms {percent(one.rms)})")
+        + _spread(one)
         + f" at {one.torque:.4g} N·m"
         for one in found.totals.values()
     ]
@@ -225,6 +227,14 @@ def validation_summary(found: MapValidation) -> str:
         f" torques, worst torque of each, ripple in parts of its peak to peak:"
         f" {', '.join(told)}"
     )
+
+
+def _spread(one: Difference) -> str:
+    """Root mean square and what more angles would show, where they are known."""
+    told = [] if one.rms is None else [f"rms {percent(one.rms)}"]
+    if one.expected is not None:
+        told.append(f"expected at more angles {percent(one.expected)}")
+    return f" ({', '.join(told)})" if told else ""
 
 
 def _torques(found: MapValidation, limit: float) -> str:
@@ -303,7 +313,8 @@ def _total(given: Mapping[str, Any], key: str) -> Difference:
         quantity=key,
         largest=_share(table, "largest", where),
         torque=_number(table, "at_Nm", where),
-        rms=None if table.get("rms") is None else _share(table, "rms", where),
+        rms=_known_share(table, "rms", where),
+        expected=_known_share(table, "expected", where),
     )
 
 
@@ -327,6 +338,10 @@ def _share(table: Mapping[str, Any], key: str, where: str) -> float:
     if value < 0.0:
         raise _Fault(f"{where}.{key} is {value:g}; accepted: >= 0")
     return value
+
+
+def _known_share(table: Mapping[str, Any], key: str, where: str) -> float | None:
+    return None if table.get(key) is None else _share(table, key, where)
 
 
 def _text(value: Any) -> str:

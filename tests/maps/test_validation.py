@@ -7,12 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from known_samples import N, samples_of
+from messages import names
 
 from swgjoint.maps.equilibrium import output_angle
 from swgjoint.maps.fit import fit_map
-from swgjoint.maps.map_validity import map_validation
+from swgjoint.maps.map_validity import map_validation, percent, validation_summary
 from swgjoint.maps.samples import FullSolves
-from swgjoint.maps.validation import validation
+from swgjoint.maps.validation import EXTREME, validation
 
 OFFSET = 5e-6
 """Mean unloaded error of ``samples_of`` [rad]."""
@@ -66,6 +67,9 @@ def test_what_is_off_counts_in_the_peak_to_peak_at_its_torque(part):
         assert record[key]["largest"] == pytest.approx(wanted, rel=1e-6)
         assert at_33[f"{key}_rms"] == pytest.approx(wanted / 5**0.5, rel=1e-6)
         assert at_11[f"{key}_largest"] < 1e-9
+        # one angle of five is off: their rms times the extreme of many
+        expected = EXTREME * wanted / 5**0.5
+        assert record[key]["expected"] == pytest.approx(expected, rel=1e-6)
     assert given.unseen is not None
 
 
@@ -76,6 +80,9 @@ def test_a_fitted_map_carries_a_record_that_can_be_read():
     assert reason is None and found is not None
     assert found.reason == "angles are off by 7 %"
     assert found.totals["output_error"].torque == 33.0
+    total = found.totals["output_error"]
+    assert total.expected == pytest.approx(EXTREME * 2**0.5 * total.rms)
+    assert names(validation_summary(found), "expected", percent(total.expected))
 
 
 def test_torques_beyond_the_map_do_not_judge_it():
@@ -84,3 +91,23 @@ def test_torques_beyond_the_map_do_not_judge_it():
     beyond = replace(samples.unseen, torque=np.full(15, 90.0))
     assert validation(drive, replace(samples, unseen=beyond)) is None
     assert validation(drive, replace(samples, unseen=None)) is None
+
+
+def test_a_record_without_the_estimate_is_read_as_before():
+    """Maps of earlier versions carry none."""
+    _, samples = judged(error=1e-6)
+    drive = fit_map(samples)
+    record = drive.info["validation"]
+    for key in ("input_torque", "output_error"):
+        del record[key]["expected"]
+    found, reason = map_validation(drive)
+    assert reason is None and found is not None
+    assert found.totals["input_torque"].expected is None
+    assert "expected" not in validation_summary(found)
+
+
+def test_the_estimate_is_the_largest_of_independent_normal_differences():
+    """The median largest of 24 normal values, over their own rms, is within 20 %."""
+    values = np.random.default_rng(7).normal(size=(4000, 24))
+    part = np.abs(values).max(axis=1) / np.sqrt((values**2).mean(axis=1))
+    assert EXTREME == pytest.approx(np.median(part), rel=0.2)
