@@ -39,7 +39,8 @@ def between(
     apart = (tooth[:, None] - tooth[None, :]) % teeth
     result = np.zeros((len(tooth), len(tooth)))
     for offset, block in zip(offsets, blocks, strict=True):
-        here = apart == offset % teeth
-        if here.any():
-            result += np.where(here, weight @ block @ weight.T, 0.0)
+        i, j = np.nonzero(apart == offset % teeth)
+        if i.size:
+            # few pairs are that far apart: no products of all points
+            result[i, j] += np.einsum("kb,kb->k", weight[i] @ block, weight[j])
     return result

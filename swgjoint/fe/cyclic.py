@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy.linalg.lapack import dgbtrf, dgbtrs
 
 Array = NDArray[np.float64]
+Index = NDArray[np.int64]
 
 
 class SingularRingError(ArithmeticError):
@@ -100,9 +101,20 @@ class CyclicFactor:
             ],
             axis=1,
         )
-        rows = np.broadcast_to(dofs[:, :, None], schur.shape)
-        columns = np.broadcast_to(dofs[:, None, :], schur.shape)
-        np.add.at(packed, (2 * band + rows - columns, columns), schur)
+
+        def place(rows: Index, columns: Index) -> tuple[Index, Index]:
+            """Where the entries of blocks are in the packed band (N, rows, columns)."""
+            down, across = rows[:, :, None], columns[:, None, :]
+            across = np.broadcast_to(across, (n_sectors, face, face))
+            return 2 * band + down - across, across
+
+        begin, end = dofs[:, :face], dofs[:, face:]
+        # a face gets a block of either sector; the blocks beside it are one sector's
+        both = schur[:, :face, :face] + np.roll(schur[:, face:, face:], 1, axis=0)
+        packed[place(begin, begin)] = both
+        # in rings of one or two sectors those blocks coincide, too
+        np.add.at(packed, place(begin, end), schur[:, :face, face:])
+        np.add.at(packed, place(end, begin), schur[:, face:, :face])
         self._band = band
         self._lu, self._pivots, info = dgbtrf(packed, band, band, overwrite_ab=True)
         if info != 0:

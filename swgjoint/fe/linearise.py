@@ -25,6 +25,10 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
+FAR = 0.03
+"""Gap, in lobe heights, from which the stations of an interval of the bore count as
+one: on parabolas they are within 0.006 of their middle, on arcs within 0.011."""
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Linearised:
@@ -226,21 +230,42 @@ def linearise(model: RingModel, state: State, torque: float | None) -> Linearise
 def _on_surface(model: RingModel, state: State) -> _Bore:
     """The layer between the bore and a rigid wave generator."""
     stations = model.stations
-    gap, normal, curvature = model.wave_generator_gap(
-        model.bore_points(state), state.wave_generator_angle
-    )
-    k = np.where(state.touching, stations.stiffness, 0.0)
+    gap, normal, curvature = _gaps(model, state)
+    # only sectors that touch push back
+    on = np.flatnonzero(state.touching.any(axis=1))
+    k = np.where(state.touching[on], stations.stiffness, 0.0)
     # sliding over a curved outline turns the contact force
-    bend = k * gap * curvature
-    return _Bore(
-        gap=gap,
-        normal=normal,
-        gradient=stations.forces_of((k * gap)[..., None] * normal).reshape(
-            model.sectors, -1
-        ),
-        hessian=stations.stiffness_of(normal, k)
-        + stations.stiffness_of(turned(normal), bend),
-    )
+    bend = k * gap[on] * curvature[on]
+    size = model.contact_dofs.size
+    gradient = np.zeros((model.sectors, size))
+    hessian = np.zeros((model.sectors, size, size))
+    push = (k * gap[on])[..., None] * normal[on]
+    gradient[on] = stations.forces_of(push).reshape(on.size, size)
+    hessian[on] = stations.stiffness_of(normal[on], k)
+    hessian[on] += stations.stiffness_of(turned(normal[on]), bend)
+    return _Bore(gap=gap, normal=normal, gradient=gradient, hessian=hessian)
+
+
+def _gaps(model: RingModel, state: State) -> tuple[Array, Array, Array]:
+    """Gap, normal and curvature of the stations, see ``wave_generator_gap``.
+
+    Where no station of an interval touches and its middle is :data:`FAR` off, all of
+    them get the values of the middle, which decide no more than that they stay apart.
+    """
+    stations, alpha = model.stations, state.wave_generator_angle
+    points = model.bore_points(state)
+    p = stations.per_interval
+    shaped = points.reshape(model.sectors, -1, p, 2)
+    middle = model.wave_generator_gap(shaped[:, :, p // 2], alpha)
+    near = middle[0] < FAR * model.lobe_height
+    near |= state.touching.reshape(shaped.shape[:3]).any(axis=2)
+    found = []
+    exact = model.wave_generator_gap(shaped[near], alpha)
+    for coarse, fine in zip(middle, exact, strict=True):
+        values = np.repeat(coarse[:, :, None], p, axis=2)
+        values[near] = fine
+        found.append(values.reshape(*points.shape[:2], *coarse.shape[2:]))
+    return found[0], found[1], found[2]
 
 
 def _in_global_frame(matrices: Array, angle: Array) -> Array:

@@ -9,7 +9,7 @@ from swgjoint.fe.complementarity import ActiveSetError, _least_squares, solve_mi
 from swgjoint.fe.cyclic import CyclicFactor
 
 
-@pytest.mark.parametrize("sectors", [3, 4, 7, 60])
+@pytest.mark.parametrize("sectors", [2, 3, 4, 7, 60])
 def test_ring_solver_equals_a_dense_solution(sectors):
     """The folded band solution is that of the assembled dense matrix."""
     rng = np.random.default_rng(sectors)
