@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.errors import DesignError
+from swgjoint.fe.bore_contact import NARROW_POINTS, POINTS
 from swgjoint.fe.circular_spline import CircularSpline, ring_compliance
 from swgjoint.fe.friction import STICK_STIFFNESS, Friction
 from swgjoint.fe.race import PlaneRace
@@ -30,6 +31,9 @@ from swgjoint.gear.wave_generator import lobe_height, wave_generator
 from swgjoint.units import mm
 
 Array = NDArray[np.float64]
+
+NARROW = ("parabolic", "asymmetric_parabolic", "four_roller")
+"""Wave generators whose contact with the bore is narrower than its nodes are apart."""
 
 
 def can_halve(design: Design, *, bearing: bool = True) -> bool:
@@ -197,6 +201,7 @@ def ring_model(
         layer=design.material_of("flexspline").youngs_modulus
         * design.drive.face_width_mm
         * mm,
+        points=NARROW_POINTS if design.wave_generator.kind in NARROW else POINTS,
         race=race,
     )
 

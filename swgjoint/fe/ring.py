@@ -12,7 +12,7 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
-from swgjoint.fe.bore_contact import BoreStations
+from swgjoint.fe.bore_contact import POINTS, BoreStations
 from swgjoint.fe.circular_spline import CircularSpline
 from swgjoint.fe.corotation import Frames, rotate, sector_frames, turned
 from swgjoint.fe.friction import Friction
@@ -52,6 +52,8 @@ class RingModel:
     """Centre of the outline in the frame of the wave generator (2,) [m]."""
     layer: float = 0.0
     """E b of the bore's layer that a rigid wave generator presses [N/m]."""
+    points: int = POINTS
+    """Stations of the bore between neighbouring nodes."""
     race: PlaneRace | None = None
     """Outer race on balls in place of the rigid wave generator."""
 
@@ -106,7 +108,7 @@ class RingModel:
         pitch = 2.0 * pi / self.element.sectors
         before, after = rotate(own[-2], -pitch), rotate(own[1], pitch)
         return BoreStations.between_nodes(
-            np.stack([before, *own, after]), layer=self.layer
+            np.stack([before, *own, after]), layer=self.layer, points=self.points
         )
 
     @cached_property
