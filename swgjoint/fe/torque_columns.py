@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Generic
 
@@ -30,6 +30,10 @@ POTENTIAL_WEIGHT = 0.3
 one of the input torque: errors of neighbouring angles are partly alike."""
 LEAST_PEAK = 0.05
 """Peak to peak that counts at least, in the largest one over the torques."""
+LAST = 0.15
+"""Part of the solves that go to the intervals with the largest estimated errors."""
+WORST = 0.5
+"""Part of the largest of these errors from which they do."""
 REACH = 1.1
 """Torque beyond the largest one at which the stiffest angle is turned as far as the
 softest one at the largest torque, in parts of the linear estimate."""
@@ -190,19 +194,19 @@ class ColumnGrid(Generic[AnyState]):
         self,
         column: AngleColumn[AnyState],
         torques: list[float],
-        before: AngleColumn[AnyState] | None = None,
+        beside: Sequence[AngleColumn[AnyState]] = (),
     ) -> None:
         """Solve other torques of a column, each from the nearest equilibrium.
 
-        That is one at the same angle, or at the same torque in the column before.
+        That is one at the same torque in a column beside, from which it takes half the
+        iterations, or else one at the same angle.
         """
-        there = self._read(column.theta, torques, column)
-        if there is None:
+        if self._read(column.theta, torques, column) is None:
             found = []
             for torque in sorted(torques, key=lambda t: (t < 0.0, abs(t))):
-                if before is not None and torque in before.states:
-                    start = before.states[torque]
-                    state = self.follow.to_angle(start, column.theta)
+                there = [one.states[torque] for one in beside if torque in one.states]
+                if there:
+                    state = self.follow.to_angle(there[0], column.theta)
                 else:
                     state = self.follow.to_torque(column.nearest(torque), torque)
                 if state.outcome.ok:
@@ -413,8 +417,14 @@ class ColumnGrid(Generic[AnyState]):
                             wanted.append((float(part[j]), k, sign * float(torque)))
             wanted.sort(reverse=True)
             worst = wanted[0][0] if wanted else 0.0
-            chosen = [w for w in wanted if w[0] > goal]
-            chosen = chosen[: max(0, most - self.solves)]
+            # where solves end before all intervals meet the goal, the last of them go
+            # to the worst ones alone, some of which have just been found
+            early = round((1.0 - LAST) * most) - self.solves
+            limit, left = goal, early
+            if early <= 0:
+                limit, left = max(goal, WORST * worst), most - self.solves
+            chosen = [w for w in wanted if w[0] > limit]
+            chosen = chosen[: max(0, left)]
             if not chosen:
                 return worst
             columns = [column for _, column in self.chosen(count)]
@@ -427,7 +437,9 @@ class ColumnGrid(Generic[AnyState]):
                     if number == k
                 ]
                 if torques:
-                    self._more(column, torques, beside[0] if k else None)
+                    # no turn of the input by a whole pitch
+                    near = columns[max(0, k - 1) : k] + columns[k + 1 : k + 2]
+                    self._more(column, torques, near)
 
     def go_beyond(self, count: int) -> None:
         """Solve one torque of each sign beyond the largest one in every column.
@@ -446,7 +458,7 @@ class ColumnGrid(Generic[AnyState]):
             low, high = (abs(top) * part for part in BEYOND)
             torque = top + sign * min(max(apart, low), high)
             for k, column in enumerate(columns):
-                self._more(column, [torque], columns[k - 1] if k else None)
+                self._more(column, [torque], columns[max(0, k - 1) : k])
                 if torque in column.failed:
                     break
             else:
