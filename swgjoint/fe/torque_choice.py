@@ -11,7 +11,7 @@ from swgjoint.fe.load_path import LoadPath
 
 Array = NDArray[np.float64]
 
-SNAP = 0.35
+SNAP = 0.3
 """Part of an interval by which its division may move to a torque of a column beside:
 that takes half the iterations, and columns with the same torques have like errors,
 which leave the input torque, their difference, alone."""
