@@ -30,7 +30,7 @@ POTENTIAL_WEIGHT = 0.3
 one of the input torque: errors of neighbouring angles are partly alike."""
 LEAST_PEAK = 0.05
 """Peak to peak that counts at least, in the largest one over the torques."""
-LAST = 0.15
+LAST = 0.07
 """Part of the solves that go to the intervals with the largest estimated errors."""
 WORST = 0.5
 """Part of the largest of these errors from which they do."""

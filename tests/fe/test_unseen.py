@@ -24,8 +24,8 @@ SHORT = {
     "reference-2d-simplified": (0.11, 0.04),
     "reference-2d-parabolic": (0.06, 0.02),
     "reference-2d-asymmetric": (0.06, 0.025),
-    "dca-80-to-1": (0.16, 0.08),
-    "own 140/142": (0.07, 0.03),
+    "dca-80-to-1": (0.11, 0.065),
+    "own 140/142": (0.13, 0.055),
 }
 """Designs that miss the goal, with bounds above what they reach. They have more contact
 events than the budget of a map covers, or almost no ripple at small torques. Parabolic
