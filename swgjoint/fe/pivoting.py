@@ -15,8 +15,9 @@ Mask = NDArray[np.bool_]
 
 TOLERANCE = 1e-9
 """Part of the largest offset of a problem that counts as zero."""
-TRIES = 3
-"""Exchanges of whole blocks without progress before single ones."""
+TRIES = 8
+"""Exchanges of whole blocks without progress before single ones: with 3 of them a
+quarter more systems are solved."""
 SINGLES = 60
 """Single exchanges without progress before a problem is solved alone."""
 PIVOTS = 10
@@ -44,31 +45,71 @@ class Pivoted:
 def solve_many(matrix: Array, offset: Array, start: Mask | None = None) -> Pivoted:
     r"""Solve :math:`0 \le v \perp w = q + M v \ge 0` for every row q of the offset.
 
+    Most unknowns are zero in every solution: the problem is solved in the others alone,
+    those that were negative at first, and again with those that are negative then.
+
+    Args:
+        matrix: M, positive definite; symmetry is not required. Shape (n, n).
+        offset: Shape (n_problems, n).
+        start: Guess of the active sets; empty ones if None.
+    """
+    scale = np.sqrt(np.diag(matrix))
+    scaled, q = matrix / scale[:, None] / scale, offset / scale
+    tolerance = TOLERANCE * np.abs(q).max(axis=1, initial=1e-300)
+    active = np.zeros(q.shape, bool) if start is None else start.copy()
+    result = q.copy()  # v where active, else w
+    unknown = (q < 0.0).any(axis=0) | active.any(axis=0)
+    open_ = np.arange(len(q))
+    while open_.size:
+        inside = np.flatnonzero(unknown)
+        part = np.ix_(open_, inside)
+        block = scaled[np.ix_(inside, inside)]
+        found, ends = _all_unknowns(block, q[part], tolerance[open_], active[part])
+        active[part] = ends
+        value = np.where(ends, found, 0.0)
+        result[open_] = q[open_] + value @ scaled[:, inside].T
+        result[part] = found
+        bad = result[open_] < -tolerance[open_, None]
+        bad[:, unknown] = False
+        unknown |= bad.any(axis=0)
+        open_ = open_[bad.any(axis=1)]
+    solved = np.isfinite(result).all(axis=1)
+    result[~solved] = np.nan
+    return Pivoted(
+        value=np.where(active, result, 0.0) / scale,
+        slack=np.where(active, 0.0, result) * scale,
+        active=active,
+        solved=solved,
+    )
+
+
+def _all_unknowns(
+    scaled: Array, q: Array, tolerance: Array, active: Mask
+) -> tuple[Array, Mask]:
+    """V where active, else w, and the active sets, searched among all unknowns.
+
     Block principal pivoting: all wrong members of the active set change sides; where
     that makes no progress only the last one does (Murty), which may take long. Where
     that makes none either the problem is solved alone, see :func:`lemke`.
 
     Args:
-        matrix: M, positive definite; symmetry is not asked. Shape (n, n).
-        offset: Shape (n_problems, n).
-        start: Guess of the active sets; empty ones if None.
+        scaled: M with a diagonal of one (n, n).
+        q: Shape (n_problems, n).
+        tolerance: What counts as zero (n_problems,).
+        active: Guess of the active sets (n_problems, n).
 
     Source:
         Júdice and Pires (1994), "A block principal pivoting algorithm for large-scale
         strictly monotone linear complementarity problems", Computers & Operations
         Research 21(5), 587-596.
     """
-    scale = np.sqrt(np.diag(matrix))
-    scaled, q = matrix / scale[:, None] / scale, offset / scale
-    count = len(q)
-    active = np.zeros(q.shape, bool) if start is None else start.copy()
-    result = np.full(q.shape, np.nan)  # v where active, else w
+    count, active = len(q), active.copy()
+    result = np.full(q.shape, np.nan)
     open_ = np.arange(count)
     stuck: list[int] = []
     fewest = np.full(count, q.shape[1] + 1)
     nearest = active.copy()
     tries = np.full(count, TRIES)
-    tolerance = TOLERANCE * np.abs(q).max(axis=1, initial=1e-300)
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         while open_.size:
             order = open_[np.argsort(active[open_].sum(axis=1))]
@@ -107,13 +148,7 @@ def solve_many(matrix: Array, offset: Array, start: Mask | None = None) -> Pivot
                 at_end = _at_active(scaled, q[k : k + 1], active[k : k + 1])[0]
                 if at_end.min() >= -tolerance[k]:
                     result[k] = at_end
-    solved = np.isfinite(result).all(axis=1)
-    return Pivoted(
-        value=np.where(active, result, 0.0) / scale,
-        slack=np.where(active, 0.0, result) * scale,
-        active=active,
-        solved=solved,
-    )
+    return result, active
 
 
 def lemke(matrix: Array, offset: Array, start: Mask) -> Mask | None:
