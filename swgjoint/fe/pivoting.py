@@ -15,7 +15,7 @@ Mask = NDArray[np.bool_]
 
 TOLERANCE = 1e-9
 """Part of the largest offset of a problem that counts as zero."""
-TRIES = 8
+TRIES = 20
 """Exchanges of whole blocks without progress before single ones: with 3 of them a
 quarter more systems are solved."""
 SINGLES = 60
@@ -54,26 +54,26 @@ def solve_many(matrix: Array, offset: Array, start: Mask | None = None) -> Pivot
         start: Guess of the active sets; empty ones if None.
     """
     scale = np.sqrt(np.diag(matrix))
-    scaled, q = matrix / scale[:, None] / scale, offset / scale
+    q = offset / scale
     tolerance = TOLERANCE * np.abs(q).max(axis=1, initial=1e-300)
     active = np.zeros(q.shape, bool) if start is None else start.copy()
     result = q.copy()  # v where active, else w
     unknown = (q < 0.0).any(axis=0) | active.any(axis=0)
-    open_ = np.arange(len(q))
+    open_ = np.flatnonzero((q < 0.0).any(axis=1) | active.any(axis=1))
     while open_.size:
         inside = np.flatnonzero(unknown)
         part = np.ix_(open_, inside)
-        block = scaled[np.ix_(inside, inside)]
+        block = matrix[np.ix_(inside, inside)] / scale[inside, None] / scale[inside]
         found, ends = _all_unknowns(block, q[part], tolerance[open_], active[part])
         active[part] = ends
-        value = np.where(ends, found, 0.0)
-        result[open_] = q[open_] + value @ scaled[:, inside].T
+        value = np.where(ends, found, 0.0) / scale[inside]
+        result[open_] = q[open_] + value @ matrix[:, inside].T / scale
         result[part] = found
         bad = result[open_] < -tolerance[open_, None]
         bad[:, unknown] = False
         unknown |= bad.any(axis=0)
         open_ = open_[bad.any(axis=1)]
-    solved = np.isfinite(result).all(axis=1)
+    solved = np.asarray(np.isfinite(result).all(axis=1))
     result[~solved] = np.nan
     return Pivoted(
         value=np.where(active, result, 0.0) / scale,
@@ -247,14 +247,18 @@ def solve_active(matrix: Array, right: Array, active: Mask) -> Array:
         right: r, the same for all (n,).
         active: Shape (n_problems, n).
     """
-    scale = np.sqrt(np.diag(matrix))
-    scaled, q = matrix / scale[:, None] / scale, right / scale
-    result = np.zeros(active.shape)
-    order = np.argsort(active.sum(axis=1))
+    inside = np.flatnonzero(active.any(axis=0))
+    scale = np.sqrt(np.diag(matrix))[inside]
+    scaled = matrix[np.ix_(inside, inside)] / scale[:, None] / scale
+    q, there = right[inside] / scale, active[:, inside]
+    found = np.zeros(there.shape)
+    order = np.argsort(there.sum(axis=1))
     for k in range(0, order.size, BATCH):
         part = order[k : k + BATCH]
-        result[part] = _at_active(scaled, np.tile(q, (part.size, 1)), active[part])
-    return np.where(active, result, 0.0) / scale
+        found[part] = _at_active(scaled, np.tile(q, (part.size, 1)), there[part])
+    result = np.zeros(active.shape)
+    result[:, inside] = np.where(there, found, 0.0) / scale
+    return result
 
 
 def _at_active(matrix: Array, q: Array, active: Mask) -> Array:

@@ -109,3 +109,22 @@ def test_lemke_begins_wherever_it_is_told():
     for guess in guesses:
         found = pivoting.lemke(scaled, offset, guess)
         np.testing.assert_array_equal(found, known > 0.0)
+
+
+def test_problems_without_active_unknowns_are_solved():
+    """All offsets positive, alone, with a start, and beside other problems."""
+    matrix, offset = np.eye(3) + 0.1, np.array([[1.0, 2.0, 3.0], [1.0, -2.0, 3.0]])
+    for rows in (offset[:1], offset):
+        found = solve_many(matrix, rows)
+        assert found.solved.all() and not found.active[0].any()
+        np.testing.assert_array_equal(found.slack[0], rows[0])
+    warm = solve_many(matrix, offset[:1], np.ones((1, 3), dtype=bool))
+    assert warm.solved.all() and not warm.active.any()
+
+
+def test_unknowns_that_turn_negative_later_are_found():
+    """An offset is positive, but another unknown pushes its row below zero."""
+    matrix = np.array([[1.0, -0.9], [-0.9, 1.0]])
+    found = solve_many(matrix, np.array([[-1.0, 0.5]]))
+    assert found.active.all()
+    np.testing.assert_allclose(found.value[0], np.linalg.solve(matrix, [1.0, -0.5]))
