@@ -24,7 +24,7 @@ from scipy.interpolate import PchipInterpolator
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.equilibrium import output_angle
 from swgjoint.maps.quartic import quartic_chain
-from swgjoint.maps.samples import FullSolves, MapSamples
+from swgjoint.maps.samples import FullSolves, MapSamples, ToleranceSamples
 from swgjoint.maps.tolerance_modes import combined
 from swgjoint.maps.torsion_table import on_knots
 from swgjoint.maps.validation import validation
@@ -39,6 +39,8 @@ BETWEEN = (0.05, 0.15, 0.35, 0.65)
 """Parts of the repeated peak torque at which harmonics are weighed, too: contact that
 moves with the torque has other harmonics at each."""
 
+END_STEPS = 6
+"""Newton steps to the torsion at which the mean torque is the largest one."""
 LADDER = 12
 """Most knots across the end of a clearance."""
 
@@ -153,12 +155,31 @@ def _knots(samples: MapSamples, torsion: Array) -> Array:
         mean = PchipInterpolator(found.torque, (rest - error).mean(axis=1))
         ends = found.torque[[0, -1]]
         knots = mean(np.clip(samples.torque, *ends))
+        _end_at_largest_torque(knots, found, rest - error)
     knots[at] = 0.0
     if found is None and samples.free:
         up = _clearance_knots(knots[at + 3 :], torsion[zero + 1 : zero + 3])
         down = _clearance_knots(-knots[: at - 2][::-1], -torsion[zero - 2 : zero][::-1])
         knots = np.concatenate([-down[::-1], [0.0], up])
     return np.asarray(knots)
+
+
+def _end_at_largest_torque(
+    knots: Array, found: ToleranceSamples, torsion: Array
+) -> None:
+    """Move the ends of the knots to where the mean torque is the largest sampled one.
+
+    Stiff positions are continued up to there and raise the mean at the mean torsion.
+    """
+    torque = np.broadcast_to(found.torque[:, None], torsion.shape)
+    curve = np.stack([found.table[1], torque, 1.0 / found.table[2]])
+    for end, beside in ((0, 1), (-1, -2)):
+        for _ in range(END_STEPS):
+            _, reached, slope = on_knots(torsion, curve, knots[[end]]).mean(axis=0)
+            step = (found.torque[end] - float(reached[0])) / float(slope[0])
+            knots[end] += step
+            least = knots[beside] + 0.1 * (knots[end] - step - knots[beside])
+            knots[end] = (max if end else min)(knots[end], least)
 
 
 def _coarse(samples: MapSamples) -> NDArray[np.bool_]:

@@ -174,3 +174,9 @@ def test_errors_of_one_member_have_orders_of_its_angle_alone():
     waves_in[-1] = FLEXSPLINE + 2
     expected = [(0, 0), (0, 2), (0, 5), (CIRCULAR_SPLINE, 2)]
     assert orders_of(waves_in, other).tolist() == [list(pq) for pq in expected]
+
+
+def test_torque_range_ends_with_the_samples():
+    """The mean torque at the last knots is the largest sampled one."""
+    drive = fit_map(known("circular_spline_fixed"))
+    assert drive.torque_range == pytest.approx((-50.0, 50.0), rel=1e-3)
