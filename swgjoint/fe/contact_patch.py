@@ -30,6 +30,11 @@ FINENESS = 6
 QUADRATURE = 24
 
 
+def half_length(stations: Array) -> float:
+    """Half length a of the patches of a flank with nodes at these arc lengths [m]."""
+    return float(stations[-1] - stations[0]) / PATCH_PARTS
+
+
 def averaged_spline(stations: Array, half: float | None = None) -> CubicSpline:
     """Weights of the flank nodes in the displacement averaged around an arc length.
 
@@ -45,8 +50,8 @@ def averaged_spline(stations: Array, half: float | None = None) -> CubicSpline:
     """
     nodal = CubicSpline(stations, np.eye(stations.size))
     first, last = float(stations[0]), float(stations[-1])
-    parts = PATCH_PARTS if half is None else (last - first) / half
-    half = (last - first) / parts
+    half = half_length(stations) if half is None else half
+    parts = (last - first) / half
     knots = np.linspace(first, last, ceil(parts * FINENESS) + 1)
     x, weight = np.polynomial.legendre.leggauss(QUADRATURE)
     weight = weight * (1.0 - x**2) ** 3

@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 from swgjoint.errors import DesignError
 from swgjoint.fe.bore_contact import NARROW_POINTS, POINTS
 from swgjoint.fe.circular_spline import CircularSpline, ring_compliance
+from swgjoint.fe.contact_patch import half_length
 from swgjoint.fe.friction import STICK_STIFFNESS, Friction
+from swgjoint.fe.indentation import Indentation, softness_of
 from swgjoint.fe.race import PlaneRace
 from swgjoint.fe.ring import RingModel
 from swgjoint.fe.sector_mesh import sector_mesh
@@ -105,6 +107,7 @@ def left_out(design: Design, model: str = "2d", *, bearing: bool = True) -> str 
         "micro_geometry": model != "3d" and any(shapes.values()),
         "passage of teeth": model == "ring",
         "rim of the circular spline": model == "ring",
+        "strips of tooth contact narrower than a patch": model != "2d",
     }
     return " and ".join(name for name, there in parts.items() if there) or None
 
@@ -192,6 +195,7 @@ def ring_model(
     return RingModel(
         **shifts,
         friction=law,
+        indentation=indentation(design, element, ring),
         element=element,
         wave_generator=flawed_wave_generator(design),
         circular_spline=ring,
@@ -203,6 +207,27 @@ def ring_model(
         * mm,
         points=NARROW_POINTS if design.wave_generator.kind in NARROW else POINTS,
         race=race,
+    )
+
+
+def indentation(
+    design: Design, element: Superelement, ring: CircularSpline
+) -> Indentation:
+    """Indentation of the flanks of both members, of the elastic ones among them."""
+    members: list[tuple[MemberName, Superelement]] = [("flexspline", element)]
+    if ring.compliance is not None:
+        members.append(("circular_spline", ring.compliance.element))
+    softness, patch = [], []
+    for name, own in members:
+        material = design.material_of(name)
+        # E' of the plane, see in_plane_constants
+        modulus = material.youngs_modulus / (
+            1.0 - own.axial_stress * material.poisson_ratio
+        )
+        softness.append(softness_of(modulus, design.drive.face_width_mm * mm))
+        patch.append(half_length(own.spline.x))
+    return Indentation.of_members(
+        tuple(softness), tuple(patch), (element.profile, ring.profile)
     )
 
 

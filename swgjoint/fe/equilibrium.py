@@ -17,6 +17,7 @@ from swgjoint.fe.complementarity import ActiveSetError, solve_mixed
 from swgjoint.fe.corotation import elastic_energy, turned
 from swgjoint.fe.cyclic import CyclicFactor, SingularRingError
 from swgjoint.fe.friction import Sliding, SlipHistory, dissipated, spring_energy
+from swgjoint.fe.indentation import Strips, strain_energy
 from swgjoint.fe.linearise import Linearised, linearise
 from swgjoint.fe.race import NODE
 from swgjoint.fe.ring import RingModel
@@ -154,12 +155,14 @@ class _Step:
     """Of the race's nodes (N, m, 2, 2) [m]; empty without a race."""
     pressure: Array
     """Force of the wave generator at each station of the bore (N, q) [N]."""
+    strip_error: float
+    """Of the approach of the flanks, whose law is linearised [m]."""
 
     @property
     def largest(self) -> float:
         """Largest displacement increment [m]."""
         of_race = float(np.abs(self.race_shift).max(initial=0.0))
-        return max(float(np.abs(self.shift).max()), of_race)
+        return max(float(np.abs(self.shift).max()), of_race, self.strip_error)
 
 
 def _solve_linear(
@@ -215,6 +218,12 @@ def _solve_linear(
         matrix[:n, :n] += ring_compliance.between(
             lines.tooth, lines.ring_weight, model.ring_teeth
         )
+    strips = None
+    if model.indentation is not None and m:
+        strips = Strips.of(
+            model.indentation, contacts, state.contacts, state.tooth_force
+        )
+        matrix[:m, :m] += strips.compliance
     last_two = np.array([n, n + 2])
     matrix[np.ix_(last_two, own)] = np.einsum("snf,snl->fl", levers[:, :, n:], response)
     matrix[:n, last_two] = matrix[last_two, :n].T
@@ -228,6 +237,8 @@ def _solve_linear(
     old += np.einsum("kb,kb->k", lines.ring_weight, ring.ring_elastic[lines.tooth])
     moved = np.einsum("kn,kn->k", rows, base[lines.sector])
     offset[:n] = lines.gap - old + moved
+    if strips is not None:
+        offset[:m] += strips.offset
     offset[last_two] = np.einsum("snf,sn->f", levers[:, :, n:], base)
     offset[n + 2] += ring.rotation - (load.rotation or 0.0)
 
@@ -289,6 +300,7 @@ def _solve_linear(
         pressure=np.where(
             state.touching, -model.stations.stiffness * ring.gap_after(increment), 0.0
         ),
+        strip_error=0.0 if strips is None else strips.error(force[:m]),
     )
 
 
@@ -383,6 +395,8 @@ def _finished(
     energy = float(elastic_energy(model.element, frames, state.flank_force).sum())
     moved = model.ring_displacement(state)
     energy += 0.5 * float(np.sum(state.ring_force * moved))
+    if model.indentation is not None:
+        energy += strain_energy(model.indentation, state.contacts, state.tooth_force)
     # the circular spline is linear: it must stay near its place
     if outcome.ok and np.abs(moved).max(initial=0.0) > ring_range * model.lobe_height:
         outcome = Outcome.DIVERGED

@@ -16,6 +16,7 @@ from swgjoint.fe.bore_contact import POINTS, BoreStations
 from swgjoint.fe.circular_spline import CircularSpline
 from swgjoint.fe.corotation import Frames, rotate, sector_frames, turned
 from swgjoint.fe.friction import Friction
+from swgjoint.fe.indentation import Indentation
 from swgjoint.fe.race import NODE, PlaneRace
 from swgjoint.fe.state import State
 from swgjoint.fe.superelement import Superelement
@@ -44,6 +45,8 @@ class RingModel:
     nonlinear: bool = True
     friction: Friction | None = None
     """Between the flanks; None without."""
+    indentation: Indentation | None = None
+    """Of the flanks; None gives them the patch of a contact alone."""
     tooth_shift: Array | None = None
     """Manufacturing errors of the flexspline's teeth in their frames (N, 2) [m]."""
     ring_tooth_shift: Array | None = None

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from swgjoint.fe.corotation import rotate, turned
 from swgjoint.fe.cyclic import CyclicFactor
+from swgjoint.fe.indentation import Strips
 from swgjoint.fe.influence import Gaps, Influence, pivoted
 from swgjoint.fe.linearise import Linearised, linearise
 from swgjoint.fe.ring import RingModel
@@ -89,6 +90,14 @@ def influence(model: RingModel, state: State, *, ring_is_output: bool) -> Influe
         "kb,kb->k", contacts.ring_weight, ring.ring_elastic[contacts.tooth]
     )
     offset[:n] += contacts.gap - old
+    if model.indentation is not None:
+        strips = Strips.of(
+            model.indentation, contacts, state.contacts, state.tooth_force
+        )
+        usual = float(strips.force[strips.force > 0.0].mean())
+        compliant, approach = strips.once_for_all(usual)
+        system[:n, :n] += compliant
+        offset[:n] += approach
     offset[n:m] += supports.start
     offset = np.append(offset, -state.torque if ring_is_output else 0.0)
 
