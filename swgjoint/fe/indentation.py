@@ -220,23 +220,21 @@ class Strips:
         same = self.strip[:, None] == self.strip
         return np.where(same, self.law.slope(self.force)[self.strip], 0.0)
 
-    def once_for_all(self, usual: float) -> tuple[Array, Array]:
-        """Linear approach of contacts whose forces are about to change much.
+    def linearised(self) -> tuple[Array, Array]:
+        """The law for a drive that is linearised once, as errors of teeth ask for.
 
-        A strip under force keeps its tangent; one without, which may come to carry
-        about as much as the others, gets the secant up to such a force.
-
-        Args:
-            usual: Force of a strip that carries [N].
+        A strip under force keeps its tangent. One without may come to carry about as
+        much as the others: it gets the secant up to their mean force.
 
         Returns:
             The compliance (n, n) [m/N] and the approach without force (n,) [m].
         """
-        open_ = self.force == 0.0
-        secant = float(self.law.approach(np.array(usual))) / usual
-        slope = np.where(open_, secant, self.law.slope(self.force))
+        law, force = self.law, self.force
+        usual = force[force > 0.0].mean()
+        secant = law.approach(usual) / usual
+        slope = np.where(force > 0.0, law.slope(force), secant)[self.strip]
         same = self.strip[:, None] == self.strip
-        return np.where(same, slope[self.strip], 0.0), self.offset
+        return np.where(same, slope, 0.0), self.offset
 
     @property
     def offset(self) -> Array:

@@ -94,8 +94,7 @@ def influence(model: RingModel, state: State, *, ring_is_output: bool) -> Influe
         strips = Strips.of(
             model.indentation, contacts, state.contacts, state.tooth_force
         )
-        usual = float(strips.force[strips.force > 0.0].mean())
-        compliant, approach = strips.once_for_all(usual)
+        compliant, approach = strips.linearised()
         system[:n, :n] += compliant
         offset[:n] += approach
     offset[n:m] += supports.start

@@ -13,7 +13,7 @@ from swgjoint.fe.tolerance_rest import influences
 def coarse_samples():
     """Of the simplified wave generator, whose teeth move more than the ellipse's."""
     design = coarse("reference-2d-simplified")
-    return kept("samples circular_spline_fixed", lambda: sample_map(design, angles=8))
+    return kept("samples circular_spline_fixed", lambda: sample_map(design, angles=12))
 
 
 @pytest.fixture(scope="session")

@@ -22,7 +22,7 @@ from swgjoint.maps.fit import fit_map
 from swgjoint.maps.unfinished import Unfinished
 
 LAYOUTS = ("circular_spline_fixed", "flexspline_fixed", "wave_generator_fixed")
-ANGLES = 8
+ANGLES = 12
 
 
 @pytest.fixture
@@ -31,7 +31,7 @@ def samples(layout, coarse_samples):
     if layout == LAYOUTS[0]:
         return coarse_samples
     design = coarse("reference-2d-simplified", **{"drive.layout": layout})
-    return sample_map(design, angles=6)
+    return sample_map(design, angles=10)
 
 
 @pytest.mark.fe

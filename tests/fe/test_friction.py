@@ -109,22 +109,20 @@ def test_driving_costs_torque_and_overhauling_gives_less():
 def test_loop_at_a_locked_input_encloses_the_work():
     """Torque up, down and up again: a closed loop whose area is the friction work."""
     # the ellipse holds the whole rim: its flanks hardly slide under torque
-    design = Design.preset("reference-2d-simplified").with_changes(
-        {"friction.tooth_coefficient": 0.1}
-    )
+    design = coarse("reference-2d-simplified", **{"friction.tooth_coefficient": 0.1})
     follow = Continuation(model=ring_model(design, half=True), ratio=design.ratio)
     state = follow.meshed(follow.deflected())
-    legs = [np.linspace(a, b, 41)[1:] for a, b in ((0, 20), (20, -20), (-20, 20))]
+    # contacts come and go within a step: 40 steps a leg leave 0.5 %, 160 leave 2e-5
+    legs = [np.linspace(a, b, 161)[1:] for a, b in ((0, 20), (20, -20), (-20, 20))]
     loop = []
     for k, torque in enumerate(np.concatenate(legs)):
         state = follow.to_torque(state, float(torque))
         assert state.outcome.ok
-        if k >= 39:
+        if k >= 159:
             loop.append(state)
     psi, torque = series(loop, "rotation"), series(loop, "torque")
     area = -float(np.trapezoid(torque, psi))
     assert psi[-1] == pytest.approx(psi[0], abs=1e-4 * np.ptp(psi))
-    # 40 steps leave 1.4e-4
     assert area == pytest.approx(np.ptp(series(loop, "friction_work")), rel=2e-3)
 
 

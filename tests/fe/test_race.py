@@ -168,7 +168,7 @@ def test_work_without_teeth_equals_energy():
 def test_work_equals_energy(cage_held):
     """T_wg dtheta - T dpsi = dU by central differences at a smooth position."""
     follow, state = drive(cage_held=cage_held), turned_on(cage_held=cage_held)
-    h = 0.004 * PITCH
+    h = 0.001 * PITCH
     low, high = (follow.to_angle(state, 0.4 * PITCH + s * h) for s in (-1, 1))
     work = state.wave_generator_torque * 2 * h
     gained = high.energy - low.energy + TORQUE * (high.rotation - low.rotation)
@@ -326,7 +326,9 @@ def test_thin_rings_tell_the_same():
             design = design.with_changes(
                 {"wave_generator.bearing.clearance_um": clearance}
             )
-        follow = Continuation(model=ring_model(design), ratio=design.ratio)
+        # the teeth of the rings have the patch of a contact alone
+        model = replace(ring_model(design), indentation=None)
+        follow = Continuation(model=model, ratio=design.ratio)
         state, rings = follow.meshed(follow.deflected()), thin_ring(design)
         twin, found, theirs = unloaded(rings, 0.0), [], []
         for torque in (5.0, 14.0, 48.0, 100.0):
@@ -359,7 +361,7 @@ def test_no_bearing_is_no_change():
 def test_labels_say_where_the_bearing_is():
     """In the plane under an outline without corners, the circular spline fixed."""
     assert left_out(small()) is None and left_out(small(), "ring") is not None
-    assert left_out(small(), "3d") == "wave_generator.bearing"
+    assert left_out(small(), "3d").startswith("wave_generator.bearing and ")
     assert left_out(small(), bearing=False) == "wave_generator.bearing"
     held = small(**{"drive.layout": "flexspline_fixed"})
     assert left_out(held) == "wave_generator.bearing"

@@ -25,7 +25,7 @@ def drive(size: int) -> Design:
 @pytest.fixture(scope="module")
 def short():
     """The first steps of the path."""
-    return ratcheting_path(drive(25), step=0.03, upto=0.12)
+    return ratcheting_path(drive(25), step=0.02, upto=0.12)
 
 
 def test_the_work_of_the_torque_is_the_energy(short):
@@ -44,7 +44,7 @@ def test_the_work_of_the_torque_is_the_energy(short):
 
 def test_torque_grows_with_the_size_cubed(short):
     """A drive of twice all lengths holds eight times the torque at the same angle."""
-    twice = ratcheting_path(drive(50), step=0.03, upto=0.03)
+    twice = ratcheting_path(drive(50), step=0.02, upto=0.02)
     # 1e-5: profiles of the family are rounded to a nanometre
     assert twice.torque[1] == pytest.approx(8.0 * short.torque[1], rel=1e-5)
 

@@ -43,7 +43,7 @@ def test_input_torque_is_the_slope_of_the_energy():
     """T_wg from contact forces is d(U + T psi)/d theta to 1e-6 of T/|i|."""
     h = 6e-4 * PITCH
     state, errors = loaded(), []
-    for part in np.arange(0.013, 1.0, 0.08):
+    for part in np.arange(0.013, 1.0, 0.04):
         state = follow().to_angle(state, part * PITCH)
         steps = (-h, -h / 2, h / 2, h)
         near = [follow().to_angle(state, part * PITCH + step) for step in steps]
@@ -82,7 +82,7 @@ def out_of_balance(theta, psi, torque, energy):
 
 def test_balance_of_work_over_a_pitch():
     """Work in minus work out minus energy vanishes with the square of the step."""
-    fine = one_pitch(96)
+    fine = one_pitch(192)
     errors = [out_of_balance(*fine[:, ::every]) for every in (4, 2, 1)]
     assert errors[2] < 1e-3
     # trapezoidal rule: 2, less where torque has a corner inside a step
@@ -90,8 +90,8 @@ def test_balance_of_work_over_a_pitch():
 
 
 def test_equilibria_do_not_depend_on_the_path():
-    """Without friction 24 steps to an angle lead where 96 lead."""
-    coarse, fine = one_pitch(24)[1:], one_pitch(96)[1:, ::4]
+    """Without friction 24 steps to an angle lead where 192 lead."""
+    coarse, fine = one_pitch(24)[1:], one_pitch(192)[1:, ::8]
     mean = TORQUE / abs(follow().ratio)
     scale = np.array([[np.ptp(fine[0])], [mean], [fine[2].max()]])
     # 5e-7 seen in the torque, where flanks conform and several sets of points hold
