@@ -250,8 +250,8 @@ def test_design_has_a_stress_and_a_picture(tmp_path, capsys, monkeypatch):
     path.write_text(coarse().to_toml(), encoding="utf-8")
     result = found(capsys, str(path), "--out", str(out))
     (row,) = result["rows"]
-    # 321 MPa at 20 N·m on the mesh of the thesis
-    assert 280.0 < row["von_mises_MPa"] < 360.0
+    # 301 MPa at 20 N·m on the mesh of the thesis, 277 MPa on half of its elements
+    assert 260.0 < row["von_mises_MPa"] < 320.0
     files = ["compare.json", "compare.png", "report.html", "run.rrd"]
     assert sorted(p.name for p in out.iterdir()) == files
 
