@@ -22,7 +22,7 @@ Mask = NDArray[np.bool_]
 
 REACH = 0.03
 """Gap up to which a contact may close, in lobe heights."""
-STATIONS = 15
+STATIONS = 30
 """Points along a flank that may touch, beside those of the perfect drive: contacts
 wander along flanks that conform."""
 SUPPORTS = 3

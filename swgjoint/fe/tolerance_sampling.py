@@ -18,7 +18,7 @@ from swgjoint.errors import ComputationError
 from swgjoint.fe.clearance import FAINT, across_clearance
 from swgjoint.fe.following import Follower
 from swgjoint.fe.tolerance_cycle import gap_errors, pitch_of, pitches_of
-from swgjoint.fe.tolerance_rest import PHASES, SMALL, Rest, influences
+from swgjoint.fe.tolerance_rest import SMALL, Rest, influences
 from swgjoint.gear.design import Design
 from swgjoint.gear.tolerances import has_errors, with_perfect_teeth, without_errors
 from swgjoint.maps.samples import FullSolves, ToleranceSamples
@@ -28,6 +28,8 @@ from swgjoint.progress import Progress, silent
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
+PHASES = {"2d": 6, "3d": 4}
+"""Positions within a pitch: what the errors add varies slowly within one."""
 ALONE = 24
 """Positions within a pitch without errors of the teeth, where one is all there is."""
 POSITIONS = 40_000
@@ -74,7 +76,7 @@ def sample_tolerances(
     """
     drive = design.drive
     if phases is None:
-        most = PHASES if pitches_of(design) > 1 else ALONE
+        most = PHASES[model] if pitches_of(design) > 1 else ALONE
         phases = int(np.clip(POSITIONS // pitches_of(design), 2, most))
     own_reference = has_errors(with_perfect_teeth(design))
     tick = _stage(progress, design, 1, phases * (2 if own_reference else 1))

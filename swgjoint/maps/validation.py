@@ -17,6 +17,9 @@ from swgjoint.maps.samples import FullSolves, MapSamples
 
 Array = NDArray[np.float64]
 
+POSITIONS = 500
+"""Of the cycle of a drive with errors of its teeth, at which its map is evaluated."""
+GOLDEN = 0.618034
 EXTREME = 2.5
 """Largest of many differences over their root mean square: sqrt(2 ln n) of n = 24
 independent normal ones, the order of the positions in a pitch at which a map may be
@@ -29,11 +32,13 @@ def validation(drive: DriveMap, samples: MapSamples) -> dict[str, Any] | None:
 
     Differences of input torque and output error are parts of the peak to peak of the
     finite elements at the same torque, of the samples and the unseen equilibria
-    together. ``largest`` is the largest one that was seen, at a few angles of each
-    torque. ``expected`` estimates what more angles would show: :data:`EXTREME` times
-    the root mean square of the worst torque, which varies less than its largest
-    difference. Both miss what happens between the torques of the record. With errors
-    of the teeth those equilibria are the few full solves of the toleranced drive.
+    together; with errors of the teeth, whose equilibria are few, those of the map over
+    the whole cycle count, too. ``largest`` is the largest one that was seen, at a few
+    angles of each torque. ``expected`` estimates what more angles would show:
+    :data:`EXTREME` times the root mean square of the worst torque, which varies less
+    than its largest difference. Both miss what happens between the torques of the
+    record. With errors of the teeth those equilibria are the few full solves of the
+    toleranced drive.
 
     Args:
         drive: The map.
@@ -62,8 +67,14 @@ def validation(drive: DriveMap, samples: MapSamples) -> dict[str, Any] | None:
         at = solved.torque == torque
         error, moment = solved.output_error[at], solved.input_torque[at]
         if toleranced is None:
-            error = np.concatenate([error, _over(samples, "output_error", torque)])
-            moment = np.concatenate([moment, _over(samples, "input_torque", torque)])
+            others = [
+                _over(samples, key, torque) for key in ("output_error", "input_torque")
+            ]
+        else:
+            others = _over_cycle(drive, samples, torque)
+        error, moment = (
+            np.concatenate(pair) for pair in zip((error, moment), others, strict=True)
+        )
         row: dict[str, float] = {"torque_Nm": float(torque), "angles": int(at.sum())}
         for key, values, difference in (
             ("input_torque", moment, missed[at]),
@@ -119,6 +130,20 @@ def _over(samples: MapSamples, key: str, torque: float) -> Array:
     """Output error or input torque of all sampled angles at a torque (n_angles,)."""
     table = getattr(samples, key)
     return np.array([np.interp(torque, samples.torque, row) for row in table.T])
+
+
+def _over_cycle(drive: DriveMap, samples: MapSamples, torque: float) -> list[Array]:
+    """Output error and input torque of the map over the cycle of the teeth."""
+    assert samples.tolerances is not None
+    step = samples.input_angle[1] - samples.input_angle[0]
+    cycle = step * samples.input_angle.size * samples.tolerances.pitches
+    # the golden section spreads them over pitches and phases of a pitch alike
+    theta = cycle * (GOLDEN * np.arange(POSITIONS) % 1.0)
+    none = np.zeros(POSITIONS)
+    there = FullSolves(
+        input_angle=theta, torque=none + torque, output_error=none, input_torque=none
+    )
+    return [_predicted(drive, there), _input_torque(drive, there)]
 
 
 def _stiffness(
