@@ -45,8 +45,9 @@ COLORS = dict(
 # ## Four maps
 #
 # Finite elements in the plane, both members elastic, contact everywhere, large
-# rotations, 96 positions of the wave generator over a pitch. That takes one to five
-# minutes of a core a drive, so the maps are read from files, which
+# rotations, 24 or 48 positions of the wave generator over a pitch, as many torques as
+# contacts ask for. That takes half a minute to two minutes of a core a drive, so the
+# maps are read from files, which
 #
 #     swgjoint map reference-2d --no-fields -o notebooks/maps/reference-2d.swg
 #
@@ -96,11 +97,6 @@ for axis in (left, right):
 # Error over a pitch comes in the opposite order: four rollers hold the rim at four
 # lines and let the teeth push it about. Two things follow, and they pull against each
 # other: a soft drive winds up, a stiff one turns every error into torque.
-#
-# The fast waves, ten a pitch, are no gear but the mesh: a tooth has ten elements along
-# the bore, and a narrow contact takes one after the other. With twice the elements they
-# come twice as often and half as high (9.4 and 4.2 microrad with four rollers), while
-# the wave once a pitch stays (20.0 and 20.4). No step below carries them.
 
 # %%
 K = {name: sheet.figures["K1_Nm_rad"] for name, sheet in sheets.items()}
