@@ -367,7 +367,7 @@ def test_map_of_a_flawed_drive_with_play(
     its energy, four of them 0.04; a wrong sign leaves as much as there is.
     """
     monkeypatch.setattr(tolerance_sampling, "influences", lambda *a, **k: at_both_ends)
-    monkeypatch.setattr(tolerance_sampling, "PHASES", 2)
+    monkeypatch.setitem(tolerance_sampling.PHASES, "3d", 2)
     monkeypatch.setattr(tolerance_sampling, "CHECKS", {"3d": 2})
     design = with_play(small_design)
     # four angles alias: teeth come into contact one after the other on coarse flanks
