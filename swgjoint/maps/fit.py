@@ -167,19 +167,19 @@ def _knots(samples: MapSamples, torsion: Array) -> Array:
 def _end_at_largest_torque(
     knots: Array, found: ToleranceSamples, torsion: Array
 ) -> None:
-    """Move the ends of the knots to where the mean torque is the largest sampled one.
+    """Scale the knots of each sign to end where the mean torque is the largest sampled.
 
     Stiff positions are continued up to there and raise the mean at the mean torsion.
     """
     torque = np.broadcast_to(found.torque[:, None], torsion.shape)
     curve = np.stack([found.table[1], torque, 1.0 / found.table[2]])
-    for end, beside in ((0, 1), (-1, -2)):
+    for end, sign in ((0, -1.0), (-1, 1.0)):
+        last = knots[[end]].copy()
         for _ in range(END_STEPS):
-            _, reached, slope = on_knots(torsion, curve, knots[[end]]).mean(axis=0)
-            step = (found.torque[end] - float(reached[0])) / float(slope[0])
-            knots[end] += step
-            least = knots[beside] + 0.1 * (knots[end] - step - knots[beside])
-            knots[end] = (max if end else min)(knots[end], least)
+            _, reached, slope = on_knots(torsion, curve, last).mean(axis=0)
+            last += (found.torque[end] - reached) / slope
+        side = knots * sign > 0.0
+        knots[side] *= last / knots[end]
 
 
 def _coarse(samples: MapSamples) -> NDArray[np.bool_]:

@@ -9,7 +9,7 @@ import pytest
 
 from swgjoint.gear.kinematics import LAYOUTS, angle_coefficients, periodicity, ratio
 from swgjoint.maps.drive_map import Ratings
-from swgjoint.maps.fit import fit_map
+from swgjoint.maps.fit import _end_at_largest_torque, fit_map
 from swgjoint.maps.samples import MapSamples, ToleranceSamples
 from swgjoint.maps.tolerance_modes import orders_of
 
@@ -180,3 +180,18 @@ def test_torque_range_ends_with_the_samples():
     """The mean torque at the last knots is the largest sampled one."""
     drive = fit_map(known("circular_spline_fixed"))
     assert drive.torque_range == pytest.approx((-50.0, 50.0), rel=1e-3)
+
+
+def test_the_end_of_the_knots_moves_them_all():
+    """Where a level lies next to the largest torque no interval collapses."""
+    samples = known("circular_spline_fixed")
+    found = samples.tolerances
+    torsion = found.table[0, found.torque == 0.0] - found.table[0]
+    knots = torsion.mean(axis=1) * 1.05
+    # the last but one beyond the torsion at which the map is to end
+    knots[-2] = 0.999 * knots[-1]
+    before = np.diff(knots)
+    _end_at_largest_torque(knots, found, torsion)
+    scale = np.diff(knots) / before
+    assert scale[[0, -1]] == pytest.approx([1.0 / 1.05] * 2, rel=0.01)
+    assert scale[-2] == pytest.approx(scale[-1], rel=1e-9)
