@@ -221,10 +221,10 @@ class Strips:
         return np.where(same, self.law.slope(self.force)[self.strip], 0.0)
 
     def linearised(self) -> tuple[Array, Array]:
-        """The law for a drive that is linearised once, as errors of teeth ask for.
+        """Linear law for a drive that is linearised once, to superpose tooth errors.
 
-        A strip under force keeps its tangent. One without may come to carry about as
-        much as the others: it gets the secant up to their mean force.
+        A strip under force keeps its tangent. A strip without force may come to carry
+        about as much as the others, so it gets the secant up to their mean force.
 
         Returns:
             The compliance (n, n) [m/N] and the approach without force (n,) [m].

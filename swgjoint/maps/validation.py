@@ -31,14 +31,14 @@ def validation(drive: DriveMap, samples: MapSamples) -> dict[str, Any] | None:
     """Record of the differences between a map and its unseen equilibria.
 
     Differences of input torque and output error are parts of the peak to peak of the
-    finite elements at the same torque, of the samples and the unseen equilibria
-    together; with errors of the teeth, whose equilibria are few, those of the map over
-    the whole cycle count, too. ``largest`` is the largest one that was seen, at a few
-    angles of each torque. ``expected`` estimates what more angles would show:
-    :data:`EXTREME` times the root mean square of the worst torque, which varies less
-    than its largest difference. Both miss what happens between the torques of the
-    record. With errors of the teeth those equilibria are the few full solves of the
-    toleranced drive.
+    finite elements at the same torque, taken over the samples and the unseen equilibria
+    together. With errors of the teeth the unseen equilibria are a few full solves of
+    the toleranced drive; the peak to peak then includes the map over the whole cycle.
+
+    ``largest`` is the largest difference seen, at a few angles of each torque.
+    ``expected`` estimates what more angles would show: :data:`EXTREME` times the root
+    mean square of the worst torque, which varies less than its largest difference.
+    Neither covers what happens between the torques of the record.
 
     Args:
         drive: The map.
