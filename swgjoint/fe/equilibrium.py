@@ -28,6 +28,9 @@ RING_RANGE = 0.2
 """Displacement of the circular spline, in lobe heights, at which its linear model ends:
 at a half of it the input torque still agrees with the energy to seven digits."""
 
+TOUCH = 1e-15
+"""Gap that counts as none [m]."""
+
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
@@ -72,6 +75,11 @@ class NewtonSolver:
     smallest effect of interest, a tenth of a micrometre."""
     thorough_below: float = 1e-7
     """Increment below which contact is searched between the nodes, too [m]."""
+    exchanges: int = 6
+    """Exchanges of stations of the bore at one linearisation: most iterations would
+    serve nothing else, and search for contact again."""
+    exchange_below: float = 1e-5
+    """Increment below which a linearisation is good enough for that [m]."""
     stride: float = 0.1
     """Longest move of one iteration, in lobe heights: contact changes on the way."""
     largest_step: float = 0.1
@@ -95,7 +103,18 @@ class NewtonSolver:
                 # after the first steps, or a short one, only close candidates matter
                 close = thorough or iteration > 2
                 reach = (0.02 if close else 0.1) * model.lobe_height
-                step = _solve_linear(model, state, ring, load, reach, thorough)
+                contacts = ring.no_contacts
+                if load.teeth:
+                    contacts = ring.search.search(
+                        ring.flank, reach, state.contacts, thorough=thorough
+                    )
+                step = _solve_linear(model, state, ring, load, contacts)
+                for _ in range(self.exchanges):
+                    exchanged = _exchanged(state, ring, step, self.exchange_below)
+                    if exchanged is None:
+                        break
+                    state, ring = exchanged
+                    step = _solve_linear(model, state, ring, load, contacts)
                 history.append(step.largest)
                 if not step.largest < self.largest_step:
                     return replace(
@@ -170,8 +189,7 @@ def _solve_linear(
     state: State,
     ring: Linearised,
     load: Load,
-    reach: float,
-    thorough: bool,
+    contacts: Contacts,
 ) -> _Step:
     """Condense the ring to its contact forces, solve for them, go back.
 
@@ -180,11 +198,6 @@ def _solve_linear(
     and the gradient of the output rotation.
     """
     element = model.element
-    contacts = ring.no_contacts
-    if load.teeth:
-        contacts = ring.search.search(
-            ring.flank, reach, state.contacts, thorough=thorough
-        )
     # lines of force: the normals and, with friction, the tangents of the contacts
     m, lines, sliding = len(contacts), contacts, None
     if model.friction is not None and m:
@@ -304,6 +317,30 @@ def _solve_linear(
     )
 
 
+def _exchanged(
+    state: State, ring: Linearised, step: _Step, below: float
+) -> tuple[State, Linearised] | None:
+    """Stations of the bore that a step closes or opens, taken in or out of the tangent.
+
+    Returns:
+        None without such stations, after too large a step, or on a race, whose tangent
+        depends on more than the stations.
+    """
+    if ring.race_rows is not None or not step.largest < below:
+        return None
+    bad = _wrong(state, ring.gap_after(step.increment)) > TOUCH
+    if not bad.any() or not (state.touching ^ bad).any():
+        return None
+    return replace(state, touching=state.touching ^ bad), ring.exchanged(
+        bad, state.touching
+    )
+
+
+def _wrong(state: State, gap: Array) -> Array:
+    """How far the stations are on the wrong side (N, q) [m]."""
+    return np.asarray(np.where(state.touching, gap, -gap))
+
+
 def _output_compliance(
     matrix: Array, held: NDArray[np.int64], k: int, load: Load
 ) -> float:
@@ -336,8 +373,8 @@ def _advance(
 ) -> tuple[State, bool]:
     """Move, exchange tooth forces, update the wave generator's active set."""
     after = ring.gap_after(damping * step.increment)
-    wrong = np.where(state.touching, after, -after)
-    bad = wrong > 1e-15
+    wrong = _wrong(state, after)
+    bad = wrong > TOUCH
     # without any contact the rim springs back: let go of the worst node only
     if bad.any() and (one_at_a_time or not (state.touching ^ bad).any()):
         bad = wrong == wrong.max()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -117,6 +117,26 @@ class Linearised:
             return np.asarray(self.gap + (self.race_rows @ moved[..., None])[..., 0])
         shift = self.stations.positions(moved.reshape(len(moved), -1, 2))
         return np.asarray(self.gap + np.einsum("sqi,sqi->sq", shift, self.normal))
+
+    def exchanged(self, stations: Mask, touching: Mask) -> Linearised:
+        """With some stations of the bore (N, q) taken out that touch, or taken in.
+
+        On a rigid wave generator; its curvature there does not matter, the gap is next
+        to nothing.
+        """
+        sectors = np.flatnonzero(stations.any(axis=1))
+        change = np.where(touching, -1.0, 1.0) * stations * self.stations.stiffness
+        k, normal = change[sectors], self.normal[sectors]
+        push = (k * self.gap[sectors])[..., None] * normal
+        into, sign = self.gap_dofs, self.sign[sectors][:, self.gap_dofs]
+        forces = self.stations.forces_of(push).reshape(sectors.size, -1)
+        springs = self.stations.stiffness_of(normal, k)
+        gradient, hessian = self.gradient.copy(), self.hessian.copy()
+        gradient[sectors[:, None], into] += sign * forces
+        hessian[sectors[:, None, None], into[:, None], into] += (
+            sign[:, :, None] * springs * sign[:, None, :]
+        )
+        return replace(self, gradient=gradient, hessian=hessian)
 
     def gap_gradients(self) -> Array:
         """Derivative of the gaps of the stations by ``gap_dofs`` (N, q, k)."""

@@ -26,6 +26,8 @@ Index = NDArray[np.int64]
 SAMPLES_PER_NODE = 2
 DENSE_SAMPLES = 8
 REFINEMENTS = 6
+REFINED = 1e-12
+"""Change of the stations at which a refinement ends [m]."""
 MERGE = 1e-6  # of the flank: points closer than that are one contact
 
 
@@ -375,7 +377,9 @@ class ToothContact:
             low_s = np.where(slope <= 0.0, s, low_s)
             newton = s - slope / np.where(np.abs(relative) > 1e-3, relative, 1e-3)
             good = (relative > 1e-3) & (newton >= low_s) & (newton <= high_s)
-            s = np.where(good, newton, 0.5 * (low_s + high_s))
+            last, s = s, np.where(good, newton, 0.5 * (low_s + high_s))
+            if np.abs(s - last).max(initial=0.0) < REFINED:
+                break
         return s
 
     def _gather(
