@@ -7,6 +7,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from swgjoint.fe.contact_changes import ContactChanges
+from swgjoint.fe.contact_prediction import predicted_changes
 from swgjoint.fe.equilibrium import Load, NewtonSolver
 from swgjoint.fe.following import Follower
 from swgjoint.fe.influence import Influence
@@ -96,6 +98,14 @@ class Continuation(Follower[State]):
             state.wave_generator_angle + alpha,
             state.rotation + rotation,
             state.ring_rotation + ring_rotation,
+        )
+
+    def predicted_changes(
+        self, state: State, low: float, high: float
+    ) -> ContactChanges | None:
+        """Changes of contact over the torque that an equilibrium predicts."""
+        return predicted_changes(
+            self.model, state, ring_is_output=self.ring_is_output, low=low, high=high
         )
 
     def influence(self, state: State) -> Influence:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.errors import Outcome
+from swgjoint.fe.contact_changes import ContactChanges
 from swgjoint.fe.influence import Influence
 
 if TYPE_CHECKING:
@@ -103,6 +104,18 @@ class Follower(ABC, Generic[AnyState]):
     @abstractmethod
     def turned(self, state: AnyState, output: float) -> AnyState:
         """Predictor: the output turned at a fixed input."""
+
+    def predicted_changes(
+        self, state: AnyState, low: float, high: float
+    ) -> ContactChanges | None:
+        """Changes of contact over the torque that an equilibrium predicts, if any.
+
+        Args:
+            state: The equilibrium.
+            low: Smallest torque of interest [N·m].
+            high: Largest one [N·m].
+        """
+        return None
 
     @abstractmethod
     def influence(self, state: AnyState) -> Influence:

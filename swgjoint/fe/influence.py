@@ -20,12 +20,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from swgjoint.fe.contact_changes import ContactChanges
 from swgjoint.fe.pivoting import exchange, solve_active, solve_many
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
+MOST_CHANGES = 60
+"""Changes of contact on one side of a torque that are followed."""
 SOFTEST = 3e-6
 """Least stiffness of a motion that opens contacts, in that of a single one."""
 
@@ -157,6 +160,64 @@ class Influence:
             active=found.active,
         )
 
+    def changes(self, low: float, high: float, contact: Index) -> ContactChanges:
+        """Changes of contact over the torque, without errors of the teeth.
+
+        Args:
+            low: Smallest torque [N·m].
+            high: Largest one [N·m].
+            contact: Numbers of the contacts (m,).
+        """
+        below, c_below = self._followed(-1.0, self.torque - low)
+        above, c_above = self._followed(1.0, high - self.torque)
+        which = [k for k, _ in below[::-1]] + [k for k, _ in above]
+        places = [self.torque - t for _, t in below[::-1]]
+        places += [self.torque + t for _, t in above]
+        return ContactChanges(
+            torque=np.array(places),
+            contact=contact[np.array(which, dtype=np.int64)],
+            compliance=np.array(c_below[:0:-1] + c_above),
+        )
+
+    def _followed(
+        self, sign: float, reach: float
+    ) -> tuple[list[tuple[int, float]], list[float]]:
+        """Follow the solution over the torque, linear between changes of contact.
+
+        Each change is the exchange of one unknown: principal pivots in a single
+        parameter. More than :data:`MOST_CHANGES` of them end the path.
+
+        Args:
+            sign: Of the change of the torque.
+            reach: Its size [N·m].
+
+        Returns:
+            Contacts that change, with the change of the torque [N·m]; compliances
+            before, between and after them [rad/(N·m)].
+        """
+        offset = np.stack([self.slack, sign * self.by_torque], axis=1)
+        active = np.zeros(len(offset), bool)
+        changes, compliances, away = list[tuple[int, float]](), list[float](), 0.0
+        while True:
+            inside = np.flatnonzero(active)
+            block = self.matrix[np.ix_(inside, inside)]
+            moves = np.linalg.solve(block, -offset[inside])
+            found = offset + self.matrix[:, inside] @ moves
+            found[inside] = moves
+            slope = sign * moves[:, 1] @ self.angle_by_value[inside]
+            compliances.append(-float(self.angle_by_torque + slope))
+            value, rate = found.T
+            falling = np.flatnonzero(rate < 0.0)
+            if not falling.size or len(changes) == MOST_CHANGES:
+                return changes, compliances
+            left = np.maximum(value + away * rate, 0.0)[falling] / -rate[falling]
+            if away + left.min() > reach:
+                return changes, compliances
+            first = int(falling[left.argmin()])
+            away += float(left.min())
+            changes.append((first, away))
+            active[first] ^= True
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Gaps:
@@ -234,6 +295,8 @@ def _stiffening(block: Array) -> Array:
     search for one passes.
     """
     size = np.diag(block)
+    if not (size > 0.0).all():
+        raise np.linalg.LinAlgError("no stiffness against an opening")
     scale = np.sqrt(size)
     lowest = float(np.linalg.eigvalsh(block / scale[:, None] / scale)[0])
     return np.asarray(max(0.0, SOFTEST - lowest) * size)

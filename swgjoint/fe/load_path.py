@@ -7,26 +7,40 @@ e, strain energy U and C, and with the complementary potential
 .. math:: G = U + T e, \quad \frac{dG}{dT} = e, \quad \frac{de}{dT} = -C
 
 two of them give for the interval between them C at both ends, its mean (from e) and its
-first moment (from G). These four figures determine one jump on a common slope, and two
-equal jumps; where both explanations agree the curve is known, where they differ the
-difference estimates what is not known.
+first moment (from G). Where both equilibria predict which contacts change between them,
+see :mod:`swgjoint.fe.contact_prediction`, the curve has those jumps and a cubic that
+meets the four figures. Elsewhere these determine one jump on a common slope, and two
+equal jumps. Where the predictions of both ends, or both explanations, agree the curve
+is known; where they differ the difference estimates what is not known.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swgjoint.arrays import frozen_array
+from swgjoint.fe.contact_changes import ContactChanges, Steps
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 CHANCE = 0.01
 """Part of the length of an interval times the change of its compliance that counts as
 unknown: several jumps may happen to look like one."""
+AGREED = 0.5
+"""Part of the difference between the predictions of both ends that their mean is off
+by: they err by the square of the distance."""
+BENT = 0.1
+"""Part of what they leave to a cubic that may be off, too."""
+SMOOTH = 0.4
+"""Usual smooth deviation of the compliance from a straight line, in its size."""
+STRONG = 0.02
+"""Step of the compliance, in the largest one, that torques of a table follow."""
 _GRID = np.linspace(0.0, 1.0, 17)
 """Where explanations are compared in an interval."""
 _NEAR_END = 0.1
@@ -45,6 +59,8 @@ class LoadPath:
     """Strain energy [J]. Shape (n,)."""
     compliance: Array
     """Tangent -de/dT [rad/(N·m)]. Shape (n,)."""
+    changes: tuple[ContactChanges | None, ...] = ()
+    """Changes of contact that each equilibrium predicts, n of them or none at all."""
 
     def __post_init__(self) -> None:
         torque = frozen_array(self.torque, "torque [N·m]", ndim=1)
@@ -99,8 +115,8 @@ class LoadPath:
     def doubt(self) -> tuple[Array, Array]:
         """Estimates of the error of e [rad] and of G [J] in each interval (n - 1,)."""
         once, twice = self._differences
-        h = self.length
-        chance = CHANCE * h * np.abs(self._jump)
+        h, known = self.length, self._predicted[0]
+        chance = np.where(known, 0.0, CHANCE * h * np.abs(self._jump))
         return h * once.max(axis=1) + chance, h**2 * twice.max(axis=1)
 
     @property
@@ -118,9 +134,13 @@ class LoadPath:
     @property
     def events(self) -> Array:
         """Torques at which the compliance jumps as the curve has it [N·m]. (m,)."""
-        one = self._explained[0]
+        one, (known, _, _, both) = self._explained[0], self._predicted
         strong = one.feasible & (np.abs(one.jump[:, 0]) > 0.5 * np.abs(self._jump))
-        return (self.torque[:-1] + one.place[:, 0] * self.length)[strong]
+        found = (self.torque[:-1] + one.place[:, 0] * self.length)[strong & ~known]
+        # steps that matter; a cubic has none
+        size = np.abs(both.jump) > STRONG * self.compliance.max()
+        places = self.torque[:-1, None] + both.place * self.length[:, None]
+        return np.sort(np.concatenate([found, places[known[:, None] & size]]))
 
     @property
     def _jump(self) -> Array:
@@ -133,13 +153,23 @@ class LoadPath:
         return self.energy + self.torque * self.output_error
 
     @cached_property
-    def _explained(self) -> tuple[_Curves, _Curves, _Curves]:
-        """One jump on a slope, two equal jumps, a cubic."""
+    def _known(self) -> tuple[Array, Array, Array, Array]:
+        """What the equilibria tell of every interval, its length 1.
+
+        Returns:
+            C at its begin and its change; mean of C, and of (1 - x) C, less those of C
+            at the begin (n - 1,).
+        """
         h, e = self.length, self.output_error
-        c0, change = self.compliance[:-1], self._jump
-        # mean of C, and of (1 - x) C, over an interval of length 1, less those of C0
+        c0 = self.compliance[:-1]
         mean = -np.diff(e) / h - c0
         moment = (h * e[:-1] - np.diff(self._potential)) / h**2 - 0.5 * c0
+        return c0, self._jump, mean, moment
+
+    @cached_property
+    def _explained(self) -> tuple[_Curves, _Curves, _Curves]:
+        """One jump on a slope, two equal jumps, a cubic."""
+        c0, change, mean, moment = self._known
         return (
             _one_jump(c0, change, mean, moment),
             _two_jumps(c0, change, mean, moment),
@@ -147,7 +177,43 @@ class LoadPath:
         )
 
     @cached_property
+    def _predicted(self) -> tuple[Mask, _Curves, _Curves, _Curves]:
+        """Curves by the changes of contact that the ends of an interval predict.
+
+        Returns:
+            Where both ends do (n - 1,); curves by the first end, by the last one and by
+            both.
+        """
+        n = self.torque.size - 1
+        empty = np.zeros(0)
+        none = Steps(place=empty, jump=empty, contact=empty.astype(int), doubt=empty)
+        known, steps = np.zeros(n, bool), [[none] * 3 for _ in range(n)]
+        for j, (one, two) in enumerate(pairwise(self.changes)):
+            if one is not None and two is not None:
+                low, high = self.torque[j : j + 2]
+                first, last = one.between(low, high), two.between(low, high)
+                known[j] = True
+                steps[j] = [first, last, Steps.merged(first, last)]
+        c0, change, mean, moment = self._known
+        for k in np.flatnonzero(known).tolist():
+            smooth = SMOOTH * max(c0[k], c0[k] + change[k])
+            steps[k][2] = steps[k][2].fitted(
+                mean[k] - change[k] / 2.0, moment[k] - change[k] / 6.0, smooth
+            )
+        curves = [
+            _steps_on_cubic(c0, change, mean, moment, [own[which] for own in steps])
+            for which in range(3)
+        ]
+        return known, curves[0], curves[1], curves[2]
+
+    @cached_property
     def _curves(self) -> _Curves:
+        """By predictions of both ends, elsewhere by what explains the equilibria."""
+        known, _, _, predicted = self._predicted
+        return _Curves.where(known, predicted, self._by_jumps)
+
+    @cached_property
+    def _by_jumps(self) -> _Curves:
         """The mean of both explanations by jumps, one of them, or the cubic."""
         one, two, cubic = self._explained
         # one jump without a slope is exact, and two at its place up to a square root
@@ -183,6 +249,11 @@ class LoadPath:
             apart = np.where(one.feasible[:, None], a - c, b - c)
             apart = np.where(both[:, None], a - b, apart)
             found.append(np.abs(np.where(neither[:, None], c - line, apart)))
+        known, first, last, merged = self._predicted
+        predictions = (curves.on(grid) for curves in (first, last, merged.bend))
+        for own, a, b, bend in zip(found, *predictions, strict=True):
+            apart = AGREED * np.abs(a - b) + BENT * np.abs(bend)
+            own[known] = apart[known]
         return found[0], found[1]
 
 
@@ -198,6 +269,28 @@ class _Curves:
     """(n, m)."""
     feasible: NDArray[np.bool_]
     """Whether the explanation exists (n,)."""
+
+    @classmethod
+    def where(cls, mask: Mask, one: _Curves, other: _Curves) -> _Curves:
+        """One of two by interval (n,)."""
+        place, jump = [
+            np.concatenate([mask[:, None] * a, ~mask[:, None] * b], axis=1)
+            for a, b in ((one.place, other.place), (one.jump, other.jump))
+        ]
+        return cls(
+            power=np.where(mask[:, None], one.power, other.power),
+            place=place,
+            jump=jump,
+            feasible=np.where(mask, one.feasible, other.feasible),
+        )
+
+    @property
+    def bend(self) -> _Curves:
+        """What is no step and no slope."""
+        power = self.power.copy()
+        power[:, 1] = -power[:, 2:].sum(axis=1)
+        power[:, 0] = 0.0
+        return replace(self, power=power, jump=np.zeros_like(self.jump))
 
     def of(self, k: NDArray[np.intp]) -> _Curves:
         """Those of some intervals."""
@@ -278,6 +371,24 @@ def _two_jumps(c0: Array, change: Array, mean: Array, moment: Array) -> _Curves:
         jump=np.repeat(0.5 * change[:, None], 2, axis=1),
         feasible=inside & ~flat & (apart >= -slack),
     )
+
+
+def _steps_on_cubic(
+    c0: Array, change: Array, mean: Array, moment: Array, steps: list[Steps]
+) -> _Curves:
+    """Given steps in every interval, and the cubic that they leave."""
+    most = max((own.place.size for own in steps), default=0)
+    place, jump = np.zeros((c0.size, most)), np.zeros((c0.size, most))
+    for k, own in enumerate(steps):
+        place[k, : own.place.size], jump[k, : own.jump.size] = own.place, own.jump
+    after = 1.0 - place
+    cubic = _cubic(
+        c0,
+        change - jump.sum(axis=1),
+        mean - (jump * after).sum(axis=1),
+        moment - 0.5 * (jump * after**2).sum(axis=1),
+    )
+    return replace(cubic, place=place, jump=jump)
 
 
 def _cubic(c0: Array, change: Array, mean: Array, moment: Array) -> _Curves:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
 from messages import naming
 
+from swgjoint.fe.contact_changes import ContactChanges
 from swgjoint.fe.load_path import CHANCE, LoadPath
 
 ERROR, ENERGY, COMPLIANCE = 1e-4, 1e-3, 6e-5
@@ -157,6 +159,68 @@ def test_dividing_where_it_says_makes_the_curve_exact():
         part = curve.doubt[0]
         torque = np.sort(np.append(torque, curve.division[part.argmax()]))
     assert np.abs(path(torque, events).at(x) - drive(x, events))[0].max() < 1e-9
+
+
+MANY = tuple(
+    (float(p), 1e-5 * float(j))
+    for p, j in np.random.default_rng(3).uniform((0.5, -1.0), (46.5, 1.0), (12, 2))
+)
+"""Events, several in every interval."""
+
+
+def predicted(torque, jumps, bend=0.0):
+    """What each equilibrium predicts.
+
+    Its events are off by ``bend`` [1/(N·m)] times the square of their distance.
+    """
+    found = []
+    for own in np.asarray(torque, float):
+        events = sorted(
+            (p + bend * (p - own) ** 2, k) for k, (p, _) in enumerate(jumps)
+        )
+        places, numbers = (np.array(v) for v in zip(*events, strict=True))
+        steps = np.array([jumps[k][1] for k in numbers])
+        found.append(
+            ContactChanges(
+                torque=places,
+                contact=numbers,
+                compliance=COMPLIANCE + np.cumsum([0.0, *steps]),
+            )
+        )
+    return tuple(found)
+
+
+def test_predicted_events_make_the_curve_exact():
+    """Twelve events in four intervals, their places and steps known, on a slope."""
+    given = MANY, 2e-8
+    plain = path(TORQUES, *given)
+    curve = replace(plain, changes=predicted(TORQUES, MANY))
+    apart = np.abs(curve.at(FINE) - drive(FINE, *given)).max(axis=1)
+    assert (apart < ROUND_OFF).all()
+    assert np.abs(plain.at(FINE)[0] - drive(FINE, *given)[0]).max() > 1e-6
+    assert curve.doubt[0].max() < 1e-3 * plain.doubt[0].max()
+    own = np.stack([curve.output_error, curve.energy, curve.compliance])
+    assert np.array_equal(curve.at(TORQUES), own)
+
+
+def test_the_doubt_of_predictions_tells_how_far_off_they_are():
+    """Events displaced by the square of the distance from the end that predicts."""
+    plain = path(TORQUES, MANY)
+    curve = replace(plain, changes=predicted(TORQUES, MANY, bend=2e-3))
+    apart = np.abs(curve.at(FINE)[0] - drive(FINE, MANY)[0]).max()
+    assert 0.2 < apart / curve.doubt[0].max() < 2.0
+    assert apart < 0.3 * np.abs(plain.at(FINE)[0] - drive(FINE, MANY)[0]).max()
+
+
+def test_without_a_prediction_of_both_ends_the_equilibria_alone_count():
+    """An interval whose one end predicts nothing is as without predictions."""
+    plain = path(TORQUES, MANY)
+    given = list(predicted(TORQUES, MANY))
+    given[1] = None
+    curve = replace(plain, changes=tuple(given))
+    inside = FINE < TORQUES[2]
+    assert np.array_equal(curve.at(FINE[inside]), plain.at(FINE[inside]))
+    assert not np.array_equal(curve.at(FINE), plain.at(FINE))
 
 
 def test_torques_outside_are_refused():
