@@ -24,10 +24,12 @@ EVERY = 4
 ANGLE_GOAL = 0.02
 """Difference at unseen angles, in the peak to peak, at which the first angles suffice;
 it grows with the root of their number: each doubling takes solves from the torques."""
+GOAL = 0.04
+"""The same difference at unseen torques, where those of the samples count, too."""
 STALLED = 0.7
-"""Part of that difference which is left after a doubling that was worth it: more angles
+"""Part of a difference which is left after a doubling that was worth it: more angles
 do not cure what comes from the mesh."""
-TORQUE_GOAL = 0.02
+TORQUE_GOAL = 0.04
 """Estimated error between torques, in the same, at which they suffice."""
 
 
@@ -95,10 +97,11 @@ def solve_pattern(
     """Solve as many angles and torques as the drive asks for.
 
     First the given torques at every angle. Angles are doubled until they predict others
-    at these torques; then the load path of every angle is divided where its estimated
-    error is largest, see :class:`swgjoint.fe.load_path.LoadPath`. Last comes a torque
-    beyond the largest one, see :meth:`ColumnGrid.go_beyond`. The claims that the map
-    rests on are checked at one torque.
+    at these torques; then torques are added where the estimated error of the load paths
+    is largest, see :class:`swgjoint.fe.load_path.LoadPath`, and angles where others are
+    still missed. Last comes a torque beyond the largest one, see
+    :meth:`ColumnGrid.go_beyond`. The claims that the map rests on are checked at one
+    torque.
 
     Args:
         follow: The drive.
@@ -115,7 +118,7 @@ def solve_pattern(
     Raises:
         ComputationError: If the unloaded drive or all torques cannot be solved.
     """
-    grid = ColumnGrid(
+    grid: ColumnGrid[AnyState] = ColumnGrid(
         follow=follow,
         period=period,
         finest=effort.most_angles,
@@ -140,7 +143,8 @@ def solve_pattern(
     # angles that no sample has, first at the torques that all have
     places = unseen_places(effort.unseen[1], effort.most_angles)
     others = [grid.unseen_column(place) for place in places]
-    missed = grid.missed(count, others)
+    first = [0.0, *grid.levels]
+    missed = grid.missed(count, others, first)
     reserved = len(others) * effort.unseen[0] * len(grid.signs)
 
     def budget() -> int:
@@ -148,32 +152,47 @@ def solve_pattern(
         last = count * len(grid.signs) if effort.beyond else 0
         return effort.solves - reserved - last
 
+    def doubles(goal: float) -> bool:
+        """Whether more angles are wanted, and a torque for them all still fits."""
+        fits = grid.solves + grid.cost(count) + count <= budget()
+        return missed > goal and 2 * count <= effort.most_angles and fits
+
     def angle_goal() -> float:
         return float(ANGLE_GOAL * np.sqrt(count / effort.angles))
 
-    while missed > angle_goal() and 2 * count <= effort.most_angles:
+    while True:
         # no better between the torques than between the angles
-        grid.divide(count, budget(), max(TORQUE_GOAL, missed))
-        if grid.solves + grid.cost(count) > budget():
+        doubt = grid.divide(count, budget(), max(TORQUE_GOAL, missed))
+        if not doubles(angle_goal()):
             break
         count, before = 2 * count, missed
         grid.solve_columns(count)
-        missed = grid.missed(count, others)
+        missed = grid.missed(count, others, first)
         if missed > STALLED * before:
             break
     doubt = grid.divide(count, budget(), TORQUE_GOAL)
+    # contacts may change between the angles under other torques alone
+    unseen = grid.unseen(others, effort.unseen[0])
+    reserved = 0
+    missed = grid.missed(count, others, np.unique(unseen.torque))
+    while doubles(GOAL):
+        count, before = 2 * count, missed
+        grid.solve_columns(count)
+        doubt = grid.divide(count, budget(), TORQUE_GOAL)
+        missed = grid.missed(count, others, np.unique(unseen.torque))
+        if missed > STALLED * before:
+            break
     if effort.beyond:
         grid.go_beyond(count)
     shortfall = []
-    if missed > angle_goal():
+    if missed > GOAL:
         shortfall.append(
-            f"angles between {count} a pitch are off by up to {100.0 * missed:.2g} %"
+            f"other torques and angles are off by up to {100.0 * missed:.2g} %"
         )
     if doubt > TORQUE_GOAL:
         shortfall.append(
             f"torques between the samples by an estimated {100.0 * doubt:.2g} %"
         )
-    unseen = grid.unseen(others, effort.unseen[0])
     tables, solved = grid.tables(count, effort.torques)
     if symmetric:
         tables = with_mirrored_torques(tables)
@@ -196,8 +215,8 @@ def solve_pattern(
         unseen=unseen,
         shortfall=", ".join(shortfall),
         free=grid.free,
-        truncated=len(grid.levels) < len(torques),
-        states=grid.states(count),
+        truncated=not {*torques} <= {*grid.levels},
+        states=grid.states(count, torques),
         info=info,
     )
 

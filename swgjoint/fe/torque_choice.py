@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,40 +9,8 @@ from swgjoint.fe.load_path import LoadPath
 
 Array = NDArray[np.float64]
 
-SNAP = 0.3
-"""Part of an interval by which its division may move to a torque of a column beside:
-that takes half the iterations, and columns with the same torques have like errors,
-which leave the input torque, their difference, alone."""
 FEWEST_TORQUES = 40
 """Of one sign in the table."""
-
-
-def torque_as_beside(
-    torque: float, solved: Iterable[float], beside: Iterable[Iterable[float]]
-) -> float:
-    """A torque near the wanted one that a column beside has, else the wanted one.
-
-    To go on from there takes half the iterations of a change of the torque, and events
-    move little from column to column.
-
-    Args:
-        torque: The wanted one [N·m].
-        solved: Torques of the column [N·m].
-        beside: Torques of the columns beside [N·m].
-    """
-    own = [0.0, *(t for t in solved if t * torque > 0.0)]
-    low = max(t for t in map(abs, own) if t < abs(torque))
-    high = min(t for t in map(abs, own) if t > abs(torque))
-    part = SNAP * (high - low)
-    near = [
-        t
-        for one in beside
-        for t in one
-        if t * torque > 0.0
-        and abs(t - torque) < part
-        and low + 0.5 * part < abs(t) < high - 0.5 * part
-    ]
-    return min(near, key=lambda t: abs(t - torque), default=torque)
 
 
 def common_torques(
@@ -81,15 +47,18 @@ def periodic(values: Array, parts: Array) -> tuple[Array, Array]:
     """Trigonometric interpolation over a period, and its slope by the part of it.
 
     Args:
-        values: At equal steps (n,).
+        values: At equal steps (n, ...).
         parts: Of the period (m,).
+
+    Returns:
+        Two of (m, ...).
     """
     n = len(values)
-    modes = np.fft.rfft(values)[: (n + 1) // 2] / n
+    modes = np.fft.rfft(values, axis=0)[: (n + 1) // 2] / n
     modes[1:] *= 2.0
     wave = 2.0j * np.pi * np.arange(len(modes))
     phase = np.exp(parts[:, None] * wave)
-    return (phase @ modes).real, (phase @ (wave * modes)).real
+    return (phase @ modes).real, ((phase * wave) @ modes).real
 
 
 def unseen_places(count: int, finest: int) -> list[float]:

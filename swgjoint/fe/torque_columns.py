@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Generic
 
@@ -11,13 +12,13 @@ from numpy.typing import NDArray
 
 from swgjoint.errors import ComputationError
 from swgjoint.fe.clearance import across_clearance
+from swgjoint.fe.contact_changes import ContactChanges
 from swgjoint.fe.following import AnyState, Follower, Unloaded
 from swgjoint.fe.load_path import LoadPath
 from swgjoint.fe.state_arrays import packed, settled, unpacked
 from swgjoint.fe.torque_choice import (
     common_torques,
     periodic,
-    torque_as_beside,
     unseen_parts,
 )
 from swgjoint.maps.samples import FullSolves
@@ -25,20 +26,21 @@ from swgjoint.maps.unfinished import UNREADABLE, Unfinished
 
 Array = NDArray[np.float64]
 
-POTENTIAL_WEIGHT = 0.3
-"""Of the estimated error of the complementary potential over a step of the angle, as
-one of the input torque: errors of neighbouring angles are partly alike."""
+POTENTIAL_WAVES = 1.0
+"""Waves in a pitch of the estimated error of the complementary potential, whose
+derivative by the angle is one of the input torque."""
 LEAST_PEAK = 0.05
 """Peak to peak that counts at least, in the largest one over the torques."""
-LAST = 0.07
-"""Part of the solves that go to the intervals with the largest estimated errors."""
 WORST = 0.5
-"""Part of the largest of these errors from which they do."""
+"""Part of the largest estimated error from which intervals are divided next."""
 REACH = 1.1
 """Torque beyond the largest one at which the stiffest angle is turned as far as the
 softest one at the largest torque, in parts of the linear estimate."""
 BEYOND = (0.02, 0.15)
 """Least and most of that torque, in parts of the largest one."""
+AHEAD = 0.4
+"""Reach of a prediction of contact changes, in parts of the largest torque: above the
+distance of any two common torques."""
 _SOLVES, _REST, _TORQUES = "solves-{:04d}", "rest", "torques"
 STATE = "state"
 """Name of a state in the arrays of an interrupted run."""
@@ -54,6 +56,14 @@ class AngleColumn(Generic[AnyState]):
     """By torque, that without torque excluded."""
     failed: set[float] = field(default_factory=set)
     """Torques that were tried in vain."""
+    changes: dict[tuple[float, float], ContactChanges | None] = field(
+        default_factory=dict
+    )
+    """Changes of contact that an equilibrium predicts, by its torque and the sign."""
+    paths: dict[float, tuple[LoadPath, tuple[Array, Array]]] = field(
+        default_factory=dict
+    )
+    """The last curve of each sign, see :meth:`ColumnGrid.path`."""
 
     def towards(self, torque: float) -> AnyState:
         """Where a torque of this sign begins."""
@@ -86,6 +96,8 @@ class ColumnGrid(Generic[AnyState]):
     keep: Unfinished | None
     restored: Callable[[int], None]
     columns: dict[float, AngleColumn[AnyState]] = field(default_factory=dict)
+    failed: list[float] = field(default_factory=list)
+    """Torques between the levels that were tried in vain."""
     beyond: list[float] = field(default_factory=list)
     """Torques of every column beyond the levels, at most one of each sign."""
     solves: int = 0
@@ -111,11 +123,14 @@ class ColumnGrid(Generic[AnyState]):
         for k in range(count):
             yield k, self.columns[k * (self.finest // count)]
 
-    def states(self, count: int) -> dict[float, list[AnyState]]:
-        """At the torques that all columns have."""
+    def states(
+        self, count: int, torques: Iterable[float]
+    ) -> dict[float, list[AnyState]]:
+        """Without torque, and at those of some torques that all columns have."""
         columns = [column for _, column in self.chosen(count)]
         found = {0.0: [one.rest.state for one in columns]}
-        return found | {t: [one.states[t] for one in columns] for t in self.levels}
+        levels = [t for t in torques if t in self.levels]
+        return found | {t: [one.states[t] for one in columns] for t in levels}
 
     # -- solving -----------------------------------------------------------------------
 
@@ -299,19 +314,6 @@ class ColumnGrid(Generic[AnyState]):
             [error, state.energy, state.compliance, follow.input_torque(state)]
         )
 
-    def _path(self, column: AngleColumn[AnyState], sign: float) -> tuple[Array, Array]:
-        """Torques [N·m] and figures (4, n) of one sign, outwards from zero."""
-        top = max(abs(t) for t in [*self.levels, *self.beyond] if t * sign > 0.0)
-        outward: list[float] = sorted(
-            (t for t in column.states if t * sign > 0.0 and abs(t) <= top), key=abs
-        )
-        # a free output has no curve before its clearance is taken up
-        first = 0.0 if column.rest.sides is None else sign * self.small
-        states: list[AnyState] = [column.towards(sign)]
-        states += [column.states[t] for t in outward]
-        table = np.array([self.figures(s, column.theta) for s in states]).T
-        return np.array([first, *outward]), table
-
     def path(
         self, column: AngleColumn[AnyState], sign: float
     ) -> tuple[LoadPath, tuple[Array, Array]]:
@@ -319,38 +321,90 @@ class ColumnGrid(Generic[AnyState]):
 
         Of negative torques it is the curve of the mirrored drive.
         """
-        torque, table = self._path(column, sign)
-        error, energy, compliance, moment = table
+        common = [*self.levels, *self.beyond]
+        outward: list[float] = sorted(
+            (t for t in common if t * sign > 0.0 and t in column.states), key=abs
+        )
+        # a free output has no curve before its clearance is taken up
+        first = 0.0 if column.rest.sides is None else sign * self.small
+        torque = sign * np.array([first, *outward])
+        known = column.paths.get(sign)
+        if known is not None and np.array_equal(known[0].torque, torque):
+            return known
+        states: list[AnyState] = [column.towards(sign)]
+        states += [column.states[t] for t in outward]
+        top = abs(outward[-1])
+        figures = np.array([self.figures(s, column.theta) for s in states])
+        error, energy, compliance, moment = figures.T
         curve = LoadPath(
-            torque=sign * torque,
+            torque=torque,
             output_error=sign * error,
             energy=energy,
             compliance=compliance,
+            changes=tuple(self._changes(column, state, sign, top) for state in states),
         )
-        return curve, (sign * torque, sign * moment)
+        column.paths[sign] = curve, (torque, sign * moment)
+        return column.paths[sign]
 
-    def missed(self, count: int, others: list[AngleColumn[AnyState]]) -> float:
+    def _changes(
+        self, column: AngleColumn[AnyState], state: AnyState, sign: float, top: float
+    ) -> ContactChanges | None:
+        """Changes of contact that a state of a column predicts, see :meth:`path`."""
+        key = (state.torque, sign)
+        if key not in column.changes:
+            low, high = state.torque - AHEAD * top, state.torque + AHEAD * top
+            found = self.follow.predicted_changes(state, low, high)
+            if found is not None and sign < 0.0:
+                found = found.mirrored()
+            column.changes[key] = found
+        return column.changes[key]
+
+    def missed(
+        self, count: int, others: list[AngleColumn[AnyState]], torques: Iterable[float]
+    ) -> float:
         """Largest part of the peak to peak that other angles are off by.
 
-        At the common torques: output error, and input torque as the derivative of the
-        complementary potential by the angle.
+        Output error, and input torque as the derivative of the complementary potential
+        by the angle.
         """
         worst, columns = 0.0, [column for _, column in self.chosen(count)]
-        for torque in [0.0, *self.levels]:
+        parts = np.array([one.theta for one in others]) / self.period
+        for torque in torques:
             if torque == 0.0 and self.free:
                 continue
-
-            error, energy, _, moment = self._row(columns, torque)
-            potential = energy + torque * error
-            e, _, _, m = self._row(others, torque)
-            parts = np.array([one.theta for one in others]) / self.period
-            predicted, _ = periodic(error, parts)
-            _, slope = periodic(potential, parts)
+            if torque and any(torque not in one.states for one in others):
+                continue
+            error, energy = self._curves_at(columns, torque)
+            there, _, _, moment = self._row(others, torque)
+            told, _ = periodic(error, parts)
+            _, slope = periodic(energy + torque * error, parts)
             slope = slope / self.period + torque / self.follow.ratio
-            for own, there, told in ((error, e, predicted), (moment, m, slope)):
-                height = np.ptp(np.concatenate([own, there]))
-                worst = max(worst, float(np.abs(told - there).max() / height))
+            # the height of what the samples and the others have
+            moments = periodic(energy + torque * error, self._parts(count))[1]
+            moments = moments / self.period + torque / self.follow.ratio
+            for own, truth, prediction in (
+                (error, there, told),
+                (moments, moment, slope),
+            ):
+                height = np.ptp(np.concatenate([own, truth]))
+                worst = max(worst, float(np.abs(prediction - truth).max() / height))
         return worst
+
+    def _curves_at(
+        self, columns: list[AngleColumn[AnyState]], torque: float
+    ) -> tuple[Array, Array]:
+        """Output error and energy of some columns at any torque, by their curves."""
+        if torque == 0.0:
+            error, energy, _, _ = self._row(columns, 0.0)
+            return error, energy
+        sign = math.copysign(1.0, torque)
+        table = [self.path(one, sign)[0].at([abs(torque)]) for one in columns]
+        error, energy, _ = np.array(table)[:, :, 0].T
+        return sign * error, energy
+
+    @staticmethod
+    def _parts(count: int) -> Array:
+        return np.arange(count) / count
 
     def _row(self, columns: list[AngleColumn[AnyState]], torque: float) -> Array:
         """Figures of some columns at a torque that all of them have (4, n)."""
@@ -366,24 +420,33 @@ class ColumnGrid(Generic[AnyState]):
 
         Positive torques also where ``sign`` is negative.
         """
-        paths = [self.path(column, sign) for _, column in self.chosen(count)]
-        first = max(curve.torque[0] for curve, _ in paths)
+        curves = [self.path(column, sign)[0] for _, column in self.chosen(count)]
+        first = max(curve.torque[0] for curve in curves)
         top = max(abs(t) for t in self.levels if t * sign > 0.0)
         torque = np.linspace(first, top, 49)
-        errors = np.array([curve.at(torque)[0] for curve, _ in paths])
-        moments = np.array([np.interp(torque, *solved) for _, solved in paths])
+        tables = np.array([curve.at(torque) for curve in curves])
+        errors = tables[:, 0]
+        potential = tables[:, 1] + torque * errors
+        _, slope = periodic(potential, self._parts(count))
+        moments = slope / self.period
         heights = []
         for table in (errors, moments):
             height = np.ptp(table, axis=0)
-            heights.append(np.maximum(height, LEAST_PEAK * height.max()))
+            height = np.maximum(height, LEAST_PEAK * height.max())
+            # two angles alone have no slope to be off from
+            heights.append(np.where(height > 0.0, height, np.inf))
         return torque, heights[0], heights[1]
 
     def cost(self, count: int) -> int:
-        """Solves of so many columns: what as many others between them would take."""
-        return sum(1 + len(column.states) for _, column in self.chosen(count))
+        """Solves of so many columns at the common torques."""
+        return count * (1 + len(self.levels))
 
     def divide(self, count: int, most: int, goal: float) -> float:
-        """Divide load paths until their estimated errors meet a goal.
+        """Add common torques until the estimated errors between them meet a goal.
+
+        All angles get the same torques: what the curves between them miss then changes
+        slowly from angle to angle, which leaves the input torque, a derivative by the
+        angle, alone.
 
         Args:
             count: Of the columns.
@@ -393,53 +456,61 @@ class ColumnGrid(Generic[AnyState]):
         Returns:
             The largest estimate that is left, in the peak to peak.
         """
-        step = self.period / count
         while True:
-            wanted: list[tuple[float, int, float]] = []
-            for sign in self.signs:
-                at, error, moment = self.peaks(count, sign)
-                for k, column in self.chosen(count):
-                    curve, _ = self.path(column, sign)
-                    of_error, of_potential = curve.doubt
-                    there = curve.division
-                    # the input torque is the difference of G from angle to angle
-                    part = np.maximum(
-                        of_error / np.interp(there, at, error),
-                        POTENTIAL_WEIGHT
-                        * of_potential
-                        / step
-                        / np.interp(there, at, moment),
-                    )
-                    tried = sign * np.array(sorted(column.failed))
-                    for j, torque in enumerate(there):
-                        low, high = curve.torque[j], curve.torque[j + 1]
-                        if not ((tried > low) & (tried < high)).any():
-                            wanted.append((float(part[j]), k, sign * float(torque)))
-            wanted.sort(reverse=True)
-            worst = wanted[0][0] if wanted else 0.0
-            # where solves end before all intervals meet the goal, the last of them go
-            # to the worst ones alone, some of which have just been found
-            early = round((1.0 - LAST) * most) - self.solves
-            limit, left = goal, early
-            if early <= 0:
-                limit, left = max(goal, WORST * worst), most - self.solves
-            chosen = [w for w in wanted if w[0] > limit]
-            chosen = chosen[: max(0, left)]
+            wanted = self._doubts(count)
+            worst = max((part for part, _ in wanted), default=0.0)
+            limit = max(goal, WORST * worst)
+            chosen = sorted((w for w in wanted if w[0] > limit), reverse=True)
+            chosen = chosen[: max(0, (most - self.solves) // count)]
             if not chosen:
                 return worst
-            columns = [column for _, column in self.chosen(count)]
-            for k, column in enumerate(columns):
-                # the column before, and after the last one the first
-                beside = (columns[k - 1], columns[(k + 1) % count])
-                torques = [
-                    torque_as_beside(torque, column.states, [b.states for b in beside])
-                    for _, number, torque in chosen
-                    if number == k
-                ]
-                if torques:
-                    # no turn of the input by a whole pitch
-                    near = columns[max(0, k - 1) : k] + columns[k + 1 : k + 2]
-                    self._more(column, torques, near)
+            for _, torque in chosen:
+                self._add_torque(count, torque)
+
+    def _doubts(self, count: int) -> list[tuple[float, float]]:
+        """What is unknown of every interval between common torques.
+
+        Returns:
+            Estimated error, in the peak to peak, and where to divide it [N·m].
+        """
+        wanted: list[tuple[float, float]] = []
+        for sign in self.signs:
+            at, error, moment = self.peaks(count, sign)
+            parts, places = [], []
+            for _, column in self.chosen(count):
+                curve, _ = self.path(column, sign)
+                of_error, of_potential = curve.doubt
+                there = curve.division
+                parts.append(
+                    np.maximum(
+                        of_error / np.interp(there, at, error),
+                        POTENTIAL_WAVES
+                        * (2.0 * np.pi / self.period)
+                        * of_potential
+                        / np.interp(there, at, moment),
+                    )
+                )
+                places.append(there)
+            weights = np.array(parts) + 1e-12
+            torques = np.average(places, axis=0, weights=weights)
+            ends = curve.torque
+            tried = sign * np.array([t for t in self.failed if t * sign > 0.0])
+            for j, torque in enumerate(torques):
+                if not ((tried > ends[j]) & (tried < ends[j + 1])).any():
+                    part = float(weights[:, j].max())
+                    wanted.append((part, sign * float(torque)))
+        return wanted
+
+    def _add_torque(self, count: int, torque: float) -> None:
+        """Solve one more torque in every column, unless it fails in one."""
+        columns = [column for _, column in self.chosen(count)]
+        for k, column in enumerate(columns):
+            # no turn of the input by a whole pitch
+            self._more(column, [torque], columns[max(0, k - 1) : k])
+            if torque in column.failed:
+                self.failed.append(torque)
+                return
+        self.levels = sorted([*self.levels, torque])
 
     def go_beyond(self, count: int) -> None:
         """Solve one torque of each sign beyond the largest one in every column.

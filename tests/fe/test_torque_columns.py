@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import pi
 
 import numpy as np
@@ -10,6 +10,7 @@ import pytest
 
 from swgjoint.errors import Outcome
 from swgjoint.fe import torque_columns
+from swgjoint.fe.contact_changes import ContactChanges
 from swgjoint.fe.following import Unloaded
 from swgjoint.fe.torque_columns import ColumnGrid
 
@@ -85,6 +86,12 @@ class KnownDrive:
         self.ways.append(("angle", state.theta, theta))
         return self.at(state.torque, theta)
 
+    def predicted_changes(
+        self, state: Known, low: float, high: float
+    ) -> ContactChanges | None:
+        """As of a follower that predicts none."""
+        return None
+
     def output_angle(self, state: Known) -> float:
         """Psi [rad]."""
         return state.error + state.theta / self.ratio
@@ -92,6 +99,39 @@ class KnownDrive:
     def input_torque(self, state: Known) -> float:
         """On the input [N·m]."""
         return state.moment
+
+
+class FailingDrive(KnownDrive):
+    """It has no equilibrium at one angle between two torques."""
+
+    def to_torque(self, state: Known, torque: float) -> Known:
+        """As of a follower."""
+        return self._failing(super().to_torque(state, torque))
+
+    def to_angle(self, state: Known, theta: float) -> Known:
+        """As of a follower."""
+        return self._failing(super().to_angle(state, theta))
+
+    def _failing(self, found: Known) -> Known:
+        if 2.0 < found.torque < PEAK and abs(found.theta - pi) < 0.1:
+            return replace(found, outcome=Outcome.DIVERGED)
+        return found
+
+
+class ForeseeingDrive(KnownDrive):
+    """Its equilibria predict all events of their angle."""
+
+    def predicted_changes(
+        self, state: Known, low: float, high: float
+    ) -> ContactChanges | None:
+        """As of a follower."""
+        moved = self.swing * np.sin(state.theta)
+        steps = [-drop for _, drop in self.drops]
+        return ContactChanges(
+            torque=np.array([place + moved for place, _ in self.drops]),
+            contact=np.arange(len(self.drops)),
+            compliance=STIFF + np.cumsum([0.0, *steps]),
+        )
 
 
 def grid(drive: KnownDrive, count: int = 6, levels=(2.0, PEAK)) -> ColumnGrid:
@@ -124,27 +164,65 @@ def test_a_torque_of_the_column_after_is_reached_by_turning_back():
     assert drive.ways[-1][0] == "torque"
 
 
-def test_division_never_turns_the_input_by_a_pitch():
-    """The first and the last column are neighbours in the pattern, not in the angle."""
+def test_all_angles_get_the_same_torques():
+    """Until the doubt meets the goal; no column turns the input by a pitch for it."""
     drive = KnownDrive(drops=((3.0, 2e-4), (5.0, 3e-4), (7.0, 1e-4)))
     columns = grid(drive)
     begin = len(drive.ways)
-    columns.divide(6, 90, 0.002)
+    assert columns.divide(6, 300, 0.02) <= 0.02
+    assert len(columns.levels) > 4
+    for _, column in columns.chosen(6):
+        assert sorted(column.states) == columns.levels
     turned = [abs(b - a) for kind, a, b in drive.ways[begin:] if kind == "angle"]
-    assert turned
+    assert len(turned) == 5 * (len(columns.levels) - 2)
     assert max(turned) == pytest.approx(2.0 * pi / 6)
 
 
-def test_the_last_solves_go_to_the_worst_intervals(monkeypatch):
-    """With a budget that ends early, less is left in doubt than without that share."""
+def test_division_ends_with_the_budget():
+    """A torque for every angle, or none; what is left in doubt is told."""
     drops = tuple((1.0 + 0.53 * k, 4e-5 * (1 + k % 3)) for k in range(16))
-    left = {}
-    for share in (0.0, torque_columns.LAST):
-        monkeypatch.setattr(torque_columns, "LAST", share)
-        columns = grid(KnownDrive(drops=drops), count=8)
-        left[share] = columns.divide(8, 120, 0.001)
-        assert columns.solves <= 120
-    assert 0.001 < left[torque_columns.LAST] < left[0.0]
+    columns = grid(KnownDrive(drops=drops), count=8)
+    before = columns.solves
+    left = columns.divide(8, before + 8 * 5 + 7, 0.001)
+    assert columns.solves == before + 8 * 5
+    assert left > 0.001
+    assert left == max(part for part, _ in columns._doubts(8))
+
+
+def test_a_torque_that_fails_at_one_angle_is_no_common_one():
+    """Its interval is left as it is, and the division of the others goes on."""
+    drive = FailingDrive(drops=((1.5, 2e-4), (5.0, 6e-4), (8.0, 1e-4)))
+    columns = grid(drive)
+    columns.divide(6, 400, 0.02)
+    (failed,) = columns.failed
+    assert 2.0 < failed < PEAK
+    inside = [t for t in columns.levels if 2.0 < t < PEAK]
+    assert failed not in columns.levels and not inside
+    assert len(columns.levels) > 2
+
+
+def test_predicted_events_need_no_torques_next_to_them():
+    """Where every equilibrium knows the events of its angle the first torques do."""
+    drops = ((3.0, 2e-4), (5.0, 3e-4), (7.0, 1e-4))
+    columns = grid(ForeseeingDrive(drops=drops))
+    assert columns.divide(6, 300, 0.02) < 1e-6
+    assert columns.levels == [2.0, PEAK]
+    plain = grid(KnownDrive(drops=drops))
+    assert plain.divide(6, plain.solves, 0.02) > 0.02
+
+
+def test_other_angles_are_missed_by_what_the_samples_cannot_know():
+    """Smooth over the angle the error falls with their number."""
+    # at 2 N·m the event comes at some angles only
+    drive = KnownDrive(drops=((2.1, 2e-4),), swing=0.4)
+    columns = grid(drive, count=48)
+    others = [columns.unseen_column(k + 0.38) for k in range(0, 48, 5)]
+    missed = [columns.missed(count, others, [2.0, PEAK]) for count in (6, 12, 24, 48)]
+    assert missed[0] > 0.1
+    assert missed[3] < 0.03
+    assert (np.diff(missed) < 0.0).all()
+    # at the peak, where it always has come, a sine is all there is
+    assert columns.missed(6, others, [PEAK]) < 1e-9
 
 
 def test_the_torque_beyond_the_peak_turns_the_stiffest_angle_as_far_as_the_softest():
