@@ -81,6 +81,8 @@ class Fields:
     """(n, 2) [mm]."""
     stress: Array
     """xx, yy, xy (n, 3) [MPa]; in space (n, 3) and xx, yy, zz, xy, yz, zx (n, 6)."""
+    reaction: Array | None = None
+    """Forces at held nodes, where the deck writes them; in space (n, 3) [N]."""
 
 
 def run(deck: str, folder: Path, nodes: int, name: str = "job") -> Fields:
@@ -113,7 +115,11 @@ def run_solid(deck: str, folder: Path, nodes: int, name: str = "job") -> Fields:
     if done.returncode or "Job finished" not in done.stdout:
         raise RuntimeError(f"ccx failed:\n{done.stdout[-2000:]}{done.stderr}")
     blocks = _last_blocks(folder / f"{name}.frd", nodes)
-    return Fields(displacement=blocks["DISP"], stress=blocks["STRESS"])
+    return Fields(
+        displacement=blocks["DISP"],
+        stress=blocks["STRESS"],
+        reaction=blocks.get("FORC"),
+    )
 
 
 def _last_blocks(path: Path, nodes: int) -> dict[str, Array]:
@@ -124,7 +130,7 @@ def _last_blocks(path: Path, nodes: int) -> dict[str, Array]:
         for line in file:
             key = line[:3]
             if key == " -4":
-                name, width = line.split()[1], {"DISP": 3, "STRESS": 6}
+                name, width = line.split()[1], {"DISP": 3, "STRESS": 6, "FORC": 3}
                 current = None
                 if name in width:
                     current = blocks[name] = np.full((nodes, width[name]), np.nan)

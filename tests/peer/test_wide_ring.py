@@ -6,7 +6,12 @@ import os
 
 import calculix
 import pytest
-from wide_ring import plane_compliance, solid_compliance
+from wide_ring import (
+    plane_compliance,
+    plane_wall,
+    solid_compliance,
+    solid_wall,
+)
 
 from swgjoint.fe.drive2d import sector
 from swgjoint.gear.design import Design
@@ -14,6 +19,9 @@ from swgjoint.gear.profile import tooth_profile
 
 STIFFNESS = 0.01
 """The plate theory misses solids by up to 0.8 %, our mesh by 0.3 %."""
+
+WALL = 0.02
+"""Of the force of a wall, and of the displacement at its lobe."""
 
 needs_calculix = pytest.mark.skipif(
     not (calculix.available() or os.environ.get("SWGJOINT_REQUIRE_CCX")),
@@ -51,6 +59,12 @@ def compliance(design):
     return plane_compliance(element, design.drive.face_width_mm * 1e-3)
 
 
+def walled(design):
+    """Force of a wall and shape by our plane model."""
+    element = sector(design, "flexspline", tooth_profile(design, "flexspline"))
+    return plane_wall(element)
+
+
 @needs_calculix
 @pytest.mark.parametrize(
     "which",
@@ -78,3 +92,20 @@ def test_width_decides_between_plane_stress_and_plane_strain(which, tmp_path):
     if design.drive.face_width_mm > 10 * design.flexspline.rim_mm - 1e-9:
         assert 1.045 < soft < 1.07
         assert 0.955 < stiff < 0.98
+
+
+@needs_calculix
+@pytest.mark.parametrize(
+    "which",
+    ["10 mm on 1 mm", pytest.param("9 mm on 0.73 mm", marks=pytest.mark.slow)],
+)
+def test_walls_meet_the_force_of_a_solid_and_leave_its_shape(which, tmp_path):
+    """Spread by two rigid walls: radial force of a wall, shape of the free arcs."""
+    design = DRIVES[which]
+    force, shape = solid_wall(design, tmp_path)
+    own, own_shape = walled(design)
+    assert force > 0.0 and shape[-1] < -0.5
+    assert own == pytest.approx(force, rel=WALL)
+    assert own_shape == pytest.approx(shape, abs=WALL)
+    soft, _ = walled(design.with_changes({"mesh.stress_state": "plane_stress"}))
+    assert 0.94 < soft / force < 0.96
