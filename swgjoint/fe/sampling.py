@@ -40,8 +40,7 @@ contact events leave corners in the error, which some wave generators pass in a 
 torques and others at every angle."""
 MOST_ANGLES = 96
 SOLVES = 1050
-"""Equilibria of a map in the plane: one and a half times the time of 96 angles at five
-torques, of which most maps take a half."""
+"""Equilibria of a map in the plane at most; ellipses take a half."""
 UNSEEN = (16, 7)
 """Torques of one sign and angles of each that judge the map."""
 SOLID_ANGLES = 16
@@ -57,7 +56,7 @@ FIXED_SOLVES = 14
 """Equilibria per angle where the number of angles is given."""
 LEVELS = (0.05, 0.15, 0.35, 0.65, 1.0)
 """Torques of every angle, of both signs, as parts of the repeated peak torque; others
-are added angle by angle."""
+are added for all of them."""
 SOLVER = NewtonSolver(step_tolerance=1e-9, thorough_below=1e-6)
 """A map needs no more: the output error moves by 1e-9 rad and the input torque by 2e-6
 N·m, in little more than half the iterations."""
