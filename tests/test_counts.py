@@ -26,9 +26,10 @@ BAND = 0.1
 
 
 # as counted where they were written; a change that lowers one lowers it here
-PLANE_ITERATIONS = 28
-PLANE_ACTIVE_SETS = 45
-PLANE_PEAK_MB = 6.36
+PLANE_ITERATIONS = 16
+PLANE_FACTORISATIONS = 42
+PLANE_ACTIVE_SETS = 55
+PLANE_PEAK_MB = 7.58
 RANDOM_ACTIVE_SETS = 179
 SOLID_FACTORISATIONS = 35
 SOLID_ACTIVE_SETS = 102
@@ -72,8 +73,8 @@ def near(count, recorded, band=BAND):
 def test_a_fifth_more_is_found():
     """No band is so wide that the counts below could grow by a fifth unseen."""
     for recorded in (
-        *(PLANE_ITERATIONS, PLANE_ACTIVE_SETS, RANDOM_ACTIVE_SETS),
-        *(SOLID_FACTORISATIONS, SOLID_ACTIVE_SETS),
+        *(PLANE_ITERATIONS, PLANE_FACTORISATIONS, PLANE_ACTIVE_SETS),
+        *(RANDOM_ACTIVE_SETS, SOLID_FACTORISATIONS, SOLID_ACTIVE_SETS),
     ):
         assert near(recorded, recorded)
         assert not near(1.2 * recorded, recorded) and not near(0.8 * recorded, recorded)
@@ -98,13 +99,15 @@ def plane():
 
 
 def test_plane_iterations_and_factorisations(plane, counter):
-    """One factorisation and one complementarity problem an iteration; no try fails."""
+    """One complementarity problem a factorisation; no try fails."""
     counter.watch(equilibrium, "CyclicFactor")
     counter.watch(equilibrium, "solve_mixed")
     iterations, _ = path(plane, 20.0, 0.25 * PITCH)
     made = counter.taken()
     assert near(sum(iterations), PLANE_ITERATIONS)
-    assert made == {"CyclicFactor": sum(iterations), "solve_mixed": sum(iterations)}
+    # stations of the bore change sides at a linearisation, and each set is solved
+    assert near(made["CyclicFactor"], PLANE_FACTORISATIONS)
+    assert made["solve_mixed"] == made["CyclicFactor"] >= sum(iterations)
 
 
 def test_plane_complementarity_solves(plane, counter):

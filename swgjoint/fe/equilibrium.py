@@ -114,7 +114,9 @@ class NewtonSolver:
                     if exchanged is None:
                         break
                     state, ring = exchanged
-                    step = _solve_linear(model, state, ring, load, contacts)
+                    step = _solve_linear(
+                        model, state, ring, load, contacts, step.active
+                    )
                 history.append(step.largest)
                 if not step.largest < self.largest_step:
                     return replace(
@@ -190,8 +192,12 @@ def _solve_linear(
     ring: Linearised,
     load: Load,
     contacts: Contacts,
+    pressing: NDArray[np.int64] | None = None,
 ) -> _Step:
     """Condense the ring to its contact forces, solve for them, go back.
+
+    The contacts that are ``pressing``, if given, are the first guess of those that
+    carry force.
 
     Columns of the ring's inverse: the load, every contact candidate, a soft anchor that
     keeps the rotation of the whole ring regular and is taken out again as an unknown,
@@ -264,6 +270,8 @@ def _solve_linear(
     guess = offset[:m] < 0.0
     if state.contacts is not None and len(state.contacts):
         guess = contacts.on_flanks_of(state.contacts)
+    if pressing is not None:
+        guess = np.isin(np.arange(m), pressing)
 
     def solved_for(matrix: Array, offset: Array) -> tuple[Array, Mask]:
         return solve_mixed(
