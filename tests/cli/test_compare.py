@@ -222,8 +222,9 @@ def test_wave_generators_come_out_in_the_known_order(capsys, monkeypatch):
     assert K["parabolic"] > 4.0 * K["simplified"]  # 1.5e4
     assert K["simplified"] > 1.5 * K["four rollers"]  # 7.2e3
     error = {k: row["transmission_error_ripple_arcmin"] for k, row in of.items()}
-    assert error["simplified"] > 2.0 * error["elliptical"]  # 0.040, 0.011 arcmin
-    assert error["parabolic"] > error["simplified"]  # 0.050
+    # lower bounds, 0.0050 and 0.0093 arcmin with the angles that maps take
+    assert error["simplified"] < error["elliptical"]
+    assert error["parabolic"] > 2.0 * error["elliptical"]  # 0.046
     assert error["four rollers"] > 4.0 * error["parabolic"]  # 0.36
     ripple = {name: row["ripple_rms_percent"] for name, row in of.items()}
     assert ripple["four rollers"] > 1.5 * ripple["elliptical"]  # 2.0, 0.95 %
