@@ -130,7 +130,7 @@ class CondensedRing:
         return system, offset
 
     def _answers(self, response: Array) -> Array:
-        """Of teeth, anchor and rotation to displacements (n + 2, n_columns)."""
+        """Gaps of teeth, anchor, rotation under displacements (n + 2, n_columns)."""
         n = len(self.contacts)
         return np.concatenate(
             [
@@ -140,7 +140,7 @@ class CondensedRing:
         )
 
     def _system(self, supports: Supports) -> tuple[Array, Array]:
-        """The same with supports behind the teeth, k of them (n + k + 3)."""
+        """As :attr:`_teeth`, with k supports after the teeth (n + k + 3 unknowns)."""
         n, sector = len(self.contacts), supports.intervals.sector
         k = len(sector)
         m = n + k
@@ -159,7 +159,7 @@ class CondensedRing:
         return system, offset
 
     def influence(self, supports: Supports) -> Influence:
-        """With some supports that may change sides."""
+        """Complementarity problem of teeth and of supports that may change sides."""
         model, state, contacts = self.model, self.state, self.contacts
         system, offset = self._system(supports)
         n, m = len(contacts), len(contacts) + len(supports.intervals.sector)
@@ -193,8 +193,7 @@ def distinct(contacts: Contacts, state: State) -> tuple[Contacts, Mask]:
     """Contacts that are not almost the same point, and which of them carry force.
 
     Of two points of a flank closer than :data:`ALIKE` the one with the larger force
-    stays. Both would be nearly dependent: what opens them together would be lost in
-    round-off.
+    stays: two nearly dependent contacts would make the system ill-conditioned.
     """
     held = state.contacts
     force = np.zeros(len(contacts))
@@ -250,7 +249,7 @@ class Supports:
 
     @classmethod
     def of(cls, ring: Linearised, state: State, used: Mask) -> Supports:
-        """Those of some intervals (N, intervals)."""
+        """Supports of the intervals marked in ``used`` (N, intervals)."""
         p = ring.stations.per_interval
         touching = state.touching.reshape(len(used), -1, p)
         sector, interval = np.nonzero(used)

@@ -13,7 +13,8 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 LONE = 0.3
-"""Doubt of the place of a step that one end alone predicts, in the interval."""
+"""Uncertainty of the place of a step that only one end predicts, as part of the
+interval."""
 FITS = 3
 """Linearisations of a fit."""
 
@@ -66,7 +67,7 @@ class Steps:
     """[rad/(N·m)]."""
     contact: Index
     doubt: Array
-    """How far the places may be off."""
+    """Uncertainty of the places."""
 
     @classmethod
     def merged(cls, first: Steps, last: Steps) -> Steps:

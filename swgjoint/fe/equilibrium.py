@@ -328,7 +328,7 @@ def _solve_linear(
 def _exchanged(
     state: State, ring: Linearised, step: _Step, below: float
 ) -> tuple[State, Linearised] | None:
-    """Stations of the bore that a step closes or opens, taken in or out of the tangent.
+    """Invert the contact state of the bore stations that a step closes or opens.
 
     Returns:
         None without such stations, after too large a step, or on a race, whose tangent

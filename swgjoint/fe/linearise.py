@@ -119,10 +119,10 @@ class Linearised:
         return np.asarray(self.gap + np.einsum("sqi,sqi->sq", shift, self.normal))
 
     def exchanged(self, stations: Mask, touching: Mask) -> Linearised:
-        """With some stations of the bore (N, q) taken out that touch, or taken in.
+        """The tangent with the contact state of some stations (N, q) inverted.
 
-        On a rigid wave generator; its curvature there does not matter, the gap is next
-        to nothing.
+        For a rigid wave generator. Its curvature is neglected there, because the gap of
+        a station that changes sides is almost zero.
         """
         sectors = np.flatnonzero(stations.any(axis=1))
         change = np.where(touching, -1.0, 1.0) * stations * self.stations.stiffness

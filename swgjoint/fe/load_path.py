@@ -33,14 +33,15 @@ CHANCE = 0.01
 """Part of the length of an interval times the change of its compliance that counts as
 unknown: several jumps may happen to look like one."""
 AGREED = 0.5
-"""Part of the difference between the predictions of both ends that their mean is off
-by: they err by the square of the distance."""
+"""Estimated error of the merged prediction, as part of the difference between the
+predictions of both ends. Measured on five designs: true errors are 0.5 to 1.6 of it."""
 BENT = 0.1
-"""Part of what they leave to a cubic that may be off, too."""
+"""Estimated error of the cubic correction, as part of its deviation from a line."""
 SMOOTH = 0.4
-"""Usual smooth deviation of the compliance from a straight line, in its size."""
+"""Typical smooth variation of the compliance between two steps, as part of its size."""
 STRONG = 0.02
-"""Step of the compliance, in the largest one, that torques of a table follow."""
+"""Smallest step of the compliance that the torques of a table follow, as part of the
+largest compliance."""
 _GRID = np.linspace(0.0, 1.0, 17)
 """Where explanations are compared in an interval."""
 _NEAR_END = 0.1
@@ -286,7 +287,7 @@ class _Curves:
 
     @property
     def bend(self) -> _Curves:
-        """What is no step and no slope."""
+        """Deviation of the cubic from a straight line, without the steps."""
         power = self.power.copy()
         power[:, 1] = -power[:, 2:].sum(axis=1)
         power[:, 0] = 0.0
@@ -376,7 +377,7 @@ def _two_jumps(c0: Array, change: Array, mean: Array, moment: Array) -> _Curves:
 def _steps_on_cubic(
     c0: Array, change: Array, mean: Array, moment: Array, steps: list[Steps]
 ) -> _Curves:
-    """Given steps in every interval, and the cubic that they leave."""
+    """Given steps in every interval, plus the cubic that meets all four figures."""
     most = max((own.place.size for own in steps), default=0)
     place, jump = np.zeros((c0.size, most)), np.zeros((c0.size, most))
     for k, own in enumerate(steps):

@@ -376,18 +376,18 @@ class ColumnGrid(Generic[AnyState]):
                 continue
             error, energy = self._curves_at(columns, torque)
             there, _, _, moment = self._row(others, torque)
-            told, _ = periodic(error, parts)
-            _, slope = periodic(energy + torque * error, parts)
-            slope = slope / self.period + torque / self.follow.ratio
-            # the height of what the samples and the others have
-            moments = periodic(energy + torque * error, self._parts(count))[1]
-            moments = moments / self.period + torque / self.follow.ratio
-            for own, truth, prediction in (
-                (error, there, told),
-                (moments, moment, slope),
+            predicted, _ = periodic(error, parts)
+            _, slope = periodic(
+                energy + torque * error, np.concatenate([parts, self._parts(count)])
+            )
+            moments = slope / self.period + torque / self.follow.ratio
+            predicted_moment, own_moment = np.split(moments, [len(parts)])
+            for own, truth, found in (
+                (error, there, predicted),
+                (own_moment, moment, predicted_moment),
             ):
                 height = np.ptp(np.concatenate([own, truth]))
-                worst = max(worst, float(np.abs(prediction - truth).max() / height))
+                worst = max(worst, float(np.abs(found - truth).max() / height))
         return worst
 
     def _curves_at(
@@ -468,7 +468,7 @@ class ColumnGrid(Generic[AnyState]):
                 self._add_torque(count, torque)
 
     def _doubts(self, count: int) -> list[tuple[float, float]]:
-        """What is unknown of every interval between common torques.
+        """Estimate the error of every interval between common torques.
 
         Returns:
             Estimated error, in the peak to peak, and where to divide it [N·m].
