@@ -29,6 +29,10 @@ class ComputationError(SwgError, RuntimeError):
     """A computation that failed; carries the outcome's advice (exit status 1)."""
 
 
+class OutputWarning(UserWarning):
+    """A file that belongs to a result could not be written; the result stands."""
+
+
 class Outcome(Enum):
     """Outcome of a solve; the value is the advice that a user sees."""
 

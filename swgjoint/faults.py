@@ -20,6 +20,20 @@ from swgjoint.errors import InputError
 
 MAX_BYTES = 2_000_000
 """No input file of ours is longer; a longer one is not read."""
+MAX_DEPTH = 16
+"""Tables and lists inside each other; our files have five."""
+MAX_KEY = 200
+"""Characters of a key."""
+_INTEGERS = range(-(2**63), 2**63)
+"""Of TOML 1.0.0, section "Integer"."""
+# more parts than MAX_DEPTH joined by dots: parsing those takes quadratic time
+_LONG_KEY = re.compile(
+    r"(?<![\w\"'-])[\w\"'-]++(?:[ \t]*+\.[ \t]*+[\w\"'-]++)"
+    rf"{{{MAX_DEPTH}}}"
+)
+_LONG = f"a key of more than {MAX_DEPTH} parts joined by dots"
+_CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]")
+"""Characters that move a terminal's cursor or end a text; tab and newline do not."""
 
 # the last part of a key that is a unit, as written in messages
 _UNITS = {
@@ -165,11 +179,83 @@ def _a(noun: str) -> str:
 def parse_toml(
     text: str, *, where: str, error: type[InputError] = InputError
 ) -> dict[str, Any]:
-    """Parse TOML text; a syntax error is one line."""
+    """Parse TOML text from elsewhere.
+
+    The one door for it: what passes is at most :data:`MAX_DEPTH` deep, its integers
+    have 64 bits, its keys are short and its texts hold no control characters, so that
+    no reader behind has to expect anything else.
+
+    Raises:
+        InputError: With one line about the first fault.
+    """
+    if _LONG_KEY.search(text):
+        raise error(f"{where}: {_LONG}")
     try:
-        return tomllib.loads(text)
-    except (tomllib.TOMLDecodeError, RecursionError) as exc:
+        data = tomllib.loads(text)
+    except RecursionError:
+        raise error(f"{where}: {_too_deep()}") from None
+    except ValueError as exc:  # also of Python, for an integer of thousands of digits
         raise error(f"{where}: not valid TOML: {exc}") from None
+    fault = _first_fault(data)
+    if fault is not None:
+        raise error(f"{where}: {fault}")
+    return data
+
+
+def parse_value(text: str, *, where: str) -> Any:
+    """A TOML value from elsewhere; a bare word is a text.
+
+    Raises:
+        InputError: If it is a value that :func:`parse_toml` refuses in a file.
+    """
+    if _LONG_KEY.search(text):
+        raise InputError(f"{where}: {_LONG}")
+    try:
+        value = tomllib.loads(f"value = {text}")["value"]
+    except RecursionError:
+        raise InputError(f"{where}: {_too_deep()}") from None
+    except tomllib.TOMLDecodeError:
+        value = text.strip()
+    except ValueError as exc:
+        raise InputError(f"{where}: not a valid value: {exc}") from None
+    fault = _first_fault({where: value})
+    if fault is not None:
+        raise InputError(fault)
+    return value
+
+
+def shortened(text: str, most: int = 60) -> str:
+    """A foreign text as a message repeats it: cut, without control characters."""
+    text = _CONTROL.sub("?", text)
+    return text if len(text) <= most else f"{text[: most - 3]}..."
+
+
+def _too_deep() -> str:
+    return f"TOML tables or lists nested too deep; accepted: {MAX_DEPTH} levels"
+
+
+def _first_fault(data: dict[str, Any]) -> str | None:
+    """What no file of ours holds, wherever it stands; walks without recursion."""
+    todo: list[tuple[str, Any, int]] = [("", data, 0)]
+    while todo:
+        path, value, depth = todo.pop()
+        if depth > MAX_DEPTH:
+            return f"{shortened(path)}: {_too_deep()}"
+        if isinstance(value, dict):
+            for key, item in value.items():
+                if len(key) > MAX_KEY or _CONTROL.search(key):
+                    return (
+                        f"{shortened(key)}: not a key; accepted: up to {MAX_KEY}"
+                        " characters, no control characters"
+                    )
+                todo.append((f"{path}.{key}" if path else key, item, depth + 1))
+        elif isinstance(value, list):
+            todo += [(f"{path}[{k}]", item, depth + 1) for k, item in enumerate(value)]
+        elif isinstance(value, int) and value not in _INTEGERS:
+            return f"{shortened(path)}: an integer of more than 64 bits"
+        elif isinstance(value, str) and _CONTROL.search(value):
+            return f"{shortened(path)} = {shortened(value)!r}: a control character"
+    return None
 
 
 def validated(
@@ -219,7 +305,7 @@ def _lines(model: type[BaseModel], detail: ErrorDetails) -> list[str]:
         tags = ctx["expected_tags"]
         near = get_close_matches(str(ctx["tag"]), re.findall(r"\w+", tags), n=1)
         hint = f"did you mean {near[0]}? " if near else ""
-        return [f"{path}.kind = {ctx['tag']!r}: {hint}accepted: {tags}"]
+        return [f"{path}.kind = {_shown(ctx['tag'], '')}: {hint}accepted: {tags}"]
     if kind == "literal_error":
         return [f"{path} = {_shown(value, '')}: accepted: {ctx['expected']}"]
     if kind in _BOUND_ERRORS:
@@ -254,7 +340,8 @@ def _walk(
         if isinstance(part, int):
             path += f"[{part}]"
             continue
-        path += f".{part}" if path else part
+        name = shortened(str(part))
+        path += f".{name}" if path else name
         if named or here is None:
             named = False
             continue
@@ -351,6 +438,5 @@ def _shown(value: Any, key: str) -> str:
         if value is True or value is False
         else (f"{value:g}" if isinstance(value, float) else repr(value))
     )
-    text = text if len(text) <= 60 else text[:57] + "..."
     unit = unit_of(key)
-    return f"{text} {unit}" if unit else text
+    return f"{shortened(text)} {unit}" if unit else shortened(text)

@@ -4,9 +4,14 @@ from __future__ import annotations
 
 import os
 import secrets
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
-from swgjoint.errors import InputError
+from swgjoint.errors import InputError, OutputWarning, SwgError
+from swgjoint.json_text import json_text
 
 
 def write_whole(path: str | Path, data: bytes | str) -> Path:
@@ -27,6 +32,72 @@ def write_whole(path: str | Path, data: bytes | str) -> Path:
     finally:
         beside.unlink(missing_ok=True)
     return path
+
+
+@contextmanager
+def attempting(
+    path: str | Path, *, unless: Callable[[], bool] = lambda: False
+) -> Iterator[None]:
+    """Turn whatever keeps a file from being written into an ``OutputWarning``.
+
+    A picture that cannot be drawn must not cost the figures that it would show.
+
+    Args:
+        path: The file.
+        unless: Whether a failure is not that of the file but of its content, which is
+            raised.
+    """
+    try:
+        yield
+    except Exception as failure:
+        if unless():
+            raise
+        kind = "" if isinstance(failure, SwgError) else f"{type(failure).__name__}: "
+        text = f"{path} is not written: {kind}{' '.join(str(failure).split())}"
+        warnings.warn(OutputWarning(text), stacklevel=3)
+
+
+class Outputs:
+    """The files of one result; one that fails is a warning and costs no other.
+
+    Args:
+        folder: Where they go; it is made when the first one is written.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self.files: list[str] = []
+        """Paths of those that were written."""
+
+    def write(self, name: str, make: Callable[[], bytes | str | None]) -> None:
+        """Write what ``make`` returns, whole; nothing where it returns None."""
+
+        def written(path: Path) -> Path | None:
+            content = make()
+            return None if content is None else write_whole(path, content)
+
+        self.hand_over(name, written)
+
+    def write_json(self, name: str, result: dict[str, Any]) -> None:
+        """Write a result with all files in its key ``files``, which this sets.
+
+        The last one to write, so that it names no file that is not there.
+        """
+        path = str(self._folder / name)
+        content = result | {"files": [path, *self.files]}
+        self.write(name, lambda: json_text(content) + "\n")
+        if path in self.files:
+            self.files.remove(path)
+            self.files.insert(0, path)
+        result["files"] = self.files
+
+    def hand_over(self, name: str, write: Callable[[Path], Path | None]) -> None:
+        """Let ``write`` write the file; it returns the path, or None for no file."""
+        path = self._folder / name
+        with attempting(path):
+            self._folder.mkdir(parents=True, exist_ok=True)
+            if write(path) is not None:
+                self.files.append(str(path))
 
 
 def check_output_file(path: str | Path, suffix: str) -> Path:

@@ -8,8 +8,7 @@ from typing import Any
 
 from swgjoint.cli.text import table
 from swgjoint.errors import InputError
-from swgjoint.files import output_folder, write_whole
-from swgjoint.json_text import json_text
+from swgjoint.files import Outputs, output_folder
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -120,7 +119,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         "files": [],
     }
     if folder is not None:
-        result["files"] = _write(folder, result, rows, spec, args.progress)
+        _write(folder, result, rows, spec, args.progress)
     return result
 
 
@@ -138,32 +137,36 @@ def _limits(args: argparse.Namespace) -> dict[str, float] | None:
 
 def _write(
     folder: Path, result: dict[str, Any], rows: Any, spec: Any, progress: Any
-) -> list[str]:
+) -> None:
     """Picture, figures, report and recording."""
     from swgjoint.study.compare_shown import comparison_picture, comparison_table
     from swgjoint.view.recording import write_recording
     from swgjoint.view.report import write_report
 
-    folder.mkdir(parents=True, exist_ok=True)
-    picture = comparison_picture(rows, result["scene"], spec)
     runs: dict[str, Any] = {}
     for row in rows:  # an argument may be given twice, a run of the report has one name
         again = sum(name.split(" (again")[0] == row.argument for name in runs)
         runs[f"{row.argument} (again {again})" if again else row.argument] = row.run
-    report = write_report(
-        runs,
-        folder / "report.html",
-        summary=comparison_table(rows, spec),
-        pictures={"Figures side by side": picture},
-        progress=progress,
+    outputs, pictures = Outputs(folder), {}
+
+    def picture() -> bytes:
+        drawn = comparison_picture(rows, result["scene"], spec)
+        pictures["Figures side by side"] = drawn
+        return drawn
+
+    outputs.write("compare.png", picture)
+    outputs.hand_over(
+        "report.html",
+        lambda path: write_report(
+            runs,
+            path,
+            summary=comparison_table(rows, spec),
+            pictures=pictures,
+            progress=progress,
+        ),
     )
-    files = [
-        write_whole(folder / "compare.png", picture),
-        write_whole(folder / "compare.json", json_text(result) + "\n"),
-        report,
-        write_recording(runs, folder / "run.rrd"),
-    ]
-    return [str(path) for path in files]
+    outputs.hand_over("run.rrd", lambda path: write_recording(runs, path))
+    outputs.write_json("compare.json", result)
 
 
 def status(result: dict[str, Any]) -> int:

@@ -9,7 +9,7 @@ from typing import Any
 
 from swgjoint.cli.run import joint_table, notes, verdict_lines
 from swgjoint.cli.text import table
-from swgjoint.files import output_folder
+from swgjoint.files import Outputs, output_folder
 
 SCENE = "ur5e-sweep"
 DRIVES = {"elliptical": "reference-2d", "simplified": "reference-2d-simplified"}
@@ -86,15 +86,23 @@ def _write(folder: Path, runs: Any, rigid: Any, progress: Any) -> list[str]:
     from swgjoint.view.recording import write_recording
     from swgjoint.view.report import write_report
 
+    outputs, shown = Outputs(folder), {}
+
+    def picture(path: Path) -> Path:
+        comparison_png(runs, path, rigid=rigid)
+        shown["Torsion, error, ripple, its orders and tool error"] = path.read_bytes()
+        return path
+
     progress("recording and picture", 0, 2)
-    recording = write_recording(runs, folder / "run.rrd", rigid=rigid)
+    outputs.hand_over("run.rrd", lambda path: write_recording(runs, path, rigid=rigid))
     progress("recording and picture", 1, 2)
-    picture = comparison_png(runs, folder / "demo.png", rigid=rigid)
+    outputs.hand_over("demo.png", picture)
     progress("recording and picture", 2, 2)
-    shown = {"Torsion, error, ripple, its orders and tool error": picture.read_bytes()}
-    page = folder / "report.html"
-    report = write_report(runs, page, pictures=shown, progress=progress)
-    return [str(recording), str(picture), str(report)]
+    outputs.hand_over(
+        "report.html",
+        lambda path: write_report(runs, path, pictures=shown, progress=progress),
+    )
+    return outputs.files
 
 
 def status(result: dict[str, Any]) -> int:
@@ -133,5 +141,6 @@ def report(result: dict[str, Any]) -> str:
     header = ("", "mean", "rms", "largest", "pp at speed", "steps/s")
     lines += ["", "tool against the rigid arm [mm]:", table(rows, header=header), ""]
     lines += [f"wrote {path}" for path in result["files"]]
-    lines += [f"{result['wall_s']:.1f} s; watch it: swgjoint view {result['files'][0]}"]
+    watch = [f"; watch it: swgjoint view {f}" for f in result["files"] if ".rrd" in f]
+    lines += [f"{result['wall_s']:.1f} s{''.join(watch)}"]
     return "\n".join(lines)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from swgjoint.cli.text import table
 from swgjoint.errors import DesignError, InputError
-from swgjoint.files import check_output_file, output_folder, write_whole
+from swgjoint.files import Outputs, check_output_file, output_folder, write_whole
 
 if TYPE_CHECKING:
     from swgjoint.gear.check import Check
@@ -330,12 +330,11 @@ def _show(design: Design, path: ToothPath | str, folder: Path) -> dict[str, Any]
     from swgjoint.view.design_plots import design_picture
     from swgjoint.view.tooth_path_plots import tooth_path_picture
 
-    pictures = {"design.png": design_picture(design)}
+    outputs = Outputs(folder)
+    outputs.write("design.png", lambda: design_picture(design))
     if not isinstance(path, str):
-        pictures["tooth-path.png"] = tooth_path_picture(design, path)
-    folder.mkdir(parents=True, exist_ok=True)
-    files = [str(write_whole(folder / name, data)) for name, data in pictures.items()]
-    return {"tooth_path": _path_numbers(path), "files": files}
+        outputs.write("tooth-path.png", lambda: tooth_path_picture(design, path))
+    return {"tooth_path": _path_numbers(path), "files": outputs.files}
 
 
 def _export(design: Design, folder: Path) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from swgjoint.cli.text import table
 from swgjoint.errors import InputError
-from swgjoint.files import output_folder
+from swgjoint.files import Outputs, output_folder
 from swgjoint.units import arcmin
 
 if TYPE_CHECKING:
@@ -105,13 +105,14 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         orders=orders,
         window=WINDOW if args.window is None else args.window,
     )
-    files = []
+    files: list[str] = []
     if out is not None:
-        from swgjoint.control.identify_plots import write_picture
+        from swgjoint.control.identify_plots import png
 
-        out.mkdir(parents=True, exist_ok=True)
-        found.drive.save(out / "identified.swg")
-        files = [str(out / "identified.swg"), str(write_picture(found, out))]
+        outputs = Outputs(out)
+        outputs.hand_over("identified.swg", found.drive.save)
+        outputs.write("identified.png", lambda: png(found))
+        files = outputs.files
     return result_of(found) | {
         "log": args.log,
         "files": files,

@@ -9,8 +9,7 @@ from typing import Any
 
 from swgjoint.cli.text import table
 from swgjoint.errors import InputError
-from swgjoint.files import output_folder, write_whole
-from swgjoint.json_text import json_text
+from swgjoint.files import Outputs, output_folder
 
 MAX_DRIVES = 100_000
 MAX_JOBS = 256
@@ -75,16 +74,13 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         jobs=args.jobs,
         progress=args.progress,
     )
-    files: list[str] = []
+    result = {**result, "files": []}
     if folder is not None:
-        folder.mkdir(parents=True, exist_ok=True)
-        files.append(str(write_whole(folder / "lot.csv", _csv(result["rows"]))))
-        picture = lot_picture(result)
-        if picture is not None:
-            files.append(str(write_whole(folder / "lot.png", picture)))
-        files.append(str(folder / "lot.json"))
-        write_whole(folder / "lot.json", json_text({**result, "files": files}))
-    return {**result, "files": files}
+        outputs = Outputs(folder)
+        outputs.write("lot.csv", lambda: _csv(result["rows"]))
+        outputs.write("lot.png", lambda: lot_picture(result))
+        outputs.write_json("lot.json", result)
+    return result
 
 
 def report(result: dict[str, Any]) -> str:

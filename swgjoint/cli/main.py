@@ -12,16 +12,19 @@ import argparse
 import os
 import sys
 import textwrap
+import traceback
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from difflib import get_close_matches
+from functools import partial
 from importlib import import_module
+from pathlib import Path
 from types import ModuleType
 from typing import Any, NoReturn
 
 from swgjoint import __version__
-from swgjoint.errors import InputError, SwgError
+from swgjoint.errors import InputError, OutputWarning, SwgError
 from swgjoint.progress import StderrProgress, silent
 
 COMMANDS = {
@@ -51,6 +54,8 @@ COMMANDS = {
 BAD_INPUT = 2
 FAILED = 1
 INTERRUPTED = 130
+LONGEST, MOST = 500, 50
+"""Characters of a line, and lines, that one message has at most."""
 BROKEN_PIPE = 141
 STATUSES = (
     "Exit status: 0 success; 1 a computation failed, or its result misses a limit or is"
@@ -66,7 +71,8 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Print the fault and where help is."""
-        self.exit(BAD_INPUT, f"{self.prog}: {message}; see '{self.prog} --help'\n")
+        line = _cut(f"{self.prog}: {message}")
+        self.exit(BAD_INPUT, f"{line}; see '{self.prog} --help'\n")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -120,9 +126,8 @@ def _top(arguments: list[str]) -> int:
     hint = f"did you mean {near[0]}? " if near else ""
     if args.command in COMMANDS:
         parser.error(f"options stand after the command: swgjoint {args.command} ...")
-    parser.error(
-        f"unknown command {args.command!r}; {hint}one of {', '.join(COMMANDS)}"
-    )
+    command = args.command if len(args.command) <= 40 else f"{args.command[:37]}..."
+    parser.error(f"unknown command {command!r}; {hint}one of {', '.join(COMMANDS)}")
 
 
 def _command(name: str, arguments: list[str]) -> int:
@@ -143,13 +148,19 @@ def _command(name: str, arguments: list[str]) -> int:
         action="store_true",
         help="every step of the progress as a line of its own",
     )
+    parser.add_argument(
+        "--traceback",
+        action="store_true",
+        help="after an internal error, where in the code it happened",
+    )
     parser.epilog = f"{parser.epilog or ''} {STATUSES}".strip()
     args = parser.parse_args(arguments)
     progress = StderrProgress(verbose=args.verbose)
     args.progress = silent if args.quiet else progress
+    incomplete: list[str] = []
     try:
         with warnings.catch_warnings(), _ended(progress):
-            warnings.showwarning = _show_warning
+            warnings.showwarning = partial(_show_warning, incomplete)
             result = _result(module, args)
     except SwgError as exc:
         bad_input = isinstance(exc, InputError)
@@ -161,8 +172,12 @@ def _command(name: str, arguments: list[str]) -> int:
         return _refuse(name, f"{what}{exc.strerror or exc}", FAILED)
     except MemoryError:
         return _refuse(name, "out of memory: use a smaller refinement", FAILED)
+    except Exception as exc:  # a defect of ours: one line, and how to report it
+        if args.traceback:
+            traceback.print_exc()
+        return _refuse(name, _internal(exc, shown=args.traceback), FAILED)
     status = getattr(module, "status", None)
-    return int(status(result)) if status else 0
+    return (int(status(result)) if status else 0) or int(bool(incomplete)) * FAILED
 
 
 def _result(module: ModuleType, args: argparse.Namespace) -> dict[str, Any]:
@@ -181,13 +196,43 @@ def _result(module: ModuleType, args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _refuse(name: str, message: str, status: int) -> int:
-    for line in message.splitlines():
-        print(f"swgjoint {name}: {line}", file=sys.stderr)
+    lines = message.splitlines()
+    for line in lines[:MOST]:
+        print(_cut(f"swgjoint {name}: {line}"), file=sys.stderr)
+    if len(lines) > MOST:
+        print(f"swgjoint {name}: {len(lines) - MOST} more faults", file=sys.stderr)
     return status
 
 
-def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
-    print(f"swgjoint: warning: {message}", file=sys.stderr)
+def _internal(exc: Exception, *, shown: bool) -> str:
+    """One line about an exception that nobody expected."""
+    last = traceback.extract_tb(exc.__traceback__)[-1]
+    text = " ".join(str(exc).split())[:200]
+    again = "" if shown else " of the same command with --traceback"
+    return (
+        f"internal error, {type(exc).__name__} at {Path(last.filename).name}:"
+        f"{last.lineno}{': ' if text else ''}{text}; please report it with the input"
+        f" and the output{again}"
+    )
+
+
+def _show_warning(
+    incomplete: list[str],
+    message: Warning | str,
+    category: type[Warning],
+    *_: Any,
+    **__: Any,
+) -> None:
+    """Print a warning; one about an output that is missing is kept, too."""
+    print(_cut(f"swgjoint: warning: {message}"), file=sys.stderr)
+    if issubclass(category, OutputWarning):
+        incomplete.append(str(message))
+
+
+def _cut(line: str) -> str:
+    """A line of a message without what controls a terminal, and not too long."""
+    line = "".join(c if c.isprintable() or c == "\t" else "?" for c in line)
+    return line if len(line) <= LONGEST else f"{line[: LONGEST - 3]}..."
 
 
 @contextmanager

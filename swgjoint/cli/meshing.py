@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import argparse
 import math
+from functools import partial
 from typing import Any
 
 from swgjoint.cli.text import table
 from swgjoint.errors import InputError, Outcome
-from swgjoint.files import output_folder, write_whole
-from swgjoint.json_text import json_text, plain
+from swgjoint.files import Outputs, attempting, output_folder
+from swgjoint.json_text import plain
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -100,21 +101,20 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         from swgjoint.fe.meshing_run import MeshingRun
         from swgjoint.view.meshing_plots import meshing_picture
 
-        pictures = {"meshing": meshing_picture(result)}
-        if isinstance(meshing, MeshingRun):
-            from swgjoint.view.field_plots import field_pictures
+        outputs = Outputs(folder)
+        outputs.write("meshing.png", lambda: meshing_picture(result))
+        with attempting(folder / "pictures of the fields"):
+            if isinstance(meshing, MeshingRun):
+                from swgjoint.view.field_plots import field_pictures
 
-            pictures |= field_pictures(meshing)
-        else:
-            from swgjoint.view.solid_plots import solid_pictures
+                pictures = field_pictures(meshing)
+            else:
+                from swgjoint.view.solid_plots import solid_pictures
 
-            pictures |= solid_pictures(meshing)
-        folder.mkdir(parents=True, exist_ok=True)
-        names = ["meshing.json", *(f"{name}.png" for name in pictures)]
-        result["files"] = [str(folder / name) for name in names]
-        write_whole(folder / "meshing.json", json_text(result) + "\n")
-        for name, picture in pictures.items():
-            write_whole(folder / f"{name}.png", picture)
+                pictures = solid_pictures(meshing)
+            for name, picture in pictures.items():
+                outputs.write(f"{name}.png", partial(bytes, picture))
+        outputs.write_json("meshing.json", result)
     return result
 
 

@@ -7,8 +7,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 from swgjoint.cli.text import table
-from swgjoint.files import output_folder, write_whole
-from swgjoint.json_text import json_text
+from swgjoint.files import Outputs, output_folder
 
 if TYPE_CHECKING:
     from swgjoint.gear.profile import ToothProfile
@@ -49,11 +48,9 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     if folder is not None:
         from swgjoint.view.profile_plots import profile_picture
 
-        picture = profile_picture(design, profiles)
-        folder.mkdir(parents=True, exist_ok=True)
-        result["files"] = [str(folder / f"profile.{end}") for end in ("json", "png")]
-        write_whole(folder / "profile.json", json_text(result) + "\n")
-        write_whole(folder / "profile.png", picture)
+        outputs = Outputs(folder)
+        outputs.write("profile.png", lambda: profile_picture(design, profiles))
+        outputs.write_json("profile.json", result)
     return result
 
 

@@ -8,7 +8,7 @@ from typing import Any
 from swgjoint.cli.arm_arguments import add_arm_arguments, choice_lines, scene_of
 from swgjoint.cli.text import table
 from swgjoint.errors import InputError
-from swgjoint.files import output_folder, write_whole
+from swgjoint.files import Outputs, output_folder
 
 JOINT_HEADER = (
     "joint",
@@ -100,18 +100,22 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         scene = scene.with_model(args.model)
     recording = folder / "run.rrd" if folder is not None else None
     result = run_scene(scene, recording=recording, progress=args.progress)
-    files = []
+    files: list[str] = []
     if folder is not None:
-        files.append(str(recording))
+        outputs = Outputs(folder)
+        outputs.hand_over("run.rrd", lambda path: result.recording)
         if of_arm:
             from swgjoint.sim.scene_toml import scene_toml
 
-            files.append(str(write_whole(folder / "scene.toml", scene_toml(scene))))
+            outputs.write("scene.toml", lambda: scene_toml(scene))
         if args.report:
             from swgjoint.view.report import write_report
 
-            page = folder / "report.html"
-            files.append(str(write_report({"": result}, page, progress=args.progress)))
+            outputs.hand_over(
+                "report.html",
+                lambda path: write_report({"": result}, path, progress=args.progress),
+            )
+        files = outputs.files
     live = None
     if args.live is not None:
         from swgjoint.view.live import stream_runs

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from swgjoint.cli.map_validity_text import doubts, marked, validation_of_sheet
 from swgjoint.cli.text import table
-from swgjoint.files import output_folder, write_whole
-from swgjoint.json_text import json_text
+from swgjoint.files import Outputs, output_folder
 from swgjoint.view.words import words
 
 if TYPE_CHECKING:
@@ -115,10 +114,9 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         found = laid.as_dict()
         found["warnings"] = [*doubts, *found["warnings"]]
         result["measured"] = {"file": args.measured, **found}
-    result["files"] = []
+    result |= {"files": [], "wall_s": time.perf_counter() - start}
     if folder is not None:
-        _write(folder, result, sheet, laid, start)
-    result["wall_s"] = time.perf_counter() - start
+        _write(folder, result, sheet, laid)
     return result
 
 
@@ -247,21 +245,16 @@ def _write(
     result: dict[str, Any],
     sheet: SpecSheet,
     laid: Overlay | None,
-    start: float,
 ) -> None:
     from swgjoint.view.spec_plots import spec_picture
 
-    pictures = {"spec.png": spec_picture(result["design"], sheet)}
+    outputs = Outputs(folder)
+    outputs.write("spec.png", lambda: spec_picture(result["design"], sheet))
     if laid is not None:
         from swgjoint.view.overlay_plots import overlay_picture
 
-        pictures["measured.png"] = overlay_picture(result["design"], laid)
-    folder.mkdir(parents=True, exist_ok=True)
-    result["files"] = [str(folder / name) for name in ("spec.json", *pictures)]
-    content = result | {"wall_s": time.perf_counter() - start}
-    write_whole(folder / "spec.json", json_text(content) + "\n")
-    for name, picture in pictures.items():
-        write_whole(folder / name, picture)
+        outputs.write("measured.png", lambda: overlay_picture(result["design"], laid))
+    outputs.write_json("spec.json", result)
 
 
 def report(result: dict[str, Any]) -> str:

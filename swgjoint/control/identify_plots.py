@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import io
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from swgjoint.files import write_whole
 from swgjoint.units import arcmin
 
 if TYPE_CHECKING:
@@ -20,11 +18,11 @@ _TURNS = 4
 _LABELS = {"output_torque": "output torque", "motor_torque": "motor torque"}
 
 
-def write_picture(found: Identified, folder: Path) -> Path:
-    """Write ``identified.png`` into a folder."""
+def png(found: Identified) -> bytes:
+    """The picture as a file."""
     out = io.BytesIO()
     picture(found).savefig(out, format="png", dpi=120)
-    return write_whole(folder / "identified.png", out.getvalue())
+    return out.getvalue()
 
 
 def picture(found: Identified) -> Figure:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable, Mapping
 from copy import deepcopy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -16,6 +16,7 @@ from mujoco.rollout import Rollout
 from numpy.typing import NDArray
 
 from swgjoint.errors import ComputationError, InputError
+from swgjoint.files import attempting
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.progress import Progress, silent
 from swgjoint.sim.actuators import control_inputs, limited, wanted_torque
@@ -79,6 +80,8 @@ class Run:
     """Tool on the commanded motion without any error [m]. Same shape."""
     wall: float
     """Time that the steps took [s]."""
+    recording: Path | None = None
+    """The recording for the viewer that was written with the run."""
 
     @property
     def steps_per_second(self) -> float:
@@ -154,7 +157,8 @@ def run_scene(
             feed-forward then has; None: the scene's arm, with its payload if known.
         name: What recordings and progress call the run; default: the scene's name.
         recording: File that receives the recording for the viewer, like
-            :meth:`Run.to_rerun` but begun while the steps are taken.
+            :meth:`Run.to_rerun` but begun while the steps are taken; a recording that
+            cannot be written is an ``OutputWarning``, the run stands.
         progress: Called with the steps done.
 
     Raises:
@@ -184,14 +188,18 @@ def run_scene(
         return simulate(assembly, name=name, loop=loop, progress=progress)
     from swgjoint.view.recording import Recorder
 
-    with Recorder(assembly, recording) as recorder:
+    run = None
+    with attempting(recording, unless=lambda: run is None):
+        with Recorder(assembly, recording) as recorder:
 
-        def going(label: str, done: int, total: int) -> None:
-            recorder.begin()
-            progress(label, done, total)
+            def going(label: str, done: int, total: int) -> None:
+                recorder.begin()
+                progress(label, done, total)
 
-        run = simulate(assembly, name=name, loop=loop, progress=going)
-        recorder.finish(run)
+            run = simulate(assembly, name=name, loop=loop, progress=going)
+            recorder.finish(run)
+        run = replace(run, recording=Path(recording))
+    assert run is not None
     return run
 
 

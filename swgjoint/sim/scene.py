@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Self
@@ -10,7 +9,16 @@ from typing import Annotated, Any, Self
 from pydantic import Field, PrivateAttr, model_validator
 
 from swgjoint.errors import InputError
-from swgjoint.faults import Fault, Section, parse_toml, read_toml, validated
+from swgjoint.faults import (
+    MAX_DEPTH,
+    Fault,
+    Section,
+    parse_toml,
+    parse_value,
+    read_toml,
+    shortened,
+    validated,
+)
 from swgjoint.models_path import find
 from swgjoint.sim.arm_reading import ArmReading
 from swgjoint.sim.feature_sections import (
@@ -322,13 +330,15 @@ def parse_override(text: str) -> tuple[str, Any]:
     key = key.strip()
     if not equals or not all(key.split(".")):
         raise InputError(
-            f"override {text!r}: accepted: key=value with a dotted key, for example"
-            " simulation.step_s=0.0005"
+            f"override {shortened(text)!r}: accepted: key=value with a dotted key, for"
+            " example simulation.step_s=0.0005"
         )
-    try:
-        return key, tomllib.loads(f"value = {value}")["value"]
-    except tomllib.TOMLDecodeError:
-        return key, value.strip()  # a bare word: a name or a path
+    if key.count(".") >= MAX_DEPTH:
+        raise InputError(
+            f"override {shortened(key)}: accepted: a dotted key of at most {MAX_DEPTH}"
+            " parts"
+        )
+    return key, parse_value(value, where=key)  # a bare word: a name or a path
 
 
 def _anchor_paths(data: dict[str, Any], folder: Path) -> None:

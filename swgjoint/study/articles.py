@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from swgjoint.errors import InputError
-from swgjoint.files import write_whole
+from swgjoint.files import Outputs
 from swgjoint.gear.design import Design
 from swgjoint.json_text import json_text
 from swgjoint.study.articles_file import ArticlesFile, changed
@@ -185,10 +185,7 @@ def _write(
         return ()
     from swgjoint.study.articles_plots import articles_picture
 
-    options.folder.mkdir(parents=True, exist_ok=True)
-    table = json_text([row.to_json() for row in rows]) + "\n"
-    files = [write_whole(options.folder / "articles.json", table)]
-    picture = articles_picture(parts, found)
-    if picture is not None:
-        files.append(write_whole(options.folder / "articles.png", picture))
-    return tuple(str(path) for path in files)
+    outputs, table = Outputs(options.folder), [row.to_json() for row in rows]
+    outputs.write("articles.json", lambda: json_text(table) + "\n")
+    outputs.write("articles.png", lambda: articles_picture(parts, found))
+    return tuple(outputs.files)

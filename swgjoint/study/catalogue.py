@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from swgjoint.errors import InputError
-from swgjoint.files import write_whole
+from swgjoint.files import Outputs
 from swgjoint.gear.design import Design
 from swgjoint.json_text import json_text
 from swgjoint.study.catalogue_coning import (
@@ -107,10 +107,8 @@ def run_catalogue(options: StudyOptions) -> StudyResult:
         more["coning"] = coning_summary(study, found)
         lines += more["coning"]["lines"]
     lines += [f"failed: {name}: {fault}" for name, fault in failed.items()]
-    files = _write(options.folder, rows, lines)
-    if "coning" in parts and options.folder is not None:
-        picture = coning_picture(more["coning"]["rows"])
-        files += (str(write_whole(options.folder / "coning.png", picture)),)
+    coning = more["coning"]["rows"] if "coning" in parts else None
+    files = _write(options.folder, rows, lines, coning)
     return StudyResult(rows=tuple(rows), summary=tuple(lines), more=more, files=files)
 
 
@@ -203,23 +201,27 @@ def rows_of(study: CatalogueFile, part: str, found: Mapping[str, Found]) -> list
 
 
 def _write(
-    folder: Path | None, rows: Sequence[Row], lines: Sequence[str]
+    folder: Path | None,
+    rows: Sequence[Row],
+    lines: Sequence[str],
+    coning: Sequence[Any] | None,
 ) -> tuple[str, ...]:
     if folder is None:
         return ()
     from swgjoint.study.catalogue_plots import catalogue_picture
 
     plain = [row.to_json() for row in rows]
-    folder.mkdir(parents=True, exist_ok=True)
-    content = json_text({"rows": plain, "summary": lines})
-    files = [write_whole(folder / "catalogue.json", content)]
+    outputs = Outputs(folder)
+    outputs.write(
+        "catalogue.json", lambda: json_text({"rows": plain, "summary": lines})
+    )
     if plain:
         text = io.StringIO()
         writer = csv.DictWriter(text, fieldnames=list(plain[0]), lineterminator="\n")
         writer.writeheader()
         writer.writerows(plain)
-        files.append(write_whole(folder / "catalogue.csv", text.getvalue()))
-    picture = catalogue_picture(rows)
-    if picture is not None:
-        files.append(write_whole(folder / "catalogue.png", picture))
-    return tuple(str(path) for path in files)
+        outputs.write("catalogue.csv", text.getvalue)
+    outputs.write("catalogue.png", lambda: catalogue_picture(rows))
+    if coning is not None:
+        outputs.write("coning.png", lambda: coning_picture(coning))
+    return tuple(outputs.files)

@@ -27,7 +27,7 @@ from typing import Any
 
 from swgjoint.errors import ComputationError, DesignError
 from swgjoint.fe.solid.drive3d import check_modelled
-from swgjoint.files import write_whole
+from swgjoint.files import Outputs
 from swgjoint.gear.design import Design
 from swgjoint.json_text import json_text
 from swgjoint.progress import Progress, silent
@@ -130,19 +130,16 @@ def run_fe_cost(
         "kinematic_error_positions": POSITIONS,
         "provenance": provenance(),
     }
-    files = []
+    files: list[str] = []
     if folder is not None:
-        folder.mkdir(parents=True, exist_ok=True)
-        files = [
-            write_whole(folder / "bench-fe.json", json_text(result) + "\n"),
-            write_whole(folder / "bench-fe.csv", _table(rows)),
-            write_whole(folder / "bench-fe.png", cost_picture(result)),
-        ]
+        outputs = Outputs(folder)
+        outputs.write("bench-fe.json", lambda: json_text(result) + "\n")
+        outputs.write("bench-fe.csv", lambda: _table(rows))
+        outputs.write("bench-fe.png", lambda: cost_picture(result))
         if recompute:
-            text = json_text(to_store(design, found))
-            files.append(write_whole(folder / FILE, text + "\n"))
-    wall = time.perf_counter() - begin
-    return result | {"files": [str(path) for path in files], "wall_s": wall}
+            outputs.write(FILE, lambda: json_text(to_store(design, found)) + "\n")
+        files = outputs.files
+    return result | {"files": files, "wall_s": time.perf_counter() - begin}
 
 
 def _solve_all(

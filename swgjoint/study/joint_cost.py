@@ -11,13 +11,14 @@ import csv
 import io
 import time
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import mujoco
 
 from swgjoint.errors import ComputationError, InputError
-from swgjoint.files import write_whole
+from swgjoint.files import Outputs
 from swgjoint.joint.attach import LEVELS
 from swgjoint.json_text import json_text
 from swgjoint.progress import Progress, silent
@@ -294,12 +295,10 @@ def write_files(result: dict[str, Any], folder: Path) -> list[str]:
     writer = csv.DictWriter(text, fieldnames=names, lineterminator="\n")
     writer.writeheader()
     writer.writerows(rows)
-    written = [
-        write_whole(folder / "bench-joint.csv", text.getvalue()),
-        write_whole(folder / "bench-joint.json", json_text(result) + "\n"),
-    ]
+    outputs = Outputs(folder)
+    outputs.write("bench-joint.csv", text.getvalue)
+    outputs.write("bench-joint.json", lambda: json_text(result) + "\n")
     for scene in dict.fromkeys(row["scene"] for row in rows):
         own = [row for row in rows if row["scene"] == scene]
-        picture = joint_picture(scene, own)
-        written.append(write_whole(folder / f"bench-joint-{scene}.png", picture))
-    return [str(path) for path in written]
+        outputs.write(f"bench-joint-{scene}.png", partial(joint_picture, scene, own))
+    return outputs.files

@@ -5,11 +5,12 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Iterator, Sequence
+from functools import partial
 from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from swgjoint.files import write_whole
+from swgjoint.files import Outputs
 from swgjoint.json_text import json_text
 from swgjoint.study.cases import StudyFile
 from swgjoint.study.checks import TrendCheck
@@ -64,18 +65,14 @@ def write_report(
     Returns:
         The paths.
     """
-    folder.mkdir(parents=True, exist_ok=True)
     plain_rows = [row.to_json() for row in rows]
-    files = [
-        write_whole(folder / "thesis.csv", _csv(plain_rows)),
-        write_whole(
-            folder / "thesis.md", _markdown(study, results, rows, trends, summary)
-        ),
-        write_whole(folder / "thesis.json", json_text(plain_rows) + "\n"),
-    ]
+    outputs = Outputs(folder)
+    outputs.write("thesis.csv", lambda: _csv(plain_rows))
+    outputs.write("thesis.md", lambda: _markdown(study, results, rows, trends, summary))
+    outputs.write("thesis.json", lambda: json_text(plain_rows) + "\n")
     for part, found in groupby(results, key=lambda result: result.case.group.id):
-        files.append(write_whole(folder / f"{part}.png", group_picture(list(found))))
-    return tuple(str(path) for path in files)
+        outputs.write(f"{part}.png", partial(group_picture, list(found)))
+    return tuple(outputs.files)
 
 
 def _csv(rows: Sequence[dict[str, Any]]) -> str:

@@ -19,7 +19,7 @@ from scipy.interpolate import CubicSpline
 
 from swgjoint.errors import InputError
 from swgjoint.fe.plain_ring import PlainRing, PulledRing, pull_ring
-from swgjoint.files import write_whole
+from swgjoint.files import Outputs
 from swgjoint.json_text import json_text
 from swgjoint.study.ring_plots import ring_picture
 from swgjoint.study.rows import Row, StudyOptions, StudyResult
@@ -206,11 +206,10 @@ def _write(
 ) -> tuple[str, ...]:
     if options.folder is None:
         return ()
-    options.folder.mkdir(parents=True, exist_ok=True)
-    picture = ring_picture(cases, fine=REFINEMENTS[-1], total=TOTAL_mm * mm)
-    table = json_text([row.to_json() for row in rows]) + "\n"
-    files = [
-        write_whole(options.folder / "ring.json", table),
-        write_whole(options.folder / "ring.png", picture),
-    ]
-    return tuple(str(path) for path in files)
+    outputs, table = Outputs(options.folder), [row.to_json() for row in rows]
+    outputs.write("ring.json", lambda: json_text(table) + "\n")
+    outputs.write(
+        "ring.png",
+        lambda: ring_picture(cases, fine=REFINEMENTS[-1], total=TOTAL_mm * mm),
+    )
+    return tuple(outputs.files)

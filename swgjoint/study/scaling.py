@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from swgjoint.errors import ComputationError
-from swgjoint.files import write_whole
+from swgjoint.files import Outputs
 from swgjoint.json_text import json_text
 from swgjoint.progress import Progress, silent
 from swgjoint.study import scaling_fe, scaling_joint
@@ -154,17 +154,14 @@ def run_scaling(
         "fits": [fit for sweep in sweeps if (fit := fitted(sweep, rows)) is not None],
         "provenance": provenance(),
     }
-    files = []
+    files: list[str] = []
     if folder is not None:
-        folder.mkdir(parents=True, exist_ok=True)
-        labels = {sweep.name: sweep.label for sweep in sweeps}
-        files = [
-            write_whole(folder / "bench-scaling.json", json_text(result) + "\n"),
-            write_whole(folder / "bench-scaling.csv", _table(rows)),
-            write_whole(folder / "bench-scaling.png", scaling_picture(result, labels)),
-        ]
-    wall = time.perf_counter() - begin
-    return result | {"files": [str(path) for path in files], "wall_s": wall}
+        outputs, labels = Outputs(folder), {sweep.name: sweep.label for sweep in sweeps}
+        outputs.write("bench-scaling.json", lambda: json_text(result) + "\n")
+        outputs.write("bench-scaling.csv", lambda: _table(rows))
+        outputs.write("bench-scaling.png", lambda: scaling_picture(result, labels))
+        files = outputs.files
+    return result | {"files": files, "wall_s": time.perf_counter() - begin}
 
 
 def fitted(sweep: Sweep, rows: Sequence[dict[str, Any]]) -> dict[str, Any] | None:

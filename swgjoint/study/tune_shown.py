@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from swgjoint.files import write_whole
+from swgjoint.files import Outputs
 from swgjoint.json_text import json_text
 from swgjoint.study.tune_result import Candidate, Tuned
 from swgjoint.units import arcmin
@@ -56,25 +56,31 @@ def claims(found: Tuned) -> list[str]:
 
 def write_files(found: Tuned, folder: Path) -> list[str]:
     """``tune.png``, ``tune.json`` and ``report.html``; returns their paths."""
-    folder.mkdir(parents=True, exist_ok=True)
-    drawn = picture(found)
-    files = [
-        write_whole(folder / "tune.png", drawn),
-        write_whole(folder / "tune.json", json_text(found.to_json()) + "\n"),
-        write_tables(
-            folder / "report.html",
+    outputs, pictures = Outputs(folder), {}
+
+    def drawn() -> bytes:
+        png = picture(found)
+        pictures["Search, held-out seeds and one episode"] = png
+        return png
+
+    outputs.write("tune.png", drawn)
+    outputs.write("tune.json", lambda: json_text(found.to_json()) + "\n")
+    outputs.hand_over(
+        "report.html",
+        lambda path: write_tables(
+            path,
             title=f"Tuning of {found.settings.controller} in {found.environment}",
             description="; ".join(claims(found)) + ".",
             tables=[_summary(found), _gains(found), _by_seed(found)],
-            pictures={"Search, held-out seeds and one episode": drawn},
+            pictures=pictures,
             settings={
                 "Run": json_text(
                     {k: v for k, v in found.to_json().items() if k != "candidates"}
                 )
             },
         ),
-    ]
-    return [str(path) for path in files]
+    )
+    return outputs.files
 
 
 def picture(found: Tuned) -> bytes:

@@ -19,6 +19,7 @@ from swgjoint import __version__
 from swgjoint.cli import main as frame
 from swgjoint.cli.main import COMMANDS, main
 from swgjoint.errors import ComputationError, DesignError, MissingExtraError
+from swgjoint.files import Outputs
 
 
 @pytest.fixture
@@ -176,15 +177,65 @@ def test_errors_are_lines(command, capsys, error, status, lines, options):
         assert found == [f"swgjoint doctor: {line}" for line in lines]
 
 
-def test_a_defect_is_not_hidden(command):
-    """An error that is not ours keeps its traceback."""
+@pytest.mark.parametrize("options", [[], ["--json"], ["--traceback"]])
+@pytest.mark.parametrize(
+    "error",
+    [ZeroDivisionError(), RecursionError("x" * 5000), KeyError("a\nb"), TypeError("µ")],
+)
+def test_a_defect_is_one_line(command, capsys, error, options):
+    """An error that is not ours is one line that asks for a report; status 1."""
 
     def work(args):
-        raise ZeroDivisionError
+        raise error
 
     command(work)
-    with pytest.raises(ZeroDivisionError):
-        main(["doctor"])
+    assert main(["doctor", *options]) == 1
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert ("Traceback" in err) == ("--traceback" in options)
+    last = err.splitlines()[-1]
+    assert len(last) <= 500 and (err.count("\n") == 1 or "--traceback" in options)
+    assert names(last, "internal error", type(error).__name__, "test_main.py", "report")
+
+
+def test_a_missing_output_leaves_the_figures(command, capsys, tmp_path):
+    """The result is printed, the file is named, and the status is 1."""
+
+    def work(args):
+        outputs = Outputs(tmp_path)
+        outputs.write("a.png", lambda: 1 / 0)
+        return {"figure": 1.5, "files": outputs.files}
+
+    command(work)
+    with warnings.catch_warnings():
+        warnings.simplefilter("default")
+        assert main(["doctor", "--json"]) == 1
+    out, err = capsys.readouterr()
+    assert json.loads(out) == {"figure": 1.5, "files": []}
+    assert err.count("\n") == 1
+    assert names(err, "warning", "a.png", "not written", "ZeroDivisionError")
+
+
+def test_long_messages_are_cut(command, capsys):
+    """A message has 51 lines at most, each of up to 500 printable characters."""
+
+    def work(args):
+        raise DesignError("\n".join(["\x1b[2J" + "k" * 5000] * 1000))
+
+    command(work)
+    assert main(["doctor"]) == 2
+    lines = capsys.readouterr().err.splitlines()
+    assert len(lines) == 51 and max(map(len, lines)) <= 500
+    assert all(line.isprintable() for line in lines)
+    assert names(lines[-1], "950", "more")
+    for arguments in (
+        ["k" * 5000],
+        ["doctor", "k" * 5000],
+        ["doctor", "--size", "k" * 5000],
+    ):
+        with pytest.raises(SystemExit):
+            main(arguments)
+        assert len(capsys.readouterr().err) < 600
 
 
 def test_json_is_alone_on_stdout(command, capfd):

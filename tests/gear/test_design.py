@@ -94,7 +94,7 @@ def test_bundled_designs_load_by_name_and_path(name):
 
 def test_text_round_trip(reference):
     """The text of a design reads back to the same design, awkward texts included."""
-    named = reference.with_changes(drive__name='a "b" \\ \t µ\x7f', drive__source="§")
+    named = reference.with_changes(drive__name='a "b" \\ \t\n µ', drive__source="§")
     again = Design.from_toml(named.to_toml())
     assert again.model_dump() == named.model_dump()
     tomllib.loads(named.to_toml())
