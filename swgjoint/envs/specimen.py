@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from functools import cache
+from functools import lru_cache
+from hashlib import sha256
+from pathlib import Path
 
 import numpy as np
 
@@ -16,8 +18,39 @@ from swgjoint.maps.error_spectrum import with_assumed_error
 from swgjoint.sim.drives import load_drive
 from swgjoint.units import arcmin
 
-load_drive_once = cache(load_drive)
-"""Maps by reference: environments are made by the hundred."""
+
+def load_drive_once(
+    reference: str, *, kinematic_error_arcmin: float | None = None
+) -> DriveMap:
+    """The map that a reference names now: environments are made by the hundred.
+
+    It is kept as long as the file has the same content, wherever the process works.
+
+    Args:
+        reference: See :func:`swgjoint.sim.drives.load_drive`.
+        kinematic_error_arcmin: The same.
+
+    Raises:
+        InputError: The same.
+    """
+    file = Path(reference)
+    try:
+        content = sha256(file.read_bytes()).digest() if file.is_file() else None
+    except (OSError, ValueError):  # what cannot be read is refused by the loader
+        content = None
+    return _load_once(
+        reference if content is None else str(file.resolve()),
+        content,
+        kinematic_error_arcmin=kinematic_error_arcmin,
+    )
+
+
+@lru_cache(maxsize=256)
+def _load_once(
+    reference: str, content: bytes | None, *, kinematic_error_arcmin: float | None
+) -> DriveMap:
+    """The map of a reference whose file, if it is one, has this content."""
+    return load_drive(reference, kinematic_error_arcmin=kinematic_error_arcmin)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -17,7 +17,7 @@ from swgjoint.envs.core import LIMITS
 from swgjoint.envs.joint_tracking import JointTrackingEnv, JointTrackingVectorEnv
 from swgjoint.envs.references import KINDS
 from swgjoint.envs.sensors import Sensors
-from swgjoint.envs.specimen import Tolerances
+from swgjoint.envs.specimen import Tolerances, load_drive_once
 from swgjoint.errors import InputError
 from swgjoint.joint.variation import Variation
 from swgjoint.maps.drive_map import DriveMap
@@ -374,3 +374,26 @@ def test_missing_gymnasium_names_the_command(tmp_path):
     )
     assert done.returncode == 1
     assert names(done.stderr, "gymnasium", "pip install 'swgjoint[envs]'")
+
+
+def test_an_environment_has_the_drive_that_the_file_holds_now(tmp_path, monkeypatch):
+    """A map that was written anew, or another folder's of the same name, counts."""
+
+    def stiffness():
+        env = JointTrackingEnv(drive="d.swg")
+        return env.core.plant.drives[0].drive.mean_stiffness
+
+    for folder, first in (("a", 2e4), ("b", 3e4)):
+        (tmp_path / folder).mkdir()
+        monkeypatch.chdir(tmp_path / folder)
+        for value in (first, 5e3, first):
+            DriveMap.linear(value).save("d.swg")
+            assert stiffness() == pytest.approx(value)
+
+
+def test_a_drive_is_loaded_once_while_its_file_stays(tmp_path):
+    """Environments of one drive share its map."""
+    path = str(tmp_path / "d.swg")
+    DriveMap.linear(2e4).save(path)
+    assert load_drive_once(path) is load_drive_once(path)
+    assert load_drive_once("CSG-25-100") is load_drive_once("CSG-25-100")

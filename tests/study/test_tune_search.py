@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from messages import naming
 
-from swgjoint.envs.specimen import load_drive_once
 from swgjoint.errors import InputError
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.study.tune import tune
@@ -135,7 +134,6 @@ def test_a_changed_drive_is_another_run(tmp_path):
             end_stiffness=ends,
             kinematic_error=shape,
         ).save(path)
-        load_drive_once.cache_clear()  # as in another process
 
     path = tmp_path / "own.swg"
     arguments = settings().arguments | {"drive": str(path)}
@@ -149,4 +147,3 @@ def test_a_changed_drive_is_another_run(tmp_path):
         tune(chosen, folder=folder, resume=True)
     written(1e-4)
     assert tune(chosen, folder=folder, resume=True).best.values
-    load_drive_once.cache_clear()
