@@ -112,7 +112,7 @@ def test_rated_torque_is_the_default(monkeypatch):
 
     seen = {}
 
-    class Stop(Exception):
+    class Stop(BaseException):
         pass
 
     def simulate(design, **options):
