@@ -30,6 +30,7 @@ from swgjoint.fe.solid.drive3d import check_modelled
 from swgjoint.files import write_whole
 from swgjoint.gear.design import Design
 from swgjoint.json_text import json_text
+from swgjoint.kept import json_file
 from swgjoint.progress import Progress, silent
 from swgjoint.study.fe_cost_plots import cost_picture
 from swgjoint.study.fe_cost_rows import cheapest, rows_of
@@ -139,8 +140,8 @@ def run_fe_cost(
             write_whole(folder / "bench-fe.png", cost_picture(result)),
         ]
         if recompute:
-            text = json_text(to_store(design, found))
-            files.append(write_whole(folder / FILE, text + "\n"))
+            stored_file = json_file(to_store(design, found))
+            files.append(write_whole(folder / FILE, stored_file))
     wall = time.perf_counter() - begin
     return result | {"files": [str(path) for path in files], "wall_s": wall}
 

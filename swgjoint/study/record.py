@@ -3,27 +3,22 @@
 from __future__ import annotations
 
 import hashlib
-import json
-import logging
 import time
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import asdict, dataclass, field
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from swgjoint.errors import ComputationError, DesignError, InputError
-from swgjoint.files import write_whole
+from swgjoint.errors import ComputationError, DesignError
 from swgjoint.gear.design import Design
-from swgjoint.json_text import json_text
+from swgjoint.kept import json_content, json_file, keep, read_kept
 from swgjoint.maps.cache import cache_folder, key_of
 from swgjoint.study.cases import KINDS
 from swgjoint.units import MPa
-
-_log = logging.getLogger(__name__)
 
 NUMBER = float | None
 
@@ -108,31 +103,13 @@ def recorded(spec: RunSpec) -> RunRecord:
     """
     folder = cache_folder()
     path = None if folder is None else folder / "studies" / f"{spec.key}.json"
-    found = None if path is None else _kept(path)
-    if found is not None:
-        return found
-    record = compute(spec)
-    if path is not None:
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            write_whole(path, json_text(asdict(record)))
-        except (OSError, InputError) as error:
-            _log.warning("record not kept in the cache: %s", error)
-    return record
-
-
-def _kept(path: Path) -> RunRecord | None:
-    names = {item.name for item in fields(RunRecord)}
-    try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-        if set(data) == names:
-            return RunRecord(**data)
-    except FileNotFoundError:
-        return None
-    except (OSError, ValueError, TypeError):
-        pass
-    _log.warning("cache entry ignored and computed again: %s", path)
-    return None
+    if path is None:
+        return compute(spec)
+    found = read_kept(path, lambda data: json_content(data, RunRecord))
+    if found is None:
+        found = compute(spec)
+        keep(path, json_file(asdict(found)))
+    return found
 
 
 def compute(spec: RunSpec) -> RunRecord:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 from dataclasses import dataclass, replace
+from typing import Any
 
 import pytest
 from messages import names, naming
@@ -13,6 +13,7 @@ from validation_record import validated_map
 
 from swgjoint.errors import ComputationError, InputError, MissingExtraError
 from swgjoint.faults import parse_toml, validated
+from swgjoint.kept import json_content, json_file
 from swgjoint.sim.scene import Scene
 from swgjoint.study import sweep as sweep_module
 from swgjoint.study import sweep_figures
@@ -234,7 +235,8 @@ def test_a_kept_result_of_other_types_is_computed_again(tmp_path, counted, chang
     place = place_of(tmp_path)
     first = run_sweep(sheet([10.0]), executor=counted, place=place)
     (path,) = tmp_path.glob("results/*/*.json")
-    path.write_text(json.dumps(json.loads(path.read_text()) | change))
+    content = json_content(path.read_bytes(), dict[str, Any])
+    path.write_bytes(json_file(content | change))
     found = run_sweep(sheet([10.0]), executor=counted, place=place)
     assert (found.reused, found.computed) == (0, 1)
     assert found.records[0].figures == first.records[0].figures
