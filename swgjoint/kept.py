@@ -39,14 +39,14 @@ class DamagedError(InputError):
     """A kept file that is not what a run has written."""
 
 
-def json_file(content: Mapping[str, Any]) -> bytes:
+def json_file(content: Any) -> bytes:
     """A JSON object whose first entry ``sha256`` is the hash of the rest.
 
     Args:
-        content: At least one entry.
+        content: A dataclass or mapping with at least one entry.
     """
-    assert content, "an empty object has no place for the hash"
     body = (json_text(content, ascii_only=True) + "\n").encode()
+    assert body.startswith(b"{\n"), "no entry: the hash has no place"
     return _HEAD % _hash(body) + body.removeprefix(b"{")
 
 

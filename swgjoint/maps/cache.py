@@ -12,14 +12,17 @@ from dataclasses import replace
 from functools import lru_cache
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from swgjoint import __version__
 from swgjoint.errors import InputError, MapFileError
 from swgjoint.json_text import plain
+from swgjoint.kept import json_content, json_file, keep, read_kept
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.file import SCHEMA_VERSION
 from swgjoint.models_path import models_path
+
+Found = TypeVar("Found")
 
 _log = logging.getLogger(__name__)
 
@@ -109,6 +112,46 @@ def cached(
     path = folder / "maps" / key[:2] / f"{key}.swg"
     drive = _sound(path, str(parts["design"])) or _built(path, build)
     return drive if name in (None, drive.name) else replace(drive, name=name)
+
+
+def recalled(
+    store: str,
+    parts: Mapping[str, Any],
+    kind: type[Found],
+    compute: Callable[[], Found],
+) -> Found:
+    """What was computed of the given parts, from the cache or computed and then kept.
+
+    An entry appears whole, under a name that only its content decides, so that work
+    that was interrupted goes on where it stopped; a damaged entry is computed again.
+
+    Args:
+        store: Folder in the cache.
+        parts: Everything that decides the result, code outside of gear, fe and maps
+            included. JSON values.
+        kind: Type of the result, with fields of JSON values.
+        compute: Called when there is no sound entry.
+    """
+    path = entry_of(store, parts)
+    found = known(path, kind)
+    if found is None:
+        found = compute()
+        if path is not None:
+            keep(path, json_file(found))
+    return found
+
+
+def entry_of(store: str, parts: Mapping[str, Any]) -> Path | None:
+    """File of a result in the cache, see :func:`recalled`; None if that is off."""
+    folder = cache_folder()
+    return None if folder is None else folder / store / f"{key_of(parts)}.json"
+
+
+def known(path: Path | None, kind: type[Found]) -> Found | None:
+    """What an entry holds; None if there is none or it is damaged."""
+    if path is None:
+        return None
+    return read_kept(path, lambda data: json_content(data, kind))
 
 
 def _sound(path: Path, design: str) -> DriveMap | None:

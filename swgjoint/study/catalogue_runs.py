@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 from swgjoint.errors import ComputationError, DesignError
 from swgjoint.gear.design import Design
-from swgjoint.kept import json_content, json_file, keep, read_kept
-from swgjoint.maps.cache import cache_folder, key_of
+from swgjoint.maps.cache import recalled
 
 if TYPE_CHECKING:
     from swgjoint.fe.ring_friction import RubbedPath
@@ -51,35 +50,23 @@ class Task:
 
 def run_task(task: Task) -> Found:
     """The result of a task, kept or computed; ``fault`` where it failed."""
-    folder = cache_folder()
-    path = None if folder is None else folder / "studies" / f"{_key(task)}.json"
-    kept = None if path is None else read_kept(path, _found)
-    if kept is not None:
-        return kept
+    parts = {
+        "study": _own_version(),
+        "kind": task.kind,
+        "design": task.design.content_hash(),
+        "torques": task.torques,
+    }
+    return recalled("studies", parts, Found, lambda: _computed(task))
+
+
+def _computed(task: Task) -> Found:
     begin = time.perf_counter()
     try:
         found = KINDS[task.kind](task)
     except (ComputationError, DesignError) as error:
         found = {"fault": str(error).splitlines()[0]}
     found["wall_s"] = time.perf_counter() - begin
-    if path is not None:
-        keep(path, json_file(found))
     return found
-
-
-def _found(data: bytes) -> Found:
-    return json_content(data, Found)
-
-
-def _key(task: Task) -> str:
-    return key_of(
-        {
-            "study": _own_version(),
-            "kind": task.kind,
-            "design": task.design.content_hash(),
-            "torques": task.torques,
-        }
-    )
 
 
 @lru_cache

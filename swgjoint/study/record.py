@@ -6,7 +6,7 @@ import hashlib
 import time
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -15,8 +15,7 @@ import numpy as np
 
 from swgjoint.errors import ComputationError, DesignError
 from swgjoint.gear.design import Design
-from swgjoint.kept import json_content, json_file, keep, read_kept
-from swgjoint.maps.cache import cache_folder, key_of
+from swgjoint.maps.cache import key_of, recalled
 from swgjoint.study.cases import KINDS
 from swgjoint.units import MPa
 
@@ -36,18 +35,21 @@ class RunSpec:
     model: str = "2d"
 
     @property
+    def parts(self) -> dict[str, Any]:
+        """The design, the load and the code of the record."""
+        return {
+            "study": _own_version(),
+            "design": self.design.content_hash(),
+            "torque": self.torque,
+            "positions": self.positions,
+            "turn": self.turn,
+            "model": self.model,
+        }
+
+    @property
     def key(self) -> str:
-        """Hash of the design, the load and the code."""
-        return key_of(
-            {
-                "study": _own_version(),
-                "design": self.design.content_hash(),
-                "torque": self.torque,
-                "positions": self.positions,
-                "turn": self.turn,
-                "model": self.model,
-            }
-        )
+        """Hash of the parts and of all other code."""
+        return key_of(self.parts)
 
     @property
     def size(self) -> float:
@@ -96,20 +98,8 @@ class RunRecord:
 
 
 def recorded(spec: RunSpec) -> RunRecord:
-    """The record of a run, from the cache or computed and then kept.
-
-    An entry appears whole, under a name that only its content decides, so that a study
-    that was interrupted goes on where it stopped; a damaged entry is computed again.
-    """
-    folder = cache_folder()
-    path = None if folder is None else folder / "studies" / f"{spec.key}.json"
-    if path is None:
-        return compute(spec)
-    found = read_kept(path, lambda data: json_content(data, RunRecord))
-    if found is None:
-        found = compute(spec)
-        keep(path, json_file(asdict(found)))
-    return found
+    """The record of a run, from the cache or computed and then kept."""
+    return recalled("studies", spec.parts, RunRecord, lambda: compute(spec))
 
 
 def compute(spec: RunSpec) -> RunRecord:
