@@ -2,16 +2,61 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
+import platform
+import re
 import secrets
+import stat
 import warnings
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 from swgjoint.errors import InputError, OutputWarning, SwgError
 from swgjoint.json_text import json_text
+
+
+@contextmanager
+def whole(path: Path) -> Iterator[Path]:
+    """A file beside the target that takes its place at the end if nothing fails.
+
+    Its name tells the machine and the process. What a killed process has left beside
+    this target goes when the next one begins.
+    """
+    host = hashlib.sha256(platform.node().encode()).hexdigest()[:8]
+    start = f".{path.name[:40]}.{host}-"
+    _clear(path.parent, re.compile(re.escape(start) + r"(\d+)-[0-9a-f]{8}"))
+    beside = path.with_name(f"{start}{os.getpid()}-{secrets.token_hex(4)}")
+    # made here, so that it is nobody else's; its mode follows the umask
+    beside.open("xb").close()
+    try:
+        yield beside
+        os.replace(beside, path)
+    finally:
+        beside.unlink(missing_ok=True)
+
+
+def _clear(folder: Path, left: re.Pattern[str]) -> None:
+    """Remove temporary files of processes of this machine that are gone."""
+    with suppress(OSError):  # no such folder, or another process removes them too
+        for name in os.listdir(folder):
+            found = left.fullmatch(name)
+            if found is not None and _is_gone(int(found[1])):
+                (folder / name).unlink(missing_ok=True)
+
+
+def _is_gone(process: int) -> bool:
+    if os.name != "posix":  # signal 0 asks there only
+        return False
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return True
+    except (OSError, OverflowError):
+        return False
+    return False
 
 
 def write_whole(path: str | Path, data: bytes | str) -> Path:
@@ -21,16 +66,11 @@ def write_whole(path: str | Path, data: bytes | str) -> Path:
         InputError: If the folder does not exist or cannot be written.
     """
     path = Path(path)
-    beside = path.with_name(f".{path.name[:80]}.{os.getpid()}-{secrets.token_hex(4)}")
-    content = data.encode() if isinstance(data, str) else data
     try:
-        with beside.open("xb") as file:
-            file.write(content)
-        os.replace(beside, path)
+        with whole(path) as beside:
+            beside.write_bytes(data.encode() if isinstance(data, str) else data)
     except OSError as exc:
         raise InputError(f"cannot write {path}: {exc.strerror}") from None
-    finally:
-        beside.unlink(missing_ok=True)
     return path
 
 
@@ -98,6 +138,17 @@ class Outputs:
             self._folder.mkdir(parents=True, exist_ok=True)
             if write(path) is not None:
                 self.files.append(str(path))
+
+
+def read_regular(path: Path) -> bytes:
+    """Content of a regular file; a pipe or a device would never end.
+
+    Raises:
+        OSError: If it cannot be read or is something else.
+    """
+    if not stat.S_ISREG(path.stat().st_mode):
+        raise OSError(f"{path} is no regular file")
+    return path.read_bytes()
 
 
 def check_output_file(path: str | Path, suffix: str) -> Path:

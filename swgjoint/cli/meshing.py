@@ -58,12 +58,14 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out",
         metavar="DIR",
-        help="write meshing.json and pictures there; of a 3d run also the states",
+        help="write meshing.json and pictures there; of a 3d run also the states, from"
+        " which the same command goes on after a stop",
     )
     parser.add_argument(
         "--resume",
         action="store_true",
-        help="go on with an interrupted 3d run whose states lie in --out DIR",
+        help="go on with an interrupted 3d run whose states are in --out DIR; without,"
+        " one of the same design and options is gone on with, too",
     )
 
 

@@ -176,6 +176,7 @@ def _ratcheting(
 ) -> None:
     """Add the ratcheting torque of a design, or the reason why there is none."""
     from swgjoint.gear.design import Design
+    from swgjoint.maps.cache import recalled
     from swgjoint.maps.spec_sheet import RATCHETING_KEY
     from swgjoint.sim.drives import find_drive
 
@@ -184,15 +185,20 @@ def _ratcheting(
         return
     from swgjoint.fe.ratcheting import ratcheting_path
 
-    path = ratcheting_path(source, progress=args.progress)
-    details["ratcheting"] = path.as_dict()
-    if path.passed:
-        values[RATCHETING_KEY] = path.limit
+    path = recalled(
+        "figures",
+        {"figure": RATCHETING_KEY, "design": source.content_hash()},
+        dict[str, Any],
+        lambda: ratcheting_path(source, progress=args.progress).as_dict(),
+    )
+    details["ratcheting"] = path
+    if path["passed"]:
+        values[RATCHETING_KEY] = path["limit_Nm"]
     else:
         rim = source.circular_spline.outer_rim
         reasons[RATCHETING_KEY] = (
-            f"more than {path.limit:.4g} N·m (a lower bound, where the search ended:"
-            f" {path.outcome.name.lower()}): the plane has a rigid wave generator, and"
+            f"more than {path['limit_Nm']:.4g} N·m (a lower bound, where the search"
+            f" ended: {path['outcome']}): the plane has a rigid wave generator, and"
             f" the outside of the circular spline is {rim}"
         )
 

@@ -20,9 +20,7 @@ SHOWN = 40
 def configure(parser: argparse.ArgumentParser) -> None:
     """Sweep file, where it is computed, where results are kept."""
     parser.epilog = (
-        "A sweep that was stopped goes on with the same command. After kill -KILL of"
-        " this process its workers stay up to five minutes and finish what they have in"
-        " hand; another sweep may run beside them."
+        "A sweep that was stopped, by whatever means, goes on with the same command."
     )
     parser.add_argument("file", metavar="FILE", help="sweep file or bundled name")
     configure_places(

@@ -51,10 +51,13 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--out",
         metavar="DIR",
         help="write report.html, tune.png, tune.json there, and tune.npz after every"
-        " generation",
+        " generation, from which the same command goes on after a stop",
     )
     parser.add_argument(
-        "--resume", action="store_true", help="go on with the tune.npz of --out"
+        "--resume",
+        action="store_true",
+        help="go on with the tune.npz of --out, which has to be there; without, one of"
+        " the same settings is gone on with, too",
     )
 
 

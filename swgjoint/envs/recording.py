@@ -7,10 +7,7 @@ figures of ``info`` at every step (``<figure>`` alone where there is one for all
 
 from __future__ import annotations
 
-import contextlib
-import os
 import re
-import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +20,7 @@ from swgjoint.envs.api import SingleEnv
 from swgjoint.errors import InputError
 from swgjoint.view.columns import Column
 from swgjoint.view.geometry import quaternion_xyzw, shape_of
+from swgjoint.view.recording import end_stream, recording_file
 
 Array = NDArray[np.float64]
 
@@ -133,15 +131,12 @@ def write_episode(
     import rerun as rr
     import rerun.blueprint as rrb
 
-    handle, name = tempfile.mkstemp(dir=path.parent, suffix=".rrd.part")
-    os.close(handle)
-    beside = Path(name)
     curves = [c for c in SHOWN if any(key.split("/")[0] == c for key in figures)]
     plots = [rrb.TimeSeriesView(origin=key, name=key) for key in curves]
     layout = rrb.Horizontal(
         rrb.Spatial3DView(origin="arm"), rrb.Vertical(*plots), column_shares=[2, 3]
     )
-    try:
+    with recording_file(path) as beside:
         stream = rr.RecordingStream("swgjoint episode")
         stream.save(
             beside, default_blueprint=rrb.Blueprint(layout, collapse_panels=True)
@@ -151,13 +146,7 @@ def write_episode(
         for key, values in figures.items():
             column = Column(rr.Scalars.descriptor_scalars(), values, np.float64)
             stream.send_columns(key, indexes=[at], columns=[column])
-        stream.flush()
-        stream.disconnect()
-        beside.chmod(0o644)
-        os.replace(beside, path)
-    finally:
-        with contextlib.suppress(FileNotFoundError):
-            beside.unlink()
+        end_stream(stream, path)
 
 
 def _log_arm(stream: Any, model: mujoco.MjModel, time: Array, positions: Array) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import fields, replace
 from math import pi
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,7 @@ from swgjoint.gear.design import Design
 from swgjoint.gear.mounting import series_compliance
 from swgjoint.gear.tolerances import without_errors
 from swgjoint.maps.hysteresis_loops import FrictionLoop
-from swgjoint.maps.unfinished import UNREADABLE, Unfinished
+from swgjoint.maps.unfinished import Unfinished
 from swgjoint.progress import Progress, silent
 
 Array = NDArray[np.float64]
@@ -122,23 +123,18 @@ def _kept(
     keep: Unfinished | None, number: int, theta: float, torque: Array
 ) -> FrictionLoop | None:
     """A loop of an interrupted run."""
-    arrays = None if keep is None else keep.read(_LOOP.format(number))
-    if keep is None or arrays is None:
-        return None
-    try:
-        loop = FrictionLoop(
-            **arrays
-            | {
-                "input_angle": float(arrays["input_angle"]),
-                "quarter": int(arrays["quarter"]),
-            }
-        )
+
+    def taken(arrays: dict[str, Any]) -> FrictionLoop:
+        numbers = {
+            "input_angle": float(arrays["input_angle"]),
+            "quarter": int(arrays["quarter"]),
+        }
+        loop = FrictionLoop(**arrays | numbers)
         if loop.input_angle != theta or not np.array_equal(loop.torque, torque):
             raise ValueError("a loop along other torques")
-    except UNREADABLE as error:
-        keep.ignored(_LOOP.format(number), error)
-        return None
-    return loop
+        return loop
+
+    return None if keep is None else keep.read(_LOOP.format(number), taken)
 
 
 def _along(follow: Continuation, theta: float, torques: Array) -> list[State]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, Generic
 
@@ -15,7 +15,7 @@ from swgjoint.fe.state_arrays import packed, settled, unpacked
 from swgjoint.fe.torque_choice import unseen_places
 from swgjoint.fe.torque_columns import STATE, ColumnGrid, check_like
 from swgjoint.maps.samples import FullSolves
-from swgjoint.maps.unfinished import UNREADABLE, Unfinished
+from swgjoint.maps.unfinished import Unfinished
 
 Array = NDArray[np.float64]
 
@@ -264,16 +264,13 @@ def _mirror(grid: ColumnGrid[AnyState], torque: float, count: int) -> dict[str, 
 
 def _read(keep: Unfinished, name: str, *, like: AnyState) -> AnyState | None:
     """A state of an interrupted run; None if it did not get there."""
-    arrays = keep.read(name)
-    if arrays is None:
-        return None
-    try:
+
+    def taken(arrays: Mapping[str, Any]) -> AnyState:
         state: AnyState = unpacked(arrays, STATE)
         check_like(state, like)
-    except UNREADABLE as error:
-        keep.ignored(name, error)
-        return None
-    return state
+        return state
+
+    return keep.read(name, taken)
 
 
 def with_mirrored_torques(tables: dict[float, Array]) -> dict[float, Array]:

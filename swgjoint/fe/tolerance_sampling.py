@@ -8,7 +8,7 @@ a few positions within one pitch, and the errors of all pitches are superposed t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -22,7 +22,7 @@ from swgjoint.fe.tolerance_rest import SMALL, Rest, influences
 from swgjoint.gear.design import Design
 from swgjoint.gear.tolerances import has_errors, with_perfect_teeth, without_errors
 from swgjoint.maps.samples import FullSolves, ToleranceSamples
-from swgjoint.maps.unfinished import UNREADABLE, Unfinished
+from swgjoint.maps.unfinished import Unfinished
 from swgjoint.progress import Progress, silent
 
 Array = NDArray[np.float64]
@@ -270,17 +270,14 @@ def _kept(
     keep: Unfinished | None, phase: int, shape: tuple[int, ...]
 ) -> tuple[Array, int] | None:
     """Table and free sets of a phase of an interrupted run."""
-    arrays = None if keep is None else keep.read(_PHASE.format(phase))
-    if keep is None or arrays is None:
-        return None
-    try:
-        table, free = np.asarray(arrays["table"], float), int(arrays["free"])
+
+    def taken(arrays: Mapping[str, Any]) -> tuple[Array, int]:
+        table = np.asarray(arrays["table"], float)
         if table.shape != shape:
             raise ValueError(f"a table of shape {table.shape}")
-    except UNREADABLE as error:
-        keep.ignored(_PHASE.format(phase), error)
-        return None
-    return table, free
+        return table, int(arrays["free"])
+
+    return None if keep is None else keep.read(_PHASE.format(phase), taken)
 
 
 def _with_onsets(table: Array, small: float) -> Array:

@@ -22,7 +22,7 @@ from swgjoint.fe.torque_choice import (
     unseen_parts,
 )
 from swgjoint.maps.samples import FullSolves
-from swgjoint.maps.unfinished import UNREADABLE, Unfinished
+from swgjoint.maps.unfinished import Unfinished
 
 Array = NDArray[np.float64]
 
@@ -257,15 +257,13 @@ class ColumnGrid(Generic[AnyState]):
         """The next part of an interrupted run, added to a column if one is given."""
         if self.keep is None:
             return None
-        name = _SOLVES.format(self.parts)
-        arrays = self.keep.read(name)
-        if arrays is None:
+        there = self.keep.read(
+            _SOLVES.format(self.parts),
+            lambda arrays: self._taken(arrays, theta, torques, column),
+        )
+        if there is None:
             return None
-        try:
-            found, solves = self._taken(arrays, theta, torques, column)
-        except UNREADABLE as error:
-            self.keep.ignored(name, error)
-            return None
+        found, solves = there
         self.parts += 1
         self.solves += solves
         self.restored(solves)

@@ -8,37 +8,20 @@ complete.
 
 from __future__ import annotations
 
-import io
-import logging
 import shutil
 import time
-import zipfile
-import zlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
-import numpy as np
-
-from swgjoint.errors import InputError
-from swgjoint.files import write_whole
+from swgjoint.kept import arrays_content, arrays_file, keep, read_kept
 from swgjoint.maps.cache import cache_folder, key_of
-
-_log = logging.getLogger(__name__)
 
 FORGOTTEN = 14 * 24 * 3600.0
 """Parts that nobody went on with are removed after this time [s]."""
-UNREADABLE = (
-    OSError,
-    EOFError,
-    KeyError,
-    TypeError,
-    ValueError,
-    zipfile.BadZipFile,
-    zlib.error,
-)
-"""What a damaged file may raise when it is read."""
+
+Part = TypeVar("Part")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,34 +44,21 @@ class Unfinished:
         _remove_forgotten(cache / "unfinished")
         return cls(folder=cache / "unfinished" / key_of(parts))
 
-    def read(self, name: str) -> dict[str, Any] | None:
-        """Arrays of a part; None if it was not kept or is damaged."""
-        path = self.folder / f"{name}.npz"
-        if not path.exists():
-            return None
-        try:
-            content = io.BytesIO(path.read_bytes())
-            with np.load(content, allow_pickle=False) as arrays:
-                return {key: arrays[key] for key in arrays.files}
-        except UNREADABLE as error:
-            self.ignored(name, error)
-            return None
+    def read(self, name: str, take: Callable[[dict[str, Any]], Part]) -> Part | None:
+        """A part; None if it was not kept or is damaged.
+
+        Args:
+            name: Of the part.
+            take: Makes the part of its arrays; what it raises means damage.
+        """
+        return read_kept(self._path(name), lambda data: take(arrays_content(data)))
 
     def write(self, name: str, arrays: Mapping[str, Any]) -> None:
         """Keep a part, whole or not at all; a full disk is no reason to stop."""
-        out = io.BytesIO()
-        np.savez_compressed(out, **arrays)
-        try:
-            self.folder.mkdir(parents=True, exist_ok=True)
-            write_whole(self.folder / f"{name}.npz", out.getvalue())
-        except (OSError, InputError) as error:
-            _log.warning("part of a map not kept in the cache: %s", error)
+        keep(self._path(name), arrays_file(arrays))
 
-    def ignored(self, name: str, why: Exception) -> None:
-        """Report a part that cannot be used and is computed again."""
-        _log.warning(
-            "%s ignored and computed again: %s", self.folder / f"{name}.npz", why
-        )
+    def _path(self, name: str) -> Path:
+        return self.folder / f"{name}.npz"
 
     def clear(self) -> None:
         """Remove all parts: the map is complete."""

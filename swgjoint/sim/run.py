@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from copy import deepcopy
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -203,6 +204,23 @@ def run_scene(
     return run
 
 
+@contextmanager
+def _without_log_file() -> Iterator[None]:
+    """Let the engine put its warnings on the console alone, not in the working folder.
+
+    A run tells what they mean; the engine's ``MUJOCO_LOG.TXT`` would stay for ever.
+    """
+    config = mujoco.MjLogConfig.get()
+    before, config.logto_file = config.logto_file, False
+    config.set()
+    try:
+        yield
+    finally:
+        config.logto_file = before
+        config.set()
+
+
+@_without_log_file()
 def simulate(
     assembly: Assembly,
     *,

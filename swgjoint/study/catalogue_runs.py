@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
-import logging
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,18 +13,14 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from swgjoint.errors import ComputationError, DesignError, InputError
-from swgjoint.files import write_whole
+from swgjoint.errors import ComputationError, DesignError
 from swgjoint.gear.design import Design
-from swgjoint.json_text import json_text
-from swgjoint.maps.cache import cache_folder, key_of
+from swgjoint.maps.cache import recalled
 
 if TYPE_CHECKING:
     from swgjoint.fe.ring_friction import RubbedPath
 
 Array = NDArray[np.float64]
-
-_log = logging.getLogger(__name__)
 
 Found = dict[str, Any]
 
@@ -56,53 +50,28 @@ class Task:
 
 def run_task(task: Task) -> Found:
     """The result of a task, kept or computed; ``fault`` where it failed."""
-    folder = cache_folder()
-    path = None if folder is None else folder / "studies" / f"{_key(task)}.json"
-    found = None if path is None else _kept(path)
-    if found is not None:
-        return found
+    parts = {
+        "study": _own_version(),
+        "kind": task.kind,
+        "design": task.design.content_hash(),
+        "torques": task.torques,
+    }
+    return recalled("studies", parts, Found, lambda: _computed(task))
+
+
+def _computed(task: Task) -> Found:
     begin = time.perf_counter()
     try:
         found = KINDS[task.kind](task)
     except (ComputationError, DesignError) as error:
         found = {"fault": str(error).splitlines()[0]}
     found["wall_s"] = time.perf_counter() - begin
-    if path is not None:
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            write_whole(path, json_text(found))
-        except (OSError, InputError) as error:
-            _log.warning("result not kept in the cache: %s", error)
     return found
-
-
-def _key(task: Task) -> str:
-    return key_of(
-        {
-            "study": _own_version(),
-            "kind": task.kind,
-            "design": task.design.content_hash(),
-            "torques": task.torques,
-        }
-    )
 
 
 @lru_cache
 def _own_version() -> str:
     return hashlib.sha256(Path(__file__).read_bytes()).hexdigest()
-
-
-def _kept(path: Path) -> Found | None:
-    try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-        if isinstance(data, dict) and "wall_s" in data:
-            return data
-    except FileNotFoundError:
-        return None
-    except (OSError, ValueError):
-        pass
-    _log.warning("cache entry ignored and computed again: %s", path)
-    return None
 
 
 def _whole_path(task: Task, angles: Array | None = None) -> RubbedPath:

@@ -30,6 +30,7 @@ from swgjoint.fe.solid.drive3d import check_modelled
 from swgjoint.files import Outputs
 from swgjoint.gear.design import Design
 from swgjoint.json_text import json_text
+from swgjoint.kept import json_file
 from swgjoint.progress import Progress, silent
 from swgjoint.study.fe_cost_plots import cost_picture
 from swgjoint.study.fe_cost_rows import cheapest, rows_of
@@ -137,7 +138,7 @@ def run_fe_cost(
         outputs.write("bench-fe.csv", lambda: _table(rows))
         outputs.write("bench-fe.png", lambda: cost_picture(result))
         if recompute:
-            outputs.write(FILE, lambda: json_text(to_store(design, found)) + "\n")
+            outputs.write(FILE, lambda: json_file(to_store(design, found)))
         files = outputs.files
     return result | {"files": files, "wall_s": time.perf_counter() - begin}
 

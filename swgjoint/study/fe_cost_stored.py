@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import json
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from swgjoint.gear.design import Design
+from swgjoint.kept import json_content, read_kept
 from swgjoint.models_path import models_path
 from swgjoint.study.fe_cost_setting import POSITIONS, Found
 from swgjoint.study.provenance import provenance
@@ -23,19 +24,34 @@ DRIFT = 1e-3
 FILE = "bench-fe-reference.json"
 
 
+@dataclass(frozen=True, kw_only=True)
+class _Stored:
+    """What is read of the file."""
+
+    design_hash: str
+    positions: int
+    command: str
+    provenance: dict[str, Any]
+    settings: dict[str, dict[str, float | list[float] | None]]
+
+
 def stored_of(design: Design, path: Path | None = None) -> dict[str, Any]:
     """Stored settings of a design, empty if the file is of another one."""
     path = path or models_path() / "studies" / FILE
-    if not path.is_file():
+    kept = read_kept(path, _read)
+    if kept is None:
         return {}
-    kept: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
     of_this = (kept["design_hash"], kept["positions"])
-    if of_this != (design.content_hash(), POSITIONS):
-        return {}
-    return kept | {"settings": {k: _read(v) for k, v in kept["settings"].items()}}
+    return kept if of_this == (design.content_hash(), POSITIONS) else {}
 
 
-def _read(values: dict[str, Any]) -> Found:
+def _read(data: bytes) -> dict[str, Any]:
+    kept = json_content(data, _Stored)
+    settings = {key: _found(values) for key, values in kept.settings.items()}
+    return {**vars(kept), "settings": settings}
+
+
+def _found(values: dict[str, Any]) -> Found:
     arrays = {
         key: None if values[key] is None else np.array(values[key], float)
         for key in ("kinematic_error", "rim_shape")

@@ -7,9 +7,12 @@ delivered, or their limits (``uniform``): then each size is drawn between zero a
 
 from __future__ import annotations
 
+import hashlib
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cache, lru_cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -27,6 +30,8 @@ from swgjoint.fe.tolerance_lot import (
 from swgjoint.fe.tolerance_rest import Rest
 from swgjoint.gear.design import Design
 from swgjoint.gear.tolerances import has_errors
+from swgjoint.kept import json_file, keep
+from swgjoint.maps.cache import entry_of, known, recalled
 from swgjoint.maps.catalogue import ratings_of
 from swgjoint.progress import Progress, silent
 from swgjoint.study.catalogue_accuracy import REST, peaks
@@ -78,9 +83,25 @@ class Drawn:
 
 
 @dataclass(frozen=True, kw_only=True)
+class _Part:
+    """Drives of one task, as they are kept."""
+
+    rows: list[Drawn]
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Judged:
+    """:func:`superposition_error` of the first drive, as it is kept."""
+
+    error: float | None
+
+
+@dataclass(frozen=True, kw_only=True)
 class _Task:
     rests: Sequence[Rest]
     drives: tuple[Design, ...]
+    path: Path | None
+    """Where they are kept."""
 
 
 def draw(design: Design, seed: int, sizes: str = "limit") -> Design:
@@ -125,6 +146,9 @@ def run_lot(
         jobs: Processes.
         progress: Called with the stage, the tasks done and their number.
 
+    Drives are kept in the user's cache as soon as they are solved: a lot that was
+    interrupted goes on, and a longer one solves those alone that it has more.
+
     Returns:
         ``rows`` (:class:`Drawn` and, with a spec, ``passed``), ``figures``
         (:func:`distribution` of each), ``yield`` (None without a spec; ``part``,
@@ -143,20 +167,52 @@ def run_lot(
             f"{design.drive.name}: all tolerances are zero; accepted: a positive value"
             " of at least one key of [tolerances]"
         )
-    progress(f"{design.drive.name}: without errors", 0, 1)
-    rests = perfect_positions(design)
-    progress(f"{design.drive.name}: without errors", 1, 1)
-    progress(f"{design.drive.name}: full solves", 0, 1)
-    off = superposition_error(draw(design, seed, sizes), rests)
-    progress(f"{design.drive.name}: full solves", 1, 1)
-    drives = [draw(design, seed + k, sizes) for k in range(count)]
-    tasks = [
-        _Task(rests=rests, drives=tuple(drives[k : k + CHUNK]))
-        for k in range(0, count, CHUNK)
-    ]
-    stage = f"{design.drive.name}: tens of drives"
-    found = run_all(_solved, tasks, jobs=jobs, stage=stage, progress=progress)
-    rows = [row for part in found for row in part]
+    name = design.drive.name
+    parts = {
+        "lot": _own_version(),
+        "design": design.content_hash(),
+        "sizes": sizes,
+    }
+
+    @cache
+    def rests() -> Sequence[Rest]:
+        progress(f"{name}: without errors", 0, 1)
+        found = perfect_positions(design)
+        progress(f"{name}: without errors", 1, 1)
+        return found
+
+    def judged() -> _Judged:
+        perfect = rests()
+        progress(f"{name}: full solves", 0, 1)
+        error = superposition_error(draw(design, seed, sizes), perfect)
+        progress(f"{name}: full solves", 1, 1)
+        return _Judged(error=error)
+
+    off = recalled("lots", {**parts, "full solves": seed}, _Judged, judged).error
+    found: dict[tuple[int, ...], _Part] = {}
+    tasks = {}
+    for first in range(seed, seed + count, CHUNK):
+        seeds = tuple(range(first, min(first + CHUNK, seed + count)))
+        path = entry_of("lots", {**parts, "seeds": seeds})
+        there = known(path, _Part)
+        if there is None:
+            drives = tuple(draw(design, one, sizes) for one in seeds)
+            tasks[seeds] = _Task(rests=rests(), drives=drives, path=path)
+        else:
+            found[seeds] = there
+
+    def report(stage: str, done: int, total: int) -> None:
+        progress(stage, len(found) + done, len(found) + total)
+
+    solved_now = run_all(
+        _solved,
+        list(tasks.values()),
+        jobs=jobs,
+        stage=f"{name}: tens of drives",
+        progress=report,
+    )
+    found |= dict(zip(tasks, solved_now, strict=True))
+    rows = [row for _, part in sorted(found.items()) for row in part.rows]
     solved = [row for row in rows if not row.failed]
     return {
         "design": design.drive.name,
@@ -210,9 +266,21 @@ def _yields(rows: Sequence[Drawn], spec: Mapping[str, float]) -> dict[str, Any]:
     return of(spec) | {"by_limit": {key: of({key: spec[key]}) for key in spec}}
 
 
-def _solved(task: _Task) -> list[Drawn]:
+@lru_cache
+def _own_version() -> str:
+    """Hash of the files of this part that decide the figures of a drive."""
+    here = Path(__file__).parent
+    names = ("lot.py", "catalogue_accuracy.py")
+    return hashlib.sha256(b"".join((here / n).read_bytes() for n in names)).hexdigest()
+
+
+def _solved(task: _Task) -> _Part:
     lot = sample_lot(task.drives, task.rests)
-    return [_figures(lot, n, drive) for n, drive in enumerate(task.drives)]
+    rows = [_figures(lot, n, drive) for n, drive in enumerate(task.drives)]
+    found = _Part(rows=rows)
+    if task.path is not None:
+        keep(task.path, json_file(found))
+    return found
 
 
 def _figures(lot: Lot, n: int, drive: Design) -> Drawn:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import threading
+import time
 import warnings
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -14,6 +16,8 @@ from swgjoint.errors import ComputationError
 from swgjoint.progress import Progress, silent
 
 CACHE = "SWGJOINT_CACHE"
+WATCH_S = 1.0
+"""Time between two looks of a process for its parent."""
 
 Task = TypeVar("Task")
 Found = TypeVar("Found")
@@ -109,7 +113,13 @@ def _parallel(
     from joblib import Parallel, delayed, parallel_config
 
     # small dense products gain nothing from threads that fight for the cores
-    with parallel_config(backend="loky", n_jobs=jobs, inner_max_num_threads=1):
+    with parallel_config(
+        backend="loky",
+        n_jobs=jobs,
+        inner_max_num_threads=1,
+        initializer=_end_with,
+        initargs=(os.getpid(),),
+    ):
         parallel = Parallel(
             return_as="generator_unordered",
             batch_size=1,
@@ -131,6 +141,20 @@ def _numbered(
     else:
         os.environ[CACHE] = cache
     return number, function(task)
+
+
+def _end_with(parent: int) -> None:
+    """End this process soon after its parent, whatever ended that.
+
+    Nobody is left to take the result; what is worth keeping is kept while it computes.
+    """
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(WATCH_S)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
 
 
 def run_all(

@@ -3,27 +3,21 @@
 from __future__ import annotations
 
 import hashlib
-import json
-import logging
 import time
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from swgjoint.errors import ComputationError, DesignError, InputError
-from swgjoint.files import write_whole
+from swgjoint.errors import ComputationError, DesignError
 from swgjoint.gear.design import Design
-from swgjoint.json_text import json_text
-from swgjoint.maps.cache import cache_folder, key_of
+from swgjoint.maps.cache import key_of, recalled
 from swgjoint.study.cases import KINDS
 from swgjoint.units import MPa
-
-_log = logging.getLogger(__name__)
 
 NUMBER = float | None
 
@@ -41,18 +35,21 @@ class RunSpec:
     model: str = "2d"
 
     @property
+    def parts(self) -> dict[str, Any]:
+        """The design, the load and the code of the record."""
+        return {
+            "study": _own_version(),
+            "design": self.design.content_hash(),
+            "torque": self.torque,
+            "positions": self.positions,
+            "turn": self.turn,
+            "model": self.model,
+        }
+
+    @property
     def key(self) -> str:
-        """Hash of the design, the load and the code."""
-        return key_of(
-            {
-                "study": _own_version(),
-                "design": self.design.content_hash(),
-                "torque": self.torque,
-                "positions": self.positions,
-                "turn": self.turn,
-                "model": self.model,
-            }
-        )
+        """Hash of the parts and of all other code."""
+        return key_of(self.parts)
 
     @property
     def size(self) -> float:
@@ -101,38 +98,8 @@ class RunRecord:
 
 
 def recorded(spec: RunSpec) -> RunRecord:
-    """The record of a run, from the cache or computed and then kept.
-
-    An entry appears whole, under a name that only its content decides, so that a study
-    that was interrupted goes on where it stopped; a damaged entry is computed again.
-    """
-    folder = cache_folder()
-    path = None if folder is None else folder / "studies" / f"{spec.key}.json"
-    found = None if path is None else _kept(path)
-    if found is not None:
-        return found
-    record = compute(spec)
-    if path is not None:
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            write_whole(path, json_text(asdict(record)))
-        except (OSError, InputError) as error:
-            _log.warning("record not kept in the cache: %s", error)
-    return record
-
-
-def _kept(path: Path) -> RunRecord | None:
-    names = {item.name for item in fields(RunRecord)}
-    try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-        if set(data) == names:
-            return RunRecord(**data)
-    except FileNotFoundError:
-        return None
-    except (OSError, ValueError, TypeError):
-        pass
-    _log.warning("cache entry ignored and computed again: %s", path)
-    return None
+    """The record of a run, from the cache or computed and then kept."""
+    return recalled("studies", spec.parts, RunRecord, lambda: compute(spec))
 
 
 def compute(spec: RunSpec) -> RunRecord:

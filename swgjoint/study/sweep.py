@@ -179,8 +179,9 @@ def _computed(
             code, computed = found
             if code != code_version():
                 raise ComputationError(
-                    "a worker computes with another version of swgjoint than this"
-                    " process, or it was changed meanwhile: what is finished is kept"
+                    "a worker computes with another version of swgjoint, numpy, scipy"
+                    " or scikit-fem than this process, or it was changed meanwhile:"
+                    " what is finished is kept"
                 )
             for point, record in zip(task, computed, strict=True):
                 count, spent = count + 1, spent + record.work_s

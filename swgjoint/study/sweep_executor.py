@@ -121,7 +121,8 @@ def dask_pool(address: str) -> Iterator[DaskPool]:
     try:
         there = _address(address)
         client = Client(there, timeout=CONNECT_S, set_as_default=False)
-    except (OSError, ValueError) as error:  # no such file or protocol, refused
+    # no such file or protocol, refused; a file that is nested without end
+    except (OSError, ValueError, RecursionError) as error:
         text = " ".join(str(error).split()) or type(error).__name__
         raise InputError(f"scheduler {address!r}: {text}") from None
     with client:

@@ -256,11 +256,17 @@ def _own_version() -> str:
 
 @lru_cache
 def _engine_version() -> str:
-    """Hash of the code between a map and the figures of a run."""
+    """Hash of the code between a map and the figures of a run, the plugin included.
+
+    A wheel holds the library without its sources.
+    """
     import mujoco
+
+    from swgjoint.engine import library
 
     package = Path(__file__).resolve().parents[1]
     digest = hashlib.sha256(str(mujoco.__version__).encode())
+    digest.update(_content(library()).encode())
     for part in ("joint", "plugin", "sim", "control"):
         for file in sorted((package / part).rglob("*")):
             if file.suffix in (".py", ".cc", ".h"):

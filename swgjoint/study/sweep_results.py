@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-import json
-import logging
 import math
 import secrets
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, fields
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Protocol
 
-from pydantic import TypeAdapter
-
 from swgjoint.errors import InputError, MissingExtraError
-from swgjoint.files import output_folder, write_whole
+from swgjoint.files import output_folder, read_regular, write_whole
 from swgjoint.json_text import json_text
+from swgjoint.kept import DamagedError, ignored, json_content, json_file
 from swgjoint.study.sweep_figures import Record
-
-_log = logging.getLogger(__name__)
 
 
 class Place(Protocol):
@@ -50,11 +45,12 @@ class Folder:
     def read(self, name: str) -> bytes | None:
         """See :class:`Place`."""
         try:
-            return (self.path / name).read_bytes()
+            return read_regular(self.path / name)
         except FileNotFoundError:
             return None
         except OSError as error:  # a file where a folder should be, no permission
-            raise InputError(f"cannot read {self.at(name)}: {error.strerror}") from None
+            why = error.strerror or error
+            raise InputError(f"cannot read {self.at(name)}: {why}") from None
 
     def write(self, name: str, data: bytes) -> str:
         """See :class:`Place`."""
@@ -122,31 +118,23 @@ def place_of(where: str | Path) -> Place:
     return Remote(where) if isinstance(where, str) and "://" in where else Folder(where)
 
 
-_FIELDS = {item.name for item in fields(Record)}
-_KEPT = TypeAdapter(Record)
-
-
 def read_record(place: Place, key: str) -> Record | None:
     """What is kept under a key; a damaged one is none."""
     data = place.read(_name(key))
     if data is None:
         return None
     try:
-        content = json.loads(data)
-        if isinstance(content, dict) and content.keys() >= _FIELDS:
-            return _KEPT.validate_json(data, strict=True)
-    except ValueError:  # no JSON, or of other types
-        pass
-    _log.warning("damaged result %s is computed again", key)
-    return None
+        return json_content(data, Record)
+    except DamagedError as error:
+        ignored(place.at(_name(key)), error)
+        return None
 
 
 def write_record(
     place: Place, key: str, record: Record, values: Mapping[str, Any]
 ) -> None:
     """Keep a record, with the values for whoever looks into the folder."""
-    content = {**asdict(record), "values": dict(values)}
-    place.write(_name(key), (json_text(content) + "\n").encode())
+    place.write(_name(key), json_file({**asdict(record), "values": dict(values)}))
 
 
 def _name(key: str) -> str:

@@ -69,8 +69,9 @@ def tune(
     Args:
         settings: What, and how long. With ``evaluations`` the same settings give the
             same result to the last bit; minutes end a search sooner or later.
-        folder: Receives the journal after every generation; None: none is kept.
-        resume: Go on with the journal of the folder.
+        folder: Receives the journal after every generation, and goes on with one of
+            the same settings that is there; None: none is kept.
+        resume: Whether there has to be such a journal.
         progress: Called with the search, the candidates (or seconds) done and all.
 
     Raises:
@@ -86,19 +87,17 @@ def tune(
     searches = {name: Search() for name in tunables}
     if folder is None and resume:
         raise InputError("resume without a folder; accepted: --out of the run")
-    if folder is not None and not resume and (folder / JOURNAL).exists():
-        raise InputError(
-            f"{folder / JOURNAL} exists; accepted: --resume to go on with it, or"
-            " another --out"
-        )
     training, held_out = settings.seeds
     trials = Trials(
         environment, arguments, seeds=training, candidates=settings.population
     )
     header = _header(settings, environment, arguments, trials.joints.drives[0])
     if folder is not None:
-        if resume:
+        if resume or (folder / JOURNAL).exists():
             searches = read_journal(folder, header, tuple(tunables))
+            known = sum(search.evaluations for search in searches.values())
+            told = f"going on with {folder / JOURNAL}: candidates that are known"
+            progress(told, known, known)
         folder.mkdir(parents=True, exist_ok=True)
     before = sum(sum(s.seconds) for s in searches.values())
 

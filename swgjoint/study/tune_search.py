@@ -7,9 +7,7 @@ its questions answered from the journal, so that it goes on as if nothing had ha
 
 from __future__ import annotations
 
-import io
 import json
-import zipfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -19,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.errors import InputError, MissingExtraError
-from swgjoint.files import write_whole
+from swgjoint.files import read_regular, write_whole
+from swgjoint.kept import arrays_content, arrays_file, told
 
 Array = NDArray[np.float64]
 Evaluate = Callable[[Array], Array]
@@ -230,9 +229,7 @@ def write_journal(
             arrays[f"{name}.places"] = np.stack(search.places)
             arrays[f"{name}.costs_rad"] = np.stack(search.costs)
             arrays[f"{name}.seconds"] = np.array(search.seconds)
-    out = io.BytesIO()
-    np.savez(out, **arrays)
-    return write_whole(folder / JOURNAL, out.getvalue())
+    return write_whole(folder / JOURNAL, arrays_file(arrays))
 
 
 def read_journal(
@@ -245,8 +242,7 @@ def read_journal(
     """
     path = folder / JOURNAL
     try:
-        with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as file:
-            arrays = {key: file[key] for key in file.files}
+        arrays = arrays_content(read_regular(path))
         kept = json.loads(str(arrays["header"]))
         if not isinstance(kept, dict):
             raise ValueError("the header is no object")
@@ -255,16 +251,10 @@ def read_journal(
         raise InputError(
             f"{path}: nothing to resume; accepted: --out of an interrupted run"
         ) from None
-    except (
-        OSError,
-        LookupError,
-        ValueError,
-        TypeError,
-        EOFError,
-        zipfile.BadZipFile,
-    ):
+    except Exception as error:  # a file may be anything
         raise InputError(
-            f"{path}: damaged, or no journal of a tuning run; accepted: another --out"
+            f"{path} is no journal of a tuning run: {told(error)}; accepted: another"
+            " --out"
         ) from None
     for key, value in header.items():
         if kept.get(key) != value:

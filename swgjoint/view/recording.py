@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import contextlib
-import os
-import tempfile
 from collections.abc import Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from swgjoint.errors import ComputationError
+from swgjoint.files import whole
 from swgjoint.view.blueprint import blueprint_of, joints_shown
 from swgjoint.view.drive_view import drives_shown
 from swgjoint.view.entities import log_known, log_measured, log_moving
@@ -33,10 +33,11 @@ def write_recording(
     Returns:
         The path.
     """
-    with _whole(Path(path)) as beside:
+    with recording_file(Path(path)) as beside:
         scenes = {label: run.assembly for label, run in runs.items()}
         stream, drives = _begin(beside, scenes)
         _end(stream, runs, drives, rigid=rigid)
+        end_stream(stream, path)
     return Path(path)
 
 
@@ -61,7 +62,7 @@ class Recorder:
 
     def __enter__(self) -> Recorder:
         """Make the file."""
-        self._beside = self._stack.enter_context(_whole(self._path))
+        self._beside = self._stack.enter_context(recording_file(self._path))
         self._begun: Future[tuple[Any, dict[str, str]]] | None = None
         self._thread = self._stack.enter_context(ThreadPoolExecutor(1))
         return self
@@ -77,6 +78,7 @@ class Recorder:
         assert self._begun is not None
         stream, drives = self._begun.result()
         _end(stream, {"": run}, drives)
+        end_stream(stream, self._path)
 
     def __exit__(self, *failure: Any) -> bool | None:
         """Put the file in its place, or remove it after a failure."""
@@ -84,19 +86,26 @@ class Recorder:
 
 
 @contextlib.contextmanager
-def _whole(path: Path) -> Iterator[Path]:
+def recording_file(path: Path) -> Iterator[Path]:
     """A file beside the path that takes its place at the end if nothing fails."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=path.parent, suffix=".rrd.part")
-    os.close(handle)
-    beside = Path(name)
-    try:
+    with whole(path) as beside:
         yield beside
-        beside.chmod(0o644)
-        os.replace(beside, path)
-    finally:
-        with contextlib.suppress(FileNotFoundError):
-            beside.unlink()
+
+
+def end_stream(stream: Any, path: str | Path) -> None:
+    """Wait until all of a recording is in its file.
+
+    Raises:
+        ComputationError: If it cannot be written.
+    """
+    try:
+        stream.flush()
+    except RuntimeError as error:  # the thread that writes has given up
+        raise ComputationError(
+            f"cannot write the recording {path}: {error}; the disk may be full"
+        ) from None
+    stream.disconnect()
 
 
 def _begin(path: Path, scenes: Mapping[str, Assembly]) -> tuple[Any, dict[str, str]]:
@@ -117,12 +126,10 @@ def _end(
     drives: Mapping[str, str],
     rigid: Run | None = None,
 ) -> None:
-    """What follows from the runs, and the end of the file."""
+    """What follows from the runs."""
     scales = phase_scales(runs)
     log_moving(stream, runs, scales, drives=drives, rigid=rigid)
     log_measured(stream, runs, scales)
-    stream.flush()
-    stream.disconnect()
 
 
 def stream_name(scenes: Mapping[str, Assembly]) -> str:

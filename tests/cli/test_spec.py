@@ -160,6 +160,7 @@ def solid(monkeypatch):
 
     monkeypatch.setattr(spec_figures, "radial_stiffness", stiffness)
     monkeypatch.setattr(spec_figures, "fatigue", safety)
+    monkeypatch.setenv("SWGJOINT_CACHE", "")  # not what a test makes up
     return calls
 
 
@@ -201,6 +202,19 @@ def test_figures_of_the_solid_model(built, solid, capsys):
         and "half the elements 65.5," in out
         and "2 at mid-face (200 MPa)" in out
     )
+
+
+def test_figures_of_the_solid_model_are_kept(solid, capsys, monkeypatch, tmp_path):
+    """Each takes minutes: the same sheet is there at once, another torque is not."""
+    monkeypatch.setenv("SWGJOINT_CACHE", str(tmp_path))
+    keys = "radial_stiffness_N_mm,fatigue_safety_factor"
+    first, second = (spec(capsys, "stress-cup", "--only", keys) for _ in range(2))
+    assert len(solid) == 2
+    for key in (*keys.split(","), "radial_stiffness", "fatigue"):
+        assert second[key] == first[key]
+    design = Design.load("stress-cup")
+    spec_figures.solid_figures(design, keys.split(","), 1.0)
+    assert solid[2:] == [("fatigue", 1.0)]
 
 
 def test_reasons_of_the_solid_model(built, capsys):
@@ -453,7 +467,7 @@ def test_a_bad_loop_is_one_line(capsys, tmp_path, text, words):
 
 
 @pytest.mark.parametrize("passes", [True, False])
-def test_ratcheting_torque_of_a_design(capsys, monkeypatch, passes):
+def test_ratcheting_torque_of_a_design(capsys, monkeypatch, tmp_path, passes):
     """The limit where it was passed, else null and the lower bound in the reason."""
     torque = [0.0, 400.0, 500.0, 450.0] if passes else [0.0, 400.0, 500.0, 600.0]
     path = RatchetingPath(
@@ -464,7 +478,14 @@ def test_ratcheting_torque_of_a_design(capsys, monkeypatch, passes):
         pitch=1e-2,
         outcome=Outcome.CONVERGED if passes else Outcome.ACTIVE_SET_CYCLES,
     )
-    monkeypatch.setattr(ratcheting, "ratcheting_path", lambda design, **_: path)
+    calls = []
+
+    def search(design, **_):
+        calls.append(design)
+        return path
+
+    monkeypatch.setattr(ratcheting, "ratcheting_path", search)
+    monkeypatch.setenv("SWGJOINT_CACHE", str(tmp_path))
     key = "ratcheting_torque_Nm"
     result = spec(capsys, "size-25-100", "--only", key)
     if passes:
@@ -481,6 +502,7 @@ def test_ratcheting_torque_of_a_design(capsys, monkeypatch, passes):
     if not passes:
         where = "the search ended with the torque largest after 0.3 of a pitch with 3"
     assert f"ratcheting: {where}" in out
+    assert len(calls) == 1  # it takes minutes: kept
 
 
 def test_the_sheet_does_not_call_predictions_measured(capsys):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -15,7 +16,7 @@ from swgjoint.maps.file import map_bytes
 
 
 class Builder:
-    """Builds a linear map and counts."""
+    """Builds a linear map of the design ``a`` and counts."""
 
     def __init__(self, stiffness: float = 1e4) -> None:
         self.count, self.stiffness = 0, stiffness
@@ -23,7 +24,7 @@ class Builder:
     def __call__(self) -> DriveMap:
         """Build one more."""
         self.count += 1
-        return DriveMap.linear(self.stiffness)
+        return replace(DriveMap.linear(self.stiffness), info={"design_hash": "a"})
 
 
 @pytest.fixture
@@ -56,6 +57,35 @@ def test_other_code_other_entry(folder, monkeypatch):
     monkeypatch.setattr(cache, "code_version", lambda: "other")
     cached({"design": "a"}, build)
     assert build.count == 2
+
+
+@pytest.mark.parametrize("package", ["numpy", "scipy", "scikit-fem"])
+def test_other_packages_other_entry(folder, monkeypatch, package):
+    """A map that another version of a package computed is not used."""
+    build, asked = Builder(), cache.version
+    cached({"design": "a"}, build)
+    monkeypatch.setattr(
+        cache, "version", lambda name: "0" if name == package else asked(name)
+    )
+    cache.code_version.cache_clear()
+    try:
+        cached({"design": "a"}, build)
+    finally:
+        cache.code_version.cache_clear()
+    assert build.count == 2
+
+
+def test_a_map_of_another_design_is_not_taken(folder, caplog):
+    """However sound it is: whoever put it there, the design asked for is built."""
+    build = Builder()
+    cached({"design": "a"}, build)
+    (entry,) = folder.rglob("*.swg")
+    for info in ({}, {"design_hash": "b"}):
+        replace(DriveMap.linear(5e3), info=info).save(entry)
+        assert cached({"design": "a"}, build).mean_stiffness == pytest.approx(1e4)
+        assert "another design" in caplog.text
+        caplog.clear()
+    assert build.count == 3
 
 
 def test_damaged_entry_is_built_again(folder, caplog):
@@ -111,14 +141,16 @@ def test_name_is_not_content(folder):
 
 WRITER = """
 import sys
+from dataclasses import replace
 from pathlib import Path
 from swgjoint.maps.cache import _built, _sound
 from swgjoint.maps.drive_map import DriveMap
 
 entry, stiffness = Path(sys.argv[1]), float(sys.argv[2])
+info = {"design_hash": "a"}
 for _ in range(40):
-    _built(entry, lambda: DriveMap.linear(stiffness))
-    assert _sound(entry) is not None
+    _built(entry, lambda: replace(DriveMap.linear(stiffness), info=info))
+    assert _sound(entry, "a") is not None
 """
 
 

@@ -193,8 +193,11 @@ def test_tool_error_follows_from_the_joint_error(bench, synthetic_map):
 def test_a_run_that_diverges_is_a_failure_with_advice(
     bench, plain_map, tmp_path, monkeypatch
 ):
-    """A motor loop too stiff for an explicit step ends with step and remedy."""
-    monkeypatch.chdir(tmp_path)  # the engine leaves its log in the current folder
+    """A motor loop too stiff for an explicit step ends with step and remedy.
+
+    The engine warns on the console and leaves no log in the working folder.
+    """
+    monkeypatch.chdir(tmp_path)
     with pytest.raises(
         ComputationError,
         match=naming("'bench test'", "0.005 s", "RK4", "simulation.step_s", "discrete"),
@@ -206,6 +209,8 @@ def test_a_run_that_diverges_is_a_failure_with_advice(
             controller={"natural_frequency_Hz": 500.0, "damping_ratio": 1.0},
             trajectory={"kind": "sweep", "hold_s": 0.5, "end_deg": {"joint": 5.0}},
         )
+    assert list(tmp_path.iterdir()) == []
+    assert mujoco.MjLogConfig.get().logto_file
 
 
 @pytest.mark.parametrize("sampled", [False, True])

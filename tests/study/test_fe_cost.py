@@ -17,7 +17,7 @@ from swgjoint.cli import bench_fe
 from swgjoint.errors import ComputationError, DesignError
 from swgjoint.gear.cup import cup_torsional_stiffness
 from swgjoint.gear.design import Design
-from swgjoint.json_text import json_text
+from swgjoint.kept import json_file
 from swgjoint.study import fe_cost, fe_cost_solve
 from swgjoint.study.fe_cost import run_fe_cost
 from swgjoint.study.fe_cost_rows import cheapest
@@ -168,7 +168,7 @@ def test_stored_settings_are_of_their_design_and_tell_drift(tmp_path, monkeypatc
     """
     table = {key: found(0.0) for key in (*LONG, WITNESS)}
     path = tmp_path / FILE
-    path.write_text(json_text(to_store(CUP, table)), encoding="utf-8")
+    path.write_bytes(json_file(to_store(CUP, table)))
     kept = stored_of(CUP, path)
     assert set(kept["settings"]) == set(table)
     again = kept["settings"][WITNESS]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from messages import naming
+from messages import names, naming
 from solved import few_teeth, kept
 
 from swgjoint.errors import DesignError
@@ -12,6 +12,7 @@ from swgjoint.fe.tolerance_cycle import gap_errors, pitch_of, pitches_of
 from swgjoint.fe.tolerance_lot import outline_change, perfect_positions, sample_lot
 from swgjoint.gear.design import Design
 from swgjoint.gear.tolerances import without_errors
+from swgjoint.study import lot
 from swgjoint.study.lot import (
     FIGURES,
     _figures,
@@ -92,6 +93,32 @@ def test_a_drive_does_not_depend_on_its_lot(three):
     (alone,) = run_lot(DESIGN, count=1, seed=3)["rows"]
     for key in FIGURES:
         assert alone[key] == pytest.approx(three[0]["rows"][2][key], rel=1e-9)
+
+
+@pytest.mark.fe
+def test_drives_are_kept_and_a_longer_lot_goes_on(tmp_path, monkeypatch, caplog):
+    """Only tasks that are not kept, or damaged, are solved; all rows stay the same."""
+    monkeypatch.setenv("SWGJOINT_CACHE", str(tmp_path))
+    monkeypatch.setattr(lot, "CHUNK", 1)
+    solved = []
+
+    def counted(drives, rests, **options):
+        solved.extend(drive.tolerances.seed for drive in drives)
+        return sample_lot(drives, rests, **options)
+
+    monkeypatch.setattr(lot, "sample_lot", counted)
+    first = run_lot(DESIGN, count=2)["rows"]
+    assert solved == [1, 2]
+    longer = run_lot(DESIGN, count=3)
+    assert solved == [1, 2, 3] and longer["rows"][:2] == first
+    (damaged,) = (p for p in tmp_path.rglob("*.json") if b'"seed": 2' in p.read_bytes())
+    damaged.write_bytes(damaged.read_bytes().replace(b'"seed": 2', b'"seed": 7'))
+    again = run_lot(DESIGN, count=3)
+    assert solved == [1, 2, 3, 2] and again["rows"] == longer["rows"]
+    assert again["validity"] == longer["validity"]
+    assert names(caplog.text, damaged.name, "computed again")
+    monkeypatch.setattr(lot, "perfect_positions", None)  # nor is the perfect drive
+    assert run_lot(DESIGN, count=3)["rows"] == longer["rows"]
 
 
 @pytest.mark.fe

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 import signal
+import subprocess
 import sys
 import time
 from pathlib import Path
@@ -111,3 +112,45 @@ def test_a_run_may_be_left():
     found = LocalPool(2).run(slow_root, range(30))
     assert next(found)[1] is not None
     found.close()
+
+
+PARENT = """
+import os, sys, time
+from swgjoint.study.pool import run_all
+
+run_all(os.mkdir, sys.argv[1:], jobs=2)
+run_all(time.sleep, [60.0] * 2, jobs=2)
+"""
+
+
+@pytest.mark.skipif(not Path("/proc").is_dir(), reason="looks for processes in /proc")
+@pytest.mark.parametrize("stop", [signal.SIGTERM, signal.SIGKILL])
+def test_processes_end_with_their_parent(tmp_path, stop):
+    """Whatever ends it, and in the middle of a task: nobody would take the result."""
+    folders = [tmp_path / "one", tmp_path / "two"]
+    parent = subprocess.Popen([sys.executable, "-P", "-c", PARENT, *map(str, folders)])
+    while not all(folder.is_dir() for folder in folders):
+        assert parent.poll() is None
+        time.sleep(0.05)
+    children = children_of(parent.pid)
+    assert len(children) >= 2
+    parent.send_signal(stop)
+    parent.wait()
+    end = time.monotonic() + 20.0
+    while alive := [pid for pid in children if is_running(pid)]:
+        assert time.monotonic() < end, alive
+        time.sleep(0.1)
+
+
+def children_of(pid: int) -> list[int]:
+    text = "".join(p.read_text() for p in Path(f"/proc/{pid}/task").glob("*/children"))
+    return [int(child) for child in text.split()]
+
+
+def is_running(pid: int) -> bool:
+    try:
+        return (
+            Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+        )
+    except FileNotFoundError:
+        return False

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 from dataclasses import dataclass, replace
+from typing import Any
 
 import pytest
 from messages import names, naming
 from validation_record import validated_map
 
+from swgjoint import engine
 from swgjoint.errors import ComputationError, InputError, MissingExtraError
 from swgjoint.faults import parse_toml, validated
+from swgjoint.kept import json_content, json_file
 from swgjoint.sim.scene import Scene
 from swgjoint.study import sweep as sweep_module
 from swgjoint.study import sweep_figures
@@ -21,7 +23,7 @@ from swgjoint.study.sweep import run_sweep
 from swgjoint.study.sweep_figures import Record, compute
 from swgjoint.study.sweep_file import SweepFile
 from swgjoint.study.sweep_plots import label_of, sweep_picture
-from swgjoint.study.sweep_points import points_of
+from swgjoint.study.sweep_points import _engine_version, points_of
 from swgjoint.study.sweep_results import csv_text, parquet_bytes, place_of
 from swgjoint.study.sweep_tasks import RunTask
 
@@ -234,10 +236,25 @@ def test_a_kept_result_of_other_types_is_computed_again(tmp_path, counted, chang
     place = place_of(tmp_path)
     first = run_sweep(sheet([10.0]), executor=counted, place=place)
     (path,) = tmp_path.glob("results/*/*.json")
-    path.write_text(json.dumps(json.loads(path.read_text()) | change))
+    content = json_content(path.read_bytes(), dict[str, Any])
+    path.write_bytes(json_file(content | change))
     found = run_sweep(sheet([10.0]), executor=counted, place=place)
     assert (found.reused, found.computed) == (0, 1)
     assert found.records[0].figures == first.records[0].figures
+
+
+def test_another_plugin_is_other_code(tmp_path, monkeypatch):
+    """Figures of a run are not those of another library, with or without sources."""
+    library, found = tmp_path / "plugin.so", set()
+    monkeypatch.setattr(engine, "library", lambda: library)
+    try:
+        for content in (b"one", b"two"):
+            library.write_bytes(content)
+            _engine_version.cache_clear()
+            found.add(_engine_version())
+    finally:
+        _engine_version.cache_clear()
+    assert len(found) == 2
 
 
 def test_results_lie_wherever_fsspec_reaches(counted):

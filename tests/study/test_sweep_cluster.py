@@ -225,6 +225,7 @@ def test_a_scheduler_that_is_not_there_is_one_line(address, monkeypatch):
         ("{}.json", ("address", "dask")),
         ("[1].json", ("address", "dask")),
         ("{.json", ("line 1", "column 2")),
+        pytest.param(100_000 * "[" + ".json", ("recursion",), id="nested"),
     ],
 )
 def test_what_is_no_address_makes_no_client(address, told, tmp_path, monkeypatch):

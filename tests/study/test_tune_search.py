@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 from dataclasses import replace
 
@@ -10,6 +11,7 @@ import pytest
 from messages import naming
 
 from swgjoint.errors import InputError
+from swgjoint.kept import arrays_content
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.study.tune import tune
 from swgjoint.study.tune_result import TuneSettings
@@ -54,21 +56,27 @@ def go_on(search, *, optimiser="de", generations=2, costs=None, after=lambda: No
 
 
 def test_resumption_asks_for_its_own_journal(tmp_path):
-    """Another seed, a missing or a damaged journal, or one in the way: one line."""
+    """Another seed, a missing or a damaged journal: one line, asked for or not."""
     chosen = settings()
     with pytest.raises(InputError, match=naming(JOURNAL, "resume", "--out")):
         tune(chosen, folder=tmp_path, resume=True)
-    tune(chosen, folder=tmp_path)
-    with pytest.raises(InputError, match=naming(JOURNAL, "--resume", "--out")):
-        tune(chosen, folder=tmp_path)
-    with pytest.raises(InputError, match=naming(JOURNAL, "seed 0", "1", "--out")):
-        tune(settings(seed=1), folder=tmp_path, resume=True)
+    first = tune(chosen, folder=tmp_path)
     journal = tmp_path / JOURNAL
     whole = journal.read_bytes()
-    for damaged in (whole[:300], b"", b"x", whole.replace(b"costs", b"coins")):
-        journal.write_bytes(damaged)
-        with pytest.raises(InputError, match=naming(JOURNAL, "journal", "--out")):
-            tune(chosen, folder=tmp_path, resume=True)
+    other, older = settings(seed=1), io.BytesIO()
+    np.savez(older, **arrays_content(whole))  # without a checksum
+    flipped = whole.replace(b"costs", b"coins")
+    for resume in (False, True):
+        with pytest.raises(InputError, match=naming(JOURNAL, "seed 0", "1", "--out")):
+            tune(other, folder=tmp_path, resume=resume)
+        for damaged in (whole[:300], b"", b"x", flipped, older.getvalue()):
+            journal.write_bytes(damaged)
+            with pytest.raises(InputError, match=naming(JOURNAL, "journal", "--out")):
+                tune(chosen, folder=tmp_path, resume=resume)
+            assert journal.read_bytes() == damaged
+        journal.write_bytes(whole)
+    assert tune(chosen, folder=tmp_path).best.values == first.best.values
+    assert journal.read_bytes() == whole
 
 
 @pytest.mark.parametrize("header", [[], ["seed"], 3, None, "seed", True])

@@ -1,6 +1,7 @@
 """Recordings and pictures: read back and compared with memory."""
 
 import json
+import os
 from urllib.request import urlopen
 
 import numpy as np
@@ -177,6 +178,30 @@ def test_a_recording_is_written_whole_or_not_at_all(run, tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_full_disk_is_one_line(run, tmp_path, monkeypatch):
+    """The thread of the viewer's library that writes gives up; nothing is left."""
+
+    def full(*_: object, **__: object) -> None:
+        raise RuntimeError("File-writer thread shut down prematurely")
+
+    monkeypatch.setattr("rerun.RecordingStream.flush", full)
+    path = tmp_path / "run.rrd"
+    with pytest.raises(ComputationError, match=naming(str(path), "disk")) as told:
+        run.to_rerun(path)
+    assert "\n" not in str(told.value)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_recording_has_the_mode_of_any_file(run, tmp_path):
+    """It follows the umask."""
+    before = os.umask(0o027)
+    try:
+        path = run.to_rerun(tmp_path / "run.rrd")
+    finally:
+        os.umask(before)
+    assert path.stat().st_mode & 0o777 == 0o640
+
+
 def test_a_recording_begun_during_the_run_is_the_same(run, synthetic_map, tmp_path):
     """It holds the same components at as many rows, and the same torsion."""
     after, beside = tmp_path / "after.rrd", tmp_path / "new" / "beside.rrd"
@@ -209,7 +234,7 @@ def test_a_run_that_fails_leaves_no_recording(synthetic_map, tmp_path, monkeypat
     """Nothing is left of what was sent while it went on."""
 
     def fail(*_: object, **__: object) -> None:
-        assert [path.suffix for path in tmp_path.iterdir()] == [".part"]
+        assert [path.name.startswith(".run.rrd.") for path in tmp_path.iterdir()]
         raise ComputationError("diverged")
 
     monkeypatch.setattr("swgjoint.sim.run._recorded", fail)

@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
-import io
 import json
-import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from swgjoint.errors import InputError
 from swgjoint.fe.solid.state import SolidState
 from swgjoint.fe.state_arrays import packed, unpacked
-from swgjoint.files import write_whole
+from swgjoint.files import read_regular, write_whole
 from swgjoint.json_text import json_text
+from swgjoint.kept import (
+    DamagedError,
+    arrays_content,
+    arrays_file,
+    ignored,
+    json_content,
+    json_file,
+    told,
+)
+from swgjoint.maps.cache import code_version
 
 RUN = "run.json"
-SCHEMA = 6
 _STATE = "state"
 
 
@@ -27,61 +32,93 @@ class Checkpoint:
     """A folder with the states of one run."""
 
     folder: Path
-    settings: dict[str, Any]
-    """What makes the run the same: design hash, torque, positions, model."""
+    asked: bool
+    """Whether the user has asked to go on: a damaged state is an error then."""
 
     @classmethod
     def open(
         cls, folder: Path, settings: dict[str, Any], *, resume: bool
     ) -> Checkpoint:
-        """Begin a run in a folder, or go on with the one that lies there.
+        """Begin a run in a folder, or go on with the same run if it is there.
+
+        Nothing in the folder is ever removed.
+
+        Args:
+            folder: Of the states.
+            settings: What makes the run the same: design hash, torque, positions.
+            resume: Whether there has to be a run to go on with.
 
         Raises:
-            InputError: If there is nothing to go on with, or it is of another run.
+            InputError: If the folder holds another run or other files, or there is
+                nothing to resume.
         """
-        settings = json.loads(json_text({"schema": SCHEMA} | settings))
+        # code that has changed may solve the states differently
+        settings = json.loads(json_text({"code": code_version()} | settings))
         file = folder / RUN
+        try:
+            there = json_content(read_regular(file), dict[str, Any])
+        except FileNotFoundError:
+            cls._begin(folder, settings, resume=resume)
+            return cls(folder=folder, asked=resume)
+        except (OSError, DamagedError) as error:
+            raise InputError(
+                f"--resume: {file}: {told(error)}; accepted: another --out"
+            ) from None
+        if there != settings:
+            keys = [k for k in {**settings, **there} if there.get(k) != settings.get(k)]
+            raise InputError(
+                f"the run in {folder} differs in {', '.join(keys)}; accepted: the same"
+                " design, options and version to go on with it (--resume), or another"
+                " --out"
+            )
+        return cls(folder=folder, asked=resume)
+
+    @classmethod
+    def _begin(cls, folder: Path, settings: dict[str, Any], *, resume: bool) -> None:
         if resume:
-            try:
-                there = json.loads(file.read_text())
-            except (OSError, ValueError):
-                raise InputError(
-                    f"--resume: no interrupted run in {folder}; leave --resume out"
-                ) from None
-            if there != settings:
-                other = [k for k in settings if there.get(k) != settings[k]]
-                raise InputError(
-                    f"--resume: the run in {folder} has another {', '.join(other)};"
-                    " accepted: the same design and options"
-                )
-        else:
-            folder.mkdir(parents=True, exist_ok=True)
-            for old in folder.glob("*.npz"):
-                old.unlink()
-            write_whole(file, json_text(settings) + "\n")
-        return cls(folder=folder, settings=settings)
+            raise InputError(
+                f"--resume: no interrupted run in {folder}; leave --resume out"
+            )
+        folder.mkdir(parents=True, exist_ok=True)
+        # an interrupted write leaves a hidden file
+        foreign = sorted(
+            path.name for path in folder.iterdir() if not path.name.startswith(".")
+        )
+        if foreign:
+            raise InputError(
+                f"{folder} holds {foreign[0]!r}, but no {RUN} of a run that --resume"
+                " could go on with; accepted: another --out"
+            )
+        write_whole(folder / RUN, json_file(settings))
+
+    @property
+    def count(self) -> int:
+        """States in the folder."""
+        return len(list(self.folder.glob("*.npz")))
 
     def read(self, name: str) -> SolidState | None:
-        """A state of that name; None if the run did not get there."""
+        """A state of that name; None if the run did not get there.
+
+        Raises:
+            InputError: If it is damaged and the user has asked to go on.
+        """
         path = self.folder / f"{name}.npz"
-        if not path.exists():
-            return None
         try:
-            content = io.BytesIO(path.read_bytes())
-            with np.load(content, allow_pickle=False) as arrays:
-                found = unpacked({key: arrays[key] for key in arrays.files}, _STATE)
-        except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile) as error:
-            raise InputError(
-                f"--resume: {path} is damaged ({error}); remove it to compute it again"
-            ) from None
-        if not isinstance(found, SolidState):
-            raise InputError(
-                f"--resume: {path} holds no state; remove it to compute it again"
-            )
+            found = unpacked(arrays_content(read_regular(path)), _STATE)
+            if not isinstance(found, SolidState):
+                raise DamagedError("it holds no state")
+        except FileNotFoundError:
+            return None
+        except Exception as error:  # a file may be anything
+            if self.asked:
+                raise InputError(
+                    f"--resume: {path}: {told(error)}; remove it to compute it again"
+                ) from None
+            ignored(path, error)
+            return None
         return found
 
     def write(self, name: str, state: SolidState) -> None:
         """Keep a state, whole or not at all."""
-        out = io.BytesIO()
-        np.savez(out, **packed(state, _STATE))
-        write_whole(self.folder / f"{name}.npz", out.getvalue())
+        data = arrays_file(packed(state, _STATE))
+        write_whole(self.folder / f"{name}.npz", data)

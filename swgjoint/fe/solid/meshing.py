@@ -159,14 +159,16 @@ def simulate_solid_meshing(
         elastic_circular_spline: Whether the circular spline deforms.
         throw: Whether a position that cannot be solved is an error.
         progress: Called with the stage, the steps done and their number.
-        keep: Folder for the state of every position; None keeps none.
-        resume: Whether to go on with the run in that folder; the result is the same,
-            bit for bit.
+        keep: Folder for the state of every position; None keeps none. If it holds an
+            interrupted run of the same settings and code, that run goes on; the result
+            is the same, bit for bit.
+        resume: Whether there has to be a run to go on with in that folder.
 
     Raises:
         DesignError: If the design cannot be built or holds what is not modelled.
         ComputationError: If a solve fails or memory will not do.
-        InputError: If there is no such run to go on with.
+        InputError: If the folder holds another run or other files, or there is no run
+            to resume.
     """
     begin = time.perf_counter()
     check_modelled(design)
@@ -185,6 +187,10 @@ def simulate_solid_meshing(
             "orders": asdict(Orders()),
         }
         kept = Checkpoint.open(keep, settings, resume=resume)
+        if kept.count:
+            # three states of the set-up, then all positions but the first
+            stage = f"going on with the run in {keep}: states that are kept"
+            progress(stage, kept.count, steps + 2)
     ring = solid_ring(
         design,
         half=half,
@@ -207,7 +213,7 @@ def simulate_solid_meshing(
     setup = []
 
     def reached(name: str, solve: Callable[[], SolidState]) -> SolidState:
-        state = kept.read(name) if kept is not None and resume else None
+        state = kept.read(name) if kept is not None else None
         if state is None:
             state = solve()
             if kept is not None and state.outcome.ok:

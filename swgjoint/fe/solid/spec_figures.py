@@ -10,6 +10,7 @@ from swgjoint.errors import DesignError
 from swgjoint.fe.solid.fatigue import fatigue
 from swgjoint.fe.solid.radial_stiffness import radial_stiffness
 from swgjoint.gear.design import Design
+from swgjoint.maps.cache import recalled
 from swgjoint.progress import Progress, silent
 
 
@@ -33,7 +34,8 @@ def solid_figures(
 ) -> SolidFigures:
     """Compute the wanted ones of ``radial_stiffness_N_mm``, ``fatigue_safety_factor``.
 
-    The safety factor is the least of all sections over the face width.
+    The safety factor is the least of all sections over the face width. Each figure
+    takes up to minutes and is kept in the user's cache.
 
     Args:
         design: The drive.
@@ -44,30 +46,40 @@ def solid_figures(
     Raises:
         ComputationError: If a solve fails or memory will not do.
     """
-    found = SolidFigures()
 
-    def radial() -> None:
+    def radial() -> SolidFigures:
         result = radial_stiffness(design, progress=progress)
-        found.values["radial_stiffness_N_mm"] = result.mid_face / 1e3
-        found.details["radial_stiffness"] = result.to_json()
+        return SolidFigures(
+            values={"radial_stiffness_N_mm": result.mid_face / 1e3},
+            details={"radial_stiffness": result.to_json()},
+        )
 
-    def safety() -> None:
+    def safety() -> SolidFigures:
         (result,) = fatigue(design, [torque], progress=progress)
-        found.values["fatigue_safety_factor"] = result.worst.safety.combined
-        found.details["fatigue"] = result.to_json()
+        return SolidFigures(
+            values={"fatigue_safety_factor": result.worst.safety.combined},
+            details={"fatigue": result.to_json()},
+        )
 
-    compute: dict[str, Callable[[], None]] = {
+    compute: dict[str, Callable[[], SolidFigures]] = {
         "fatigue_safety_factor": safety,
         "radial_stiffness_N_mm": radial,
     }
+    found = SolidFigures()
     for key, work in compute.items():
         if key not in keys:
             continue
         if design.cup is None:
             found.missing[key] = "needs a design with a [cup]"
             continue
+        parts: dict[str, Any] = {"figure": key, "design": design.content_hash()}
+        if work is safety:
+            parts["torque"] = torque
         try:
-            work()
+            one = recalled("figures", parts, SolidFigures, work)
         except DesignError as fault:
             found.missing[key] = "; ".join(str(fault).splitlines())
+        else:
+            found.values.update(one.values)
+            found.details.update(one.details)
     return found

@@ -6,11 +6,13 @@ from dataclasses import fields, is_dataclass
 
 import numpy as np
 import pytest
+from messages import names, naming
 
 from swgjoint.errors import InputError
 from swgjoint.fe.pattern import Effort, solve_pattern
 from swgjoint.fe.solid.checkpoint import Checkpoint
 from swgjoint.fe.state_arrays import packed, settled, unpacked
+from swgjoint.kept import arrays_file
 from swgjoint.maps.unfinished import Unfinished
 
 pytestmark = pytest.mark.fe
@@ -29,20 +31,57 @@ def assert_same(one: object, other: object) -> None:
         assert one == other or (one != one and other != other)
 
 
-def test_a_state_comes_back_from_a_file(loaded, tmp_path):
-    """By both ways, and a run of meshing refuses a file that is damaged."""
+def test_a_state_comes_back_from_a_file(loaded, tmp_path, caplog):
+    """By both ways; a damaged one is solved again, or refused where going on is asked.
+
+    The user who says ``--resume`` relies on the states that are there.
+    """
     keep = Unfinished(folder=tmp_path / "map")
     keep.write("a", packed(loaded, "state"))
-    assert_same(unpacked(keep.read("a"), "state"), settled(loaded))
+    found = keep.read("a", lambda arrays: unpacked(arrays, "state"))
+    assert_same(found, settled(loaded))
     kept = Checkpoint.open(tmp_path / "run", {"steps": 2}, resume=False)
     kept.write("a", loaded)
-    again = Checkpoint.open(tmp_path / "run", {"steps": 2}, resume=True)
-    assert_same(again.read("a"), settled(loaded))
-    assert again.read("b") is None
+    asked = Checkpoint.open(tmp_path / "run", {"steps": 2}, resume=True)
+    same = Checkpoint.open(tmp_path / "run", {"steps": 2}, resume=False)
     path = tmp_path / "run" / "a.npz"
-    path.write_bytes(path.read_bytes()[:-99])
-    with pytest.raises(InputError, match=r"a\.npz"):
-        again.read("a")
+    for again in (asked, same):
+        assert_same(again.read("a"), settled(loaded))
+        assert again.read("b") is None
+    for damaged in (path.read_bytes()[:-99], arrays_file({"state.kind": "State"})):
+        path.write_bytes(damaged)
+        with pytest.raises(InputError, match=naming("--resume", str(path))):
+            asked.read("a")
+        caplog.clear()
+        assert same.read("a") is None
+        assert names(caplog.text, str(path), "computed again")
+
+
+def test_nothing_in_a_folder_of_states_is_removed(tmp_path):
+    """The same run goes on; another one, its damaged record and foreign files stay."""
+    folder = tmp_path / "states"
+    folder.mkdir()
+    (folder / "precious.npz").write_text("mine")
+    with pytest.raises(InputError, match=naming("precious.npz", "--resume", "--out")):
+        Checkpoint.open(folder, {"steps": 2}, resume=False)
+    assert [path.name for path in folder.iterdir()] == ["precious.npz"]
+    run = tmp_path / "run"
+    Checkpoint.open(run, {"steps": 2}, resume=False)
+    (run / "meshed.npz").write_text("hours of work")
+    for resume in (False, True):
+        assert Checkpoint.open(run, {"steps": 2}, resume=resume).count == 1
+    record = (run / "run.json").read_bytes()
+    for resume in (False, True):
+        with pytest.raises(InputError, match=naming("steps", "--resume", "--out")):
+            Checkpoint.open(run, {"steps": 3}, resume=resume)
+        for damaged in (b"[]", b'{"steps": 2}', record.replace(b"2", b"3")):
+            (run / "run.json").write_bytes(damaged)
+            with pytest.raises(InputError, match=naming("run.json", "--out")):
+                Checkpoint.open(run, {"steps": 2}, resume=resume)
+        (run / "run.json").write_bytes(record)
+    assert {path.name for path in run.iterdir()} == {"run.json", "meshed.npz"}
+    with pytest.raises(InputError, match=naming("--resume", "none")):
+        Checkpoint.open(tmp_path / "none", {"steps": 2}, resume=True)
 
 
 class Stop(Exception):
