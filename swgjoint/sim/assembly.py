@@ -23,6 +23,7 @@ from swgjoint.sim.drives import check_joint_names, drive_of
 from swgjoint.sim.feature_sections import Disturbance, ToolForce
 from swgjoint.sim.payload import arms_of
 from swgjoint.sim.rigid_arm import RigidArm, compile_spec
+from swgjoint.sim.run_memory import require_run_memory
 from swgjoint.sim.scene import MAX_STEPS, Scene
 from swgjoint.sim.scene_sections import JointSection
 from swgjoint.sim.start_check import check_link, check_ranges
@@ -160,6 +161,7 @@ def assemble(
             f"{scene.where}: sensors.torque: read by nobody; accepted: with a"
             " controller that is given to run_scene"
         )
+    require_run_memory(scene, len(arm.joints))
     trajectory = trajectory_of(scene, arm)
     check_ranges(arm, trajectory, where=scene.where)
     known = dict(drives or {})
@@ -206,6 +208,7 @@ def assemble(
     # follows from the step that its user chose, not from what the integrator needs
     if sub_steps > 1:
         _check_length(scene, sub_steps)
+        require_run_memory(scene, len(arm.joints), sub_steps=sub_steps)
         spec.option.timestep = scene.simulation.step_s / sub_steps
         trajectory = trajectory_of(scene, arm, sub_steps=sub_steps)
     if is_implicit(spec):

@@ -159,9 +159,15 @@ def use_of_motor(run: Run, j: int) -> dict[str, Any]:
     return found
 
 
-def torque_deviation(run: Run, j: int) -> Array:
-    """Output torque less what the rigid arm needs at that instant [N·m]. Shape (n,)."""
-    return np.asarray(run.output_torque[:, j] - run.assembly.link_torque[:, j])
+def torque_deviation(run: Run, j: int, part: slice = slice(None)) -> Array:
+    """Output torque less what the rigid arm needs at that instant [N·m]. Shape (n,).
+
+    Args:
+        run: The run.
+        j: Number of the joint.
+        part: Samples, all by default.
+    """
+    return np.asarray(run.output_torque[part, j] - run.assembly.link_torque[part, j])
 
 
 def torque_ripple(run: Run, j: int) -> Array:
@@ -169,7 +175,7 @@ def torque_ripple(run: Run, j: int) -> Array:
 
     Deviation of the torque less its mean and its straight line in time.
     """
-    rest = torque_deviation(run, j)[run.steady]
+    rest = torque_deviation(run, j, run.steady)
     rest = rest - rest.mean()
     line = np.linspace(-1.0, 1.0, rest.size)  # its mean is zero
     return np.asarray(rest - (line @ rest) / (line @ line) * line)

@@ -65,16 +65,22 @@ COLORS = ((31, 119, 180), (214, 96, 30), (110, 110, 110), (44, 140, 70))
 LABEL_COLOR = 0xFAFAFAFF
 
 
-def signals_of(run: Run, j: int) -> dict[str, Array]:
-    """Signals of one joint under the names and in the units of the recording."""
+def signals_of(run: Run, j: int, part: slice = slice(None)) -> dict[str, Array]:
+    """Signals of one joint under the names and in the units of the recording.
+
+    Args:
+        run: The run.
+        j: Number of the joint.
+        part: Samples, all by default.
+    """
     return {
-        "output_torque_Nm": run.output_torque[:, j],
-        "torque_deviation_Nm": torque_deviation(run, j),
-        "motor_torque_Nm": run.motor_torque[:, j],
-        "torsion_arcmin": run.torsion[:, j] / arcmin,
-        "transmission_error_arcmin": run.transmission_error[:, j] / arcmin,
-        "position_deg": run.position[:, j] / deg,
-        "reference_deg": run.reference[:, j] / deg,
+        "output_torque_Nm": run.output_torque[part, j],
+        "torque_deviation_Nm": torque_deviation(run, j, part),
+        "motor_torque_Nm": run.motor_torque[part, j],
+        "torsion_arcmin": run.torsion[part, j] / arcmin,
+        "transmission_error_arcmin": run.transmission_error[part, j] / arcmin,
+        "position_deg": run.position[part, j] / deg,
+        "reference_deg": run.reference[part, j] / deg,
     }
 
 
@@ -192,8 +198,8 @@ def log_moving(
     for label, run in runs.items():
         for j, joint in enumerate(run.joints):
             columns = [
-                Column(signal(name), values[part], np.float64)
-                for name, values in signals_of(run, j).items()
+                Column(signal(name), values, np.float64)
+                for name, values in signals_of(run, j, part).items()
             ]
             stream.send_columns(
                 f"{prefix_of(label)}joint/{joint}", indexes=[time], columns=columns

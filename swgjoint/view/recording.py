@@ -20,6 +20,11 @@ if TYPE_CHECKING:
     from swgjoint.sim.run import Run
 
 
+PART = 100_000
+"""Samples that are sent at a time: a long run needs no more memory for its recording
+than a short one."""
+
+
 def write_recording(
     runs: Mapping[str, Run], path: str | Path, *, rigid: Run | None = None
 ) -> Path:
@@ -128,7 +133,12 @@ def _end(
 ) -> None:
     """What follows from the runs."""
     scales = phase_scales(runs)
-    log_moving(stream, runs, scales, drives=drives, rigid=rigid)
+    samples = next(iter(runs.values())).time.size
+    for first in range(0, samples, PART):
+        if first:  # what was sent is in the file before more is put together
+            stream.flush()
+        part = slice(first, min(first + PART, samples))
+        log_moving(stream, runs, scales, drives=drives, rigid=rigid, part=part)
     log_measured(stream, runs, scales)
 
 

@@ -12,7 +12,7 @@ from swgjoint.fe.circular_spline import CircularSpline
 from swgjoint.fe.contact_patch import averaged_spline
 from swgjoint.fe.drive2d import can_halve
 from swgjoint.fe.solid.masters import Orders
-from swgjoint.fe.solid.memory import require_memory, required_memory
+from swgjoint.fe.solid.memory import require_solid_memory, required_memory
 from swgjoint.fe.solid.race import SolidRace
 from swgjoint.fe.solid.ring import SolidRing
 from swgjoint.fe.solid.ring_gear import ring_gear
@@ -71,7 +71,7 @@ def solid_ring(
     mesh = flexspline_strip(design, profile)
     ring = circular_spline_strip(design, facing) if elastic_circular_spline else None
     sectors = design.drive.teeth_flexspline // (2 if half else 1)
-    require_memory(name, required_memory(mesh, ring, sectors, orders))
+    require_solid_memory(name, required_memory(mesh, ring, sectors, orders))
     strip = flexspline(design, profile, mesh, orders=orders)
     gear, surface = None, CircularSpline(profile=facing)
     if ring is not None:

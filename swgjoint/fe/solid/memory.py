@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import os
-from pathlib import Path
-
-from swgjoint.errors import ComputationError
 from swgjoint.fe.solid.masters import Orders, strip_masters
 from swgjoint.fe.solid.strip_mesh import StripMesh
+from swgjoint.memory import INTERPRETER, require_memory
 
 BYTES = 8
 FILL = 28.0
@@ -19,8 +16,6 @@ COPIES = 4
 """Arrays of the size of the system or of its right-hand sides that live at once."""
 OFFSETS = 9
 """Teeth of the circular spline that feel a loaded one."""
-INTERPRETER = 0.25e9
-"""Python with its libraries [B]."""
 
 
 def required_memory(
@@ -53,34 +48,14 @@ def required_memory(
     return float(INTERPRETER + kept + max(condensing, solving + stresses))
 
 
-def available_memory() -> float | None:
-    """Free memory of this machine or container [B]; None where it cannot be told."""
-    found = []
-    try:
-        for line in Path("/proc/meminfo").read_text().splitlines():
-            if line.startswith("MemAvailable:"):
-                found.append(1024.0 * float(line.split()[1]))
-        limit = Path("/sys/fs/cgroup/memory.max").read_text().strip()
-        used = float(Path("/sys/fs/cgroup/memory.current").read_text())
-        if limit != "max":
-            found.append(float(limit) - used)
-    except (OSError, ValueError, IndexError):
-        pass
-    if not found and hasattr(os, "sysconf") and "SC_AVPHYS_PAGES" in os.sysconf_names:
-        found.append(float(os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")))
-    return min(found) if found else None
-
-
-def require_memory(name: str, required: float) -> None:
-    """Refuse a model that would not fit.
+def require_solid_memory(name: str, required: float) -> None:
+    """Refuse a 3D model that would not fit.
 
     Raises:
         ComputationError: With both figures and what would need less.
     """
-    free = available_memory()
-    if free is not None and required > free:
-        raise ComputationError(
-            f"{name}: the 3d model needs about {required / 1e9:.1f} GB, of which"
-            f" {free / 1e9:.1f} GB are free; try a smaller mesh.refinement, --half or"
-            " --model 2d"
-        )
+    require_memory(
+        f"{name}: the 3d model",
+        required,
+        less="a smaller mesh.refinement, --half or --model 2d",
+    )

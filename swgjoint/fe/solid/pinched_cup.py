@@ -33,7 +33,7 @@ from swgjoint.fe.solid.corotation import (
     tangent,
 )
 from swgjoint.fe.solid.masters import Masters, Orders, strip_masters
-from swgjoint.fe.solid.memory import require_memory, required_memory
+from swgjoint.fe.solid.memory import require_solid_memory, required_memory
 from swgjoint.fe.solid.ring_factor import RingFactor
 from swgjoint.fe.solid.segment import Segment, condense_segment
 from swgjoint.fe.solid.smooth_strip import smooth_strip
@@ -332,7 +332,7 @@ def pinched_cup(
     profile = tooth_profile(design, "flexspline")
     strip = smooth_strip(design) if toothless else flexspline_strip(design, profile)
     orders = orders or Orders()
-    require_memory(name, required_memory(strip, None, teeth // 2, orders))
+    require_solid_memory(name, required_memory(strip, None, teeth // 2, orders))
     masters = strip_masters(strip, orders)
     material = design.material_of("flexspline")
     bore = strip.teeth.bore.ravel()

@@ -1,0 +1,48 @@
+"""Memory that a computation will take, before it begins."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from swgjoint.errors import ComputationError
+
+INTERPRETER = 0.25e9
+"""Python with its libraries [B]."""
+
+
+def available_memory() -> float | None:
+    """Free memory of this machine or container [B]; None where it cannot be told."""
+    found = []
+    try:
+        for line in Path("/proc/meminfo").read_text().splitlines():
+            if line.startswith("MemAvailable:"):
+                found.append(1024.0 * float(line.split()[1]))
+        limit = Path("/sys/fs/cgroup/memory.max").read_text().strip()
+        used = float(Path("/sys/fs/cgroup/memory.current").read_text())
+        if limit != "max":
+            found.append(float(limit) - used)
+    except (OSError, ValueError, IndexError):
+        pass
+    if not found and hasattr(os, "sysconf") and "SC_AVPHYS_PAGES" in os.sysconf_names:
+        found.append(float(os.sysconf("SC_AVPHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")))
+    return min(found) if found else None
+
+
+def require_memory(what: str, required: float, *, less: str) -> None:
+    """Refuse a computation that would not fit.
+
+    Args:
+        what: The computation, for the message.
+        required: Estimate of its peak [B].
+        less: What would need less, for the message.
+
+    Raises:
+        ComputationError: With both figures and what would need less.
+    """
+    free = available_memory()
+    if free is not None and required > free:
+        raise ComputationError(
+            f"{what} needs about {required / 1e9:.1f} GB, of which {free / 1e9:.1f} GB"
+            f" are free; try {less}"
+        )
