@@ -111,12 +111,13 @@ class Outputs:
 
     def write(self, name: str, make: Callable[[], bytes | str | None]) -> None:
         """Write what ``make`` returns, whole; nothing where it returns None."""
-
-        def written(path: Path) -> Path | None:
+        path = self._folder / name
+        with attempting(path):
             content = make()
-            return None if content is None else write_whole(path, content)
-
-        self.hand_over(name, written)
+            if content is not None:
+                self._folder.mkdir(parents=True, exist_ok=True)
+                write_whole(path, content)
+                self.files.append(str(path))
 
     def write_json(self, name: str, result: dict[str, Any]) -> None:
         """Write a result with all files in its key ``files``, which this sets.
@@ -131,13 +132,13 @@ class Outputs:
             self.files.insert(0, path)
         result["files"] = self.files
 
-    def hand_over(self, name: str, write: Callable[[Path], Path | None]) -> None:
-        """Let ``write`` write the file; it returns the path, or None for no file."""
+    def hand_over(self, name: str, write: Callable[[Path], object]) -> None:
+        """Let ``write`` write the file."""
         path = self._folder / name
         with attempting(path):
             self._folder.mkdir(parents=True, exist_ok=True)
-            if write(path) is not None:
-                self.files.append(str(path))
+            write(path)
+            self.files.append(str(path))
 
 
 def read_regular(path: Path) -> bytes:

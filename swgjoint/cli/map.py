@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from swgjoint.cli.map_validity_text import validation_of_map, validation_table
 from swgjoint.cli.text import table
 from swgjoint.errors import InputError
-from swgjoint.files import check_output_file
+from swgjoint.files import Outputs, check_output_file
 
 if TYPE_CHECKING:
     from swgjoint.maps.drive_map import DriveMap
@@ -75,7 +75,8 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     drive = _measured(args) if args.design.endswith(".csv") else _built(args)
     if args.no_fields:
         drive = replace(drive, fields=None)
-    drive.save(path)
+    outputs = Outputs(path.parent)
+    outputs.hand_over(path.name, drive.save)
     info = dict(drive.info)
     info.pop("validation", None)
     return {
@@ -90,7 +91,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         "torque_range_Nm": _sampled(drive),
         "fit": (info.get("fit") or {}).get("loop"),
         "info": info,
-        "files": [str(path)],
+        "files": outputs.files,
         "wall_s": time.perf_counter() - start,
     }
 
@@ -161,7 +162,8 @@ def report(result: dict[str, Any]) -> str:
         *_flat("energy check", result["energy_check"]),
         ("wall time [s]", result["wall_s"]),
     ]
-    lines = [f"map of {result['design']}: {result['files'][0]}", table(rows)]
+    where = ", ".join(result["files"]) or "not written"
+    lines = [f"map of {result['design']}: {where}", table(rows)]
     lines += validation_table(result)
     fit = result.get("fit")
     if fit:

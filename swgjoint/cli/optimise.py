@@ -57,28 +57,29 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 def _write(place: Place, found: Optimum, result: dict[str, Any]) -> list[str]:
     """Designs of the front, all that were tried, the picture, the whole as JSON."""
     from swgjoint.study.optimise_plots import optimum_picture
-    from swgjoint.study.sweep_results import csv_text
+    from swgjoint.study.sweep_results import csv_text, write_to
 
     rows = [
         {key: value for key, value in row.items() if key != "confirmed"}
         for row in result["rows"]
     ]
     designs = found.designs(result["optimisation"])
-    contents = {
-        **{_front(k): design.to_toml().encode() for k, design in enumerate(designs)},
-        "tried.csv": csv_text(rows).encode(),
-        "optimise.png": optimum_picture(found),
-    }
-    files = [place.write(name, data) for name, data in contents.items()]
+    files = write_to(
+        place,
+        {_front(k): design.to_toml().encode for k, design in enumerate(designs)}
+        | {
+            "tried.csv": csv_text(rows).encode,
+            "optimise.png": lambda: optimum_picture(found),
+        },
+    )
     # a longer front that an earlier search left there is none of this one
     left = len(designs)
     while place.read(_front(left)) is not None:
         place.remove(_front(left))
         left += 1
     last = "optimise.json"  # which names them all
-    files.append(place.at(last))
-    place.write(last, (json_text({**result, "files": files}) + "\n").encode())
-    return files
+    content = {**result, "files": [*files, place.at(last)]}
+    return files + write_to(place, {last: (json_text(content) + "\n").encode})
 
 
 def _front(k: int) -> str:

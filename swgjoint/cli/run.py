@@ -103,7 +103,8 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     files: list[str] = []
     if folder is not None:
         outputs = Outputs(folder)
-        outputs.hand_over("run.rrd", lambda path: result.recording)
+        if result.recording is not None:
+            outputs.files.append(str(result.recording))
         if of_arm:
             from swgjoint.sim.scene_toml import scene_toml
 

@@ -67,21 +67,20 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 def _write(place: Place, found: SweepResult, result: dict[str, Any]) -> list[str]:
     """One row a design as tables, the picture, and the whole as JSON."""
     from swgjoint.study.sweep_plots import sweep_picture
-    from swgjoint.study.sweep_results import csv_text, parquet_bytes
+    from swgjoint.study.sweep_results import csv_text, parquet_bytes, write_to
 
     rows = found.rows()
-    contents = {
-        "sweep.csv": csv_text(rows).encode(),
-        "sweep.parquet": parquet_bytes(rows),
-        "sweep.png": sweep_picture(found),
-    }
-    files = [
-        place.write(name, data) for name, data in contents.items() if data is not None
-    ]
+    files = write_to(
+        place,
+        {
+            "sweep.csv": csv_text(rows).encode,
+            "sweep.parquet": lambda: parquet_bytes(rows),
+            "sweep.png": lambda: sweep_picture(found),
+        },
+    )
     last = "sweep.json"  # which names them all
-    files.append(place.at(last))
-    place.write(last, (json_text({**result, "files": files}) + "\n").encode())
-    return files
+    content = {**result, "files": [*files, place.at(last)]}
+    return files + write_to(place, {last: (json_text(content) + "\n").encode})
 
 
 def status(result: dict[str, Any]) -> int:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 import secrets
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Protocol
 
 from swgjoint.errors import InputError, MissingExtraError
-from swgjoint.files import output_folder, read_regular, write_whole
+from swgjoint.files import attempting, output_folder, read_regular, write_whole
 from swgjoint.json_text import json_text
 from swgjoint.kept import DamagedError, ignored, json_content, json_file
 from swgjoint.study.sweep_figures import Record
@@ -139,6 +139,23 @@ def write_record(
 
 def _name(key: str) -> str:
     return f"results/{key[:2]}/{key}.json"
+
+
+def write_to(
+    place: Place, outputs: Mapping[str, Callable[[], bytes | None]]
+) -> list[str]:
+    """Write the outputs of a result by name; one that fails costs no other.
+
+    Returns:
+        Paths of those that were written; an output that is None is none.
+    """
+    files: list[str] = []
+    for name, make in outputs.items():
+        with attempting(place.at(name)):
+            data = make()
+            if data is not None:
+                files.append(place.write(name, data))
+    return files
 
 
 def csv_text(rows: Sequence[Mapping[str, Any]]) -> str:
