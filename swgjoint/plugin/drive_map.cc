@@ -288,7 +288,8 @@ void DriveMap::HalfStep(double dtheta, double dpsi) {
 // to those of A and B in the first block.
 void DriveMap::Combine(int segment, const double* weight, double out[5]) const {
   Lanes sum[5] = {};
-  const double* row = &table_[static_cast<size_t>(segment) * blocks_ * kBlock];
+  // by data(): a map without harmonics has no table
+  const double* row = table_.data() + static_cast<size_t>(segment) * blocks_ * kBlock;
   for (int b = 0; b < blocks_; ++b, row += kBlock, weight += kWeights) {
     Lanes wc, ws, even, odd;
     Load(weight, &wc);

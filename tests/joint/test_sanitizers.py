@@ -1,6 +1,7 @@
-"""The plugin under AddressSanitizer and UndefinedBehaviorSanitizer.
+"""The plugin under AddressSanitizer, UndefinedBehaviorSanitizer and a checking library.
 
-Its own tests run in a process that loads a library built for that. Leaks are not looked
+The standard library then checks indices and iterators, as some packagers have it. Its
+own tests run in a process that loads a library built for that. Leaks are not looked
 for: the interpreter leaves memory to the system. A planted overflow must be found.
 """
 
@@ -41,6 +42,7 @@ pytestmark = [
 # without optimisation, names in place of line numbers: half the time of a compiler
 OPTIONS = "-std=c++17 -O0 -g1 -fPIC -fvisibility=hidden -ffp-contract=off".split()
 OPTIONS += ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
+OPTIONS += ["-D_GLIBCXX_ASSERTIONS"]
 
 
 def build(folder: Path, change: tuple[str, str, str] | None = None) -> Path:
@@ -130,10 +132,21 @@ def test_the_plugin_is_clean(tmp_path):
 
 
 def test_a_planted_overflow_is_found(tmp_path):
-    """One element too few in a vector of the hysteresis stops the run."""
-    line = "drive->stretch_.assign(drive->reach_.size(), 0.0);"
-    library = build(tmp_path, ("drive.cc", line, line.replace("size()", "size() - 1")))
-    done = run_tests(library, "tests/joint/test_hysteresis.py", "-k", "equals_twin")
+    """A lane too few in the weights, which pointers alone reach, stops the run."""
+    line = "weight_.assign(static_cast<size_t>(blocks_) * kWeights, 0.0);"
+    short = line.replace("kWeights", "kWeights - kLanes")
+    library = build(tmp_path, ("drive_map.cc", line, short))
+    done = run_tests(library, "tests/joint/test_twin.py", "-k", "trajectory")
     assert done.returncode != 0
     assert "heap-buffer-overflow" in done.stderr
-    assert "Place" in done.stderr
+    assert "Sweep" in done.stderr
+
+
+def test_a_planted_index_past_an_empty_table_is_found(tmp_path):
+    """A map without harmonics has no table, of which nothing may be indexed."""
+    line = "table_.data() + static_cast<size_t>(segment) * blocks_ * kBlock"
+    planted = "&table_[static_cast<size_t>(segment) * blocks_ * kBlock]"
+    library = build(tmp_path, ("drive_map.cc", line, planted))
+    done = run_tests(library, "tests/joint/test_twin.py", "-k", "without_harmonics")
+    assert done.returncode != 0
+    assert "__n < this->size()" in done.stderr
