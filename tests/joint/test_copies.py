@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from dataclasses import replace
 
 import mujoco
 import mujoco.rollout
@@ -13,6 +14,7 @@ from messages import naming
 from swgjoint.joint import plugin
 from swgjoint.joint.attach import attach
 from swgjoint.maps.drive_map import DriveMap
+from swgjoint.maps.hysteresis import Jenkin
 
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 
@@ -61,6 +63,41 @@ def test_copy_between_the_halves_of_a_step(bench, synthetic_map):
     for data in (b.data, twin):
         mujoco.mj_step2(b.model, data)
     np.testing.assert_array_equal(run_on(b.model, twin), run_on(b.model, b.data))
+
+
+@pytest.mark.parametrize("integrator", ["DISCRETE", "IMPLICITFAST"])
+def test_a_fresh_copy_completes_the_step_of_a_specimen(
+    bench, synthetic_map, friction_law, integrator
+):
+    """A copy into new data in mid-step ends it with the deviations of the tendon."""
+    elements = (Jenkin(stiffness=1e4, yield_torque=3.0),)
+    lossy = replace(synthetic_map, friction=friction_law, hysteresis=elements)
+    b = bench(lossy, variable=True, step=2e-4)
+    b.model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{integrator}")
+    b.model.tendon_user[:] = 0.3, 0.2, 0.5, 0.1, 0.7
+    b.place(0.1, -5e-4, 30.0, 0.5)
+    mujoco.mj_step(b.model, b.data, 50)
+    mujoco.mj_step1(b.model, b.data)
+    twin = mujoco.MjData(b.model)
+    mujoco.mj_copyData(twin, b.model, b.data)
+    for data in (b.data, twin):
+        mujoco.mj_step2(b.model, data)
+    np.testing.assert_array_equal(
+        full_state(b.model, twin), full_state(b.model, b.data)
+    )
+
+
+def test_a_copy_from_another_model_brings_its_state_alone(bench, synthetic_map):
+    """With the state of a stiffer drive's data, a model moves with its own map."""
+    soft = bench(synthetic_map)
+    stiff = bench(replace(synthetic_map, potential=10.0 * synthetic_map.potential))
+    start(stiff)
+    want = mujoco.MjData(soft.model)
+    mujoco.mj_setState(soft.model, want, full_state(stiff.model, stiff.data), STATE)
+    mujoco.mj_copyData(soft.data, soft.model, stiff.data)
+    np.testing.assert_array_equal(
+        run_on(soft.model, soft.data), run_on(soft.model, want)
+    )
 
 
 def test_reset_starts_anew(bench, synthetic_map):
