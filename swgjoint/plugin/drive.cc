@@ -89,6 +89,26 @@ mjtNum NativeForce(const mjModel* m, const mjData* d, int tendon) {
               x * x * m->tendon_stiffnesspoly[mjNPOLY * tendon + 1]);
 }
 
+// Acceleration of a dof by a unit torque on it, with all others free: the diagonal of
+// M^-1, from the factor L' D L as the sum of (L^-T e)^2/D over the dof's ancestors.
+mjtNum Response(const mjModel* m, mjData* d, int dof) {
+  const int row = m->M_rowadr[dof], last = m->M_rownnz[dof] - 1;
+  mj_markStack(d);
+  mjtNum* x = mj_stackAllocNum(d, last + 1);
+  mju_zero(x, last);
+  x[last] = 1;
+  mjtNum sum = 0;
+  for (int a = last; a >= 0; --a) {
+    // the ancestors of an ancestor are the entries before it
+    const int j = m->M_colind[row + a];
+    const mjtNum* factor = d->qLD + m->M_rowadr[j];
+    sum += x[a] * x[a] * d->qLDiagInv[j];
+    for (int b = 0; b < a; ++b) x[b] -= factor[b] * x[a];
+  }
+  mj_freeStack(d);
+  return sum;
+}
+
 // Whether a model with this signature and step has not been warned of yet.
 bool First(uint64_t model, mjtNum step, int bound) {
   static std::mutex mutex;
@@ -365,7 +385,7 @@ void Drive::AddGradient(const mjModel* m, mjData* d, int instance) {
 void Drive::AddScheme(const mjModel* m, mjData* d, int instance) {
   const mjtNum h = m->opt.timestep;
   const mjtNum vm = d->qvel[v_rotor_], vl = d->qvel[v_link_];
-  const mjtNum wm = d->qLDiagInv[v_rotor_], wl = d->qLDiagInv[v_link_];
+  const mjtNum wm = Response(m, d, v_rotor_), wl = Response(m, d, v_link_);
   const mjtNum* state = d->plugin_state + m->plugin_stateadr[instance];
   const mjtNum damping = m->opt.disableflags & mjDSBL_DAMPER ? 0 : damping_;
 
