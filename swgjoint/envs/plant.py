@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from swgjoint.envs.arguments import check_count
 from swgjoint.errors import InputError
 from swgjoint.joint.drive import JointDrive
+from swgjoint.joint.response import responses
 from swgjoint.joint.variation import SIZE, Variation
 from swgjoint.maps.drive_map import DriveMap
 
@@ -72,7 +73,8 @@ class Plant:
             # of every joint: acceleration of the rotor, then of the link
             others = [int(model.plugin_stateadr[k]) + 1 for k in instances]
             self._others = state, np.array(others)
-            self._qacc, self._weight = batch.bind("qacc"), batch.bind("qLDiagInv")
+            self._qacc = batch.bind("qacc")
+            self._factor = batch.bind("qLD"), batch.bind("qLDiagInv")
 
     @property
     def motor_angle(self) -> Array:
@@ -104,7 +106,8 @@ class Plant:
         if self._others is not None:
             state, index = self._others
             v = self._link_v
-            return np.asarray((self._qacc[:, v] - state[:, index]) / self._weight[:, v])
+            weight = responses(self.model, *self._factor, v)
+            return np.asarray((self._qacc[:, v] - state[:, index]) / weight)
         stiffness = np.array([d.stiffness for d in self.drives])
         damping = np.array([d.damping for d in self.drives])
         torsion = self.motor_angle / self.ratio - self.link_angle
@@ -157,9 +160,10 @@ class Plant:
         # by all other forces cancel those by the drive, hysteresis is relaxed here
         batch.forward([index])
         state, others = self._others
-        weight = self._weight[index]
-        state[index, others - 1] = -weight[self._rotor_v] * forces[:, 0]
-        state[index, others] = -weight[self._link_v] * forces[:, 1]
+        factor = [part[index] for part in self._factor]
+        for side, dofs in enumerate((self._rotor_v, self._link_v)):
+            weight = responses(self.model, *factor, dofs)
+            state[index, others - 1 + side] = -weight * forces[:, side]
         for j, drive in enumerate(maps):
             first = others[j] + 1
             torsion = float(drive.torsion(motor_angle[j], links[j]))

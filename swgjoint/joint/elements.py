@@ -13,6 +13,10 @@ from swgjoint.joint.native import NativeSpring
 from swgjoint.joint.place import ROTOR_MASS, Place, Rotor
 from swgjoint.units import deg
 
+SOLREF = (0.02, 1.0)
+SOLIMP = (0.9, 0.95, 0.001, 0.5, 2.0)
+"""MuJoCo's own for constraints: time constant [s], damping ratio; impedance."""
+
 
 def add_rotor(
     spec: mujoco.MjSpec, place: Place, name: str, rotor: Rotor
@@ -37,6 +41,10 @@ def add_rotor(
     hinge.springyield = 0.0
     hinge.armature = rotor.inertia - rotor.body
     hinge.frictionloss = 0.0
+    # of the friction loss at level native
+    hinge.solref_friction = np.array(SOLREF)
+    hinge.solimp_friction = np.array(SOLIMP)
+    hinge.actgravcomp = False
     hinge.limited = mujoco.mjtLimited.mjLIMITED_FALSE
     hinge.actfrclimited = mujoco.mjtLimited.mjLIMITED_FALSE
     hinge.ref = place.ref * rotor.ratio / (deg if spec.compiler.degree else 1.0)

@@ -29,9 +29,12 @@ class Surroundings:
         """Joints of the fixed tendons, by tendon."""
         for tendon in spec.tendons:
             self.tendons[tendon.name] = tendon
+            path = tendon.path
+            # by index: iterating ends in an exception of 0.1 ms inside the engine
+            wraps = (path[k] for k in range(len(path)))
             self.wrapped[tendon.name] = [
                 wrap.target.name
-                for wrap in tendon.path
+                for wrap in wraps
                 if wrap.type == mujoco.mjtWrap.mjWRAP_JOINT
             ]
         self.actuators: dict[str, dict[int, Any]] = defaultdict(dict)

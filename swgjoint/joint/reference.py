@@ -61,7 +61,8 @@ class Motion:
     theta_rate: float
     psi_rate: float
     rotor_weight: float = 0.0
-    """Inverse articulated inertia, ``qLDiagInv`` of the rotor [1/(kg·m²)]."""
+    """Of the rotor's dof in the inverse mass matrix, see :mod:`.response`
+    [1/(kg·m²)]."""
     link_weight: float = 0.0
     rotor_acceleration: float = 0.0
     """What all other forces caused in the last step, plugin state [rad/s²]."""

@@ -37,7 +37,16 @@ from swgjoint.maps.drive_map import DriveMap
 try:
     import warp as wp
 
-    from swgjoint.joint.warp_law import Drive, Maps, Step, articulated, law, real, vec5
+    from swgjoint.joint.warp_law import (
+        Drive,
+        Maps,
+        Step,
+        articulated,
+        law,
+        real,
+        respond,
+        vec5,
+    )
 except ImportError as error:
     raise MissingExtraError(
         "drives in MuJoCo Warp need mujoco-warp: pip install 'swgjoint[warp]'"
@@ -94,7 +103,9 @@ class WarpDrives:
             unknown = Step()
             unknown.time = float("inf")  # taken as a reset
             self.steps = wp.full((worlds, len(rows)), unknown, dtype=Step)
-            self.inertia = wp.zeros((worlds, model.nC), dtype=float)
+            self.factor = wp.zeros((worlds, model.nC), dtype=float)
+            self.column = wp.zeros((worlds, model.nv), dtype=float)
+            self.weight = wp.zeros((worlds, model.nv), dtype=float)
 
     def __call__(self, m: Any, d: Any) -> None:
         """Add the drives to the passive forces and the metric of every world."""
@@ -102,11 +113,18 @@ class WarpDrives:
         if m.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_SPRING:
             return
         damped = not m.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_DAMPER
+        rows = [m.M_rownnz, m.M_rowadr, m.M_colind]
         wp.launch(
             articulated,
             dim=d.nworld,
-            inputs=[m.M_rownnz, m.M_rowadr, m.M_colind, d.M, m.nv],
-            outputs=[self.inertia],
+            inputs=[*rows, d.M, m.nv],
+            outputs=[self.factor],
+        )
+        wp.launch(
+            respond,
+            dim=d.nworld,
+            inputs=[*rows, self.factor],
+            outputs=[self.column, self.weight],
         )
         wp.launch(
             law,
@@ -116,9 +134,7 @@ class WarpDrives:
                 real(float(damped)),
                 self.drives,
                 self.maps,
-                m.M_rownnz,
-                m.M_rowadr,
-                self.inertia,
+                self.weight,
                 d.time,
                 d.qpos,
                 d.qvel,

@@ -361,7 +361,7 @@ def articulated(
     nv: int,
     out: wp.array2d(dtype=float),
 ):
-    """M with the dofs eliminated from the leaves: its diagonal is what each dof moves.
+    """M with the dofs eliminated from the leaves: D, and the rows of L times D.
 
     MuJoCo Warp has no factor of M before the passive stage, and other ones than this.
     """
@@ -379,14 +379,42 @@ def articulated(
 
 
 @wp.kernel
+def respond(
+    M_rownnz: wp.array(dtype=int),
+    M_rowadr: wp.array(dtype=int),
+    M_colind: wp.array(dtype=int),
+    factor: wp.array2d(dtype=float),
+    column: wp.array2d(dtype=float),
+    weight: wp.array2d(dtype=float),
+):
+    """Diagonal of the inverse of M, as in ``response.py``.
+
+    ``column`` is room for one column of L^-T.
+    """
+    world = wp.tid()
+    for dof in range(weight.shape[1]):
+        start, last = M_rowadr[dof], M_rownnz[dof] - 1
+        for k in range(last):
+            column[world, k] = 0.0
+        column[world, last] = 1.0
+        total = float(0.0)
+        for up in range(last + 1):
+            a = last - up
+            at = M_rowadr[M_colind[start + a]]
+            scaled = column[world, a] / factor[world, at + a]
+            total += scaled * column[world, a]
+            for b in range(a):
+                column[world, b] -= factor[world, at + b] * scaled
+        weight[world, dof] = total
+
+
+@wp.kernel
 def law(
     timestep: wp.array(dtype=float),
     damped: real,
     drives: wp.array(dtype=Drive),
     maps: Maps,
-    M_rownnz: wp.array(dtype=int),
-    M_rowadr: wp.array(dtype=int),
-    inertia: wp.array2d(dtype=float),
+    weight: wp.array2d(dtype=float),
     time: wp.array(dtype=float),
     qpos: wp.array2d(dtype=float),
     qvel: wp.array2d(dtype=float),
@@ -443,10 +471,7 @@ def law(
         on_rotor += native * drive.b_theta
         on_link += native * drive.b_psi
 
-    # inverse articulated inertias
-    rotor_end = M_rowadr[drive.v_rotor] + M_rownnz[drive.v_rotor] - 1
-    link_end = M_rowadr[drive.v_link] + M_rownnz[drive.v_link] - 1
-    wm, wl = ONE / real(inertia[world, rotor_end]), ONE / real(inertia[world, link_end])
+    wm, wl = real(weight[world, drive.v_rotor]), real(weight[world, drive.v_link])
 
     # the scheme is a midpoint rule in positions half a step back
     theta = real(qpos[world, drive.q_rotor]) - HALF * h * vm

@@ -27,6 +27,8 @@ constexpr mjtNum kLeastLosses = 1e-6;    // the bristle keeps some stiffness
 // spring pulls with nothing, for its length, unlike a torsion, is a rotation of many
 // turns. 1e-19 is written, as XML has nothing below 1e-20; older models have 1e-30.
 constexpr mjtNum kFrictionCubic = 1e-18;
+// Torque that the engine warns of (mjWARN_BADQACC) at inertias up to 1e10 kg m^2
+constexpr mjtNum kDiverged = mjMAXVAL * mjMAXVAL;
 // Custom numeric with the bounds of the integrator's region, see joint/watch.py.
 constexpr char kRegion[] = "swgjoint_region";
 
@@ -85,6 +87,26 @@ mjtNum NativeForce(const mjModel* m, const mjData* d, int tendon) {
   const mjtNum x = d->ten_length[tendon];
   return x * (m->tendon_stiffness[tendon] +
               x * x * m->tendon_stiffnesspoly[mjNPOLY * tendon + 1]);
+}
+
+// Acceleration of a dof by a unit torque on it, with all others free: the diagonal of
+// M^-1, from the factor L' D L as the sum of (L^-T e)^2/D over the dof's ancestors.
+mjtNum Response(const mjModel* m, mjData* d, int dof) {
+  const int row = m->M_rowadr[dof], last = m->M_rownnz[dof] - 1;
+  mj_markStack(d);
+  mjtNum* x = mj_stackAllocNum(d, last + 1);
+  mju_zero(x, last);
+  x[last] = 1;
+  mjtNum sum = 0;
+  for (int a = last; a >= 0; --a) {
+    // the ancestors of an ancestor are the entries before it
+    const int j = m->M_colind[row + a];
+    const mjtNum* factor = d->qLD + m->M_rowadr[j];
+    sum += x[a] * x[a] * d->qLDiagInv[j];
+    for (int b = 0; b < a; ++b) x[b] -= factor[b] * x[a];
+  }
+  mj_freeStack(d);
+  return sum;
 }
 
 // Whether a model with this signature and step has not been warned of yet.
@@ -258,7 +280,7 @@ void Drive::Vary(const mjModel* m) {
   if (m->nuser_tendon < kDeviations) return;
   const mjtNum* by = m->tendon_user + tendon_ * m->nuser_tendon;
   map_.Vary(1 + by[0], 1 + by[1], by[2], by[3]);
-  losses_ = std::max(kLeastLosses, 1 + by[4]);
+  losses_ = std::max(1 + by[4], kLeastLosses);  // NaN stays, to be found
   if (friction_) friction_->Scale(losses_);
 }
 
@@ -311,11 +333,25 @@ void Drive::Slip(mjtNum change, DriveValue* value) const {
   }
 }
 
+// Whether one of the torques and stiffnesses of a step is not finite or beyond all
+// bounds, for the user data or the state are. The engine's solver would take it for no
+// force at all and let the whole model coast in silence. So the rotor gets a torque by
+// which the engine warns of a divergence and starts anew, as after any other, and the
+// step leaves no trace in the history of the drive.
+bool Drive::Diverges(mjData* d, std::initializer_list<mjtNum> numbers) const {
+  const auto bounded = [](mjtNum x) { return std::fabs(x) <= kDiverged; };  // not NaN
+  if (std::all_of(numbers.begin(), numbers.end(), bounded)) return false;
+  d->qfrc_passive[v_rotor_] = kDiverged;
+  d->qfrc_passive[v_link_] = 0;
+  return true;
+}
+
 void Drive::AddGradient(const mjModel* m, mjData* d, int instance) {
   DriveValue value;
   map_.Gradient(d->qpos[q_rotor_], d->qpos[q_link_], &value);
   Place(d->plugin_state + m->plugin_stateadr[instance] + kAccelerations);
   Slip(0, &value);
+  mjtNum rubs = 0;
   if (friction_) {
     const mjtNum* state = d->plugin_state + m->plugin_stateadr[instance] +
                           kAccelerations + reach_.size();
@@ -323,18 +359,23 @@ void Drive::AddGradient(const mjModel* m, mjData* d, int instance) {
     const mjtNum v[2] = {d->qvel[v_rotor_], d->qvel[v_link_]};
     const mjtNum speed = Rotation(v);
     const mjtNum x = state[1] != 0 ? Rotation(q) - state[0] : 0;
-    const mjtNum rubs =
-        friction_->Torque(x, friction_->Reach(speed, value.torque), speed);
-    d->qfrc_passive[v_rotor_] -= rubs * friction_->b_theta();
-    d->qfrc_passive[v_link_] -= rubs * friction_->b_psi();
+    rubs = friction_->Torque(x, friction_->Reach(speed, value.torque), speed);
   }
-  step_.gradient = true;
   const mjtNum damping = m->opt.disableflags & mjDSBL_DAMPER ? 0 : damping_;
   const mjtNum rate =
       value.g_theta * d->qvel[v_rotor_] + value.g_psi * d->qvel[v_link_];
   const mjtNum force = value.torque + damping * rate;
+  if (Diverges(d, {force, value.g_theta, value.g_psi, value.e_theta, value.e_psi,
+                   rubs})) {
+    return;
+  }
+  if (friction_) {
+    d->qfrc_passive[v_rotor_] -= rubs * friction_->b_theta();
+    d->qfrc_passive[v_link_] -= rubs * friction_->b_psi();
+  }
   d->qfrc_passive[v_rotor_] -= force * value.g_theta + value.e_theta;
   d->qfrc_passive[v_link_] -= force * value.g_psi + value.e_psi;
+  step_.gradient = true;
 }
 
 // Predicts the step of the pair, takes the discrete gradient over it and hands the
@@ -344,7 +385,7 @@ void Drive::AddGradient(const mjModel* m, mjData* d, int instance) {
 void Drive::AddScheme(const mjModel* m, mjData* d, int instance) {
   const mjtNum h = m->opt.timestep;
   const mjtNum vm = d->qvel[v_rotor_], vl = d->qvel[v_link_];
-  const mjtNum wm = d->qLDiagInv[v_rotor_], wl = d->qLDiagInv[v_link_];
+  const mjtNum wm = Response(m, d, v_rotor_), wl = Response(m, d, v_link_);
   const mjtNum* state = d->plugin_state + m->plugin_stateadr[instance];
   const mjtNum damping = m->opt.disableflags & mjDSBL_DAMPER ? 0 : damping_;
 
@@ -402,6 +443,10 @@ void Drive::AddScheme(const mjModel* m, mjData* d, int instance) {
     }
   }
 
+  if (Diverges(d, {force, p, g.g_theta, g.g_psi, g.e_theta, g.e_psi, rub.force,
+                   rub.metric})) {
+    return;
+  }
   p = SetTangent(m, d, tendon_, p);
   // the engine will add -h p times the tendon's velocity along g: cancel it
   const mjtNum shift = h * p * d->ten_velocity[tendon_];
@@ -428,7 +473,15 @@ void Drive::AddScheme(const mjModel* m, mjData* d, int instance) {
 }
 
 void Drive::Advance(const mjModel* m, mjData* d, int instance) {
+  Vary(m);  // a copy may end a step that it has not begun
   mjtNum* state = d->plugin_state + m->plugin_stateadr[instance];
+  AdvanceState(m, d, state);
+  std::replace_if(
+      state, state + m->plugin_statenum[instance],
+      [](mjtNum x) { return !std::isfinite(x); }, 0.0);
+}
+
+void Drive::AdvanceState(const mjModel* m, const mjData* d, mjtNum* state) {
   state[0] = state[1] = 0;
   // one path from the last torsion: its end decides where an element is relaxed. The
   // end of a step of the scheme is the beginning of the next and counts then; stages
@@ -497,15 +550,17 @@ void Drive::RegisterPlugin() {
     delete Get(d, instance);
     d->plugin_data[instance] = 0;
   };
-  plugin.copy = +[](mjData* dest, const mjModel*, const mjData* src, int instance) {
+  plugin.copy = +[](mjData* dest, const mjModel* m, const mjData* src, int instance) {
     // a copy between the two halves of a step must carry what Advance needs
-    if (dest == src || !Get(src, instance)) return;
-    if (Get(dest, instance) && Get(dest, instance) != Get(src, instance)) {
-      *Get(dest, instance) = *Get(src, instance);
-    } else {
-      dest->plugin_data[instance] =
-          reinterpret_cast<uintptr_t>(new Drive(*Get(src, instance)));
+    const Drive* from = Get(src, instance);
+    if (dest == src || !from) return;
+    if (!Get(dest, instance) || Get(dest, instance) == from) {
+      // new data; a model that was edited since it was compiled may be refused
+      auto drive = Drive::Create(m, instance);
+      if (!drive) drive = std::make_unique<Drive>(*from);
+      dest->plugin_data[instance] = reinterpret_cast<uintptr_t>(drive.release());
     }
+    Get(dest, instance)->Continue(*from);
   };
   plugin.reset = +[](const mjModel* m, mjtNum* state, void* data, int instance) {
     mju_zero(state, m->plugin_statenum[instance]);

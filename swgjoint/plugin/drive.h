@@ -4,6 +4,7 @@
 
 #include <mujoco/mujoco.h>
 
+#include <initializer_list>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -22,10 +23,15 @@ class Drive {
   void Compute(const mjModel* m, mjData* d, int instance);
 
   // After the step: keeps the acceleration that all other forces caused, and where
-  // the elements of the hysteresis and the bristle of the friction are relaxed.
+  // the elements of the hysteresis and the bristle of the friction are relaxed. A
+  // state that is not finite becomes 0.
   void Advance(const mjModel* m, mjData* d, int instance);
 
   void Forget() { step_ = Step(); }
+
+  // Takes over what Advance needs of a step that the drive of another mjData began. That
+  // one may be of another model, so its map, addresses and parameters stay there.
+  void Continue(const Drive& other) { step_ = other.step_; }
 
   static void RegisterPlugin();
 
@@ -50,6 +56,8 @@ class Drive {
   void Watch(const mjModel* m, const mjData* d, int instance, int scheme);
   void AddGradient(const mjModel* m, mjData* d, int instance);
   void AddScheme(const mjModel* m, mjData* d, int instance);
+  void AdvanceState(const mjModel* m, const mjData* d, mjtNum* state);
+  bool Diverges(mjData* d, std::initializer_list<mjtNum> numbers) const;
   void Place(const mjtNum* rest);
   void Slip(mjtNum change, DriveValue* value) const;
   bool FindFriction(const mjModel* m, const char* text, int rotor, int link);

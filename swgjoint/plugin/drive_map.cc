@@ -4,8 +4,10 @@
 #include <cctype>
 #include <charconv>
 #include <cmath>
+#include <cstdint>
 #include <cstring>
 #include <limits>
+#include <unordered_map>
 
 namespace swgjoint {
 namespace {
@@ -213,23 +215,34 @@ bool DriveMap::Parse(const DriveText& text, std::string* error) {
     }
   }
 
-  // sums and differences of earlier harmonics need no call of sin and cos
+  FindRecipes();
+  return true;
+}
+
+// Sums and differences of earlier harmonics need no call of sin and cos: the first pair
+// by the later of the two, then by the earlier one.
+void DriveMap::FindRecipes() {
   const int count = n_ - 1;
+  const auto key = [](double theta, double psi) {
+    // one number of two integers below 2e6
+    return static_cast<int64_t>(theta) * (int64_t{1} << 22) + static_cast<int64_t>(psi);
+  };
+  std::unordered_map<int64_t, int> first;  // harmonic of these orders
+  const auto find = [&](double theta, double psi) {
+    const auto at = first.find(key(theta, psi));
+    return at == first.end() ? count : at->second;
+  };
+  for (int k = 0; k < count; ++k) first.emplace(key(n_theta_[k], n_psi_[k]), k);
   recipe_.assign(count, Recipe());
   for (int k = 0; k < count; ++k) {
-    for (int a = 0; a < k && recipe_[k].a < 0; ++a) {
-      for (int b = 0; b <= a && recipe_[k].a < 0; ++b) {
-        for (double sign : {1.0, -1.0}) {
-          if (n_theta_[a] + sign * n_theta_[b] == n_theta_[k] &&
-              n_psi_[a] + sign * n_psi_[b] == n_psi_[k]) {
-            recipe_[k] = Recipe{a, b, sign};
-            break;
-          }
-        }
-      }
+    for (int a = 0; a < k; ++a) {
+      const double theta = n_theta_[k] - n_theta_[a], psi = n_psi_[k] - n_psi_[a];
+      const int plus = find(theta, psi), minus = find(-theta, -psi);
+      if (std::min(plus, minus) > a) continue;
+      recipe_[k] = plus <= minus ? Recipe{a, plus, 1} : Recipe{a, minus, -1};
+      break;
     }
   }
-  return true;
 }
 
 int DriveMap::Segment(double torsion) const {
@@ -288,7 +301,8 @@ void DriveMap::HalfStep(double dtheta, double dpsi) {
 // to those of A and B in the first block.
 void DriveMap::Combine(int segment, const double* weight, double out[5]) const {
   Lanes sum[5] = {};
-  const double* row = &table_[static_cast<size_t>(segment) * blocks_ * kBlock];
+  // by data(): a map without harmonics has no table
+  const double* row = table_.data() + static_cast<size_t>(segment) * blocks_ * kBlock;
   for (int b = 0; b < blocks_; ++b, row += kBlock, weight += kWeights) {
     Lanes wc, ws, even, odd;
     Load(weight, &wc);

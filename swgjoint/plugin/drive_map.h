@@ -76,6 +76,7 @@ class DriveMap {
     double sign = 1;     // phase = phase_a + sign * phase_b
   };
 
+  void FindRecipes();
   int Segment(double torsion) const;
   int SegmentNear(int guess, double torsion) const;
   void HalfStep(double dtheta, double dpsi);

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.errors import ComputationError, InputError
+from swgjoint.joint.response import responses
 from swgjoint.sim.start_check import touching_at
 from swgjoint.sim.transmission import Transmission
 
@@ -93,9 +94,10 @@ def set_start(assembly: Assembly, data: mujoco.MjData) -> None:
         on_input, on_output = transmission.law.forces(theta, psi)
         instance = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_PLUGIN, plugin)
         first = model.plugin_stateadr[instance]
-        data.plugin_state[first : first + 2] = [
-            -data.qLDiagInv[rotor] * float(on_input),
-            -data.qLDiagInv[link] * float(on_output),
+        weight = responses(model, data.qLD, data.qLDiagInv, (rotor, link))
+        data.plugin_state[first : first + 2] = -weight * [
+            float(on_input),
+            float(on_output),
         ]
         # the balance is that of the spring: hysteresis starts relaxed
         torsion = float(transmission.law.torsion(theta, psi))

@@ -19,6 +19,7 @@ from swgjoint.joint.reference import (
     rest_after,
     scheme_force,
 )
+from swgjoint.joint.response import responses
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.hysteresis import Sliders
 
@@ -85,7 +86,8 @@ class Bench:
         """What the twin sees where the engine stands, after mj_forward."""
         d = self.data
         (theta, psi), rates = d.qpos[self.q], d.qvel[self.v]
-        weight, other = d.qLDiagInv[self.v], d.plugin_state[:2]
+        weight = responses(self.model, d.qLD, d.qLDiagInv, self.v)
+        other = d.plugin_state[:2]
         return Motion(
             theta=theta,
             psi=psi,

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 from swgjoint.joint.attach import attach
+from swgjoint.joint.response import responses
+from swgjoint.maps.drive_map import DriveMap
 
 LINKS = ((8.0, 0.42), (6.0, 0.38), (2.0, 0.1), (1.2, 0.1), (1.2, 0.1), (0.3, 0.06))
 
@@ -122,3 +124,46 @@ def test_joint_limits_stop_the_links(arm):
     assert np.isfinite(data.qpos).all()
     assert np.abs(angles).max() < np.deg2rad(65)
     assert 1e-4 < peak < 0.05
+
+
+def test_responses_are_the_diagonal_of_the_inverse_mass_matrix(arm):
+    """What the plugin takes for rotor and link follows from the factor of M."""
+    model, data, _ = arm()
+    data.qpos[:] = np.random.default_rng(3).uniform(-1, 1, model.nq)
+    mujoco.mj_forward(model, data)
+    mass = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, mass)
+    got = responses(model, data.qLD, data.qLDiagInv, range(model.nv))
+    np.testing.assert_allclose(got, np.linalg.inv(mass).diagonal(), rtol=1e-9)
+    many = [np.tile(part, (2, 3, 1)) for part in (data.qLD, data.qLDiagInv)]
+    assert responses(model, *many, [1, 4]).shape == (2, 3, 2)
+    np.testing.assert_array_equal(responses(model, *many, [1, 4])[1, 2], got[[1, 4]])
+
+
+@pytest.mark.parametrize("step", [2.5e-4, 5e-4, 1e-3])
+def test_torsion_of_a_light_chain_does_not_feed_itself(step):
+    """Two links on catalogue drives wound up past T2, no damping: no energy appears.
+
+    Each link answers to its drive far more than its own inertia says, for the other
+    gives way; a drive that predicts by its own inertia gains hundreds of times the
+    energy in seconds, at any of these steps.
+    """
+    drive = DriveMap.from_catalogue("CSG-17-100", kinematic_error_arcmin=0.0)
+    spec = mujoco.MjSpec.from_string(f"""
+      <mujoco><option timestep="{step}" gravity="0 0 0"/><worldbody>
+        <body><joint name="a" axis="0 1 0"/>
+          <geom type="capsule" size=".03" fromto="0 0 0 .4 0 0" mass=".3"/>
+          <body pos=".4 0 0"><joint name="b" axis="0 1 0"/>
+            <geom type="capsule" size=".03" fromto="0 0 0 .3 0 0" mass=".3"/></body>
+        </body></worldbody></mujoco>""")
+    keys = {"rotor_inertia": 7.9e-6, "damping_ratio": 0.0, "friction": False}
+    drives = [attach(spec, joint=j, drive=drive, **keys) for j in "ab"]
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    torsion = drive.mean_torsion(drive.ratings.T2)
+    data.joint("a").qpos, data.joint("b").qpos = 0.5 * torsion, 2.0 * torsion
+    energies = []
+    for _ in range(round(2.0 / step / 50)):
+        energies.append(total_energy(model, data, drives))
+        mujoco.mj_step(model, data, 50)
+    assert max(energies) < 1.05 * energies[0]

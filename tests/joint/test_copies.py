@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import copy
+import time
+from dataclasses import replace
 
 import mujoco
 import mujoco.rollout
@@ -13,6 +15,7 @@ from messages import naming
 from swgjoint.joint import plugin
 from swgjoint.joint.attach import attach
 from swgjoint.maps.drive_map import DriveMap
+from swgjoint.maps.hysteresis import Jenkin
 
 STATE = mujoco.mjtState.mjSTATE_INTEGRATION
 
@@ -61,6 +64,41 @@ def test_copy_between_the_halves_of_a_step(bench, synthetic_map):
     for data in (b.data, twin):
         mujoco.mj_step2(b.model, data)
     np.testing.assert_array_equal(run_on(b.model, twin), run_on(b.model, b.data))
+
+
+@pytest.mark.parametrize("integrator", ["DISCRETE", "IMPLICITFAST"])
+def test_a_fresh_copy_completes_the_step_of_a_specimen(
+    bench, synthetic_map, friction_law, integrator
+):
+    """A copy into new data in mid-step ends it with the deviations of the tendon."""
+    elements = (Jenkin(stiffness=1e4, yield_torque=3.0),)
+    lossy = replace(synthetic_map, friction=friction_law, hysteresis=elements)
+    b = bench(lossy, variable=True, step=2e-4)
+    b.model.opt.integrator = getattr(mujoco.mjtIntegrator, f"mjINT_{integrator}")
+    b.model.tendon_user[:] = 0.3, 0.2, 0.5, 0.1, 0.7
+    b.place(0.1, -5e-4, 30.0, 0.5)
+    mujoco.mj_step(b.model, b.data, 50)
+    mujoco.mj_step1(b.model, b.data)
+    twin = mujoco.MjData(b.model)
+    mujoco.mj_copyData(twin, b.model, b.data)
+    for data in (b.data, twin):
+        mujoco.mj_step2(b.model, data)
+    np.testing.assert_array_equal(
+        full_state(b.model, twin), full_state(b.model, b.data)
+    )
+
+
+def test_a_copy_from_another_model_brings_its_state_alone(bench, synthetic_map):
+    """With the state of a stiffer drive's data, a model moves with its own map."""
+    soft = bench(synthetic_map)
+    stiff = bench(replace(synthetic_map, potential=10.0 * synthetic_map.potential))
+    start(stiff)
+    want = mujoco.MjData(soft.model)
+    mujoco.mj_setState(soft.model, want, full_state(stiff.model, stiff.data), STATE)
+    mujoco.mj_copyData(soft.data, soft.model, stiff.data)
+    np.testing.assert_array_equal(
+        run_on(soft.model, soft.data), run_on(soft.model, want)
+    )
 
 
 def test_reset_starts_anew(bench, synthetic_map):
@@ -176,6 +214,28 @@ def test_bad_attribute_is_rejected(key, value, says):
     instance.config = {**plugin.config(drive, damping=1.0), key: value}
     with pytest.raises(ValueError, match=naming("'j_drive'", f"'{key}'", *says)):
         spec.compile()
+
+
+def test_data_of_thousands_of_harmonics_are_made_in_a_moment():
+    """4000 orders cost tenths of a second, not the cube of their number."""
+    drive, n = DriveMap.linear(1e4), 4000
+    spec = mujoco.MjSpec.from_string(
+        '<mujoco><worldbody><body><joint name="j"/><geom size=".1"/></body>'
+        "</worldbody></mujoco>"
+    )
+    attach(spec, joint="j", drive=drive, rotor_inertia=4e-5)
+    [instance] = spec.plugins
+    flat = plugin.config(drive, damping=1.0)
+    parts = ("potential", "end_stiffness", "kinematic_error")
+    instance.config = (
+        flat
+        | {"orders": " ".join(f"{7 * k % 9973} {k % 3 if k else 0}" for k in range(n))}
+        | {key: flat[key] + (n - 1) * len(flat[key].split()) * " 0" for key in parts}
+    )
+    model = spec.compile()
+    began = time.process_time()
+    mujoco.MjData(model)
+    assert time.process_time() - began < 1.0
 
 
 def test_a_tendon_of_the_other_sense_is_rejected():

@@ -1,11 +1,13 @@
-"""The plugin under AddressSanitizer and UndefinedBehaviorSanitizer.
+"""The plugin under AddressSanitizer, UndefinedBehaviorSanitizer and a checking library.
 
-Its own tests run in a process that loads a library built for that. Leaks are not looked
+The standard library then checks indices and iterators, as some packagers have it. Its
+own tests run in a process that loads a library built for that. Leaks are not looked
 for: the interpreter leaves memory to the system. A planted overflow must be found.
 """
 
 from __future__ import annotations
 
+import json
 import os
 import shutil
 import subprocess
@@ -25,8 +27,16 @@ import sys
 from pathlib import Path
 from swgjoint import engine
 engine.library = lambda: Path(sys.argv[1])  # before mujoco is imported and takes it
+"""
+TESTS = """
 import pytest
 sys.exit(pytest.main(["-q", "-x", "-s", "-p", "no:cacheprovider", *sys.argv[2:]]))
+"""
+HOSTILE = """
+import json
+sys.path.insert(0, "tests/shared")
+import hostile_drives
+print(json.dumps(hostile_drives.run(*map(int, sys.argv[2:]))))
 """
 LONG = "rk4 native coasting stiction spec_sheet loses swing one_step pushes".split()
 LONG += ["wave_generator_fixed", "flexspline_fixed"]
@@ -41,6 +51,7 @@ pytestmark = [
 # without optimisation, names in place of line numbers: half the time of a compiler
 OPTIONS = "-std=c++17 -O0 -g1 -fPIC -fvisibility=hidden -ffp-contract=off".split()
 OPTIONS += ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
+OPTIONS += ["-fsanitize=float-cast-overflow", "-D_GLIBCXX_ASSERTIONS"]
 
 
 def build(folder: Path, change: tuple[str, str, str] | None = None) -> Path:
@@ -84,8 +95,13 @@ def build(folder: Path, change: tuple[str, str, str] | None = None) -> Path:
     return out
 
 
-def run_tests(library: Path, *tests: str) -> subprocess.CompletedProcess[str]:
-    """Run tests of this folder against a library, the sanitizer loaded first."""
+def run_tests(
+    library: Path, *tests: str, program: str = TESTS
+) -> subprocess.CompletedProcess[str]:
+    """Run tests of this folder against a library, the sanitizer loaded first.
+
+    Or another program, with other arguments.
+    """
     asan = subprocess.run(
         [CXX, "-print-file-name=libasan.so"], check=True, capture_output=True, text=True
     ).stdout.strip()
@@ -95,7 +111,7 @@ def run_tests(library: Path, *tests: str) -> subprocess.CompletedProcess[str]:
         "UBSAN_OPTIONS": "print_stacktrace=1",
     }
     return subprocess.run(
-        [sys.executable, "-c", RUN, str(library), *tests],
+        [sys.executable, "-P", "-c", RUN + program, str(library), *tests],
         cwd=ROOT,
         env=environment,
         capture_output=True,
@@ -129,11 +145,32 @@ def test_the_plugin_is_clean(tmp_path):
     assert " passed" in done.stdout
 
 
+def test_hostile_models_are_refused_or_step(tmp_path):
+    """200 models of bad attributes and wild states: no finding, and no crash."""
+    done = run_tests(build(tmp_path), "0", "200", program=HOSTILE)
+    assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-4000:]
+    assert "Sanitizer" not in done.stderr
+    found = json.loads(done.stdout)
+    assert sum(found.values()) == 200
+    assert min(found["by the plugin"], found["stepped"]) > 50
+
+
 def test_a_planted_overflow_is_found(tmp_path):
-    """One element too few in a vector of the hysteresis stops the run."""
-    line = "drive->stretch_.assign(drive->reach_.size(), 0.0);"
-    library = build(tmp_path, ("drive.cc", line, line.replace("size()", "size() - 1")))
-    done = run_tests(library, "tests/joint/test_hysteresis.py", "-k", "equals_twin")
+    """A lane too few in the weights, which pointers alone reach, stops the run."""
+    line = "weight_.assign(static_cast<size_t>(blocks_) * kWeights, 0.0);"
+    short = line.replace("kWeights", "kWeights - kLanes")
+    library = build(tmp_path, ("drive_map.cc", line, short))
+    done = run_tests(library, "tests/joint/test_twin.py", "-k", "trajectory")
     assert done.returncode != 0
     assert "heap-buffer-overflow" in done.stderr
-    assert "Place" in done.stderr
+    assert "Sweep" in done.stderr
+
+
+def test_a_planted_index_past_an_empty_table_is_found(tmp_path):
+    """A map without harmonics has no table, of which nothing may be indexed."""
+    line = "table_.data() + static_cast<size_t>(segment) * blocks_ * kBlock"
+    planted = "&table_[static_cast<size_t>(segment) * blocks_ * kBlock]"
+    library = build(tmp_path, ("drive_map.cc", line, planted))
+    done = run_tests(library, "tests/joint/test_twin.py", "-k", "without_harmonics")
+    assert done.returncode != 0
+    assert "__n < this->size()" in done.stderr

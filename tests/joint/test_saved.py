@@ -1,8 +1,10 @@
-"""Saved models with drives: XML and MJB in a process that only imports swgjoint."""
+"""Saved models with drives: XML, MJB and pickles in a process that imports swgjoint."""
 
 from __future__ import annotations
 
+import itertools
 import json
+import pickle
 import subprocess
 import sys
 from dataclasses import replace
@@ -28,78 +30,127 @@ TEXT = """
   <keyframe><key name="home" qpos=".3" qvel=".5"/></keyframe>
 </mujoco>
 """
-CASES = {
-    "rigid": {"level": "rigid"},
-    "kinematic": {"level": "kinematic"},
-    "linear": {"level": "linear"},
-    "native": {"level": "native"},
-    "full": {},
-    "frictionless": {"friction": False},
-    "lumped": {"rotor": "lumped"},
-    "variable": {"variable": True},
-    "prefix": {},
-    "flexspline_fixed": {},
-}
+# what would change the elements of a drive, were it inherited
+DEFAULTS = """
+<mujoco><size nuser_tendon="6" nuser_jnt="2"/><default>
+  <tendon user="1 .5 .1 .2 3 4" stiffness="7" damping="3" frictionloss="1" range="-1 1"
+    limited="true" springlength=".1 .2" armature="1" actuatorfrclimited="true"
+    actuatorfrcrange="-1 1" margin=".1" solreffriction=".5 2"/>
+  <joint stiffness="5" damping="3" armature="2" frictionloss="1" limited="true"
+    range="-1 1" springref="20" user="1 2" actuatorgravcomp="true" margin=".2"
+    actuatorfrclimited="true" actuatorfrcrange="-1 1" pos="1 1 1" axis="0 1 0"
+    ref="5" solreffriction=".5 2" solimpfriction=".1 .2"/>
+  <geom mass="3" size=".3" margin=".1"/><site size=".2"/><general gear="5"/>
+  <equality solref=".4 1"/>
+</default>"""
+OWN = """pos="0 0 0" stiffness="0" damping="0" armature="0" frictionloss="0"
+  limited="false" springref="0" actuatorgravcomp="false" margin="0"
+  actuatorfrclimited="false" """
+# every level with every option that it has
+PARTS = ("friction", "hysteresis")
+OPTIONS = ("lumped", "variable", "prefix", "defaults")
+LAYOUTS = ("circular_spline_fixed", "flexspline_fixed", "wave_generator_fixed")
+CASES = [
+    ("rigid", ()),
+    ("rigid", ("prefix",)),
+    ("kinematic", ()),
+    *((level, (part, "prefix")) for level in ("rigid", "kinematic") for part in PARTS),
+    *(
+        (level, (*parts, *options))
+        for level in ("linear", "native", "full")
+        for n in range(3)
+        for parts in itertools.combinations(PARTS, n)
+        for options in ((), *((one,) for one in OPTIONS), ("variable", "prefix"))
+    ),
+    *(
+        (level, (*PARTS, layout))
+        for level in ("rigid", "kinematic", "linear", "native", "full")
+        for layout in LAYOUTS[1:]
+    ),
+]
 # what a program of somebody else does, with nothing but these imports
 PROGRAM = """
-import json, sys
+import json, pickle, sys
 {imports}
 ends = {{}}
 for name, path in json.loads(sys.argv[1]).items():
-    read = mujoco.MjModel.from_{kind}_path
-    model = read(path)
+    model = {read}
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, 0)
     mujoco.mj_step(model, data, 200)
     ends[name] = data.qpos.tolist()
 print(json.dumps(ends))
 """
+READ = {
+    "xml": "mujoco.MjModel.from_xml_path(path)",
+    "mjb": "mujoco.MjModel.from_binary_path(path)",
+    "pkl": "pickle.load(open(path, 'rb'))",
+}
 
 
 @pytest.fixture
 def models(synthetic_map, friction_law):
-    """Spec by case; the map has hysteresis and friction."""
+    """Model by case, and its spec: maps with and without hysteresis and friction."""
     elements = (Jenkin(stiffness=1e4, yield_torque=3.0),)
     lossy = replace(synthetic_map, friction=friction_law, hysteresis=elements)
     found = {}
-    for name, keys in CASES.items():
-        spec = mujoco.MjSpec.from_string(TEXT)
-        layout = name if name.endswith("fixed") else lossy.layout
-        drive = replace(lossy, layout=layout)
-        got = attach(spec, joint="j", drive=drive, rotor_inertia=4e-5, **keys)
-        if name == "variable":
-            tendon = spec.tendon(got.tendon)
-            tendon.userdata = Variation(stiffness=0.3, theta=0.2, losses=0.5).numbers
-        if name == "prefix":
-            outer = mujoco.MjSpec.from_string(
-                '<mujoco><option timestep="0.001" integrator="discrete" '
-                'gravity="1 0 0"/><worldbody/></mujoco>'
-            )
-            frame = outer.worldbody.add_frame()
-            outer.attach(spec, prefix="left_", frame=frame)
-            spec = outer
-        found[name] = spec
-    return found
+    for level, options in CASES:
+        found[" ".join((level, *options))] = make_spec(lossy, level, options)
+    return {name: (spec, spec.compile()) for name, spec in found.items()}
 
 
-def ends_here(spec):
-    model = spec.compile()
+def make_spec(lossy, level, options):
+    text = TEXT
+    if "defaults" in options:
+        text = text.replace("<joint ", f"<joint {OWN}").replace("<mujoco>", DEFAULTS)
+    spec = mujoco.MjSpec.from_string(text)
+    drive = replace(
+        lossy,
+        friction=lossy.friction if "friction" in options else None,
+        hysteresis=lossy.hysteresis if "hysteresis" in options else (),
+        layout=next((x for x in LAYOUTS if x in options), lossy.layout),
+    )
+    got = attach(
+        spec,
+        joint="j",
+        drive=drive,
+        rotor_inertia=4e-5,
+        level=level,
+        rotor="lumped" if "lumped" in options else "gyroscopic",
+        variable="variable" in options,
+    )
+    if got.variable:
+        tendon = spec.tendon(got.tendon)
+        tendon.userdata = Variation(stiffness=0.3, theta=0.2, losses=0.5).numbers
+    if "prefix" in options:
+        outer = mujoco.MjSpec.from_string(
+            '<mujoco><option timestep="0.001" integrator="discrete" '
+            'gravity="1 0 0"/><worldbody/></mujoco>'
+        )
+        outer.attach(spec, prefix="left_", frame=outer.worldbody.add_frame())
+        return outer
+    return spec
+
+
+def ends_here(model):
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, 0)
     mujoco.mj_step(model, data, 200)
     return data.qpos.copy()
 
 
-def ends_elsewhere(folder, specs, kind, imports):
+def ends_elsewhere(folder, models, kind, imports):
     paths = {}
-    for name, spec in specs.items():
-        model = spec.compile()
-        paths[name] = str(folder / f"{name}.{kind}")
+    for k, (name, (spec, model)) in enumerate(models.items()):
+        path = folder / f"{k}.{kind}"
+        paths[name] = str(path)
         if kind == "xml":
-            (folder / f"{name}.xml").write_text(spec.to_xml())
-        else:
+            path.write_text(spec.to_xml())
+        elif kind == "mjb":
             mujoco.mj_saveModel(model, paths[name])
-    program = PROGRAM.format(imports=imports, kind=kind.replace("mjb", "binary"))
+        else:
+            path.write_bytes(pickle.dumps(model))
+    program = PROGRAM.format(imports=imports, read=READ[kind])
     done = subprocess.run(
         [sys.executable, "-c", program, json.dumps(paths)],
         capture_output=True,
@@ -117,26 +168,37 @@ def ends_elsewhere(folder, specs, kind, imports):
 def test_every_level_and_option_survives_xml(models, tmp_path, imports):
     """A fresh process moves alike; MuJoCo writes six digits of the tendon's lengths."""
     found = ends_elsewhere(tmp_path, models, "xml", imports)
-    for name, spec in models.items():
-        here = ends_here(spec)
+    for name, (_, model) in models.items():
+        here = ends_here(model)
         assert np.abs(here).max() > 0.05
         np.testing.assert_allclose(found[name], here, rtol=2e-5, err_msg=name)
 
 
-def test_every_level_and_option_survives_mjb(models, tmp_path):
-    """A fresh process moves with the same bits."""
-    found = ends_elsewhere(tmp_path, models, "mjb", "import mujoco, swgjoint")
-    for name, spec in models.items():
-        np.testing.assert_array_equal(found[name], ends_here(spec), err_msg=name)
+@pytest.mark.parametrize("kind", ["mjb", "pkl"])
+def test_every_level_and_option_survives_in_binary(models, tmp_path, kind):
+    """A fresh process moves with the same bits, from MJB and from a pickle."""
+    found = ends_elsewhere(tmp_path, models, kind, "import mujoco, swgjoint")
+    for name, (_, model) in models.items():
+        np.testing.assert_array_equal(found[name], ends_here(model), err_msg=name)
+
+
+@pytest.mark.parametrize("level", ["linear", "native", "full"])
+def test_defaults_of_the_file_do_not_reach_a_drive(models, level):
+    """With any defaults a joint moves as without them, bit by bit."""
+    for parts in ("", " friction", " hysteresis", " friction hysteresis"):
+        ends = [
+            ends_here(models[f"{level}{parts}{tail}"][1]) for tail in ("", " defaults")
+        ]
+        np.testing.assert_array_equal(*ends)
 
 
 def test_a_model_of_an_older_mark_still_runs(models):
     """Binary models of before have a friction tendon with a cubic of 1e-30."""
-    spec = models["full"].copy()
+    spec = models["full friction"][0].copy()
     assert spec.tendon("j_friction").stiffness.tolist() == list(FRICTION_STIFFNESS)
-    new = ends_here(spec)
+    new = ends_here(spec.compile())
     spec.tendon("j_friction").stiffness = np.array([1e-9, 0.0, 1e-30])
-    np.testing.assert_allclose(ends_here(spec), new, rtol=1e-12)
+    np.testing.assert_allclose(ends_here(spec.compile()), new, rtol=1e-12)
 
 
 def test_the_plugin_is_loaded_by_name_with_its_path():

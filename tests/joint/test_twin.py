@@ -10,6 +10,7 @@ from swgjoint.joint.reference import (
     gradient_force,
     scheme_force,
 )
+from swgjoint.maps.drive_map import DriveMap
 
 
 def random_motion(bench, rng, spread=1.5, speed=30.0):
@@ -104,6 +105,23 @@ def test_trajectory_equals_twin(bench, any_layout, torque):
         np.testing.assert_allclose(
             b.data.plugin_state, b.data.qfrc_applied[b.v] / inertia, rtol=1e-6
         )
+
+
+def test_a_map_without_harmonics_equals_twin_across_its_knots(bench):
+    """The three lines of a catalogue drive alone, wound up past all corners."""
+    drive = DriveMap.from_catalogue("CSG-25-100")
+    drive = drive.with_harmonics(np.arange(len(drive.angle_orders)) == 0)
+    b = bench(drive)
+    b.place(0.0, 3.0 * drive.torsion_knots[0])
+    twin = b.twin(40)
+    torsion = []
+    for _ in range(40):
+        mujoco.mj_step(b.model, b.data)
+        torsion.append(float(drive.torsion(*b.data.qpos[b.q])))
+    assert min(torsion) < drive.torsion_knots[0]
+    assert max(torsion) > drive.torsion_knots[-1]
+    np.testing.assert_allclose(b.data.qpos[b.q], twin.q, rtol=1e-9)
+    np.testing.assert_allclose(b.data.qvel[b.v], twin.v, rtol=1e-9)
 
 
 def test_force_is_slope_of_potential(bench, any_layout):

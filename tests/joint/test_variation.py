@@ -177,6 +177,55 @@ def test_a_model_may_have_user_data_of_its_own(synthetic_map):
         assert not model.tendon_user[ours].any()
 
 
+@pytest.mark.parametrize("integrator", ["discrete", "RK4"])
+@pytest.mark.parametrize("keeps", [(), ("hysteresis",), ("friction",)])
+@pytest.mark.parametrize("bad", [np.nan, np.inf, 1e308])
+def test_a_bad_number_is_warned_of_and_forgotten(bench, lossy, bad, keeps, integrator):
+    """The engine warns and starts anew, and the drive runs as if it had not seen it.
+
+    Silent, the whole model would coast for the rest of the run.
+    """
+    without = {"hysteresis": (), "friction": None}
+    drive = replace(lossy, **{k: v for k, v in without.items() if k not in keeps})
+    b = bench(drive, variable=True, integrator=integrator)
+    fresh = bench(drive, variable=True, integrator=integrator)
+    user = b.model.tendon_user[b.model.tendon(b.drive.tendon).id]
+    # a huge angle is still one, and losses count where there are any
+    numbers = ([0, 1] if bad == 1e308 else [0, 1, 2, 3]) + [4] * bool(keeps)
+    for number in numbers:
+        mujoco.mj_resetData(b.model, b.data)
+        b.place(0.2, 0.2 / drive.ratio, 20.0, 20.0 / drive.ratio)
+        mujoco.mj_step(b.model, b.data, 20)
+        user[number] = bad
+        mujoco.mj_step(b.model, b.data)
+        user[number] = 0.0
+        assert b.data.warning[mujoco.mjtWarning.mjWARN_BADQACC].number == 1
+        assert np.isfinite(b.data.plugin_state).all()
+        mujoco.mj_step(b.model, b.data)
+        mujoco.mj_resetData(fresh.model, fresh.data)
+        mujoco.mj_step(fresh.model, fresh.data)
+        ends = []
+        for one in (b, fresh):
+            one.data.qfrc_applied[one.v] = 0.3, -10.0
+            mujoco.mj_step(one.model, one.data, 50)
+            ends.append(
+                np.concatenate([one.data.qpos, one.data.qvel, one.data.plugin_state])
+            )
+        np.testing.assert_array_equal(*ends)
+        assert np.abs(ends[0][:4]).min() > 0.0
+
+
+def test_a_state_that_is_no_number_is_forgotten(bench, lossy):
+    """With the engine's resets off, the next step writes finite states and goes on."""
+    b = bench(lossy)
+    b.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
+    for k in range(len(b.data.plugin_state)):
+        mujoco.mj_resetData(b.model, b.data)
+        b.data.plugin_state[k] = np.nan
+        mujoco.mj_step(b.model, b.data)
+        assert np.isfinite(b.data.plugin_state).all()
+
+
 @pytest.mark.parametrize("key", ["stiffness", "kinematic_error", "losses"])
 def test_a_share_that_leaves_nothing_is_refused(key):
     """A deviation of minus one leaves no spring, no error or no losses."""

@@ -227,8 +227,8 @@ def test_arm_moves_as_with_the_plugin(drive):
     np.testing.assert_allclose(got, want, rtol=0, atol=near)
 
 
-def test_articulated_inertia_is_that_of_the_engine(drive):
-    """The weights of the prediction are MuJoCo's, which factors M from the leaves."""
+def test_responses_are_those_of_the_engine(drive):
+    """The weights of the prediction are the diagonal of MuJoCo's inverse of M."""
     both = Both(ARM, drive, joints=("a", "b", "c"))
     qpos = np.random.default_rng(1).uniform(-1, 1, both.model.nq)
     both.put(qpos, np.zeros(both.model.nv))
@@ -236,7 +236,11 @@ def test_articulated_inertia_is_that_of_the_engine(drive):
     mjw.forward(both.m, both.d)
     for k, one in enumerate(both.drives):
         step = both.call.steps.numpy()[0, k]
-        want = both.data.qLDiagInv[both.pair(one)]
+        pair = both.pair(one)
+        units = np.eye(both.model.nv)[pair]
+        inverse = np.zeros_like(units)
+        mujoco.mj_solveM(both.model, both.data, inverse, units)
+        want = [row[dof] for row, dof in zip(inverse, pair, strict=True)]
         # products of single precision
         assert [step["w_rotor"], step["w_link"]] == pytest.approx(want, rel=1e-5)
 
