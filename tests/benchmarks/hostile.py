@@ -34,7 +34,7 @@ LIMIT_S = 10
 KILL_S = 60
 """Time after which a process is ended that does not answer its alarm."""
 MEMORY = 2 << 30
-"""Address space that an input may add to that of the imported packages."""
+"""Address space that an input may add to that of its process."""
 COLUMNS = (
     *("accepted", "line", "status 1", "traceback"),
     *("crash", "hang > 10 s", "> 2 GB", "other law"),
@@ -55,17 +55,22 @@ def _on_alarm(*_: Any) -> None:
     raise TimeoutError
 
 
+def limit_memory() -> None:
+    """Let the address space of this process grow by no more than the limit."""
+    pages = int(Path("/proc/self/statm").read_text().split()[0])
+    most = pages * resource.getpagesize() + MEMORY
+    resource.setrlimit(resource.RLIMIT_AS, (most, resource.RLIM_INFINITY))
+
+
 def work(line: Connection) -> None:
     """Answer cases until there are no more."""
-    used = int(Path("/proc/self/statm").read_text().split()[0])
-    most = used * os.sysconf("SC_PAGE_SIZE") + MEMORY
-    resource.setrlimit(resource.RLIMIT_AS, (most, most))
     signal.signal(signal.SIGPROF, _on_alarm)
     null = os.open(os.devnull, os.O_WRONLY)
     os.dup2(null, 2)  # what the engine prints from C
     os.environ["MPLBACKEND"] = "agg"
     while (task := line.recv()) is not None:
         case = draw(*task)
+        limit_memory()
         signal.setitimer(signal.ITIMER_PROF, LIMIT_S)
         faults: list[str] = []
         told = ""
