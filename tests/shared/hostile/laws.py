@@ -19,9 +19,9 @@ import numpy as np
 
 from hostile.case import Case
 from swgjoint.cli.main import main
+from swgjoint.fe.tolerance_lot import Lot
 from swgjoint.maps.cache import code_version
 from swgjoint.maps.drive_map import DriveMap
-from swgjoint.study.lot import Drawn
 from swgjoint.study.sweep_figures import Record
 
 TASKS = ("meshing", "spec", "size", "run")
@@ -181,7 +181,7 @@ def _no_finite_elements() -> Iterator[None]:
         mock.patch("swgjoint.study.sweep.compute_all", _drawn_records),
         mock.patch(f"{lot}.perfect_positions", lambda *_: ()),
         mock.patch(f"{lot}.superposition_error", lambda *_: 0.01),
-        mock.patch(f"{lot}.run_all", _drawn_drives),
+        mock.patch(f"{lot}.sample_lot", _drawn_lot),
         mock.patch("swgjoint.fe.build_map.build_map", _known_map),
     ):
         yield
@@ -198,19 +198,16 @@ def _drawn_records(points: Sequence[Any]) -> tuple[str, list[Record]]:
     return code_version(), records
 
 
-def _drawn_drives(_: Any, tasks: Sequence[Any], **__: Any) -> list[list[Drawn]]:
-    return [
-        [
-            Drawn(
-                seed=drive.tolerances.seed,
-                transmission_accuracy_arcmin=1.0,
-                ripple_rms_percent=0.1,
-                torsional_stiffness_Nm_rad=1e4,
-            )
-            for drive in task.drives
-        ]
-        for task in tasks
-    ]
+def _drawn_lot(drives: Sequence[Any], *_: Any) -> Lot:
+    rng = np.random.default_rng(len(drives))
+    shape = (len(drives), 16)
+    return Lot(
+        input_angle=np.linspace(0.0, np.pi, 16),
+        unloaded=1e-5 * rng.standard_normal(shape),
+        loaded=1e-5 * rng.standard_normal(shape),
+        compliance=np.full(shape, 1e-4),
+        whole=np.ones(len(drives), dtype=bool),
+    )
 
 
 def _known_map(*_: Any, **__: Any) -> DriveMap:
