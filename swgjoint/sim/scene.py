@@ -11,7 +11,7 @@ from pydantic import Field, PrivateAttr, model_validator
 
 from swgjoint.errors import InputError
 from swgjoint.faults import Fault, Section, parse_toml, read_toml, validated
-from swgjoint.models_path import find
+from swgjoint.models_path import find, is_file
 from swgjoint.sim.arm_reading import ArmReading
 from swgjoint.sim.feature_sections import (
     Disturbance,
@@ -336,7 +336,7 @@ def _anchor_paths(data: dict[str, Any], folder: Path) -> None:
 
     def anchor(table: Any, key: str) -> None:
         value = table.get(key) if isinstance(table, dict) else None
-        if isinstance(value, str) and "\0" not in value and (folder / value).is_file():
+        if isinstance(value, str) and is_file(folder / value):
             table[key] = str(folder / value)
 
     anchor(data, "arm")

@@ -158,11 +158,13 @@ def main() -> int:
                 outcome = "hang > 10 s"
             if not outcome:
                 continue
-            if worker.task is not None:  # the process is gone, or does not answer
+            # gone, silent, or stopped in the middle of an import
+            if worker.task is not None or outcome in ("hang > 10 s", "> 2 GB"):
                 worker.process.kill()
                 worker.process.join()
                 workers[k] = start()
             counts[task[0]][outcome] += 1
+            worker.task = None
             if faults or outcome in COLUMNS[3:]:
                 keep(folder, task, outcome, [faults, told])
     for worker in workers:

@@ -120,11 +120,23 @@ def _case(rng: np.random.Generator, name: str, text: str, children: list[str]) -
                 b"\xef\xbb\xbf" + content,
                 text.encode("utf-16"),
                 b"<mujoco>" + b"<worldbody>" * 3000,
+                _deep(2000),
                 content + b"<",
                 content.replace(b"name", b"nam\xff"),
             ],
         )
     return {name: content}, [part.format(name) for part in pick(rng, list(COMMANDS))]
+
+
+def _deep(bodies: int) -> bytes:
+    """A chain of many bodies, each in the one before; the first one has a hinge."""
+    start = b'<mujoco><worldbody><body><joint name="j" axis="0 1 0"/><geom size=".1"/>'
+    return (
+        start
+        + b"<body>" * bodies
+        + b"</body>" * (bodies + 1)
+        + b"</worldbody></mujoco>"
+    )
 
 
 def _spoil(rng: np.random.Generator, root: ET.Element, children: list[str]) -> None:

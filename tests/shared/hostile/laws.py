@@ -117,9 +117,12 @@ def broken_laws(case: Case, found: Answer) -> list[str]:
         broken.append("an internal error was told")
     if "Traceback" in found.err:
         broken.append("a traceback on stderr")
-    longest = max(map(len, found.err.splitlines()), default=0)
+    lines = [line.partition("; see 'swgjoint")[0] for line in found.err.splitlines()]
+    longest = max(map(len, lines), default=0)
     if longest > LONGEST_LINE:
         broken.append(f"a line of {longest} letters on stderr")
+    if found.status == 1 and "File name too long" in found.err:
+        broken.append("a name that no file has is no bad input")
     if found.status == 2 and not found.err.strip():
         broken.append("refused without a line")
     # a design that cannot be built is a result, with its checks

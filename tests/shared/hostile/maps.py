@@ -181,7 +181,7 @@ def _other_members(
     if what == 0:
         del content[name]
     elif what == 1:
-        content[pick(rng, ["../x.npy", "/x.npy", "x" * 5000, "", "a\nb"])] = b"x"
+        content[pick(rng, ["../x.npy", "/x.npy", "x" * 5000, " ", "a\nb"])] = b"x"
     elif what == 2:
         content[pick(rng, ["../x", "fields_torque.npy", "é.npy"])] = content.pop(name)
     elif what == 3:
