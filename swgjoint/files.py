@@ -162,6 +162,7 @@ def check_output_file(path: str | Path, suffix: str) -> Path:
     path = Path(path)
     if path.suffix != suffix:
         raise InputError(f"output file {str(path)!r}: accepted: a name ending {suffix}")
+    _check_length(path)
     if path.is_dir():
         raise InputError(f"output file {str(path)!r} is a folder")
     if not path.parent.is_dir():
@@ -178,6 +179,7 @@ def output_folder(path: str | Path) -> Path:
         InputError: If the path or one above it is a file, or is not writable.
     """
     path = Path(path)
+    _check_length(path)
     existing = path
     while not existing.exists() and existing != existing.parent:
         existing = existing.parent
@@ -186,3 +188,11 @@ def output_folder(path: str | Path) -> Path:
     if not os.access(existing, os.W_OK):
         raise InputError(f"output folder {str(path)!r} is not writable")
     return path
+
+
+def _check_length(path: Path) -> None:
+    """Refuse a path that no file system takes."""
+    try:
+        path.exists()
+    except OSError as exc:
+        raise InputError(f"output {str(path)[:60]!r}: {exc.strerror}") from None

@@ -18,6 +18,10 @@ KINDS = {
 }
 """Folders below ``models/`` with files that a command takes by name: suffix, and what
 one of them is."""
+MAX_NAME, MAX_PATH = 255, 4096
+"""Bytes of a file's name and of a path on Linux; other systems take no more."""
+SHOWN = 16
+"""Bundled names that a message lists."""
 TOGETHER = {"scenes": ("arms",)}
 """Kinds that are accepted as well wherever a kind is."""
 
@@ -36,6 +40,14 @@ def near_names(text: str, names: Iterable[str], n: int = 3) -> list[str]:
     within = [key for key in known if parts and parts <= _parts(key)]
     close = get_close_matches(wanted, known, n=n)
     return [known[key] for key in dict.fromkeys([*begin, *within, *close])][:n]
+
+
+def is_file(reference: str | Path) -> bool:
+    """Whether there is a file of this name; a name that no file can have has none."""
+    try:
+        return Path(reference).is_file()
+    except (OSError, ValueError):  # too long, or with a null character
+        return False
 
 
 def _parts(name: str) -> set[str]:
@@ -73,9 +85,10 @@ def find(reference: str | Path, kind: str, suffix: str, *, what: str) -> Path:
     """
     path = Path(reference)
     text = str(reference)
-    if "\0" in text or len(text) > 4096:
+    longest = max(len(part.encode(errors="replace")) for part in ("", *path.parts))
+    if "\0" in text or len(text) > MAX_PATH or longest > MAX_NAME:
         raise InputError(f"{what} {text[:60]!r} is not a path or a bundled name")
-    if path.is_file():
+    if is_file(path):
         return path
     names = bundled_names(kind, suffix)
     if path.parent == Path("."):
@@ -94,8 +107,16 @@ def find(reference: str | Path, kind: str, suffix: str, *, what: str) -> Path:
         folders = " or ".join(f"models/{k}" for k in accepted)
         fault = f"{what} {text!r} is neither a file nor in {folders}"
     hint = f"; did you mean {' or '.join(near)}?" if near else ""
-    bundled = (f"{k}: {', '.join(_names(k, suffix))}" for k in accepted)
+    bundled = (f"{k}: {_listed(_names(k, suffix))}" for k in accepted)
     raise InputError(f"{fault}{hint} (bundled {'; '.join(bundled)})")
+
+
+def _listed(names: list[str]) -> str:
+    """Names in a message; where they are many, the first ones."""
+    if len(names) <= SHOWN:
+        return ", ".join(names)
+    more = f"and {len(names) - SHOWN} more, see 'swgjoint list'"
+    return ", ".join([*names[:SHOWN], more])
 
 
 def named_kind(name: str) -> str | None:

@@ -13,7 +13,9 @@ import mujoco
 import numpy as np
 
 from swgjoint.errors import InputError
+from swgjoint.models_path import is_file
 from swgjoint.sim.arm_holding import FREE, NOT_CHOSEN, choose_held, hold
+from swgjoint.sim.arm_numbers import check_numbers
 from swgjoint.sim.arm_reading import ArmReading
 from swgjoint.sim.compiling import skeleton
 
@@ -82,12 +84,20 @@ def read_arm(path: Path, reading: ArmReading | None = None) -> ArmFile:
                 names = (f"{kind}_{j}" for j in count(k))
                 element.name = next(name for name in names if name not in named)
                 named.add(element.name)
+    _check_references(spec, path)
     limits = _effort(spec)
+    for name, limit in limits.items():
+        if np.isnan(limit):
+            raise InputError(
+                f"{path}: torque limit {limit} N·m of joint {name[:60]!r}; accepted: a"
+                " number, or none"
+            )
     for element in [*spec.sensors, *spec.actuators]:
         spec.delete(element)
     for key in spec.keys:
         key.ctrl, key.act = [], []  # of actuators that are gone
     bones = skeleton(spec, where=str(path))
+    check_numbers(bones, where=str(path))
     keyframes = _keyframes(bones)
     if reading.pose is not None and reading.pose not in keyframes:
         known = ", ".join(keyframes) or "none in this file"
@@ -104,8 +114,56 @@ def read_arm(path: Path, reading: ArmReading | None = None) -> ArmFile:
         joint.armature = 0.0
         joint.actfrclimited = mujoco.mjtLimited.mjLIMITED_FALSE
         joint.actfrcrange = [0.0, 0.0]
-    effort = {name: limit for name, limit in limits.items() if name not in holding.held}
+    effort = {
+        name: limit
+        for name, limit in limits.items()
+        if name not in holding.held and np.isfinite(limit)  # inf is no limit
+    }
     return ArmFile(spec=spec, held=holding.held, keyframes=keyframes, effort=effort)
+
+
+def _check_references(spec: mujoco.MjSpec, path: Path) -> None:
+    """Refuse tendons, equalities and pairs of what the file does not have.
+
+    The engine refuses them, too, but not before joints are held.
+    """
+    tendons = [
+        (f"tendon {tendon.name!r}", wrap.target)
+        for tendon in spec.tendons
+        for wrap in tendon.path
+        if wrap.type != mujoco.mjtWrap.mjWRAP_PULLEY
+    ]
+    equalities = [
+        (f"equality {equality.name!r}", _tied_element(spec, equality, name))
+        for equality in spec.equalities
+        for name in (equality.name1, equality.name2)
+        if name
+    ]
+    pairs = [
+        (f"contact pair {pair.name!r}", spec.geom(name))
+        for pair in spec.pairs
+        for name in (pair.geomname1, pair.geomname2)
+    ]
+    for what, target in [*tendons, *equalities, *pairs]:
+        if target is None:
+            raise InputError(
+                f"{path}: {what} names what is not in the file; accepted: its joints,"
+                " sites, bodies, geoms and tendons"
+            )
+
+
+def _tied_element(
+    spec: mujoco.MjSpec, equality: mujoco.MjsEquality, name: str
+) -> object:
+    """What an equality names; None if there is none, or the name for other kinds."""
+    if equality.type == mujoco.mjtEq.mjEQ_JOINT:
+        return spec.joint(name)
+    if equality.type == mujoco.mjtEq.mjEQ_TENDON:
+        return spec.tendon(name)
+    if equality.type not in (mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtEq.mjEQ_WELD):
+        return name
+    on_site = equality.objtype == mujoco.mjtObj.mjOBJ_SITE
+    return spec.site(name) if on_site else spec.body(name)
 
 
 def _forget_actuators(spec: mujoco.MjSpec) -> None:
@@ -261,7 +319,7 @@ def _find_meshes(spec: mujoco.MjSpec, path: Path) -> None:
 def _mesh_file(reference: str, folder: Path, meshdir: str) -> Path | None:
     """Where a mesh of a URDF lies; None if nowhere."""
     for file in _places(reference, folder, meshdir):
-        if file.is_file():
+        if is_file(file):
             return file.resolve()
     return None
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.errors import InputError
-from swgjoint.models_path import bundled_names
+from swgjoint.models_path import bundled_names, is_file
 from swgjoint.sim.arm_motions import TOOL_MOTIONS, tables_of
 from swgjoint.sim.arm_reading import ArmReading, patterns_of
 from swgjoint.sim.commanded import trajectory_of
@@ -52,7 +52,7 @@ def is_arm(reference: str) -> bool:
     if Path(reference).suffix.lower() in (".xml", ".urdf", ".xacro"):
         return True
     return (
-        not Path(reference).is_file()
+        not is_file(reference)
         and reference in bundled_names("arms", ".xml")
         and reference not in bundled_names("scenes", ".toml")
     )

@@ -6,7 +6,6 @@ import re
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import lru_cache
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from swgjoint.errors import InputError
@@ -20,7 +19,7 @@ from swgjoint.maps.from_catalogue import (
     is_catalogue_name,
     with_stated_error,
 )
-from swgjoint.models_path import bundled_names, named_kind, near_names
+from swgjoint.models_path import bundled_names, is_file, named_kind, near_names
 from swgjoint.progress import Progress, silent
 from swgjoint.sim.scene_sections import JointSection, LinearDrive
 from swgjoint.units import arcmin
@@ -223,7 +222,7 @@ def find_drive(reference: str) -> DriveMap | Design:
     try:
         return Design.load(reference)
     except InputError:
-        file = Path(reference).is_file()
+        file = is_file(reference)
         if file or named_kind(reference) or not re.fullmatch(r"[\w-]+", reference):
             raise
         if family_member(reference) is not None:
@@ -252,7 +251,7 @@ def names_catalogue(reference: str) -> bool:
     return (
         is_catalogue_name(reference)
         and not reference.endswith(".swg")
-        and not Path(reference).is_file()
+        and not is_file(reference)
         and reference not in bundled_names("drives", ".toml")
     )
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from swgjoint.errors import InputError
 from swgjoint.models_path import find
 from swgjoint.sim.arm_file import read_arm
+from swgjoint.sim.arm_numbers import check_numbers
 from swgjoint.sim.arm_reading import ArmReading
 from swgjoint.sim.compiling import compile_spec as compile_spec
 
@@ -68,6 +69,7 @@ class RigidArm:
                 f"{f' ({others})' if others else ''}; a drive needs one"
             )
         self.model = compile_spec(self.spec(), where=str(self.path))
+        check_numbers(self.model, where=str(self.path))
         model = self.model
         self.joints = tuple(model.joint(j).name for j in range(model.njnt))
         self.tool = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, tool_site)

@@ -19,7 +19,7 @@ from swgjoint.faults import (
     shortened,
     validated,
 )
-from swgjoint.models_path import find
+from swgjoint.models_path import find, is_file
 from swgjoint.sim.arm_reading import ArmReading
 from swgjoint.sim.feature_sections import (
     Disturbance,
@@ -346,7 +346,7 @@ def _anchor_paths(data: dict[str, Any], folder: Path) -> None:
 
     def anchor(table: Any, key: str) -> None:
         value = table.get(key) if isinstance(table, dict) else None
-        if isinstance(value, str) and "\0" not in value and (folder / value).is_file():
+        if isinstance(value, str) and is_file(folder / value):
             table[key] = str(folder / value)
 
     anchor(data, "arm")

@@ -67,11 +67,12 @@ def check_link(attached: JointDrive, arm: RigidArm, *, where: str) -> None:
         return
     model = arm.model
     body = model.body(int(model.joint(attached.joint).bodyid[0]))
+    fastest = torque / inertia if inertia else np.inf
     raise InputError(
         f"{where}: joint {attached.joint!r}: link {body.name!r} has {inertia:.2g} kg·m²"
         f" about the joint (its own mass: {body.mass[0]:.2g} kg), which"
         f" {torque:.3g} N·m of drive {attached.drive.name} accelerate by"
-        f" {torque / inertia:.1g} rad/s²; needed: more than"
+        f" {fastest:.1g} rad/s²; needed: more than"
         f" {torque / FASTEST:.1g} kg·m², so an inertia in {arm.path} that a real link"
         " has, or a joint that is not driven"
     )

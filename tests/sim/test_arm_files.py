@@ -432,3 +432,64 @@ def test_few_iterations_of_a_file_do_not_reach_a_scene(tmp_path):
         assert run.assembly.model.opt.iterations == 100
         found.append(run.position)
     np.testing.assert_array_equal(*found)
+
+
+BENT = """<mujoco>{head}<worldbody><body name="link">
+  <joint name="j" axis="{axis}" damping="{damping}"/><geom size=".1" pos="{at} 0 0"/>
+  </body></worldbody>{tail}</mujoco>"""
+SOUND = {"head": "", "axis": "0 1 0", "damping": "0", "at": "0", "tail": ""}
+
+
+@pytest.mark.filterwarnings("ignore:Inertia matrix:UserWarning")  # of the engine
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"head": '<option gravity="nan 0 0"/>'}, ("gravity", "nan", "1e+10")),
+        ({"head": '<option gravity="0 0 1e300"/>'}, ("gravity", "1e+300")),
+        ({"damping": "nan"}, ("joint 'j'", "damping", "nan")),
+        ({"damping": "inf"}, ("joint 'j'", "damping", "inf")),
+        ({"axis": "0 1e300 0"}, ("joint 'j'", "axis")),
+        ({"at": "1e200"}, ("body 'link'", "1e+10")),
+        (
+            {"tail": '<keyframe><key name="k" qpos="nan"/></keyframe>'},
+            ("key 'k'", "qpos", "nan"),
+        ),
+        (
+            {"tail": '<tendon><fixed name="t"><joint joint="x" coef="1"/></fixed>'
+             "</tendon>"},
+            ("tendon 't'", "not in the file"),
+        ),
+        (
+            {"tail": '<equality><weld name="w" body1="link" body2="x"/></equality>'},
+            ("equality 'w'", "not in the file"),
+        ),
+        (
+            {"tail": '<contact><pair name="p" geom1="x" geom2="y"/></contact>'},
+            ("contact pair 'p'", "not in the file"),
+        ),
+    ],
+)  # fmt: skip
+def test_numbers_and_names_that_no_arm_has_are_named(change, says, tmp_path, capfd):
+    """Element and attribute of what is not finite, huge, or refers to nothing."""
+    file = tmp_path / "bent.xml"
+    file.write_text(BENT.format(**SOUND | change))
+    with pytest.raises(InputError) as caught:
+        RigidArm(str(file))
+    assert names(str(caught.value), "bent.xml", *says)
+    file.write_text(BENT.format(**SOUND))
+    assert RigidArm(str(file)).joints == ("j",)
+
+
+def test_numbers_of_a_urdf_are_named(tmp_path, capfd):
+    """A damping that is no number and a link without inertia are one line each."""
+    file = Path(urdf(tmp_path))
+    sound = file.read_text()
+    file.write_text(sound.replace('damping="0.4"', 'damping="nan"'))
+    with pytest.raises(InputError, match=naming("joint 'lift'", "damping", "nan")):
+        RigidArm(str(file))
+    file.write_text(sound.replace('effort="60"', 'effort="nan"'))
+    with pytest.raises(InputError, match=naming("'lift'", "torque limit", "nan")):
+        RigidArm(str(file))
+    file.write_text(sound.replace('effort="60"', 'effort="inf"'))
+    with pytest.warns(UserWarning, match=r"finger \(slide\)"):
+        assert "lift" not in RigidArm(str(file)).effort
