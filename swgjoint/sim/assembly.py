@@ -24,7 +24,7 @@ from swgjoint.sim.feature_sections import Disturbance, ToolForce
 from swgjoint.sim.payload import arms_of
 from swgjoint.sim.rigid_arm import RigidArm, compile_spec
 from swgjoint.sim.run_memory import require_run_memory
-from swgjoint.sim.scene import MAX_STEPS, Scene
+from swgjoint.sim.scene import Scene
 from swgjoint.sim.scene_sections import JointSection
 from swgjoint.sim.start_check import check_link, check_ranges
 from swgjoint.sim.trajectory import Trajectory
@@ -207,7 +207,6 @@ def assemble(
     # attach kept the harmonics that the scene's own step carries: what a run contains
     # follows from the step that its user chose, not from what the integrator needs
     if sub_steps > 1:
-        _check_length(scene, sub_steps)
         require_run_memory(scene, len(arm.joints), sub_steps=sub_steps)
         spec.option.timestep = scene.simulation.step_s / sub_steps
         trajectory = trajectory_of(scene, arm, sub_steps=sub_steps)
@@ -328,16 +327,6 @@ def _touching(arm: RigidArm, trajectory: Trajectory) -> NDArray[np.bool_]:
     path, slack = trajectory.position, 1e-3  # drives give way by minutes of arc [rad]
     beyond = (path <= low + slack) | (path >= high - slack)
     return np.asarray(collides | (model.jnt_limited.astype(bool) & beyond.any(axis=0)))
-
-
-def _check_length(scene: Scene, sub_steps: int) -> None:
-    steps = scene.simulation.duration_s / scene.simulation.step_s * sub_steps
-    if steps > MAX_STEPS:
-        raise InputError(
-            f"{scene.where}: simulation.duration_s: {scene.simulation.duration_s:g} s"
-            f" with {sub_steps} sub-steps a step makes {steps:.3g} steps; accepted: at"
-            f" most {MAX_STEPS} steps in a run"
-        )
 
 
 def _between(values: Array, n: int) -> Array:

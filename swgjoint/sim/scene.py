@@ -42,7 +42,7 @@ from swgjoint.sim.trajectory_sections import MOTIONS, Chirp, TrajectorySection
 from swgjoint.units import deg
 
 MAX_STEPS = 2_000_000
-"""Steps of the engine in a run."""
+"""Recorded steps of a run; memory bounds the sub-steps of the engine."""
 
 
 class Scene(Section):
