@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -210,15 +211,20 @@ def test_equal_designs_are_computed_once(counted):
 
 
 def test_a_damaged_result_is_computed_again(tmp_path, counted):
-    """Half a file, or one of another make, is no result."""
+    """Half a file, one of another make, or one with another digit is no result."""
     place = place_of(tmp_path)
-    run_sweep(sheet([10.0, 20.0, 30.0]), executor=counted, place=place)
+    first = run_sweep(sheet([10.0, 20.0, 30.0]), executor=counted, place=place)
     files = sorted(tmp_path.glob("results/*/*.json"))
     assert len(files) == 3
     files[0].write_bytes(files[0].read_bytes()[:-20])
     files[1].write_text('{"outcome": "ok"}')
+    whole = files[2].read_text()
+    digit = re.search(r'"T1_Nm": (\d)', whole)
+    other = str(9 - int(digit[1]))
+    files[2].write_text(whole[: digit.start(1)] + other + whole[digit.end(1) :])
     found = run_sweep(sheet([10.0, 20.0, 30.0]), executor=counted, place=place)
-    assert (found.reused, found.computed) == (1, 2)
+    assert (found.reused, found.computed) == (0, 3)
+    assert [r.figures for r in found.records] == [r.figures for r in first.records]
 
 
 @pytest.mark.parametrize(

@@ -62,7 +62,8 @@ class Checkpoint:
             return cls(folder=folder, asked=resume)
         except (OSError, DamagedError) as error:
             raise InputError(
-                f"--resume: {file}: {told(error)}; accepted: another --out"
+                f"{file} is of no run that --resume could go on with: {told(error)};"
+                " accepted: another --out"
             ) from None
         if there != settings:
             keys = [k for k in {**settings, **there} if there.get(k) != settings.get(k)]
