@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import os
+import re
 import secrets
 from pathlib import Path
 
 from swgjoint.errors import InputError
+
+LONGEST_NAME = 60
+"""Characters of a foreign name within that of a file, 240 bytes in UTF-8 at most."""
 
 
 def write_whole(path: str | Path, data: bytes | str) -> Path:
@@ -73,3 +77,12 @@ def _check_length(path: Path) -> None:
         path.exists()
     except OSError as exc:
         raise InputError(f"output {str(path)[:60]!r}: {exc.strerror}") from None
+
+
+def file_name(text: str) -> str:
+    """A name from a file as part of the name of a file, in the folder it is meant for.
+
+    Letters, digits, ``.``, ``_`` and ``-`` stay, so that names of drives do; a slash
+    leads nowhere. Names that differ elsewhere, or late, become the same.
+    """
+    return re.sub(r"[^\w.-]", "-", text)[:LONGEST_NAME].lstrip(".") or "-"

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from swgjoint.files import write_whole
+from swgjoint.pictures import save_png
 from swgjoint.units import arcmin
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ _LABELS = {"output_torque": "output torque", "motor_torque": "motor torque"}
 def write_picture(found: Identified, folder: Path) -> Path:
     """Write ``identified.png`` into a folder."""
     out = io.BytesIO()
-    picture(found).savefig(out, format="png", dpi=120)
+    save_png(picture(found), out, dpi=120)
     return write_whole(folder / "identified.png", out.getvalue())
 
 
