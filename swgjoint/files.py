@@ -17,6 +17,9 @@ from typing import Any
 from swgjoint.errors import InputError, OutputWarning, SwgError
 from swgjoint.json_text import json_text
 
+LONGEST_NAME = 60
+"""Characters of a foreign name within that of a file, 240 bytes in UTF-8 at most."""
+
 
 @contextmanager
 def whole(path: Path) -> Iterator[Path]:
@@ -57,7 +60,6 @@ def _is_gone(process: int) -> bool:
     except (OSError, OverflowError):
         return False
     return False
-
 
 def write_whole(path: str | Path, data: bytes | str) -> Path:
     """Write beside the target and rename, so that no reader sees half a file.
@@ -196,3 +198,12 @@ def _check_length(path: Path) -> None:
         path.exists()
     except OSError as exc:
         raise InputError(f"output {str(path)[:60]!r}: {exc.strerror}") from None
+
+
+def file_name(text: str) -> str:
+    """A name from a file as part of the name of a file, in the folder it is meant for.
+
+    Letters, digits, ``.``, ``_`` and ``-`` stay, so that names of drives do; a slash
+    leads nowhere. Names that differ elsewhere, or late, become the same.
+    """
+    return re.sub(r"[^\w.-]", "-", text)[:LONGEST_NAME].lstrip(".") or "-"

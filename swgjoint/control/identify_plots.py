@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from swgjoint.pictures import save_png
 from swgjoint.units import arcmin
 
 if TYPE_CHECKING:
@@ -21,7 +22,7 @@ _LABELS = {"output_torque": "output torque", "motor_torque": "motor torque"}
 def png(found: Identified) -> bytes:
     """The picture as a file."""
     out = io.BytesIO()
-    picture(found).savefig(out, format="png", dpi=120)
+    save_png(picture(found), out, dpi=120)
     return out.getvalue()
 
 

@@ -19,6 +19,9 @@ MAX_BYTES = 200_000_000
 """Some million samples; a longer file is not a record of one turn or one loop."""
 
 
+LARGEST = 1e12
+"""In SI units: nothing that a test bench measures, its clock included, is larger, and
+powers of it are far below overflow."""
 HEAD_LINES = 10_000
 """A header stands within these lines, comments included."""
 SEPARATORS = {",": "','", ";": "';'", "\t": "a tab"}
@@ -53,12 +56,15 @@ def read_columns(
 
     Raises:
         InputError: If the file cannot be read, a column is missing or doubled, or a
-            cell is no finite number; names file and line.
+            cell is no finite number of a size that can be measured; names file and
+            line.
     """
     path = Path(path)
     sheet = _sheet(path, _wanted(quantities))
     header = sheet.header
     found = {name: _column(path, sheet, name, quantities) for name in quantities}
+    if not sheet.rows:
+        raise InputError(f"{path}: no line of numbers below the header")
     values: dict[str, list[float]] = {name: [] for name in quantities}
     for number, row in sheet.rows:
         if len(row) != len(header):
@@ -71,12 +77,13 @@ def read_columns(
                 value = float(row[index])
             except ValueError:
                 value = float("nan")
-            if not isfinite(value):
+            if not abs(value * factor) <= LARGEST:  # NaN, too
                 cell = row[index].strip()
                 comma = _DECIMAL_COMMA.fullmatch(cell)
                 raise InputError(
                     f"{path}, line {number}: {header[index]} = {cell[:40]!r};"
                     f" accepted: a finite number{' with a decimal point' * bool(comma)}"
+                    f"{f', at most {LARGEST:g} in SI units' * isfinite(value)}"
                 )
             values[name].append(value * factor)
     return {name: np.array(column) for name, column in values.items()}

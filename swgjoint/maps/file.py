@@ -19,7 +19,7 @@ import zipfile
 from dataclasses import asdict
 from numbers import Real
 from pathlib import Path
-from typing import Any, Literal, TypeVar
+from typing import Annotated, Any, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +35,7 @@ from swgjoint.maps.drive_map import DriveMap, Ratings
 from swgjoint.maps.fields import DriveFields
 from swgjoint.maps.friction import Friction
 from swgjoint.maps.hysteresis import Jenkin
+from swgjoint.maps.info import check_texts, sound_info
 
 SCHEMA_VERSION = 4
 """2 added ``hysteresis``, 3 ``friction`` and the ratcheting torque, 4 fields to be
@@ -130,7 +131,7 @@ class Header(Section):
     schema_version: int
     units: dict[str, str]
     versions: dict[str, str]
-    name: str
+    name: Annotated[str, Field(max_length=300)]
     level: str
     layout: str
     teeth_flexspline: int
@@ -274,7 +275,7 @@ def map_from_bytes(data: bytes, cls: type[Map]) -> Map:
         ),
         friction=_friction(header.friction),
         fields=fields,
-        info=header.info,
+        info=sound_info(header.info, name=header.name),
         **arrays,
     )
     check_map(drive)
@@ -361,6 +362,7 @@ def _header(data: bytes) -> Header:
         raise MapFileError(f"header is not JSON: {exc}") from None
     if not isinstance(content, dict):
         raise MapFileError("header is not a JSON object")
+    check_texts(content)
     version = content.get("schema_version")
     if version not in _READABLE:
         raise MapFileError(

@@ -11,6 +11,7 @@ import numpy as np
 
 from swgjoint.errors import InputError
 from swgjoint.gear.kinematics import LAYOUTS
+from swgjoint.maps.checks import check_map
 from swgjoint.maps.csv_columns import read_columns
 from swgjoint.maps.drive_map import DriveMap, Ratings
 from swgjoint.maps.error_fit import ORDERS, fit_error
@@ -127,6 +128,12 @@ def map_from_measurement(
     amplitudes = np.zeros((1, 2))
     if kinematic_error is not None:
         record = read_columns(kinematic_error, {"output": OUTPUT, "error": ERROR})
+        largest = float(np.abs(record["error"]).max())
+        if largest > np.pi:
+            raise InputError(
+                f"{kinematic_error}: kinematic error of {largest:.4g} rad; accepted:"
+                " less than half a turn, so is the unit that of the column's name?"
+            )
         found = fit_error(
             record["output"],
             record["error"],
@@ -170,6 +177,10 @@ def map_from_measurement(
         hysteresis=fit.hysteresis,
         info=info,
     )
+    try:
+        check_map(drive)
+    except ValueError as exc:  # a fit through samples that say too little
+        raise InputError(f"{path}: the fitted map is no drive: {exc}") from None
     laid = overlay(replace(drive, kinematic_error=0.0 * amplitudes), loop).as_dict()
     compared = {key: laid[key] for key in ("rms_arcmin", *COMPARED)}
     compared["warnings"] = [*doubts, *laid["warnings"]]

@@ -47,8 +47,10 @@ def check_numbers(model: mujoco.MjModel, *, where: str) -> None:
         if not isinstance(values, np.ndarray) or values.dtype.kind != "f":
             continue
         rows = values.reshape(len(values), -1) if values.size else values[:, None]
-        top = LARGEST if key in _BOUNDED else np.inf
-        for row in np.flatnonzero(~((abs(rows) <= top) & np.isfinite(rows)).all(1)):
+        top = LARGEST if key in _BOUNDED else np.finfo(float).max
+        if key.endswith("range"):  # inf is a range without an end
+            top = np.inf
+        for row in np.flatnonzero(~(abs(rows) <= top).all(axis=1)):
             _refuse(where, f"{_element(model, kind, row)}: {attribute}", rows[row], top)
     lengths = np.linalg.norm(model.jnt_axis, axis=1)
     for row in np.flatnonzero(abs(lengths - 1.0) > 1e-6):
@@ -60,7 +62,7 @@ def check_numbers(model: mujoco.MjModel, *, where: str) -> None:
 
 def _refuse(where: str, what: str, values: np.ndarray, top: float = LARGEST) -> None:
     """One line about the first value beyond the bound, if there is one."""
-    wrong = values[~(np.isfinite(values) & (abs(values) <= top))]
+    wrong = values[~(abs(values) <= top)]  # NaN, too
     if wrong.size:
         raise InputError(
             f"{where}: {what} {wrong[0]:g}; accepted: finite numbers up to"

@@ -14,6 +14,12 @@ from swgjoint.units import deg
 
 Array = NDArray[np.float64]
 
+CLOSEST, LONGEST = 1e-6, 1e4
+"""Times between points of a file and of the whole motion [s]: the shortest step and the
+longest duration of a simulation."""
+LARGEST = 1e4
+"""Angle of a point of a file [rad]: more than a thousand turns."""
+
 
 def step(
     time: Array, *, start: Array, jump: Array, at: float, answer_speed: Array
@@ -239,6 +245,20 @@ def read_points(
             f"{path}: time_s does not increase from line to line; needed: two points"
             " or more, each later than the one before"
         )
+    nearest, length = float(np.diff(time).min()), float(time[-1] - time[0])
+    if nearest < CLOSEST or length > LONGEST:
+        raise InputError(
+            f"{path}: time_s: points {nearest:.3g} s apart at the closest,"
+            f" {length:.3g} s in all; accepted: at least {CLOSEST:g} s and at most"
+            f" {LONGEST:g} s"
+        )
+    for name in moved:
+        largest = float(np.abs(columns[name]).max())
+        if largest > LARGEST:
+            raise InputError(
+                f"{path}: {name}: an angle of {largest / deg:.3g} deg; accepted: up to"
+                f" {LARGEST / deg:.3g} deg"
+            )
     points = np.tile(start, (time.size, 1))
     for name in moved:
         points[:, joints.index(name)] = columns[name]

@@ -262,6 +262,11 @@ def strongest_left_out(transmission: Transmission) -> bool:
     return bool(lost > strength[1:].max(initial=0.0))
 
 
+AT_REST = 1e-9
+"""Commanded speed of a joint that rests [rad/s]: the round-off of a motion through
+equal points is below it."""
+
+
 def spread(values: Array) -> dict[str, float]:
     """Mean, root mean square and peak to peak of a signal, in its unit."""
     return {
@@ -280,7 +285,7 @@ def use_of_ratings(run: Run, j: int) -> dict[str, Any]:
     ratings = transmission.drive.ratings
     torque = np.abs(run.output_torque[:, j])
     speed = np.abs(run.velocity[:, j])
-    moving = run.assembly.trajectory.top_speed[j] > 0.0
+    moving = run.assembly.trajectory.top_speed[j] > AT_REST and speed.any()
     cubed = cubed_mean(torque, speed if moving else np.ones_like(speed))
     peak = float(torque.max())
     low, high = transmission.drive.torque_range

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from swgjoint.pictures import save_png
 from swgjoint.study.articles_runs import Found
 
 
@@ -35,7 +36,7 @@ def articles_picture(parts: Sequence[str], found: Mapping[str, Found]) -> bytes 
     for ax, draw in zip(axes, panels, strict=True):
         draw(ax, found)
     out = io.BytesIO()
-    figure.savefig(out, format="png", dpi=110)
+    save_png(figure, out, dpi=110)
     return out.getvalue()
 
 

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from swgjoint.pictures import save_png
 from swgjoint.study.catalogue_file import CatalogueFile
 from swgjoint.study.catalogue_printed import (
     STIFFNESS,
@@ -146,5 +147,5 @@ def coning_picture(rows: Sequence[Mapping[str, Any]]) -> bytes:
     axes[1, 0].set_ylabel("centre of tooth forces\nfrom mid-face, open end < 0 [face]")
     axes[1, 0].set_ylim(-0.55, 0.25)
     out = io.BytesIO()
-    figure.savefig(out, format="png", dpi=130)
+    save_png(figure, out, dpi=130)
     return out.getvalue()

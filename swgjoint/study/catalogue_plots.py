@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 from collections.abc import Sequence
 
+from swgjoint.pictures import save_png
 from swgjoint.study.rows import Row
 
 PANELS = ("K1", "K2", "K3", "ratcheting torque")
@@ -64,5 +65,5 @@ def catalogue_picture(rows: Sequence[Row]) -> bytes | None:
         "middle and bracket of the variants; triangle: lower bound; grey: goal"
     )
     out = io.BytesIO()
-    figure.savefig(out, format="png", dpi=130)
+    save_png(figure, out, dpi=130)
     return out.getvalue()

@@ -8,6 +8,7 @@ from typing import Any
 
 from swgjoint.maps.map_validity import QUANTITIES
 from swgjoint.maps.validity_marks import error_mark, joint_mark, mark_legend
+from swgjoint.pictures import save_png
 from swgjoint.study.compare import LOWER, RIPPLE, Compared
 from swgjoint.view.entities import COLORS
 from swgjoint.view.report import Cell, Table
@@ -147,7 +148,7 @@ def comparison_picture(
     axes[0, 0].invert_yaxis()
     figure.suptitle(f"scene {scene}, worst joint", fontsize="medium")
     out = io.BytesIO()
-    figure.savefig(out, format="png", dpi=110)
+    save_png(figure, out, dpi=110)
     return out.getvalue()
 
 

@@ -30,7 +30,7 @@ from swgjoint.control.kinematic_error import (
 from swgjoint.control.learning import LearningCompensation
 from swgjoint.control.motor_side import MotorPID, ideal_plan, rigid_plan
 from swgjoint.control.mpc import PredictiveController
-from swgjoint.files import write_whole
+from swgjoint.files import file_name, write_whole
 from swgjoint.json_text import json_text
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.progress import Progress, silent
@@ -231,7 +231,7 @@ def run_control(options: StudyOptions) -> StudyResult:
         }
         if options.folder is not None:
             picture = ladder_picture(name, found)
-            target = options.folder / f"control-{drive.name}.png"
+            target = options.folder / f"control-{file_name(drive.name)}.png"
             files.append(write_whole(target, picture))
     if options.folder is not None:
         text = json_text({"rows": [row.to_json() for row in rows], "values": more})

@@ -6,6 +6,7 @@ import io
 
 import numpy as np
 
+from swgjoint.pictures import save_png
 from swgjoint.study.control_bench import UNITS
 from swgjoint.study.control_ladder import RUNGS, Ladder
 
@@ -72,5 +73,5 @@ def ladder_picture(name: str, found: Ladder) -> bytes:
     count = next(iter(found.figures.values()))[bars[0]].size
     figure.suptitle(f"{name}: above one specimen, below {count} (dots) and their mean")
     out = io.BytesIO()
-    figure.savefig(out, format="png", dpi=100)
+    save_png(figure, out, dpi=100)
     return out.getvalue()

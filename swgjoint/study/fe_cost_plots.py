@@ -6,6 +6,7 @@ import io
 from collections.abc import Mapping
 from typing import Any
 
+from swgjoint.pictures import save_png
 from swgjoint.study.fe_cost_rows import BOUNDS, QUANTITIES, seconds
 
 STYLES = {
@@ -65,5 +66,5 @@ def cost_picture(result: Mapping[str, Any]) -> bytes:
     panels[0, 0].legend(fontsize="small")
     figure.suptitle(f"{result['design']} against {reference}")
     out = io.BytesIO()
-    figure.savefig(out, format="png", dpi=100)
+    save_png(figure, out, dpi=100)
     return out.getvalue()

@@ -6,6 +6,7 @@ import io
 from collections.abc import Sequence
 from typing import Any
 
+from swgjoint.pictures import save_png
 from swgjoint.study.joint_runs import QUANTITIES
 
 _COLOURS = {
@@ -57,7 +58,7 @@ def joint_picture(scene: str, rows: Sequence[dict[str, Any]]) -> bytes:
     against = next(row["reference"] for row in rows)
     figure.suptitle(f"{scene} against {against}")
     out = io.BytesIO()
-    figure.savefig(out, format="png", dpi=90)
+    save_png(figure, out, dpi=90)
     return out.getvalue()
 
 

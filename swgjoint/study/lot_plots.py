@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from swgjoint.pictures import save_png
 from swgjoint.study.lot import LOWER
 
 _LABELS = {
@@ -57,5 +58,5 @@ def lot_picture(result: dict[str, Any]) -> bytes | None:
     }[result["sizes"]]
     figure.suptitle(f"{result['design']}: {len(rows)} drives, {meaning}", fontsize=11)
     out = io.BytesIO()
-    figure.savefig(out, format="png", dpi=110)
+    save_png(figure, out, dpi=110)
     return out.getvalue()

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from swgjoint.pictures import save_png
 from swgjoint.study.optimise_front import Candidate
 from swgjoint.study.sweep_plan import Parameter
 from swgjoint.study.sweep_plots import label_of
@@ -30,7 +31,7 @@ def optimum_picture(found: Optimum) -> bytes:
     _values(values, found)
     canvas.suptitle(found.file.description or "search", fontsize=11)
     out = io.BytesIO()
-    canvas.savefig(out, format="png", dpi=100)
+    save_png(canvas, out, dpi=100)
     return out.getvalue()
 
 

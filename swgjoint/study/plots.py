@@ -6,6 +6,7 @@ import io
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+from swgjoint.pictures import save_png
 from swgjoint.study.cases import KINDS
 
 if TYPE_CHECKING:
@@ -53,7 +54,7 @@ def group_picture(results: Sequence[CaseRecords]) -> bytes:
         )
     figure.suptitle(f"{group.id}: {group.title} ({group.source})", fontsize=11)
     out = io.BytesIO()
-    figure.savefig(out, format="png", dpi=100)
+    save_png(figure, out, dpi=100)
     return out.getvalue()
 
 

@@ -14,9 +14,10 @@ from typing import Any
 import numpy as np
 
 from swgjoint.errors import InputError
-from swgjoint.files import write_whole
+from swgjoint.files import file_name, write_whole
 from swgjoint.json_text import json_text
 from swgjoint.maps.drive_map import DriveMap
+from swgjoint.pictures import save_png
 from swgjoint.sim.drives import load_drive
 from swgjoint.sim.frequency_response import (
     Chirp,
@@ -99,7 +100,7 @@ def run_response(options: StudyOptions) -> StudyResult:
         summary += _summary(name, found)
         if options.folder is not None:
             options.folder.mkdir(parents=True, exist_ok=True)
-            stem = f"response-{drive.name}"
+            stem = f"response-{file_name(drive.name)}"
             picture = response_picture(name, found)
             files.append(write_whole(options.folder / f"{stem}.png", picture))
     if options.folder is not None:
@@ -299,5 +300,5 @@ def response_picture(name: str, found: list[Measured]) -> bytes:
         ax.grid(alpha=0.3, which="both")
     axes[0].legend(fontsize="small")
     out = io.BytesIO()
-    figure.savefig(out, format="png", dpi=110)
+    save_png(figure, out, dpi=110)
     return out.getvalue()

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from swgjoint.pictures import save_png
 from swgjoint.study.thin_ring import small_deflection
 from swgjoint.units import deg, mm, um
 
@@ -34,7 +35,7 @@ def ring_picture(cases: Sequence[RingCase], *, fine: int, total: float) -> bytes
     _around(around, cases[0], fine)
     _inward(inward, cases, fine, total)
     out = io.BytesIO()
-    figure.savefig(out, format="png", dpi=110)
+    save_png(figure, out, dpi=110)
     return out.getvalue()
 
 

@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from swgjoint.pictures import save_png
+
 
 def scaling_picture(result: Mapping[str, Any], labels: Mapping[str, str]) -> bytes:
     """PNG: time over size, one panel a sweep, with the fitted power.
@@ -42,5 +44,5 @@ def scaling_picture(result: Mapping[str, Any], labels: Mapping[str, str]) -> byt
     for ax in panels[len(labels) :]:
         ax.set_visible(False)
     out = io.BytesIO()
-    figure.savefig(out, format="png", dpi=90)
+    save_png(figure, out, dpi=90)
     return out.getvalue()

@@ -6,6 +6,7 @@ import io
 from collections.abc import Sequence
 from typing import Any
 
+from swgjoint.pictures import save_png
 from swgjoint.study.stability_rows import DEFAULT, FREE, OUTCOMES, StabilityRow
 
 _COLOURS = {
@@ -37,7 +38,7 @@ def stability_picture(rows: Sequence[StabilityRow]) -> bytes:
     _error(axes["error"], rows)
     _free(axes["free"], rows)
     out = io.BytesIO()
-    figure.savefig(out, format="png", dpi=100)
+    save_png(figure, out, dpi=100)
     return out.getvalue()
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from swgjoint.faults import split_unit
+from swgjoint.pictures import save_png
 
 if TYPE_CHECKING:
     from swgjoint.study.sweep import SweepResult
@@ -67,7 +68,7 @@ def sweep_picture(found: SweepResult) -> bytes:
     text = f"{ok} designs, {len(rows) - ok} without figures (crosses)"
     canvas.suptitle(f"{found.file.description or 'sweep'}\n{text}", fontsize=10)
     out = io.BytesIO()
-    canvas.savefig(out, format="png", dpi=100)
+    save_png(canvas, out, dpi=100)
     return out.getvalue()
 
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from swgjoint.files import Outputs
 from swgjoint.json_text import json_text
+from swgjoint.pictures import save_png
 from swgjoint.study.tune_result import Candidate, Tuned
 from swgjoint.units import arcmin
 from swgjoint.view.report import Cell, Table, write_tables
@@ -93,7 +94,7 @@ def picture(found: Tuned) -> bytes:
     _draw_seeds(axes[0, 1], found)
     _draw_episode(axes[1], found)
     out = io.BytesIO()
-    figure.savefig(out, format="png", dpi=110)
+    save_png(figure, out, dpi=110)
     return out.getvalue()
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from swgjoint.gear.neutral_line import neutral_line
 from swgjoint.gear.profile import tooth_profile
 from swgjoint.gear.wave_generator import lobe_height, wave_generator
+from swgjoint.pictures import save_png
 from swgjoint.units import mm
 
 if TYPE_CHECKING:
@@ -45,7 +46,7 @@ def design_picture(design: Design) -> bytes:
         ax.set_ylabel("y [mm]")
     figure.suptitle(f"{design.drive.name}: {_summary(design)}")
     out = io.BytesIO()
-    figure.savefig(out, format="png", dpi=110)
+    save_png(figure, out, dpi=110)
     return out.getvalue()
 
 

@@ -20,6 +20,7 @@ from swgjoint.fe.fields import (
     tooth_forces,
     wave_generator_contact,
 )
+from swgjoint.pictures import save_png
 from swgjoint.units import deg, mm
 
 if TYPE_CHECKING:
@@ -295,5 +296,5 @@ def _title(run: MeshingRun, state: State | None) -> str:
 
 def _png(figure: Any) -> bytes:
     out = io.BytesIO()
-    figure.savefig(out, format="png", dpi=110)
+    save_png(figure, out, dpi=110)
     return out.getvalue()

@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from swgjoint.pictures import save_png
+
 _KINDS = {"tensile": "tab:red", "compressive": "tab:blue", "von_mises": "0.3"}
 
 
@@ -48,7 +50,7 @@ def meshing_picture(result: Mapping[str, Any]) -> bytes:
     load = f", {torque_Nm:g} N·m at the output" if torque_Nm is not None else ""
     figure.suptitle(f"Meshing of {name}{load}: {result['outcome']}", fontsize="medium")
     out = io.BytesIO()
-    figure.savefig(out, format="png", dpi=120)
+    save_png(figure, out, dpi=120)
     return out.getvalue()
 
 

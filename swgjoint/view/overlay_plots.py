@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from swgjoint.pictures import save_png
 from swgjoint.units import arcmin
 
 if TYPE_CHECKING:
@@ -57,5 +58,5 @@ def overlay_picture(name: str, laid: Overlay) -> bytes:
         axis.grid(alpha=0.3)
     figure.suptitle(f"{name}: measured loop over the prediction")
     out = io.BytesIO()
-    figure.savefig(out, format="png", dpi=130)
+    save_png(figure, out, dpi=130)
     return out.getvalue()

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from swgjoint.files import write_whole
+from swgjoint.pictures import save_png
 from swgjoint.sim.metrics import (
     highest_resolved_order,
     strongest_left_out,
@@ -41,7 +42,7 @@ def comparison_png(
         The path.
     """
     buffer = io.BytesIO()
-    comparison_figure(runs, rigid=rigid).savefig(buffer, format="png", dpi=110)
+    save_png(comparison_figure(runs, rigid=rigid), buffer, dpi=110)
     return write_whole(path, buffer.getvalue())
 
 

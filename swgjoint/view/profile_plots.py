@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from swgjoint.pictures import save_png
 from swgjoint.units import mm
 
 if TYPE_CHECKING:
@@ -59,5 +60,5 @@ def profile_picture(design: Design, profiles: Mapping[str, ToothProfile]) -> byt
     figure.legend(handles, labels, loc="outside lower center", ncols=2)
     figure.suptitle(f"{design.drive.name}: tooth profiles")
     out = io.BytesIO()
-    figure.savefig(out, format="png", dpi=130)
+    save_png(figure, out, dpi=130)
     return out.getvalue()

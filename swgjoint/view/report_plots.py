@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from swgjoint.pictures import save_png
 from swgjoint.units import arcmin
 from swgjoint.view.blueprint import is_rigid
 from swgjoint.view.entities import COLORS
@@ -77,7 +78,7 @@ def joint_png(runs: Mapping[str, Run], joint: str) -> bytes:
 def png(figure: Any) -> bytes:
     """The bytes of a picture."""
     out = io.BytesIO()
-    figure.savefig(out, format="png", dpi=95)
+    save_png(figure, out, dpi=95)
     return out.getvalue()
 
 

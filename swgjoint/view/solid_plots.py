@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from swgjoint.pictures import save_png
 from swgjoint.units import deg, mm
 
 if TYPE_CHECKING:
@@ -165,5 +166,5 @@ def coning_picture(run: SolidRun) -> bytes:
 
 def _png(figure: Any) -> bytes:
     out = io.BytesIO()
-    figure.savefig(out, format="png", dpi=110)
+    save_png(figure, out, dpi=110)
     return out.getvalue()

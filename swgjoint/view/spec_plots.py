@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from swgjoint.pictures import save_png
 from swgjoint.units import arcmin, rpm
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ def spec_picture(name: str, sheet: SpecSheet) -> bytes:
         draw(ax, sheet)
     figure.suptitle(f"{name}: spec sheet")
     out = io.BytesIO()
-    figure.savefig(out, format="png", dpi=130)
+    save_png(figure, out, dpi=130)
     return out.getvalue()
 
 

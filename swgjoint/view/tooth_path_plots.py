@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from swgjoint.gear.profile import tooth_profile
+from swgjoint.pictures import save_png
 from swgjoint.units import deg, mm, um
 
 if TYPE_CHECKING:
@@ -64,5 +65,5 @@ def tooth_path_picture(design: Design, path: ToothPath) -> bytes:
     clearance.grid(alpha=0.3)
     figure.suptitle(f"{design.drive.name}: passage of a rigid tooth")
     out = io.BytesIO()
-    figure.savefig(out, format="png", dpi=110)
+    save_png(figure, out, dpi=110)
     return out.getvalue()

@@ -19,6 +19,7 @@ from hypothesis import strategies as st
 from messages import names, naming
 
 from swgjoint.errors import InputError, MapFileError
+from swgjoint.json_text import plain
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.file import MAX_BYTES, map_bytes, map_from_bytes
 from swgjoint.maps.friction import Friction
@@ -538,3 +539,66 @@ def test_an_unsound_map_is_not_written(synthetic_map, tmp_path):
     ):
         synthetic_map.save(tmp_path / "none" / "a.swg")
     assert os.listdir(tmp_path) == []
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("pruned", "x"),
+        ("pruned", {"dropped": [[3, 1]]}),
+        ("residual", [1]),
+        ("energy_check", 3),
+        ("stiffness_range_Nm_rad", ["a", "b"]),
+        ("stated", "x"),
+        ("stated", {"transmission_accuracy_arcmin": "x"}),
+        ("missing", ["x"]),
+        ("label", 1e308),
+        ("sampled_torque_Nm", [1.0]),
+        ("kinematic_error", {}),
+        ("hysteresis_left_out", "two"),
+    ],
+)
+def test_a_record_of_another_kind_is_left_out(synthetic_map, tmp_path, key, value):
+    """One warning names the key; the drive, its other keys and its figures stay."""
+    file = tmp_path / "map.swg"
+    replace(synthetic_map, info={"note": [1, "x"], key: value}).save(file)
+    with pytest.warns(UserWarning, match=f"info {key} left out") as told:
+        drive = DriveMap.load(file)
+    assert len(told) == 1
+    assert drive.info == {"note": [1, "x"]}
+    assert drive.pruned(1.0).info["pruned"]["harmonics"] >= 0
+
+
+def test_a_record_of_this_package_is_kept(synthetic_map, tmp_path):
+    """What pruning and the catalogue write is read without a warning."""
+    for name, drive in (
+        ("pruned", synthetic_map.pruned(1.0)),
+        ("catalogue", DriveMap.from_catalogue("CSG-25-100")),
+    ):
+        drive.save(tmp_path / f"{name}.swg")
+        assert DriveMap.load(tmp_path / f"{name}.swg").info == plain(drive.info)
+
+
+@pytest.mark.parametrize(
+    ("value", "says"),
+    [("\\udc80", ("not", "Unicode")), ("[" * 40 + "]" * 40, ("nested", "30"))],
+)
+def test_a_header_that_cannot_be_written_is_refused(
+    synthetic_map, tmp_path, value, says
+):
+    """Half a character and records without end are one line."""
+    text = f'"{value}"' if value.startswith("\\") else value
+    data = map_bytes(replace(synthetic_map, info={"note": "@"}))
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        members = {name: archive.read(name) for name in archive.namelist()}
+    header = np.load(io.BytesIO(members["header.npy"])).tobytes()
+    header = header.replace(b'"@"', text.encode())
+    buffer = io.BytesIO()
+    np.save(buffer, np.frombuffer(header, dtype=np.uint8))
+    members["header.npy"] = buffer.getvalue()
+    file = tmp_path / "map.swg"
+    with zipfile.ZipFile(file, "w") as archive:
+        for name, content in members.items():
+            archive.writestr(name, content)
+    with pytest.raises(MapFileError, match=naming("map.swg", *says)):
+        DriveMap.load(file)

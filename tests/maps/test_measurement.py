@@ -249,6 +249,7 @@ def test_orders_that_the_samples_cannot_tell_are_listed(synthetic_map, tmp_path)
             ("line 2", "torsion_rad", "'nan'", "finite"),
         ),
         ("", ("empty", "torque_Nm", "torsion_arcmin", "torsion_rad")),
+        ("torque_Nm,torsion_rad\n", ("no line of numbers",)),
         ("torque_Nm,torsion_rad\n-1,0\n1,1\n", ("2 samples", "8")),
         (
             "torque_Nm,torsion_rad\n" + "\n".join(f"{k},{k}" for k in range(20)),
@@ -257,6 +258,10 @@ def test_orders_that_the_samples_cannot_tell_are_listed(synthetic_map, tmp_path)
         (
             "torque_Nm,torsion_rad\n" + "\n".join(f"{k},{-k}" for k in range(-9, 10)),
             ("torsion", "torque", "sign"),
+        ),
+        (
+            "torque_Nm,torsion_rad\n" + "\n".join(f"{k},1e300" for k in range(-9, 10)),
+            ("line 2", "torsion_rad", "1e300", "1e+12"),
         ),
     ],
 )
@@ -269,6 +274,18 @@ def test_bad_loops(tmp_path, text, message):
     assert names(str(caught.value), *message)
     assert "bad.csv" in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_an_error_in_the_wrong_unit_is_named(synthetic_map, tmp_path):
+    """Minutes of arc in a column of radians are refused where the file is read."""
+    torque, x = hysteresis_loop(synthetic_map.with_harmonics([True] + [False] * 4))
+    loop = write(tmp_path / "loop.csv", "torque_Nm,torsion_rad", torque, x)
+    angle = np.linspace(0.0, 2.0 * np.pi, 400)
+    errors = write(
+        tmp_path / "e.csv", "output_rad,error_rad", angle, 5.0 * np.sin(2.0 * angle)
+    )
+    with pytest.raises(InputError, match=naming("e.csv", "rad", "half a turn", "unit")):
+        DriveMap.from_measurement(loop, ratings=50.0, kinematic_error=errors, **TEETH)
 
 
 def test_bad_options(synthetic_map, tmp_path):

@@ -8,6 +8,7 @@ from swgjoint.errors import InputError
 from swgjoint.sim.commanded import trajectory_of
 from swgjoint.sim.joint_motions import chirp, read_points, through_points, trapezoid
 from swgjoint.sim.rigid_arm import RigidArm
+from swgjoint.sim.run import run_scene
 from swgjoint.sim.scene import Scene
 from swgjoint.sim.trajectory import time_grid
 
@@ -183,6 +184,9 @@ def test_a_csv_lies_beside_its_scene(tmp_path):
         ("time_s\n0\n1\n", ("column", "time_s", "<joint>_deg", "<joint>_rad")),
         ("time_s,joint_deg\n0,1\n0,2\n", ("time_s", "two")),
         ("time_s,joint_deg\n0,1\n", ("time_s", "two")),
+        ("time_s,joint_deg\n0,1\n1e-300,2\n", ("time_s", "1e-300 s", "1e-06 s")),
+        ("time_s,joint_deg\n0,1\n2e5,2\n", ("time_s", "2e+05 s", "10000 s")),
+        ("time_s,joint_rad\n0,1\n1,1e5\n", ("joint", "deg", "5.73e+05 deg")),
         ("time_s,joint_deg\n0,one\n1,2\n", ("line 2", "joint_deg", "'one'", "finite")),
         ("", ("empty", "time_s")),
     ],
@@ -195,6 +199,17 @@ def test_a_bad_csv_is_one_line(tmp_path, text, message):
         read_points(path, ("joint",), np.zeros(1))
     assert names(str(caught.value), "points.csv", *message)
     assert len(str(caught.value).splitlines()) == 1
+
+
+def test_points_that_do_not_move_are_a_joint_at_rest(tmp_path):
+    """The cubed mean of a joint that rests is that over time, as catalogues have it."""
+    path = tmp_path / "still.csv"
+    path.write_text("time_s,joint_deg\n0,5\n0.1,5\n0.2,5\n")
+    scene = scene_of(f"[trajectory]\nkind = 'csv'\nfile = {str(path)!r}\nhold_s = 0.1")
+    run = run_scene(scene)
+    torque = np.abs(run.output_torque[:, 0])
+    found = run.metrics()["joints"]["joint"]["ratings"]["cubed_mean_Nm"]
+    assert found == pytest.approx(np.mean(torque**3) ** (1.0 / 3.0), abs=1e-12)
 
 
 def test_a_motion_between_two_samples_is_refused(tmp_path):
