@@ -15,6 +15,14 @@ from swgjoint.maps.drive_map import DriveMap
 from swgjoint.study import stability, stability_arms
 from swgjoint.study.stability_arms import ArmTask, run_arm
 from swgjoint.study.stability_catalogue import catalogue_drives, run_drive
+from swgjoint.study.stability_contact import (
+    KINDS,
+    MASSES,
+    ContactTask,
+    contact_tasks,
+    gain,
+    run_contact,
+)
 from swgjoint.study.stability_damping import numerical_damping
 from swgjoint.study.stability_grid import GridJoint, grid, run_joint, situations
 from swgjoint.study.stability_impact import drop, drop_joint, impact_speed
@@ -211,6 +219,33 @@ def test_a_falling_arm_keeps_its_energy(monkeypatch):
     assert row.largest_gain < 0.01 and abs(row.energy_balance) < 0.01
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_chains_in_contact_come_to_rest(kind):
+    """The contact takes the energy of the fall; the torsion of the drives adds none."""
+    [drive] = [d for d in catalogue_drives() if d.name == "CSG-17-100"]
+    task = ContactTask(drive=drive, kind=kind, mass=0.3, damping_ratios=(0.001,))
+    rows = run_contact(task)
+    assert [row.outcome for row in rows] == ["ok", "ok", "sub_stepped"]
+    assert max(row.largest_gain for row in rows) < 0.05
+    assert max(row.energy_balance for row in rows) < -0.1
+
+
+def test_a_gain_after_a_loss_is_one():
+    """A rise above the lowest mean before counts, also below that at the start."""
+    assert gain(np.array([0.0, -1.0, -0.9, -0.7, -0.8])) == pytest.approx(0.3)
+    assert gain(np.array([0.0, -0.5, -0.5, -0.6])) == 0.0
+    assert gain(np.array([0.0, np.inf])) == np.inf
+
+
+def test_the_chains_span_the_catalogue():
+    """Every drive, both kinds and masses; the quick grid has a few of them."""
+    every = contact_tasks(full=True)
+    assert len({task.name for task in every}) == 22 * len(KINDS) * len(MASSES)
+    few = contact_tasks(full=False)
+    assert {task.name for task in few} < {task.name for task in every}
+    assert {task.kind for task in few} == set(KINDS)
+
+
 def _no_scene(*_, **__):
     from types import SimpleNamespace
 
@@ -227,9 +262,10 @@ def _no_scene(*_, **__):
 
 @pytest.fixture
 def small(monkeypatch):
-    """The study with one joint of the grid and one drive, no arms."""
+    """The study with one joint of the grid and one drive, no arms, no chains."""
     monkeypatch.setattr(stability, "SCENES", ())
     monkeypatch.setattr(stability, "grid", lambda full: [replace(STIFF, others=False)])
+    monkeypatch.setattr(stability, "contact_tasks", lambda full: [])
     monkeypatch.setattr(stability, "catalogue_drives", lambda: catalogue_drives()[:1])
 
 
