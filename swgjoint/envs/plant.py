@@ -160,9 +160,9 @@ class Plant:
         # by all other forces cancel those by the drive, hysteresis is relaxed here
         batch.forward([index])
         state, others = self._others
-        factor = [part[index] for part in self._factor]
+        factor, inverse = (part[index] for part in self._factor)
         for side, dofs in enumerate((self._rotor_v, self._link_v)):
-            weight = responses(self.model, *factor, dofs)
+            weight = responses(self.model, factor, inverse, dofs)
             state[index, others - 1 + side] = -weight * forces[:, side]
         for j, drive in enumerate(maps):
             first = others[j] + 1

@@ -81,6 +81,9 @@ class JointDrive:
     [N·m·s/rad]; see :mod:`swgjoint.joint.step_damping`."""
     compensated_at: float | None = None
     """Step at which that holds [s]; None where nothing is taken out."""
+    coupling: float = 0.0
+    """Share of the inertia about the joint at qpos0 that gives way where the other
+    joints are free [-]."""
     motors: tuple[str, ...] = ()
     """Actuators that the model had on the joint; with a rotor they turn that."""
     variable: bool = False

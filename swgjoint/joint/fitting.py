@@ -122,6 +122,7 @@ def fitted(
         ratio=ratio,
         rotor_inertia=float(fitting.rotor_inertia),
         link_inertia=place.inertia,
+        coupling=place.coupling,
         stiffness=stiffness,
         damping=damping if own else 0.0,
         drive=drive,

@@ -1,8 +1,8 @@
 r"""How a joint answers to its own torque with all others free, as the plugin takes it.
 
-The plugin predicts the step of a drive from what its torque does to rotor and link. With
-the others free that is the diagonal of the inverse mass matrix. From the engine's factor
-M = L'DL,
+The plugin predicts the step of a drive from what its torque does to rotor and link.
+With the others free that is the diagonal of the inverse mass matrix. From the engine's
+factor M = L'DL,
 
 .. math:: (M^{-1})_{ii} = \sum_j (L^{-T} e_i)_j^2 / D_j
 

@@ -397,7 +397,7 @@ def respond(
         for k in range(last):
             column[world, k] = 0.0
         column[world, last] = 1.0
-        total = float(0.0)
+        total = wp.float32(0.0)
         for up in range(last + 1):
             a = last - up
             at = M_rowadr[M_colind[start + a]]

@@ -4,9 +4,12 @@
   and steps (:mod:`stability_grid`), kinematic error of 1 arcmin at 2 and 4 per turn;
 - ``free 10 s``, ``ratchet``: every CSG row of the catalogue
   (:mod:`stability_catalogue`);
-- ``fall``, ``sweep``: four arms with catalogue drives (:mod:`stability_arms`).
+- ``fall``, ``sweep``: four arms with catalogue drives (:mod:`stability_arms`);
+- ``contact``: chains of two links that lie on a floor or press against joint limits
+  (:mod:`stability_contact`).
 
-No run has physical damping, so whatever energy appears is the integrator's. A gain is
+But for two thirds of the last, no run has physical damping, so whatever energy appears
+is the integrator's, or the contacts', which a much finer run tells. A gain is
 sustained: the mean of energy less work over a tenth of the run, above that at the
 start, over the kinetic and torsion energy at the start and what the load winds up.
 """
@@ -32,6 +35,7 @@ from swgjoint.study.stability_catalogue import (
     catalogue_drives,
     run_drive,
 )
+from swgjoint.study.stability_contact import ContactTask, contact_tasks, run_contact
 from swgjoint.study.stability_grid import GridJoint, grid, run_joint
 from swgjoint.study.stability_joint import GAIN
 from swgjoint.study.stability_rows import (
@@ -43,7 +47,7 @@ from swgjoint.study.stability_rows import (
     shares,
 )
 
-Task = ArmTask | CatalogueDrive | GridJoint
+Task = ArmTask | CatalogueDrive | ContactTask | GridJoint
 
 ARM_GROUPS = ("fall", "sweep")
 REFERENCE = (
@@ -82,7 +86,7 @@ def run_stability(
     if folder is not None:
         folder.mkdir(parents=True, exist_ok=True)  # before minutes of work
     tasks: list[Task] = [ArmTask(scene=scene) for scene in SCENES]
-    tasks += [*grid(full=full), *catalogue_drives()]
+    tasks += [*grid(full=full), *contact_tasks(full=full), *catalogue_drives()]
     found = run_all(run_task, tasks, jobs=jobs, stage="stability", progress=progress)
     rows = [row for part in found for row in part]
     files = [] if folder is None else write_files(rows, folder)
@@ -121,6 +125,8 @@ def run_task(task: Task) -> list[StabilityRow]:
             return run_joint(task)
         if isinstance(task, CatalogueDrive):
             return run_drive(task)
+        if isinstance(task, ContactTask):
+            return run_contact(task)
         return run_arm(task)
     finally:
         mujoco.set_mju_user_warning(None)

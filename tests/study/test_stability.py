@@ -11,10 +11,20 @@ import pytest
 from messages import names
 
 from swgjoint.cli.main import main
+from swgjoint.joint.region import check_region
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.study import stability, stability_arms
 from swgjoint.study.stability_arms import ArmTask, run_arm
 from swgjoint.study.stability_catalogue import catalogue_drives, run_drive
+from swgjoint.study.stability_contact import (
+    KINDS,
+    MASSES,
+    ContactTask,
+    chain,
+    contact_tasks,
+    gain,
+    run_contact,
+)
 from swgjoint.study.stability_damping import numerical_damping
 from swgjoint.study.stability_grid import GridJoint, grid, run_joint, situations
 from swgjoint.study.stability_impact import drop, drop_joint, impact_speed
@@ -211,6 +221,54 @@ def test_a_falling_arm_keeps_its_energy(monkeypatch):
     assert row.largest_gain < 0.01 and abs(row.energy_balance) < 0.01
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_chains_in_contact_come_to_rest(kind):
+    """The contact takes the energy of the fall; the torsion of the drives adds none."""
+    [drive] = [d for d in catalogue_drives() if d.name == "CSG-17-100"]
+    task = ContactTask(drive=drive, kind=kind, mass=0.3, damping_ratios=(0.001,))
+    rows = run_contact(task)
+    assert [row.outcome for row in rows] == ["ok", "ok", "sub_stepped"]
+    assert max(row.largest_gain for row in rows) < 0.05
+    assert max(row.energy_balance for row in rows) < -0.1
+
+
+def test_a_chain_without_any_loss_is_refused_in_contact():
+    """No step helps it, a damping ratio of 0.001 does; a joint by itself needs none."""
+    [drive] = [d for d in catalogue_drives() if d.name == "CSG-17-100"]
+    task = ContactTask(drive=drive, kind="floor", mass=0.3, steps=(1e-3,))
+    for damping, ok in ((0.0, False), (0.001, True)):
+        _, drives = chain(task, 1e-3, damping)
+        # (M12)² over M11 M22 of the two links, stretched, with elbow and shoulder
+        assert [d.coupling for d in drives] == pytest.approx([0.714, 0.714], abs=1e-3)
+        for one in drives:
+            region = check_region(one, timestep=1e-3, contacts=True)
+            assert region.ok is ok
+            assert check_region(one, timestep=1e-3).ok
+            if not ok:
+                assert region.sub_steps is None
+                assert names(region.message, "no step helps", "damping ratio", "0.001")
+    alone = drop_joint(hardening_drive(1e4), rotor=1e-5, link=0.1, step=1e-3)
+    assert alone.region(0.0, contacts=True).ok
+    lossless = replace(task, damping_ratios=(0.0,))
+    assert [row.outcome for row in run_contact(lossless)] == ["refused"]
+
+
+def test_a_gain_after_a_loss_is_one():
+    """A rise above the lowest mean before counts, also below that at the start."""
+    assert gain(np.array([0.0, -1.0, -0.9, -0.7, -0.8])) == pytest.approx(0.3)
+    assert gain(np.array([0.0, -0.5, -0.5, -0.6])) == 0.0
+    assert gain(np.array([0.0, np.inf])) == np.inf
+
+
+def test_the_chains_span_the_catalogue():
+    """Every drive, both kinds and masses; the quick grid has a few of them."""
+    every = contact_tasks(full=True)
+    assert len({task.name for task in every}) == 22 * len(KINDS) * len(MASSES)
+    few = contact_tasks(full=False)
+    assert {task.name for task in few} < {task.name for task in every}
+    assert {task.kind for task in few} == set(KINDS)
+
+
 def _no_scene(*_, **__):
     from types import SimpleNamespace
 
@@ -227,9 +285,10 @@ def _no_scene(*_, **__):
 
 @pytest.fixture
 def small(monkeypatch):
-    """The study with one joint of the grid and one drive, no arms."""
+    """The study with one joint of the grid and one drive, no arms, no chains."""
     monkeypatch.setattr(stability, "SCENES", ())
     monkeypatch.setattr(stability, "grid", lambda full: [replace(STIFF, others=False)])
+    monkeypatch.setattr(stability, "contact_tasks", lambda full: [])
     monkeypatch.setattr(stability, "catalogue_drives", lambda: catalogue_drives()[:1])
 
 
