@@ -61,6 +61,7 @@ def _is_gone(process: int) -> bool:
         return False
     return False
 
+
 def write_whole(path: str | Path, data: bytes | str) -> Path:
     """Write beside the target and rename, so that no reader sees half a file.
 

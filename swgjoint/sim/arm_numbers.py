@@ -50,10 +50,10 @@ def check_numbers(model: mujoco.MjModel, *, where: str) -> None:
         top = LARGEST if key in _BOUNDED else np.finfo(float).max
         if key.endswith("range"):  # inf is a range without an end
             top = np.inf
-        for row in np.flatnonzero(~(abs(rows) <= top).all(axis=1)):
+        for row in np.flatnonzero(~(abs(rows) <= top).all(axis=1)).tolist():
             _refuse(where, f"{_element(model, kind, row)}: {attribute}", rows[row], top)
     lengths = np.linalg.norm(model.jnt_axis, axis=1)
-    for row in np.flatnonzero(abs(lengths - 1.0) > 1e-6):
+    for row in np.flatnonzero(abs(lengths - 1.0) > 1e-6).tolist():
         raise InputError(
             f"{where}: {_element(model, 'jnt', row)}: the axis has no direction;"
             " accepted: a vector of a length that can be computed"
@@ -72,7 +72,7 @@ def _refuse(where: str, what: str, values: np.ndarray, top: float = LARGEST) -> 
 
 def _element(model: mujoco.MjModel, kind: str, row: int) -> str:
     """Kind and name of a row's owner."""
-    index = int(model.dof_jntid[row]) if kind == "dof" else int(row)
+    index = int(model.dof_jntid[row]) if kind == "dof" else row
     word = {"jnt": "joint", "dof": "joint", "eq": "equality"}.get(kind, kind)
     name = mujoco.mj_id2name(model, _KINDS[kind], index)
     return f"{word} {name[:60]!r}" if name else f"{word} number {index}"

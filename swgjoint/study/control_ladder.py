@@ -30,7 +30,7 @@ from swgjoint.control.kinematic_error import (
 from swgjoint.control.learning import LearningCompensation
 from swgjoint.control.motor_side import MotorPID, ideal_plan, rigid_plan
 from swgjoint.control.mpc import PredictiveController
-from swgjoint.files import file_name, write_whole
+from swgjoint.files import Outputs, file_name
 from swgjoint.json_text import json_text
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.progress import Progress, silent
@@ -207,8 +207,7 @@ def run_control(options: StudyOptions) -> StudyResult:
     """
     from swgjoint.study.control_ladder_shown import ladder_picture, ladder_table
 
-    if options.folder is not None:
-        options.folder.mkdir(parents=True, exist_ok=True)
+    outputs = None if options.folder is None else Outputs(options.folder)
     references, seeds = options.only or (DRIVE,), options.seeds or SEEDS
     drives = {
         # the errors of specimens are the study's own, of more orders
@@ -216,7 +215,7 @@ def run_control(options: StudyOptions) -> StudyResult:
         for name in references
     }
     rows: list[Row] = []
-    summary, files, more = [], [], {}
+    summary, more = [], {}
     for name, drive in drives.items():
         found = climb(drive, seeds=seeds, jobs=options.jobs, progress=options.progress)
         rows += ladder_rows(name, found)
@@ -229,18 +228,19 @@ def run_control(options: StudyOptions) -> StudyResult:
             rung: {key: values.tolist() for key, values in figures.items()}
             for rung, figures in found.figures.items()
         }
-        if options.folder is not None:
-            picture = ladder_picture(name, found)
-            target = options.folder / f"control-{file_name(drive.name)}.png"
-            files.append(write_whole(target, picture))
-    if options.folder is not None:
-        text = json_text({"rows": [row.to_json() for row in rows], "values": more})
-        files.append(write_whole(options.folder / "control.json", text + "\n"))
+        if outputs is not None:
+            outputs.write(
+                f"control-{file_name(drive.name)}.png",
+                partial(ladder_picture, name, found),
+            )
+    if outputs is not None:
+        content = {"rows": [row.to_json() for row in rows], "values": more}
+        outputs.write("control.json", lambda: json_text(content) + "\n")
     return StudyResult(
         rows=tuple(rows),
         summary=tuple(summary),
         more={"values": more},
-        files=tuple(str(path) for path in files),
+        files=() if outputs is None else tuple(outputs.files),
     )
 
 

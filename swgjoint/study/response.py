@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import io
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from swgjoint.errors import InputError
-from swgjoint.files import file_name, write_whole
+from swgjoint.files import Outputs, file_name
 from swgjoint.json_text import json_text
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.pictures import save_png
@@ -79,7 +80,8 @@ def run_response(options: StudyOptions) -> StudyResult:
         name: load_drive(name, model=options.model, kinematic_error_arcmin=0.0)
         for name in references
     }
-    rows, files = [], []
+    outputs = None if options.folder is None else Outputs(options.folder)
+    rows: list[Row] = []
     summary: list[str] = []
     predicted: list[dict[str, Any]] = []
     for number, (name, drive) in enumerate(drives.items()):
@@ -98,19 +100,19 @@ def run_response(options: StudyOptions) -> StudyResult:
         found = _measured(drive, masses, progress)
         rows += [row for measured in found for row in _rows(name, measured)]
         summary += _summary(name, found)
-        if options.folder is not None:
-            options.folder.mkdir(parents=True, exist_ok=True)
-            stem = f"response-{file_name(drive.name)}"
-            picture = response_picture(name, found)
-            files.append(write_whole(options.folder / f"{stem}.png", picture))
-    if options.folder is not None:
-        text = json_text([row.to_json() for row in rows]) + "\n"
-        files.append(write_whole(options.folder / "response.json", text))
+        if outputs is not None:
+            outputs.write(
+                f"response-{file_name(drive.name)}.png",
+                partial(response_picture, name, found),
+            )
+    if outputs is not None:
+        content = [row.to_json() for row in rows]
+        outputs.write("response.json", lambda: json_text(content) + "\n")
     return StudyResult(
         rows=tuple(rows),
         summary=tuple(summary),
         more={"drives": predicted},
-        files=tuple(str(path) for path in files),
+        files=() if outputs is None else tuple(outputs.files),
     )
 
 

@@ -25,7 +25,7 @@ from typing import Any
 
 import mujoco
 
-from swgjoint.files import write_whole
+from swgjoint.files import Outputs
 from swgjoint.joint.region import MAX_SUB_STEPS
 from swgjoint.progress import Progress, silent
 from swgjoint.study.pool import run_all
@@ -141,10 +141,10 @@ def write_files(rows: Sequence[StabilityRow], folder: Path) -> list[str]:
     writer = csv.DictWriter(text, fieldnames=list(table[0]), lineterminator="\n")
     writer.writeheader()
     writer.writerows(table)
-    return [
-        str(write_whole(folder / "stability.csv", text.getvalue())),
-        str(write_whole(folder / "stability.png", stability_picture(rows))),
-    ]
+    outputs = Outputs(folder)
+    outputs.write("stability.csv", text.getvalue)
+    outputs.write("stability.png", lambda: stability_picture(rows))
+    return outputs.files
 
 
 def summary(result: dict[str, Any]) -> list[str]:
