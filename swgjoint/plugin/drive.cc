@@ -89,26 +89,6 @@ mjtNum NativeForce(const mjModel* m, const mjData* d, int tendon) {
               x * x * m->tendon_stiffnesspoly[mjNPOLY * tendon + 1]);
 }
 
-// Acceleration of a dof by a unit torque on it, with all others free: the diagonal of
-// M^-1, from the factor L' D L as the sum of (L^-T e)^2/D over the dof's ancestors.
-mjtNum Response(const mjModel* m, mjData* d, int dof) {
-  const int row = m->M_rowadr[dof], last = m->M_rownnz[dof] - 1;
-  mj_markStack(d);
-  mjtNum* x = mj_stackAllocNum(d, last + 1);
-  mju_zero(x, last);
-  x[last] = 1;
-  mjtNum sum = 0;
-  for (int a = last; a >= 0; --a) {
-    // the ancestors of an ancestor are the entries before it
-    const int j = m->M_colind[row + a];
-    const mjtNum* factor = d->qLD + m->M_rowadr[j];
-    sum += x[a] * x[a] * d->qLDiagInv[j];
-    for (int b = 0; b < a; ++b) x[b] -= factor[b] * x[a];
-  }
-  mj_freeStack(d);
-  return sum;
-}
-
 // Whether a model with this signature and step has not been warned of yet.
 bool First(uint64_t model, mjtNum step, int bound) {
   static std::mutex mutex;
@@ -224,6 +204,8 @@ std::unique_ptr<Drive> Drive::Create(const mjModel* m, int instance) {
   drive->q_link_ = m->jnt_qposadr[link];
   drive->v_rotor_ = m->jnt_dofadr[rotor];
   drive->v_link_ = m->jnt_dofadr[link];
+  drive->column_.resize(
+      std::max(m->M_rownnz[drive->v_rotor_], m->M_rownnz[drive->v_link_]));
   const int row = m->ten_J_rowadr[t];
   for (int j = row; j < row + m->ten_J_rownnz[t]; ++j) {
     if (m->ten_J_colind[j] == drive->v_rotor_) drive->entry_rotor_ = j;
@@ -344,6 +326,23 @@ bool Drive::Diverges(mjData* d, std::initializer_list<mjtNum> numbers) const {
   d->qfrc_passive[v_rotor_] = kDiverged;
   d->qfrc_passive[v_link_] = 0;
   return true;
+}
+
+// Acceleration of a dof by a unit torque on it, with all others free: the diagonal of
+// M^-1, from the factor L' D L as the sum of (L^-T e)^2/D over the dof's ancestors.
+mjtNum Drive::Response(const mjModel* m, const mjData* d, int dof) {
+  const int row = m->M_rowadr[dof], last = m->M_rownnz[dof] - 1;
+  std::fill_n(column_.begin(), last, 0.0);
+  column_[last] = 1;
+  mjtNum sum = 0;
+  for (int a = last; a >= 0; --a) {
+    // the ancestors of an ancestor are the entries before it
+    const int j = m->M_colind[row + a];
+    const mjtNum* factor = d->qLD + m->M_rowadr[j];
+    sum += column_[a] * column_[a] * d->qLDiagInv[j];
+    for (int b = 0; b < a; ++b) column_[b] -= factor[b] * column_[a];
+  }
+  return sum;
 }
 
 void Drive::AddGradient(const mjModel* m, mjData* d, int instance) {

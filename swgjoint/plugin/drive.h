@@ -56,6 +56,7 @@ class Drive {
   void Watch(const mjModel* m, const mjData* d, int instance, int scheme);
   void AddGradient(const mjModel* m, mjData* d, int instance);
   void AddScheme(const mjModel* m, mjData* d, int instance);
+  mjtNum Response(const mjModel* m, const mjData* d, int dof);
   void AdvanceState(const mjModel* m, const mjData* d, mjtNum* state);
   bool Diverges(mjData* d, std::initializer_list<mjtNum> numbers) const;
   void Place(const mjtNum* rest);
@@ -71,6 +72,7 @@ class Drive {
   int q_rotor_ = -1, q_link_ = -1, v_rotor_ = -1, v_link_ = -1;  // addresses
   // Jenkin elements: stiffness, torsion from rest to slip, torsion from rest now
   std::vector<mjtNum> stiffness_, reach_, stretch_;
+  std::vector<mjtNum> column_;  // of L^-T, room for Response
   mjtNum losses_ = 1;  // scale of hysteresis and friction
   std::optional<Friction> friction_;
   int friction_tendon_ = -1;  // carries its part of the metric

@@ -36,8 +36,8 @@ DURATION = 4.0
 SPEED = 100.0
 """Of the rotors that the region is asked for [rad/s]; falling they reach ten times
 that."""
-PARTS = 20
-"""Of a run, over which the energy is averaged."""
+PARTS = 10
+"""Of a run, over which the energy is averaged: a bounce gives back what it stored."""
 SAMPLES = 2000
 FINE = 4
 """Steps in one of the runs that tell what contacts give by themselves."""
