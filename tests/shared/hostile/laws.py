@@ -32,6 +32,10 @@ ENGINE_LOG = "MUJOCO_LOG.TXT"
 """The engine leaves it in the current folder; no file of ours."""
 
 
+class OutOfTime(BaseException):
+    """Raised by an alarm; nothing in the package may catch it."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Answer:
     """What a command did."""
@@ -87,7 +91,7 @@ def answer(case: Case, folder: Path) -> Answer:
         except SystemExit as exc:  # of argparse
             status = exc.code if isinstance(exc.code, int) else 2
         except BaseException as exc:
-            if isinstance(exc, KeyboardInterrupt | TimeoutError):
+            if isinstance(exc, KeyboardInterrupt | OutOfTime):
                 raise
             raised = "".join(traceback.format_exception(exc, limit=-4))
     texts = [
@@ -167,6 +171,8 @@ def _litter(case: Case, found: Answer) -> list[str]:
 
 
 def _within(name: str, place: str) -> bool:
+    if os.path.normpath(place) == ".":
+        return True
     return name == os.path.normpath(place) or os.path.normpath(name).startswith(
         os.path.normpath(place) + os.sep
     )
