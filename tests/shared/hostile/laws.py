@@ -6,6 +6,7 @@ import contextlib
 import io
 import json
 import os
+import re
 import sys
 import traceback
 import warnings
@@ -32,6 +33,10 @@ ENGINE_LOG = "MUJOCO_LOG.TXT"
 """The engine leaves it in the current folder; no file of ours."""
 
 
+_INTERNAL = re.compile(r"internal error|is not written: \w*(Error|Exception): ")
+"""A fault of ours, told by the outermost guard or where a file is written."""
+
+
 class OutOfTime(BaseException):
     """Raised by an alarm; nothing in the package may catch it."""
 
@@ -51,7 +56,7 @@ class Answer:
     @property
     def internal(self) -> bool:
         """Whether a fault of ours ended it, told or not."""
-        return bool(self.raised) or "internal error" in self.err
+        return bool(self.raised) or _INTERNAL.search(self.err) is not None
 
     @property
     def outcome(self) -> str:
@@ -117,7 +122,7 @@ def broken_laws(case: Case, found: Answer) -> list[str]:
         broken.append(f"an exception left main: {found.raised.splitlines()[-1][:200]}")
     elif found.status not in (0, 1, 2):
         broken.append(f"exit status {found.status}")
-    if "internal error" in found.err:
+    elif found.internal:
         broken.append("an internal error was told")
     if "Traceback" in found.err:
         broken.append("a traceback on stderr")
