@@ -20,7 +20,7 @@ KINDS = {
 one of them is."""
 MAX_NAME, MAX_PATH = 255, 4096
 """Bytes of a file's name and of a path on Linux; other systems take no more."""
-SHOWN = 16
+SHOWN = 12
 """Bundled names that a message lists."""
 TOGETHER = {"scenes": ("arms",)}
 """Kinds that are accepted as well wherever a kind is."""

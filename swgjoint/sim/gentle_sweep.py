@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.errors import InputError
+from swgjoint.sim.arm_numbers import LARGEST
 from swgjoint.sim.arm_reading import ArmReading
 from swgjoint.sim.rigid_arm import RigidArm
 from swgjoint.units import deg, mm
@@ -193,7 +194,9 @@ def _room(arm: RigidArm, start: Array) -> tuple[Array, Array]:
     """Bounds of all joints [rad]; a start beyond the margin is within."""
     model = arm.model
     low, high = model.jnt_range.T.copy()
-    free = ~model.jnt_limited.astype(bool)
+    # a limit far beyond any turn is none, and differences of such ones overflow
+    free = ~model.jnt_limited.astype(bool) | ~(abs(model.jnt_range) < LARGEST).all(1)
+    low[free], high[free] = 0.0, 0.0
     room = MARGIN * (high - low)
     low, high = low + room, high - room
     low[free], high[free] = -np.inf, np.inf

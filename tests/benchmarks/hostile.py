@@ -18,6 +18,7 @@ import tempfile
 import time
 from collections import Counter
 from dataclasses import dataclass
+from importlib import import_module
 from multiprocessing import get_context
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
@@ -27,7 +28,9 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "shared"))
 
 from hostile import KINDS, draw
-from hostile.laws import answer, broken_laws
+from hostile.laws import OutOfTime, answer, broken_laws
+
+from swgjoint.cli.main import COMMANDS
 
 LIMIT_S = 10
 """CPU time of one input."""
@@ -52,7 +55,7 @@ class Worker:
 
 
 def _on_alarm(*_: Any) -> None:
-    raise TimeoutError
+    raise OutOfTime
 
 
 def limit_memory() -> None:
@@ -84,13 +87,21 @@ def work(line: Connection) -> None:
                 outcome = "> 2 GB"
             elif faults and outcome != "traceback":
                 outcome = "other law"
-        except TimeoutError:
+        except OutOfTime:
             outcome = "hang > 10 s"
         except MemoryError:
             outcome = "> 2 GB"
         finally:
             signal.setitimer(signal.ITIMER_PROF, 0)
         line.send((outcome, faults, told))
+
+
+def load() -> None:
+    """Import what is imported late, so that no limit stops it half way."""
+    for name in ("matplotlib.figure", "matplotlib.backends.backend_agg", "mujoco"):
+        import_module(name)
+    for name in COMMANDS:
+        import_module(f"swgjoint.cli.{name}")
 
 
 def start() -> Worker:
@@ -133,6 +144,7 @@ def main() -> int:
     begin = time.perf_counter()
     counts = {kind: Counter[str]() for kind in kinds}
     waiting = tasks[::-1]
+    load()
     workers = [start() for _ in range(args.processes)]
     while True:
         for worker in workers:
