@@ -70,7 +70,7 @@ def _refuse(where: str, what: str, values: np.ndarray, top: float = LARGEST) -> 
         )
 
 
-def _element(model: mujoco.MjModel, kind: str, row: np.integer) -> str:
+def _element(model: mujoco.MjModel, kind: str, row: int) -> str:
     """Kind and name of a row's owner."""
     index = int(model.dof_jntid[row]) if kind == "dof" else row
     word = {"jnt": "joint", "dof": "joint", "eq": "equality"}.get(kind, kind)
