@@ -42,7 +42,7 @@ itself, none of the 582 with h sqrt(K/J_link) from 2 to 2.5; without that bound 
 more than 5 %. ``swgjoint stability --full`` runs a grid of all this: of 6300 runs none
 gains energy, 155 are refused. Of 528 chains of two links that lie on a floor or press
 against limits with damping ratios of 0.001 and 0.02, none gains and none is refused;
-132 without any loss are refused.
+264 without any loss are refused.
 Not a proof: the step is one linearised solve with two evaluations.
 `tests/joint/test_random_joints.py` runs a sample.
 """

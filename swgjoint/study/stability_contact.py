@@ -82,20 +82,12 @@ class ContactTask:
 
 
 def contact_tasks(*, full: bool) -> list[ContactTask]:
-    """All drives of the catalogue, both kinds and masses, or a few of them.
-
-    Without loss the heavier links are left out: the region refuses every such chain.
-    """
+    """All drives of the catalogue, both kinds and masses, or a few of them."""
     drives, masses = catalogue_drives(), list(MASSES)
     if not full:
         drives, masses = drives[3::8], masses[:1]
     return [
-        ContactTask(
-            drive=drive,
-            kind=kind,
-            mass=mass,
-            damping_ratios=DAMPING_RATIOS[mass > MASSES[0] :],
-        )
+        ContactTask(drive=drive, kind=kind, mass=mass)
         for drive, kind, mass in product(drives, KINDS, masses)
     ]
 
