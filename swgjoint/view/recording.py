@@ -41,8 +41,7 @@ def write_recording(
     with recording_file(Path(path)) as beside:
         scenes = {label: run.assembly for label, run in runs.items()}
         stream, drives = _begin(beside, scenes)
-        _end(stream, runs, drives, rigid=rigid)
-        end_stream(stream, path)
+        _end(stream, path, runs, drives, rigid=rigid)
     return Path(path)
 
 
@@ -82,8 +81,7 @@ class Recorder:
         self.begin()
         assert self._begun is not None
         stream, drives = self._begun.result()
-        _end(stream, {"": run}, drives)
-        end_stream(stream, self._path)
+        _end(stream, self._path, {"": run}, drives)
 
     def __exit__(self, *failure: Any) -> bool | None:
         """Put the file in its place, or remove it after a failure."""
@@ -99,18 +97,23 @@ def recording_file(path: Path) -> Iterator[Path]:
 
 
 def end_stream(stream: Any, path: str | Path) -> None:
-    """Wait until all of a recording is in its file.
+    """Wait until all of a recording is in its file, and close it.
 
     Raises:
         ComputationError: If it cannot be written.
     """
+    _flush(stream, path)
+    stream.disconnect()
+
+
+def _flush(stream: Any, path: str | Path) -> None:
+    """Wait until what was sent so far is in the file of a recording."""
     try:
         stream.flush()
     except RuntimeError as error:  # the thread that writes has given up
         raise ComputationError(
             f"cannot write the recording {path}: {error}; the disk may be full"
         ) from None
-    stream.disconnect()
 
 
 def _begin(path: Path, scenes: Mapping[str, Assembly]) -> tuple[Any, dict[str, str]]:
@@ -127,19 +130,21 @@ def _begin(path: Path, scenes: Mapping[str, Assembly]) -> tuple[Any, dict[str, s
 
 def _end(
     stream: Any,
+    path: str | Path,
     runs: Mapping[str, Run],
     drives: Mapping[str, str],
     rigid: Run | None = None,
 ) -> None:
-    """What follows from the runs."""
+    """What follows from the runs, and the end of the file."""
     scales = phase_scales(runs)
     samples = next(iter(runs.values())).time.size
     for first in range(0, samples, PART):
         if first:  # what was sent is in the file before more is put together
-            stream.flush()
+            _flush(stream, path)
         part = slice(first, min(first + PART, samples))
         log_moving(stream, runs, scales, drives=drives, rigid=rigid, part=part)
     log_measured(stream, runs, scales)
+    end_stream(stream, path)
 
 
 def stream_name(scenes: Mapping[str, Assembly]) -> str:

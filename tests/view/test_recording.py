@@ -14,6 +14,7 @@ from swgjoint.errors import ComputationError, InputError
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.run import Run, run_scene
 from swgjoint.units import mm
+from swgjoint.view import recording
 from swgjoint.view.blueprint import joints_shown
 from swgjoint.view.entities import pose_rows, signals_of
 from swgjoint.view.plots import comparison_png
@@ -42,8 +43,12 @@ def columns(path, entity: str, component: str) -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate(times), np.array(values)
 
 
-def test_the_recording_holds_what_the_metrics_were_computed_from(run, tmp_path):
-    """Every signal of every joint comes back bit by bit, at every step."""
+@pytest.mark.parametrize("part", [recording.PART, 300])
+def test_the_recording_holds_what_the_metrics_were_computed_from(
+    run, tmp_path, monkeypatch, part
+):
+    """Every signal of every joint comes back bit by bit, however it was sent."""
+    monkeypatch.setattr(recording, "PART", part)
     path = run.to_rerun(tmp_path / "run.rrd")
     for name, expected in signals_of(run, 0).items():
         time, values = columns(path, "/joint/joint", name)
