@@ -10,7 +10,7 @@ from messages import naming
 from rerun.chunk import RrdReader
 
 from swgjoint.cli.main import main
-from swgjoint.errors import ComputationError, InputError
+from swgjoint.errors import ComputationError, InputError, OutputWarning
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.run import Run, run_scene
 from swgjoint.units import mm
@@ -183,7 +183,9 @@ def test_a_recording_is_written_whole_or_not_at_all(run, tmp_path, monkeypatch):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_full_disk_is_one_line(run, tmp_path, monkeypatch):
+def test_a_full_disk_is_one_line_and_costs_no_run(
+    run, synthetic_map, tmp_path, monkeypatch
+):
     """The thread of the viewer's library that writes gives up; nothing is left."""
 
     def full(*_: object, **__: object) -> None:
@@ -194,6 +196,14 @@ def test_a_full_disk_is_one_line(run, tmp_path, monkeypatch):
     with pytest.raises(ComputationError, match=naming(str(path), "disk")) as told:
         run.to_rerun(path)
     assert "\n" not in str(told.value)
+    with pytest.warns(OutputWarning, match=naming(str(path), "not written", "disk")):
+        again = run_scene(
+            "bench",
+            overrides=SHORT,
+            drives={"reference-2d": synthetic_map},
+            recording=path,
+        )
+    assert again.recording is None and again.metrics()["joints"]
     assert list(tmp_path.iterdir()) == []
 
 
