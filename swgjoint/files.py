@@ -17,6 +17,8 @@ from typing import Any
 from swgjoint.errors import InputError, OutputWarning, SwgError
 from swgjoint.json_text import json_text
 
+DEEPEST = 100
+"""Folders inside each other in the path of an output: making them is recursive."""
 LONGEST_NAME = 60
 """Characters of a foreign name within that of a file, 240 bytes in UTF-8 at most."""
 
@@ -194,11 +196,16 @@ def output_folder(path: str | Path) -> Path:
 
 
 def _check_length(path: Path) -> None:
-    """Refuse a path that no file system takes."""
+    """Refuse a path that no file system takes, or nobody follows."""
     try:
         path.exists()
     except OSError as exc:
         raise InputError(f"output {str(path)[:60]!r}: {exc.strerror}") from None
+    if len(path.parts) > DEEPEST:
+        raise InputError(
+            f"output {str(path)[:60]!r}: {len(path.parts)} folders inside each other;"
+            f" accepted: up to {DEEPEST}"
+        )
 
 
 def file_name(text: str) -> str:

@@ -20,6 +20,8 @@ KINDS = {
 one of them is."""
 MAX_NAME, MAX_PATH = 255, 4096
 """Bytes of a file's name and of a path on Linux; other systems take no more."""
+ECHOED = 120
+"""Characters of a reference that a message repeats whole."""
 SHOWN = 12
 """Bundled names that a message lists."""
 TOGETHER = {"scenes": ("arms",)}
@@ -96,16 +98,17 @@ def find(reference: str | Path, kind: str, suffix: str, *, what: str) -> Path:
         if bare in names:
             return models_path() / kind / f"{bare}{suffix}"
     if path.is_dir():
-        raise InputError(f"{what} {text!r} is a folder; needed: a {suffix} file")
+        raise InputError(f"{what} {text[:200]!r} is a folder; needed: a {suffix} file")
     bare = text.removesuffix(suffix)
+    shown = text if len(text) <= ECHOED else f"{text[:57]}..."
     accepted = (kind, *TOGETHER.get(kind, ()))
     near = near_names(bare, [name for k in accepted for name in _names(k, suffix)])
     other = named_kind(bare)
     if other is not None and other not in accepted:
-        fault = f"{text!r} is the name of {KINDS[other][1]}; needed: a {what}"
+        fault = f"{shown!r} is the name of {KINDS[other][1]}; needed: a {what}"
     else:
         folders = " or ".join(f"models/{k}" for k in accepted)
-        fault = f"{what} {text!r} is neither a file nor in {folders}"
+        fault = f"{what} {shown!r} is neither a file nor in {folders}"
     hint = f"; did you mean {' or '.join(near)}?" if near else ""
     bundled = (f"{k}: {_listed(_names(k, suffix))}" for k in accepted)
     raise InputError(f"{fault}{hint} (bundled {'; '.join(bundled)})")

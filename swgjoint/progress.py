@@ -14,6 +14,10 @@ def silent(stage: str, done: int, total: int) -> None:
     """Show nothing."""
 
 
+LONGEST = 100
+"""Characters of a stage, which may have a name from a file in it."""
+
+
 class StderrProgress:
     """One line per stage on stderr, rewritten in a terminal, sparse in a log.
 
@@ -36,6 +40,7 @@ class StderrProgress:
 
     def __call__(self, stage: str, done: int, total: int) -> None:
         """Show the stage, the share done and the time left."""
+        stage = "".join(c if c.isprintable() else "?" for c in stage[:LONGEST])
         now = time.monotonic()
         if stage != self._stage:
             self.end_line()

@@ -79,3 +79,11 @@ def test_what_stops_a_command_stands_on_its_own_line(monkeypatch, key):
     head, message = stream.shown().split("\n")[-3:-1]
     assert head.endswith("samples: 3/10")
     assert message.startswith("swgjoint")
+
+
+def test_a_stage_of_a_foreign_name_is_one_short_line(capsys):
+    """A name of thousands of characters, or with controls, does not fill a terminal."""
+    progress = StderrProgress()
+    progress("run \x1b[31m" + "n" * 5000, 3, 3)
+    (line,) = capsys.readouterr().err.splitlines()
+    assert len(line) < 150 and line.isprintable()

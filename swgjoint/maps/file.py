@@ -44,6 +44,9 @@ _READABLE = (1, 2, 3, SCHEMA_VERSION)
 MAX_BYTES = 64_000_000
 """A map with a thousand harmonics and a hundred knots is below 10 MB."""
 
+MAX_NAME = 300
+"""Characters of a map's name, and of a path that a message repeats whole."""
+
 _ARRAYS: dict[str, tuple[str, int, str]] = {
     "torsion_knots": ("<f8", 1, "rad"),
     "orders": ("<i8", 2, "cycles per turn of alpha, beta"),
@@ -131,7 +134,7 @@ class Header(Section):
     schema_version: int
     units: dict[str, str]
     versions: dict[str, str]
-    name: Annotated[str, Field(max_length=300)]
+    name: Annotated[str, Field(max_length=MAX_NAME)]
     level: str
     layout: str
     teeth_flexspline: int
@@ -223,15 +226,16 @@ def read_map(path: str | Path, cls: type[Map]) -> Map:
         MapFileError: In one line, if the file is missing, damaged, hostile or of
             another schema version.
     """
+    where = str(path) if len(str(path)) <= MAX_NAME else f"{str(path)[:57]}..."
     try:
         return map_from_bytes(_content(Path(path)), cls)
     except OSError as exc:
-        raise MapFileError(f"map {path}: cannot be read: {exc.strerror}") from None
+        raise MapFileError(f"map {where}: cannot be read: {exc.strerror}") from None
     # zipfile knows some kinds of compression and encryption by name only
     except (ValueError, zipfile.BadZipFile, NotImplementedError, EOFError) as exc:
         lines = str(exc).splitlines() or [type(exc).__name__]
         more = f" (and {len(lines) - 1} more)" if len(lines) > 1 else ""
-        raise MapFileError(f"map {path}: {lines[0]}{more}") from None
+        raise MapFileError(f"map {where}: {lines[0]}{more}") from None
 
 
 def map_from_bytes(data: bytes, cls: type[Map]) -> Map:

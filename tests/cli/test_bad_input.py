@@ -268,3 +268,23 @@ def test_lists_and_tables_are_shown_as_they_are_written(
     """A value of another shape is answered with the syntax of the right one."""
     err = refused(capsys, "run", "bench", "--set", override)
     assert names(err, override.partition("=")[0], *message)
+
+
+@pytest.mark.parametrize("ending", ["", ".toml", ".swg", ".xml"])
+@pytest.mark.parametrize("name", ["n" * 300, "d/" * 1500 + "d", "n" * 200])
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["profile"],
+        ["spec"],
+        ["run"],
+        ["compare"],
+        ["sweep"],
+        ["run", "bench", "--drive"],
+    ],
+)
+def test_names_that_no_file_has_are_bad_input(here, capsys, arguments, name, ending):
+    """Longer than a file system takes: one line that does not echo it."""
+    err = refused(capsys, *arguments, name + ending)
+    assert err.count("\n") == 1
+    assert len(err) < 700

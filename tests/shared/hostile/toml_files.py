@@ -188,6 +188,15 @@ def override_case(rng: np.random.Generator) -> Drawn:
         text = pick(rng, ["[" * 5000, "{" * 3000, "'" * 7, "1\n2", "[[[1]]]", "\x00"])
     change = (f"{key}={text}") if rng.random() < 0.95 else text
     change = str(Raw(change))[:100_000]
+    if key == "simulation.duration_s":  # hours are honest work
+        return {"s.toml": text_of(data).encode()}, [
+            "run",
+            "s.toml",
+            "--set",
+            change,
+            "--json",
+            *SHORT,
+        ]
     argv = pick(
         rng,
         [
