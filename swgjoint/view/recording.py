@@ -24,6 +24,9 @@ PART = 100_000
 """Samples that are sent at a time: a long run needs no more memory for its recording
 than a short one."""
 
+FLUSH = 120.0
+"""Longest wait until a part is in its file [s]."""
+
 
 def write_recording(
     runs: Mapping[str, Run], path: str | Path, *, rigid: Run | None = None
@@ -109,7 +112,7 @@ def end_stream(stream: Any, path: str | Path) -> None:
 def _flush(stream: Any, path: str | Path) -> None:
     """Wait until what was sent so far is in the file of a recording."""
     try:
-        stream.flush()
+        stream.flush(timeout_sec=FLUSH)  # a writer that died need not answer
     except RuntimeError as error:  # the thread that writes has given up
         raise ComputationError(
             f"cannot write the recording {path}: {error}; the disk may be full"
