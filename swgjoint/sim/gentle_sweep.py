@@ -103,13 +103,13 @@ def _poses(
     """Name, keyframe and angles of the poses that may be the start."""
     model = arm.model
     low, high = model.jnt_range.T
-    limited = model.jnt_limited.astype(bool)
+    limited = _limited(arm)
     inside = ~limited | ((model.qpos0 >= low) & (model.qpos0 <= high))
     middle = np.where(limited, 0.5 * (low + high), model.qpos0)
     reference = np.where(inside, model.qpos0, middle)
 
     def angles(q: Array, margin: float = START_MARGIN) -> dict[str, float]:
-        pad = margin * (high - low)
+        pad = np.where(limited, margin * (high - low), 0.0)
         kept = np.where(limited, np.clip(q, low + pad, high - pad), q)
         return dict(zip(arm.joints, kept.tolist(), strict=True))
 
@@ -141,7 +141,8 @@ def bent_starts(arm: RigidArm, start: Array) -> list[Array]:
     """
     model = arm.model
     low, high = model.jnt_range.T
-    limited, pad = model.jnt_limited.astype(bool), MARGIN * np.ptp(model.jnt_range, 1)
+    limited = _limited(arm)
+    pad = np.where(limited, MARGIN * (high - low), 0.0)
     turn = np.where(np.arange(start.size) % 2, -1.0, 1.0)
     poses = [start + sign * bend * turn for bend in BENDS for sign in (1.0, -1.0)]
     poses = [np.where(limited, np.clip(q, low + pad, high - pad), q) for q in poses]
@@ -195,12 +196,19 @@ def _room(arm: RigidArm, start: Array) -> tuple[Array, Array]:
     model = arm.model
     low, high = model.jnt_range.T.copy()
     # a limit far beyond any turn is none, and differences of such ones overflow
-    free = ~model.jnt_limited.astype(bool) | ~(abs(model.jnt_range) < LARGEST).all(1)
+    free = ~_limited(arm)
     low[free], high[free] = 0.0, 0.0
     room = MARGIN * (high - low)
     low, high = low + room, high - room
     low[free], high[free] = -np.inf, np.inf
     return np.minimum(low, start), np.maximum(high, start)
+
+
+def _limited(arm: RigidArm) -> NDArray[np.bool_]:
+    """Joints whose range has two ends that a state can reach. Shape (n_joints,)."""
+    model = arm.model
+    reached = (abs(model.jnt_range) < LARGEST).all(axis=1)
+    return np.asarray(model.jnt_limited.astype(bool) & reached)
 
 
 class _Way:
