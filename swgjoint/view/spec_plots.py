@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 _AT_MOST = 20_000
 _MANY = 200
+_FEW = 5
+"""Orders that have a tick each."""
 _ERRORS = {"no_load": ("without load", "tab:blue"), "rated": ("rated load", "tab:red")}
 
 
@@ -100,17 +102,20 @@ def _orders(ax: Any, sheet: SpecSheet) -> None:
         return
     from matplotlib.ticker import NullFormatter
 
-    largest = 0.0
+    largest, drawn = 0.0, set()
     for k, key in enumerate(shown):
         label, colour = _ERRORS[key]
         order, amplitude = sheet.turns[key].lines()
         amplitude = amplitude / arcmin
         largest = max(largest, float(amplitude.max(initial=0.0)))
         keep = amplitude > 1e-4 * amplitude.max(initial=1e-300)
+        drawn |= set(order[keep].tolist())
         shift = 1.0 + 0.02 * k  # side by side on the logarithmic axis
         ax.vlines(order[keep] * shift, 0.0, amplitude[keep], color=colour, label=label)
     ax.set_xscale("log")
     ax.xaxis.set_minor_formatter(NullFormatter())
+    if len(drawn) <= _FEW:  # they may lie between two powers of ten
+        ax.set_xticks(sorted(drawn), [f"{order:.4g}" for order in sorted(drawn)])
     if largest > 0.0:
         ax.set_yscale("log")
         ax.set_ylim(1e-4 * largest, 2.0 * largest)
