@@ -34,6 +34,14 @@ class Pruned(BaseModel):
     harmonics: int
 
 
+class Label(BaseModel):
+    """What the elements model; other entries are shown as they are."""
+
+    model_config = ConfigDict(extra="allow")
+
+    stress_state: Text | None = None
+
+
 KINDS: dict[str, TypeAdapter[Any]] = {
     **dict.fromkeys(
         (
@@ -45,7 +53,7 @@ KINDS: dict[str, TypeAdapter[Any]] = {
     "pruned": TypeAdapter(Pruned),
     "stated": TypeAdapter(dict[str, Number | None]),
     "missing": TypeAdapter(dict[str, Text]),
-    "label": TypeAdapter(dict[str, Text | Number | bool | None]),
+    "label": TypeAdapter(Label),
     "sampled_torque_Nm": TypeAdapter(tuple[Number, Number]),
     "hysteresis_left_out": TypeAdapter(Annotated[int, Field(strict=True, ge=0)]),
     "residual": TypeAdapter(dict[str, Any]),

@@ -22,11 +22,17 @@ _KINDS = {
 """Prefixes of the model's arrays, and whose rows they have."""
 _BOUNDED = {
     *("body_mass", "body_inertia", "body_pos", "body_ipos", "geom_pos", "geom_size"),
-    *("jnt_pos", "jnt_stiffness", "dof_damping", "dof_frictionloss", "site_pos"),
-    *("tendon_stiffness", "tendon_damping", "tendon_frictionloss", "key_qpos"),
+    *("jnt_pos", "site_pos", "key_qpos"),
 }
 """Arrays of the file's own numbers; others may follow from them and be larger, and a
 range without an end is written as a large number."""
+_HOLDING = {
+    *("jnt_stiffness", "dof_damping", "dof_frictionloss"),
+    *("tendon_stiffness", "tendon_damping", "tendon_frictionloss"),
+}
+"""Arrays with which some arms hold a joint for good, by a damping of 1e11."""
+HOLDING = LARGEST**2
+"""Their largest value."""
 
 
 def check_numbers(model: mujoco.MjModel, *, where: str) -> None:
@@ -48,6 +54,8 @@ def check_numbers(model: mujoco.MjModel, *, where: str) -> None:
             continue
         rows = values.reshape(len(values), -1) if values.size else values[:, None]
         top = LARGEST if key in _BOUNDED else np.finfo(float).max
+        if key in _HOLDING:
+            top = HOLDING
         if key.endswith("range"):  # inf is a range without an end
             top = np.inf
         for row in np.flatnonzero(~(abs(rows) <= top).all(axis=1)).tolist():
@@ -66,7 +74,7 @@ def _refuse(where: str, what: str, values: np.ndarray, top: float = LARGEST) -> 
     if wrong.size:
         raise InputError(
             f"{where}: {what} {wrong[0]:g}; accepted: finite numbers up to"
-            f" {LARGEST:g} in SI units"
+            f" {top:.3g} in SI units"
         )
 
 

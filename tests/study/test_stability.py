@@ -374,10 +374,13 @@ def test_shares_count_the_default_scheme_only():
 def test_the_study_finds_nothing_unexplained(monkeypatch):
     """Grid, catalogue and arms: no gain, at most 5 % refused, no arm refused.
 
-    Every fifth joint of the grid: neither of its lengths is a multiple of five.
+    Every fifth joint of the grid, neither of whose lengths is a multiple of five, and
+    every fifth chain in contact: both kinds.
     """
-    every = stability.grid(full=False)
+    every, chains = stability.grid(full=False), contact_tasks(full=False)
+    assert {task.kind for task in chains[::5]} == set(KINDS)
     monkeypatch.setattr(stability, "grid", lambda full: every[::5])
+    monkeypatch.setattr(stability, "contact_tasks", lambda full: chains[::5])
     result = stability.run_stability(jobs=1)
     assert result["unexplained"] == []
     assert result["refused_share"] < 0.05
