@@ -120,7 +120,7 @@ def test_whatever_a_reader_raises_is_one_warning(tmp_path, caplog, error):
 
 
 def test_a_pipe_is_not_waited_for(tmp_path):
-    """What is no regular file is damaged: a pipe without a writer would never end."""
+    """A kept file that is not regular counts as damaged: a pipe would never end."""
     os.mkfifo(tmp_path / "pipe")
     assert read_kept(tmp_path / "pipe", read_json) is None
 

@@ -167,3 +167,40 @@ def test_torsion_of_a_light_chain_does_not_feed_itself(step):
         energies.append(total_energy(model, data, drives))
         mujoco.mj_step(model, data, 50)
     assert max(energies) < 1.05 * energies[0]
+
+
+def test_a_drive_is_predicted_with_all_other_joints_free():
+    """In a chain of three, rotor and link feel one torque by the inverse mass matrix.
+
+    What the plugin remembers is the acceleration less that by its own torque, so the
+    rest of the acceleration times the inertia is that torque, on either side.
+    """
+    link = (
+        '<body pos=".3 0 0"><joint name="j{}" axis="0 1 0"/><geom type="capsule"'
+        ' size=".03" fromto="0 0 0 .3 0 0" mass="1"/>'
+    )
+    spec = mujoco.MjSpec.from_string(
+        '<mujoco><option timestep="0.0005" integrator="discrete" gravity="0 0 -9.81"/>'
+        f"<worldbody>{''.join(link.format(k) for k in range(3))}{'</body>' * 3}"
+        "</worldbody></mujoco>"
+    )
+    drive = DriveMap.linear(1e4)
+    got = [
+        attach(spec, joint=f"j{k}", drive=drive, rotor_inertia=4e-5) for k in range(3)
+    ]
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    data.qpos[:] = 0.3
+    mujoco.mj_forward(model, data)
+    mass = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, mass)
+    response = np.linalg.inv(mass).diagonal()
+    before = data.qvel.copy()
+    mujoco.mj_step(model, data)
+    rate = (data.qvel - before) / model.opt.timestep
+    for k, joint in enumerate(got):
+        state = data.plugin_state[model.plugin_stateadr[k] :][:2]
+        dofs = [model.joint(name).dofadr[0] for name in (joint.rotor, joint.joint)]
+        rotor, link_torque = (rate[dofs] - state) / response[dofs]
+        assert abs(link_torque) > 1.0
+        assert rotor * joint.ratio == pytest.approx(-link_torque, rel=1e-6)

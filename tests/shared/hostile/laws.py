@@ -35,7 +35,7 @@ ENGINE_LOG = "MUJOCO_LOG.TXT"
 
 
 _INTERNAL = re.compile(r"internal error|is not written: \w*(Error|Exception): ")
-"""A fault of ours, told by the outermost guard or where a file is written."""
+"""A fault of ours, reported by the outermost guard or where a file is written."""
 
 
 class OutOfTime(BaseException):
