@@ -33,16 +33,16 @@ from swgjoint.control.kinematic_error import compensated, identify_kinematic_err
 from swgjoint.control.learning import LearningCompensation
 from swgjoint.control.motor_side import MotorPID, ideal_plan, rigid_plan
 from swgjoint.maps.drive_map import DriveMap
-from swgjoint.maps.error_spectrum import peak_to_peak
-from swgjoint.study.control_bench import (
+from swgjoint.maps.fit.error_spectrum import peak_to_peak
+from swgjoint.units import arcmin
+from swgjoint.validation.control.bench import (
     FREQUENCY,
     record_turn,
     run_motion,
     two_per_turn,
 )
-from swgjoint.study.control_ladder import LEARNED
-from swgjoint.study.control_specimens import specimen
-from swgjoint.units import arcmin
+from swgjoint.validation.control.ladder import LEARNED
+from swgjoint.validation.control.specimens import specimen
 
 SEED = 4
 drive = DriveMap.from_catalogue("CSG-25-100", kinematic_error_arcmin=0.0)

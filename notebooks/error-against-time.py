@@ -23,10 +23,10 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import swgjoint
-from swgjoint.gear.design import Design
-from swgjoint.sim.drives import load_drive
+from swgjoint.drives.references import load_drive
+from swgjoint.gear.design.design import Design
 from swgjoint.sim.run import run_scene
-from swgjoint.sim.scene import Scene
+from swgjoint.sim.scene.scene import Scene
 from swgjoint.units import arcmin
 from swgjoint.view.validity import step_error
 

@@ -23,10 +23,10 @@ import mujoco
 import numpy as np
 
 import swgjoint
-from swgjoint.gear.profile import tooth_profile
-from swgjoint.maps.catalogue import ratings_of
+from swgjoint.gear.catalogue import ratings_of
+from swgjoint.gear.teeth.profile import tooth_profile
 from swgjoint.models_path import models_path
-from swgjoint.sim.scene import Scene
+from swgjoint.sim.scene.scene import Scene
 from swgjoint.units import arcmin, deg, mm
 
 # %% [markdown]

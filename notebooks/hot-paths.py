@@ -33,11 +33,11 @@ import mujoco
 import numpy as np
 
 import swgjoint
+from swgjoint.bench.scaling.joint import chain_model
 from swgjoint.fe.build_map import build_map
 from swgjoint.fe.solid.continuation import SolidContinuation
 from swgjoint.fe.solid.drive3d import solid_ring
 from swgjoint.fe.solid.stress import SolidMaxima
-from swgjoint.study.scaling_joint import chain_model
 
 here = Path(__file__).parent if "__file__" in globals() else Path.cwd()
 stored = json.loads((here / "hot-paths.json").read_text(encoding="utf-8"))
@@ -108,8 +108,10 @@ whole = seconds(times, "build_map.py", "build_map")
 search = seconds(times, "tooth_contact.py", "search")
 plane = {
     "search of tooth contact": search,
-    "ring: factorise, solve": seconds(times, "fe/cyclic.py", "__init__", "solve"),
-    "frames and tangents": seconds(times, "fe/linearise.py", "linearise"),
+    "ring: factorise, solve": seconds(
+        times, "fe/common/cyclic.py", "__init__", "solve"
+    ),
+    "frames and tangents": seconds(times, "fe/plane/linearise.py", "linearise"),
     "contact forces": seconds(times, "complementarity.py", "solve_mixed"),
     "sector: mesh, condense": seconds(times, "superelement.py", "condense"),
 }

@@ -28,14 +28,14 @@ from tempfile import TemporaryDirectory
 import matplotlib.pyplot as plt
 import numpy as np
 
-from swgjoint.control.identify import identify
-from swgjoint.control.identify_log import read_log
-from swgjoint.control.identify_plots import picture
+from swgjoint.identify.identification import identify
+from swgjoint.identify.log import read_log
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.hysteresis import Jenkin
 from swgjoint.sim.run import run_scene
-from swgjoint.sim.scene import Scene
+from swgjoint.sim.scene.scene import Scene
 from swgjoint.units import arcmin
+from swgjoint.view.plots.identification import picture
 
 catalogue = DriveMap.from_catalogue("CSG-25-100", kinematic_error_arcmin=0.0)
 

@@ -34,7 +34,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 
-from swgjoint.gear.design import Design
+from swgjoint.gear.design.design import Design
 
 here = Path(__file__).parent if "__file__" in globals() else Path.cwd()
 study = json.loads((here / "micro-geometry.json").read_text(encoding="utf-8"))

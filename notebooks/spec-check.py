@@ -27,9 +27,9 @@ from itertools import pairwise
 import matplotlib.pyplot as plt
 import numpy as np
 
+from swgjoint.explore.compare.compare import compare, missed
 from swgjoint.sim.run import run_scene
-from swgjoint.sim.scene import Scene
-from swgjoint.study.compare import compare, missed
+from swgjoint.sim.scene.scene import Scene
 from swgjoint.units import mm
 from swgjoint.view.words import short, shown
 

@@ -36,16 +36,16 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from swgjoint import Design
-from swgjoint.study.optimise import optimise
-from swgjoint.study.optimise_file import OptimisationFile
-from swgjoint.study.optimise_plots import optimum_picture
-from swgjoint.study.pool import LocalPool
-from swgjoint.study.sweep import TASK_S, run_sweep
-from swgjoint.study.sweep_executor import dask_pool
-from swgjoint.study.sweep_file import SweepFile
-from swgjoint.study.sweep_points import points_of
-from swgjoint.study.sweep_results import place_of
-from swgjoint.study.sweep_scale import schedule, tasks_of
+from swgjoint.explore.optimise.file import OptimisationFile
+from swgjoint.explore.optimise.optimise import optimise
+from swgjoint.explore.sweep.executor import dask_pool
+from swgjoint.explore.sweep.file import SweepFile
+from swgjoint.explore.sweep.points import points_of
+from swgjoint.explore.sweep.results import place_of
+from swgjoint.explore.sweep.scale import schedule, tasks_of
+from swgjoint.explore.sweep.sweep import TASK_S, run_sweep
+from swgjoint.pool import LocalPool
+from swgjoint.view.plots.optimise import optimum_picture
 
 SWEEP = """
 description = "Rim and minor axis"
@@ -347,8 +347,8 @@ assert schedule(tasks, 16, start=start, handing=handing).efficiency > 0.8
 # - Up to about a hundred workers the wall time is the core hours over the workers:
 #   take as many as the queue gives.
 # - Beyond that the process that hands out is the bound, not the drives. A task of more
-#   designs (`swgjoint.study.sweep.TASK_S`) moves it in proportion; so do several sweeps
-#   of a part of the plan each, into the same folder.
+#   designs (`swgjoint.explore.sweep.sweep.TASK_S`) moves it in proportion; so do
+#   several sweeps of a part of the plan each, into the same folder.
 # - That process needs about 1 GB for a million designs with their records, and some
 #   5 GB while it writes the tables at the end: run it where it may have them.
 # - A million small files are slow to list on a parallel file system, though few

@@ -32,11 +32,11 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 
 import swgjoint
-from swgjoint.fe.continuation import Continuation
-from swgjoint.fe.drive2d import ring_model
-from swgjoint.fe.elasticity import stress_maxima
-from swgjoint.fe.solid.masters import Orders
-from swgjoint.fe.stress import flexspline_stress
+from swgjoint.fe.plane.continuation import Continuation
+from swgjoint.fe.plane.drive2d import ring_model
+from swgjoint.fe.plane.elasticity import stress_maxima
+from swgjoint.fe.plane.stress import flexspline_stress
+from swgjoint.fe.solid.strip.masters import Orders
 
 here = Path(__file__).parent if "__file__" in globals() else Path.cwd()
 study = json.loads((here / "calculix.json").read_text(encoding="utf-8"))

@@ -7,10 +7,10 @@ __version__ = "0.1.0"
 
 # name -> module; imported on first use, so that importing the package stays cheap
 _PUBLIC = {
-    "Design": "swgjoint.gear.design",
+    "Design": "swgjoint.gear.design.design",
     "DriveMap": "swgjoint.maps.drive_map",
     "SwgError": "swgjoint.errors",
-    "attach": "swgjoint.sim.attach",
+    "attach": "swgjoint.drives.attach",
     "build_map": "swgjoint.fe.build_map",
     "load_plugin": "swgjoint.joint.plugin",
     "run_scene": "swgjoint.sim.run",

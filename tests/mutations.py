@@ -34,7 +34,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 PARTS = ("gear", "fe", "maps", "joint", "plugin", "sim", "control", "envs")
-WIDER = ("tests/peer", "tests/study", "tests/cli", "tests/test_notebooks.py")
+WIDER = ("tests/peer", "tests/explore", "tests/bench", "tests/validation", "tests/cli")
+WIDER += ("tests/test_notebooks.py",)
 """Slow tests that reach into every part."""
 ENOUGH = 0.9
 """Share of the changes that the default tier must notice."""

@@ -12,13 +12,14 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from swgjoint.fe import complementarity, equilibrium
-from swgjoint.fe.continuation import Continuation
-from swgjoint.fe.drive2d import ring_model
+from swgjoint.fe.common import complementarity
+from swgjoint.fe.plane import equilibrium
+from swgjoint.fe.plane.continuation import Continuation
+from swgjoint.fe.plane.drive2d import ring_model
 from swgjoint.fe.solid import equilibrium as solid_equilibrium
 from swgjoint.fe.solid.continuation import SolidContinuation
 from swgjoint.fe.solid.drive3d import solid_ring
-from swgjoint.gear.design import Design
+from swgjoint.gear.design.design import Design
 
 PITCH = 2.0 * np.pi / 122
 BAND = 0.1

@@ -19,8 +19,8 @@ import mujoco
 import numpy as np
 import pytest
 
+from swgjoint.bench.scaling.joint import chain_model, chain_spec, map_with
 from swgjoint.joint import plugin
-from swgjoint.study.scaling_joint import chain_model, chain_spec, map_with
 
 ROOT = Path(__file__).parents[1]
 CC, CXX = os.environ.get("CC", "gcc"), os.environ.get("CXX", "g++")

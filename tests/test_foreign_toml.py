@@ -8,7 +8,7 @@ import pytest
 
 from swgjoint.errors import InputError
 from swgjoint.faults import MAX_DEPTH, parse_toml, parse_value, shortened
-from swgjoint.sim.scene import parse_override
+from swgjoint.sim.scene.scene import parse_override
 
 DEEP = 5000
 FILES = {

@@ -10,7 +10,7 @@ from pathlib import Path
 import jupytext
 import pytest
 
-from swgjoint.gear.design import Design
+from swgjoint.gear.design.design import Design
 from swgjoint.maps.drive_map import DriveMap
 
 STORIES = {

@@ -8,9 +8,9 @@ from dataclasses import replace
 import pytest
 
 from swgjoint.files import check_output_file, file_name, output_folder
-from swgjoint.maps.spec_sheet import measure_spec
+from swgjoint.maps.sheet.spec_sheet import measure_spec
 from swgjoint.pictures import drawn, save_png
-from swgjoint.view.spec_plots import spec_picture
+from swgjoint.view.plots.spec import spec_picture
 
 HOSTILE = ("$\\frac{$", "$x^$", "$$", "\\$", "a\x1b[31m", "half \udc80", "n" * 5000)
 

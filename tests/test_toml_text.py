@@ -7,8 +7,8 @@ import tomllib
 import pytest
 
 from swgjoint.models_path import bundled_names
-from swgjoint.sim.scene import Scene
-from swgjoint.sim.scene_toml import scene_toml
+from swgjoint.sim.scene.scene import Scene
+from swgjoint.sim.scene.text import scene_toml
 from swgjoint.toml_text import toml_text
 
 

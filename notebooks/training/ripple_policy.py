@@ -8,7 +8,7 @@ import numpy as np
 
 from swgjoint.control.kinematic_error import KinematicErrorTable
 from swgjoint.maps.drive_map import DriveMap
-from swgjoint.maps.error_spectrum import AMPLITUDES
+from swgjoint.maps.fit.error_spectrum import AMPLITUDES
 from swgjoint.units import arcmin
 
 

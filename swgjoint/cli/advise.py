@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from swgjoint.cli.arm_arguments import add_arm_arguments, scene_of
-from swgjoint.cli.text import table
+from swgjoint.cli.shared.arm_arguments import add_arm_arguments, scene_of
+from swgjoint.cli.shared.text import table
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -35,10 +35,10 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     """Find the setting.
 
     Returns:
-        See :func:`swgjoint.study.advise.advise`.
+        See :func:`swgjoint.explore.advise.advise.advise`.
     """
-    from swgjoint.study.advise import advise
-    from swgjoint.study.advise_bound import parse_bound
+    from swgjoint.explore.advise.advise import advise
+    from swgjoint.explore.advise.bound import parse_bound
 
     bound = parse_bound(args.error)
     scene, _ = scene_of(args, args.set)

@@ -7,7 +7,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from swgjoint.cli import bench_fe, bench_joint, bench_scaling
+from swgjoint.cli.shared import bench_fe, bench_joint, bench_scaling
 from swgjoint.errors import InputError
 from swgjoint.files import output_folder
 
@@ -99,7 +99,7 @@ def _check(args: argparse.Namespace) -> None:
             " folder for it; accepted: with --out DIR"
         )
     if args.only is not None:
-        from swgjoint.study.joint_cost import check_scenes
+        from swgjoint.bench.joint.cost import check_scenes
 
         check_scenes(args.only.split(","))
 
@@ -109,10 +109,10 @@ def _run_part(
 ) -> dict[str, Any]:
     """One part with its options; the folder need not exist."""
     if name == "fe":
-        from swgjoint.gear.design import Design
+        from swgjoint.gear.design.design import Design
 
         design = Design.load(args.design or DESIGN)
-        from swgjoint.study.fe_cost import run_fe_cost
+        from swgjoint.bench.fe.cost import run_fe_cost
 
         return run_fe_cost(
             design=design,
@@ -121,12 +121,12 @@ def _run_part(
             recompute=args.recompute,
         )
     if name == "joint":
-        from swgjoint.study.joint_cost import run_joint_cost
+        from swgjoint.bench.joint.cost import run_joint_cost
 
         only = () if args.only is None else tuple(args.only.split(","))
         return run_joint_cost(only=only, folder=folder, progress=args.progress)
     if name == "scaling":
-        from swgjoint.study.scaling import run_scaling
+        from swgjoint.bench.scaling.scaling import run_scaling
 
         return run_scaling(folder=folder, progress=args.progress)
     raise ValueError(f"part {name!r} has no function")

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from swgjoint.cli.text import table
+from swgjoint.cli.shared.text import table
 from swgjoint.errors import InputError
 from swgjoint.files import Outputs, output_folder
 
@@ -73,11 +73,11 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         every limit), ``files``.
     """
     folder = output_folder(args.out) if args.out else None
+    from swgjoint.explore.compare.compare import LOWER, SLOW, SORTABLE, compare
+    from swgjoint.explore.compare.scene import joints_named, resolved, scene_or_arm
     from swgjoint.models_path import near_names
-    from swgjoint.sim.arm_scene import is_arm
-    from swgjoint.study.compare import LOWER, SLOW, SORTABLE, compare
-    from swgjoint.study.compare_scene import joints_named, resolved, scene_or_arm
-    from swgjoint.study.compare_shown import columns, left_out_notes
+    from swgjoint.sim.arm.scene import is_arm
+    from swgjoint.view.plots.compare import columns, left_out_notes
 
     if args.sort is not None and args.sort not in SORTABLE:
         near = near_names(args.sort, SORTABLE)
@@ -125,8 +125,8 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 def _limits(args: argparse.Namespace) -> dict[str, float] | None:
     """Limits of the file and of the options, the options first; None without any."""
-    from swgjoint.sim.scene import parse_override
-    from swgjoint.study.compare import checked_limits, read_spec
+    from swgjoint.explore.compare.compare import checked_limits, read_spec
+    from swgjoint.sim.scene.scene import parse_override
 
     if not args.spec and not args.limit:
         return None
@@ -139,9 +139,9 @@ def _write(
     folder: Path, result: dict[str, Any], rows: Any, spec: Any, progress: Any
 ) -> None:
     """Picture, figures, report and recording."""
-    from swgjoint.study.compare_shown import comparison_picture, comparison_table
-    from swgjoint.view.recording import write_recording
-    from swgjoint.view.report import write_report
+    from swgjoint.view.plots.compare import comparison_picture, comparison_table
+    from swgjoint.view.recording.recording import write_recording
+    from swgjoint.view.report.report import write_report
 
     runs: dict[str, Any] = {}
     for row in rows:  # an argument may be given twice, a run of the report has one name
@@ -171,7 +171,7 @@ def _write(
 
 def status(result: dict[str, Any]) -> int:
     """1 where a limit of the spec is missed or a run is not valid."""
-    from swgjoint.sim.verdict import VALID
+    from swgjoint.sim.figures.verdict import VALID
 
     valid = all(row["verdict"] == VALID for row in result["rows"])
     return int(result["passed"] is False or not valid)
@@ -179,7 +179,7 @@ def status(result: dict[str, Any]) -> int:
 
 def report(result: dict[str, Any]) -> str:
     """One line an argument, then what misses the spec."""
-    from swgjoint.study.compare_shown import cell
+    from swgjoint.view.plots.compare import cell
 
     columns, spec = result["columns"], result["spec"]
     verdict = [] if spec is None else ["spec"]

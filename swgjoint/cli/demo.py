@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from swgjoint.cli.run import joint_table, notes, verdict_lines
-from swgjoint.cli.text import table
+from swgjoint.cli.shared.text import table
 from swgjoint.files import Outputs, output_folder
 
 SCENE = "ur5e-sweep"
@@ -36,10 +36,10 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     """
     start = time.perf_counter()
     folder = output_folder(args.out)
-    from swgjoint.sim.drives import load_drive
-    from swgjoint.sim.metrics import against_rigid
+    from swgjoint.drives.references import load_drive
+    from swgjoint.sim.figures.metrics import against_rigid
     from swgjoint.sim.run import run_scene
-    from swgjoint.sim.scene import Scene
+    from swgjoint.sim.scene.scene import Scene
 
     maps = {name: load_drive(name, progress=args.progress) for name in DRIVES.values()}
     scene = Scene.load_file(SCENE)
@@ -82,9 +82,9 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _write(folder: Path, runs: Any, rigid: Any, progress: Any) -> list[str]:
-    from swgjoint.view.plots import comparison_png
-    from swgjoint.view.recording import write_recording
-    from swgjoint.view.report import write_report
+    from swgjoint.view.plots.runs import comparison_png
+    from swgjoint.view.recording.recording import write_recording
+    from swgjoint.view.report.report import write_report
 
     outputs, shown = Outputs(folder), {}
 
@@ -107,7 +107,7 @@ def _write(folder: Path, runs: Any, rigid: Any, progress: Any) -> list[str]:
 
 def status(result: dict[str, Any]) -> int:
     """1 where a run is not valid."""
-    from swgjoint.sim.verdict import VALID
+    from swgjoint.sim.figures.verdict import VALID
 
     return int(any(m["verdict"] != VALID for m in result["metrics"].values()))
 

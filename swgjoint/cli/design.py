@@ -7,14 +7,14 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from swgjoint.cli.text import table
+from swgjoint.cli.shared.text import table
 from swgjoint.errors import DesignError, InputError
 from swgjoint.files import Outputs, check_output_file, output_folder, write_whole
 
 if TYPE_CHECKING:
-    from swgjoint.gear.check import Check
-    from swgjoint.gear.design import Design
-    from swgjoint.gear.tooth_path import ToothPath
+    from swgjoint.gear.design.check import Check
+    from swgjoint.gear.design.design import Design
+    from swgjoint.gear.teeth.tooth_path import ToothPath
 
 ACTIONS = ("check", "show", "export", "new")
 ONLY_NEW = ("teeth", "module", "name", "overrides", "output")
@@ -86,9 +86,9 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     if not args.out:
         raise InputError(f"design {args.action} needs --out DIR")
     folder = output_folder(args.out)
-    from swgjoint.gear.check import raise_faults
-    from swgjoint.gear.design import Design
-    from swgjoint.gear.design_defaults import defaults_taken
+    from swgjoint.gear.design.check import raise_faults
+    from swgjoint.gear.design.defaults import defaults_taken
+    from swgjoint.gear.design.design import Design
 
     design = Design.load(args.designs[0])
     checks, path = _all_checks(design)
@@ -115,9 +115,9 @@ def _new(args: argparse.Namespace) -> dict[str, Any]:
         raise InputError("design new needs -o FILE.toml")
     path = check_output_file(args.output, ".toml")
     teeth = _teeth(args.teeth) if args.teeth else None
-    from swgjoint.gear.design import Design
-    from swgjoint.gear.design_scaling import scaled_design
-    from swgjoint.sim.scene import parse_override
+    from swgjoint.gear.design.design import Design
+    from swgjoint.gear.design.scaling import scaled_design
+    from swgjoint.sim.scene.scene import parse_override
 
     found = scaled_design(
         Design.load(args.designs[0]),
@@ -246,8 +246,8 @@ def _all_checks(design: Design) -> tuple[list[Check], ToothPath | str]:
 
     Without a passage the reason: what cannot be built, or a rim without an outline.
     """
-    from swgjoint.gear.feasibility import design_checks, engagement_checks
-    from swgjoint.gear.tooth_path import tooth_path
+    from swgjoint.gear.design.feasibility import design_checks, engagement_checks
+    from swgjoint.gear.teeth.tooth_path import tooth_path
 
     checks = design_checks(design)
     if not all(check.ok for check in checks):
@@ -297,8 +297,8 @@ def _check(references: list[str]) -> dict[str, Any]:
 
 def _checked(reference: str) -> dict[str, Any]:
     """Checks of one design; a file that cannot be read is a failed check."""
-    from swgjoint.gear.design import Design
-    from swgjoint.gear.design_defaults import defaults_taken
+    from swgjoint.gear.design.defaults import defaults_taken
+    from swgjoint.gear.design.design import Design
 
     try:
         design = Design.load(reference)
@@ -327,8 +327,8 @@ def _checked(reference: str) -> dict[str, Any]:
 
 def _show(design: Design, path: ToothPath | str, folder: Path) -> dict[str, Any]:
     """Pictures of the design and of the passage of a rigid tooth, with its numbers."""
-    from swgjoint.view.design_plots import design_picture
-    from swgjoint.view.tooth_path_plots import tooth_path_picture
+    from swgjoint.view.plots.design import design_picture
+    from swgjoint.view.plots.tooth_path import tooth_path_picture
 
     outputs = Outputs(folder)
     outputs.write("design.png", lambda: design_picture(design))
@@ -338,14 +338,14 @@ def _show(design: Design, path: ToothPath | str, folder: Path) -> dict[str, Any]
 
 
 def _export(design: Design, folder: Path) -> dict[str, Any]:
-    from swgjoint.gear.export import (
+    from swgjoint.gear.design.export import (
         csv_text,
         dxf_text,
         tooth_curve,
         wave_generator_curves,
     )
-    from swgjoint.gear.profile import tooth_profile
-    from swgjoint.gear.wave_generator import wave_generator
+    from swgjoint.gear.teeth.profile import tooth_profile
+    from swgjoint.gear.wave_generators.wave_generator import wave_generator
 
     curves = {
         member: [tooth_curve(tooth_profile(design, member))] for member in MEMBERS

@@ -11,7 +11,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
-from swgjoint.cli.text import table
+from swgjoint.cli.shared.text import table
 from swgjoint.errors import SwgError
 
 EXTRAS = {
@@ -126,7 +126,7 @@ def _models() -> str:
 
 
 def _cache() -> str:
-    from swgjoint.maps.cache import cache_folder
+    from swgjoint.store import cache_folder
 
     folder = cache_folder()
     if folder is None:

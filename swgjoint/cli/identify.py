@@ -6,13 +6,13 @@ import argparse
 import time
 from typing import TYPE_CHECKING, Any
 
-from swgjoint.cli.text import table
+from swgjoint.cli.shared.text import table
 from swgjoint.errors import InputError
 from swgjoint.files import Outputs, output_folder
 from swgjoint.units import arcmin
 
 if TYPE_CHECKING:
-    from swgjoint.control.identify import Identified
+    from swgjoint.identify.identification import Identified
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -87,8 +87,8 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
             _pair(part, "--orders", "P:Q,...", ":", int)
             for part in args.orders.split(",")
         ]
-    from swgjoint.control.identify import WINDOW, identify
-    from swgjoint.control.identify_log import read_log
+    from swgjoint.identify.identification import WINDOW, identify
+    from swgjoint.identify.log import read_log
 
     corners = None
     if args.corners is not None:
@@ -107,7 +107,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     )
     files: list[str] = []
     if out is not None:
-        from swgjoint.control.identify_plots import png
+        from swgjoint.view.plots.identification import png
 
         outputs = Outputs(out)
         outputs.hand_over("identified.swg", found.drive.save)
@@ -122,7 +122,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 def result_of(found: Identified) -> dict[str, Any]:
     """The JSON object of an identification, without files."""
-    from swgjoint.control.identify import rms
+    from swgjoint.identify.identification import rms
 
     measured = found.model.measured()
     drive = found.drive

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from swgjoint.cli.text import table
+from swgjoint.cli.shared.text import table
 
 KINDS = ("drives", "designs", "arms", "scenes", "sweeps", "optimisations")
 HEADERS = {
@@ -49,7 +49,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     Returns:
         ``kind``, ``rows`` (each with ``name`` and the figures of its kind), ``note``.
     """
-    from swgjoint.study.bundled import NOTES, bundled_rows
+    from swgjoint.sim.bundled import NOTES, bundled_rows
 
     rows = bundled_rows(args.kind)
     return {"kind": args.kind, "rows": rows, "note": NOTES[args.kind]}

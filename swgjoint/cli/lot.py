@@ -7,7 +7,7 @@ import csv
 import io
 from typing import Any
 
-from swgjoint.cli.text import table
+from swgjoint.cli.shared.text import table
 from swgjoint.errors import InputError
 from swgjoint.files import Outputs, output_folder
 
@@ -49,7 +49,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     """Draw and solve the drives.
 
     Returns:
-        See :func:`swgjoint.study.lot.run_lot`, and ``files``.
+        See :func:`swgjoint.explore.lot.run_lot`, and ``files``.
     """
     for name, value, most in (
         ("drives", args.drives, MAX_DRIVES),
@@ -59,10 +59,10 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         if not 1 <= value <= most:
             raise InputError(f"--{name} {value}; accepted: 1 to {most}")
     folder = output_folder(args.out) if args.out else None
-    from swgjoint.gear.design import Design
-    from swgjoint.study.compare import read_spec
-    from swgjoint.study.lot import FIGURES, run_lot
-    from swgjoint.study.lot_plots import lot_picture
+    from swgjoint.explore.compare.compare import read_spec
+    from swgjoint.explore.lot import FIGURES, run_lot
+    from swgjoint.gear.design.design import Design
+    from swgjoint.view.plots.lot import lot_picture
 
     spec = read_spec(args.spec, FIGURES) if args.spec else None
     result = run_lot(

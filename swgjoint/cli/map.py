@@ -7,8 +7,8 @@ import time
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from swgjoint.cli.map_validity_text import validation_of_map, validation_table
-from swgjoint.cli.text import table
+from swgjoint.cli.shared.map_validity_text import validation_of_map, validation_table
+from swgjoint.cli.shared.text import table
 from swgjoint.errors import InputError
 from swgjoint.files import Outputs, check_output_file
 
@@ -114,7 +114,7 @@ def _built(args: argparse.Namespace) -> DriveMap:
         raise InputError(
             f"--{given[0].replace('_', '-')} with a design; accepted with a .csv file"
         )
-    from swgjoint.gear.design import Design
+    from swgjoint.gear.design.design import Design
 
     design = Design.load(args.design)
     # the finite elements take half a second to import: not before the design is sound

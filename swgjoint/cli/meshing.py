@@ -7,7 +7,7 @@ import math
 from functools import partial
 from typing import Any
 
-from swgjoint.cli.text import table
+from swgjoint.cli.shared.text import table
 from swgjoint.errors import InputError, Outcome
 from swgjoint.files import Outputs, attempting, output_folder
 from swgjoint.json_text import plain
@@ -73,12 +73,12 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     """Run the simulation; the result has the keys of ``MeshingRun.to_json``."""
     _check(args)
     folder = output_folder(args.out) if args.out else None
-    from swgjoint.gear.design import Design
+    from swgjoint.gear.design.design import Design
 
     design = Design.load(args.design)
     # the finite elements take half a second to import: not before the design is sound
     from swgjoint.fe.meshing import simulate_meshing
-    from swgjoint.maps.catalogue import ratings_of
+    from swgjoint.gear.catalogue import ratings_of
 
     torque = ratings_of(design).rated_torque if args.torque is None else args.torque
     model = args.model or ("3d" if design.cup is not None else "2d")
@@ -101,17 +101,17 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     result["files"] = []
     if folder is not None:
         from swgjoint.fe.meshing_run import MeshingRun
-        from swgjoint.view.meshing_plots import meshing_picture
+        from swgjoint.view.plots.meshing import meshing_picture
 
         outputs = Outputs(folder)
         outputs.write("meshing.png", lambda: meshing_picture(result))
         with attempting(folder / "pictures of the fields"):
             if isinstance(meshing, MeshingRun):
-                from swgjoint.view.field_plots import field_pictures
+                from swgjoint.view.plots.fields import field_pictures
 
                 pictures = field_pictures(meshing)
             else:
-                from swgjoint.view.solid_plots import solid_pictures
+                from swgjoint.view.plots.solid import solid_pictures
 
                 pictures = solid_pictures(meshing)
             for name, picture in pictures.items():

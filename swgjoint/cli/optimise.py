@@ -5,13 +5,13 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from swgjoint.cli.places import configure_places, places_of
-from swgjoint.cli.text import short_headers, table
+from swgjoint.cli.shared.places import configure_places, places_of
+from swgjoint.cli.shared.text import short_headers, table
 from swgjoint.json_text import json_text
 
 if TYPE_CHECKING:
-    from swgjoint.study.optimise import Optimum
-    from swgjoint.study.sweep_results import Place
+    from swgjoint.explore.optimise.optimise import Optimum
+    from swgjoint.explore.sweep.results import Place
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -41,8 +41,8 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         ``objectives``, ``parameters``, ``figures``, ``validity``, ``start``,
         ``beside``, ``rows`` (all that were tried), ``files``.
     """
-    from swgjoint.study.optimise import optimise
-    from swgjoint.study.optimise_file import OptimisationFile
+    from swgjoint.explore.optimise.file import OptimisationFile
+    from swgjoint.explore.optimise.optimise import optimise
 
     place, executor_of = places_of(args)
     file = OptimisationFile.load(args.file)
@@ -56,8 +56,8 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 def _write(place: Place, found: Optimum, result: dict[str, Any]) -> list[str]:
     """Designs of the front, all that were tried, the picture, the whole as JSON."""
-    from swgjoint.study.optimise_plots import optimum_picture
-    from swgjoint.study.sweep_results import csv_text, write_to
+    from swgjoint.explore.sweep.results import csv_text, write_to
+    from swgjoint.view.plots.optimise import optimum_picture
 
     rows = [
         {key: value for key, value in row.items() if key != "confirmed"}

@@ -6,11 +6,11 @@ import argparse
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
-from swgjoint.cli.text import table
+from swgjoint.cli.shared.text import table
 from swgjoint.files import Outputs, output_folder
 
 if TYPE_CHECKING:
-    from swgjoint.gear.profile import ToothProfile
+    from swgjoint.gear.teeth.profile import ToothProfile
 
 MEMBERS = ("flexspline", "circular_spline")
 
@@ -31,8 +31,8 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         of both right flanks from tip to root [mm]; ``checks``; ``files``.
     """
     folder = output_folder(args.out) if args.out else None
-    from swgjoint.gear.design import Design
-    from swgjoint.gear.profile import tooth_profile
+    from swgjoint.gear.design.design import Design
+    from swgjoint.gear.teeth.profile import tooth_profile
 
     design = Design.load(args.design)
     profiles = {member: tooth_profile(design, member) for member in MEMBERS}
@@ -46,7 +46,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     ]
     result["files"] = []
     if folder is not None:
-        from swgjoint.view.profile_plots import profile_picture
+        from swgjoint.view.plots.profile import profile_picture
 
         outputs = Outputs(folder)
         outputs.write("profile.png", lambda: profile_picture(design, profiles))
@@ -136,7 +136,7 @@ def _checks(profile: ToothProfile) -> list[dict[str, Any]]:
     """Closed and tangent at every junction, nothing of negative length."""
     import numpy as np
 
-    from swgjoint.gear.profile import TANGENCY_RAD
+    from swgjoint.gear.teeth.profile import TANGENCY_RAD
     from swgjoint.units import mm
 
     junctions, stations = profile.junctions(), profile.stations

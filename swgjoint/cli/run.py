@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from swgjoint.cli.arm_arguments import add_arm_arguments, choice_lines, scene_of
-from swgjoint.cli.text import table
+from swgjoint.cli.shared.arm_arguments import add_arm_arguments, choice_lines, scene_of
+from swgjoint.cli.shared.text import table
 from swgjoint.errors import InputError
 from swgjoint.files import Outputs, output_folder
 
@@ -88,7 +88,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     if args.report and not args.out:
         raise InputError("--report needs a folder; accepted: --out DIR")
     if args.live:
-        from swgjoint.view.live import loopback_port
+        from swgjoint.view.recording.live import loopback_port
 
         loopback_port(args.live)
     folder = output_folder(args.out) if args.out else None
@@ -106,11 +106,11 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         if result.recording is not None:
             outputs.files.append(str(result.recording))
         if of_arm:
-            from swgjoint.sim.scene_toml import scene_toml
+            from swgjoint.sim.scene.text import scene_toml
 
             outputs.write("scene.toml", lambda: scene_toml(scene))
         if args.report:
-            from swgjoint.view.report import write_report
+            from swgjoint.view.report.report import write_report
 
             outputs.hand_over(
                 "report.html",
@@ -119,7 +119,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         files = outputs.files
     live = None
     if args.live is not None:
-        from swgjoint.view.live import stream_runs
+        from swgjoint.view.recording.live import stream_runs
 
         live = stream_runs({"": result}, url=args.live or None, pace=1.0)
     arm = result.assembly.arm
@@ -138,7 +138,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 def status(result: dict[str, Any]) -> int:
     """1 where the run is not valid; with ``--strict`` where anything is marked."""
-    from swgjoint.sim.verdict import VALID
+    from swgjoint.sim.figures.verdict import VALID
     from swgjoint.view.validity import warnings_of
 
     if result["verdict"] != VALID:
@@ -174,7 +174,7 @@ def report(result: dict[str, Any]) -> str:
 
 def verdict_lines(metrics: dict[str, Any]) -> list[str]:
     """Whether the figures describe the scene, and why not."""
-    from swgjoint.sim.verdict import VALID
+    from swgjoint.sim.figures.verdict import VALID
 
     if metrics["verdict"] == VALID:
         return [metrics["verdict"]]
@@ -231,7 +231,7 @@ def joint_table(joints: dict[str, Any]) -> str:
 
 def joint_row(item: tuple[str, dict[str, Any]]) -> tuple[str, ...]:
     """Figures of one joint as the table shows them."""
-    from swgjoint.maps.validity_marks import error_mark, joint_mark
+    from swgjoint.maps.sheet.validity_marks import error_mark, joint_mark
 
     name, joint = item
     torsion, error = joint["torsion_arcmin"], joint["transmission_error_arcmin"]
@@ -262,7 +262,7 @@ def ripple_cell(joint: dict[str, Any], key: str) -> str:
 
     > where it is a lower bound, ~ and ! where the map differs from unseen solves.
     """
-    from swgjoint.maps.validity_marks import joint_mark
+    from swgjoint.maps.sheet.validity_marks import joint_mark
 
     if joint["ripple_missing"]:
         return "-"
@@ -281,7 +281,7 @@ def fixed(value: float, digits: int = 3) -> str:
 
 def notes(joints: dict[str, Any]) -> list[str]:
     """What marks in the table mean, and warnings about the validity of figures."""
-    from swgjoint.maps.validity_marks import error_mark, joint_mark, mark_legend
+    from swgjoint.maps.sheet.validity_marks import error_mark, joint_mark, mark_legend
     from swgjoint.view.validity import warnings_of
 
     lines = warnings_of(joints)

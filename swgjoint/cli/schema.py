@@ -29,15 +29,15 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     Returns:
         JSON Schema with ``unit``, range, ``default`` and ``description`` of each key.
     """
-    from swgjoint.study.schema import file_schema
+    from swgjoint.explore.schema import file_schema
 
     return file_schema(args.kind)
 
 
 def report(result: dict[str, Any]) -> str:
     """One line for each key, its meaning below."""
+    from swgjoint.explore.schema import described_keys
     from swgjoint.json_text import json_text
-    from swgjoint.study.schema import described_keys
 
     lines = []
     for one in described_keys(result):

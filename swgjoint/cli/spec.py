@@ -6,14 +6,14 @@ import argparse
 import time
 from typing import TYPE_CHECKING, Any
 
-from swgjoint.cli.map_validity_text import doubts, marked, validation_of_sheet
-from swgjoint.cli.text import table
+from swgjoint.cli.shared.map_validity_text import doubts, marked, validation_of_sheet
+from swgjoint.cli.shared.text import table
 from swgjoint.files import Outputs, output_folder
 from swgjoint.view.words import words
 
 if TYPE_CHECKING:
-    from swgjoint.maps.overlay import Overlay
-    from swgjoint.maps.spec_sheet import SpecSheet
+    from swgjoint.identify.overlay import Overlay
+    from swgjoint.maps.sheet.spec_sheet import SpecSheet
 
 FEW_ANGLES = 3
 """Wave-generator positions of a design's map where every wanted figure is read with the
@@ -59,25 +59,25 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     """Find or build the map and measure it.
 
     Returns:
-        Every key of :data:`swgjoint.maps.spec_sheet.KEYS` (or those of ``--only``),
-        None where the source cannot tell, with the reason in ``missing``; ``design``,
-        ``validity``, ``files``, ``wall_s``; ``radial_stiffness`` and ``fatigue`` with
-        what stands behind these two figures, where they were computed; ``uncertain``
-        by key what the map misses, ``validation`` of the map against unseen solves
-        (null with ``validation_reason``) and ``validation_notes``; ``ratcheting``
-        with the path to the largest torque, or to where it ended; ``running`` with
-        what rubs in a design that turns without load; ``measured`` with --measured,
-        see :meth:`swgjoint.maps.overlay.Overlay.as_dict`.
+        Every key of :data:`swgjoint.maps.sheet.spec_sheet.KEYS` (or those of
+        ``--only``), None where the source cannot tell, with the reason in ``missing``;
+        ``design``, ``validity``, ``files``, ``wall_s``; ``radial_stiffness`` and
+        ``fatigue`` with what stands behind these two figures, where they were computed;
+        ``uncertain`` by key what the map misses, ``validation`` of the map against
+        unseen solves (null with ``validation_reason``) and ``validation_notes``;
+        ``ratcheting`` with the path to the largest torque, or to where it ended;
+        ``running`` with what rubs in a design that turns without load; ``measured``
+        with --measured, see :meth:`swgjoint.identify.overlay.Overlay.as_dict`.
     """
     start = time.perf_counter()
     folder = output_folder(args.out) if args.out else None
-    from swgjoint.maps.spec_sheet import check_keys, measure_spec, validity
+    from swgjoint.maps.sheet.spec_sheet import check_keys, measure_spec, validity
 
     only = [] if args.only is None else [k.strip() for k in args.only.split(",")]
     keys = check_keys(only)
     loop = None
     if args.measured is not None:
-        from swgjoint.maps.measurement import read_loop
+        from swgjoint.identify.measurement import read_loop
 
         loop = read_loop(args.measured)
     drive, ratings, name = _drive(args, keys, always=loop is not None)
@@ -106,8 +106,8 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         result |= validation_of_sheet(None, keys)
     laid = None
     if loop is not None:
-        from swgjoint.maps.loop_units import check_units
-        from swgjoint.maps.overlay import overlay
+        from swgjoint.identify.loop_units import check_units
+        from swgjoint.identify.overlay import overlay
 
         doubts = check_units(args.measured, loop, drive.ratings.rated_torque)
         laid = overlay(drive, loop)
@@ -124,10 +124,10 @@ def _drive(
     args: argparse.Namespace, keys: tuple[str, ...], *, always: bool
 ) -> tuple[Any, Any, str]:
     """Map (None where ratings suffice, unless always), ratings and name."""
-    from swgjoint.maps.catalogue import ratings_of
+    from swgjoint.drives.references import find_drive, load_drive
+    from swgjoint.gear.catalogue import ratings_of
     from swgjoint.maps.drive_map import DriveMap
-    from swgjoint.maps.spec_sheet import needs_map, needs_turn
-    from swgjoint.sim.drives import find_drive, load_drive
+    from swgjoint.maps.sheet.spec_sheet import needs_map, needs_turn
 
     if not needs_map(keys) and not always:
         source = find_drive(args.drive)
@@ -150,9 +150,9 @@ def _solid(
     args: argparse.Namespace, keys: tuple[str, ...], ratings: Any
 ) -> tuple[dict[str, float], dict[str, str], dict[str, Any]]:
     """Figures of the solid model of a design, reasons of those it has not, details."""
-    from swgjoint.gear.design import Design
-    from swgjoint.maps.spec_sheet import SOLID_KEYS
-    from swgjoint.sim.drives import find_drive
+    from swgjoint.drives.references import find_drive
+    from swgjoint.gear.design.design import Design
+    from swgjoint.maps.sheet.spec_sheet import SOLID_KEYS
 
     wanted = [key for key in SOLID_KEYS if key in keys]
     source = find_drive(args.drive) if wanted else None
@@ -161,7 +161,7 @@ def _solid(
     if args.model not in (None, "3d"):
         reason = f"needs the 3d model, not --model {args.model}"
         return {}, dict.fromkeys(wanted, reason), {}
-    from swgjoint.fe.solid.spec_figures import solid_figures
+    from swgjoint.fe.solid.figures.spec_figures import solid_figures
 
     found = solid_figures(source, wanted, ratings.rated_torque, progress=args.progress)
     return found.values, found.missing, found.details
@@ -175,15 +175,15 @@ def _ratcheting(
     details: dict[str, Any],
 ) -> None:
     """Add the ratcheting torque of a design, or the reason why there is none."""
-    from swgjoint.gear.design import Design
+    from swgjoint.drives.references import find_drive
+    from swgjoint.gear.design.design import Design
     from swgjoint.maps.cache import recalled
-    from swgjoint.maps.spec_sheet import RATCHETING_KEY
-    from swgjoint.sim.drives import find_drive
+    from swgjoint.maps.sheet.spec_sheet import RATCHETING_KEY
 
     source = find_drive(args.drive) if RATCHETING_KEY in keys else None
     if not isinstance(source, Design):
         return
-    from swgjoint.fe.ratcheting import ratcheting_path
+    from swgjoint.fe.plane.ratcheting import ratcheting_path
 
     path = recalled(
         "figures",
@@ -214,17 +214,17 @@ def _running(
     A lower bound, a small part of what a drive takes: no figure, but the reason why
     there is none.
     """
+    from swgjoint.drives.references import find_drive
     from swgjoint.errors import ComputationError, DesignError
-    from swgjoint.gear.design import Design
-    from swgjoint.maps.friction_bending import without_friction
-    from swgjoint.maps.spec_sheet import SLOW_KEYS
-    from swgjoint.sim.drives import find_drive
+    from swgjoint.gear.design.design import Design
+    from swgjoint.maps.fit.friction_bending import without_friction
+    from swgjoint.maps.sheet.spec_sheet import SLOW_KEYS
 
     wanted = [key for key in SLOW_KEYS if key in keys]
     source = find_drive(args.drive) if wanted else None
     if not isinstance(source, Design):
         return
-    from swgjoint.fe.ring_running import LEFT_OUT, running_friction
+    from swgjoint.fe.rings.running import LEFT_OUT, running_friction
 
     mu = source.friction.tooth_coefficient
     found, why = None, "nothing rubs with friction.tooth_coefficient = 0"
@@ -252,12 +252,12 @@ def _write(
     sheet: SpecSheet,
     laid: Overlay | None,
 ) -> None:
-    from swgjoint.view.spec_plots import spec_picture
+    from swgjoint.view.plots.spec import spec_picture
 
     outputs = Outputs(folder)
     outputs.write("spec.png", lambda: spec_picture(result["design"], sheet))
     if laid is not None:
-        from swgjoint.view.overlay_plots import overlay_picture
+        from swgjoint.view.plots.overlay import overlay_picture
 
         outputs.write("measured.png", lambda: overlay_picture(result["design"], laid))
     outputs.write_json("spec.json", result)
@@ -265,8 +265,8 @@ def _write(
 
 def report(result: dict[str, Any]) -> str:
     """Figures with units, the strongest orders, what is missing and why."""
-    from swgjoint.maps.catalogue_stated import LOSS_KEYS
-    from swgjoint.maps.spec_sheet import KEYS, TURN_KEYS
+    from swgjoint.gear.catalogue_stated import LOSS_KEYS
+    from swgjoint.maps.sheet.spec_sheet import KEYS, TURN_KEYS
 
     keys = [key for key in KEYS if key in result and key != "orders"]
     stated = result.get("stated") or {}

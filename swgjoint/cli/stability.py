@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from swgjoint.cli.text import table
+from swgjoint.cli.shared.text import table
 from swgjoint.errors import InputError
 from swgjoint.files import output_folder
 
@@ -31,12 +31,12 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     """Run the study.
 
     Returns:
-        See :func:`swgjoint.study.stability.run_stability`.
+        See :func:`swgjoint.bench.stability.stability.run_stability`.
     """
     if not 1 <= args.jobs <= MAX_JOBS:
         raise InputError(f"--jobs {args.jobs}; accepted: 1 to {MAX_JOBS}")
     folder = output_folder(args.out) if args.out else None
-    from swgjoint.study.stability import run_stability
+    from swgjoint.bench.stability.stability import run_stability
 
     return run_stability(
         full=args.full, jobs=args.jobs, folder=folder, progress=args.progress
@@ -45,8 +45,8 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 def report(result: dict[str, Any]) -> str:
     """Outcomes by situation and scheme, then what they add up to."""
-    from swgjoint.study.stability import summary
-    from swgjoint.study.stability_rows import OUTCOMES
+    from swgjoint.bench.stability.rows import OUTCOMES
+    from swgjoint.bench.stability.stability import summary
 
     rows = [
         [name, *(count.get(outcome, 0) for outcome in OUTCOMES)]

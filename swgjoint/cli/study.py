@@ -7,33 +7,33 @@ import time
 from importlib import import_module
 from typing import Any
 
-from swgjoint.cli.text import table
+from swgjoint.cli.shared.text import table
 from swgjoint.errors import InputError
 from swgjoint.files import output_folder
 
 STUDIES = {
     "thesis": (
-        "swgjoint.study.thesis:run_thesis",
+        "swgjoint.validation.thesis.thesis:run_thesis",
         "stresses of the thesis, chapters 4 to 6, with the 2D model",
     ),
     "ring": (
-        "swgjoint.study.ring:run_ring",
+        "swgjoint.validation.ring:run_ring",
         "deflection of a plain ring between two rollers, thesis appendix A",
     ),
     "articles": (
-        "swgjoint.study.articles:run_articles",
+        "swgjoint.validation.articles.articles:run_articles",
         "force, deflection, stress and fatigue of three articles, with the 3D model",
     ),
     "catalogue": (
-        "swgjoint.study.catalogue:run_catalogue",
+        "swgjoint.validation.catalogue.catalogue:run_catalogue",
         "stiffness, losses and ratcheting of a family of drives beside a catalogue",
     ),
     "response": (
-        "swgjoint.study.response:run_response",
+        "swgjoint.validation.response:run_response",
         "two-mass frequency response of a joint beside its closed form",
     ),
     "control": (
-        "swgjoint.study.control_ladder:run_control",
+        "swgjoint.validation.control.ladder:run_control",
         "controllers of one joint from PD to learning, on ten specimens of a drive",
     ),
 }
@@ -112,7 +112,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     if args.seeds is not None and not 1 <= args.seeds <= MAX_SEEDS:
         raise InputError(f"--seeds {args.seeds}; accepted: 1 to {MAX_SEEDS}")
     folder = output_folder(args.out) if args.out else None
-    from swgjoint.study.rows import StudyOptions
+    from swgjoint.validation.rows import StudyOptions
 
     module, _, function = STUDIES[args.name][0].partition(":")
     found = getattr(import_module(module), function)(

@@ -5,13 +5,13 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from swgjoint.cli.places import configure_places, places_of
-from swgjoint.cli.text import short_headers, table
+from swgjoint.cli.shared.places import configure_places, places_of
+from swgjoint.cli.shared.text import short_headers, table
 from swgjoint.json_text import json_text
 
 if TYPE_CHECKING:
-    from swgjoint.study.sweep import SweepResult
-    from swgjoint.study.sweep_results import Place
+    from swgjoint.explore.sweep.results import Place
+    from swgjoint.explore.sweep.sweep import SweepResult
 
 SHOWN = 40
 """Rows of the table in the terminal."""
@@ -45,8 +45,8 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         ``work_s``, ``wall_s``, ``efficiency`` (work over wall time and workers),
         ``parameters``, ``figures``, ``validity`` (by task), ``rows``, ``files``.
     """
-    from swgjoint.study.sweep import run_sweep
-    from swgjoint.study.sweep_file import SweepFile
+    from swgjoint.explore.sweep.file import SweepFile
+    from swgjoint.explore.sweep.sweep import run_sweep
 
     place, executor_of = places_of(args)
     file = SweepFile.load(args.file)
@@ -66,8 +66,8 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 def _write(place: Place, found: SweepResult, result: dict[str, Any]) -> list[str]:
     """One row a design as tables, the picture, and the whole as JSON."""
-    from swgjoint.study.sweep_plots import sweep_picture
-    from swgjoint.study.sweep_results import csv_text, parquet_bytes, write_to
+    from swgjoint.explore.sweep.results import csv_text, parquet_bytes, write_to
+    from swgjoint.view.plots.sweep import sweep_picture
 
     rows = found.rows()
     files = write_to(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from swgjoint.cli.text import table
+from swgjoint.cli.shared.text import table
 from swgjoint.files import output_folder
 
 
@@ -71,10 +71,10 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         ``seeds``, ``bounds``, ``files``, ``wall_s`` and the settings.
     """
     folder = output_folder(args.out) if args.out else None
-    from swgjoint.sim.scene import parse_override
-    from swgjoint.study.tune import tune
-    from swgjoint.study.tune_result import TuneSettings
-    from swgjoint.study.tune_shown import claims, write_files
+    from swgjoint.explore.tune.result import TuneSettings
+    from swgjoint.explore.tune.tune import tune
+    from swgjoint.sim.scene.scene import parse_override
+    from swgjoint.view.plots.tune import claims, write_files
 
     settings = TuneSettings(
         environment=args.environment,

@@ -33,7 +33,12 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         process ends the page.
     """
     path = _recording(args.file)
-    from swgjoint.view.viewer import LOOPBACK, free_port, start_viewer, wait_for
+    from swgjoint.view.recording.viewer import (
+        LOOPBACK,
+        free_port,
+        start_viewer,
+        wait_for,
+    )
 
     display = sys.platform in ("darwin", "win32") or any(
         os.environ.get(key) for key in ("DISPLAY", "WAYLAND_DISPLAY")

@@ -33,7 +33,7 @@ class PinocchioArm:
         """Take over tree, inertias, gravity, armature, damping, friction and springs.
 
         Args:
-            model: Of MuJoCo, for instance ``swgjoint.sim.rigid_arm.RigidArm("ur5e")
+            model: Of MuJoCo, for instance ``swgjoint.sim.arm.rigid_arm.RigidArm("ur5e")
                 .model``, or of Pinocchio.
 
         Raises:

@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from swgjoint.drives.references import names_catalogue
 from swgjoint.envs.api import BatchEnv, SingleEnv
 from swgjoint.envs.arguments import check_flag, check_number, shown
 from swgjoint.envs.core import Core, Entry, Limits, ceiling, error_bounds
@@ -21,15 +22,14 @@ from swgjoint.envs.specimen import Tolerances, load_drive_once, tolerances_of
 from swgjoint.errors import InputError
 from swgjoint.joint.region import check_region
 from swgjoint.maps.drive_map import DriveMap
-from swgjoint.sim.arm_scene import is_arm, scene_of_arm
+from swgjoint.sim.arm.payload import arms_of
+from swgjoint.sim.arm.rigid_arm import RigidArm
+from swgjoint.sim.arm.scene import is_arm, scene_of_arm
 from swgjoint.sim.assembly import Assembly, assemble
-from swgjoint.sim.commanded import trajectory_of
-from swgjoint.sim.drives import names_catalogue
 from swgjoint.sim.equilibrium import start_state
-from swgjoint.sim.payload import arms_of
-from swgjoint.sim.rigid_arm import RigidArm
-from swgjoint.sim.scene import Scene
-from swgjoint.sim.task import task_of
+from swgjoint.sim.motion.commanded import trajectory_of
+from swgjoint.sim.scene.scene import Scene
+from swgjoint.sim.scene.task import task_of
 from swgjoint.units import arcmin
 
 Array = NDArray[np.float64]

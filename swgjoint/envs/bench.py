@@ -15,20 +15,16 @@ from swgjoint.envs.core import Core, Entry, Limits, ceiling, error_bounds
 from swgjoint.envs.loop import MotorLoop
 from swgjoint.envs.plant import Plant, specimen
 from swgjoint.envs.sensors import Sensors
-from swgjoint.envs.specimen import (
-    Tolerances,
-    drive_of_environment,
-    tolerances_of,
-)
+from swgjoint.envs.specimen import Tolerances, drive_of_environment, tolerances_of
 from swgjoint.errors import InputError
 from swgjoint.joint.attach import attach
 from swgjoint.joint.drive import JointDrive
 from swgjoint.joint.region import check_region
 from swgjoint.joint.step_damping import damp_as_asked
 from swgjoint.maps.drive_map import DriveMap
+from swgjoint.sim.arm.rigid_arm import RigidArm, compile_spec
 from swgjoint.sim.controller import KnownJoints
-from swgjoint.sim.rigid_arm import RigidArm, compile_spec
-from swgjoint.sim.transmission import transmission_of
+from swgjoint.sim.figures.transmission import transmission_of
 
 Array = NDArray[np.float64]
 

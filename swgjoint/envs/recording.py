@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 
 from swgjoint.envs.api import SingleEnv
 from swgjoint.errors import InputError
-from swgjoint.view.columns import Column
-from swgjoint.view.geometry import quaternion_xyzw, shape_of
-from swgjoint.view.recording import end_stream, recording_file
+from swgjoint.view.recording.columns import Column
+from swgjoint.view.recording.geometry import quaternion_xyzw, shape_of
+from swgjoint.view.recording.recording import end_stream, recording_file
 
 Array = NDArray[np.float64]
 

@@ -10,12 +10,12 @@ from pathlib import Path
 
 import numpy as np
 
+from swgjoint.drives.references import load_drive
 from swgjoint.envs.arguments import is_flag, is_number, shown
 from swgjoint.errors import InputError
 from swgjoint.joint.variation import Variation
 from swgjoint.maps.drive_map import DriveMap
-from swgjoint.maps.error_spectrum import with_assumed_error
-from swgjoint.sim.drives import load_drive
+from swgjoint.maps.fit.error_spectrum import with_assumed_error
 from swgjoint.units import arcmin
 
 
@@ -27,7 +27,7 @@ def load_drive_once(
     It is kept as long as the file has the same content, wherever the process works.
 
     Args:
-        reference: See :func:`swgjoint.sim.drives.load_drive`.
+        reference: See :func:`swgjoint.drives.references.load_drive`.
         kinematic_error_arcmin: The same.
 
     Raises:

@@ -5,16 +5,16 @@ from __future__ import annotations
 from dataclasses import replace
 
 from swgjoint.errors import ComputationError
-from swgjoint.fe import drive2d
-from swgjoint.fe.friction_loop import friction_loops
-from swgjoint.fe.sampling import sample_map
+from swgjoint.fe.common.sampling import sample_map
+from swgjoint.fe.plane import drive2d
+from swgjoint.fe.plane.friction_loop import friction_loops
+from swgjoint.fe.rings import sampling as thin_ring
 from swgjoint.fe.solid import drive3d
-from swgjoint.fe.thin_ring import sampling as thin_ring
-from swgjoint.gear.design import Design
+from swgjoint.gear.design.design import Design
 from swgjoint.maps.cache import cached
 from swgjoint.maps.drive_map import DriveMap
-from swgjoint.maps.fit import fit_map
-from swgjoint.maps.hysteresis_loops import with_hysteresis
+from swgjoint.maps.fit.fit import fit_map
+from swgjoint.maps.fit.hysteresis_loops import with_hysteresis
 from swgjoint.maps.unfinished import Unfinished
 from swgjoint.progress import Progress, silent
 
@@ -39,8 +39,8 @@ def build_map(
             a cup, else ``2d``.
         angles: Wave-generator positions over one pitch of the fixed member, with
             ``ring`` positions of the balls over one passage; the default of
-            :func:`swgjoint.fe.sampling.sample_map` or
-            :func:`swgjoint.fe.thin_ring.sampling.sample_rings` if None.
+            :func:`swgjoint.fe.common.sampling.sample_map` or
+            :func:`swgjoint.fe.rings.sampling.sample_rings` if None.
         progress: Called with the stage, the solves done and their number.
         cache: Whether to look in the cache of maps, and to store there. With it a map
             in the plane or in space that was interrupted goes on where it was, and is

@@ -8,16 +8,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from swgjoint.errors import ComputationError
-from swgjoint.fe.continuation import Continuation
-from swgjoint.fe.drive2d import check_modelled, ring_model
 from swgjoint.fe.meshing_phases import default_steps, overload
 from swgjoint.fe.meshing_run import MeshingRun, MeshingStep, SetupState
-from swgjoint.fe.ring import RingModel
-from swgjoint.fe.state import State
-from swgjoint.fe.stress import MemberMaxima
-from swgjoint.gear.design import Design
+from swgjoint.fe.plane.continuation import Continuation
+from swgjoint.fe.plane.drive2d import check_modelled, ring_model
+from swgjoint.fe.plane.ring import RingModel
+from swgjoint.fe.plane.state import State
+from swgjoint.fe.plane.stress import MemberMaxima
+from swgjoint.gear.catalogue import ratings_of
+from swgjoint.gear.design.design import Design
 from swgjoint.gear.mounting import series_compliance
-from swgjoint.maps.catalogue import ratings_of
 from swgjoint.progress import Progress, silent
 from swgjoint.units import deg
 

@@ -16,8 +16,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from swgjoint.gear.design import Design
-from swgjoint.maps.catalogue import ratings_of
+from swgjoint.gear.catalogue import ratings_of
+from swgjoint.gear.design.design import Design
 
 STEPS = 35
 """Positions of the thesis (section 3.4.5); the default where they spread."""

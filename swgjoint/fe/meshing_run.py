@@ -11,17 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.errors import Outcome
-from swgjoint.fe.drive2d import left_out
-from swgjoint.fe.fields import root_stress, tooth_forces, wave_generator_contact
+from swgjoint.fe.common.stress_state import stress_state_label
 from swgjoint.fe.meshing_phases import alike, overload, unspread
-from swgjoint.fe.ring import RingModel
-from swgjoint.fe.state import State
-from swgjoint.fe.stress import KINDS, MemberMaxima, StressMaxima
-from swgjoint.fe.stress_state import stress_state_label
-from swgjoint.fe.superelement import Superelement
-from swgjoint.gear.design import Design
+from swgjoint.fe.plane.drive2d import left_out
+from swgjoint.fe.plane.fields import root_stress, tooth_forces, wave_generator_contact
+from swgjoint.fe.plane.ring import RingModel
+from swgjoint.fe.plane.state import State
+from swgjoint.fe.plane.stress import KINDS, MemberMaxima, StressMaxima
+from swgjoint.fe.plane.superelement import Superelement
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.design.tolerances import has_errors
 from swgjoint.gear.mounting import springs_of
-from swgjoint.gear.tolerances import has_errors
 from swgjoint.units import arcsec, deg
 
 Array = NDArray[np.float64]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import pi
 
-from swgjoint.gear.design import Design
+from swgjoint.gear.design.design import Design
 from swgjoint.units import mm
 
 

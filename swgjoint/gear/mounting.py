@@ -18,7 +18,7 @@ and the small turn by which it shifts the pattern over theta, are left out.
 from __future__ import annotations
 
 from swgjoint.gear.cup import cup_torsional_stiffness
-from swgjoint.gear.design import Design, MemberName
+from swgjoint.gear.design.design import Design, MemberName
 
 
 def torque_shares(design: Design) -> dict[MemberName, float]:

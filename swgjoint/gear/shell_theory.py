@@ -15,7 +15,7 @@ from math import pi, sqrt
 
 import numpy as np
 
-from swgjoint.gear.design import Design
+from swgjoint.gear.design.design import Design
 from swgjoint.units import mm
 
 SERIES_SUM = (pi**2 - 8.0) / 16.0

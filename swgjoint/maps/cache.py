@@ -5,8 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import logging
-import os
-import sys
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import lru_cache
@@ -15,12 +13,13 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from swgjoint import __version__
+from swgjoint.code_hash import code_hash
 from swgjoint.errors import InputError, MapFileError
 from swgjoint.json_text import plain
-from swgjoint.kept import json_content, json_file, keep, read_kept
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.file import SCHEMA_VERSION
 from swgjoint.models_path import models_path
+from swgjoint.store import cache_folder, json_content, json_file, keep, read_kept
 
 Found = TypeVar("Found")
 
@@ -32,50 +31,21 @@ _PACKAGES = ("numpy", "scipy", "scikit-fem")
 """Others that compute it."""
 
 
-def cache_folder() -> Path | None:
-    """Folder of the cache: ``SWGJOINT_CACHE``, else the platform's; None if off.
-
-    An empty ``SWGJOINT_CACHE`` switches the cache off.
-    """
-    named = os.environ.get("SWGJOINT_CACHE")
-    if named is not None:
-        return Path(named) if named.strip() else None
-    try:
-        if sys.platform == "darwin":
-            return Path.home() / "Library" / "Caches" / "swgjoint"
-        if sys.platform == "win32":
-            local = os.environ.get("LOCALAPPDATA")
-            base = Path(local) if local else Path.home() / "AppData" / "Local"
-            return base / "swgjoint" / "Cache"
-        # XDG base directories: a relative path is to be ignored
-        xdg = os.environ.get("XDG_CACHE_HOME", "")
-        base = Path(xdg) if os.path.isabs(xdg) else Path.home() / ".cache"
-        return base / "swgjoint"
-    except RuntimeError:  # no home folder
-        return None
-
-
 @lru_cache
 def code_version() -> str:
     """Hash of the code that decides the content of a map, and of its file schema.
 
     With it no map computed by other code is ever taken from the cache, also while the
     package is being changed or after another version of numpy, scipy or scikit-fem was
-    installed.
+    installed. Comments and docstrings do not count.
     """
     used = [f"{name} {version(name)}" for name in _PACKAGES]
     digest = hashlib.sha256(f"{__version__} {SCHEMA_VERSION} {used}".encode())
-    package = Path(__file__).resolve().parents[1]
-    files = [file for part in _CODE for file in _python_files(package / part)]
+    digest.update(code_hash(*_CODE).encode())
     # the catalogue gives a design the ratings that it does not state
-    files += sorted((models_path() / "catalogue").glob("*.csv"))
-    for file in files:
+    for file in sorted((models_path() / "catalogue").glob("*.csv")):
         digest.update(file.name.encode() + b"\0" + file.read_bytes())
     return digest.hexdigest()
-
-
-def _python_files(path: Path) -> list[Path]:
-    return [path] if path.is_file() else sorted(path.rglob("*.py"))
 
 
 def key_of(parts: Mapping[str, Any]) -> str:

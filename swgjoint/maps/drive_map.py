@@ -229,12 +229,12 @@ class DriveMap:
             kinematic_error: CSV file of one output turn without load: ``output_deg``
                 and ``error_arcmin``, output minus ideal output (also ``_rad``).
             **options: ``layout``, ``orders``, ``intervals``, ``damping_ratio``,
-                ``name``; see :mod:`swgjoint.maps.measurement`.
+                ``name``; see :mod:`swgjoint.identify.measurement`.
 
         Raises:
             InputError: If a file or a value cannot be used.
         """
-        from swgjoint.maps.measurement import map_from_measurement
+        from swgjoint.identify.measurement import map_from_measurement
 
         return map_from_measurement(
             path,
@@ -268,7 +268,7 @@ class DriveMap:
         Args:
             only: Keys that are wanted, all for none.
         """
-        from swgjoint.maps.spec_sheet import spec_sheet
+        from swgjoint.maps.sheet.spec_sheet import spec_sheet
 
         return spec_sheet(self, only)
 
@@ -468,7 +468,7 @@ class DriveMap:
         """A copy without the harmonics that a tolerance does not need.
 
         ``info["pruned"]`` lists what was dropped and bounds its effect on output angle,
-        kinematic error and torque; see :mod:`swgjoint.maps.pruning`.
+        kinematic error and torque; see :mod:`swgjoint.maps.fit.pruning`.
 
         Args:
             tolerance_arcmin: Of the output angle at a given torque and input angle.
@@ -476,6 +476,6 @@ class DriveMap:
         Raises:
             InputError: If it is not positive, or no bound follows from the map.
         """
-        from swgjoint.maps.pruning import pruned_map
+        from swgjoint.maps.fit.pruning import pruned_map
 
         return pruned_map(self, tolerance_arcmin * arcmin)

@@ -5,7 +5,7 @@ corners are rounded by parabolas that end on the catalogue's lines (:data:`CORNE
 torque and stiffness are continuous. Two figures that a catalogue states as upper bounds
 are in the map at the bound, with a label that a drive may have less: the hysteresis
 loss and, as the kinematic error of an assumed specimen, the transmission accuracy; see
-:mod:`swgjoint.maps.error_spectrum`. Where losses at speed are stated the map has
+:mod:`swgjoint.maps.fit.error_spectrum`. Where losses at speed are stated the map has
 friction.
 """
 
@@ -20,18 +20,18 @@ from typing import Any, TypeVar
 import numpy as np
 
 from swgjoint.errors import InputError
-from swgjoint.maps.catalogue import CatalogueRow, named_rows
-from swgjoint.maps.catalogue_stated import (
+from swgjoint.gear.catalogue import CatalogueRow, named_rows
+from swgjoint.gear.catalogue_stated import (
     LOSS_KEYS,
     stated_figures,
     stated_losses,
     stiffness_of,
 )
 from swgjoint.maps.drive_map import DriveMap, Ratings
-from swgjoint.maps.error_spectrum import with_assumed_error
-from swgjoint.maps.friction_fit import friction_of_losses
+from swgjoint.maps.fit.error_spectrum import with_assumed_error
+from swgjoint.maps.fit.friction_fit import friction_of_losses
 from swgjoint.maps.hysteresis import Jenkin
-from swgjoint.maps.loop import largest_torque, torque_loop
+from swgjoint.maps.sheet.loop import largest_torque, torque_loop
 from swgjoint.maps.torsion_law import potential_of_stiffness
 from swgjoint.units import arcmin
 
@@ -132,7 +132,7 @@ def with_stated_error(
             transmission accuracy.
         seed: Of the assumed error.
         joint: That the drive is for, see
-            :func:`~swgjoint.maps.error_spectrum.with_assumed_error`.
+            :func:`~swgjoint.maps.fit.error_spectrum.with_assumed_error`.
 
     Raises:
         InputError: If an option is out of range.

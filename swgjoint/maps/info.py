@@ -3,7 +3,7 @@
 A map is sound without its record. So a known key of another kind than this package
 writes is left out with a warning instead of refusing the map, and whoever reads a key
 may rely on its kind. ``validation`` has a reader of its own, see
-:mod:`swgjoint.maps.map_validity`; unknown keys are kept as they are.
+:mod:`swgjoint.maps.sheet.map_validity`; unknown keys are kept as they are.
 """
 
 from __future__ import annotations

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
-from swgjoint.kept import arrays_content, arrays_file, keep, read_kept
-from swgjoint.maps.cache import cache_folder, key_of
+from swgjoint.maps.cache import key_of
+from swgjoint.store import arrays_content, arrays_file, cache_folder, keep, read_kept
 
 FORGOTTEN = 14 * 24 * 3600.0
 """Parts that nobody went on with are removed after this time [s]."""

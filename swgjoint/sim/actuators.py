@@ -10,14 +10,14 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from swgjoint.sim.feature_sections import (
+from swgjoint.sim.figures.transmission import Transmission
+from swgjoint.sim.scene.feature_sections import (
     Disturbance,
     JointPulse,
     JointSine,
     MotorLimits,
     ToolForce,
 )
-from swgjoint.sim.transmission import Transmission
 from swgjoint.units import rpm
 
 if TYPE_CHECKING:

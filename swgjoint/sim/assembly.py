@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from swgjoint.drives.references import check_joint_names, drive_of
 from swgjoint.errors import InputError
 from swgjoint.joint.attach import attach_all
 from swgjoint.joint.fitting import Fitting
@@ -17,18 +18,17 @@ from swgjoint.joint.step_damping import damp_as_asked, is_implicit
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.progress import Progress, silent
 from swgjoint.sim.actuators import Loops, add_actuators
-from swgjoint.sim.commanded import check_motion, trajectory_of
+from swgjoint.sim.arm.payload import arms_of
+from swgjoint.sim.arm.rigid_arm import RigidArm, compile_spec
 from swgjoint.sim.control import control_gains, feedforward, integral_gain
-from swgjoint.sim.drives import check_joint_names, drive_of
-from swgjoint.sim.feature_sections import Disturbance, ToolForce
-from swgjoint.sim.payload import arms_of
-from swgjoint.sim.rigid_arm import RigidArm, compile_spec
+from swgjoint.sim.figures.transmission import Transmission, transmission_of
+from swgjoint.sim.motion.commanded import check_motion, trajectory_of
+from swgjoint.sim.motion.start_check import check_link, check_ranges
+from swgjoint.sim.motion.trajectory import Trajectory
 from swgjoint.sim.run_memory import require_run_memory
-from swgjoint.sim.scene import Scene
-from swgjoint.sim.scene_sections import JointSection
-from swgjoint.sim.start_check import check_link, check_ranges
-from swgjoint.sim.trajectory import Trajectory
-from swgjoint.sim.transmission import Transmission, transmission_of
+from swgjoint.sim.scene.feature_sections import Disturbance, ToolForce
+from swgjoint.sim.scene.scene import Scene
+from swgjoint.sim.scene.sections import JointSection
 
 Array = NDArray[np.float64]
 

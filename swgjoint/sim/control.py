@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from swgjoint.sim.scene_sections import Controller, FeedForward
+from swgjoint.sim.scene.sections import Controller, FeedForward
 
 Array = NDArray[np.float64]
 

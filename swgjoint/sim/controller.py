@@ -43,7 +43,7 @@ class KnownJoints:
 class KnownArm(Protocol):
     """What a controller takes the arm for, without drives.
 
-    :class:`swgjoint.sim.rigid_arm.RigidArm` is one, and
+    :class:`swgjoint.sim.arm.rigid_arm.RigidArm` is one, and
     :class:`swgjoint.control.pinocchio_arm.PinocchioArm`.
     """
 

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from swgjoint.errors import ComputationError, InputError
 from swgjoint.joint.response import responses
-from swgjoint.sim.start_check import touching_at
-from swgjoint.sim.transmission import Transmission
+from swgjoint.sim.figures.transmission import Transmission
+from swgjoint.sim.motion.start_check import touching_at
 
 if TYPE_CHECKING:
     from swgjoint.sim.assembly import Assembly

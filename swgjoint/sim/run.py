@@ -22,13 +22,13 @@ from swgjoint.maps.drive_map import DriveMap
 from swgjoint.progress import Progress, silent
 from swgjoint.sim.actuators import control_inputs, limited, wanted_torque
 from swgjoint.sim.assembly import Assembly, assemble
-from swgjoint.sim.contains import contents
 from swgjoint.sim.controller import Controller, KnownArm
 from swgjoint.sim.equilibrium import set_start
-from swgjoint.sim.metrics import run_metrics
+from swgjoint.sim.figures.contains import contents
+from swgjoint.sim.figures.metrics import run_metrics
 from swgjoint.sim.sampled_loop import GivenLoop, Loop, SampledLoop, run_sampled
-from swgjoint.sim.scene import Scene
-from swgjoint.sim.task import task_of
+from swgjoint.sim.scene.scene import Scene
+from swgjoint.sim.scene.task import task_of
 
 Array = NDArray[np.float64]
 
@@ -119,7 +119,7 @@ class Run:
 
     def to_rerun(self, path: str | Path) -> Path:
         """Write the recording for the rerun viewer; see :mod:`swgjoint.view`."""
-        from swgjoint.view.recording import write_recording
+        from swgjoint.view.recording.recording import write_recording
 
         return write_recording({"": self}, path)
 
@@ -187,7 +187,7 @@ def run_scene(
     name = name or scene.name
     if recording is None:
         return simulate(assembly, name=name, loop=loop, progress=progress)
-    from swgjoint.view.recording import Recorder
+    from swgjoint.view.recording.recording import Recorder
 
     run = None
     with attempting(recording, unless=lambda: run is None):

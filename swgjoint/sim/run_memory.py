@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from swgjoint.memory import require_memory
-from swgjoint.sim.scene import Scene
+from swgjoint.sim.scene.scene import Scene
 
 BYTES = 8
 STEP, STEP_AND_JOINT = 75, 32

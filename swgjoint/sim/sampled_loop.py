@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from swgjoint.errors import ComputationError
 from swgjoint.sim.controller import Controller, Measured, Task
-from swgjoint.sim.feature_sections import Sensor, TorqueSensor
+from swgjoint.sim.scene.feature_sections import Sensor, TorqueSensor
 from swgjoint.units import arcsec
 
 if TYPE_CHECKING:

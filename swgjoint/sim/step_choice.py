@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from swgjoint.gear.design import Design
+from swgjoint.drives.references import find_drive
+from swgjoint.gear.design.design import Design
 from swgjoint.joint.drive import input_orders
 from swgjoint.maps.drive_map import DriveMap
-from swgjoint.sim.commanded import trajectory_of
-from swgjoint.sim.drives import find_drive
-from swgjoint.sim.rigid_arm import RigidArm
-from swgjoint.sim.ripple_validity import SHARE
-from swgjoint.sim.scene import Scene
+from swgjoint.sim.arm.rigid_arm import RigidArm
+from swgjoint.sim.figures.ripple_validity import SHARE
+from swgjoint.sim.motion.commanded import trajectory_of
+from swgjoint.sim.scene.scene import Scene
 
 STEPS = (1e-3, 5e-4, 2.5e-4, 2e-4, 1e-4, 5e-5)
 """Steps to choose from [s]."""
@@ -47,10 +47,10 @@ def resolving_step(scene: Scene, arm: RigidArm) -> float:
 def needed_order(source: DriveMap | Design) -> float:
     """Highest order per input turn that matters for the ripple; 0 without harmonics.
 
-    Its torque, as :mod:`swgjoint.sim.ripple_validity` estimates it, is at least
-    :data:`~swgjoint.sim.ripple_validity.SHARE` of the largest; low orders have less
-    ripple than that estimate, so the sum of all says little. Of a design, whose map is
-    not known yet, the second tooth order.
+    Its torque, as :mod:`swgjoint.sim.figures.ripple_validity` estimates it, is at least
+    :data:`~swgjoint.sim.figures.ripple_validity.SHARE` of the largest; low orders have
+    less ripple than that estimate, so the sum of all says little. Of a design, whose
+    map is not known yet, the second tooth order.
     """
     if isinstance(source, Design):
         return float(TOOTH_ORDERS * source.periodicity)

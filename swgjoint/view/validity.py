@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from swgjoint.errors import SwgError
-from swgjoint.maps.map_validity import map_validation, validation_summary
-from swgjoint.maps.validity_marks import joint_doubt
+from swgjoint.maps.sheet.map_validity import map_validation, validation_summary
+from swgjoint.maps.sheet.validity_marks import joint_doubt
 from swgjoint.sim.run import run_scene
-from swgjoint.sim.scene import Scene
+from swgjoint.sim.scene.scene import Scene
 from swgjoint.units import arcmin, deg
 
 if TYPE_CHECKING:
@@ -140,7 +140,7 @@ def warnings_of(joints: Mapping[str, Any]) -> list[str]:
     """What a reader of the figures must know, one line each.
 
     What takes a run out of its model is in its ``reasons``, see
-    :mod:`swgjoint.sim.verdict`.
+    :mod:`swgjoint.sim.figures.verdict`.
 
     Args:
         joints: Figures of the joints, see :meth:`swgjoint.sim.run.Run.metrics`.

@@ -16,13 +16,13 @@ import sys
 
 import mujoco
 
-from swgjoint.sim.arm_scene import is_arm, scene_of_arm
-from swgjoint.sim.scene import Scene
-from swgjoint.study.advise import advise
-from swgjoint.study.advise_bound import parse_bound
-from swgjoint.study.advise_search import ALIKE
-from swgjoint.study.joint_runs import Setting, attempt, errors
-from swgjoint.study.pool import LocalPool, Lost
+from swgjoint.bench.joint.runs import Setting, attempt, errors
+from swgjoint.explore.advise.advise import advise
+from swgjoint.explore.advise.bound import parse_bound
+from swgjoint.explore.advise.search import ALIKE
+from swgjoint.pool import LocalPool, Lost
+from swgjoint.sim.arm.scene import is_arm, scene_of_arm
+from swgjoint.sim.scene.scene import Scene
 
 CASES = (
     ("ur5e-catalogue", "0.1arcmin", ()),

@@ -36,10 +36,10 @@ from interrupted import (
     stored,
 )
 
-from swgjoint.cli.text import table
-from swgjoint.gear.design import Design
-from swgjoint.kept import arrays_content
+from swgjoint.cli.shared.text import table
+from swgjoint.gear.design.design import Design
 from swgjoint.maps.drive_map import DriveMap
+from swgjoint.store import arrays_content
 
 FEW = {
     "mesh.refinement": 0.5,

@@ -28,7 +28,7 @@ from swgjoint.maps.friction import Friction
 from swgjoint.maps.from_catalogue import three_lines
 from swgjoint.maps.hysteresis import Jenkin
 from swgjoint.maps.torsion_law import potential_of_stiffness
-from swgjoint.sim.rigid_arm import RigidArm
+from swgjoint.sim.arm.rigid_arm import RigidArm
 
 STIFFNESS = (4e4, 4e4, 3e4, 3e4, 1.5e4, 8e3, 8e3)
 """N·m/rad, the size of catalogue drives for the joints of such an arm."""

@@ -18,12 +18,12 @@ from typing import Any
 from swgjoint import __version__
 from swgjoint.fe.meshing import simulate_meshing
 from swgjoint.files import write_whole
-from swgjoint.gear.design import Design
+from swgjoint.gear.catalogue import ratings_of
+from swgjoint.gear.design.design import Design
 from swgjoint.json_text import json_text
-from swgjoint.maps.catalogue import ratings_of
 from swgjoint.progress import StderrProgress
 from swgjoint.units import mm
-from swgjoint.view.solid_plots import contact_forces
+from swgjoint.view.plots.solid import contact_forces
 
 STEPS = 2
 PARTS = {

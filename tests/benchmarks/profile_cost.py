@@ -23,7 +23,7 @@ import numpy as np
 import swgjoint
 from swgjoint.files import write_whole
 from swgjoint.json_text import json_text
-from swgjoint.study.provenance import provenance
+from swgjoint.provenance import provenance
 
 COMMON = """
 import json, time

@@ -17,9 +17,9 @@ from pathlib import Path
 
 import numpy as np
 
-from swgjoint.sim.drives import load_drive
+from swgjoint.drives.references import load_drive
 from swgjoint.sim.run import run_scene
-from swgjoint.sim.scene import Scene
+from swgjoint.sim.scene.scene import Scene
 
 DEFAULT = ("ur5e-sweep", "ur5e-catalogue", "ur5e-circle", "ur5e-payload-step")
 

@@ -16,12 +16,12 @@ import os
 import platform
 import tempfile
 
+from swgjoint.explore.sweep.file import SweepFile
+from swgjoint.explore.sweep.results import place_of
+from swgjoint.explore.sweep.sweep import run_sweep
 from swgjoint.faults import parse_toml, validated
+from swgjoint.pool import LocalPool
 from swgjoint.progress import StderrProgress
-from swgjoint.study.pool import LocalPool
-from swgjoint.study.sweep import run_sweep
-from swgjoint.study.sweep_file import SweepFile
-from swgjoint.study.sweep_results import place_of
 
 WANTED = 0.9
 FILE = """

@@ -16,14 +16,14 @@ from typing import Any
 
 import numpy as np
 
-from swgjoint.fe.tolerance_cycle import MEMBERS, pitches_of, shifted
-from swgjoint.fe.tolerance_rest import influences
-from swgjoint.fe.tolerance_sampling import full_solves
+from swgjoint.fe.tolerances.cycle import MEMBERS, pitches_of, shifted
+from swgjoint.fe.tolerances.rest import influences
+from swgjoint.fe.tolerances.sampling import full_solves
 from swgjoint.files import write_whole
-from swgjoint.gear.design import Design
-from swgjoint.gear.tolerances import tooth_errors
+from swgjoint.gear.catalogue import ratings_of
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.design.tolerances import tooth_errors
 from swgjoint.json_text import json_text
-from swgjoint.maps.catalogue import ratings_of
 
 LINE = (
     "seed {seed:2d} {torque_Nm:4.0f} N·m: full {peak_to_peak_full_urad:.1f} of"

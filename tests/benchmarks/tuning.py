@@ -13,8 +13,8 @@ import argparse
 import json
 from typing import Any
 
-from swgjoint.study.tune import tune
-from swgjoint.study.tune_result import TuneSettings
+from swgjoint.explore.tune.result import TuneSettings
+from swgjoint.explore.tune.tune import tune
 from swgjoint.units import arcmin
 
 

@@ -9,10 +9,12 @@ import pytest
 from messages import names
 from solved import small_cup
 
-from swgjoint.cli import bench, bench_fe, bench_scaling
+from swgjoint.bench.fe import cost as fe_cost
+from swgjoint.bench.fe.cost import Setting
+from swgjoint.bench.scaling import scaling
+from swgjoint.cli import bench
 from swgjoint.cli.main import main
-from swgjoint.study import fe_cost, scaling
-from swgjoint.study.fe_cost import Setting
+from swgjoint.cli.shared import bench_fe, bench_scaling
 
 SMALL = small_cup()
 

@@ -14,14 +14,14 @@ from validation_record import validated_map
 
 from swgjoint.cli.main import main
 from swgjoint.errors import InputError
-from swgjoint.gear.design import Design
+from swgjoint.explore.compare.compare import LOWER, UPPER
+from swgjoint.explore.compare.scene import joints_named, resolved, with_drive
+from swgjoint.gear.design.design import Design
 from swgjoint.models_path import models_path
-from swgjoint.sim.arm_scene import scene_of_arm
-from swgjoint.sim.rigid_arm import RigidArm
+from swgjoint.sim.arm.rigid_arm import RigidArm
+from swgjoint.sim.arm.scene import scene_of_arm
 from swgjoint.sim.run import run_scene
-from swgjoint.sim.scene import Scene
-from swgjoint.study.compare import LOWER, UPPER
-from swgjoint.study.compare_scene import joints_named, resolved, with_drive
+from swgjoint.sim.scene.scene import Scene
 
 SHORT = ["--set", "simulation.duration_s=1.5", "--set", "trajectory.settle_s=0.3"]
 STIFF, SOFT = "CSG-32-100", "CSG-14-100"
@@ -207,11 +207,11 @@ def test_wave_generators_come_out_in_the_known_order(capsys, monkeypatch):
     four rollers at a seventh of their error, has the most of it.
     """
     monkeypatch.setenv("SWGJOINT_CACHE", "")  # coarser maps than the cache may hold
-    monkeypatch.setattr("swgjoint.study.compare.STRESS_POSITIONS", 1)
-    monkeypatch.setattr("swgjoint.fe.sampling.ANGLES", 6)
-    monkeypatch.setattr("swgjoint.fe.sampling.MOST_ANGLES", 6)
-    monkeypatch.setattr("swgjoint.fe.sampling.SOLVES", 84)
-    monkeypatch.setattr("swgjoint.fe.sampling.UNSEEN", (4, 2))
+    monkeypatch.setattr("swgjoint.explore.compare.compare.STRESS_POSITIONS", 1)
+    monkeypatch.setattr("swgjoint.fe.common.sampling.ANGLES", 6)
+    monkeypatch.setattr("swgjoint.fe.common.sampling.MOST_ANGLES", 6)
+    monkeypatch.setattr("swgjoint.fe.common.sampling.SOLVES", 84)
+    monkeypatch.setattr("swgjoint.fe.common.sampling.UNSEEN", (4, 2))
     status = main(["compare", *DRIVES.values(), "--scene", "ur5e-sweep", "--json"])
     rows = json.loads(capsys.readouterr().out)["rows"]
     # maps of six angles are judged by unseen solves: some of them are not valid
@@ -241,11 +241,11 @@ def test_wave_generators_come_out_in_the_known_order(capsys, monkeypatch):
 def test_design_has_a_stress_and_a_picture(tmp_path, capsys, monkeypatch):
     """A design brings its stress; table, picture and report lie in the folder."""
     monkeypatch.setenv("SWGJOINT_CACHE", "")  # a coarser map than the cache may hold
-    monkeypatch.setattr("swgjoint.study.compare.STRESS_POSITIONS", 1)
-    monkeypatch.setattr("swgjoint.fe.sampling.ANGLES", 4)
-    monkeypatch.setattr("swgjoint.fe.sampling.MOST_ANGLES", 4)
-    monkeypatch.setattr("swgjoint.fe.sampling.SOLVES", 56)
-    monkeypatch.setattr("swgjoint.fe.sampling.UNSEEN", (4, 2))
+    monkeypatch.setattr("swgjoint.explore.compare.compare.STRESS_POSITIONS", 1)
+    monkeypatch.setattr("swgjoint.fe.common.sampling.ANGLES", 4)
+    monkeypatch.setattr("swgjoint.fe.common.sampling.MOST_ANGLES", 4)
+    monkeypatch.setattr("swgjoint.fe.common.sampling.SOLVES", 56)
+    monkeypatch.setattr("swgjoint.fe.common.sampling.UNSEEN", (4, 2))
     out = tmp_path / "out"
     path = tmp_path / "design.toml"
     path.write_text(coarse().to_toml(), encoding="utf-8")

@@ -8,9 +8,9 @@ import pytest
 
 from swgjoint.cli.main import main
 from swgjoint.fe.meshing import simulate_meshing
-from swgjoint.fe.solid.masters import Orders
-from swgjoint.gear.design import Design
-from swgjoint.view.solid_plots import contact_forces
+from swgjoint.fe.solid.strip.masters import Orders
+from swgjoint.gear.design.design import Design
+from swgjoint.view.plots.solid import contact_forces
 
 pytestmark = [pytest.mark.fe, pytest.mark.slow]
 
@@ -51,11 +51,11 @@ def test_micro_geometry_shows_with_the_sign_of_the_contact_pattern(
     """Contact leaves the edges: less stress, play, so a lower stiffness from zero."""
     monkeypatch.setenv("SWGJOINT_CACHE", "")  # coarser maps than the cache may hold
     monkeypatch.setattr(Orders.__init__, "__kwdefaults__", ORDERS)
-    monkeypatch.setattr("swgjoint.study.compare.STRESS_POSITIONS", 1)
-    monkeypatch.setattr("swgjoint.fe.sampling.SOLID_ANGLES", 3)
-    monkeypatch.setattr("swgjoint.fe.sampling.SOLID_MOST_ANGLES", 3)
-    monkeypatch.setattr("swgjoint.fe.sampling.SOLID_SOLVES", 12)
-    monkeypatch.setattr("swgjoint.fe.sampling.LEVELS", (0.15, 1.0))
+    monkeypatch.setattr("swgjoint.explore.compare.compare.STRESS_POSITIONS", 1)
+    monkeypatch.setattr("swgjoint.fe.common.sampling.SOLID_ANGLES", 3)
+    monkeypatch.setattr("swgjoint.fe.common.sampling.SOLID_MOST_ANGLES", 3)
+    monkeypatch.setattr("swgjoint.fe.common.sampling.SOLID_SOLVES", 12)
+    monkeypatch.setattr("swgjoint.fe.common.sampling.LEVELS", (0.15, 1.0))
     runs = []
     monkeypatch.setattr(
         "swgjoint.fe.meshing.simulate_meshing",

@@ -9,9 +9,9 @@ import pytest
 from messages import names
 
 from swgjoint.cli.main import main
-from swgjoint.gear.design import Design
-from swgjoint.gear.profile import tooth_profile
-from swgjoint.gear.wave_generator import wave_generator
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.teeth.profile import tooth_profile
+from swgjoint.gear.wave_generators.wave_generator import wave_generator
 from swgjoint.models_path import bundled_names
 
 LAYERS = ("flexspline", "circular_spline", "wave_generator")
@@ -77,7 +77,7 @@ def test_all_presets_in_one_call(capsys, chosen):
 
 def test_check_finds_what_show_draws(capsys):
     """Clearance of the rigid flanks, the number that goes with the picture."""
-    from swgjoint.gear.tooth_path import tooth_path
+    from swgjoint.gear.teeth.tooth_path import tooth_path
 
     least = tooth_path(Design.preset("size-25-100")).smallest_clearance * 1e6
     assert least < 0.0
@@ -91,7 +91,7 @@ def test_check_finds_what_show_draws(capsys):
 
 def test_round_off_is_shown_where_it_fails(tmp_path, capsys, monkeypatch):
     """Gaps of 1e-15 mm are no lines of the table, unless they are too large."""
-    from swgjoint.gear import feasibility
+    from swgjoint.gear.design import feasibility
 
     def lines():
         main(["design", "check", "reference-2d-four-roller"])
@@ -235,8 +235,8 @@ def test_show_writes_a_picture(name, tmp_path, capsys):
 
 def test_show_tells_the_passage_of_a_rigid_tooth(tmp_path, capsys):
     """Numbers of the tooth path as the function gives them, or why there are none."""
-    from swgjoint.gear.design import Design
-    from swgjoint.gear.tooth_path import tooth_path
+    from swgjoint.gear.design.design import Design
+    from swgjoint.gear.teeth.tooth_path import tooth_path
 
     _, result, _ = outcome(capsys, "show", "reference-2d", "--out", str(tmp_path))
     path = tooth_path(Design.load("reference-2d"))

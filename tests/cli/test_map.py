@@ -14,7 +14,7 @@ from swgjoint.cli.main import main
 from swgjoint.fe import build_map as builder
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.file import map_bytes
-from swgjoint.maps.map_validity import NOT_VALIDATED
+from swgjoint.maps.sheet.map_validity import NOT_VALIDATED
 
 
 @pytest.fixture

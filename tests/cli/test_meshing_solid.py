@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from swgjoint.cli.main import main
-from swgjoint.gear.design import Design
-from swgjoint.view.solid_plots import magnification, outline
+from swgjoint.gear.design.design import Design
+from swgjoint.view.plots.solid import magnification, outline
 
 pytestmark = pytest.mark.fe
 

@@ -11,7 +11,7 @@ from messages import names
 
 from swgjoint.cli.main import main
 from swgjoint.cli.optimise import _best
-from swgjoint.gear.design import Design
+from swgjoint.gear.design.design import Design
 
 pytest.importorskip("optuna", reason="needs swgjoint[tune]")
 

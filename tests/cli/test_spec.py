@@ -11,25 +11,26 @@ from messages import names
 from validation_record import validated_map
 
 from swgjoint.cli.main import main
+from swgjoint.drives.references import load_drive
 from swgjoint.errors import DesignError, Outcome
 from swgjoint.fe import build_map as builder
-from swgjoint.fe import ratcheting, ring_running
-from swgjoint.fe.ratcheting import RatchetingPath
-from swgjoint.fe.ring_running import RunningFriction
-from swgjoint.fe.solid import spec_figures
-from swgjoint.fe.solid.fatigue import Fatigue, Limits, SectionFatigue
-from swgjoint.fe.solid.radial_stiffness import RadialStiffness
-from swgjoint.gear.design import Design
+from swgjoint.fe.plane import ratcheting
+from swgjoint.fe.plane.ratcheting import RatchetingPath
+from swgjoint.fe.rings import running as ring_running
+from swgjoint.fe.rings.running import RunningFriction
+from swgjoint.fe.solid.figures import spec_figures
+from swgjoint.fe.solid.figures.fatigue import Fatigue, Limits, SectionFatigue
+from swgjoint.fe.solid.figures.radial_stiffness import RadialStiffness
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.design.tolerances import has_errors
 from swgjoint.gear.shell_theory import (
     SafetyFactor,
     ShellDimensions,
     shell_safety_factor,
 )
-from swgjoint.gear.tolerances import has_errors
 from swgjoint.maps.drive_map import DriveMap
-from swgjoint.maps.loop import torque_loop
-from swgjoint.maps.map_validity import NOT_VALIDATED
-from swgjoint.sim.drives import load_drive
+from swgjoint.maps.sheet.loop import torque_loop
+from swgjoint.maps.sheet.map_validity import NOT_VALIDATED
 from swgjoint.units import arcmin
 
 CONTRACT = (

@@ -9,8 +9,8 @@ from messages import names
 
 from swgjoint.cli.main import main
 from swgjoint.cli.study import report
-from swgjoint.study import thesis
-from swgjoint.study.record import RunRecord
+from swgjoint.validation.thesis import thesis
+from swgjoint.validation.thesis.record import RunRecord
 
 KEYS = {"case", "quantity", "unit", "source_value", "ours", "converged", "reason"}
 

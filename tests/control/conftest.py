@@ -7,7 +7,7 @@ import pytest
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.controller import Controller
 from swgjoint.sim.run import Run, run_scene
-from swgjoint.sim.scene import Scene
+from swgjoint.sim.scene.scene import Scene
 
 
 @pytest.fixture(scope="session")

@@ -14,7 +14,7 @@ from swgjoint.errors import ComputationError
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.controller import KnownJoints, Task
 from swgjoint.sim.run import run_scene
-from swgjoint.sim.scene import Scene
+from swgjoint.sim.scene.scene import Scene
 from swgjoint.units import arcmin
 
 K, C, JM, JL, LOAD = 2e4, 8.0, 1e-4, 1.0, 20.0

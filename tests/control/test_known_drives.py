@@ -12,9 +12,9 @@ from swgjoint.control.motor_side import MotorPID, rigid_plan
 from swgjoint.joint.prescribed import error_of_motor
 from swgjoint.sim.assembly import assemble
 from swgjoint.sim.run import run_scene
-from swgjoint.sim.scene import Scene
-from swgjoint.sim.scene_sections import LEVELS
-from swgjoint.sim.task import task_of
+from swgjoint.sim.scene.scene import Scene
+from swgjoint.sim.scene.sections import LEVELS
+from swgjoint.sim.scene.task import task_of
 from swgjoint.units import arcmin
 
 SCENE = {

@@ -18,10 +18,10 @@ from swgjoint.control.mpc_solver import prepare, solve
 from swgjoint.errors import InputError
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.hysteresis import Jenkin
+from swgjoint.sim.arm.rigid_arm import RigidArm
 from swgjoint.sim.controller import KnownJoints, Measured, Task
-from swgjoint.sim.rigid_arm import RigidArm
 from swgjoint.sim.run import run_scene
-from swgjoint.sim.scene import Scene
+from swgjoint.sim.scene.scene import Scene
 from swgjoint.units import arcmin
 
 SHOULDER = TwoMass(

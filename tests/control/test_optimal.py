@@ -14,7 +14,7 @@ from swgjoint.control.symbolic_arm import symbolic_arm
 from swgjoint.errors import ComputationError, InputError
 from swgjoint.joint.attach import attach
 from swgjoint.maps.drive_map import DriveMap
-from swgjoint.sim.rigid_arm import RigidArm
+from swgjoint.sim.arm.rigid_arm import RigidArm
 
 INERTIA = 4e-5
 DURATION = 0.5

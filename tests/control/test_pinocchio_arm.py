@@ -15,9 +15,9 @@ from swgjoint.control.pinocchio_arm import PinocchioArm
 from swgjoint.errors import InputError, MissingExtraError
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.models_path import bundled_names
-from swgjoint.sim.rigid_arm import RigidArm
+from swgjoint.sim.arm.rigid_arm import RigidArm
 from swgjoint.sim.run import run_scene
-from swgjoint.sim.scene import Scene
+from swgjoint.sim.scene.scene import Scene
 
 SCENE = {
     "name": "known",

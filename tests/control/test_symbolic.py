@@ -144,8 +144,8 @@ def test_forces_of_a_map_of_finite_elements(toleranced_map, layout, lossy):
 @pytest.fixture(scope="module")
 def toleranced_map() -> DriveMap:
     """Of a coarse drive: any map with all these parts will do."""
-    from swgjoint.fe.sampling import sample_map
-    from swgjoint.maps.fit import fit_map
+    from swgjoint.fe.common.sampling import sample_map
+    from swgjoint.maps.fit.fit import fit_map
 
     errors = {"tolerances.circular_spline_cumulative_pitch_um": 10.0}
     return kept(

@@ -11,7 +11,7 @@ from swgjoint.control.symbolic_arm import inertia_of, inverse_dynamics, symbolic
 from swgjoint.errors import InputError
 from swgjoint.joint.attach import attach
 from swgjoint.models_path import bundled_names
-from swgjoint.sim.rigid_arm import RigidArm
+from swgjoint.sim.arm.rigid_arm import RigidArm
 
 ARMS = bundled_names("arms", ".xml")
 

@@ -11,7 +11,7 @@ from swgjoint.envs.arm_tracking import ArmTrackingEnv
 from swgjoint.errors import InputError
 from swgjoint.models_path import models_path
 from swgjoint.sim.run import run_scene
-from swgjoint.sim.scene import Scene
+from swgjoint.sim.scene.scene import Scene
 from swgjoint.units import arcmin
 
 

@@ -10,7 +10,7 @@ from swgjoint.envs.references import KINDS, draw_motion
 from swgjoint.envs.specimen import drive_of_environment
 from swgjoint.errors import InputError
 from swgjoint.maps.drive_map import DriveMap
-from swgjoint.maps.error_spectrum import peak_to_peak
+from swgjoint.maps.fit.error_spectrum import peak_to_peak
 from swgjoint.units import arcmin
 
 TIME = np.arange(2001) * 1e-3

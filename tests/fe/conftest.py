@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 from solved import coarse, kept
 
-from swgjoint.fe.sampling import sample_map
-from swgjoint.fe.tolerance_rest import influences
+from swgjoint.fe.common.sampling import sample_map
+from swgjoint.fe.tolerances.rest import influences
 
 
 @pytest.fixture(scope="session")

@@ -5,11 +5,11 @@ from __future__ import annotations
 import pytest
 from solved import coarse
 
-from swgjoint.fe.continuation import Continuation
-from swgjoint.fe.drive2d import ring_model
 from swgjoint.fe.meshing import simulate_meshing
-from swgjoint.gear.backlash import initial_rotation
-from swgjoint.gear.design import Design
+from swgjoint.fe.plane.continuation import Continuation
+from swgjoint.fe.plane.drive2d import ring_model
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.teeth.backlash import initial_rotation
 
 
 def loose(coefficient: float, **changes) -> Design:

@@ -9,11 +9,11 @@ import pytest
 from solved import few_teeth, kept
 
 from swgjoint.errors import Outcome
-from swgjoint.fe import pattern, sampling
-from swgjoint.fe.sampling import effort_of, sample_map
-from swgjoint.fe.torque_columns import BEYOND
-from swgjoint.maps.catalogue import ratings_of
-from swgjoint.maps.fit import fit_map
+from swgjoint.fe.common import pattern, sampling
+from swgjoint.fe.common.sampling import effort_of, sample_map
+from swgjoint.fe.common.torque_columns import BEYOND
+from swgjoint.gear.catalogue import ratings_of
+from swgjoint.maps.fit.fit import fit_map
 
 pytestmark = pytest.mark.fe
 ANGLES = 6

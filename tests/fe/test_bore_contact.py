@@ -5,12 +5,12 @@ from math import pi
 import numpy as np
 import pytest
 
-from swgjoint.fe import linearise
-from swgjoint.fe.bore_contact import DEPTH, NARROW_POINTS, BoreStations
-from swgjoint.fe.continuation import Continuation
-from swgjoint.fe.corotation import rotate
-from swgjoint.fe.drive2d import ring_model
-from swgjoint.gear.design import Design
+from swgjoint.fe.plane import linearise
+from swgjoint.fe.plane.bore_contact import DEPTH, NARROW_POINTS, BoreStations
+from swgjoint.fe.plane.continuation import Continuation
+from swgjoint.fe.plane.corotation import rotate
+from swgjoint.fe.plane.drive2d import ring_model
+from swgjoint.gear.design.design import Design
 
 RADIUS, STEP = 0.03, 0.01
 """Of a circle of nodes [m] and the angle between them [rad]."""

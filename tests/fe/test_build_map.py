@@ -11,14 +11,15 @@ from solved import coarse, few_teeth
 
 from swgjoint.errors import ComputationError
 from swgjoint.fe import build_map as building
-from swgjoint.fe import sampling, tolerance_sampling
 from swgjoint.fe.build_map import build_map
-from swgjoint.fe.pattern import with_mirrored_torques
-from swgjoint.fe.sampling import sample_map
-from swgjoint.fe.tolerance_sampling import sample_tolerances
-from swgjoint.gear.design import Design
+from swgjoint.fe.common import sampling
+from swgjoint.fe.common.pattern import with_mirrored_torques
+from swgjoint.fe.common.sampling import sample_map
+from swgjoint.fe.tolerances import sampling as tolerance_sampling
+from swgjoint.fe.tolerances.sampling import sample_tolerances
+from swgjoint.gear.design.design import Design
 from swgjoint.maps.file import map_bytes
-from swgjoint.maps.fit import fit_map
+from swgjoint.maps.fit.fit import fit_map
 from swgjoint.maps.unfinished import Unfinished
 
 LAYOUTS = ("circular_spline_fixed", "flexspline_fixed", "wave_generator_fixed")

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from scipy.sparse.linalg import spsolve
 
-from swgjoint.fe.circular_spline import FlankSplines
-from swgjoint.fe.continuation import Continuation
-from swgjoint.fe.drive2d import ring_model
-from swgjoint.fe.elasticity import plane_basis, stiffness_matrix
-from swgjoint.gear.design import Design
+from swgjoint.fe.plane.circular_spline import FlankSplines
+from swgjoint.fe.plane.continuation import Continuation
+from swgjoint.fe.plane.drive2d import ring_model
+from swgjoint.fe.plane.elasticity import plane_basis, stiffness_matrix
+from swgjoint.gear.design.design import Design
 
 
 @cache

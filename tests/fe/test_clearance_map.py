@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from solved import FEW_PITCH, FEW_TEETH, few_teeth, kept
 
-from swgjoint.fe.clearance import across_clearance
-from swgjoint.fe.sampling import sample_map
+from swgjoint.fe.common.clearance import across_clearance
+from swgjoint.fe.common.sampling import sample_map
 from swgjoint.maps.equilibrium import output_angle
-from swgjoint.maps.fit import fit_map
-from swgjoint.maps.loop import torque_loop
+from swgjoint.maps.fit.fit import fit_map
+from swgjoint.maps.sheet.loop import torque_loop
 
 pytestmark = pytest.mark.fe
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from messages import naming
 
-from swgjoint.fe.contact_changes import ContactChanges, Steps
+from swgjoint.fe.common.contact_changes import ContactChanges, Steps
 
 LOW, HIGH = 10.0, 30.0
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from swgjoint.fe.contact_patch import PATCH_PARTS, averaged_spline
-from swgjoint.fe.continuation import Continuation
-from swgjoint.fe.drive2d import ring_model
-from swgjoint.gear.design import Design
+from swgjoint.fe.common.contact_patch import PATCH_PARTS, averaged_spline
+from swgjoint.fe.plane.continuation import Continuation
+from swgjoint.fe.plane.drive2d import ring_model
+from swgjoint.gear.design.design import Design
 
 STATIONS = np.linspace(0.3e-3, 2.2e-3, 21)
 

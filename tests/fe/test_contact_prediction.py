@@ -9,15 +9,21 @@ import numpy as np
 import pytest
 from solved import coarse
 
-from swgjoint.fe.condensed_ring import ALIKE, REACH, CondensedRing, Supports, distinct
-from swgjoint.fe.continuation import Continuation
-from swgjoint.fe.corotation import turned
-from swgjoint.fe.linearise import linearise
-from swgjoint.fe.sampling import follower_in_plane
-from swgjoint.fe.state import State
-from swgjoint.fe.tooth_contact import Contacts
-from swgjoint.gear.design import Design
-from swgjoint.maps.catalogue import ratings_of
+from swgjoint.fe.common.sampling import follower_in_plane
+from swgjoint.fe.plane.condensed_ring import (
+    ALIKE,
+    REACH,
+    CondensedRing,
+    Supports,
+    distinct,
+)
+from swgjoint.fe.plane.continuation import Continuation
+from swgjoint.fe.plane.corotation import turned
+from swgjoint.fe.plane.linearise import linearise
+from swgjoint.fe.plane.state import State
+from swgjoint.fe.plane.tooth_contact import Contacts
+from swgjoint.gear.catalogue import ratings_of
+from swgjoint.gear.design.design import Design
 
 pytestmark = pytest.mark.fe
 

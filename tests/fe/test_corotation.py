@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from swgjoint.fe.corotation import (
+from swgjoint.fe.plane.corotation import (
     elastic_energy,
     elastic_force,
     projected,
@@ -13,9 +13,9 @@ from swgjoint.fe.corotation import (
     sector_frames,
     tangent,
 )
-from swgjoint.fe.drive2d import ring_model
-from swgjoint.fe.elasticity import plane_basis
-from swgjoint.gear.design import Design
+from swgjoint.fe.plane.drive2d import ring_model
+from swgjoint.fe.plane.elasticity import plane_basis
+from swgjoint.gear.design.design import Design
 
 
 @pytest.fixture(scope="module")

@@ -10,16 +10,16 @@ from scipy.sparse.linalg import spsolve
 from skfem import Basis, FacetBasis, Functional, LinearForm, MeshQuad, condense
 from skfem.helpers import eye, sym_grad, trace
 
-from swgjoint.fe.elasticity import (
+from swgjoint.fe.plane.elasticity import (
     in_plane_constants,
     nodal_stress_operator,
     plane_basis,
     stiffness_matrix,
     stress_maxima,
 )
-from swgjoint.fe.sector_mesh import sector_mesh
-from swgjoint.gear.design import Design
-from swgjoint.gear.profile import tooth_profile
+from swgjoint.fe.plane.sector_mesh import sector_mesh
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.teeth.profile import tooth_profile
 
 E, NU, WIDTH = 210e9, 0.29, 0.01
 

@@ -10,7 +10,7 @@ from strips import open_gaps
 
 from swgjoint.errors import ComputationError, Outcome
 from swgjoint.fe.meshing import simulate_meshing
-from swgjoint.gear.design import Design
+from swgjoint.gear.design.design import Design
 
 
 def teeth(flexspline: int, rim: float = 1.0) -> dict:

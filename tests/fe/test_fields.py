@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from solved import kept
 
-from swgjoint.fe.corotation import rotate, turned
-from swgjoint.fe.elasticity import stress_maxima
-from swgjoint.fe.fields import (
+from swgjoint.fe.meshing import simulate_meshing
+from swgjoint.fe.plane.corotation import rotate, turned
+from swgjoint.fe.plane.elasticity import stress_maxima
+from swgjoint.fe.plane.fields import (
     circular_spline_field,
     flexspline_field,
     root_stress,
@@ -19,9 +20,8 @@ from swgjoint.fe.fields import (
     tooth_forces,
     wave_generator_contact,
 )
-from swgjoint.fe.meshing import simulate_meshing
-from swgjoint.fe.stress import flexspline_stress
-from swgjoint.gear.design import Design
+from swgjoint.fe.plane.stress import flexspline_stress
+from swgjoint.gear.design.design import Design
 from swgjoint.units import deg
 
 TORQUE = -20.0

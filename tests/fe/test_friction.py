@@ -11,11 +11,11 @@ from messages import naming
 from solved import PITCH, coarse, kept
 
 from swgjoint.errors import DesignError
-from swgjoint.fe.continuation import Continuation
-from swgjoint.fe.drive2d import ring_model
-from swgjoint.fe.linearise import linearise
 from swgjoint.fe.meshing import simulate_meshing
-from swgjoint.gear.design import Design
+from swgjoint.fe.plane.continuation import Continuation
+from swgjoint.fe.plane.drive2d import ring_model
+from swgjoint.fe.plane.linearise import linearise
+from swgjoint.gear.design.design import Design
 
 
 def rubbing(coefficient: float = 0.1, **changes) -> Design:

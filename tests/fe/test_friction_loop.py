@@ -12,13 +12,13 @@ from solved import kept
 
 import swgjoint.fe.build_map as building
 from swgjoint.errors import ComputationError
-from swgjoint.fe import friction_loop
-from swgjoint.fe.continuation import Continuation
-from swgjoint.fe.drive2d import ring_model
-from swgjoint.fe.friction_loop import FIRST_STEPS, friction_loops, loop_torques
-from swgjoint.fe.sampling import sample_map
-from swgjoint.gear.design import Design
-from swgjoint.maps.fit import fit_map
+from swgjoint.fe.common.sampling import sample_map
+from swgjoint.fe.plane import friction_loop
+from swgjoint.fe.plane.continuation import Continuation
+from swgjoint.fe.plane.drive2d import ring_model
+from swgjoint.fe.plane.friction_loop import FIRST_STEPS, friction_loops, loop_torques
+from swgjoint.gear.design.design import Design
+from swgjoint.maps.fit.fit import fit_map
 from swgjoint.maps.unfinished import Unfinished
 
 TOP = 40.0

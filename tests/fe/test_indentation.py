@@ -19,9 +19,8 @@ from skfem import (
 from skfem.helpers import ddot, sym_grad, trace
 from solved import coarse
 
-from swgjoint.fe.contact_patch import half_length
-from swgjoint.fe.drive2d import ring_model, sector
-from swgjoint.fe.indentation import (
+from swgjoint.fe.common.contact_patch import half_length
+from swgjoint.fe.common.indentation import (
     CENTRE_OVER_PATCH,
     Indentation,
     Strips,
@@ -29,11 +28,12 @@ from swgjoint.fe.indentation import (
     softness_of,
     strain_energy,
 )
-from swgjoint.fe.sampling import follower_in_plane
-from swgjoint.fe.sector_mesh import sector_mesh
-from swgjoint.fe.tooth_contact import Contacts
-from swgjoint.gear.design import Design
-from swgjoint.gear.profile import tooth_profile
+from swgjoint.fe.common.sampling import follower_in_plane
+from swgjoint.fe.plane.drive2d import ring_model, sector
+from swgjoint.fe.plane.sector_mesh import sector_mesh
+from swgjoint.fe.plane.tooth_contact import Contacts
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.teeth.profile import tooth_profile
 from swgjoint.units import mm
 
 LAW = Indentation(softness=6e-10, patch=1.4e-4, radius=1.2e-3)

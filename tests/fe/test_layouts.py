@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from solved import coarse
 
-from swgjoint.fe.continuation import Continuation
-from swgjoint.fe.drive2d import ring_model
 from swgjoint.fe.meshing import simulate_meshing
-from swgjoint.gear.design import Design
+from swgjoint.fe.plane.continuation import Continuation
+from swgjoint.fe.plane.drive2d import ring_model
+from swgjoint.gear.design.design import Design
 
 TORQUE = 20.0
 LAYOUTS = {

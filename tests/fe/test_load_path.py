@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from messages import naming
 
-from swgjoint.fe.contact_changes import ContactChanges
-from swgjoint.fe.load_path import CHANCE, LoadPath
+from swgjoint.fe.common.contact_changes import ContactChanges
+from swgjoint.fe.common.load_path import CHANCE, LoadPath
 
 ERROR, ENERGY, COMPLIANCE = 1e-4, 1e-3, 6e-5
 

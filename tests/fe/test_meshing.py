@@ -13,16 +13,16 @@ from solved import coarse, kept
 from strips import open_gaps
 
 from swgjoint.errors import DesignError
-from swgjoint.fe.continuation import Continuation
-from swgjoint.fe.corotation import elastic_energy
-from swgjoint.fe.cyclic import CyclicFactor
-from swgjoint.fe.drive2d import left_out, ring_model
-from swgjoint.fe.indentation import Strips
-from swgjoint.fe.linearise import linearise
+from swgjoint.fe.common.cyclic import CyclicFactor
+from swgjoint.fe.common.indentation import Strips
 from swgjoint.fe.meshing import simulate_meshing
-from swgjoint.fe.stress import circular_spline_stress, flexspline_stress
+from swgjoint.fe.plane.continuation import Continuation
+from swgjoint.fe.plane.corotation import elastic_energy
+from swgjoint.fe.plane.drive2d import left_out, ring_model
+from swgjoint.fe.plane.linearise import linearise
+from swgjoint.fe.plane.stress import circular_spline_stress, flexspline_stress
 from swgjoint.gear.cup import cup_torsional_stiffness
-from swgjoint.gear.design import Design
+from swgjoint.gear.design.design import Design
 
 TORQUE = 20.0
 PITCH = 2 * pi / 122

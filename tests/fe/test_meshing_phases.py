@@ -17,7 +17,7 @@ from swgjoint.fe.meshing_phases import (
     spreading_steps,
     spreads,
 )
-from swgjoint.gear.design import Design
+from swgjoint.gear.design.design import Design
 
 
 def drive(teeth: int, layout: str = "circular_spline_fixed") -> Design:

@@ -11,13 +11,13 @@ from messages import naming
 from solved import coarse
 
 from swgjoint.errors import DesignError
-from swgjoint.fe.continuation import Continuation
-from swgjoint.fe.drive2d import ring_model
+from swgjoint.fe.common.sampling import sample_map
 from swgjoint.fe.meshing import simulate_meshing
-from swgjoint.fe.sampling import sample_map
-from swgjoint.gear.design import Design
+from swgjoint.fe.plane.continuation import Continuation
+from swgjoint.fe.plane.drive2d import ring_model
+from swgjoint.gear.design.design import Design
 from swgjoint.gear.mounting import series_compliance, torque_shares
-from swgjoint.maps.fit import fit_map
+from swgjoint.maps.fit.fit import fit_map
 
 TORQUE = 20.0
 LAYOUTS = ("circular_spline_fixed", "flexspline_fixed", "wave_generator_fixed")

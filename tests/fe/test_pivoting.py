@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from swgjoint.fe import pivoting
-from swgjoint.fe.pivoting import solve_active, solve_many
+from swgjoint.fe.common import pivoting
+from swgjoint.fe.common.pivoting import solve_active, solve_many
 
 
 def problems(seed: int, size: int = 40, count: int = 100):

@@ -12,18 +12,18 @@ from messages import naming
 
 from swgjoint.errors import DesignError
 from swgjoint.fe.build_map import build_map
-from swgjoint.fe.continuation import Continuation
-from swgjoint.fe.corotation import turned
-from swgjoint.fe.drive2d import can_halve, carries_bearing, left_out, ring_model
-from swgjoint.fe.equilibrium import Load
-from swgjoint.fe.linearise import linearise
+from swgjoint.fe.common.sampling import on_bearing
 from swgjoint.fe.meshing import simulate_meshing
-from swgjoint.fe.race import PlaneRace
-from swgjoint.fe.sampling import on_bearing
-from swgjoint.fe.thin_ring.loading import loaded, unloaded
-from swgjoint.fe.thin_ring.model import thin_ring
-from swgjoint.gear.ball_bearing import BallBearing
-from swgjoint.gear.design import Design
+from swgjoint.fe.plane.continuation import Continuation
+from swgjoint.fe.plane.corotation import turned
+from swgjoint.fe.plane.drive2d import can_halve, carries_bearing, left_out, ring_model
+from swgjoint.fe.plane.equilibrium import Load
+from swgjoint.fe.plane.linearise import linearise
+from swgjoint.fe.plane.race import PlaneRace
+from swgjoint.fe.rings.loading import loaded, unloaded
+from swgjoint.fe.rings.model import thin_ring
+from swgjoint.gear.bearing.ball_bearing import BallBearing
+from swgjoint.gear.design.design import Design
 
 TORQUE = 20.0
 PITCH = 2.0 * pi / 42

@@ -9,8 +9,8 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from swgjoint.errors import Outcome
-from swgjoint.fe.ratcheting import RatchetingPath, ratcheting_path
-from swgjoint.gear.design import Design
+from swgjoint.fe.plane.ratcheting import RatchetingPath, ratcheting_path
+from swgjoint.gear.design.design import Design
 
 OVAL = {"circular_spline.outer_rim": "free", "mesh.refinement": 0.6}
 """A circular spline whose outside can become oval, as thick as stated below."""

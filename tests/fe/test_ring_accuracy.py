@@ -10,9 +10,9 @@ from messages import naming
 from solved import hundred_elements
 
 from swgjoint.errors import ComputationError, Outcome
-from swgjoint.fe import ring_accuracy
-from swgjoint.fe.ring_accuracy import over_output_turn, transmission_error
-from swgjoint.gear.design import Design
+from swgjoint.fe.rings import accuracy as ring_accuracy
+from swgjoint.fe.rings.accuracy import over_output_turn, transmission_error
+from swgjoint.gear.design.design import Design
 from swgjoint.units import arcmin
 
 PERFECT = Design.preset("size-25-50")

@@ -8,11 +8,11 @@ from messages import naming
 from solved import hundred_elements
 
 from swgjoint.errors import InputError, Outcome
-from swgjoint.fe.ring_friction import RubbedPath, rubbed_path
-from swgjoint.fe.thin_ring.loading import loaded, unloaded
-from swgjoint.fe.thin_ring.model import thin_ring
-from swgjoint.fe.thin_ring.sliding import weighted_median
-from swgjoint.gear.design import Design
+from swgjoint.fe.rings.friction import RubbedPath, rubbed_path
+from swgjoint.fe.rings.loading import loaded, unloaded
+from swgjoint.fe.rings.model import thin_ring
+from swgjoint.fe.rings.sliding import weighted_median
+from swgjoint.gear.design.design import Design
 
 ANGLES = [0.3]
 TORQUES = [20.0, 40.0, 80.0]

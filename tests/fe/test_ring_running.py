@@ -8,17 +8,17 @@ from messages import naming
 from solved import hundred_elements
 
 from swgjoint.errors import DesignError
-from swgjoint.fe import ring_running
-from swgjoint.fe.corotation import rotate, turned
-from swgjoint.fe.ring_running import STEP, RunningFriction, running_friction
-from swgjoint.fe.thin_ring import model as rings
-from swgjoint.fe.thin_ring.contacts import linearised, race_on_balls
-from swgjoint.fe.thin_ring.equilibrium import RingSolver, rim_rotation
-from swgjoint.fe.thin_ring.facing import facing
-from swgjoint.fe.thin_ring.loading import loaded, positions, without_torque
-from swgjoint.fe.thin_ring.model import thin_ring
-from swgjoint.fe.thin_ring.sliding import weighted_median
-from swgjoint.gear.design import Design
+from swgjoint.fe.plane.corotation import rotate, turned
+from swgjoint.fe.rings import model as rings
+from swgjoint.fe.rings import running as ring_running
+from swgjoint.fe.rings.contacts import linearised, race_on_balls
+from swgjoint.fe.rings.equilibrium import RingSolver, rim_rotation
+from swgjoint.fe.rings.facing import facing
+from swgjoint.fe.rings.loading import loaded, positions, without_torque
+from swgjoint.fe.rings.model import thin_ring
+from swgjoint.fe.rings.running import STEP, RunningFriction, running_friction
+from swgjoint.fe.rings.sliding import weighted_median
+from swgjoint.gear.design.design import Design
 
 ANGLE = 0.3
 ANCHOR = RingSolver().anchor

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from swgjoint.fe.sector_mesh import sector_mesh
-from swgjoint.fe.solid.strip_mesh import flexspline_strip
-from swgjoint.gear.design import Design
-from swgjoint.gear.profile import tooth_profile
+from swgjoint.fe.plane.sector_mesh import sector_mesh
+from swgjoint.fe.solid.strip.mesh import flexspline_strip
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.teeth.profile import tooth_profile
 
 
 def test_mesh_of_the_thesis():

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from solved import PITCH, coarse
 
-from swgjoint.fe.continuation import Continuation
-from swgjoint.fe.drive2d import ring_model
-from swgjoint.fe.fields import flexspline_field
-from swgjoint.fe.shape_fields import plane_surface
+from swgjoint.fe.plane.continuation import Continuation
+from swgjoint.fe.plane.drive2d import ring_model
+from swgjoint.fe.plane.fields import flexspline_field
+from swgjoint.fe.plane.shape_fields import plane_surface
 
 
 @pytest.fixture(scope="module")

@@ -5,8 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from swgjoint.fe.complementarity import ActiveSetError, _least_squares, solve_mixed
-from swgjoint.fe.cyclic import CyclicFactor
+from swgjoint.fe.common.complementarity import (
+    ActiveSetError,
+    _least_squares,
+    solve_mixed,
+)
+from swgjoint.fe.common.cyclic import CyclicFactor
 
 
 @pytest.mark.parametrize("sectors", [2, 3, 4, 7, 60])

@@ -8,13 +8,17 @@ import numpy as np
 import pytest
 from skfem import MeshQuad
 
-from swgjoint.fe.continuation import Continuation
-from swgjoint.fe.drive2d import ring_model, sector
-from swgjoint.fe.stress import circular_spline_stress, flexspline_stress
-from swgjoint.fe.stress_state import confinement, second_moment, stress_state_label
-from swgjoint.fe.thin_ring.sections import rim_section
-from swgjoint.gear.design import Design
-from swgjoint.gear.profile import tooth_profile
+from swgjoint.fe.common.stress_state import (
+    confinement,
+    second_moment,
+    stress_state_label,
+)
+from swgjoint.fe.plane.continuation import Continuation
+from swgjoint.fe.plane.drive2d import ring_model, sector
+from swgjoint.fe.plane.stress import circular_spline_stress, flexspline_stress
+from swgjoint.fe.rings.sections import rim_section
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.teeth.profile import tooth_profile
 
 KINDS = ("plane_stress", "auto", "plane_strain")
 

@@ -9,13 +9,13 @@ import pytest
 from messages import naming
 from solved import coarse
 
-from swgjoint.fe.continuation import Continuation
-from swgjoint.fe.drive2d import ring_model
-from swgjoint.fe.tolerance_cycle import MEMBERS, pitch_of, pitches_of, shifted
-from swgjoint.fe.tolerance_rest import Rest, influences
-from swgjoint.fe.tolerance_sampling import full_solves
-from swgjoint.gear.design import Design
-from swgjoint.gear.tolerances import tooth_errors
+from swgjoint.fe.plane.continuation import Continuation
+from swgjoint.fe.plane.drive2d import ring_model
+from swgjoint.fe.tolerances.cycle import MEMBERS, pitch_of, pitches_of, shifted
+from swgjoint.fe.tolerances.rest import Rest, influences
+from swgjoint.fe.tolerances.sampling import full_solves
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.design.tolerances import tooth_errors
 
 pytestmark = pytest.mark.fe
 
@@ -152,7 +152,7 @@ def test_a_pitch_on_the_next_teeth_stand_alike(name):
 
 def test_flawed_or_half_models_are_refused(reference):
     """The linearised drive has perfect teeth and all sectors."""
-    from swgjoint.fe.tolerance_influence import influence
+    from swgjoint.fe.tolerances.influence import influence
 
     follow, state, _ = reference
     shifts = np.full((120, 2), 1e-6)

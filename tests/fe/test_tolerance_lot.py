@@ -8,16 +8,16 @@ from messages import naming
 from solved import coarse
 
 from swgjoint.errors import DesignError
-from swgjoint.fe.tolerance_cycle import gap_errors, pitch_of
-from swgjoint.fe.tolerance_lot import (
+from swgjoint.fe.tolerances.cycle import gap_errors, pitch_of
+from swgjoint.fe.tolerances.lot import (
     outline_change,
     perfect_positions,
     sample_lot,
     superposition_error,
 )
-from swgjoint.fe.tolerance_rest import influences
-from swgjoint.fe.tolerance_sampling import full_solves
-from swgjoint.gear.tolerances import without_errors
+from swgjoint.fe.tolerances.rest import influences
+from swgjoint.fe.tolerances.sampling import full_solves
+from swgjoint.gear.design.tolerances import without_errors
 
 pytestmark = pytest.mark.fe
 

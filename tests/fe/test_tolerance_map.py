@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from swgjoint.fe.sampling import sample_map
-from swgjoint.gear.design import Design
+from swgjoint.fe.common.sampling import sample_map
+from swgjoint.gear.design.design import Design
 from swgjoint.maps.drive_map import DriveMap
-from swgjoint.maps.fit import fit_map
-from swgjoint.maps.turn import error_turn
+from swgjoint.maps.fit.fit import fit_map
+from swgjoint.maps.sheet.turn import error_turn
 
 pytestmark = [pytest.mark.fe, pytest.mark.slow]
 

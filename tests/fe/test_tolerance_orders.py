@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from solved import coarse
 
-from swgjoint.fe.tolerance_cycle import MEMBERS, pitches_of, shifted
-from swgjoint.fe.tolerance_rest import influences
-from swgjoint.gear.design import Design
-from swgjoint.gear.tolerances import ToothErrors, tooth_errors
+from swgjoint.fe.tolerances.cycle import MEMBERS, pitches_of, shifted
+from swgjoint.fe.tolerances.rest import influences
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.design.tolerances import ToothErrors, tooth_errors
 
 pytestmark = pytest.mark.fe
 

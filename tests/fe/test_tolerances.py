@@ -10,9 +10,9 @@ from messages import naming
 from solved import FEW_PITCH, coarse, few_teeth
 
 from swgjoint.errors import DesignError
-from swgjoint.fe.continuation import Continuation
-from swgjoint.fe.drive2d import can_halve, ring_model
-from swgjoint.gear.design import Design
+from swgjoint.fe.plane.continuation import Continuation
+from swgjoint.fe.plane.drive2d import can_halve, ring_model
+from swgjoint.gear.design.design import Design
 
 
 def flawed(**values) -> Design:

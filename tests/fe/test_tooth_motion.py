@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from swgjoint.fe.continuation import Continuation
-from swgjoint.fe.drive2d import ring_model
-from swgjoint.fe.linearise import linearise
-from swgjoint.fe.tooth_motion import conjugate_by_fe, deflected_rim
-from swgjoint.gear.design import Design
-from swgjoint.gear.neutral_line import neutral_line
+from swgjoint.fe.plane.continuation import Continuation
+from swgjoint.fe.plane.drive2d import ring_model
+from swgjoint.fe.plane.linearise import linearise
+from swgjoint.fe.plane.tooth_motion import conjugate_by_fe, deflected_rim
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.teeth.neutral_line import neutral_line
 
 THETA = np.linspace(-np.pi, 2.0 * np.pi, 31)
 

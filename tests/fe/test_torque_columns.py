@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from swgjoint.errors import Outcome
-from swgjoint.fe import torque_columns
-from swgjoint.fe.contact_changes import ContactChanges
-from swgjoint.fe.following import Unloaded
-from swgjoint.fe.torque_columns import ColumnGrid
+from swgjoint.fe.common import torque_columns
+from swgjoint.fe.common.contact_changes import ContactChanges
+from swgjoint.fe.common.following import Unloaded
+from swgjoint.fe.common.torque_columns import ColumnGrid
 
 PEAK, STIFF = 10.0, 1e-3
 

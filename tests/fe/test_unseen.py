@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from solved import coarse
 
-from swgjoint.fe.sampling import SYMMETRIC, follower_in_plane, sample_map
-from swgjoint.gear.design import Design
+from swgjoint.fe.common.sampling import SYMMETRIC, follower_in_plane, sample_map
+from swgjoint.gear.catalogue import ratings_of
+from swgjoint.gear.design.design import Design
 from swgjoint.gear.mounting import series_compliance
-from swgjoint.maps.catalogue import ratings_of
 from swgjoint.maps.equilibrium import output_angle
-from swgjoint.maps.fit import fit_map
+from swgjoint.maps.fit.fit import fit_map
 
 PARTS = (0.02, 0.045, 0.1, 0.19, 0.31, 0.47, 0.63, 0.87)
 """Torques in parts of the repeated peak torque; no record of a map has any of them."""

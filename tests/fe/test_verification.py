@@ -8,8 +8,8 @@ import numpy as np
 from solved import FEW_PITCH as PITCH
 from solved import few_teeth, kept
 
-from swgjoint.fe.continuation import Continuation
-from swgjoint.fe.drive2d import ring_model
+from swgjoint.fe.plane.continuation import Continuation
+from swgjoint.fe.plane.drive2d import ring_model
 
 TORQUE = 20.0
 

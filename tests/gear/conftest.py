@@ -7,8 +7,8 @@ from math import pi
 import numpy as np
 import pytest
 
-from swgjoint.gear.design import Design
-from swgjoint.gear.profile import tooth_profile
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.teeth.profile import tooth_profile
 
 
 def _laws(p):

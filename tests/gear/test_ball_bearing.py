@@ -8,12 +8,12 @@ import pytest
 from messages import naming
 
 from swgjoint.errors import DesignError
-from swgjoint.gear.ball_bearing import (
+from swgjoint.gear.bearing.ball_bearing import (
     BallBearing,
     effective_modulus,
     point_contact,
 )
-from swgjoint.gear.design import Design
+from swgjoint.gear.design.design import Design
 
 MODULUS = 115e9
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import pytest
 
-from swgjoint.gear.ball_bearing import BallBearing
+from swgjoint.gear.bearing.ball_bearing import BallBearing
 from swgjoint.gear.cup import cup_torsional_stiffness
-from swgjoint.gear.design import Design
-from swgjoint.gear.feasibility import design_checks
-from swgjoint.gear.wave_generator import lobe_height
-from swgjoint.study.catalogue_file import CatalogueFile, variant_design
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.design.feasibility import design_checks
+from swgjoint.gear.wave_generators.wave_generator import lobe_height
 from swgjoint.units import GPa, mm, um
+from swgjoint.validation.catalogue.file import CatalogueFile, variant_design
 
 STUDY = CatalogueFile.load()
 CLEARANCE_UM = {14: 12.5, 17: 13.0, 20: 13.0, 25: 14.5, 32: 18.0}

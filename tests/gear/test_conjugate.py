@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from messages import naming
 
 from swgjoint.errors import DesignError
-from swgjoint.gear.design import Design
-from swgjoint.gear.profile import tooth_profile
-from swgjoint.gear.tooth_motion import tooth_motions
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.teeth.profile import tooth_profile
+from swgjoint.gear.teeth.tooth_motion import tooth_motions
 
 MEMBERS = ("flexspline", "circular_spline")
 PROFILES = {
@@ -176,9 +176,9 @@ def test_backlash_turns_the_flank(profile_laws):
 def test_double_conjugation_returns_the_flank():
     """The flexspline conjugate to the generated ring is the flexspline it came from."""
     given, made, motions = pair("circular_spline", "qca", "elliptical")
-    from swgjoint.gear.blank import blank
-    from swgjoint.gear.conjugate import _Builder
-    from swgjoint.gear.envelope import Envelope
+    from swgjoint.gear.teeth.blank import blank
+    from swgjoint.gear.teeth.conjugate import _Builder
+    from swgjoint.gear.teeth.envelope import Envelope
 
     design = Design.load("reference-2d")
     envelope = Envelope(

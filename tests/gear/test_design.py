@@ -13,14 +13,8 @@ from hypothesis import strategies as st
 from messages import names, naming
 
 from swgjoint.errors import DesignError
-from swgjoint.gear.design import Design
-from swgjoint.maps.catalogue import (
-    SIZE,
-    catalogue_rows,
-    nearest_row,
-    ratings_of,
-    table,
-)
+from swgjoint.gear.catalogue import SIZE, catalogue_rows, nearest_row, ratings_of, table
+from swgjoint.gear.design.design import Design
 from swgjoint.models_path import bundled_names, models_path
 
 

@@ -9,14 +9,14 @@ import pytest
 from messages import names, naming
 
 from swgjoint.errors import DesignError
-from swgjoint.gear.bounds import nearest_bound
-from swgjoint.gear.design import Design
-from swgjoint.gear.design_defaults import defaults_taken
-from swgjoint.gear.design_scaling import scaled_design
-from swgjoint.gear.feasibility import design_checks, engagement_checks
-from swgjoint.gear.profile import tooth_profile
-from swgjoint.gear.tooth_path import tooth_path
-from swgjoint.gear.wave_generator import wave_generator
+from swgjoint.gear.design.bounds import nearest_bound
+from swgjoint.gear.design.defaults import defaults_taken
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.design.feasibility import design_checks, engagement_checks
+from swgjoint.gear.design.scaling import scaled_design
+from swgjoint.gear.teeth.profile import tooth_profile
+from swgjoint.gear.teeth.tooth_path import tooth_path
+from swgjoint.gear.wave_generators.wave_generator import wave_generator
 from swgjoint.units import mm
 
 MEMBERS = ("flexspline", "circular_spline")

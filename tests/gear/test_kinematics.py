@@ -9,8 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from messages import naming
 
-from swgjoint.gear.backlash import circumferential_backlash, initial_rotation
-from swgjoint.gear.design import Design
+from swgjoint.gear.design.design import Design
 from swgjoint.gear.kinematics import (
     LAYOUTS,
     angle_coefficients,
@@ -18,6 +17,7 @@ from swgjoint.gear.kinematics import (
     periodicity,
     ratio,
 )
+from swgjoint.gear.teeth.backlash import circumferential_backlash, initial_rotation
 
 ANGLE = st.floats(-10.0, 10.0)
 

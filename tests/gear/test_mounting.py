@@ -7,7 +7,7 @@ from messages import naming
 
 from swgjoint.errors import DesignError
 from swgjoint.gear import kinematics
-from swgjoint.gear.design import Design
+from swgjoint.gear.design.design import Design
 from swgjoint.gear.mounting import coupling_share, series_compliance, springs_of
 
 STIFFNESS = 500.0

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from swgjoint.gear.design import Design
-from swgjoint.gear.tolerances import flawed_wave_generator
-from swgjoint.gear.wave_generator import wave_generator
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.design.tolerances import flawed_wave_generator
 from swgjoint.gear.wave_generators.oval import Oval
+from swgjoint.gear.wave_generators.wave_generator import wave_generator
 
 NAMES = ("reference-2d", "reference-2d-simplified", "reference-2d-parabolic")
 

@@ -8,10 +8,10 @@ import pytest
 from messages import naming
 
 from swgjoint.errors import DesignError
-from swgjoint.gear.design import Design
-from swgjoint.gear.family import family_design, family_text
-from swgjoint.gear.feasibility import design_checks
-from swgjoint.maps.catalogue import ratings_of
+from swgjoint.gear.catalogue import ratings_of
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.design.family import family_design, family_text
+from swgjoint.gear.design.feasibility import design_checks
 from swgjoint.models_path import bundled_names, models_path
 
 NAMES = bundled_names("drives", ".toml")

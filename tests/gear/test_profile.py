@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from messages import naming
 
 from swgjoint.errors import DesignError
-from swgjoint.gear.design import Design
-from swgjoint.gear.profile import tooth_profile
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.teeth.profile import tooth_profile
 
 MEMBERS = ("flexspline", "circular_spline")
 

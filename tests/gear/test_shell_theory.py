@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from messages import naming
 
-from swgjoint.gear.design import Design
+from swgjoint.gear.design.design import Design
 from swgjoint.gear.shell_theory import (
     PRINTED_SUM,
     SERIES_SUM,

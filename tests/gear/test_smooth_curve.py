@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from swgjoint.gear.design import Design
-from swgjoint.gear.profile import tooth_profile
-from swgjoint.gear.smooth_curve import SmoothCurve
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.teeth.profile import tooth_profile
+from swgjoint.gear.teeth.smooth_curve import SmoothCurve
 
 
 def curves():

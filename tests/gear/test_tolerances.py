@@ -5,8 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from swgjoint.gear.design import Design
-from swgjoint.gear.tolerances import has_errors, tooth_errors, wave_generator_offset
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.design.tolerances import (
+    has_errors,
+    tooth_errors,
+    wave_generator_offset,
+)
 
 
 def errors(member="circular_spline", **values):

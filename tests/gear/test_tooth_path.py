@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from scipy.special import ellipe
 
-from swgjoint.gear.design import Design
-from swgjoint.gear.neutral_line import neutral_line
-from swgjoint.gear.tooth_motion import tooth_motions
-from swgjoint.gear.tooth_path import tooth_path
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.teeth.neutral_line import neutral_line
+from swgjoint.gear.teeth.tooth_motion import tooth_motions
+from swgjoint.gear.teeth.tooth_path import tooth_path
 
 INVOLUTE = {
     "flexspline.profile": {"kind": "involute"},

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from swgjoint.gear.cup import cup_torsional_stiffness
-from swgjoint.gear.design import Design
-from swgjoint.gear.wave_generator import wave_generator
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.wave_generators.wave_generator import wave_generator
 
 NAMES = ("reference-2d", "reference-2d-simplified")
 

@@ -14,11 +14,11 @@ from messages import names, naming
 from scipy.integrate import quad
 
 from swgjoint.errors import DesignError
-from swgjoint.gear.design import Design
-from swgjoint.gear.wave_generator import wave_generator
+from swgjoint.gear.design.design import Design
 from swgjoint.gear.wave_generators.chain import Chain
 from swgjoint.gear.wave_generators.pieces import Arc
 from swgjoint.gear.wave_generators.rollers import FourRoller
+from swgjoint.gear.wave_generators.wave_generator import wave_generator
 
 IMPROVED = {
     "parabola_coefficient_per_mm": 0.0097,

@@ -17,11 +17,7 @@ from swgjoint.errors import InputError
 from swgjoint.joint import plugin
 from swgjoint.joint.attach import attach
 from swgjoint.joint.friction_step import friction_step, stretch_after
-from swgjoint.joint.reference import (
-    Motion,
-    gradient_force,
-    scheme_force,
-)
+from swgjoint.joint.reference import Motion, gradient_force, scheme_force
 from swgjoint.joint.region import check_region
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.friction import Friction

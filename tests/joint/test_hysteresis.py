@@ -13,10 +13,7 @@ from messages import naming
 
 from swgjoint.joint import plugin
 from swgjoint.joint.attach import attach
-from swgjoint.joint.reference import (
-    gradient_force,
-    scheme_force,
-)
+from swgjoint.joint.reference import gradient_force, scheme_force
 from swgjoint.joint.region import check_region
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.hysteresis import Jenkin

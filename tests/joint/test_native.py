@@ -14,7 +14,7 @@ from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.friction import Friction
 from swgjoint.maps.from_catalogue import catalogue_names
 from swgjoint.maps.hysteresis import Jenkin, play_hysteresis
-from swgjoint.maps.spec_sheet import spec_sheet
+from swgjoint.maps.sheet.spec_sheet import spec_sheet
 
 
 def with_mean(drive, torque):

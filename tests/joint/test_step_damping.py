@@ -11,11 +11,7 @@ import pytest
 from swgjoint.errors import InputError
 from swgjoint.joint.attach import attach_all
 from swgjoint.joint.fitting import Fitting
-from swgjoint.joint.step_damping import (
-    damp_as_asked,
-    restore_damping,
-    step_mode,
-)
+from swgjoint.joint.step_damping import damp_as_asked, restore_damping, step_mode
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.hysteresis import Jenkin
 

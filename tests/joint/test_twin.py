@@ -6,10 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from swgjoint.joint.reference import (
-    gradient_force,
-    scheme_force,
-)
+from swgjoint.joint.reference import gradient_force, scheme_force
 from swgjoint.maps.drive_map import DriveMap
 
 

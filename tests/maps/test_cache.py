@@ -5,14 +5,14 @@ from __future__ import annotations
 import subprocess
 import sys
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
 from swgjoint.maps import cache
-from swgjoint.maps.cache import cache_folder, cached
+from swgjoint.maps.cache import cached
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.file import map_bytes
+from swgjoint.store import cache_folder
 
 
 class Builder:
@@ -109,16 +109,6 @@ def test_empty_variable_switches_off(monkeypatch):
     cached({"design": "a"}, build)
     assert build.count == 2
     assert cache_folder() is None
-
-
-def test_platform_folder(monkeypatch):
-    """Without the variable the folder follows the platform; relative XDG is ignored."""
-    monkeypatch.delenv("SWGJOINT_CACHE", raising=False)
-    monkeypatch.setattr(cache.sys, "platform", "linux")
-    monkeypatch.setenv("XDG_CACHE_HOME", "/x/cache")
-    assert cache_folder() == Path("/x/cache/swgjoint")
-    monkeypatch.setenv("XDG_CACHE_HOME", "relative")
-    assert cache_folder() == Path.home() / ".cache" / "swgjoint"
 
 
 def test_unwritable_folder_is_no_obstacle(tmp_path, monkeypatch, caplog):

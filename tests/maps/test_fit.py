@@ -7,7 +7,7 @@ import pytest
 from known_samples import N, samples_of
 
 from swgjoint.maps.drive_map import DriveMap
-from swgjoint.maps.fit import fit_map
+from swgjoint.maps.fit.fit import fit_map
 from swgjoint.maps.quartic import quartic_chain
 
 

@@ -8,18 +8,18 @@ import numpy as np
 import pytest
 from messages import naming
 
-from swgjoint.gear.design import Design
-from swgjoint.maps.catalogue import table
-from swgjoint.maps.catalogue_stated import LOSS_KEYS
+from swgjoint.gear.catalogue import table
+from swgjoint.gear.catalogue_stated import LOSS_KEYS
+from swgjoint.gear.design.design import Design
 from swgjoint.maps.drive_map import DriveMap
-from swgjoint.maps.friction import Friction
-from swgjoint.maps.friction_bending import (
+from swgjoint.maps.fit.friction_bending import (
     bending_friction,
     bending_torque,
     rim_bending_energy,
 )
-from swgjoint.maps.friction_fit import StatedLosses, friction_of_losses
-from swgjoint.maps.friction_running import (
+from swgjoint.maps.fit.friction_fit import StatedLosses, friction_of_losses
+from swgjoint.maps.friction import Friction
+from swgjoint.maps.sheet.friction_running import (
     RUNNING_SPEED,
     back_driving_torque,
     efficiency,

@@ -10,17 +10,17 @@ import pytest
 from messages import names, naming
 
 from swgjoint.errors import InputError
-from swgjoint.gear.kinematics import LAYOUTS
-from swgjoint.maps import catalogue_stated
-from swgjoint.maps.catalogue import table
-from swgjoint.maps.catalogue_stated import (
+from swgjoint.gear import catalogue_stated
+from swgjoint.gear.catalogue import table
+from swgjoint.gear.catalogue_stated import (
     catalogue_faults,
     catalogue_gaps,
     stated_figures,
 )
+from swgjoint.gear.kinematics import LAYOUTS
 from swgjoint.maps.drive_map import DriveMap
-from swgjoint.maps.error_spectrum import with_assumed_error
 from swgjoint.maps.file import map_bytes, map_from_bytes
+from swgjoint.maps.fit.error_spectrum import with_assumed_error
 from swgjoint.maps.from_catalogue import (
     catalogue_names,
     find_row,

@@ -12,9 +12,9 @@ from messages import naming
 
 from swgjoint.errors import InputError
 from swgjoint.maps.drive_map import DriveMap
+from swgjoint.maps.fit.hysteresis_fit import hysteresis_from
 from swgjoint.maps.hysteresis import Jenkin, Sliders, play_hysteresis
-from swgjoint.maps.hysteresis_fit import hysteresis_from
-from swgjoint.maps.loop import torque_loop
+from swgjoint.maps.sheet.loop import torque_loop
 from swgjoint.units import arcmin
 
 ELEMENTS = (

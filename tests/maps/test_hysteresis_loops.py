@@ -10,14 +10,14 @@ from messages import naming
 
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.equilibrium import output_angle
-from swgjoint.maps.hysteresis import Jenkin
-from swgjoint.maps.hysteresis_loops import (
+from swgjoint.maps.fit.hysteresis_loops import (
     REACHES,
     FrictionLoop,
     fit_elements,
     played_loop,
     with_hysteresis,
 )
+from swgjoint.maps.hysteresis import Jenkin
 from swgjoint.units import arcmin
 
 N = 24

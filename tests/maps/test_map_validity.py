@@ -11,8 +11,8 @@ from messages import names
 from validation_record import made_record, validated_map
 
 from swgjoint.maps.drive_map import DriveMap
-from swgjoint.maps.error_spectrum import with_error
-from swgjoint.maps.map_validity import (
+from swgjoint.maps.fit.error_spectrum import with_error
+from swgjoint.maps.sheet.map_validity import (
     LIMIT,
     NOT_VALIDATED,
     WARNING,
@@ -22,7 +22,7 @@ from swgjoint.maps.map_validity import (
     validation_json,
     validation_lines,
 )
-from swgjoint.maps.validity_marks import error_mark, mark
+from swgjoint.maps.sheet.validity_marks import error_mark, mark
 from swgjoint.units import arcmin
 from swgjoint.view.validity import map_error
 

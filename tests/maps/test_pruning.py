@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 
 from swgjoint.errors import InputError
 from swgjoint.maps.drive_map import DriveMap
-from swgjoint.maps.pruning import stiffness_range, torque_amplitudes
+from swgjoint.maps.fit.pruning import stiffness_range, torque_amplitudes
 from swgjoint.units import arcmin
 
 TOLERANCES = (0.02, 0.1, 0.3)

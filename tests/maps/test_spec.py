@@ -11,13 +11,13 @@ from messages import names, naming
 from validation_record import validated_map
 
 from swgjoint.errors import ComputationError, InputError
-from swgjoint.maps import spec_sheet as sheets
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.equilibrium import output_angle
-from swgjoint.maps.loop import TorqueLoop, torque_loop
-from swgjoint.maps.spec_sheet import KEYS, measure_spec
+from swgjoint.maps.sheet import spec_sheet as sheets
+from swgjoint.maps.sheet.loop import TorqueLoop, torque_loop
+from swgjoint.maps.sheet.spec_sheet import KEYS, measure_spec
+from swgjoint.maps.sheet.turn import error_turn, period_of, ripple_turn
 from swgjoint.maps.torsion_law import potential_of_stiffness
-from swgjoint.maps.turn import error_turn, period_of, ripple_turn
 from swgjoint.units import arcmin
 
 

@@ -9,9 +9,9 @@ import pytest
 
 from swgjoint.gear.kinematics import LAYOUTS, angle_coefficients, periodicity, ratio
 from swgjoint.maps.drive_map import Ratings
-from swgjoint.maps.fit import _end_at_largest_torque, fit_map
+from swgjoint.maps.fit.fit import _end_at_largest_torque, fit_map
+from swgjoint.maps.fit.tolerance_modes import orders_of
 from swgjoint.maps.samples import MapSamples, ToleranceSamples
-from swgjoint.maps.tolerance_modes import orders_of
 
 RATINGS = Ratings(rated_torque=20, repeated_peak=50, momentary_peak=90, T1=5, T2=15)
 FLEXSPLINE, CIRCULAR_SPLINE, CYCLE = 30, 32, 480

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import BPoly
 
-from swgjoint.maps.torsion_table import on_knots
+from swgjoint.maps.fit.torsion_table import on_knots
 
 KNOTS = np.linspace(-1.2, 1.2, 9)
 

@@ -10,10 +10,10 @@ from known_samples import N, samples_of
 from messages import names
 
 from swgjoint.maps.equilibrium import output_angle
-from swgjoint.maps.fit import fit_map
-from swgjoint.maps.map_validity import map_validation, percent, validation_summary
+from swgjoint.maps.fit.fit import fit_map
+from swgjoint.maps.fit.validation import EXTREME, validation
 from swgjoint.maps.samples import FullSolves
-from swgjoint.maps.validation import EXTREME, validation
+from swgjoint.maps.sheet.map_validity import map_validation, percent, validation_summary
 
 OFFSET = 5e-6
 """Mean unloaded error of ``samples_of`` [rad]."""

@@ -25,12 +25,12 @@ from replay import (
     symmetry,
 )
 
-from swgjoint.fe.corotation import rotate
-from swgjoint.fe.ring import RingModel
-from swgjoint.fe.state import State
-from swgjoint.gear.design import Design
-from swgjoint.gear.profile import ToothProfile
-from swgjoint.gear.wave_generator import WaveGenerator
+from swgjoint.fe.plane.corotation import rotate
+from swgjoint.fe.plane.ring import RingModel
+from swgjoint.fe.plane.state import State
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.teeth.profile import ToothProfile
+from swgjoint.gear.wave_generators.wave_generator import WaveGenerator
 from swgjoint.units import mm
 
 Array = NDArray[np.float64]

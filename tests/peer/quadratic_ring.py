@@ -8,9 +8,9 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
-from swgjoint.fe.corotation import rotate
-from swgjoint.fe.sector_mesh import SectorMesh, sector_mesh
-from swgjoint.gear.profile import ToothProfile
+from swgjoint.fe.plane.corotation import rotate
+from swgjoint.fe.plane.sector_mesh import SectorMesh, sector_mesh
+from swgjoint.gear.teeth.profile import ToothProfile
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

@@ -12,12 +12,12 @@ from calculix import Fields
 from numpy.typing import NDArray
 from quadratic_ring import Chain, QuadraticRing, quadratic_ring
 
-from swgjoint.fe.corotation import rotate, turned
-from swgjoint.fe.elasticity import stress_maxima
-from swgjoint.fe.ring import RingModel
-from swgjoint.fe.state import State
-from swgjoint.fe.stress import flexspline_stress
-from swgjoint.gear.design import Design
+from swgjoint.fe.plane.corotation import rotate, turned
+from swgjoint.fe.plane.elasticity import stress_maxima
+from swgjoint.fe.plane.ring import RingModel
+from swgjoint.fe.plane.state import State
+from swgjoint.fe.plane.stress import flexspline_stress
+from swgjoint.gear.design.design import Design
 from swgjoint.units import mm
 
 Array = NDArray[np.float64]

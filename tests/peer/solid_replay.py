@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from swgjoint.fe.solid.elasticity import stress_maxima
 from swgjoint.fe.solid.ring import SolidRing
 from swgjoint.fe.solid.state import SolidState
 from swgjoint.fe.solid.stress import flexspline_stresses
-from swgjoint.gear.design import Design
+from swgjoint.fe.solid.strip.elasticity import stress_maxima
+from swgjoint.gear.design.design import Design
 from swgjoint.units import mm
 
 Array = NDArray[np.float64]

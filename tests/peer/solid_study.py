@@ -23,11 +23,11 @@ from two_teeth import two_teeth
 
 from swgjoint.fe.solid.continuation import SolidContinuation
 from swgjoint.fe.solid.drive3d import solid_ring
-from swgjoint.fe.solid.masters import Orders
 from swgjoint.fe.solid.ring import SolidRing
 from swgjoint.fe.solid.state import SolidState
+from swgjoint.fe.solid.strip.masters import Orders
 from swgjoint.files import write_whole
-from swgjoint.gear.design import Design
+from swgjoint.gear.design.design import Design
 
 um = 1e-6
 DESIGN = "reference-3d-modified"

@@ -5,11 +5,11 @@ from __future__ import annotations
 from functools import cache
 from math import pi
 
-from swgjoint.fe.continuation import Continuation
-from swgjoint.fe.drive2d import ring_model
-from swgjoint.fe.ring import RingModel
-from swgjoint.fe.state import State
-from swgjoint.gear.design import Design
+from swgjoint.fe.plane.continuation import Continuation
+from swgjoint.fe.plane.drive2d import ring_model
+from swgjoint.fe.plane.ring import RingModel
+from swgjoint.fe.plane.state import State
+from swgjoint.gear.design.design import Design
 
 DESIGNS = {
     "elliptical": "reference-2d",

@@ -21,7 +21,7 @@ from states import (
     turned_to,
 )
 
-from swgjoint.fe.corotation import rotate, turned
+from swgjoint.fe.plane.corotation import rotate, turned
 from swgjoint.units import mm
 
 OURS = 2, 3

@@ -13,11 +13,11 @@ from skfem.element import DiscreteField
 from solid_replay import CORNERS, QuarterCup, solid_replay
 from two_teeth import two_teeth
 
-from swgjoint.fe.solid import elasticity
 from swgjoint.fe.solid.continuation import SolidContinuation
 from swgjoint.fe.solid.drive3d import solid_ring
-from swgjoint.fe.solid.hexahedron import ElementHexIncompatible
-from swgjoint.gear.design import Design
+from swgjoint.fe.solid.strip import elasticity
+from swgjoint.fe.solid.strip.hexahedron import ElementHexIncompatible
+from swgjoint.gear.design.design import Design
 
 um = 1e-6
 

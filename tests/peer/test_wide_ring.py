@@ -13,9 +13,9 @@ from wide_ring import (
     solid_wall,
 )
 
-from swgjoint.fe.drive2d import sector
-from swgjoint.gear.design import Design
-from swgjoint.gear.profile import tooth_profile
+from swgjoint.fe.plane.drive2d import sector
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.teeth.profile import tooth_profile
 
 STIFFNESS = 0.01
 """The plate theory misses solids by up to 0.8 %, our mesh by 0.3 %."""

@@ -21,12 +21,12 @@ from skfem import MeshHex
 from solid_replay import CORNERS, INSIDE, MPa
 
 from swgjoint.fe.solid.corotation import about_z
-from swgjoint.fe.solid.elasticity import solid, stress_maxima
-from swgjoint.fe.solid.masters import Orders, strip_masters
 from swgjoint.fe.solid.ring import SolidRing
 from swgjoint.fe.solid.state import SolidState
-from swgjoint.fe.solid.strip_mesh import StripMesh, flexspline_strip
-from swgjoint.gear.design import Design
+from swgjoint.fe.solid.strip.elasticity import solid, stress_maxima
+from swgjoint.fe.solid.strip.masters import Orders, strip_masters
+from swgjoint.fe.solid.strip.mesh import StripMesh, flexspline_strip
+from swgjoint.gear.design.design import Design
 from swgjoint.units import mm
 
 Array = NDArray[np.float64]

@@ -15,10 +15,10 @@ from quadratic_ring import QuadraticRing, quadratic_ring
 from scipy.sparse import block_array, coo_array
 from scipy.sparse.linalg import spsolve
 
-from swgjoint.fe.corotation import rotate
-from swgjoint.fe.superelement import Superelement
-from swgjoint.gear.design import Design
-from swgjoint.gear.profile import tooth_profile
+from swgjoint.fe.plane.corotation import rotate
+from swgjoint.fe.plane.superelement import Superelement
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.teeth.profile import tooth_profile
 from swgjoint.units import mm
 
 Array = NDArray[np.float64]

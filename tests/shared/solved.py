@@ -20,9 +20,9 @@ from typing import TypeVar
 import pytest
 from filelock import FileLock
 
-from swgjoint.fe.ring_friction import RubbedPath, rubbed_path
-from swgjoint.fe.thin_ring import model as rings
-from swgjoint.gear.design import Design
+from swgjoint.fe.rings import model as rings
+from swgjoint.fe.rings.friction import RubbedPath, rubbed_path
+from swgjoint.gear.design.design import Design
 from swgjoint.maps.cache import code_version
 
 T = TypeVar("T")

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from swgjoint.fe.indentation import Strips
-from swgjoint.fe.ring import RingModel
-from swgjoint.fe.state import State
+from swgjoint.fe.common.indentation import Strips
+from swgjoint.fe.plane.ring import RingModel
+from swgjoint.fe.plane.state import State
 
 
 def open_gaps(model: RingModel, state: State) -> NDArray[np.float64]:

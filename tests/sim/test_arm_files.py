@@ -13,11 +13,11 @@ from messages import names, naming
 
 from swgjoint.cli.main import main
 from swgjoint.errors import InputError
-from swgjoint.sim.arm_scene import is_arm, scene_of_arm
-from swgjoint.sim.gentle_sweep import MARGIN, SWEEP, gentle_sweep
-from swgjoint.sim.rigid_arm import RigidArm
+from swgjoint.sim.arm.gentle_sweep import MARGIN, SWEEP, gentle_sweep
+from swgjoint.sim.arm.rigid_arm import RigidArm
+from swgjoint.sim.arm.scene import is_arm, scene_of_arm
 from swgjoint.sim.run import run_scene
-from swgjoint.sim.scene import Scene
+from swgjoint.sim.scene.scene import Scene
 from swgjoint.units import deg
 
 LINK = """

@@ -11,8 +11,8 @@ import pytest
 from messages import naming
 
 from swgjoint.errors import InputError
-from swgjoint.sim.arm_reading import ArmReading, patterns_of
-from swgjoint.sim.rigid_arm import RigidArm
+from swgjoint.sim.arm.reading import ArmReading, patterns_of
+from swgjoint.sim.arm.rigid_arm import RigidArm
 
 EVERY_KIND = """
 <mujoco>

@@ -11,8 +11,8 @@ import warnings
 import numpy as np
 import pytest
 
-from swgjoint.sim.arm_scene import scene_of_arm
-from swgjoint.sim.rigid_arm import RigidArm
+from swgjoint.sim.arm.rigid_arm import RigidArm
+from swgjoint.sim.arm.scene import scene_of_arm
 from swgjoint.sim.run import run_scene
 
 FILE = """

@@ -5,9 +5,9 @@ import pytest
 from messages import naming
 
 from swgjoint.errors import InputError
-from swgjoint.sim.rigid_arm import RigidArm
+from swgjoint.sim.arm.rigid_arm import RigidArm
 from swgjoint.sim.run import run_scene
-from swgjoint.sim.scene import Scene
+from swgjoint.sim.scene.scene import Scene
 
 UR5E = RigidArm("ur5e")
 

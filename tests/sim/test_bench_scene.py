@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from solved import few_teeth, kept
 
-from swgjoint.fe.sampling import sample_map
+from swgjoint.fe.common.sampling import sample_map
 from swgjoint.maps.drive_map import DriveMap
-from swgjoint.maps.fit import fit_map
-from swgjoint.maps.spec_sheet import measure_spec
+from swgjoint.maps.fit.fit import fit_map
+from swgjoint.maps.sheet.spec_sheet import measure_spec
 from swgjoint.sim.run import Run, run_scene
 from swgjoint.units import arcmin
 

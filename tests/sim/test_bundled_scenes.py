@@ -5,7 +5,7 @@ import pytest
 
 from swgjoint.models_path import bundled_names
 from swgjoint.sim.run import run_scene
-from swgjoint.sim.scene import Scene
+from swgjoint.sim.scene.scene import Scene
 
 
 def test_there_are_enough_and_each_says_what_it_is():

@@ -82,11 +82,13 @@ def test_the_demo_compares_two_drives_with_the_rigid_arm(
     The picture of the demo is drawn; those of its report have tests of their own.
     """
     for picture in ("joint_png", "spec_picture"):
-        monkeypatch.setattr(f"swgjoint.view.report.{picture}", lambda *_: b"\x89PNG")
+        monkeypatch.setattr(
+            f"swgjoint.view.report.report.{picture}", lambda *_: b"\x89PNG"
+        )
     soft = DriveMap.linear(2e4, teeth_flexspline=120, teeth_circular_spline=122)
     maps = {"reference-2d": synthetic_map, "reference-2d-simplified": soft}
     monkeypatch.setattr(
-        "swgjoint.sim.drives.load_drive", lambda name, progress: maps[name]
+        "swgjoint.drives.references.load_drive", lambda name, progress: maps[name]
     )
     assert main(["demo", "--out", str(tmp_path / "demo"), "--json"]) == 0
     result = json.loads(capsys.readouterr().out)
@@ -123,7 +125,7 @@ def test_run_goes_to_a_viewer_on_this_machine_only(capsys, monkeypatch):
         return "rerun+http://127.0.0.1:9876/proxy"
 
     with monkeypatch.context() as patch:
-        patch.setattr("swgjoint.view.live.stream_runs", stream)
+        patch.setattr("swgjoint.view.recording.live.stream_runs", stream)
         assert main(["run", "bench", *SHORT, "--live", "--json"]) == 0
     assert sent == {"runs": [""], "url": None, "pace": 1.0}
     assert json.loads(capsys.readouterr().out)["live"].startswith("rerun+http://127.")
@@ -142,7 +144,7 @@ def test_the_fidelity_of_designs_is_an_option(capsys, monkeypatch, synthetic_map
         asked.append((name, model))
         return synthetic_map
 
-    monkeypatch.setattr("swgjoint.sim.drives.load_drive", load)
+    monkeypatch.setattr("swgjoint.drives.references.load_drive", load)
     short = ["--set", "simulation.duration_s=1.0"]
     assert main(["run", "bench", "--model", "ring", *short]) == 0
     assert asked == [("reference-2d", "ring")]

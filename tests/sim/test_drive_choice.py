@@ -11,12 +11,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from messages import names
 
-from swgjoint.cli.arm_arguments import choice_lines
 from swgjoint.cli.main import main
-from swgjoint.maps.catalogue import catalogue_rows
-from swgjoint.sim.arm_scene import arm_scene, rigid_arm_of
-from swgjoint.sim.commanded import trajectory_of
-from swgjoint.sim.drive_choice import choose_drive
+from swgjoint.cli.shared.arm_arguments import choice_lines
+from swgjoint.gear.catalogue import catalogue_rows
+from swgjoint.sim.arm.drive_choice import choose_drive
+from swgjoint.sim.arm.scene import arm_scene, rigid_arm_of
+from swgjoint.sim.motion.commanded import trajectory_of
 
 ROWS = sorted(
     (row for row in catalogue_rows() if row.ratio == 100),

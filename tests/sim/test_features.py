@@ -12,14 +12,14 @@ from swgjoint.joint.attach import attach_all
 from swgjoint.joint.fitting import Fitting
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.actuators import control_inputs
+from swgjoint.sim.arm.payload import arms_of
+from swgjoint.sim.arm.rigid_arm import RigidArm
 from swgjoint.sim.assembly import assemble
-from swgjoint.sim.contains import contents
 from swgjoint.sim.equilibrium import set_start
-from swgjoint.sim.feature_sections import Payload
-from swgjoint.sim.payload import arms_of
-from swgjoint.sim.rigid_arm import RigidArm
+from swgjoint.sim.figures.contains import contents
 from swgjoint.sim.run import run_scene
-from swgjoint.sim.scene import Scene
+from swgjoint.sim.scene.feature_sections import Payload
+from swgjoint.sim.scene.scene import Scene
 
 LINEAR = DriveMap.linear(2e4, teeth_flexspline=120, teeth_circular_spline=122)
 INERTIA = 1e-4 + 1.0 / 60.0**2  # rotor and load of the bench at the motor

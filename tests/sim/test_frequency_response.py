@@ -8,7 +8,7 @@ from messages import naming
 
 from swgjoint.errors import ComputationError, InputError
 from swgjoint.maps.drive_map import DriveMap
-from swgjoint.sim.frequency_response import Chirp, TwoMass, frequency_response
+from swgjoint.sim.figures.frequency_response import Chirp, TwoMass, frequency_response
 
 CHIRP = Chirp(low=8.0, high=100.0, period=4.0)
 

@@ -11,17 +11,12 @@ import pytest
 from messages import naming
 
 from swgjoint.errors import InputError
-from swgjoint.sim.arm_reading import ArmReading
-from swgjoint.sim.arm_scene import arm_scene, rigid_arm_of, scene_of_arm
+from swgjoint.sim.arm.gentle_sweep import CLEARANCE, SWEEP, gentle_sweep, place_arm
+from swgjoint.sim.arm.reading import ArmReading
+from swgjoint.sim.arm.rigid_arm import RigidArm
+from swgjoint.sim.arm.scene import arm_scene, rigid_arm_of, scene_of_arm
 from swgjoint.sim.assembly import assemble
-from swgjoint.sim.commanded import trajectory_of
-from swgjoint.sim.gentle_sweep import (
-    CLEARANCE,
-    SWEEP,
-    gentle_sweep,
-    place_arm,
-)
-from swgjoint.sim.rigid_arm import RigidArm
+from swgjoint.sim.motion.commanded import trajectory_of
 from swgjoint.units import deg
 
 STEADY = "defaults.linear={stiffness_Nm_rad=2e4,rated_torque_Nm=50.0}"

@@ -5,12 +5,17 @@ import pytest
 from messages import names, naming
 
 from swgjoint.errors import InputError
-from swgjoint.sim.commanded import trajectory_of
-from swgjoint.sim.joint_motions import chirp, read_points, through_points, trapezoid
-from swgjoint.sim.rigid_arm import RigidArm
+from swgjoint.sim.arm.rigid_arm import RigidArm
+from swgjoint.sim.motion.commanded import trajectory_of
+from swgjoint.sim.motion.joint_motions import (
+    chirp,
+    read_points,
+    through_points,
+    trapezoid,
+)
+from swgjoint.sim.motion.trajectory import time_grid
 from swgjoint.sim.run import run_scene
-from swgjoint.sim.scene import Scene
-from swgjoint.sim.trajectory import time_grid
+from swgjoint.sim.scene.scene import Scene
 
 START, END = np.array([0.3, -1.0, 0.5]), np.array([1.3, -1.4, 0.5])
 

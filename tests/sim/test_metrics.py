@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from swgjoint.maps.drive_map import DriveMap
-from swgjoint.sim.metrics import (
+from swgjoint.sim.figures.metrics import (
     against_rigid,
     cubed_mean,
     orders_untold,

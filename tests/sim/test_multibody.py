@@ -14,7 +14,7 @@ from swgjoint.joint.attach import attach
 from swgjoint.joint.drive import JointDrive
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.models_path import bundled_names
-from swgjoint.sim.rigid_arm import RigidArm
+from swgjoint.sim.arm.rigid_arm import RigidArm
 
 ARMS = bundled_names("arms", ".xml")
 QUICK = ("bench", "two-link")

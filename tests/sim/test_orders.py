@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from swgjoint.sim.orders import order_spectrum, strongest_lines
+from swgjoint.sim.figures.orders import order_spectrum, strongest_lines
 
 
 def uneven_angle(turns: float = 3.37, samples: int = 6000) -> np.ndarray:

@@ -18,8 +18,8 @@ from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.friction import Friction
 from swgjoint.maps.hysteresis import Jenkin
 from swgjoint.sim.assembly import assemble
-from swgjoint.sim.contains import contents
-from swgjoint.sim.scene import Scene
+from swgjoint.sim.figures.contains import contents
+from swgjoint.sim.scene.scene import Scene
 
 PULSE = {
     "kind": "joint_pulse",
@@ -289,7 +289,7 @@ def test_a_scene_loads_only_what_it_asks_for(used):
     The engine plugin is registered wherever MuJoCo is imported, so that saved models
     load; instances of it are counted by ``contains``.
     """
-    viewer = {"swgjoint.view.recording", "rerun"}
+    viewer = {"swgjoint.view.recording.recording", "rerun"}
     for case, found in used.items():
         modules = set(found["modules"])
         assert viewer & modules == (viewer if case == "recording" else set())

@@ -11,7 +11,7 @@ from swgjoint.sim.actuators import control_inputs
 from swgjoint.sim.assembly import assemble
 from swgjoint.sim.equilibrium import set_start
 from swgjoint.sim.run import run_scene
-from swgjoint.sim.scene import Scene
+from swgjoint.sim.scene.scene import Scene
 
 LINEAR = DriveMap.linear(2e4, teeth_flexspline=120, teeth_circular_spline=122)
 

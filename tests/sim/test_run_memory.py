@@ -11,8 +11,8 @@ from swgjoint import memory
 from swgjoint.cli.main import main
 from swgjoint.sim.run import run_scene
 from swgjoint.sim.run_memory import VIEWER, required_memory
-from swgjoint.sim.scene import Scene
-from swgjoint.view import recording
+from swgjoint.sim.scene.scene import Scene
+from swgjoint.view.recording import recording
 
 DRIVE = {"defaults.drive": "CSG-25-100", "trajectory.settle_s": 0.2}
 

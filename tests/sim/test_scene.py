@@ -4,8 +4,8 @@ import pytest
 from messages import names, naming
 
 from swgjoint.errors import InputError
-from swgjoint.sim.scene import Scene, parse_override
-from swgjoint.sim.scene_sections import JointSection
+from swgjoint.sim.scene.scene import Scene, parse_override
+from swgjoint.sim.scene.sections import JointSection
 
 GOOD = """
 name = "good"

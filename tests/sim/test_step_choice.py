@@ -3,8 +3,8 @@
 import pytest
 
 from swgjoint.maps.drive_map import DriveMap
-from swgjoint.sim.arm_scene import scene_of_arm
-from swgjoint.sim.rigid_arm import RigidArm
+from swgjoint.sim.arm.rigid_arm import RigidArm
+from swgjoint.sim.arm.scene import scene_of_arm
 from swgjoint.sim.run import run_scene
 from swgjoint.sim.step_choice import STEPS, needed_order, resolving_step
 

@@ -7,9 +7,7 @@ import numpy as np
 import pytest
 
 from swgjoint.maps.drive_map import DriveMap
-from swgjoint.sim.run import Run, run_scene
-from swgjoint.sim.scene import Scene
-from swgjoint.sim.tool_metrics import (
+from swgjoint.sim.figures.tool_metrics import (
     crossings,
     path_accuracy,
     path_repeatability,
@@ -18,6 +16,8 @@ from swgjoint.sim.tool_metrics import (
     settling_time,
     tool_metrics,
 )
+from swgjoint.sim.run import Run, run_scene
+from swgjoint.sim.scene.scene import Scene
 
 STIFF = DriveMap.linear(2e4, teeth_flexspline=120, teeth_circular_spline=122)
 START = {

@@ -5,12 +5,12 @@ import pytest
 from messages import names, naming
 
 from swgjoint.errors import InputError
-from swgjoint.sim.commanded import trajectory_of
-from swgjoint.sim.inverse_kinematics import ToolKinematics
-from swgjoint.sim.rigid_arm import RigidArm
-from swgjoint.sim.scene import Scene
-from swgjoint.sim.tool_motions import POSE_SHARE, cube_poses
-from swgjoint.sim.trajectory import Trajectory
+from swgjoint.sim.arm.rigid_arm import RigidArm
+from swgjoint.sim.motion.commanded import trajectory_of
+from swgjoint.sim.motion.inverse_kinematics import ToolKinematics
+from swgjoint.sim.motion.tool_motions import POSE_SHARE, cube_poses
+from swgjoint.sim.motion.trajectory import Trajectory
+from swgjoint.sim.scene.scene import Scene
 
 UR5E = {
     "shoulder_lift_joint": -100.0,

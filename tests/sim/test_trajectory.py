@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from swgjoint.sim.trajectory import constant_speed, sweep
+from swgjoint.sim.motion.trajectory import constant_speed, sweep
 
 START, END = np.array([0.3, -1.0, 0.5]), np.array([1.3, -1.4, 0.5])
 

@@ -10,11 +10,11 @@ from validation_record import validated_map
 from swgjoint.cli.main import main
 from swgjoint.cli.run import joint_row, notes
 from swgjoint.maps.drive_map import DriveMap
-from swgjoint.maps.map_validity import NOT_VALIDATED
-from swgjoint.sim.ripple_validity import integration_noise
+from swgjoint.maps.sheet.map_validity import NOT_VALIDATED
+from swgjoint.sim.figures.ripple_validity import integration_noise
+from swgjoint.sim.figures.verdict import energy_reasons
 from swgjoint.sim.run import run_scene
-from swgjoint.sim.scene import Scene
-from swgjoint.sim.verdict import energy_reasons
+from swgjoint.sim.scene.scene import Scene
 from swgjoint.view.validity import warnings_of
 
 LINEAR = "defaults.linear={stiffness_Nm_rad=2e4,rated_torque_Nm=50.0}"

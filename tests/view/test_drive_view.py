@@ -9,14 +9,14 @@ import pytest
 from rerun.chunk import RrdReader
 
 from swgjoint.sim.run import Run, run_scene
-from swgjoint.view.drive_view import (
+from swgjoint.view.recording.drive_view import (
     FRAMES,
     angles,
     drives_shown,
     frames_of,
     stress_color,
 )
-from swgjoint.view.entities import pose_rows
+from swgjoint.view.recording.entities import pose_rows
 
 SHORT = {"simulation.duration_s": 1.0, "trajectory.settle_s": 0.2}
 

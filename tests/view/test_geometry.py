@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from swgjoint.view.geometry import color_of, quaternion_xyzw, shape_of
+from swgjoint.view.recording.geometry import color_of, quaternion_xyzw, shape_of
 
 MODEL = mujoco.MjModel.from_xml_string("""
 <mujoco>

@@ -7,12 +7,17 @@ from rerun.chunk import RrdReader
 
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.models_path import models_path
-from swgjoint.sim.metrics import torque_ripple
+from swgjoint.sim.figures.metrics import torque_ripple
 from swgjoint.sim.run import Run, run_scene
 from swgjoint.units import arcmin
-from swgjoint.view.drive_markers import RADIUS, housing_radius, load_color, turned_to
-from swgjoint.view.entities import pose_rows
-from swgjoint.view.joint_pictures import (
+from swgjoint.view.recording.drive_markers import (
+    RADIUS,
+    housing_radius,
+    load_color,
+    turned_to,
+)
+from swgjoint.view.recording.entities import pose_rows
+from swgjoint.view.recording.joint_pictures import (
     BARS,
     WIDTH,
     phase_points,

@@ -12,9 +12,9 @@ from rerun.chunk import RrdReader
 from swgjoint.errors import ComputationError, InputError
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.run import Run, run_scene
-from swgjoint.view.entities import signals_of
-from swgjoint.view.live import loopback_port, stream_runs
-from swgjoint.view.viewer import STARTED, free_port, start_viewer, wait_for
+from swgjoint.view.recording.entities import signals_of
+from swgjoint.view.recording.live import loopback_port, stream_runs
+from swgjoint.view.recording.viewer import STARTED, free_port, start_viewer, wait_for
 
 
 @pytest.fixture

@@ -14,12 +14,12 @@ from swgjoint.errors import ComputationError, InputError, OutputWarning
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.run import Run, run_scene
 from swgjoint.units import mm
-from swgjoint.view import recording
-from swgjoint.view.blueprint import joints_shown
-from swgjoint.view.entities import pose_rows, signals_of
-from swgjoint.view.plots import comparison_png
-from swgjoint.view.recording import write_recording
-from swgjoint.view.viewer import STARTED
+from swgjoint.view.plots.runs import comparison_png
+from swgjoint.view.recording import recording
+from swgjoint.view.recording.blueprint import joints_shown
+from swgjoint.view.recording.entities import pose_rows, signals_of
+from swgjoint.view.recording.recording import write_recording
+from swgjoint.view.recording.viewer import STARTED
 
 SHORT = {"simulation.duration_s": 1.0, "trajectory.settle_s": 0.2}
 
@@ -177,7 +177,7 @@ def test_a_recording_is_written_whole_or_not_at_all(run, tmp_path, monkeypatch):
     def fail(*_: object) -> None:
         raise RuntimeError("no pose")
 
-    monkeypatch.setattr("swgjoint.view.entities._send_poses", fail)
+    monkeypatch.setattr("swgjoint.view.recording.entities._send_poses", fail)
     with pytest.raises(RuntimeError, match="no pose"):
         run.to_rerun(tmp_path / "run.rrd")
     assert list(tmp_path.iterdir()) == []

@@ -13,8 +13,8 @@ from validation_record import validated_map
 from swgjoint.errors import InputError
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.run import Run, run_scene
-from swgjoint.view.report import Cell, Table, write_report
-from swgjoint.view.report_plots import envelope
+from swgjoint.view.report.plots import envelope
+from swgjoint.view.report.report import Cell, Table, write_report
 from swgjoint.view.validity import STEP_KEYS, _same_orders, step_error
 from swgjoint.view.words import shown, words
 
@@ -72,7 +72,9 @@ def written(synthetic_map: DriveMap, tmp_path) -> tuple[Run, str]:
 def without_pictures(monkeypatch):
     """The first bytes of a PNG in place of every picture."""
     for picture in ("joint_png", "spec_picture"):
-        monkeypatch.setattr(f"swgjoint.view.report.{picture}", lambda *_: b"\x89PNG")
+        monkeypatch.setattr(
+            f"swgjoint.view.report.report.{picture}", lambda *_: b"\x89PNG"
+        )
 
 
 def test_the_page_needs_nothing_else(written):
@@ -188,7 +190,7 @@ def test_the_report_is_written_whole_or_not_at_all(run, tmp_path, monkeypatch):
     def fail(*_: object) -> None:
         raise RuntimeError("no picture")
 
-    monkeypatch.setattr("swgjoint.view.report.joint_png", fail)
+    monkeypatch.setattr("swgjoint.view.report.report.joint_png", fail)
     with pytest.raises(RuntimeError, match="no picture"):
         write_report({"": run}, tmp_path / "report.html", check_step=False)
     assert list(tmp_path.iterdir()) == []

@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.interpolate import CubicSpline
 
-from swgjoint.fe.contact_patch import averaged_spline
+from swgjoint.fe.common.contact_patch import averaged_spline
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -48,7 +48,7 @@ def spread_over(z: Array, nodes: int) -> sparse.csr_matrix:
     """Forces in the planes of the mesh by forces there that act on patches.
 
     A point force on a mesh sinks in by an amount that depends on the elements, and on
-    its place in them: see :mod:`swgjoint.fe.contact_patch`.
+    its place in them: see :mod:`swgjoint.fe.common.contact_patch`.
 
     Args:
         z: Of the planes, equally spaced (n_planes,) [m].

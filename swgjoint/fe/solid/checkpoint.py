@@ -8,11 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from swgjoint.errors import InputError
+from swgjoint.fe.plane.state_arrays import packed, unpacked
 from swgjoint.fe.solid.state import SolidState
-from swgjoint.fe.state_arrays import packed, unpacked
 from swgjoint.files import read_regular, write_whole
 from swgjoint.json_text import json_text
-from swgjoint.kept import (
+from swgjoint.maps.cache import code_version
+from swgjoint.store import (
     DamagedError,
     arrays_content,
     arrays_file,
@@ -21,7 +22,6 @@ from swgjoint.kept import (
     json_file,
     told,
 )
-from swgjoint.maps.cache import code_version
 
 RUN = "run.json"
 _STATE = "state"

@@ -8,9 +8,9 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
-from swgjoint.fe.following import Follower
-from swgjoint.fe.influence import Influence
-from swgjoint.fe.ring import travelled
+from swgjoint.fe.common.following import Follower
+from swgjoint.fe.common.influence import Influence
+from swgjoint.fe.plane.ring import travelled
 from swgjoint.fe.solid.corotation import about_z
 from swgjoint.fe.solid.equilibrium import SolidLoad, SolidSolver
 from swgjoint.fe.solid.ring import SolidRing
@@ -25,8 +25,8 @@ Array = NDArray[np.float64]
 class SolidContinuation(Follower[SolidState]):
     """Follows equilibria of the 3D model.
 
-    As :class:`swgjoint.fe.continuation.Continuation` does in the plane; what turns with
-    the flexspline is the bore of the diaphragm.
+    As :class:`swgjoint.fe.plane.continuation.Continuation` does in the plane; what
+    turns with the flexspline is the bore of the diaphragm.
     """
 
     ring: SolidRing

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from swgjoint.fe.solid.segment import Segment
+from swgjoint.fe.solid.strip.segment import Segment
 
 Array = NDArray[np.float64]
 

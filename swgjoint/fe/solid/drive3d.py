@@ -8,24 +8,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.errors import DesignError
-from swgjoint.fe.circular_spline import CircularSpline
-from swgjoint.fe.contact_patch import averaged_spline
-from swgjoint.fe.drive2d import can_halve
-from swgjoint.fe.solid.masters import Orders
+from swgjoint.fe.common.contact_patch import averaged_spline
+from swgjoint.fe.plane.circular_spline import CircularSpline
+from swgjoint.fe.plane.drive2d import can_halve
 from swgjoint.fe.solid.memory import require_solid_memory, required_memory
-from swgjoint.fe.solid.race import SolidRace
 from swgjoint.fe.solid.ring import SolidRing
 from swgjoint.fe.solid.ring_gear import ring_gear
-from swgjoint.fe.solid.strip import flexspline
-from swgjoint.fe.solid.strip_mesh import circular_spline_strip, flexspline_strip
+from swgjoint.fe.solid.strip.masters import Orders
+from swgjoint.fe.solid.strip.mesh import circular_spline_strip, flexspline_strip
+from swgjoint.fe.solid.strip.strip import flexspline
 from swgjoint.fe.solid.teeth import FlankCrowning, Teeth
-from swgjoint.fe.solid.wave_generator import WaveGeneratorSurface
-from swgjoint.gear.bearing_checks import bearing_checks
-from swgjoint.gear.check import raise_faults
-from swgjoint.gear.design import Design
-from swgjoint.gear.profile import tooth_profile
-from swgjoint.gear.tolerances import axis_tilt, has_errors, tooth_errors
-from swgjoint.gear.wave_generator import lobe_height
+from swgjoint.fe.solid.wave_generator.race import SolidRace
+from swgjoint.fe.solid.wave_generator.surface import WaveGeneratorSurface
+from swgjoint.gear.bearing.checks import bearing_checks
+from swgjoint.gear.design.check import raise_faults
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.design.tolerances import axis_tilt, has_errors, tooth_errors
+from swgjoint.gear.teeth.profile import tooth_profile
+from swgjoint.gear.wave_generators.wave_generator import lobe_height
 from swgjoint.units import mm, um
 
 Array = NDArray[np.float64]

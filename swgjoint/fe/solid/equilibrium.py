@@ -13,15 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.errors import Outcome
-from swgjoint.fe.complementarity import ActiveSetError, solve_mixed
-from swgjoint.fe.cyclic import SingularRingError
+from swgjoint.fe.common.complementarity import ActiveSetError, solve_mixed
+from swgjoint.fe.common.cyclic import SingularRingError
 from swgjoint.fe.solid.corotation import about_z, energies
 from swgjoint.fe.solid.linearise import Linearised, linearise
-from swgjoint.fe.solid.race import NODE
 from swgjoint.fe.solid.ring import SolidRing
 from swgjoint.fe.solid.ring_factor import RingFactor
 from swgjoint.fe.solid.state import SolidState
 from swgjoint.fe.solid.teeth import ToothRows
+from swgjoint.fe.solid.wave_generator.race import NODE
 
 Array = NDArray[np.float64]
 

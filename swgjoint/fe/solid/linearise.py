@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from swgjoint.fe.race import RaceForces
+from swgjoint.fe.plane.race import RaceForces
 from swgjoint.fe.solid.across import FLAT, WIDE, crown_bend, vertices
 from swgjoint.fe.solid.corotation import (
     Frames,

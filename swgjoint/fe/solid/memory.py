@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from swgjoint.fe.solid.masters import Orders, strip_masters
-from swgjoint.fe.solid.strip_mesh import StripMesh
+from swgjoint.fe.solid.strip.masters import Orders, strip_masters
+from swgjoint.fe.solid.strip.mesh import StripMesh
 from swgjoint.memory import INTERPRETER, require_memory
 
 BYTES = 8

@@ -16,18 +16,18 @@ from numpy.typing import NDArray
 from swgjoint.errors import ComputationError
 from swgjoint.fe.meshing_phases import default_steps, overload
 from swgjoint.fe.meshing_run import Position, Positions
-from swgjoint.fe.solid.axial_section import coning
+from swgjoint.fe.plane.stress import KINDS
 from swgjoint.fe.solid.checkpoint import Checkpoint
 from swgjoint.fe.solid.continuation import SolidContinuation
 from swgjoint.fe.solid.drive3d import check_modelled, solid_ring
-from swgjoint.fe.solid.masters import Orders
+from swgjoint.fe.solid.figures.axial_section import coning
 from swgjoint.fe.solid.ring import SolidRing
 from swgjoint.fe.solid.state import SolidState
 from swgjoint.fe.solid.stress import Place, SolidMaxima
-from swgjoint.fe.stress import KINDS
-from swgjoint.gear.design import Design
+from swgjoint.fe.solid.strip.masters import Orders
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.design.tolerances import has_errors
 from swgjoint.gear.mounting import series_compliance, springs_of
-from swgjoint.gear.tolerances import has_errors
 from swgjoint.progress import Progress, silent
 from swgjoint.units import deg
 

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.fe.solid.corotation import Frames, about_z, segment_frames
-from swgjoint.fe.solid.race import NODE, SIGN, SolidRace
 from swgjoint.fe.solid.state import SolidState
-from swgjoint.fe.solid.strip import Strip
+from swgjoint.fe.solid.strip.strip import Strip
 from swgjoint.fe.solid.teeth import Teeth
-from swgjoint.fe.solid.wave_generator import WaveGeneratorSurface
+from swgjoint.fe.solid.wave_generator.race import NODE, SIGN, SolidRace
+from swgjoint.fe.solid.wave_generator.surface import WaveGeneratorSurface
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import lu_factor, lu_solve
 
-from swgjoint.fe.cyclic import Insides, SingularRingError
+from swgjoint.fe.common.cyclic import Insides, SingularRingError
 
 Array = NDArray[np.float64]
 
@@ -14,10 +14,10 @@ Array = NDArray[np.float64]
 class RingFactor:
     """Factorised ring of symmetric sector matrices.
 
-    What :class:`swgjoint.fe.cyclic.CyclicFactor` does, sector by sector in dense blocks
-    without its pivoting across them: for faces of a hundred degrees of freedom several
-    times faster than a band, with half of the fill. The insides are eliminated first,
-    then the faces one after the other; the last one is coupled to all.
+    What :class:`swgjoint.fe.common.cyclic.CyclicFactor` does, sector by sector in dense
+    blocks without its pivoting across them: for faces of a hundred degrees of freedom
+    several times faster than a band, with half of the fill. The insides are eliminated
+    first, then the faces one after the other; the last one is coupled to all.
     """
 
     def __init__(self, blocks: Array, face: int) -> None:

@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
 from swgjoint.errors import DesignError
-from swgjoint.fe.block_circulant import between, respond
+from swgjoint.fe.common.block_circulant import between, respond
 from swgjoint.fe.solid.across import spread_over
 from swgjoint.fe.solid.corotation import about_z
-from swgjoint.fe.solid.elasticity import Solid, solid
 from swgjoint.fe.solid.ring_factor import RingFactor
-from swgjoint.fe.solid.strip_mesh import StripMesh
-from swgjoint.gear.design import Design
-from swgjoint.gear.profile import ToothProfile
+from swgjoint.fe.solid.strip.elasticity import Solid, solid
+from swgjoint.fe.solid.strip.mesh import StripMesh
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.teeth.profile import ToothProfile
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -65,7 +65,7 @@ def ring_gear(design: Design, profile: ToothProfile, mesh: StripMesh) -> RingGea
     Args:
         design: The drive.
         profile: Flank of the circular spline.
-        mesh: From :func:`swgjoint.fe.solid.strip_mesh.circular_spline_strip`.
+        mesh: From :func:`swgjoint.fe.solid.strip.mesh.circular_spline_strip`.
 
     Raises:
         DesignError: If its outside is free.

@@ -1,4 +1,4 @@
-"""Fields of solved positions in space for the map; see :mod:`swgjoint.fe.shape_fields`.
+"""Fields of solved positions in 3D, as :mod:`swgjoint.fe.plane.shape_fields` in 2D.
 
 The surface goes along the bore of the open edge, over the teeth at both edges of the
 face width, and down the outside of the cup, one row of nodes a section.
@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from swgjoint.fe.shape_fields import (
+from swgjoint.fe.plane.shape_fields import (
     EVERY,
     SectorFields,
     Surface,
@@ -17,10 +17,10 @@ from swgjoint.fe.shape_fields import (
     surface_of,
 )
 from swgjoint.fe.solid.corotation import about_z
-from swgjoint.fe.solid.elasticity import stress_maxima
 from swgjoint.fe.solid.ring import SolidRing
 from swgjoint.fe.solid.state import SolidState
 from swgjoint.fe.solid.stress import flexspline_stresses
+from swgjoint.fe.solid.strip.elasticity import stress_maxima
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from swgjoint.fe.plane.state import StateFigures
 from swgjoint.fe.solid.teeth import ToothRows
-from swgjoint.fe.state import StateFigures
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -39,7 +39,8 @@ class SolidState(StateFigures):
     """The same on the circular spline, in the frames of its teeth (N_c, n_c) [N]."""
     race: Array | None = None
     """Coordinates of the outer race (N, 2, 4), see
-    :class:`swgjoint.fe.solid.race.SolidRace`; None on a rigid wave generator."""
+    :class:`swgjoint.fe.solid.wave_generator.race.SolidRace`; None on a rigid wave
+    generator."""
     ball_force: Array | None = None
     """Of the balls of the drive [N]."""
     held: ToothRows | None = None

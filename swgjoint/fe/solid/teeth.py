@@ -11,13 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from swgjoint.fe.circular_spline import CircularSpline
-from swgjoint.fe.corotation import rotate
+from swgjoint.fe.plane.circular_spline import CircularSpline
+from swgjoint.fe.plane.corotation import rotate
+from swgjoint.fe.plane.tooth_contact import Contacts, ToothContact
 from swgjoint.fe.solid.corotation import Frames, spin
 from swgjoint.fe.solid.ring_gear import RingGear
-from swgjoint.fe.solid.strip import Strip
-from swgjoint.fe.solid.wave_generator import crown
-from swgjoint.fe.tooth_contact import Contacts, ToothContact
+from swgjoint.fe.solid.strip.strip import Strip
+from swgjoint.fe.solid.wave_generator.surface import crown
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from swgjoint.fe.corotation import rotate
-from swgjoint.fe.influence import Gaps, Influence, pivoted
+from swgjoint.fe.common.influence import Gaps, Influence, pivoted
+from swgjoint.fe.plane.corotation import rotate
 from swgjoint.fe.solid.equilibrium import condense
 from swgjoint.fe.solid.linearise import Linearised, linearise
 from swgjoint.fe.solid.ring import SolidRing

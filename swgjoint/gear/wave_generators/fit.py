@@ -7,8 +7,8 @@ from math import pi
 
 import numpy as np
 
-from swgjoint.gear.check import Check
-from swgjoint.gear.design import Design
+from swgjoint.gear.design.check import Check
+from swgjoint.gear.design.design import Design
 from swgjoint.gear.wave_generators.chain import Chain
 from swgjoint.gear.wave_generators.curve import ClosedCurve
 from swgjoint.gear.wave_generators.radial import Radial, Table

@@ -8,8 +8,8 @@ import pytest
 from swgjoint.fe.solid import drive3d
 from swgjoint.fe.solid.continuation import SolidContinuation
 from swgjoint.fe.solid.drive3d import solid_ring
-from swgjoint.fe.solid.masters import Orders
-from swgjoint.gear.design import Design
+from swgjoint.fe.solid.strip.masters import Orders
+from swgjoint.gear.design.design import Design
 
 TORQUE = 5.0
 ORDERS = Orders(teeth=3, cup=2, at_teeth=2, around=2, rim=1, wall=1, rim_bending=1)
@@ -105,7 +105,7 @@ def small_pattern(few_masters_everywhere, kept_once):
 
     Equilibria of the perfect teeth, eight angles by three torques, are solved once.
     """
-    from swgjoint.fe import sampling
+    from swgjoint.fe.common import sampling
 
     solve_pattern = sampling.solve_pattern
 

@@ -7,7 +7,7 @@ import pytest
 
 from swgjoint.fe.solid.across import crown_bend, spread_over, vertices
 from swgjoint.fe.solid.linearise import bore_contact
-from swgjoint.fe.solid.wave_generator import crown
+from swgjoint.fe.solid.wave_generator.surface import crown
 
 Z = np.linspace(-5e-3, 5e-3, 11)
 HEIGHT, WIDTH = 100e-6, 10e-3

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from swgjoint.fe.solid.axial_section import (
+from swgjoint.fe.solid.corotation import about_z
+from swgjoint.fe.solid.figures.axial_section import (
     axial_sections,
     coning,
     on_axes,
     sector_points,
 )
-from swgjoint.fe.solid.corotation import about_z
 
 TURN = 0.3
 

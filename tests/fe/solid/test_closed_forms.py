@@ -8,18 +8,18 @@ from math import pi
 import numpy as np
 import pytest
 
-from swgjoint.fe.cyclic import CyclicFactor
-from swgjoint.fe.drive2d import ring_model
+from swgjoint.fe.common.cyclic import CyclicFactor
+from swgjoint.fe.plane.drive2d import ring_model
 from swgjoint.fe.solid.across import spread_over
 from swgjoint.fe.solid.corotation import about_z
-from swgjoint.fe.solid.masters import strip_masters
 from swgjoint.fe.solid.ring_gear import ring_gear
-from swgjoint.fe.solid.segment import condense_segment
-from swgjoint.fe.solid.strip import flexspline
-from swgjoint.fe.solid.strip_mesh import circular_spline_strip, flexspline_strip
+from swgjoint.fe.solid.strip.masters import strip_masters
+from swgjoint.fe.solid.strip.mesh import circular_spline_strip, flexspline_strip
+from swgjoint.fe.solid.strip.segment import condense_segment
+from swgjoint.fe.solid.strip.strip import flexspline
 from swgjoint.gear.cup import cup_torsional_stiffness
-from swgjoint.gear.design import Design
-from swgjoint.gear.profile import tooth_profile
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.teeth.profile import tooth_profile
 
 
 @cache

@@ -15,7 +15,7 @@ from swgjoint.fe.solid.corotation import (
     segment_frames,
     tangent,
 )
-from swgjoint.fe.solid.elasticity import solid
+from swgjoint.fe.solid.strip.elasticity import solid
 
 PLACE = Rotation.from_rotvec([[0, 0, 0.0], [0, 0, 0.4], [0, 0, 2.0]]).as_matrix()
 

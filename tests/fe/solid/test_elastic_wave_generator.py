@@ -11,18 +11,22 @@ from messages import naming
 from solved import kept
 
 from swgjoint.errors import InputError
-from swgjoint.fe.solid import elastic_wave_generator as module
 from swgjoint.fe.solid.continuation import SolidContinuation
 from swgjoint.fe.solid.drive3d import solid_ring
-from swgjoint.fe.solid.elastic_wave_generator import (
+from swgjoint.fe.solid.figures.pinched_cup import pinched_cup
+from swgjoint.fe.solid.wave_generator import elastic as module
+from swgjoint.fe.solid.wave_generator.elastic import (
     ElasticWaveGenerator,
     LobeCharacteristic,
     cup_of,
     lobe_characteristic,
 )
-from swgjoint.fe.solid.lobe_pads import force_on_teeth, pad_force, with_pads
-from swgjoint.fe.solid.pinched_cup import pinched_cup
-from swgjoint.gear.wave_generator import lobe_height
+from swgjoint.fe.solid.wave_generator.lobe_pads import (
+    force_on_teeth,
+    pad_force,
+    with_pads,
+)
+from swgjoint.gear.wave_generators.wave_generator import lobe_height
 
 HEIGHT = 0.4e-3
 STIFFNESS = 60e3

@@ -13,7 +13,7 @@ from swgjoint.fe.solid.corotation import about_z
 from swgjoint.fe.solid.drive3d import solid_ring
 from swgjoint.fe.solid.equilibrium import SolidLoad
 from swgjoint.fe.solid.linearise import linearise
-from swgjoint.gear.design import Design
+from swgjoint.gear.design.design import Design
 
 TORQUE = 5.0
 PITCH = 2 * pi / 42

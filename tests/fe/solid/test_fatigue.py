@@ -10,12 +10,18 @@ import pytest
 from messages import naming
 
 from swgjoint.errors import DesignError
-from swgjoint.fe.solid import fatigue as module
-from swgjoint.fe.solid.fatigue import Limits, assess, fatigue, half_range, root_stress
-from swgjoint.fe.solid.four_forces import four_forces
-from swgjoint.fe.solid.masters import Orders
-from swgjoint.fe.solid.pinched_cup import pinched_cup
-from swgjoint.gear.design import Design
+from swgjoint.fe.solid.figures import fatigue as module
+from swgjoint.fe.solid.figures.fatigue import (
+    Limits,
+    assess,
+    fatigue,
+    half_range,
+    root_stress,
+)
+from swgjoint.fe.solid.figures.four_forces import four_forces
+from swgjoint.fe.solid.figures.pinched_cup import pinched_cup
+from swgjoint.fe.solid.strip.masters import Orders
+from swgjoint.gear.design.design import Design
 from swgjoint.gear.shell_theory import ShellDimensions, safety_factor
 
 LIMITS = Limits(bending=800e6, torsion=320e6)

@@ -7,7 +7,7 @@ import pytest
 from scipy.sparse.linalg import spsolve
 from skfem import MeshHex
 
-from swgjoint.fe.solid.elasticity import solid, stress_maxima
+from swgjoint.fe.solid.strip.elasticity import solid, stress_maxima
 
 E, NU = 210e9, 0.29
 STRAIN = 1e-4 * np.array([[3.0, 1.0, -2.0], [1.0, -4.0, 0.5], [-2.0, 0.5, 2.0]])

@@ -7,8 +7,8 @@ import pytest
 
 from swgjoint.errors import DesignError
 from swgjoint.fe.build_map import build_map
-from swgjoint.gear.design import Design
-from swgjoint.maps.fit import fit_map
+from swgjoint.gear.design.design import Design
+from swgjoint.maps.fit.fit import fit_map
 
 pytestmark = pytest.mark.fe
 

@@ -7,11 +7,11 @@ import pytest
 from skfem import Basis, ElementHex1
 
 from swgjoint.fe.solid.corotation import about_z
-from swgjoint.fe.solid.masters import Orders, SegmentMasters, strip_masters
-from swgjoint.fe.solid.segment import condense_segment
-from swgjoint.fe.solid.strip_mesh import circular_spline_strip, flexspline_strip
-from swgjoint.gear.design import Design
-from swgjoint.gear.profile import tooth_profile
+from swgjoint.fe.solid.strip.masters import Orders, SegmentMasters, strip_masters
+from swgjoint.fe.solid.strip.mesh import circular_spline_strip, flexspline_strip
+from swgjoint.fe.solid.strip.segment import condense_segment
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.teeth.profile import tooth_profile
 
 
 def strip_of(name="reference-3d", **changes):

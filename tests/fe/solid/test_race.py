@@ -10,12 +10,12 @@ import pytest
 from messages import naming
 
 from swgjoint.errors import DesignError
-from swgjoint.fe.corotation import rotate, turned
+from swgjoint.fe.plane.corotation import rotate, turned
 from swgjoint.fe.solid.continuation import SolidContinuation
 from swgjoint.fe.solid.drive3d import solid_ring
-from swgjoint.fe.solid.race import AXIAL, NODE, ROLL, SIGN, SolidRace
-from swgjoint.gear.design import Design
-from swgjoint.gear.neutral_line import NeutralLine
+from swgjoint.fe.solid.wave_generator.race import AXIAL, NODE, ROLL, SIGN, SolidRace
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.teeth.neutral_line import NeutralLine
 from swgjoint.gear.wave_generators.ellipse import Elliptical
 
 TORQUE = 5.0

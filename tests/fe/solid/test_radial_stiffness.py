@@ -6,10 +6,13 @@ import pytest
 from messages import naming
 
 from swgjoint.errors import DesignError
-from swgjoint.fe.solid import radial_stiffness as module
-from swgjoint.fe.solid.pinched_cup import PLACES, pinched_cup
-from swgjoint.fe.solid.radial_stiffness import radial_stiffness, smooth_cup_stiffness
-from swgjoint.gear.design import Design
+from swgjoint.fe.solid.figures import radial_stiffness as module
+from swgjoint.fe.solid.figures.pinched_cup import PLACES, pinched_cup
+from swgjoint.fe.solid.figures.radial_stiffness import (
+    radial_stiffness,
+    smooth_cup_stiffness,
+)
+from swgjoint.gear.design.design import Design
 from swgjoint.gear.shell_theory import ring_stiffness
 
 FORCE = 120.0  # deflects the small cup by about its lobe height [N]

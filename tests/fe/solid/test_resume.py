@@ -9,11 +9,11 @@ import pytest
 from messages import names, naming
 
 from swgjoint.errors import InputError
-from swgjoint.fe.pattern import Effort, solve_pattern
+from swgjoint.fe.common.pattern import Effort, solve_pattern
+from swgjoint.fe.plane.state_arrays import packed, settled, unpacked
 from swgjoint.fe.solid.checkpoint import Checkpoint
-from swgjoint.fe.state_arrays import packed, settled, unpacked
-from swgjoint.kept import arrays_file
 from swgjoint.maps.unfinished import Unfinished
+from swgjoint.store import arrays_file
 
 pytestmark = pytest.mark.fe
 

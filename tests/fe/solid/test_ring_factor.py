@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from swgjoint.fe.cyclic import CyclicFactor, SingularRingError
+from swgjoint.fe.common.cyclic import CyclicFactor, SingularRingError
 from swgjoint.fe.solid.ring_factor import RingFactor
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from swgjoint.fe.solid.axial_section import sector_points
+from swgjoint.fe.solid.figures.axial_section import sector_points
 from swgjoint.fe.solid.shape_fields import solid_fields, solid_surface
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from swgjoint.fe.solid.corotation import about_z
-from swgjoint.fe.solid.elasticity import COLUMNS, ROWS
 from swgjoint.fe.solid.stress import average_faces, average_sections
+from swgjoint.fe.solid.strip.elasticity import COLUMNS, ROWS
 
 
 @pytest.mark.parametrize("half", [False, True])

@@ -11,15 +11,15 @@ from messages import naming
 from solved import kept
 
 from swgjoint.errors import DesignError
-from swgjoint.fe import tolerance_sampling
-from swgjoint.fe.corotation import rotate
+from swgjoint.fe.plane.corotation import rotate
 from swgjoint.fe.solid.drive3d import solid_ring
 from swgjoint.fe.solid.tolerance_influence import influence
-from swgjoint.fe.tolerance_cycle import gap_errors, pitch_of, pitches_of, shifted
-from swgjoint.fe.tolerance_rest import influences
-from swgjoint.gear.design import Design
-from swgjoint.gear.tolerances import ToothErrors, axis_tilt
-from swgjoint.maps.fit import fit_map
+from swgjoint.fe.tolerances import sampling as tolerance_sampling
+from swgjoint.fe.tolerances.cycle import gap_errors, pitch_of, pitches_of, shifted
+from swgjoint.fe.tolerances.rest import influences
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.design.tolerances import ToothErrors, axis_tilt
+from swgjoint.maps.fit.fit import fit_map
 
 pytestmark = [pytest.mark.fe, pytest.mark.usefixtures("few_masters_everywhere")]
 

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from swgjoint.fe.following import is_free
+from swgjoint.fe.common.following import is_free
 from swgjoint.fe.solid.continuation import SolidContinuation
 from swgjoint.fe.solid.corotation import about_z
 from swgjoint.fe.solid.drive3d import solid_ring
-from swgjoint.fe.solid.tooth_play import play
+from swgjoint.fe.solid.figures.tooth_play import play
 
 pytestmark = pytest.mark.fe
 

@@ -7,7 +7,7 @@ import pytest
 from solved import kept
 
 from swgjoint.fe.solid.continuation import SolidContinuation
-from swgjoint.fe.solid.torsion import SMALL, solid_torsion
+from swgjoint.fe.solid.figures.torsion import SMALL, solid_torsion
 
 pytestmark = pytest.mark.fe
 

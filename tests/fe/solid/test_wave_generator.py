@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from swgjoint.fe.corotation import rotate
-from swgjoint.fe.solid.wave_generator import WaveGeneratorSurface, crown
-from swgjoint.gear.design import Design
+from swgjoint.fe.plane.corotation import rotate
+from swgjoint.fe.solid.wave_generator.surface import WaveGeneratorSurface, crown
+from swgjoint.gear.design.design import Design
 
 ALPHA = 0.7
 

@@ -21,10 +21,10 @@ import numpy as np
 
 from hostile.case import Case
 from swgjoint.cli.main import main
-from swgjoint.fe.tolerance_lot import Lot
+from swgjoint.explore.sweep.figures import Record
+from swgjoint.fe.tolerances.lot import Lot
 from swgjoint.maps.cache import code_version
 from swgjoint.maps.drive_map import DriveMap
-from swgjoint.study.sweep_figures import Record
 
 TASKS = ("meshing", "spec", "size", "run")
 """Tables of a sweep that ask for figures."""
@@ -191,9 +191,9 @@ def _no_finite_elements() -> Iterator[None]:
     What is read, planned, collected, drawn and written is ours; the map of a design is
     that of a catalogue drive.
     """
-    lot = "swgjoint.study.lot"
+    lot = "swgjoint.explore.lot"
     with (
-        mock.patch("swgjoint.study.sweep.compute_all", _drawn_records),
+        mock.patch("swgjoint.explore.sweep.sweep.compute_all", _drawn_records),
         mock.patch(f"{lot}.perfect_positions", lambda *_: ()),
         mock.patch(f"{lot}.superposition_error", lambda *_: 0.01),
         mock.patch(f"{lot}.sample_lot", _drawn_lot),

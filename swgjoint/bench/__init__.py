@@ -1,0 +1,1 @@
+"""Benchmarks: error against run time, scaling, stability."""

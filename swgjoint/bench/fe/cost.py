@@ -1,0 +1,218 @@
+"""``swgjoint bench fe``: what finite elements of less effort miss, and their time.
+
+Every setting is compared three times: with the finest model in space, with the finest
+mesh of its own kind, and with the finest of the next level up (ring, plane, space;
+linear, nonlinear). References that take long come from a stored file, which holds one
+short setting, too: solved again, it tells whether the file is of this code. What takes
+long and is not stored is left out.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import os
+import time
+from collections.abc import Iterator, Sequence
+from concurrent.futures import (
+    ProcessPoolExecutor,
+    ThreadPoolExecutor,
+    as_completed,
+)
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+from swgjoint.bench.fe.rows import cheapest, rows_of
+from swgjoint.bench.fe.setting import POSITIONS, Found, Setting
+from swgjoint.bench.fe.solve import Task, solved_in
+from swgjoint.bench.fe.stored import FILE, LONG, stored_of, to_store, told
+from swgjoint.errors import ComputationError, DesignError
+from swgjoint.fe.solid.drive3d import check_modelled
+from swgjoint.files import Outputs
+from swgjoint.gear.design.design import Design
+from swgjoint.json_text import json_text
+from swgjoint.progress import Progress, silent
+from swgjoint.provenance import provenance
+from swgjoint.store import json_file
+from swgjoint.view.plots.bench_fe import cost_picture
+
+SETTINGS = (
+    Setting(model="ring", refinement=0),
+    Setting(model="ring", refinement=0.5),
+    Setting(model="ring", refinement=1),
+    Setting(model="2d", refinement=0.5, nonlinear=False),
+    Setting(model="2d", refinement=1.0, nonlinear=False),
+    Setting(model="2d", refinement=2.0, nonlinear=False),
+    Setting(model="2d", refinement=0.5),
+    Setting(model="2d", refinement=1.0),
+    Setting(model="2d", refinement=1.0, full=True),
+    Setting(model="2d", refinement=2.0),
+    Setting(model="2d", refinement=4.0),
+    Setting(model="3d", refinement=0.5, nonlinear=False),
+    Setting(model="3d", refinement=1.0, nonlinear=False),
+    Setting(model="3d", refinement=0.5),
+    Setting(model="3d", refinement=0.5, full=True),
+    Setting(model="3d", refinement=0.7),
+    Setting(model="3d", refinement=1.0),
+    Setting(model="3d", refinement=1.4),
+)
+"""The finest of every kind comes last; the last one of all is the reference."""
+
+LEFT_OUT = "left out: long, and not in a stored file; solved with --recompute"
+LOST = "its process died: out of memory, or killed"
+
+
+def run_fe_cost(
+    *,
+    design: Design,
+    settings: Sequence[Setting] = SETTINGS,
+    folder: Path | None = None,
+    progress: Progress = silent,
+    jobs: int = 2,
+    recompute: bool = False,
+) -> dict[str, Any]:
+    """Solve every setting; the last one that is not left out is the reference.
+
+    Args:
+        design: With a cup.
+        settings: Coarse to fine within each kind.
+        folder: For table, JSON and picture; None writes nothing.
+        progress: Called after every setting.
+        jobs: Processes, one a core; every setting has a fresh one.
+        recompute: Solve what the stored file has, too, and write that file anew
+            (into ``folder``).
+
+    Returns:
+        ``rows``, see :func:`swgjoint.bench.fe.rows.rows_of`; ``cheapest``: setting
+        by quantity and bound, ``cheapest_in_the_plane`` against the finest plane mesh;
+        ``design``, ``stored`` with the provenance of the stored settings and how far
+        they have drifted, ``left_out``: settings by key,
+        ``kinematic_error_positions``: so many of a pitch it is told at, which sees its
+        first harmonic, ``provenance``, ``files``, ``wall_s``.
+
+    Raises:
+        DesignError: If the design has no cup or holds what is not modelled in space.
+        ComputationError: If the reference fails.
+    """
+    begin = time.perf_counter()
+    if design.cup is None:
+        raise DesignError(
+            f"{design.drive.name}: bench fe goes by the model in space, which needs a"
+            " [cup]; accepted: a design with one, such as reference-3d-modified"
+        )
+    check_modelled(design)
+    kept = {} if recompute else stored_of(design)
+    stored = kept.get("settings", {})
+    found: dict[str, Found | str] = {
+        s.key: stored.get(s.key, LEFT_OUT)
+        for s in settings
+        if s.key in LONG and not recompute
+    }
+    left_out = [key for key, one in found.items() if one == LEFT_OUT]
+    missing = [setting for setting in settings if setting.key not in found]
+    stage = f"{design.drive.name}: settings"
+    found |= _solve_all(design, missing, jobs=jobs, stage=stage, progress=progress)
+    best = [s for s in settings if s.key not in left_out][-1]
+    last = found[best.key]
+    if isinstance(last, str):
+        raise ComputationError(f"the reference, {best.name}: {last}")
+    from_file = set(LONG) & set(stored)
+    rows = rows_of(settings, found, best=best, stored=from_file)
+    result = {
+        "design": design.drive.name,
+        "rows": rows,
+        "cheapest": cheapest(rows),
+        "cheapest_in_the_plane": cheapest(rows, "2d"),
+        "stored": told(kept, found) if kept else None,
+        "left_out": left_out,
+        "kinematic_error_positions": POSITIONS,
+        "provenance": provenance(),
+    }
+    files: list[str] = []
+    if folder is not None:
+        outputs = Outputs(folder)
+        outputs.write("bench-fe.json", lambda: json_text(result) + "\n")
+        outputs.write("bench-fe.csv", lambda: _table(rows))
+        outputs.write("bench-fe.png", lambda: cost_picture(result))
+        if recompute:
+            outputs.write(FILE, lambda: json_file(to_store(design, found)))
+        files = outputs.files
+    return result | {"files": files, "wall_s": time.perf_counter() - begin}
+
+
+def _solve_all(
+    design: Design,
+    settings: Sequence[Setting],
+    *,
+    jobs: int,
+    stage: str,
+    progress: Progress,
+) -> dict[str, Found | str]:
+    """Every setting in a process that does nothing else, the long ones first."""
+    order = sorted(settings, key=_work, reverse=True)
+    found: dict[str, Found | str] = {}
+    progress(stage, 0, len(order))
+    # a thread holds the process of one setting, so that one which dies ends no other
+    threads = ThreadPoolExecutor(max_workers=jobs)
+    with _one_thread():
+        try:
+            tasks = {
+                threads.submit(_solved_apart, Task(design=design, setting=s)): s
+                for s in order
+            }
+            for future in as_completed(tasks):
+                found[tasks[future].key] = future.result()
+                progress(stage, len(found), len(order))
+        finally:
+            threads.shutdown(cancel_futures=True)
+    return found
+
+
+def _solved_apart(task: Task) -> Found | str:
+    """A setting in a process of its own; what becomes of that is part of the result."""
+    context = get_context("spawn")
+    with ProcessPoolExecutor(max_workers=1, mp_context=context) as process:
+        try:
+            return process.submit(solved_in, task).result()
+        except BrokenProcessPool:
+            return LOST
+        except MemoryError:
+            return "out of memory"
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """Processes that begin inside have one thread of algebra.
+
+    A second one would blur what a core costs. A process loads its algebra with this
+    module, before any code of ours runs in it: only what it is born with counts.
+    """
+    names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+    before = {name: os.environ.get(name) for name in names}
+    os.environ.update(dict.fromkeys(names, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
+
+
+def _work(setting: Setting) -> float:
+    """Rough seconds."""
+    base = {"ring": 6.0, "2d": 5.0, "3d": 150.0}[setting.model]
+    active_sets = 3.0 if setting.kind == "3d linear" else 1.0
+    return (2 if setting.full else 1) * active_sets * base * setting.refinement**2
+
+
+def _table(rows: Sequence[dict[str, Any]]) -> str:
+    out = io.StringIO()
+    writer = csv.DictWriter(out, list(rows[0]), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    return out.getvalue()

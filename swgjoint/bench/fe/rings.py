@@ -1,0 +1,120 @@
+"""Settings of ``swgjoint bench fe`` without a mesh: thin rings, closed forms."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from math import pi
+
+import numpy as np
+
+from swgjoint.bench.fe.setting import (
+    POSITIONS,
+    RIM,
+    Array,
+    Found,
+    Setting,
+    checked,
+    mean_of,
+    positions,
+    rim_shape,
+)
+from swgjoint.fe.rings.equilibrium import RingSolver
+from swgjoint.fe.rings.loading import SMALL, loaded, unloaded
+from swgjoint.fe.rings.model import ThinRing, thin_ring
+from swgjoint.fe.rings.state import RingState
+from swgjoint.gear.catalogue import ratings_of
+from swgjoint.gear.design import family
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.mounting import series_compliance
+from swgjoint.gear.shell_theory import ShellDimensions
+from swgjoint.gear.wave_generators.wave_generator import lobe_height
+from swgjoint.units import mm
+
+
+def solved_by_rings(design: Design, setting: Setting, begin: float) -> Found:
+    """What rings or closed forms say of a design; ``begin``: of the setting [s]."""
+    if not setting.refinement:
+        return _closed_form(design, begin)
+    if design.wave_generator.bearing is None:
+        design = design.with_changes(
+            {"wave_generator.bearing": bearing_by_rule(design)}
+        )
+    model = thin_ring(design)
+    nodes = max(1, round(2 * setting.refinement))
+    count = model.rim.elements // model.nodes_per_tooth * nodes
+    model = replace(
+        model,
+        rim=replace(model.rim, elements=count),
+        race=replace(model.race, elements=count),
+        nodes_per_tooth=nodes,
+    )
+    rated, solver = ratings_of(design).rated_torque, RingSolver()
+    series, shape = series_compliance(design, cup=True), np.zeros(RIM)
+    error, compliance, tensile = list[float](), list[float](), list[float]()
+    for angle in positions(design):
+        rest = unloaded(model, float(angle))
+        sides = [loaded(model, rest, t * SMALL * rated) for t in (1.0, -1.0)]
+        psi = 0.5 * sum(checked(side).rotation for side in sides)
+        middle = checked(solver(model, rest, rotation=psi))
+        if middle.loaded_teeth:
+            middle = checked(solver(model, middle, torque=0.0))
+        state = checked(loaded(model, sides[0], rated))
+        if not error:
+            place: Array = np.arange(4 * count, dtype=np.float64) / 4.0
+            points, _, _ = model.rim.at(state.q[: model.rim.size], place)
+            shape = rim_shape(points, model.rim.radius, state.alpha)
+        error.append(middle.rotation - angle / design.ratio)
+        compliance.append(state.compliance + series)
+        tensile.append(_rim_stress(design, model, state))
+    wall = time.perf_counter() - begin
+    return mean_of(
+        error, compliance, tensile, rim_shape=shape, wall_s=wall, nodes=nodes
+    )
+
+
+def bearing_by_rule(design: Design) -> dict[str, float]:
+    """Ball bearing of the family's proportions, without clearance."""
+    pitch = design.drive.module_mm * design.drive.teeth_flexspline
+    return {
+        "balls": family.BALLS,
+        "ball_diameter_mm": family.BALL * pitch,
+        "race_thickness_mm": family.RACE * pitch,
+        "race_width_mm": min(family.RACE_WIDTH * pitch, design.drive.face_width_mm),
+        "groove_inertia_factor": family.GROOVE,
+    }
+
+
+def _rim_stress(design: Design, model: ThinRing, state: RingState) -> float:
+    r"""Largest tensile stress of the rim between the teeth, no notch [Pa].
+
+    .. math:: \sigma = E\,(\varepsilon + y\,\Delta\kappa)
+
+    at its bore and at the root circle, y from the neutral line, in the middle of every
+    element, where bending of a cubic is right.
+    """
+    rim, outside = model.rim, design.flexspline.rim_mm * mm
+    centre: Array = np.arange(rim.elements, dtype=np.float64) + 0.5
+    change = []
+    for q in (state.q[: rim.size], rim.reference.ravel()):
+        _, v, w = rim.at(q, centre)
+        length = np.hypot(v[:, 0], v[:, 1])
+        turning = (v[:, 0] * w[:, 1] - v[:, 1] * w[:, 0]) / length**2 / rim.step
+        change.append((length / rim.step, turning))
+    stretch, bend = change[0][0] - change[1][0], change[0][1] - change[1][1]
+    bore = model.bearing.bore_radius - rim.radius
+    strain = [stretch + y * bend for y in (bore, bore + outside)]
+    modulus = design.material_of("flexspline").youngs_modulus
+    return float(modulus * np.max(strain))
+
+
+def _closed_form(design: Design, begin: float) -> Found:
+    """Thin shell on an unloaded wave generator; rigid teeth at the ideal ratio."""
+    phi = pi * np.arange(RIM) / RIM
+    return Found(
+        stiffness=1.0 / series_compliance(design, cup=True),
+        kinematic_error=np.zeros(POSITIONS),
+        tensile=ShellDimensions.of(design).bending_stress(),
+        rim_shape=np.asarray(lobe_height(design) * np.cos(2.0 * phi)),
+        wall_s=time.perf_counter() - begin,
+    )

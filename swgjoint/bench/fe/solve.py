@@ -1,0 +1,165 @@
+"""One setting of ``swgjoint bench fe`` in a process of its own."""
+
+from __future__ import annotations
+
+import resource
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from swgjoint.bench.fe.rings import solved_by_rings
+from swgjoint.bench.fe.setting import (
+    RIM,
+    Array,
+    Found,
+    Setting,
+    checked,
+    mean_of,
+    positions,
+    rim_shape,
+)
+from swgjoint.errors import ComputationError, DesignError
+from swgjoint.fe.common.following import AnyState, Follower
+from swgjoint.fe.plane.continuation import Continuation
+from swgjoint.fe.plane.drive2d import can_halve, ring_model
+from swgjoint.fe.plane.ring import RingModel
+from swgjoint.fe.plane.state import State
+from swgjoint.fe.plane.stress import MemberMaxima, StressMaxima
+from swgjoint.fe.rings.loading import SMALL
+from swgjoint.fe.solid.continuation import SolidContinuation
+from swgjoint.fe.solid.drive3d import solid_ring
+from swgjoint.fe.solid.ring import SolidRing
+from swgjoint.fe.solid.state import SolidState
+from swgjoint.fe.solid.stress import SolidMaxima
+from swgjoint.gear.catalogue import ratings_of
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.mounting import series_compliance
+
+
+@dataclass(frozen=True, kw_only=True)
+class Task:
+    """A setting of a design; a process of its own solves it."""
+
+    design: Design
+    setting: Setting
+
+
+def solved_in(task: Task) -> Found | str:
+    """A setting in a process that has done nothing else, or why it has no solution."""
+    cpu = time.process_time()
+    try:
+        found = solved(task.design, task.setting)
+    except (ComputationError, DesignError) as failure:
+        return str(failure)
+    return replace(found, cpu_s=time.process_time() - cpu, peak_MB=peak_memory() / 1e6)
+
+
+def peak_memory() -> float:
+    """Largest resident memory of this process so far [B]."""
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return float(peak if sys.platform == "darwin" else 1024 * peak)
+
+
+def solved(design: Design, setting: Setting) -> Found:
+    """What a setting says of a design.
+
+    Raises:
+        DesignError: If the design holds what the model does not.
+        ComputationError: If a position has no solution.
+    """
+    begin = time.perf_counter()
+    if setting.model == "ring":
+        return solved_by_rings(design, setting, begin)
+    changed = design.with_changes({"mesh.refinement": setting.refinement})
+    # on the rigid wave generator that the levels in space have
+    half = can_halve(changed, bearing=False) and not setting.full
+    if setting.model == "3d":
+        ring = solid_ring(changed, half=half, nonlinear=setting.nonlinear)
+        return _measured(
+            changed,
+            SolidContinuation(
+                ring=ring, ratio=changed.ratio, layout=changed.drive.layout
+            ),
+            lambda state: SolidMaxima.at(ring, state).flexspline,
+            lambda state: _solid_rim(ring, state),
+            series=series_compliance(changed, cup=False),
+            nodes=sum(s.mesh.mesh.p.shape[1] for s in ring.strip.segments),
+            begin=begin,
+        )
+    plane = ring_model(changed, half=half, nonlinear=setting.nonlinear, bearing=False)
+    return _measured(
+        changed,
+        Continuation(model=plane, ratio=changed.ratio, layout=changed.drive.layout),
+        lambda state: MemberMaxima.at(plane, state).flexspline,
+        lambda state: _plane_rim(plane, state),
+        series=series_compliance(changed, cup=True),
+        nodes=plane.element.mesh.mesh.p.shape[1],
+        begin=begin,
+    )
+
+
+def _measured(
+    design: Design,
+    follow: Follower[AnyState],
+    stress: Callable[[AnyState], StressMaxima],
+    rim: Callable[[AnyState], Array],
+    *,
+    series: float,
+    nodes: int,
+    begin: float,
+) -> Found:
+    """Unloaded and loaded positions of a model in the plane or in space.
+
+    Args:
+        design: The drive.
+        follow: Its model.
+        stress: Largest stresses of the flexspline at a state.
+        rim: Shape of the rim at a state.
+        series: Compliance that the model lacks [rad/(N·m)].
+        nodes: Of a sector.
+        begin: When the setting began [s].
+    """
+    rated, theta = ratings_of(design).rated_torque, positions(design)
+    rest = follow.unloaded(
+        checked(follow.meshed(checked(follow.deflected()))), SMALL * rated
+    )
+    state = follow.to_torque(rest.state if rest.sides is None else rest.sides[0], rated)
+    error, compliance, tensile, shape = [], [], [], np.zeros(RIM)
+    for k, angle in enumerate(theta):
+        if k:
+            rest = follow.unloaded_to(rest, float(angle))
+            state = follow.to_angle(state, float(angle))
+        checked(rest.state)
+        checked(state)
+        if not k:
+            shape = rim(state)
+        error.append(follow.output_angle(rest.state) - angle / design.ratio)
+        compliance.append(state.compliance + series)
+        tensile.append(stress(state).tensile)
+    wall = time.perf_counter() - begin
+    return mean_of(
+        error, compliance, tensile, rim_shape=shape, wall_s=wall, nodes=nodes
+    )
+
+
+def _plane_rim(model: RingModel, state: State) -> Array:
+    nodes = model.skeleton(state)[:, model.bore_nodes]
+    radius = float(np.hypot(*model.element.skeleton[model.bore_nodes[0]]))
+    return rim_shape(nodes.reshape(-1, 2), radius, state.wave_generator_angle)
+
+
+def _solid_rim(ring: SolidRing, state: SolidState) -> Array:
+    """Of the bore at mid-face, between the planes beside it."""
+    frame, strip = ring.frames(state)[0], ring.strip
+    points = np.einsum("sij,spj->spi", frame.turn, ring.bore_positions(frame, state))
+    points = points.reshape(len(points), strip.planes, -1, 3)
+    z = strip.mesh.teeth.z
+    middle = 0.5 * (z[0] + z[-1])
+    after = int(np.clip(np.searchsorted(z, middle), 1, len(z) - 1))
+    part = (middle - z[after - 1]) / (z[after] - z[after - 1])
+    flat = (1.0 - part) * points[:, after - 1] + part * points[:, after]
+    radius = float(np.hypot(strip.bore[0, 0], strip.bore[0, 1]))
+    return rim_shape(flat[..., :2].reshape(-1, 2), radius, state.wave_generator_angle)

@@ -1,0 +1,95 @@
+"""References of ``swgjoint bench fe`` that take long, in a file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from swgjoint.bench.fe.setting import POSITIONS, Found
+from swgjoint.gear.design.design import Design
+from swgjoint.models_path import models_path
+from swgjoint.provenance import provenance
+from swgjoint.store import json_content, read_kept
+
+LONG = ("3d, refinement 1, linear", "3d, refinement 1.4")
+"""Settings of up to an hour: they come from the file where it has them, else they are
+left out; only ``recompute`` solves them."""
+WITNESS = "3d, refinement 0.5"
+"""In the file, too, and always solved: its figures must not have moved."""
+DRIFT = 1e-3
+"""Change of the witness beyond which the file is of another code [-]."""
+FILE = "bench-fe-reference.json"
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Stored:
+    """What is read of the file."""
+
+    design_hash: str
+    positions: int
+    command: str
+    provenance: dict[str, Any]
+    settings: dict[str, dict[str, float | list[float] | None]]
+
+
+def stored_of(design: Design, path: Path | None = None) -> dict[str, Any]:
+    """Stored settings of a design, empty if the file is of another one."""
+    path = path or models_path() / "studies" / FILE
+    kept = read_kept(path, _read)
+    if kept is None:
+        return {}
+    of_this = (kept["design_hash"], kept["positions"])
+    return kept if of_this == (design.content_hash(), POSITIONS) else {}
+
+
+def _read(data: bytes) -> dict[str, Any]:
+    kept = json_content(data, _Stored)
+    settings = {key: _found(values) for key, values in kept.settings.items()}
+    return {**vars(kept), "settings": settings}
+
+
+def _found(values: dict[str, Any]) -> Found:
+    arrays = {
+        key: None if values[key] is None else np.array(values[key], float)
+        for key in ("kinematic_error", "rim_shape")
+    }
+    return Found(**(values | arrays))
+
+
+def to_store(design: Design, found: dict[str, Found | str]) -> dict[str, Any]:
+    """What the file holds of a design's settings."""
+    kept = {key: found.get(key) for key in (*LONG, WITNESS)}
+    return {
+        "what": "stored settings of swgjoint bench fe",
+        "command": "swgjoint bench fe --recompute --out DIR",
+        "design": design.drive.name,
+        "design_hash": design.content_hash(),
+        "positions": POSITIONS,
+        "provenance": provenance(),
+        "settings": {k: v for k, v in kept.items() if isinstance(v, Found)},
+    }
+
+
+def told(kept: dict[str, Any], found: dict[str, Found | str]) -> dict[str, Any]:
+    """Provenance of the file, how far its witness is from today's, and how much faster.
+
+    ``pace`` is CPU time of the witness today over that in the file.
+    """
+    was, now = kept["settings"].get(WITNESS), found.get(WITNESS)
+    drift = pace = None
+    if isinstance(was, Found) and isinstance(now, Found):
+        pairs = [(was.stiffness, now.stiffness), (was.tensile, now.tensile)]
+        drift = max(abs(b / a - 1.0) for a, b in pairs if a and b)
+        pace = now.cpu_s / was.cpu_s if now.cpu_s and was.cpu_s else None
+    return {
+        "settings": [key for key in LONG if key in kept["settings"]],
+        "command": kept["command"],
+        "provenance": kept["provenance"],
+        "witness": WITNESS,
+        "drift": drift,
+        "pace": pace,
+        "of_this_code": drift is not None and drift < DRIFT,
+    }

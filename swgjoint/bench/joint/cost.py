@@ -1,0 +1,304 @@
+"""``swgjoint bench joint``: what levels, integrators and steps miss, and their cost.
+
+Three scenes (:mod:`joint_scenes`). The error of a setting is that against level
+``full`` without an error of its steps; its ``own_error`` that against the same level,
+the part that its steps make.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import time
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import mujoco
+
+from swgjoint.bench.joint.modes import numerical_damping
+from swgjoint.bench.joint.runs import (
+    QUANTITIES,
+    Outcome,
+    Setting,
+    Stepper,
+    attempt,
+    attempt_assembled,
+    cost_at,
+    errors,
+    relative_speed,
+    rigid_arm,
+)
+from swgjoint.bench.joint.scenes import SCENES, BenchScene, bench_scene, exact
+from swgjoint.bench.joint.splits import SPLITS, split
+from swgjoint.errors import ComputationError, InputError
+from swgjoint.files import Outputs
+from swgjoint.joint.attach import LEVELS
+from swgjoint.json_text import json_text
+from swgjoint.pool import run_all
+from swgjoint.progress import Progress, silent
+from swgjoint.provenance import provenance
+from swgjoint.sim.run import Run
+
+STEPS = (1e-5, 5e-5, 1e-4, 2.5e-4, 5e-4, 1e-3, 2e-3, 5e-3)
+"""[s]."""
+REFERENCE_STEP = 2e-5
+"""Of RK4, whose error is shown by the run at twice that step [s]."""
+EXPLICIT = ("Euler", "implicitfast", "RK4")
+SPLIT_STEPS = (5e-4, 1e-3, 2e-3, 5e-3)
+DAMPING = "damping_ratio"
+
+
+def settings() -> list[Setting]:
+    """All that a scene is run with: the most where there is the most to see."""
+    found = []
+    for level in LEVELS:
+        steps: tuple[float, ...] = STEPS[1:]
+        if level in ("rigid", "kinematic"):
+            steps = (1e-4, 1e-3, 5e-3)
+        elif level != "full":
+            steps = (1e-4, 5e-4, 1e-3, 2e-3, 5e-3)
+        for integrator in (*EXPLICIT, "discrete"):
+            all_steps = level == "full" and integrator == "discrete"
+            found += [
+                Setting(level=level, integrator=integrator, step=step)
+                for step in (STEPS if all_steps else steps)
+            ]
+    return found + [
+        Setting(level="full", integrator=name, step=step)
+        for name in SPLITS
+        for step in SPLIT_STEPS
+    ]
+
+
+def run_joint_cost(
+    *,
+    only: Sequence[str] = (),
+    jobs: int = 2,
+    folder: Path | None = None,
+    progress: Progress = silent,
+) -> dict[str, Any]:
+    """Run every setting of every scene.
+
+    Args:
+        only: Some of the scenes.
+        jobs: Processes, one scene each.
+        folder: Where tables and pictures go; None writes nothing.
+        progress: Called after every scene.
+
+    Returns:
+        ``rows``: ``bench``, ``scene``, ``model`` (the level), ``setting``,
+        ``integrator``, ``step_s``, ``quantity``, ``error``, ``own_error``, ``unit``,
+        ``outcome``, ``reason``, ``sub_steps``, ``steps_ratio`` (steps per second over
+        those of the rigid arm), ``cost`` (CPU time per simulated time over that of the
+        rigid arm at 1 ms; both None for the splits), ``pareto``, ``wall_s``,
+        ``reference``; one a setting and quantity. ``references`` with their own errors,
+        ``files``, ``provenance``, ``wall_s``.
+
+    Raises:
+        InputError: If there is no such scene.
+        ComputationError: If a reference fails.
+    """
+    begin = time.perf_counter()
+    check_scenes(only)
+    if folder is not None:
+        folder.mkdir(parents=True, exist_ok=True)  # before minutes of work
+    names = [name for name in SCENES if not only or name in only]
+    found = run_all(
+        run_bench_scene, names, jobs=jobs, stage="bench joint", progress=progress
+    )
+    rows = [row for part in found for row in part["rows"]]
+    result = {
+        "rows": rows,
+        "references": [row for part in found for row in part["references"]],
+        "provenance": provenance(),
+        "wall_s": time.perf_counter() - begin,
+    }
+    return result | {"files": [] if folder is None else write_files(result, folder)}
+
+
+def check_scenes(only: Sequence[str]) -> None:
+    """Refuse names that are no scene of this benchmark.
+
+    Raises:
+        InputError: If one is not, or is empty.
+    """
+    unknown = [name or "''" for name in only if name not in SCENES]
+    if unknown:
+        raise InputError(
+            f"--only {','.join(unknown)}: no such scene; accepted: {', '.join(SCENES)}"
+        )
+
+
+def run_bench_scene(name: str) -> dict[str, Any]:
+    """All settings of one scene."""
+    # schemes that diverge are rows, the engine need not print them too
+    mujoco.set_mju_user_warning(lambda message: None)
+    try:
+        return measure(bench_scene(name), settings())
+    finally:
+        mujoco.set_mju_user_warning(None)
+
+
+def measure(bench: BenchScene, chosen: Sequence[Setting]) -> dict[str, Any]:
+    """Rows of some settings of a scene, and of its references."""
+    rigid = rigid_arm(bench.scene, bench.drives)
+    own, names, shown = {}, {}, []
+    for level in ("full", *LEVELS):
+        if level not in own and (level == "full" or level in {s.level for s in chosen}):
+            own[level], names[level], row = reference(bench, level)
+            shown.append(row)
+    rows: list[dict[str, Any]] = []
+    for setting in chosen:
+        base = {
+            "bench": "joint",
+            "scene": bench.name,
+            "model": setting.level,
+            "setting": setting.name,
+            "integrator": setting.integrator,
+            "step_s": setting.step,
+            "reference": names["full"],
+        }
+        if setting.integrator in SPLITS:
+            # its force comes from Python: there is no cost to compare
+            with split(bench.scene, setting, bench.drives) as whole:
+                got = attempt_assembled(whole)
+                base |= _costs(got, None)
+                rows += _rows(base, got, own["full"], own["full"])
+            continue
+        got = attempt(bench.scene, setting, bench.drives)
+        base |= _costs(got, rigid)
+        rows += _rows(base, got, own["full"], own[setting.level])
+    _mark_pareto(rows)
+    return {"rows": rows, "references": shown}
+
+
+def reference(bench: BenchScene, level: str) -> tuple[Run, str, dict[str, Any]]:
+    """A level without an error of its steps, its name, and how far it can be trusted.
+
+    RK4 with the inputs of the middle of each step; DOP853 for the bench at ``full``.
+    """
+    step = REFERENCE_STEP
+    runs, assemblies = [], []
+    for h in (step, 2.0 * step):
+        setting = Setting(level=level, integrator="RK4", step=h)
+        got = attempt(bench.scene, setting, bench.drives, midway=True)
+        if got.run is None or got.assembly is None:
+            raise ComputationError(
+                f"reference of scene {bench.name!r}, {level}, {setting.name}:"
+                f" {got.reason}"
+            )
+        runs.append(got.run)
+        assemblies.append(got.assembly)
+    name = f"{level}, RK4, {1e3 * step:g} ms"
+    row: dict[str, Any] = {"scene": bench.name, "model": level, "reference": name}
+    row |= {f"step_doubled_{k}": v for k, v in errors(runs[1], runs[0]).items()}
+    if bench.is_bench and level == "full":
+        best = exact(runs[0], assemblies[0])
+        row["reference"] = "full, DOP853"
+        row |= {f"rk4_{k}": v for k, v in errors(runs[0], best).items()}
+        return best, "full, DOP853", row
+    return runs[0], name, row
+
+
+def _rows(
+    base: dict[str, Any], got: Outcome, full: Run, level: Run
+) -> list[dict[str, Any]]:
+    """A row a quantity.
+
+    Args:
+        base: What they share.
+        got: The run.
+        full: Reference of level ``full``.
+        level: That of the run's own level.
+    """
+    row = base | {"outcome": got.outcome, "reason": got.reason}
+    off: dict[str, float] = {}
+    by_steps: dict[str, float] = {}
+    if got.run is not None:
+        off, by_steps = errors(got.run, full), errors(got.run, level)
+    rows = [
+        row
+        | {
+            "quantity": quantity,
+            "unit": unit,
+            "error": off.get(quantity),
+            "own_error": by_steps.get(quantity),
+        }
+        for quantity, unit in QUANTITIES.items()
+    ]
+    damped = [] if got.assembly is None else numerical_damping(got.assembly)
+    if damped:
+        first, worst = damped[0], max(damped, key=lambda mode: mode[2])
+        rows.append(
+            row
+            | {
+                "quantity": DAMPING,
+                "unit": "-",
+                "error": first[2],
+                "own_error": first[2],
+                "frequency_Hz": first[0],
+                "physical_damping_ratio": first[1],
+                "most": worst[2],
+                "most_at_Hz": worst[0],
+            }
+        )
+    return rows
+
+
+def _costs(got: Outcome, rigid: Stepper | None) -> dict[str, Any]:
+    """Sub-steps, harmonics left out, time; against a rigid arm where there is one."""
+    keys = ("sub_steps", "unresolved", "wall_s", "steps_ratio", "cost")
+    found: dict[str, Any] = dict.fromkeys(keys)
+    if got.run is None or got.assembly is None:
+        return found
+    parts = got.assembly.sub_steps
+    found |= {
+        "sub_steps": parts,
+        "unresolved": sum(
+            len(t.attached.unresolved) for t in got.assembly.transmissions
+        ),
+        "wall_s": got.run.wall,
+    }
+    if rigid is not None:
+        speed = relative_speed(Stepper.of(got.assembly), rigid)
+        found |= {"steps_ratio": speed / parts, "cost": cost_at(got.assembly, speed)}
+    return found
+
+
+def _mark_pareto(rows: list[dict[str, Any]]) -> None:
+    """Nothing is at most as dear and at most as far off, quantity by quantity."""
+    for row in rows:
+        if row["quantity"] == DAMPING:
+            row["pareto"] = None
+            continue
+        others = [
+            (other["cost"], other["error"])
+            for other in rows
+            if other["quantity"] == row["quantity"]
+            and other is not row
+            and None not in (other["cost"], other["error"])
+        ]
+        row["pareto"] = None not in (row["cost"], row["error"]) and not any(
+            cost <= row["cost"] and error <= row["error"] for cost, error in others
+        )
+
+
+def write_files(result: dict[str, Any], folder: Path) -> list[str]:
+    """Tables as CSV and JSON, one picture a scene; their paths."""
+    from swgjoint.view.plots.bench_joint import joint_picture
+
+    rows = result["rows"]
+    text = io.StringIO()
+    names = list(dict.fromkeys(key for row in rows for key in row))
+    writer = csv.DictWriter(text, fieldnames=names, lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    outputs = Outputs(folder)
+    outputs.write("bench-joint.csv", text.getvalue)
+    outputs.write("bench-joint.json", lambda: json_text(result) + "\n")
+    for scene in dict.fromkeys(row["scene"] for row in rows):
+        own = [row for row in rows if row["scene"] == scene]
+        outputs.write(f"bench-joint-{scene}.png", partial(joint_picture, scene, own))
+    return outputs.files

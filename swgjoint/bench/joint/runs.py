@@ -1,0 +1,276 @@
+"""One scene at one level, integrator and step: its run, its error, its cost.
+
+Euler and implicitfast, which scenes do not offer, run on the model that RK4 would have.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.errors import ComputationError, SwgError
+from swgjoint.maps.drive_map import DriveMap
+from swgjoint.sim.actuators import control_inputs
+from swgjoint.sim.assembly import Assembly, assemble
+from swgjoint.sim.equilibrium import set_start
+from swgjoint.sim.figures.metrics import torque_ripple
+from swgjoint.sim.run import Run, simulate
+from swgjoint.sim.scene.scene import Scene
+from swgjoint.units import arcmin, mm
+
+Array = NDArray[np.float64]
+
+SCENE_INTEGRATORS = ("discrete", "RK4")
+RECORD = 1e-3
+"""Interval of the samples that runs of a smaller step keep [s]."""
+TIMED_STEPS = 400
+QUANTITIES = {
+    "link_angle": "arcmin",
+    "tool_position": "mm",
+    "torsion": "arcmin",
+    "ripple_spectrum": "%",
+}
+"""With the unit of their error."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Setting:
+    """How a scene is simulated."""
+
+    level: str
+    integrator: str
+    step: float
+    """[s]."""
+
+    @property
+    def name(self) -> str:
+        """Integrator and step."""
+        return f"{self.integrator}, {1e3 * self.step:g} ms"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Outcome:
+    """What became of a setting."""
+
+    run: Run | None
+    assembly: Assembly | None
+    """None where the setting was refused."""
+    outcome: str
+    """``ok``, ``sub_stepped``, ``refused`` or ``diverged``."""
+    reason: str | None = None
+
+
+def assemble_setting(
+    scene: Scene, setting: Setting, drives: Mapping[str, DriveMap] | None = None
+) -> Assembly:
+    """The scene at a setting; explicit integrators are never cut into sub-steps."""
+    explicit = setting.integrator != "discrete"
+    changes = {
+        "simulation.step_s": setting.step,
+        "simulation.integrator": "RK4" if explicit else "discrete",
+    }
+    if explicit:
+        changes["simulation.max_sub_steps"] = 1
+    one = scene.with_level(setting.level).with_changes(changes)  # type: ignore[arg-type]
+    found = assemble(one, drives=drives)
+    if setting.integrator not in SCENE_INTEGRATORS:
+        found.model.opt.integrator = getattr(
+            mujoco.mjtIntegrator, f"mjINT_{setting.integrator.upper()}"
+        )
+    return found
+
+
+def attempt(
+    scene: Scene,
+    setting: Setting,
+    drives: Mapping[str, DriveMap] | None = None,
+    *,
+    midway: bool = False,
+) -> Outcome:
+    """Run a setting; what is refused or diverges is part of the result.
+
+    Args:
+        scene: The scene.
+        setting: How.
+        drives: Maps that stand for the scene's drive references of these names.
+        midway: See :func:`held_midway`.
+    """
+    try:
+        whole = assemble_setting(scene, setting, drives)
+    except SwgError as exc:
+        return Outcome(run=None, assembly=None, outcome="refused", reason=str(exc))
+    return attempt_assembled(whole, midway=midway)
+
+
+def attempt_assembled(whole: Assembly, *, midway: bool = False) -> Outcome:
+    """Run what was assembled."""
+    kept = thinned(held_midway(whole) if midway else whole)
+    try:
+        run = simulate(kept, name=whole.scene.name)
+    except ComputationError as exc:
+        return Outcome(run=None, assembly=whole, outcome="diverged", reason=str(exc))
+    cut = whole.sub_steps > 1
+    return Outcome(
+        run=run,
+        assembly=whole,
+        outcome="sub_stepped" if cut else "ok",
+        reason="; ".join(dict.fromkeys(whole.outside.values())) or None,
+    )
+
+
+def thinned(whole: Assembly) -> Assembly:
+    """The same, of which a run keeps samples at :data:`RECORD` instead of every step.
+
+    A loop of its own counts the steps of the scene, and is left as it is.
+    """
+    step = whole.scene.simulation.step_s
+    n = round(RECORD / step)
+    steps = (whole.trajectory.time.size - 1) // whole.sub_steps
+    fits = abs(n * step - RECORD) < 1e-9 and steps % max(n, 1) == 0
+    if n < 2 or not fits or whole.loops.sampled:
+        return whole
+    return replace(whole, sub_steps=n * whole.sub_steps)
+
+
+def held_midway(whole: Assembly) -> Assembly:
+    """The same with inputs of the middle of each step, for a reference.
+
+    Explicit integrators hold the inputs of the start of a step through it, half a step
+    late: an error of the first order in the step whatever the integrator's own. A loop
+    that is sampled has its own instants, and is left as it is.
+    """
+    if whole.loops.sampled:
+        return whole
+
+    def middle(values: Array) -> Array:
+        return np.vstack([0.5 * (values[1:] + values[:-1]), values[-1:]])
+
+    path = whole.trajectory
+    return replace(
+        whole,
+        trajectory=replace(
+            path,
+            position=middle(path.position),
+            velocity=middle(path.velocity),
+            acceleration=middle(path.acceleration),
+        ),
+        feedforward=middle(whole.feedforward),
+        prescribed=middle(whole.prescribed),
+    )
+
+
+def errors(run: Run, reference: Run) -> dict[str, float]:
+    r"""Errors of a run under the keys of :data:`QUANTITIES`.
+
+    Angles: root mean square over the motion, of the worst joint. Tool: root mean square
+    of the distance. Ripple: of the torque ripple over the constant-speed part, line by
+    line of its spectrum up to that of the reference,
+    :math:`\sqrt{\sum (A_k - A_k^{ref})^2/2}` over the rated torque, of the worst joint.
+
+    Raises:
+        ValueError: If the two have no samples at the same times.
+    """
+    own, theirs = common_samples(run, reference)
+
+    def off(name: str) -> Array:
+        return np.asarray(getattr(run, name)[own] - getattr(reference, name)[theirs])
+
+    def worst(name: str) -> float:
+        return float(np.sqrt(np.mean(off(name) ** 2, axis=0)).max())
+
+    found = {
+        "link_angle": worst("position") / arcmin,
+        "torsion": worst("torsion") / arcmin,
+        "ripple_spectrum": _ripple_error(run, reference),
+    }
+    if run.tool_position.size:
+        away = np.sum(off("tool_position") ** 2, axis=1)
+        found["tool_position"] = float(np.sqrt(away.mean())) / mm
+    return {name: found[name] for name in QUANTITIES if name in found}
+
+
+def common_samples(run: Run, other: Run) -> tuple[slice, slice]:
+    """Samples at the same times."""
+    interval = run.time[1], other.time[1]
+    by = [max(1, round(max(interval) / one)) for one in interval]
+    count = min(len(run.time[:: by[0]]), len(other.time[:: by[1]]))
+    own, theirs = (slice(0, (count - 1) * n + 1, n) for n in by)
+    if not np.allclose(run.time[own], other.time[theirs], atol=1e-9):
+        raise ValueError("the two runs have no samples at the same times")
+    return own, theirs
+
+
+def _ripple_error(run: Run, reference: Run) -> float:
+    worst = 0.0
+    for j, transmission in enumerate(reference.assembly.transmissions):
+        lines = _lines(torque_ripple(reference, j))
+        own = np.zeros_like(lines)
+        got = _lines(torque_ripple(run, j))[: lines.size]
+        own[: got.size] = got
+        rated = transmission.drive.ratings.rated_torque
+        error = 100.0 * float(np.sqrt(0.5 * np.sum((own - lines) ** 2))) / rated
+        worst = max(worst, error)
+    return worst
+
+
+def _lines(ripple: Array) -> Array:
+    """Amplitudes at whole cycles over a record [N·m]; its last sample begins anew."""
+    n = ripple.size - 1
+    return np.asarray(2.0 * np.abs(np.fft.rfft(ripple[:-1]))[1:] / max(n, 1))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Stepper:
+    """An assembled scene at its start, to be timed."""
+
+    assembly: Assembly
+    data: mujoco.MjData
+
+    @classmethod
+    def of(cls, whole: Assembly) -> Stepper:
+        """At the start, with the inputs of the first step held."""
+        data = mujoco.MjData(whole.model)
+        set_start(whole, data)
+        if whole.model.nu:
+            data.ctrl[:] = control_inputs(whole)[0]
+        return cls(assembly=whole, data=data)
+
+    def seconds(self) -> float:
+        """CPU time of one step of the engine [s]."""
+        begin = time.process_time()
+        mujoco.mj_step(self.assembly.model, self.data, TIMED_STEPS)
+        return (time.process_time() - begin) / TIMED_STEPS
+
+
+def relative_speed(own: Stepper, rigid: Stepper, *, pairs: int = 7) -> float:
+    """Steps of the engine per second over those of another arm; median of pairs."""
+    own.seconds(), rigid.seconds()
+    ratios = [rigid.seconds() / own.seconds() for _ in range(pairs)]
+    return float(np.median(ratios))
+
+
+def relative_cost(own: Stepper, rigid: Stepper, *, pairs: int = 7) -> float:
+    """:func:`cost_at` the speed that is measured."""
+    return cost_at(own.assembly, relative_speed(own, rigid, pairs=pairs))
+
+
+def cost_at(whole: Assembly, speed: float) -> float:
+    """CPU time per simulated time over that of the rigid arm at 1 ms.
+
+    Args:
+        whole: The scene at its setting.
+        speed: See :func:`relative_speed`.
+    """
+    return 1e-3 / (whole.step * speed)
+
+
+def rigid_arm(scene: Scene, drives: Mapping[str, DriveMap] | None = None) -> Stepper:
+    """The arm with rigid joints at the scene's step."""
+    step = scene.simulation.step_s
+    setting = Setting(level="rigid", integrator="discrete", step=step)
+    return Stepper.of(assemble_setting(scene, setting, drives))

@@ -1,0 +1,96 @@
+r"""The two splits that the joint does not use, for comparison with its scheme.
+
+A native tendon of stiffness :math:`K_0` lies between rotor and link, which the
+``discrete`` integrator takes implicitly, and the rest of the drive is an explicit
+force. ``plain split``: no more than that. ``corrected split``: the integrator's own
+shift :math:`-h K_0\,\dot l` along the tendon, l its length, is taken out and
+:math:`-\mu h K_0\,\dot\Delta` put in along the gradient of the torsion,
+:math:`\mu = 0.2`.
+
+The force comes from Python through ``mjcb_passive``, which is global and slow: nothing
+but this benchmark does so, and its cost is not compared.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+
+from swgjoint.bench.joint.runs import Setting, assemble_setting
+from swgjoint.joint.step_damping import restore_damping
+from swgjoint.maps.drive_map import DriveMap
+from swgjoint.sim.assembly import Assembly
+from swgjoint.sim.scene.scene import Scene
+
+SPLITS = {"plain split": None, "corrected split": 0.2}
+"""With mu, None for no correction."""
+
+
+@contextmanager
+def split(
+    scene: Scene, setting: Setting, drives: Mapping[str, DriveMap]
+) -> Iterator[Assembly]:
+    """The scene at level ``full`` under a split, as long as the context lasts.
+
+    Args:
+        scene: With drives that have neither hysteresis nor friction.
+        setting: Its integrator names the split.
+        drives: As for :func:`assemble_setting`.
+    """
+    full, linear = (
+        assemble_setting(
+            scene,
+            Setting(level=level, integrator="discrete", step=setting.step),
+            drives,
+        )
+        for level in ("full", "linear")
+    )
+    # the map says what happens, the model has its native tendons
+    whole = replace(
+        linear,
+        transmissions=tuple(
+            replace(t, attached=replace(t.attached, plugin=None))
+            for t in full.transmissions
+        ),
+    )
+    # a split has the integrator's own damping of its tendon
+    restore_damping(whole.model, [t.attached for t in linear.transmissions])
+    joints = []
+    for j, t in enumerate(linear.transmissions):
+        tendon = whole.model.tendon(t.attached.tendon).id
+        law = full.transmissions[j].attached.drive
+        # half of the largest stiffness is what keeps a split stable
+        stiffness = max(t.attached.stiffness, 0.5 * law.max_stiffness)
+        whole.model.tendon_stiffness[tendon] = stiffness
+        joints.append((j, law, stiffness))
+    mu = SPLITS[setting.integrator]
+
+    def rest(model: mujoco.MjModel, data: mujoco.MjData) -> None:
+        if model.nq != whole.model.nq:
+            return  # the rigid arm, which tells the torques of the motion
+        discrete = model.opt.integrator == mujoco.mjtIntegrator.mjINT_DISCRETE
+        h = float(model.opt.timestep) if discrete and mu is not None else 0.0
+        for j, law, k in joints:
+            rotor, link = whole.motor_velocity[j], whole.link_velocity[j]
+            theta = float(data.qpos[whole.motor_position[j]])
+            psi = float(data.qpos[whole.link_position[j]])
+            along = np.array([1.0 / law.ratio, -1.0])
+            rate = np.array([data.qvel[rotor], data.qvel[link]])
+            length = along @ np.array([theta, psi]) + h * (along @ rate)
+            force = np.array(law.forces(theta, psi)) + k * length * along
+            if h:
+                _, by_theta, by_psi = law.error_at(law.phases(theta, psi))
+                gradient = along + np.array([float(by_theta), float(by_psi)])
+                force -= (mu or 0.0) * h * k * (gradient @ rate) * gradient
+            data.qfrc_passive[rotor] += force[0]
+            data.qfrc_passive[link] += force[1]
+
+    mujoco.set_mjcb_passive(rest)
+    try:
+        yield whole
+    finally:
+        mujoco.set_mjcb_passive(None)

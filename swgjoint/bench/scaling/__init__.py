@@ -1,0 +1,1 @@
+"""How run time grows with the size of the problem."""

@@ -1,0 +1,67 @@
+"""Time of the plane simulation of meshing over teeth, mesh, torque and positions."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+from swgjoint.errors import SwgError
+from swgjoint.fe.meshing import simulate_meshing
+from swgjoint.gear.catalogue import ratings_of
+from swgjoint.gear.design.design import Design
+
+DESIGN = "reference-2d"
+POSITIONS = 3
+"""After the first one, which counts as set-up."""
+
+
+def _measure(
+    design: Design, *, part: float = 1.0, positions: int = POSITIONS
+) -> dict[str, Any]:
+    """Half of a drive over a pitch: CPU time of a position and of the set-up."""
+    marks = [time.process_time()]
+    torque = part * ratings_of(design).rated_torque
+    row: dict[str, Any] = {"model": "2d", "torque_Nm": torque}
+    try:
+        run = simulate_meshing(
+            design,
+            torque=torque,
+            steps=positions + 1,
+            turn=(positions + 1) / POSITIONS / design.drive.teeth_circular_spline,
+            half=True,
+            progress=lambda *_: marks.append(time.process_time()),
+        )
+    except SwgError as error:
+        return row | {"outcome": str(error)}
+    return row | {
+        "seconds": (marks[-1] - marks[1]) / positions,
+        "setup_s": marks[1] - marks[0],
+        "nodes": run.nodes,
+        "iterations": sum(step.iterations for step in run.steps[1:]) / positions,
+        "outcome": run.outcome.name.lower(),
+    }
+
+
+def teeth(count: float) -> dict[str, Any]:
+    """One pitch diameter, teeth of its module, rated torque, rigid wave generator."""
+    design = Design.load(f"size-25-{int(count) // 2}")
+    return _measure(design.with_changes({"wave_generator.bearing": None}))
+
+
+def mesh(refinement: float) -> dict[str, Any]:
+    """The same drive on a finer mesh; its size is the number of nodes."""
+    design = Design.load(DESIGN).with_changes({"mesh.refinement": refinement})
+    row = _measure(design)
+    return row | ({"size": float(row["nodes"])} if "nodes" in row else {})
+
+
+def torque(part: float) -> dict[str, Any]:
+    """A part of rated torque."""
+    return _measure(Design.load(DESIGN), part=part)
+
+
+def angles(count: float) -> dict[str, Any]:
+    """A turn of so many positions, as far apart as in the other sweeps."""
+    row = _measure(Design.load(DESIGN), positions=int(count))
+    each = row.get("seconds")
+    return row | {"seconds": None if each is None else each * count}

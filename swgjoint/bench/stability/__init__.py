@@ -1,0 +1,1 @@
+"""Stability of the joint on stiff and extreme cases."""

@@ -1,0 +1,110 @@
+"""Catalogue drives with kinematic error: ten seconds of free running, torque steps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from swgjoint.bench.stability.joint import Start, make_joint, with_kinematic_error
+from swgjoint.bench.stability.rows import DEFAULT, FREE, StabilityRow, outcome_of
+from swgjoint.gear.catalogue import table
+from swgjoint.joint.region import MAX_SUB_STEPS
+from swgjoint.maps.drive_map import DriveMap
+from swgjoint.units import rpm
+
+FREE_STEP, FREE_TIME = 1e-3, 10.0
+"""[s]."""
+FREE_SPEEDS = (200.0 * rpm, 2000.0 * rpm)
+"""Of the rotor: that at which catalogues rate drives, and a tenth of it [rad/s]."""
+STEPS = (5e-4, 1e-3, 2e-3)
+"""At which a drive is hit by its ratcheting torque [s]."""
+LINKS = (1e-2, 1.0)
+"""Inertia of the link [kg·m²]: a wrist, a shoulder."""
+COUNT, SHORTEST = 2000, 0.5
+
+
+@dataclass(frozen=True, kw_only=True)
+class CatalogueDrive:
+    """A row of the catalogue."""
+
+    name: str
+    rotor: float
+    """Its wave generator alone, the lightest rotor that it can have [kg·m²]."""
+    ratcheting: float
+    """Torque at which a tooth is skipped [N·m]."""
+
+
+def catalogue_drives() -> list[CatalogueDrive]:
+    """All rows with ratings."""
+    return [
+        CatalogueDrive(
+            name=f"CSG-{row['size']:.0f}-{row['ratio']:.0f}",
+            rotor=1e-4 * _number(row["input_inertia_1e-4kgm2"]),
+            ratcheting=_number(row["ratcheting_Nm"]),
+        )
+        for row in table("ratings")
+    ]
+
+
+def run_drive(task: CatalogueDrive) -> list[StabilityRow]:
+    """Free running and torque steps of one drive."""
+    drive = with_kinematic_error(
+        DriveMap.from_catalogue(task.name, kinematic_error_arcmin=0.0)
+    )
+    rows = []
+    for link in LINKS:
+        for speed in FREE_SPEEDS:
+            case = f"{task.name} Jl={link:g} {speed / rpm:.0f} rpm"
+            start = Start(speed=speed)
+            rows.append(
+                _row(task, drive, FREE, case, FREE_STEP, link, start, FREE_TIME)
+            )
+        for step in STEPS:
+            case = f"{task.name} Jl={link:g} {task.ratcheting:g} N·m"
+            duration = max(SHORTEST, COUNT * step)
+            start = Start(load=task.ratcheting)
+            rows.append(_row(task, drive, "ratchet", case, step, link, start, duration))
+    return rows
+
+
+def _row(
+    task: CatalogueDrive,
+    drive: DriveMap,
+    group: str,
+    case: str,
+    step: float,
+    link: float,
+    start: Start,
+    duration: float,
+) -> StabilityRow:
+    joint = make_joint(drive, rotor=task.rotor, link=link, step=step)
+    region = joint.region(start.speed, torque=start.load)
+    parts = region.sub_steps
+    phase = step * joint.attached.natural_frequency
+    if parts is None or parts > MAX_SUB_STEPS:
+        return StabilityRow(
+            case=case,
+            group=group,
+            scheme=DEFAULT,
+            step_s=step,
+            outcome="refused",
+            phase_step=phase,
+            reason=region.exceeded,
+        )
+    course = joint.run(start, duration=duration, sub_steps=parts)
+    return StabilityRow(
+        case=case,
+        group=group,
+        scheme=DEFAULT,
+        step_s=step,
+        outcome=outcome_of(course),
+        sub_steps=parts,
+        largest_gain=course.gain,
+        energy_balance=course.balance,
+        phase_step=phase,
+        reason=region.exceeded or None,
+    )
+
+
+def _number(value: float | str | None) -> float:
+    assert value is not None
+    return float(value)

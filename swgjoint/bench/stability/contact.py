@@ -1,0 +1,211 @@
+"""Chains of two links that lie on a floor or press against joint limits for seconds.
+
+Gravity lets a chain with catalogue drives fall on a floor or into the limits of its
+joints, where it stays. Kinetic, torsion and gravity energy together may then only fall,
+but for what a contact stores while it is pressed; so a gain is the rise of the mean
+over a part of the run above the lowest one before.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import product
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.bench.stability.catalogue import CatalogueDrive, catalogue_drives
+from swgjoint.bench.stability.joint import GAIN, with_kinematic_error
+from swgjoint.bench.stability.rows import DEFAULT, StabilityRow
+from swgjoint.joint.attach import attach
+from swgjoint.joint.drive import JointDrive
+from swgjoint.joint.region import MAX_SUB_STEPS, check_region
+from swgjoint.maps.drive_map import DriveMap
+
+Array = NDArray[np.float64]
+
+KINDS = ("floor", "limit")
+MASSES = (0.3, 3.0)
+"""Of each link [kg]."""
+DAMPING_RATIOS = (0.0, 0.001, 0.02)
+STEPS = (5e-4, 1e-3, 2e-3)
+"""[s]."""
+DURATION = 4.0
+"""[s]; a chain has come down after 0.2."""
+SPEED = 100.0
+"""Of the rotors that the region is asked for [rad/s]; falling they reach ten times
+that."""
+PARTS = 10
+"""Of a run, over which the energy is averaged: a bounce gives back what it stored."""
+SAMPLES = 2000
+FINE = 4
+"""Steps in one of the runs that tell what contacts give by themselves."""
+LIFTS = (-0.02, -0.01, 0.01, 0.02)
+"""Angles of the upper link at the start of those runs: bounces tell small differences
+apart [rad]."""
+
+_XML = """
+<mujoco>
+  <option timestep="{step!r}" integrator="discrete" gravity="0 0 -9.81"/>
+  <worldbody>
+    {floor}
+    <body name="upper" pos="0 0 1">
+      <joint name="shoulder" axis="0 1 0" {limit}/>
+      <geom type="capsule" size=".03" fromto="0 0 0 .4 0 0" mass="{mass!r}"/>
+      <body name="fore" pos=".4 0 0">
+        <joint name="elbow" axis="0 1 0" {limit}/>
+        <geom type="capsule" size=".03" fromto="0 0 0 .3 0 0" mass="{mass!r}"/>
+      </body>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+_FLOOR = '<geom type="plane" size="5 5 .1" pos="0 0 .9"/>'
+_LIMIT = 'limited="true" range="-10 10"'
+
+
+@dataclass(frozen=True, kw_only=True)
+class ContactTask:
+    """One chain with its drive in both joints."""
+
+    drive: CatalogueDrive
+    kind: str
+    mass: float
+    steps: tuple[float, ...] = STEPS
+    damping_ratios: tuple[float, ...] = DAMPING_RATIOS
+
+    @property
+    def name(self) -> str:
+        """Drive, mass of a link and what it comes to lie on."""
+        return f"{self.drive.name} {self.mass:g} kg, {self.kind}"
+
+
+def contact_tasks(*, full: bool) -> list[ContactTask]:
+    """All drives of the catalogue, both kinds and masses, or a few of them."""
+    drives, masses = catalogue_drives(), list(MASSES)
+    if not full:
+        drives, masses = drives[3::8], masses[:1]
+    return [
+        ContactTask(drive=drive, kind=kind, mass=mass)
+        for drive, kind, mass in product(drives, KINDS, masses)
+    ]
+
+
+def run_contact(task: ContactTask) -> list[StabilityRow]:
+    """All rows of one chain."""
+    return [
+        _row(task, step, damping)
+        for step, damping in product(task.steps, task.damping_ratios)
+    ]
+
+
+def _row(task: ContactTask, step: float, damping: float) -> StabilityRow:
+    spec, drives = chain(task, step, damping)
+    regions = [
+        check_region(drive, timestep=step, max_input_speed=SPEED, contacts=True)
+        for drive in drives
+    ]
+    parts = [region.sub_steps for region in regions]
+    base = StabilityRow(
+        case=f"{task.name}, damping ratio {damping:g}",
+        group="contact",
+        scheme=DEFAULT,
+        step_s=step,
+        outcome="refused",
+        phase_step=step * max(drive.natural_frequency for drive in drives),
+        reason="; ".join(dict.fromkeys(r.exceeded for r in regions if not r.ok))
+        or None,
+    )
+    count = max((n or MAX_SUB_STEPS + 1) for n in parts)
+    if count > MAX_SUB_STEPS:
+        return base
+    energy = lie_down(spec, drives, step / count)
+    rise, own = gain(energy), 0.0
+    outcome = "sub_stepped" if count > 1 else "ok"
+    if not np.isfinite(rise):
+        outcome = "diverged"
+    elif rise > GAIN:
+        own = max(
+            gain(lie_down(spec, drives, step / count / FINE, lift)) for lift in LIFTS
+        )
+        outcome = "energy_gain" if rise > GAIN + own else outcome
+    return replace(
+        base,
+        outcome=outcome,
+        sub_steps=count,
+        largest_gain=rise,
+        own_gain=own or None,
+        energy_balance=float(energy[-1]),
+    )
+
+
+def chain(
+    task: ContactTask, step: float, damping: float
+) -> tuple[mujoco.MjSpec, list[JointDrive]]:
+    """The chain of a task, lossless but for a damping ratio."""
+    drive = with_kinematic_error(
+        DriveMap.from_catalogue(task.drive.name, kinematic_error_arcmin=0.0)
+    )
+    text = _XML.format(
+        step=step,
+        mass=task.mass,
+        floor=_FLOOR if task.kind == "floor" else "",
+        limit=_LIMIT if task.kind == "limit" else "",
+    )
+    spec = mujoco.MjSpec.from_string(text)
+    return spec, [
+        attach(
+            spec,
+            joint=joint,
+            drive=drive,
+            rotor_inertia=task.drive.rotor,
+            damping_ratio=damping,
+        )
+        for joint in ("shoulder", "elbow")
+    ]
+
+
+def lie_down(
+    spec: mujoco.MjSpec, drives: list[JointDrive], step: float, lift: float = 0.0
+) -> Array:
+    """Mean energies of the parts of a run, over what the fall sets free; inf if bad."""
+    spec.option.timestep = step
+    model = spec.compile()
+    data, weighed = mujoco.MjData(model), mujoco.MjData(model)
+    rotor = [int(model.joint(d.rotor).qposadr[0]) for d in drives]
+    link = [int(model.joint(d.joint).qposadr[0]) for d in drives]
+    for d, r, j, angle in zip(drives, rotor, link, (lift, 0.0), strict=True):
+        theta = d.ratio * angle
+        error = float(d.drive.error_at(d.drive.phases(theta, angle))[0])
+        data.qpos[r], data.qpos[j] = theta, angle + error
+    every = max(1, round(DURATION / step / SAMPLES))
+    momentum = np.zeros(model.nv)
+    stored, energy = [], []
+    for _ in range(round(DURATION / step / every)):
+        mujoco.mj_step(model, data, every)
+        # the scheme lives half a step back
+        weighed.qpos[:] = data.qpos - 0.5 * step * data.qvel
+        weighed.qvel[:] = data.qvel
+        mujoco.mj_fwdPosition(model, weighed)
+        mujoco.mj_mulM(model, weighed, momentum, weighed.qvel)
+        own = 0.5 * float(weighed.qvel @ momentum)
+        for d, r, j in zip(drives, rotor, link, strict=True):
+            theta, psi = float(weighed.qpos[r]), float(weighed.qpos[j])
+            own += float(d.drive.energy(d.drive.torsion(theta, psi), theta, psi))
+        stored.append(own)
+        height = float(model.body_mass @ weighed.xipos[:, 2])
+        energy.append(own - float(model.opt.gravity[2]) * height)
+    if any(warning.number for warning in data.warning):
+        return np.full(PARTS, np.inf)
+    total = np.array(energy)
+    fallen = max(stored[: len(stored) // PARTS])
+    means = [float(part.mean()) for part in np.array_split(total - total[0], PARTS)]
+    return np.array(means) / fallen
+
+
+def gain(energy: Array) -> float:
+    """Largest rise of a mean above the lowest one before."""
+    if not np.isfinite(energy).all():
+        return float("inf")
+    return float((energy - np.minimum.accumulate(energy)).max())

@@ -1,0 +1,133 @@
+"""Contact impacts: a link with its drive and rotor dropped on a floor.
+
+The rotor turns with the link. Kinetic, torsion and gravity energy together may only
+fall: the floor takes some, and what it stores while it is pressed comes back.
+"""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.bench.stability.joint import RATIO, SAMPLES, Course, Joint
+from swgjoint.joint.attach import attach
+from swgjoint.maps.drive_map import DriveMap
+
+LENGTH = 0.3
+"""From the joint to the ball at the end of the link [m]."""
+HEIGHT = 0.05
+"""Angle of the link above its contact with the floor at the start [rad]."""
+TIP_SPEED = 1.0
+"""Of the ball, towards the floor [m/s]."""
+GRAVITY = 9.81
+
+_BALL = 0.03
+_XML = """
+<mujoco>
+  <option timestep="{step!r}" integrator="discrete" gravity="0 0 -{gravity}"/>
+  <worldbody>
+    <geom name="floor" type="plane" size="2 2 .1" pos="0 0 -{ball}"/>
+    <body name="link">
+      <joint name="joint" axis="0 -1 0"/>
+      <inertial pos="{length} 0 0" mass="{mass!r}"
+        diaginertia="{own!r} {own!r} {own!r}"/>
+      <geom type="sphere" size="{ball}" pos="{length} 0 0" mass="0"/>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+
+
+def drop_joint(drive: DriveMap, *, rotor: float, link: float, step: float) -> Joint:
+    """A joint whose link is a bar with a ball above a floor; see :func:`drop`."""
+    # nearly all of the inertia is the mass at the end
+    own = 0.01 * link
+    text = _XML.format(
+        step=step,
+        gravity=GRAVITY,
+        ball=_BALL,
+        length=LENGTH,
+        mass=(link - own) / LENGTH**2,
+        own=own,
+    )
+    spec = mujoco.MjSpec.from_string(text)
+    attached = attach(
+        spec,
+        joint="joint",
+        drive=drive,
+        rotor_inertia=rotor,
+        damping_ratio=0.0,
+        friction=False,
+    )
+    model = spec.compile()
+    joints = [model.joint(name) for name in (attached.rotor, "joint")]
+    return Joint(
+        model=model,
+        attached=attached,
+        law=attached.drive,
+        q=np.array([int(j.qposadr[0]) for j in joints], dtype=np.intp),
+        v=np.array([int(j.dofadr[0]) for j in joints], dtype=np.intp),
+        midpoint=True,
+    )
+
+
+def impact_speed() -> float:
+    """Of the rotor before the impact [rad/s]."""
+    return RATIO * TIP_SPEED / LENGTH
+
+
+def drop(
+    joint: Joint, *, duration: float, sub_steps: int, speed: float = 1.0
+) -> Course:
+    """Let the link fall on the floor and lie there.
+
+    Args:
+        joint: From :func:`drop_joint`.
+        duration: [s].
+        sub_steps: Parts of a step.
+        speed: Of the ball at the start over :data:`TIP_SPEED`.
+    """
+    model, law = joint.model, joint.law
+    whole = float(model.opt.timestep)
+    h = whole / sub_steps
+    steps = max(1, round(duration / whole))
+    samples = min(SAMPLES, steps)
+    every = steps // samples * sub_steps
+    try:
+        model.opt.timestep = h
+        data = mujoco.MjData(model)
+        rate = -speed * TIP_SPEED / LENGTH
+        theta = law.ratio * HEIGHT
+        e0, e_theta, _ = law.error_at(law.phases(theta, HEIGHT))
+        x = np.array([theta, HEIGHT + float(e0)])
+        v = np.array([rate / (1.0 / law.ratio + float(e_theta)), rate])
+        data.qpos[joint.q], data.qvel[joint.v] = x + 0.5 * h * v, v
+        q, rates = np.empty((samples + 1, 2)), np.empty((samples + 1, 2))
+        q[0], rates[0] = x, v
+        for k in range(1, samples + 1):
+            mujoco.mj_step(model, data, every)
+            rates[k] = data.qvel[joint.v]
+            q[k] = data.qpos[joint.q] - 0.5 * h * rates[k]
+    finally:
+        model.opt.timestep = whole
+    bad = any(warning.number for warning in data.warning)
+    bad = bad or not (np.isfinite(q).all() and np.abs(rates).max() < 1e9)
+    energy = np.full(samples + 1, np.inf)
+    if not bad:
+        energy = joint.energy(q, rates) + _weight(model, q[:, 1])
+    return Course(
+        time=np.asarray(np.arange(samples + 1) * (every * h), float),
+        position=q,
+        velocity=rates,
+        energy=energy,
+        scale=float(joint.energy(q[:1], rates[:1])[0]),
+        diverged=bad,
+        sub_steps=sub_steps,
+    )
+
+
+def _weight(model: mujoco.MjModel, angle: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Energy of the link in gravity [J]."""
+    mass = float(model.body("link").mass[0])
+    return np.asarray(mass * GRAVITY * LENGTH * np.sin(angle))

@@ -1,0 +1,1 @@
+"""Options, arguments and tables that several commands share."""

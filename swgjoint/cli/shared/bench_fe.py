@@ -1,0 +1,97 @@
+"""What ``swgjoint bench fe`` prints."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from swgjoint.cli.shared.text import table
+
+SHORT = {
+    "torsional_stiffness_Nm_rad": "stiffness",
+    "kinematic_error_pp_arcsec": "kinematic error",
+    "tensile_MPa": "tensile stress",
+    "rim_shape_mm": "rim shape",
+}
+
+
+def report(result: dict[str, Any]) -> str:
+    """Errors of every setting, then the cheapest one within each bound."""
+    rows = result["rows"]
+    solved = [row for row in rows if row["value"] is not None]
+    text = [f"{result['design']} against {rows[0]['reference']}; * on the Pareto front"]
+    positions = (
+        f" at {result['kinematic_error_positions']} positions of a pitch, first"
+        " harmonic"
+    )
+    for quantity, name in SHORT.items():
+        here = [row for row in solved if row["quantity"] == quantity]
+        if not here:
+            continue
+        unit = here[0]["unit"]
+        body = [
+            (
+                f"{row['model']}, {row['setting']}{' *' if row['pareto'] else ''}",
+                row["value"],
+                row["error"],
+                row["error_of_kind"],
+                row["error_next_level"],
+                row["cpu_s"],
+                row["wall_s"],
+                None if row["peak_MB"] is None else round(row["peak_MB"]),
+                "stored" if row["stored"] else "",
+            )
+            for row in here
+        ]
+        header = (
+            name + positions * quantity.startswith("kinematic_error"),
+            quantity.rpartition("pp_")[2] if "pp_" in quantity else quantity,
+            f"error {unit}",
+            "of its kind",
+            "next level",
+            "core s",
+            "wall s",
+            "MB",
+            "",
+        )
+        text += ["", table(body, header=header)]
+    for row in rows:
+        if row["value"] is None:
+            text.append(f"{row['model']}, {row['setting']}: {row['outcome']}")
+    text += ["", _cheapest(result["cheapest"], "cheapest within")]
+    text += ["", _cheapest(result["cheapest_in_the_plane"], "in the plane alone")]
+    if result["stored"] is not None:
+        text.append(_stored(result["stored"]))
+    text += [f"wrote {name}" for name in result["files"]]
+    return "\n".join([*text, f"{result['wall_s']:.0f} s"])
+
+
+def _stored(stored: dict[str, Any]) -> str:
+    """Where the stored settings come from, and whether they still hold."""
+    drift = "unknown" if stored["drift"] is None else f"{stored['drift']:.1g}"
+    state = "of this code" if stored["of_this_code"] else "of ANOTHER code"
+    pace = stored["pace"]
+    times = "" if pace is None else f", times of a machine {pace:.2g} times as fast"
+    return (
+        f"stored: {'; '.join(stored['settings'])}, commit"
+        f" {stored['provenance']['commit']}, {state} ({stored['witness']} has moved by"
+        f" {drift}){times}; again: {stored['command']}"
+    )
+
+
+def _cheapest(picks: list[dict[str, Any]], title: str) -> str:
+    """Bounds across, quantities down."""
+    bounds = list(dict.fromkeys(one["bound_percent"] for one in picks))
+    body = []
+    for quantity, name in SHORT.items():
+        cells = [name]
+        for one in picks:
+            if one["quantity"] == quantity:
+                none = "the reference alone"
+                cells.append(
+                    none
+                    if one["setting"] is None
+                    else f"{one['model']}, {one['setting']} ({one['cpu_s']:.0f} core s)"
+                )
+        body.append(cells)
+    header = (title, *(f"{bound:g} %" for bound in bounds))
+    return table(body, header=header)

@@ -1,0 +1,31 @@
+"""What ``swgjoint bench scaling`` prints."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from swgjoint.cli.shared.text import table
+
+
+def report(result: dict[str, Any]) -> str:
+    """Time by size, then the fitted exponents."""
+    body = [
+        (
+            row["setting"],
+            row["size"],
+            row["seconds"],
+            row["per"],
+            row.get("steps_per_s"),
+            row["outcome"],
+        )
+        for row in result["rows"]
+    ]
+    header = ("", "size", "core seconds", "per", "steps/s", "outcome")
+    fits = [
+        f"{fit['sweep']}: a {fit['per']} takes time ~ size^{fit['exponent']:.2f} from"
+        f" {fit['from_size']:g} on (within a factor {fit['spread']:.2f})"
+        for fit in result["fits"]
+    ]
+    wrote = [f"wrote {name}" for name in result["files"]]
+    text = [table(body, header=header), *fits, *wrote, f"{result['wall_s']:.0f} s"]
+    return "\n".join(text)

@@ -1,0 +1,109 @@
+"""The validation of a map in terminal output: table of ``map``, lines of ``spec``."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from swgjoint.cli.shared.text import table
+from swgjoint.view.words import words
+
+if TYPE_CHECKING:
+    from swgjoint.maps.drive_map import DriveMap
+
+_SHOWN_TORQUES = 12
+
+
+def validation_of_map(drive: DriveMap) -> dict[str, Any]:
+    """``validation``, ``validation_reason`` and ``validation_notes`` of a map."""
+    from swgjoint.maps.sheet.map_validity import (
+        map_validation,
+        validation_json,
+        validation_lines,
+    )
+
+    found, _ = map_validation(drive)
+    notes = [] if found is None else validation_lines(found)
+    return {**validation_json(drive), "validation_notes": notes}
+
+
+def validation_of_sheet(drive: DriveMap | None, keys: Sequence[str]) -> dict[str, Any]:
+    """The same of a spec sheet; notes only where a key depends on the ripple.
+
+    Args:
+        drive: The map; None where no key needs one.
+        keys: Keys of the sheet.
+    """
+    from swgjoint.maps.sheet.map_validity import map_validation, validation_summary
+    from swgjoint.maps.sheet.spec_sheet import needs_turn
+
+    if drive is None:
+        reason = "no key needs a map"
+        return {
+            "validation": None,
+            "validation_reason": reason,
+            "validation_notes": [],
+        }
+    result = validation_of_map(drive)
+    found, _ = map_validation(drive)
+    if found is None and drive.info.get("validation") is not None:
+        result["validation_notes"] = [result["validation_reason"]]
+    elif not needs_turn(keys):
+        result["validation_notes"] = []
+    elif found is not None:
+        result["validation_notes"] = result["validation_notes"] or [
+            validation_summary(found)
+        ]
+    return result
+
+
+def validation_table(result: dict[str, Any]) -> list[str]:
+    """What a map misses at torques and angles that it was not sampled at.
+
+    Args:
+        result: Of ``swgjoint map``.
+    """
+    record = result["validation"]
+    if record is None:
+        return [result["validation_reason"]]
+    from swgjoint.maps.sheet.map_validity import QUANTITIES, STIFFNESS
+
+    names = {key: f"{name}, of its peak to peak" for key, name in QUANTITIES.items()}
+    rows = []
+    for key, name in (names | {STIFFNESS: "secant stiffness"}).items():
+        if (of := record.get(key)) is not None:
+            shares = (of.get(part) for part in ("largest", "rms"))
+            percents = [None if part is None else 100.0 * part for part in shares]
+            rows.append((name, *percents, float(of["at_Nm"])))
+    torques = sorted({float(row["torque_Nm"]) for row in record["rows"]})
+    shown = ", ".join(f"{torque:.4g}" for torque in torques[:_SHOWN_TORQUES])
+    more = ", ..." if len(torques) > _SHOWN_TORQUES else ""
+    return [
+        f"validation: map against {record['solves']} finite-element solves that it has"
+        f" not seen, at {shown}{more} N·m; worst torque of each quantity:",
+        table(rows, header=("", "largest [%]", "rms [%]", "at [N·m]")),
+        *result["validation_notes"],
+    ]
+
+
+def marked(result: dict[str, Any], key: str) -> Any:
+    """A figure of a spec sheet, marked where its map misses unseen solves."""
+    from swgjoint.maps.sheet.validity_marks import mark
+
+    value, doubt = result[key], result["uncertain"].get(key)
+    if doubt is None or value is None:
+        return value
+    return f"{mark(doubt['largest'])} {value:.4g}"
+
+
+def doubts(result: dict[str, Any]) -> list[str]:
+    """What the marks of a spec sheet mean, figures of the same reason together."""
+    from swgjoint.maps.sheet.map_validity import Difference
+    from swgjoint.maps.sheet.validity_marks import mark
+
+    found: dict[str, list[str]] = {}
+    for key, doubt in result["uncertain"].items():
+        one = Difference.from_json(doubt)
+        why = f"{mark(one.largest)} the map {one}"
+        found.setdefault(why, []).append(words(key)[0])
+    return [f"{why}: {', '.join(names)}" for why, names in found.items()]

@@ -1,0 +1,78 @@
+"""Hash of code for the keys of kept results: a docstring edit leaves it alone."""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+from functools import lru_cache
+from pathlib import Path
+
+from swgjoint.store import cache_folder, json_content, json_file, keep, read_kept
+
+PACKAGE = Path(__file__).resolve().parent
+_CODE = (".py", ".cc", ".h")
+
+
+@lru_cache
+def code_hash(*parts: str) -> str:
+    """Hash of what the code of parts of the package does.
+
+    Of Python files the syntax tree counts, without docstrings; other sources count byte
+    by byte. The cache folder remembers the hash of files that did not change, because
+    parsing them takes most of a second.
+
+    Args:
+        parts: Files and folders relative to the package: ``"gear"``, ``"units.py"``.
+
+    Returns:
+        64 hexadecimal digits.
+    """
+    files = code_files(*parts)
+    content = {
+        path.relative_to(PACKAGE).as_posix(): path.read_bytes() for path in files
+    }
+    raw = hashlib.sha256()
+    for name, data in content.items():
+        raw.update(f"{name}\0{len(data)}\0".encode() + data)
+    folder = cache_folder()
+    path = folder / "code" / f"{raw.hexdigest()}.json" if folder else None
+    known = path and read_kept(path, lambda data: json_content(data, dict[str, str]))
+    if known:
+        return known["code"]
+    digest = hashlib.sha256()
+    for name, data in content.items():
+        meaning = _meaning(data) if name.endswith(".py") else data
+        digest.update(f"{name}\0{len(meaning)}\0".encode() + meaning)
+    if path is not None:
+        keep(path, json_file({"code": digest.hexdigest()}))
+    return digest.hexdigest()
+
+
+def code_files(*parts: str) -> list[Path]:
+    """Sources in these files and folders, sorted; a missing one is an error."""
+    found: set[Path] = set()
+    for part in parts:
+        path = PACKAGE / part
+        if path.is_dir():
+            found.update(p for p in path.rglob("*") if p.suffix in _CODE)
+        else:
+            found.add(path)
+    return sorted(found)
+
+
+def _meaning(source: bytes) -> bytes:
+    """Syntax tree without strings that stand alone, which are docstrings."""
+    tree = ast.parse(source)
+    for node in ast.walk(tree):
+        body = getattr(node, "body", None)
+        if isinstance(body, list):
+            node.body = [line for line in body if not _is_text(line)]  # type: ignore[attr-defined]
+    return ast.dump(tree, annotate_fields=False).encode()
+
+
+def _is_text(line: ast.stmt) -> bool:
+    return (
+        isinstance(line, ast.Expr)
+        and isinstance(line.value, ast.Constant)
+        and isinstance(line.value.value, str)
+    )

@@ -1,0 +1,1 @@
+"""Drives by name, file or design: the one door to their maps."""

@@ -1,0 +1,283 @@
+"""Drives that a scene names, as maps."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+from swgjoint.errors import InputError
+from swgjoint.gear.catalogue_stated import LOSS_KEYS
+from swgjoint.gear.design.family import family_member
+from swgjoint.maps.drive_map import DriveMap
+from swgjoint.maps.fit.error_spectrum import with_assumed_error
+from swgjoint.maps.fit.friction_bending import without_friction
+from swgjoint.maps.from_catalogue import (
+    catalogue_names,
+    is_catalogue_name,
+    with_stated_error,
+)
+from swgjoint.models_path import bundled_names, is_file, named_kind, near_names
+from swgjoint.progress import Progress, silent
+from swgjoint.sim.scene.sections import JointSection, LinearDrive
+from swgjoint.units import arcmin
+
+if TYPE_CHECKING:
+    from swgjoint.gear.design.design import Design
+
+WITHOUT_HARMONICS = ("rigid", "linear", "native")
+"""Levels that use of a map its mean alone."""
+
+
+def drive_of(
+    section: JointSection,
+    *,
+    known: dict[str, DriveMap],
+    joint: str = "",
+    progress: Progress = silent,
+) -> DriveMap:
+    """The map of a joint's drive; what was loaded or built is kept in ``known``.
+
+    Hysteresis that the section switches off is not in it, nor are harmonics below its
+    tolerance at the levels that have any. A catalogue drive has the kinematic error
+    that its tables state or the section asks for, other phases at every joint; what is
+    in ``known`` is taken as it is.
+
+    Args:
+        section: Settings of the joint with a drive.
+        known: Maps by reference, with ``--model MODEL`` behind it where the section
+            asks for a fidelity; extended.
+        joint: Name of the joint.
+        progress: Called while a map is built.
+
+    Raises:
+        InputError: If the reference is no design, map file or catalogue drive, or does
+            not take what the section asks for.
+    """
+    drive = _without_options(section, known=known, joint=joint, progress=progress)
+    if section.hysteresis is False and drive.hysteresis:
+        info = {**drive.info, "hysteresis_left_out": len(drive.hysteresis)}
+        drive = replace(drive, hysteresis=(), info=info)
+    tolerance = section.harmonics_tolerance_arcmin
+    if tolerance is None or section.level in WITHOUT_HARMONICS:
+        return drive
+    return drive.pruned(tolerance)
+
+
+def _without_options(
+    section: JointSection,
+    *,
+    known: dict[str, DriveMap],
+    joint: str,
+    progress: Progress,
+) -> DriveMap:
+    """The map with its kinematic error, whole."""
+    reference, model = section.drive, section.model
+    wanted, seed = section.kinematic_error_arcmin, section.seed or 0
+    where = f"joints.{joint}: " if joint else ""
+    if model is not None and (reference is None or not _may_be_built(reference)):
+        what = "linear" if reference is None else f"drive {reference!r}"
+        raise InputError(
+            f"{where}model {model!r} with {what}, which is no design; accepted: a"
+            " design, or no model"
+        )
+    if section.linear is not None:
+        drive = linear_map(section.linear)
+    elif reference is None:
+        raise ValueError("a joint without a drive has no map")
+    elif reference not in known and names_catalogue(reference):
+        return with_stated_error(
+            _catalogue_drive(reference), wanted, seed=seed, joint=joint
+        )
+    else:
+        drive = _loaded(reference, model, known, progress)
+    if not wanted:
+        return drive
+    try:
+        return with_assumed_error(drive, wanted * arcmin, seed=seed, joint=joint)
+    except InputError as error:
+        raise InputError(f"{where}{error}") from None
+
+
+def _loaded(
+    reference: str, model: str | None, known: dict[str, DriveMap], progress: Progress
+) -> DriveMap:
+    """The map of a file or a design, from ``known`` where it is there."""
+    there = known.get(reference)
+    if there is not None and model in (None, there.level):
+        return there
+    key = reference if model is None else f"{reference} --model {model}"
+    if key not in known:
+        known[key] = load_drive(reference, model=model, progress=progress)
+    return known[key]
+
+
+@lru_cache(maxsize=64)
+def _catalogue_drive(reference: str) -> DriveMap:
+    """A catalogue drive without error; an arm asks for one several times."""
+    return DriveMap.from_catalogue(reference, kinematic_error_arcmin=0.0)
+
+
+def given_drives(drives: Mapping[str, DriveMap]) -> dict[str, DriveMap]:
+    """Those of some loaded drives that a scene need not load again.
+
+    Catalogue drives are left out: a scene gives each of its joints one of its own.
+    """
+    return {name: one for name, one in drives.items() if not names_catalogue(name)}
+
+
+def linear_map(section: LinearDrive) -> DriveMap:
+    """A map of constant stiffness from the scene's own numbers."""
+    return DriveMap.linear(
+        section.stiffness_Nm_rad,
+        teeth_flexspline=section.teeth_flexspline,
+        teeth_circular_spline=section.teeth_circular_spline,
+        rated_torque=section.rated_torque_Nm,
+    )
+
+
+def load_drive(
+    reference: str,
+    *,
+    model: str | None = None,
+    angles: int | None = None,
+    errors: bool = True,
+    kinematic_error_arcmin: float | None = None,
+    progress: Progress = silent,
+) -> DriveMap:
+    """The map of a ``.swg`` file, of the catalogue, or built from a design (cached).
+
+    Args:
+        reference: See :func:`find_drive`.
+        model: Fidelity for a design; None for its default.
+        angles: Wave-generator positions for a design; None for the default.
+        errors: Whether a design keeps its manufacturing errors, whose superposition
+            over the cycle of the teeth takes minutes.
+        kinematic_error_arcmin: Peak to peak of the error that a catalogue drive is
+            assumed to have, or another one without error; None: what the catalogue
+            states, of others nothing.
+        progress: Called while a map is built.
+
+    Raises:
+        InputError: If the reference is none of these, a fidelity is given for what is
+            no design, or a kinematic error for what has its own.
+    """
+    wanted = kinematic_error_arcmin
+    if wanted is not None and names_catalogue(reference) and model is None:
+        return DriveMap.from_catalogue(reference, kinematic_error_arcmin=wanted)
+    drive = _from_source(reference, model, angles, errors, progress)
+    return with_assumed_error(drive, wanted * arcmin) if wanted else drive
+
+
+def _from_source(
+    reference: str,
+    model: str | None,
+    angles: int | None,
+    errors: bool,
+    progress: Progress,
+) -> DriveMap:
+    """See :func:`load_drive`."""
+    source = find_drive(reference)
+    if isinstance(source, DriveMap):
+        if model is not None:
+            raise InputError(
+                f"model {model!r} for {reference!r}, a map of level {source.level!r};"
+                " accepted: a design"
+            )
+        return source
+    from swgjoint.fe.build_map import build_map
+    from swgjoint.gear.design.tolerances import has_errors, without_errors
+
+    flawless = not errors and has_errors(source)
+    if flawless:
+        source = without_errors(source)
+    if angles is None:
+        drive = build_map(source, model=model, progress=progress)
+    else:
+        drive = build_map(source, model=model, angles=angles, progress=progress)
+    missing = dict.fromkeys(LOSS_KEYS, without_friction(source))
+    info = {**drive.info, "missing": missing}
+    if flawless:
+        info["manufacturing_errors"] = "left out"
+    return replace(drive, info=info)
+
+
+def find_drive(reference: str) -> DriveMap | Design:
+    """What a drive reference names; nothing is built.
+
+    A name ending ``.swg`` is a map; an existing file or a bundled name is a design; a
+    name that begins with a catalogue series (``CSG-25-100``) is a catalogue drive.
+
+    Raises:
+        InputError: If it is none of these.
+    """
+    if reference.endswith(".swg"):
+        return DriveMap.load(reference)
+    from swgjoint.gear.design.design import Design
+
+    if names_catalogue(reference):
+        return DriveMap.from_catalogue(reference)
+    try:
+        return Design.load(reference)
+    except InputError:
+        file = is_file(reference)
+        if file or named_kind(reference) or not re.fullmatch(r"[\w-]+", reference):
+            raise
+        if family_member(reference) is not None:
+            raise
+        raise InputError(_unknown(reference)) from None
+
+
+def _unknown(reference: str) -> str:
+    """Message for a name that is neither a design nor in the catalogue."""
+    designs = bundled_names("drives", ".toml")
+    near = near_names(reference, [*catalogue_names(), *designs])
+    hint = f"did you mean {' or '.join(near)}? " if near else ""
+    rows = [name.rsplit("-", 2)[:2] for name in catalogue_names()]
+    series = ", ".join(dict.fromkeys(name for name, _ in rows))
+    sizes = sorted({int(size) for _, size in rows})
+    return (
+        f"drive {reference!r} is neither a file nor in models/drives or"
+        f" models/catalogue; {hint}accepted: {series} of sizes {sizes[0]} to"
+        f" {sizes[-1]} (swgjoint list drives), a design (swgjoint list designs),"
+        " size-NN-RRR, a design file or a .swg map"
+    )
+
+
+def names_catalogue(reference: str) -> bool:
+    """Whether a reference is a catalogue drive, and neither a file nor a design."""
+    return (
+        is_catalogue_name(reference)
+        and not reference.endswith(".swg")
+        and not is_file(reference)
+        and reference not in bundled_names("drives", ".toml")
+    )
+
+
+def _may_be_built(reference: str) -> bool:
+    """Whether a reference may be a design."""
+    return not reference.endswith(".swg") and not names_catalogue(reference)
+
+
+def check_joint_names(
+    named: Mapping[str, set[str]], joints: tuple[str, ...], *, where: str, arm: str
+) -> None:
+    """Refuse keys that name a joint which the arm does not have, all at once."""
+    lines = [
+        f"{where}: {key}.{name}: no such joint in arm {arm!r}"
+        f"{_meant(key, name, joints)}; accepted: {', '.join(joints)}"
+        for key, names in named.items()
+        for name in sorted(names - set(joints))
+    ]
+    if lines:
+        raise InputError("\n".join(lines))
+
+
+def _meant(key: str, name: str, joints: tuple[str, ...]) -> str:
+    """What a name that no joint has may have meant."""
+    if key == "joints" and name == "*":
+        return "; keys of all joints are under 'defaults', e.g. defaults.friction"
+    near = near_names(name, joints)
+    return f"; did you mean {' or '.join(near)}?" if near else ""

@@ -1,0 +1,31 @@
+"""Rotors that a catalogue drive is assumed to have."""
+
+from __future__ import annotations
+
+from swgjoint.errors import InputError
+from swgjoint.gear.catalogue import table
+from swgjoint.maps.from_catalogue import find_row, is_catalogue_name
+
+
+def catalogue_rotor_inertia(drive: str) -> float | None:
+    """Twice the inertia of the wave generator: a motor of the same inertia is assumed.
+
+    Args:
+        drive: Name of a catalogue drive.
+
+    Returns:
+        Rotor with wave generator [kg·m²]; None for other drives and where the tables
+        state none.
+    """
+    if not is_catalogue_name(drive):
+        return None
+    try:
+        row = find_row(drive)
+    except InputError:
+        return None  # whoever loads the drive says what is wrong with the name
+    for rated in table("ratings"):
+        if (rated["size"], rated["ratio"]) == (row.size, row.ratio):
+            wave_generator = rated["input_inertia_1e-4kgm2"]
+            if isinstance(wave_generator, float):
+                return round(2e-4 * wave_generator, 12)
+    return None

@@ -1,0 +1,1 @@
+"""Design work: sweeps, searches, lots, tuning, comparisons, advice."""

@@ -1,0 +1,1 @@
+"""The cheapest level, integrator and step within a wanted error."""

@@ -1,0 +1,124 @@
+"""``swgjoint advise``: the cheapest level, integrator and step within an error.
+
+Everything is measured on the scene itself. The reference is level ``full`` with its
+step halved until two extrapolations to step zero agree; then settings are tried from
+the cheapest on, until one is within the bound.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import mujoco
+
+from swgjoint.drives.references import drive_of
+from swgjoint.errors import ComputationError, InputError
+from swgjoint.explore.advise.bound import Bound
+from swgjoint.explore.advise.reference import settle
+from swgjoint.explore.advise.search import Search, advised
+from swgjoint.joint.attach import LEVELS
+from swgjoint.maps.drive_map import DriveMap
+from swgjoint.progress import Progress, silent
+from swgjoint.sim.assembly import assemble
+from swgjoint.sim.scene.scene import Scene
+
+STEPS = (1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3)
+"""Of the settings that are tried [s]."""
+
+
+def advise(
+    scene: Scene,
+    bound: Bound,
+    *,
+    drives: Mapping[str, DriveMap] | None = None,
+    levels: Sequence[str] = LEVELS,
+    steps: Sequence[float] = STEPS,
+    progress: Progress = silent,
+) -> dict[str, Any]:
+    """Find the cheapest setting of a scene within an error.
+
+    Args:
+        scene: The scene; its own levels, integrator and step do not matter.
+        bound: The error.
+        drives: Maps that stand for drive references of the scene.
+        levels: Those that are tried.
+        steps: Those that are tried [s].
+        progress: Called while maps are built and after every run.
+
+    Returns:
+        ``level``, ``integrator``, ``step_s``, ``sub_steps``, ``expected_error`` in
+        ``unit``, ``expected_error_arcmin`` (of the link angle), ``cost`` (CPU time per
+        simulated time over that of the rigid arm at 1 ms), ``reference``, ``rows``
+        (what was tried, from the cheapest on), ``wall_s``.
+
+    Raises:
+        InputError: If the scene cannot be run, or has no tool for a bound of it.
+        ComputationError: If the reference does not settle, or nothing is within the
+            bound; the message names the best.
+    """
+    begin = time.perf_counter()
+    known = _loaded(scene, drives, progress)
+    if bound.quantity == "tool_position" and not _has_tool(scene, known):
+        raise InputError(
+            f"--error {bound.text}: arm {scene.arm!r} has no tool; accepted: an angle"
+        )
+    # schemes that diverge are rows, the engine need not print them too
+    mujoco.set_mju_user_warning(lambda message: None)
+    try:
+        reference = settle(scene, bound, known, progress)
+        search = Search(scene=scene, bound=bound, drives=known, reference=reference)
+        rows = search.run(levels, steps, progress)
+    finally:
+        mujoco.set_mju_user_warning(None)
+    tried = [row for row in rows if row["error"] is not None]
+    best = min(tried, key=lambda row: float(row["error"]), default=None)
+    found = advised(rows)
+    if found is None:
+        what = (
+            "no setting runs"
+            if best is None
+            else f"the best is {best['level']}, {best['integrator']} at"
+            f" {1e3 * best['step_s']:g} ms with {best['error']:.3g} {bound.unit}"
+        )
+        raise ComputationError(
+            f"{scene.where}: no setting is within {bound.text}; {what}; use a larger"
+            " --error"
+        )
+    return {
+        "scene": scene.name,
+        "bound": bound.text,
+        "quantity": bound.quantity,
+        "level": found["level"],
+        "integrator": found["integrator"],
+        "step_s": found["step_s"],
+        "sub_steps": found["sub_steps"],
+        "expected_error": found["error"],
+        "unit": bound.unit,
+        "expected_error_arcmin": found["link_angle_arcmin"],
+        "cost": found["cost"],
+        "reference": {
+            "level": "full",
+            "integrator": "discrete, extrapolated to no step",
+            "step_s": reference.step,
+            "error": reference.error,
+        },
+        "rows": rows,
+        "wall_s": time.perf_counter() - begin,
+    }
+
+
+def _loaded(
+    scene: Scene, drives: Mapping[str, DriveMap] | None, progress: Progress
+) -> dict[str, DriveMap]:
+    """Maps of all joints, built once; the scene is refused here if it must be."""
+    known = dict(drives or {})
+    rigid = assemble(scene.with_level("rigid"), drives=known, progress=progress)
+    for name in rigid.joints:
+        drive_of(scene.of_joint(name), known=known, progress=progress)
+    return known
+
+
+def _has_tool(scene: Scene, drives: Mapping[str, DriveMap]) -> bool:
+    return bool(assemble(scene.with_level("rigid"), drives=drives).arm.tool >= 0)

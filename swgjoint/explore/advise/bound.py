@@ -1,0 +1,58 @@
+"""The error that ``swgjoint advise`` may leave, with its unit."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+
+from swgjoint.bench.joint.runs import QUANTITIES
+from swgjoint.errors import InputError
+from swgjoint.units import arcmin, arcsec, deg, mm, um
+
+UNITS = {
+    "rad": ("link_angle", 1.0),
+    "deg": ("link_angle", deg),
+    "arcmin": ("link_angle", arcmin),
+    "arcsec": ("link_angle", arcsec),
+    "m": ("tool_position", 1.0),
+    "mm": ("tool_position", mm),
+    "um": ("tool_position", um),
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bound:
+    """An error that is accepted: of the link angle or of the tool, rms."""
+
+    text: str
+    quantity: str
+    value: float
+    """In the unit that ``QUANTITIES`` has for it."""
+
+    @property
+    def unit(self) -> str:
+        """Of ``value``."""
+        return QUANTITIES[self.quantity]
+
+
+def parse_bound(text: str) -> Bound:
+    """A number with its unit, such as ``0.1arcmin``, ``2e-5rad`` or ``0.05mm``.
+
+    Raises:
+        InputError: If it is none or not above zero.
+    """
+    accepted = f"accepted: a number > 0 with one of {', '.join(UNITS)}, as in 0.1arcmin"
+    found = re.fullmatch(r"\s*([0-9.]+(?:e[+-]?[0-9]+)?)\s*([a-z]+)\s*", text, re.I)
+    if found is None or found[2].lower() not in UNITS:
+        raise InputError(f"--error {text!r}; {accepted}")
+    quantity, unit = UNITS[found[2].lower()]
+    own = arcmin if quantity == "link_angle" else mm
+    try:
+        value = float(found[1]) * unit / own
+    except ValueError:
+        value = 0.0
+    if not (np.isfinite(value) and value > 0.0):
+        raise InputError(f"--error {text!r}; {accepted}")
+    return Bound(text=text.strip(), quantity=quantity, value=value)

@@ -1,0 +1,96 @@
+"""What ``swgjoint advise`` compares with: level ``full`` at no step."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from swgjoint.bench.joint.runs import Setting, attempt, common_samples, errors
+from swgjoint.errors import ComputationError
+from swgjoint.explore.advise.bound import Bound
+from swgjoint.maps.drive_map import DriveMap
+from swgjoint.progress import Progress, silent
+from swgjoint.sim.run import Run
+from swgjoint.sim.scene.scene import Scene
+
+REFERENCE_STEPS = tuple(1e-3 / 2**k for k in range(1, 7))
+"""Of the reference, as far as it takes [s]."""
+SETTLED, TRUSTED = 0.02, 0.2
+"""Shares of the bound: disagreement of two extrapolations below which the reference is
+taken, and above which the scene has none."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Reference:
+    """Level ``full`` without an error of its steps."""
+
+    run: Run
+    step: float
+    """Smallest one that it was extrapolated from [s]."""
+    error: float
+    """Disagreement with the extrapolation from twice that step, unit of the bound."""
+
+
+def settle(
+    scene: Scene,
+    bound: Bound,
+    drives: Mapping[str, DriveMap],
+    progress: Progress = silent,
+) -> Reference:
+    """The reference, its step halved until two extrapolations agree.
+
+    The scheme is of the first order in the link angle, for positions of the engine lead
+    by half a step: 2 x(h) - x(2h). A shorter step carries more harmonics, too, which
+    the two then do not agree on.
+
+    Raises:
+        ComputationError: If they never do within :data:`TRUSTED` of the bound.
+    """
+    last: Run | None = None
+    best: Run | None = None
+    apart, step = np.inf, 0.0
+    reason: str | None = "fewer than three steps in a row run"
+    stage = f"{scene.name}: reference"
+    for k, h in enumerate(REFERENCE_STEPS):
+        progress(stage, k, len(REFERENCE_STEPS))
+        got = attempt(
+            scene, Setting(level="full", integrator="discrete", step=h), drives
+        )
+        if got.run is None:
+            # what disagreed before is no word on the steps that follow
+            last, best, apart, step = None, None, np.inf, 0.0
+            reason = got.reason
+            continue
+        if last is not None:
+            finer = _extrapolated(got.run, last)
+            if best is not None:
+                apart, step = errors(finer, best)[bound.quantity], h
+            best = finer
+        last = got.run
+        if apart <= SETTLED * bound.value:
+            break
+    progress(stage, len(REFERENCE_STEPS), len(REFERENCE_STEPS))
+    if best is None or not np.isfinite(apart):
+        raise ComputationError(f"{scene.where}: level full has no reference: {reason}")
+    if apart > TRUSTED * bound.value:
+        raise ComputationError(
+            f"{scene.where}: the reference does not settle within {bound.text}: at"
+            f" steps down to {1e3 * step:g} ms it still moves by {apart:.3g}"
+            f" {bound.unit}; use a larger --error"
+        )
+    return Reference(run=best, step=step, error=float(apart))
+
+
+def _extrapolated(fine: Run, coarse: Run) -> Run:
+    """Twice the finer run less the coarser one, at the samples of the coarser one."""
+    own, theirs = common_samples(fine, coarse)
+    names = ("position", "torsion", "output_torque", "tool_position")
+    return replace(
+        coarse,
+        **{
+            name: 2.0 * getattr(fine, name)[own] - getattr(coarse, name)[theirs]
+            for name in names
+        },
+    )

@@ -1,0 +1,148 @@
+"""The settings that ``swgjoint advise`` tries, and which of them it names."""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from swgjoint.bench.joint.runs import (
+    SCENE_INTEGRATORS,
+    Setting,
+    Stepper,
+    assemble_setting,
+    attempt_assembled,
+    errors,
+    relative_cost,
+    rigid_arm,
+)
+from swgjoint.errors import ComputationError, InputError
+from swgjoint.explore.advise.bound import Bound
+from swgjoint.explore.advise.reference import Reference
+from swgjoint.joint.attach import LEVELS
+from swgjoint.maps.drive_map import DriveMap
+from swgjoint.progress import Progress
+from swgjoint.sim.assembly import Assembly
+from swgjoint.sim.scene.scene import Scene
+
+FLAT = 0.9
+"""Error over that at the last, longer step from which on a level's own error is what
+remains: shorter steps of it are not tried."""
+ALIKE = 1.05
+"""Factor within which costs count as equal: timing tells no less apart."""
+FEWEST = {"discrete": 0.4, "RK4": 1.5}
+"""Cost of a setting at 1 ms at the least, before it was measured: tried in order."""
+
+
+def advised(rows: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
+    """Of the rows within the bound the cheapest; None if there is none.
+
+    Of those that cost as much (:data:`ALIKE`) the lowest level, then the smallest
+    error, so that two runs on a busy machine advise the same.
+    """
+    within = [row for row in rows if row["within"]]
+    least = min((row["cost"] for row in within), default=np.inf)
+    return min(
+        (row for row in within if row["cost"] <= ALIKE * least),
+        key=lambda row: (LEVELS.index(row["level"]), row["error"]),
+        default=None,
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Search:
+    """Settings of one scene from the cheapest on."""
+
+    scene: Scene
+    bound: Bound
+    drives: Mapping[str, DriveMap]
+    reference: Reference
+
+    def run(
+        self, levels: Sequence[str], steps: Sequence[float], progress: Progress
+    ) -> list[dict[str, Any]]:
+        """Rows of what was tried: up to what costs as much as the first one within."""
+        rigid = rigid_arm(self.scene, self.drives)
+        settings = [
+            Setting(level=level, integrator=integrator, step=step)
+            for level in levels
+            for integrator in SCENE_INTEGRATORS
+            for step in steps
+        ]
+        heap = [
+            (FEWEST[s.integrator] * 1e-3 / s.step, k, s) for k, s in enumerate(settings)
+        ]
+        heapq.heapify(heap)
+        measured: dict[Setting, Assembly] = {}
+        last: dict[tuple[str, str], float] = {}
+        flat: set[tuple[str, str]] = set()
+        rows: list[dict[str, Any]] = []
+        most = np.inf
+        stage = f"{self.scene.name}: settings"
+        progress(stage, 0, len(settings))
+        while heap:
+            cost, k, setting = heapq.heappop(heap)
+            if cost > most:
+                break
+            key = (setting.level, setting.integrator)
+            if key in flat:
+                continue
+            if setting not in measured:
+                try:
+                    whole = assemble_setting(self.scene, setting, self.drives)
+                except (ComputationError, InputError) as exc:
+                    rows.append(self._row(setting, None, None, "refused", str(exc)))
+                    continue
+                measured[setting] = whole
+                cost = relative_cost(Stepper.of(whole), rigid)
+                heapq.heappush(heap, (cost, k, setting))
+                continue
+            row = self._try(setting, measured.pop(setting), cost)
+            rows.append(row)
+            progress(stage, len(rows), len(settings))
+            if row["within"]:
+                most = min(most, ALIKE * cost)
+            error = row["error"]
+            if error is None:
+                continue
+            # half the step, nine tenths of the error: the rest is the level's
+            if setting.level != "full" and error > FLAT * last.get(key, np.inf):
+                flat |= {(setting.level, one) for one in SCENE_INTEGRATORS}
+            last[key] = error
+        progress(stage, len(settings), len(settings))
+        return rows
+
+    def _try(self, setting: Setting, whole: Assembly, cost: float) -> dict[str, Any]:
+        got = attempt_assembled(whole)
+        off = None if got.run is None else errors(got.run, self.reference.run)
+        row = self._row(setting, off, cost, got.outcome, got.reason)
+        return row | {"sub_steps": whole.sub_steps}
+
+    def _row(
+        self,
+        setting: Setting,
+        off: dict[str, float] | None,
+        cost: float | None,
+        outcome: str,
+        reason: str | None,
+    ) -> dict[str, Any]:
+        found = {} if off is None else off
+        error = found.get(self.bound.quantity)
+        return {
+            "level": setting.level,
+            "integrator": setting.integrator,
+            "step_s": setting.step,
+            "sub_steps": None,
+            "error": error,
+            "unit": self.bound.unit,
+            "link_angle_arcmin": found.get("link_angle"),
+            "tool_position_mm": found.get("tool_position"),
+            "cost": cost,
+            "within": error is not None
+            and error + self.reference.error <= self.bound.value,
+            "outcome": outcome,
+            "reason": reason,
+        }

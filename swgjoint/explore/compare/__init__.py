@@ -1,0 +1,1 @@
+"""Drives and levels side by side in one scene."""

@@ -1,0 +1,387 @@
+"""Drives side by side in one scene: stiffness, ripple, error, stress, run time.
+
+Each argument is a design, a map, a catalogue drive or a level. A drive takes the place
+of that of every driven joint, or of some chosen ones; a level keeps the scene's drives.
+Figures of the scene are those of its worst joint among them.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from swgjoint.drives.references import find_drive, given_drives, load_drive
+from swgjoint.errors import ComputationError, InputError
+from swgjoint.explore.compare.scene import drives_of, with_drive, with_level
+from swgjoint.faults import read_toml
+from swgjoint.gear.design.design import Design
+from swgjoint.maps.drive_map import DriveMap
+from swgjoint.maps.sheet.validity_marks import joints_judged
+from swgjoint.models_path import near_names
+from swgjoint.progress import Progress, silent
+from swgjoint.sim.arm.scene import rigid_arm_of
+from swgjoint.sim.figures.metrics import drive_order, strongest_left_out
+from swgjoint.sim.run import Run, run_scene
+from swgjoint.sim.scene.scene import Scene
+from swgjoint.sim.scene.sections import LEVELS
+
+STRESS_POSITIONS = 6
+"""Over one pitch of the fixed member, after which the pattern repeats."""
+UPPER = (
+    "ripple_rms_percent",
+    "ripple_pp_percent",
+    "transmission_error_arcmin",
+    "transmission_error_ripple_arcmin",
+    "torsion_arcmin",
+    "tool_path_rms_mm",
+    "tool_ap_mm",
+    "tool_rp_mm",
+    "von_mises_MPa",
+    "peak_torque_of_rating",
+    "cubed_mean_torque_of_rating",
+    "wall_s",
+)
+"""Figures that a spec limits from above."""
+LOWER = ("K1_Nm_rad", "fatigue_safety_factor", "real_time_factor")
+"""Figures that a spec limits from below."""
+RIPPLE = (
+    "ripple_rms_percent",
+    "ripple_pp_percent",
+    "transmission_error_ripple_arcmin",
+)
+"""Figures that a drive without harmonics does not have."""
+SORTABLE = (*UPPER, *LOWER)
+SLOW = "fatigue_safety_factor"
+"""Computed only where a spec or the order asks for it: minutes in space."""
+STIFFNESS = "K1_Nm_rad"
+UNYIELDING = ("rigid", "kinematic")
+"""Levels without compliance: they have no stiffness that could be compared."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Compared:
+    """One argument in the scene; None where a figure cannot be told."""
+
+    argument: str
+    design: str
+    level: str
+    verdict: str
+    """Whether the run is valid, see :mod:`swgjoint.sim.figures.verdict`."""
+    reasons: tuple[str, ...]
+    """Why it is not."""
+    ripple_rms_percent: float
+    ripple_pp_percent: float
+    ripple_missing: str | None
+    """Why there is no ripple to tell: its figures are vibration and round-off."""
+    ripple_is_lower_bound: bool
+    """Whether the step leaves orders out that matter, in the joint with most ripple."""
+    ripple_valid: bool | None
+    """Whether the maps of all joints are within the limit of their validation at the
+    torques of the run; None where no map has one."""
+    map_difference: dict[str, Any] | None
+    """Worst differences of these maps from unseen solves by quantity, as of a joint."""
+    transmission_error_arcmin: float
+    """Peak to peak."""
+    transmission_error_ripple_arcmin: float
+    """Peak to peak of its strongest line at an order of the drive."""
+    torsion_arcmin: float
+    """Largest mean, without its sign."""
+    tool_path_rms_mm: float | None
+    tool_ap_mm: float | None
+    tool_rp_mm: float | None
+    K1_Nm_rad: float | None
+    von_mises_MPa: float | None
+    fatigue_safety_factor: float | None
+    peak_torque_of_rating: float
+    """Over the repeated peak torque."""
+    cubed_mean_torque_of_rating: float
+    """Over the rated torque."""
+    real_time_factor: float
+    """Simulated time over that of the steps."""
+    joint: str
+    """The one with the most ripple."""
+    strongest_order_left_out: tuple[str, ...]
+    """Joints too fast for the step to carry the strongest order of their drive."""
+    wall_s: float
+    """Of everything, maps included."""
+    run: Run = field(repr=False, compare=False)
+    missed: tuple[str, ...] = ()
+    """Limits of the spec that it does not keep."""
+
+    def told(self, key: str) -> Any:
+        """A figure; None where the run cannot tell it."""
+        return None if self.ripple_missing and key in RIPPLE else getattr(self, key)
+
+    def to_json(self) -> dict[str, Any]:
+        """All figures."""
+        return {
+            key: getattr(self, key) for key in self.__dataclass_fields__ if key != "run"
+        }
+
+
+def read_spec(path: str | Path, accepted: Sequence[str] = SORTABLE) -> dict[str, float]:
+    """Limits of a ``[spec]`` table.
+
+    Args:
+        path: TOML file.
+        accepted: Figures that may be limited.
+
+    Raises:
+        InputError: If the file or a key cannot be used.
+    """
+    table = read_toml(Path(path), what="spec").get("spec")
+    if not isinstance(table, Mapping) or not table:
+        raise InputError(f"{path}: accepted: a table [spec] with limits")
+    return checked_limits(table, accepted, where=f"{path}: spec.")
+
+
+def checked_limits(
+    limits: Mapping[str, Any], accepted: Sequence[str] = SORTABLE, *, where: str = ""
+) -> dict[str, float]:
+    """Limits by figure, all of them positive numbers.
+
+    Args:
+        limits: Values by figure.
+        accepted: Figures that may be limited.
+        where: What messages put before the name of a figure.
+
+    Raises:
+        InputError: With one line for every other figure or value.
+    """
+    faults = []
+    for key, value in limits.items():
+        if key not in accepted:
+            near = near_names(key, accepted)
+            hint = f"did you mean {' or '.join(near)}? " if near else ""
+            faults.append(
+                f"{where}{key} = {value!r}: unknown figure; {hint}accepted: a positive"
+                f" number under {', '.join(accepted)}"
+            )
+        elif (
+            isinstance(value, bool)
+            or not isinstance(value, int | float)
+            or not 0.0 < value < np.inf
+        ):
+            faults.append(f"{where}{key} = {value!r}; accepted: a positive number")
+    if faults:
+        raise InputError("\n".join(faults))
+    return {key: float(value) for key, value in limits.items()}
+
+
+def compare(
+    arguments: Sequence[str],
+    scene: Scene,
+    *,
+    model: str | None = None,
+    spec: Mapping[str, float] | None = None,
+    fatigue: bool = False,
+    joints: Sequence[str] = (),
+    progress: Progress = silent,
+) -> list[Compared]:
+    """Run the scene once for every argument, in the order given.
+
+    Args:
+        arguments: Designs, maps, catalogue drives or levels.
+        scene: The scene.
+        model: Fidelity of designs, those of the scene among them; their default if
+            None. Maps and catalogue drives have none.
+        spec: Limits by figure; see :data:`UPPER` and :data:`LOWER`.
+        fatigue: Whether to assess the fatigue of designs with a cup.
+        joints: Joints that get the drive or the level, and whose figures count; every
+            driven joint if empty.
+        progress: Called with the stage, what is done and their number.
+
+    Raises:
+        InputError: If an argument is none of these.
+    """
+    sources = {name: None if name in LEVELS else find_drive(name) for name in arguments}
+    kept: dict[str, DriveMap] = {}  # drives that the scene keeps
+
+    def known(changed: Scene, own: Mapping[str, DriveMap]) -> dict[str, DriveMap]:
+        if model is not None:
+            for reference in drives_of(changed, rigid_arm_of(scene).joints):
+                if reference not in {*kept, *own} and _is_design(reference):
+                    kept[reference] = load_drive(
+                        reference, model=model, progress=progress
+                    )
+        return {**kept, **own}
+
+    rows = []
+    for number, name in enumerate(arguments):
+        begin = time.perf_counter()
+        source = sources[name]
+        if source is None:
+            changed = with_level(scene, name, joints)
+            run = run_scene(changed, drives=known(changed, {}), name=name)
+            drive, stress, safety = None, None, None
+        else:
+            fidelity = model if isinstance(source, Design) else None
+            drive = load_drive(name, model=fidelity, progress=progress)
+            changed, own = with_drive(scene, name, joints), given_drives({name: drive})
+            run = run_scene(changed, drives=known(changed, own), name=name)
+            stress = _stress(source, drive, model)
+            safety = _safety(source, drive, progress) if fatigue else None
+        level = name if source is None else None
+        row = row_of(name, run, drive, level=level, of=joints)
+        row = replace(row, von_mises_MPa=stress, fatigue_safety_factor=safety)
+        row = replace(row, wall_s=time.perf_counter() - begin)
+        rows.append(replace(row, missed=missed(row, spec or {})))
+        progress("compared", number + 1, len(arguments))
+    return rows
+
+
+def _is_design(reference: str) -> bool:
+    return isinstance(find_drive(reference), Design)
+
+
+def missed(row: Compared, spec: Mapping[str, float]) -> tuple[str, ...]:
+    """Limits that a row does not keep: figures not known or not valid among them.
+
+    A level without compliance keeps every lower limit of the stiffness.
+    """
+    found = []
+    for key, limit in spec.items():
+        value = row.told(key)
+        if key == STIFFNESS and value is None and row.level in UNYIELDING:
+            continue
+        valid = key not in RIPPLE or row.ripple_valid is not False
+        kept = (
+            valid
+            and value is not None
+            and (value >= limit if key in LOWER else value <= limit)
+        )
+        if not kept:
+            found.append(key)
+    return tuple(found)
+
+
+def row_of(
+    name: str,
+    run: Run,
+    drive: DriveMap | None,
+    *,
+    level: str | None,
+    of: Sequence[str] = (),
+) -> Compared:
+    """Figures of one run; those of the design itself are filled in later.
+
+    Args:
+        name: The argument.
+        run: Its run.
+        drive: The drive that it names; None for a level, which has that of the scene.
+        level: The level that it names, None for a drive.
+        of: Joints whose figures count; all if empty.
+    """
+    metrics = run.metrics()
+    joints, tool = metrics["joints"], metrics["tool"]
+    if of:
+        joints = {name: figures for name, figures in joints.items() if name in of}
+    if drive is None:  # the softest drive of the scene
+        drives = [t.drive for t in run.assembly.transmissions if t.joint in joints]
+        drive = min(drives, key=lambda d: d.mean_stiffness)
+    worst = max(joints, key=lambda j: float(joints[j]["ripple_rms_percent"]))
+    ratings = [joint["ratings"] for joint in joints.values()]
+    errors = [joint["transmission_error_arcmin"] for joint in joints.values()]
+
+    def largest(key: str) -> float:
+        return max(float(joint[key]) for joint in joints.values())
+
+    return Compared(
+        argument=name,
+        design=drive.name,
+        level=level or joints[worst]["level"],
+        verdict=metrics["verdict"],
+        reasons=tuple(metrics["reasons"]),
+        ripple_rms_percent=largest("ripple_rms_percent"),
+        ripple_pp_percent=largest("ripple_pp_percent"),
+        ripple_missing=joints[worst]["ripple_missing"],
+        ripple_is_lower_bound=bool(joints[worst]["ripple_is_lower_bound"]),
+        **joints_judged(joints.values()),
+        transmission_error_arcmin=max(float(error["pp"]) for error in errors),
+        transmission_error_ripple_arcmin=_error_ripple(run, joints),
+        torsion_arcmin=max(
+            abs(float(joint["torsion_arcmin"]["mean"])) for joint in joints.values()
+        ),
+        tool_path_rms_mm=tool["path_rms_mm"],
+        tool_ap_mm=tool["ap_mm"],
+        tool_rp_mm=tool["rp_mm"],
+        K1_Nm_rad=None
+        if level in UNYIELDING
+        else drive.spec_sheet((STIFFNESS,))[STIFFNESS],
+        von_mises_MPa=None,
+        fatigue_safety_factor=None,
+        peak_torque_of_rating=max(
+            float(of["peak_Nm"] / of["repeated_peak_Nm"]) for of in ratings
+        ),
+        cubed_mean_torque_of_rating=max(
+            float(of["cubed_mean_Nm"] / of["rated_Nm"]) for of in ratings
+        ),
+        real_time_factor=float(run.time[-1] / run.wall),
+        joint=worst,
+        strongest_order_left_out=tuple(
+            t.joint
+            for t in run.assembly.transmissions
+            if t.joint in joints and strongest_left_out(t)
+        ),
+        wall_s=0.0,
+        run=run,
+    )
+
+
+def _error_ripple(run: Run, joints: Mapping[str, Any]) -> float:
+    """Twice the strongest line of the transmission error at an order of its drive.
+
+    The whole peak to peak is mostly torsion that follows the load.
+    """
+    lines = [
+        2.0 * float(line["amplitude_arcmin"])
+        for j, name in enumerate(run.joints)
+        if name in joints
+        for line in joints[name]["transmission_error_orders"]
+        if drive_order(run, j, line["order"]) is not None
+    ]
+    return max(lines, default=0.0)
+
+
+def _safety(
+    source: Design | DriveMap, drive: DriveMap, progress: Progress
+) -> float | None:
+    """Least fatigue safety factor of a design with a cup at rated torque [-]."""
+    if isinstance(source, DriveMap) or source.cup is None:
+        return None
+    from swgjoint.fe.solid.figures.spec_figures import solid_figures
+
+    found = solid_figures(source, [SLOW], drive.ratings.rated_torque, progress=progress)
+    return found.values.get(SLOW)
+
+
+def _stress(
+    source: Design | DriveMap, drive: DriveMap, model: str | None
+) -> float | None:
+    """Mean over a pitch of the largest von Mises stress at rated torque [MPa]."""
+    if isinstance(source, DriveMap):
+        return None
+    from swgjoint.fe.meshing import simulate_meshing
+    from swgjoint.fe.plane.drive2d import can_halve
+
+    if model == "ring":  # has no notches
+        model = "2d"
+    model = model or ("3d" if source.cup is not None else "2d")
+    try:
+        run = simulate_meshing(
+            source,
+            model=model,
+            torque=drive.ratings.rated_torque,
+            steps=STRESS_POSITIONS,
+            turn=1.0 / source.periodicity,
+            half=can_halve(source, bearing=model == "2d"),
+        )
+    except ComputationError:
+        return None
+    average = run.to_json()["flexspline"]["average_max_MPa"]
+    return float(average["von_mises"])

@@ -1,0 +1,126 @@
+"""The scene of a comparison: where from, and which joints get what is compared."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from fnmatch import fnmatchcase
+
+from swgjoint.errors import InputError
+from swgjoint.models_path import near_names
+from swgjoint.sim.arm.scene import is_arm, rigid_arm_of, scene_of_arm
+from swgjoint.sim.scene.scene import Scene
+from swgjoint.sim.scene.sections import LEVELS, JointSection
+from swgjoint.sim.step_choice import resolving_step
+
+_END = "_joint"
+"""Ending of a joint's name that a pattern may leave out."""
+
+
+def scene_or_arm(reference: str, overrides: Iterable[str] = ()) -> Scene:
+    """The scene of a file or a bundled name, or one made around an arm.
+
+    Args:
+        reference: Scene file, MJCF or URDF file of an arm, or bundled name.
+        overrides: ``key=value`` texts that change the scene.
+
+    Raises:
+        InputError: If it is neither, or a change does not fit.
+    """
+    overrides = list(overrides)
+    if is_arm(reference):
+        return scene_of_arm(reference, overrides=overrides)
+    return Scene.load_file(reference, overrides)
+
+
+def resolved(
+    scene: Scene, arguments: Iterable[str], joints: Sequence[str] = ()
+) -> Scene:
+    """The scene at a step that carries the ripple of every drive that is compared.
+
+    Args:
+        scene: The scene; a step that is short enough stays.
+        arguments: Drives and levels that are compared.
+        joints: Joints that get them; every driven one if empty.
+    """
+    arm = rigid_arm_of(scene)
+    steps = [
+        resolving_step(with_drive(scene, name, joints), arm)
+        for name in arguments
+        if name not in LEVELS
+    ]
+    needed = min(steps, default=scene.simulation.step_s)
+    if needed >= scene.simulation.step_s:
+        return scene
+    return scene.with_changes({"simulation.step_s": needed})
+
+
+def joints_named(scene: Scene, patterns: Sequence[str]) -> tuple[str, ...]:
+    """Joints of the scene's arm that the patterns name, in its order; () for none.
+
+    Args:
+        scene: The scene.
+        patterns: Names or shell patterns, several with commas between; the ending
+            ``_joint`` may be left out.
+
+    Raises:
+        InputError: If a pattern names no joint.
+    """
+    wanted = [p.strip() for text in patterns for p in text.split(",") if p.strip()]
+    if not wanted:
+        return ()
+    joints = rigid_arm_of(scene).joints
+    found = {p: [name for name in joints if _fits(name, p)] for p in wanted}
+    faults = []
+    for pattern in (p for p in wanted if not found[p]):
+        near = near_names(pattern, joints)
+        hint = f"; did you mean {' or '.join(near)}?" if near else ""
+        faults.append(
+            f"--joints {pattern}: no such joint in arm {scene.arm!r}{hint} accepted:"
+            f" {', '.join(joints)}, or a pattern such as 'wrist_*'"
+        )
+    if faults:
+        raise InputError("\n".join(faults))
+    chosen = {name for names in found.values() for name in names}
+    return tuple(name for name in joints if name in chosen)
+
+
+def _fits(name: str, pattern: str) -> bool:
+    return any(fnmatchcase(n, pattern) for n in (name, name.removesuffix(_END)))
+
+
+def with_drive(scene: Scene, reference: str, joints: Sequence[str] = ()) -> Scene:
+    """The scene with another drive in these joints; in every driven one without."""
+
+    def changed(section: JointSection) -> JointSection:
+        if not joints and section.drive is None and section.linear is None:
+            return section
+        changes = {"drive": reference, "linear": None, "model": None}
+        return section.model_copy(update=changes)
+
+    return _changed(scene, changed, joints)
+
+
+def with_level(scene: Scene, level: str, joints: Sequence[str] = ()) -> Scene:
+    """The scene with another level in these joints; in every joint without."""
+    return _changed(scene, lambda s: s.model_copy(update={"level": level}), joints)
+
+
+def _changed(
+    scene: Scene,
+    change: Callable[[JointSection], JointSection],
+    joints: Sequence[str],
+) -> Scene:
+    sections = dict(scene.joints)
+    if joints:
+        sections |= {n: change(sections.get(n, JointSection())) for n in joints}
+        return scene.model_copy(update={"joints": sections})
+    sections = {name: change(section) for name, section in sections.items()}
+    return scene.model_copy(
+        update={"defaults": change(scene.defaults), "joints": sections}
+    )
+
+
+def drives_of(scene: Scene, joints: Sequence[str]) -> tuple[str, ...]:
+    """References of the drives that a scene has in these joints, each once."""
+    found = (scene.of_joint(name).drive for name in joints)
+    return tuple(dict.fromkeys(name for name in found if name is not None))

@@ -1,0 +1,307 @@
+"""A lot of drives of one design: how accurate they are, and how many meet a spec.
+
+Every drive has errors drawn from a seed of its own. The design's tolerances are the
+sizes of the errors themselves (``limit``), which is the worst lot that may be
+delivered, or their limits (``uniform``): then each size is drawn between zero and it.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache, lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import binomtest
+
+from swgjoint.code_hash import code_hash
+from swgjoint.errors import DesignError
+from swgjoint.fe.plane.drive2d import left_out
+from swgjoint.fe.tolerances.lot import (
+    Lot,
+    perfect_positions,
+    sample_lot,
+    superposition_error,
+)
+from swgjoint.fe.tolerances.rest import Rest
+from swgjoint.gear.catalogue import ratings_of
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.design.tolerances import has_errors
+from swgjoint.maps.cache import entry_of, known, recalled
+from swgjoint.pool import run_all
+from swgjoint.progress import Progress, silent
+from swgjoint.store import json_file, keep
+from swgjoint.units import arcmin
+from swgjoint.validation.catalogue.accuracy import REST, peaks
+
+Array = NDArray[np.float64]
+
+UPPER = ("transmission_accuracy_arcmin", "ripple_rms_percent")
+"""Figures with an upper limit."""
+LOWER = ("torsional_stiffness_Nm_rad",)
+"""Figures with a lower one."""
+FIGURES = UPPER + LOWER
+SIZES = ("limit", "uniform")
+
+CHUNK = 10
+"""Drives of one task: some seconds."""
+_SIZE_STREAM = 100
+"""Of the random numbers of a drive; those of its errors have lower numbers."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Drawn:
+    """One drive of the lot; figures are None where it has no equilibrium."""
+
+    seed: int
+    transmission_accuracy_arcmin: float | None
+    """Peak to peak of the kinematic error over one output turn: middle between what
+    its low orders and samples make sure and what the rest may add. With the wave
+    generator fixed turns differ; it is the first one."""
+    ripple_rms_percent: float | None
+    """Torque ripple with the output held on its ideal motion at rated torque, of it."""
+    torsional_stiffness_Nm_rad: float | None
+    """Mean tangent at rated torque."""
+
+    @property
+    def failed(self) -> bool:
+        """Whether there is no equilibrium somewhere."""
+        return self.transmission_accuracy_arcmin is None
+
+    def meets(self, spec: Mapping[str, float]) -> bool:
+        """Whether every limit is kept; a drive that cannot be solved keeps none."""
+        if self.failed:
+            return False
+        return all(
+            getattr(self, key) <= limit if key in UPPER else getattr(self, key) >= limit
+            for key, limit in spec.items()
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Part:
+    """Drives of one task, as they are kept."""
+
+    rows: list[Drawn]
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Judged:
+    """:func:`superposition_error` of the first drive, as it is kept."""
+
+    error: float | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Task:
+    rests: Sequence[Rest]
+    drives: tuple[Design, ...]
+    path: Path | None
+    """Where they are kept."""
+
+
+def draw(design: Design, seed: int, sizes: str = "limit") -> Design:
+    """One drive of a design.
+
+    Args:
+        design: Its ``tolerances`` are the sizes of the errors or their limits.
+        seed: Of all its errors.
+        sizes: One of :data:`SIZES`.
+    """
+    changes: dict[str, Any] = {"tolerances.seed": seed}
+    if sizes == "uniform":
+        rng = np.random.default_rng([seed, _SIZE_STREAM])
+        limits = design.tolerances.model_dump(exclude={"seed"})
+        changes |= {
+            f"tolerances.{key}": limit * float(part)
+            for (key, limit), part in zip(
+                limits.items(), rng.uniform(size=len(limits)), strict=True
+            )
+        }
+    return design.with_changes(changes)
+
+
+def run_lot(
+    design: Design,
+    *,
+    count: int = 500,
+    seed: int = 1,
+    sizes: str = "limit",
+    spec: Mapping[str, float] | None = None,
+    jobs: int = 1,
+    progress: Progress = silent,
+) -> dict[str, Any]:
+    """Draw drives, solve them and count those that meet a spec.
+
+    Args:
+        design: With tolerances.
+        count: Drives.
+        seed: Of the first; the others follow.
+        sizes: What the tolerances of the design are, see :data:`SIZES`.
+        spec: Limits by figure, see :data:`UPPER` and :data:`LOWER`.
+        jobs: Processes.
+        progress: Called with the stage, the tasks done and their number.
+
+    Drives are kept in the user's cache as soon as they are solved: a lot that was
+    interrupted goes on, and a longer one solves those alone that it has more.
+
+    Returns:
+        ``rows`` (:class:`Drawn` and, with a spec, ``passed``), ``figures``
+        (:func:`distribution` of each), ``yield`` (None without a spec; ``part``,
+        its 95 % interval ``low`` and ``high``, and that of each limit alone in
+        ``by_limit``), ``validity`` (level, torque, what is left out,
+        ``superposition_error``: of the first drive against full solves, part of its
+        peak to peak), ``failed``, ``wall_s``, ``sizes``, ``spec``, ``design``.
+
+    Raises:
+        DesignError: If it cannot be built, or has no errors to draw.
+        ComputationError: If the drive without errors cannot be solved.
+    """
+    begin = time.perf_counter()
+    if not has_errors(design):
+        raise DesignError(
+            f"{design.drive.name}: all tolerances are zero; accepted: a positive value"
+            " of at least one key of [tolerances]"
+        )
+    name = design.drive.name
+    parts = {
+        "lot": _own_version(),
+        "design": design.content_hash(),
+        "sizes": sizes,
+    }
+
+    @cache
+    def rests() -> Sequence[Rest]:
+        progress(f"{name}: without errors", 0, 1)
+        found = perfect_positions(design)
+        progress(f"{name}: without errors", 1, 1)
+        return found
+
+    def judged() -> _Judged:
+        perfect = rests()
+        progress(f"{name}: full solves", 0, 1)
+        error = superposition_error(draw(design, seed, sizes), perfect)
+        progress(f"{name}: full solves", 1, 1)
+        return _Judged(error=error)
+
+    off = recalled("lots", {**parts, "full solves": seed}, _Judged, judged).error
+    found: dict[tuple[int, ...], _Part] = {}
+    tasks = {}
+    for first in range(seed, seed + count, CHUNK):
+        seeds = tuple(range(first, min(first + CHUNK, seed + count)))
+        path = entry_of("lots", {**parts, "seeds": seeds})
+        there = known(path, _Part)
+        if there is None:
+            drives = tuple(draw(design, one, sizes) for one in seeds)
+            tasks[seeds] = _Task(rests=rests(), drives=drives, path=path)
+        else:
+            found[seeds] = there
+
+    def report(stage: str, done: int, total: int) -> None:
+        progress(stage, len(found) + done, len(found) + total)
+
+    solved_now = run_all(
+        _solved,
+        list(tasks.values()),
+        jobs=jobs,
+        stage=f"{name}: tens of drives",
+        progress=report,
+    )
+    found |= dict(zip(tasks, solved_now, strict=True))
+    rows = [row for _, part in sorted(found.items()) for row in part.rows]
+    solved = [row for row in rows if not row.failed]
+    return {
+        "design": design.drive.name,
+        "sizes": sizes,
+        "spec": None if spec is None else dict(spec),
+        "rows": [
+            vars(row) | ({} if spec is None else {"passed": row.meets(spec)})
+            for row in rows
+        ],
+        "figures": {
+            key: distribution([getattr(row, key) for row in solved]) for key in FIGURES
+        },
+        "validity": {
+            "level": "2d, errors superposed",
+            "torque_Nm": ratings_of(design).rated_torque,
+            "left_out": left_out(design, bearing=False),
+            "friction": "none",
+            "cup": None if design.cup is None else "closed-form torsion in series",
+            "superposition_error": off,
+        },
+        "yield": None if spec is None else _yields(rows, spec),
+        "failed": len(rows) - len(solved),
+        "wall_s": time.perf_counter() - begin,
+    }
+
+
+def distribution(values: Sequence[float]) -> dict[str, float] | None:
+    """Mean, standard deviation and percentiles; None without values."""
+    if not values:
+        return None
+    found = {"mean": float(np.mean(values)), "std": float(np.std(values))}
+    for percent in (1, 5, 50, 95, 99):
+        found[f"p{percent}"] = float(np.percentile(values, percent))
+    return found
+
+
+def wilson(passed: int, count: int) -> dict[str, float]:
+    """Part that passed and its 95 % interval, score interval of Wilson (1927)."""
+    interval = binomtest(passed, count).proportion_ci(0.95, method="wilson")
+    return {
+        "part": passed / count,
+        "low": float(interval.low),
+        "high": float(interval.high),
+    }
+
+
+def _yields(rows: Sequence[Drawn], spec: Mapping[str, float]) -> dict[str, Any]:
+    def of(limits: Mapping[str, float]) -> dict[str, float]:
+        return wilson(sum(row.meets(limits) for row in rows), len(rows))
+
+    return of(spec) | {"by_limit": {key: of({key: spec[key]}) for key in spec}}
+
+
+@lru_cache
+def _own_version() -> str:
+    """Hash of the code of this part that decides the figures of a drive."""
+    return code_hash("explore/lot.py", "validation/catalogue/accuracy.py")
+
+
+def _solved(task: _Task) -> _Part:
+    lot = sample_lot(task.drives, task.rests)
+    rows = [_figures(lot, n, drive) for n, drive in enumerate(task.drives)]
+    found = _Part(rows=rows)
+    if task.path is not None:
+        keep(task.path, json_file(found))
+    return found
+
+
+def _figures(lot: Lot, n: int, drive: Design) -> Drawn:
+    unloaded, loaded, compliance = lot.unloaded[n], lot.loaded[n], lot.compliance[n]
+    seed = drive.tolerances.seed
+    if not np.isfinite([unloaded, loaded, compliance]).all():
+        return Drawn(
+            seed=seed,
+            transmission_accuracy_arcmin=None,
+            ripple_rms_percent=None,
+            torsional_stiffness_Nm_rad=None,
+        )
+    low, rest = peaks(lot.input_angle, unloaded, drive)
+    sure = max(low, float(np.ptp(unloaded)))
+    most = max(sure, low + 2.0 * REST * rest)
+    if lot.whole[n]:
+        sure = most = float(np.ptp(unloaded))
+    # held on its ideal motion the output feels what the error would move it
+    torque = (loaded - loaded.mean()) / compliance
+    rated = ratings_of(drive).rated_torque
+    return Drawn(
+        seed=seed,
+        transmission_accuracy_arcmin=0.5 * (sure + most) / arcmin,
+        ripple_rms_percent=100.0 * float(torque.std()) / rated,
+        torsional_stiffness_Nm_rad=float(np.mean(1.0 / compliance)),
+    )

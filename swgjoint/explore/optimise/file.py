@@ -1,0 +1,178 @@
+"""Files of ``models/optimisations``: what is sought, among which designs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, model_validator
+
+from swgjoint.explore.sweep.file import SweepFile, anchored, lying_in
+from swgjoint.explore.sweep.keys import BASE
+from swgjoint.explore.sweep.plan import List, Parameter, Search, plan_faults
+from swgjoint.explore.sweep.tasks import (
+    AskedFile,
+    MeshingTask,
+    Reference,
+    Text,
+    task_faults,
+)
+from swgjoint.faults import Fault, Section, read_toml, unit_of, validated
+from swgjoint.models_path import find
+
+REFINEMENT = "mesh.refinement"
+
+
+class Objective(Section):
+    """A figure that is to be small or large."""
+
+    figure: Text
+    goal: Literal["minimise", "maximise"] = "minimise"
+
+    @property
+    def sign(self) -> float:
+        """Times this the figure is to be small."""
+        return 1.0 if self.goal == "minimise" else -1.0
+
+
+class Limit(Section):
+    """Bounds of a figure that a design must keep."""
+
+    figure: Text
+    least: float | None = None
+    most: float | None = None
+
+    @model_validator(mode="after")
+    def _bounded(self) -> Limit:
+        if self.least is None and self.most is None:
+            raise Fault(("most", "missing; accepted: least, most or both"))
+        if self.least is not None and self.most is not None and self.least >= self.most:
+            unit = f" {unit_of(self.figure)}".rstrip()
+            told = f"{self.most:g}{unit}; accepted: above {self.least:g}{unit}"
+            raise Fault(("most", told))
+        return self
+
+    def violation(self, value: float) -> float:
+        """How far the figure is beyond a bound, 0 within them [of the bound]."""
+        beyond = 0.0
+        if self.most is not None:
+            beyond = max(beyond, (value - self.most) / (abs(self.most) or 1.0))
+        if self.least is not None:
+            beyond = max(beyond, (self.least - value) / (abs(self.least) or 1.0))
+        return beyond
+
+
+class Confirmation(Section):
+    """How designs of the front are computed again, with more care."""
+
+    designs: Annotated[int, Field(ge=1, le=1_000)] = 5
+    """Of the front: the best of every objective first, then those farthest apart."""
+    positions: Annotated[int, Field(ge=1, le=10_000)] | None = None
+    """Of the wave generator in the simulation of meshing."""
+    refinement: Annotated[float, Field(gt=0, le=100)] | None = None
+    """Of the mesh."""
+    model: Literal["2d", "3d"] | None = None
+    """Of the meshing and of the map."""
+
+
+class OptimisationFile(AskedFile):
+    """What is computed of a design, which figures count, and what may change."""
+
+    objectives: Annotated[tuple[Objective, ...], Field(strict=False, min_length=1)]
+    limits: Annotated[tuple[Limit, ...], Field(strict=False)] = ()
+    plan: Search
+    confirm: Confirmation | None = None
+    beside: Annotated[tuple[Reference, ...], Field(strict=False)] = ()
+    """Designs to hold against the front; the search does not see them."""
+
+    @model_validator(mode="after")
+    def _fits(self) -> OptimisationFile:
+        faults = [*task_faults(self), *plan_faults(self.plan, self.kinds)]
+        if self.design is None:
+            faults.append(("design", "missing; accepted: where the search starts"))
+        told = ", ".join(self.figures)
+        for table, items in (("objectives", self.objectives), ("limits", self.limits)):
+            names = [item.figure for item in items]
+            for k, name in enumerate(names):
+                where = f"{table}[{k}].figure"
+                if name not in self.figures:
+                    faults.append((where, f"{name!r}; accepted: {told}"))
+                elif name in names[:k]:
+                    faults.append((where, f"{name!r} more than once"))
+        confirm = self.confirm
+        if confirm is not None and self.meshing is None:
+            if confirm.positions is not None:
+                faults.append(("confirm.positions", "read by nobody without meshing"))
+            if confirm.model is not None and self.spec is None and self.run is None:
+                faults.append(("confirm.model", "read by nobody but meshing and maps"))
+        varied = {key for p in self.plan.parameters for key in p.keys}
+        if confirm is not None and confirm.refinement and REFINEMENT in varied:
+            told = f"{REFINEMENT} is a parameter; accepted: one of the two"
+            faults.append(("confirm.refinement", told))
+        if BASE in varied:
+            faults.append(("plan.parameters", f"key {BASE!r}; accepted: in a sweep"))
+        if faults:
+            raise Fault(*faults)
+        return self
+
+    @classmethod
+    def load(cls, reference: str | Path) -> OptimisationFile:
+        """Read a file, given as a path or as the name of a bundled one.
+
+        Files that it names by a path lie relative to it.
+
+        Raises:
+            InputError: With one line per fault of the file.
+        """
+        path = find(reference, "optimisations", ".toml", what="optimisation")
+        data = read_toml(path, what="optimisation")
+        file = anchored(validated(cls, data, where=str(path)), path.parent)
+        beside = tuple(lying_in(path.parent, name) for name in file.beside)
+        return file.model_copy(update={"beside": beside})
+
+    def violations(self, figures: Mapping[str, float | None]) -> dict[str, float]:
+        """By how much each limit is missed; what cannot be told misses it by all."""
+        found = {}
+        for limit in self.limits:
+            value = figures.get(limit.figure)
+            found[limit.figure] = 1.0 if value is None else limit.violation(value)
+        return found
+
+    def sweep(self, columns: Mapping[str, list[Any]], *, confirm: bool) -> SweepFile:
+        """The sweep over some designs.
+
+        Args:
+            columns: Values of the parameters of this file by their column, or of other
+                keys.
+            confirm: Whether they are computed with the care of the confirmation.
+        """
+        keys = {p.column: p.keys for p in self.plan.parameters}
+        tasks = {name: getattr(self, name) for name in ("meshing", "spec", "run")}
+        if confirm and (care := self.confirm) is not None:
+            if care.refinement is not None:
+                count = len(next(iter(columns.values())))
+                columns = {**columns, REFINEMENT: [care.refinement] * count}
+            for name, task in tasks.items():
+                if task is None:
+                    continue
+                changes: dict[str, Any] = {}
+                if care.model is not None:
+                    changes["model"] = care.model
+                if isinstance(task, MeshingTask) and care.positions is not None:
+                    changes["positions"] = care.positions
+                tasks[name] = task.model_copy(update=changes)
+        plan = List(
+            parameters=tuple(
+                Parameter(keys=keys.get(column, (column,)), values=tuple(values))
+                for column, values in columns.items()
+            )
+        )
+        return SweepFile(
+            description=self.description,
+            design=self.design,
+            scene=self.scene,
+            size=self.size,
+            plan=plan,
+            **tasks,
+        )

@@ -1,0 +1,224 @@
+"""JSON Schema of every input file, with unit, range, default and meaning of each key.
+
+Range and default come from the models that check the files, the meaning from the
+docstring beneath a field, the unit from the ending of the key.
+"""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from functools import lru_cache
+from itertools import pairwise
+from typing import Any
+
+from pydantic import BaseModel
+from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
+from pydantic_core import core_schema
+
+from swgjoint.faults import unit_of
+
+DIALECT = "https://json-schema.org/draft/2020-12/schema"
+KINDS = ("design", "scene", "sweep", "optimise", "spec", "lot")
+_SIGNS = {
+    "exclusiveMinimum": ">",
+    "minimum": ">=",
+    "exclusiveMaximum": "<",
+    "maximum": "<=",
+}
+
+
+def file_schema(kind: str) -> dict[str, Any]:
+    """JSON Schema of one kind of file.
+
+    Args:
+        kind: One of :data:`KINDS`; ``spec`` is the file of limits of ``compare``,
+            ``lot`` that of ``lot``, ``optimise`` a file of a search.
+    """
+    if kind in ("spec", "lot"):
+        return _limits(kind)
+    model = _model(kind)
+    schema = model.model_json_schema(schema_generator=_WithMeaning)
+    return {"$schema": DIALECT, **schema}
+
+
+def _model(kind: str) -> type[BaseModel]:
+    if kind == "design":
+        from swgjoint.gear.design.design import Design
+
+        return Design
+    if kind == "scene":
+        from swgjoint.sim.scene.scene import Scene
+
+        return Scene
+    if kind == "sweep":
+        from swgjoint.explore.sweep.file import SweepFile
+
+        return SweepFile
+    from swgjoint.explore.optimise.file import OptimisationFile
+
+    return OptimisationFile
+
+
+class _WithMeaning(GenerateJsonSchema):
+    """Schema whose properties carry the unit and the meaning of their key."""
+
+    def model_schema(self, schema: core_schema.ModelSchema) -> JsonSchemaValue:
+        found = super().model_schema(schema)
+        meaning = meanings(schema["cls"])
+        for key, entry in found.get("properties", {}).items():
+            entry.pop("title", None)
+            if unit := unit_of(key):
+                entry["unit"] = unit
+            if key in meaning:
+                entry["description"] = meaning[key]
+        return found
+
+
+def meanings(cls: type) -> dict[str, str]:
+    """Docstrings beneath the fields of a class and of those that it derives from."""
+    found: dict[str, str] = {}
+    for base in reversed(cls.__mro__):
+        found |= _docstrings(base.__module__).get(base.__name__, {})
+    return found
+
+
+@lru_cache
+def _docstrings(module: str) -> dict[str, dict[str, str]]:
+    """Docstrings beneath annotated names, by class, of a module of this package."""
+    if module.partition(".")[0] != "swgjoint":
+        return {}
+    tree = ast.parse(inspect.getsource(sys.modules[module]))
+    classes = [node for node in tree.body if isinstance(node, ast.ClassDef)]
+    return {node.name: dict(_documented(node.body)) for node in classes}
+
+
+def _documented(body: Sequence[ast.stmt]) -> Iterator[tuple[str, str]]:
+    for field, text in pairwise(body):
+        if (
+            isinstance(field, ast.AnnAssign)
+            and isinstance(field.target, ast.Name)
+            and isinstance(text, ast.Expr)
+            and isinstance(text.value, ast.Constant)
+            and isinstance(text.value.value, str)
+        ):
+            yield field.target.id, " ".join(text.value.value.split())
+
+
+def _limits(kind: str) -> dict[str, Any]:
+    """Schema of a file with a table of limits."""
+    from swgjoint.explore import lot
+    from swgjoint.explore.compare import compare
+
+    command = "compare" if kind == "spec" else "lot"
+    of: type = compare.Compared if kind == "spec" else lot.Drawn
+    upper: tuple[str, ...] = compare.UPPER if kind == "spec" else lot.UPPER
+    lower: tuple[str, ...] = compare.LOWER if kind == "spec" else lot.LOWER
+    meaning = meanings(of)
+    figures = {}
+    for key in (*upper, *lower):
+        bound = "Most" if key in upper else "Least"
+        text = f"{bound} that is accepted. {meaning.get(key, '')}".strip()
+        unit = {"unit": unit_of(key)} if unit_of(key) else {}
+        entry = {"type": "number", "exclusiveMinimum": 0, "description": text}
+        figures[key] = {**entry, **unit}
+    table = {
+        "type": "object",
+        "description": "Limits of figures.",
+        "properties": figures,
+        "additionalProperties": False,
+        "minProperties": 1,
+    }
+    return {
+        "$schema": DIALECT,
+        "title": "Spec",
+        "description": f"Limits of swgjoint {command} --spec FILE.",
+        "type": "object",
+        "properties": {"spec": table},
+        "required": ["spec"],
+    }
+
+
+def described_keys(schema: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """One entry for each key of a file, tables before their keys.
+
+    Returns:
+        ``key`` (dotted; NAME stands for a name that the file chooses, [] for an item of
+        a list), ``of_kind`` (kind of the table it belongs to, or None), ``type``,
+        ``unit``, ``range``, ``default`` (None without), ``required``, ``meaning``.
+    """
+    return list(_keys(schema, schema, "", None))
+
+
+def _keys(
+    table: Mapping[str, Any], root: Mapping[str, Any], above: str, kind: str | None
+) -> Iterator[dict[str, Any]]:
+    required = table.get("required", ())
+    for name, entry in table.get("properties", {}).items():
+        key = f"{above}{name}"
+        forms = _forms(entry, root)
+        values = [form for form in forms if form.get("type") != "null"]
+        default = entry.get("default")
+        yield {
+            "key": key,
+            "of_kind": kind,
+            "type": " or ".join(dict.fromkeys(map(_type, values))),
+            "unit": entry.get("unit", ""),
+            "range": " or ".join(dict.fromkeys(filter(None, map(_range, values)))),
+            "default": default if not isinstance(default, Mapping) else None,
+            "required": name in required,
+            "meaning": entry.get("description")
+            or " ".join(str(values[0].get("description", "")).split()),
+        }
+        for form in values:
+            yield from _below(form, root, key)
+
+
+def _below(
+    form: Mapping[str, Any], root: Mapping[str, Any], key: str
+) -> Iterator[dict[str, Any]]:
+    """Keys of a table, of tables under chosen names, and of a list of tables."""
+    if "properties" in form:
+        kind = form["properties"].get("kind", {}).get("const")
+        yield from _keys(form, root, f"{key}.", kind)
+    for inner, mark in (("additionalProperties", ".NAME"), ("items", "[]")):
+        if isinstance(form.get(inner), Mapping):
+            for item in _forms(form[inner], root):
+                yield from _below(item, root, key + mark)
+
+
+def _forms(entry: Mapping[str, Any], root: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """What an entry may be, references followed."""
+    if "$ref" in entry:
+        name = entry["$ref"].rpartition("/")[2]
+        return _forms(root["$defs"][name], root)
+    for several in ("anyOf", "oneOf", "allOf"):
+        if several in entry:
+            return [form for item in entry[several] for form in _forms(item, root)]
+    return [dict(entry)]
+
+
+def _type(form: Mapping[str, Any]) -> str:
+    if "const" in form:
+        return repr(form["const"])
+    if "enum" in form:
+        return " or ".join(map(repr, form["enum"]))
+    names = {
+        "object": "table",
+        "array": "list",
+        "integer": "whole number",
+        "string": "text",
+        "boolean": "true or false",
+    }
+    kind = str(form.get("type", "any value"))
+    return names.get(kind, kind)
+
+
+def _range(form: Mapping[str, Any]) -> str:
+    inner = form.get("additionalProperties") or form.get("items")
+    if isinstance(inner, Mapping):
+        return _range(inner)
+    parts = [f"{sign} {form[k]:g}" for k, sign in _SIGNS.items() if k in form]
+    return ", ".join(parts)

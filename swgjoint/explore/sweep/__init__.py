@@ -1,0 +1,1 @@
+"""Sweeps over designs and scenes, resumable and distributed."""

@@ -1,0 +1,303 @@
+"""Figures of one design of a sweep, computed where the executor puts it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from math import isfinite, pi
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from swgjoint.errors import InputError, MissingExtraError, SwgError
+from swgjoint.gear.design.design import Design
+from swgjoint.maps.cache import code_version
+from swgjoint.maps.sheet.spec_sheet import LOOP_KEYS, RATING_KEYS, TURN_KEYS
+
+if TYPE_CHECKING:
+    from swgjoint.explore.sweep.points import Point
+    from swgjoint.explore.sweep.tasks import MeshingTask, RunTask, SizeTask, SpecTask
+    from swgjoint.fe.meshing_run import MeshingRun
+    from swgjoint.fe.solid.meshing import SolidRun
+    from swgjoint.maps.drive_map import DriveMap
+    from swgjoint.sim.scene.scene import Scene
+
+_STRESSES = ("von_mises_MPa", "tensile_MPa", "compressive_MPa")
+_RING = "circular_spline_"
+KINEMATIC = "kinematic_error_pp_arcsec"
+STIFFNESS = "torsional_stiffness_Nm_rad"
+MESHING_FIGURES = (
+    *_STRESSES,
+    *(f"{_RING}{name}" for name in _STRESSES),
+    "transmission_error_pp_arcsec",
+    KINEMATIC,
+    "pairs_in_contact",
+    "wave_generator_torque_pp_Nm",
+    STIFFNESS,
+)
+"""Stresses: mean over the positions of the largest one of the flexspline or of the
+circular spline. Errors: peak to peak of the output over the positions, under the torque
+and, in a second simulation, unloaded. Pairs: mean over the positions. Stiffness: one
+over the mean compliance under the torque, that of the cup and the mounting included."""
+SPEC_FIGURES = tuple(
+    key for key in (*RATING_KEYS, *LOOP_KEYS, *TURN_KEYS) if key != "orders"
+)
+"""Keys of the specification sheet that the map of a design tells."""
+SIZE_FIGURES = ("outer_diameter_mm", "length_mm", "volume_cm3")
+"""Of the circular spline with its rim; of the face or, where there is one, of the cup;
+of the cylinder around both."""
+RUN_FIGURES = (
+    "ripple_rms_percent",
+    "ripple_pp_percent",
+    "transmission_error_arcmin",
+    "transmission_error_ripple_arcmin",
+    "torsion_arcmin",
+    "tool_path_rms_mm",
+    "tool_ap_mm",
+    "tool_rp_mm",
+    "peak_torque_of_rating",
+    "cubed_mean_torque_of_rating",
+)
+"""Figures of :class:`swgjoint.explore.compare.compare.Compared`, without run times."""
+
+OK = "ok"
+LOST = "lost"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Asked:
+    """One design, or scene, and what is computed of it."""
+
+    key: str
+    design: Design | None
+    scene: Scene | None
+    meshing: MeshingTask | None
+    spec: SpecTask | None
+    size: SizeTask | None
+    run: RunTask | None
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Record:
+    """What came of one design."""
+
+    outcome: str
+    """``ok``; ``refused`` (no drive), ``infeasible`` (cannot be built), ``failed`` (not
+    solved), ``error`` (a fault of the code), ``lost`` (its process died, or the machine
+    had no memory, disk or package for it: not kept, for the next one may)."""
+    reason: str = ""
+    figures: dict[str, float | None] = field(default_factory=dict)
+    """None where the model cannot tell."""
+    work_s: float = 0.0
+    """Time in the process that computed it."""
+
+    @property
+    def ok(self) -> bool:
+        """Whether there are figures."""
+        return self.outcome == OK
+
+
+def compute_all(points: Sequence[Point]) -> tuple[str, list[Record]]:
+    """Records of some designs, and the code that computed them."""
+    asked = [one for point in points if (one := point.asked) is not None]
+    _load(asked[0])  # all of a sweep ask for the same
+    return code_version(), [compute(one) for one in asked]
+
+
+def _load(first: Asked) -> None:
+    """Import what the work needs, which is no part of its time."""
+    from swgjoint.gear.design import feasibility  # noqa: F401
+    from swgjoint.maps.sheet.spec_sheet import needs_map
+
+    if first.meshing is not None:
+        from swgjoint.fe import meshing  # noqa: F401
+    mapped = first.spec is not None and needs_map(first.spec.figures)
+    if mapped or (first.run is not None and first.design is not None):
+        from swgjoint.fe import build_map  # noqa: F401
+    if first.run is not None:
+        from swgjoint.explore.compare import compare  # noqa: F401
+
+
+def compute(asked: Asked) -> Record:
+    """Figures of one design; whatever goes wrong is part of the record."""
+    begin = time.perf_counter()
+    figures: dict[str, float | None] = {}
+    reason = ""
+    try:
+        if asked.design is not None and (reason := _infeasible(asked.design)):
+            outcome = "infeasible"
+        else:
+            found, reason = _figures(asked)
+            # no number is None, as where the model cannot tell
+            figures = {k: v if _finite(v) else None for k, v in found.items()}
+            outcome = OK
+    except InputError as error:
+        outcome, reason = "refused", str(error)
+    except (MemoryError, OSError, MissingExtraError) as error:
+        outcome, reason = LOST, f"{type(error).__name__}: {error}"
+    except SwgError as error:
+        outcome, reason = "failed", str(error)
+    except Exception as error:  # one design must not end the sweep
+        outcome, reason = "error", f"{type(error).__name__}: {error}"
+    return Record(
+        outcome=outcome,
+        reason="; ".join(reason.splitlines()),
+        figures=figures,
+        work_s=time.perf_counter() - begin,
+    )
+
+
+def _finite(value: float | None) -> bool:
+    return value is not None and isfinite(value)
+
+
+def _infeasible(design: Design) -> str:
+    """Faults of the checks that a design does not pass; empty for a feasible one."""
+    from swgjoint.gear.design.feasibility import design_checks
+
+    return "\n".join(check.fault for check in design_checks(design) if not check.ok)
+
+
+def _figures(asked: Asked) -> tuple[dict[str, float | None], str]:
+    figures: dict[str, float | None] = {}
+    reasons: dict[str, str] = {}
+    if asked.meshing is not None:
+        assert asked.design is not None
+        figures |= _meshing(asked.design, asked.meshing)
+    if asked.spec is not None:
+        assert asked.design is not None
+        found, reasons = _spec(asked.design, asked.spec)
+        figures |= found
+    if asked.size is not None:
+        assert asked.design is not None
+        figures |= _size(asked.design, asked.size)
+    if asked.run is not None:
+        assert asked.scene is not None
+        found, doubts = _run(asked.scene, asked.design, asked.run)
+        figures |= found
+        reasons = reasons | doubts
+    return figures, "\n".join(f"{name}: {why}" for name, why in reasons.items())
+
+
+def _meshing(design: Design, task: MeshingTask) -> dict[str, float | None]:
+    """Means and ranges over the positions of the wave generator."""
+    from swgjoint.gear.catalogue import ratings_of
+    from swgjoint.gear.mounting import series_compliance
+
+    rated = ratings_of(design).rated_torque
+    torque = rated if task.torque_Nm is None else task.torque_Nm
+    found: dict[str, float | None] = {}
+    if set(task.figures) - {KINEMATIC}:
+        run = _simulated(design, task, torque)
+        result = run.to_json()
+        steps = result["per_step"]
+        for member, above in (("flexspline", ""), ("circular_spline", _RING)):
+            means = result[member]["average_max_MPa"]
+            found |= {f"{above}{kind}_MPa": value for kind, value in means.items()}
+        found["transmission_error_pp_arcsec"] = _range(steps["output_error_arcsec"])
+        found["pairs_in_contact"] = float(np.mean(steps["pairs_in_contact"]))
+        found["wave_generator_torque_pp_Nm"] = _range(steps["wave_generator_torque_Nm"])
+        series = series_compliance(design, cup=_model(design, task) == "2d")
+        compliance = float(np.mean([state.compliance for state in run.states]))
+        found[STIFFNESS] = 1.0 / (compliance + series)
+    if KINEMATIC in task.figures:
+        steps = _simulated(design, task, 0.0).common_series()
+        found[KINEMATIC] = _range(steps["output_error_arcsec"])
+    return {name: found[name] for name in task.figures}
+
+
+def _model(design: Design, task: MeshingTask) -> str:
+    return task.model or ("3d" if design.cup is not None else "2d")
+
+
+def _simulated(
+    design: Design, task: MeshingTask, torque: float
+) -> MeshingRun | SolidRun:
+    """A simulation of meshing with every position solved."""
+    from swgjoint.fe.meshing import simulate_meshing
+    from swgjoint.fe.plane.drive2d import can_halve
+
+    turn, model = 1.0 / design.periodicity, _model(design, task)
+    return simulate_meshing(
+        design,
+        model=model,
+        torque=torque,
+        steps=task.positions,
+        turn=turn if task.turn_deg is None else task.turn_deg / 360.0,
+        half=can_halve(design, bearing=model == "2d"),
+    )
+
+
+def _range(values: Sequence[float]) -> float:
+    return float(np.ptp(values))
+
+
+def _map(
+    design: Design, task: SpecTask | RunTask, *, turn: bool
+) -> tuple[DriveMap, Design]:
+    from swgjoint.fe.build_map import build_map
+    from swgjoint.gear.design.tolerances import has_errors, without_errors
+
+    if not turn and has_errors(design):  # read with the input locked
+        design = without_errors(design)
+    return build_map(design, model=task.model, angles=task.angles), design
+
+
+def _spec(
+    design: Design, task: SpecTask
+) -> tuple[dict[str, float | None], dict[str, str]]:
+    """Figures of the specification sheet, and why some of them cannot be told."""
+    from swgjoint.gear.catalogue import ratings_of
+    from swgjoint.maps.sheet.spec_sheet import (
+        check_keys,
+        measure_spec,
+        needs_map,
+        needs_turn,
+    )
+
+    keys = check_keys(task.figures)
+    drive = None
+    if needs_map(keys):
+        drive, design = _map(design, task, turn=needs_turn(keys))
+    sheet = measure_spec(drive, ratings=ratings_of(design), only=keys)
+    return {name: sheet.figures[name] for name in task.figures}, sheet.missing
+
+
+def _size(design: Design, task: SizeTask) -> dict[str, float | None]:
+    """Of the cylinder around the drive."""
+    gear, ring = design.drive, design.circular_spline
+    teeth, cup = gear.teeth_circular_spline, design.cup
+    depth = ring.dedendum_coefficient * gear.module_mm + ring.rim_mm
+    diameter = gear.module_mm * teeth + 2.0 * depth
+    length = gear.face_width_mm if cup is None else cup.length_mm
+    found = {
+        "outer_diameter_mm": diameter,
+        "length_mm": length,
+        "volume_cm3": 0.25e-3 * pi * diameter**2 * length,
+    }
+    return {name: found[name] for name in task.figures}
+
+
+def _run(
+    scene: Scene, design: Design | None, task: RunTask
+) -> tuple[dict[str, float | None], dict[str, str]]:
+    """Figures of the worst joint of a run, and why some of them are not valid."""
+    from swgjoint.explore.compare.compare import RIPPLE, row_of
+    from swgjoint.maps.sheet.validity_marks import joint_doubt
+    from swgjoint.sim.run import run_scene
+
+    drive = None
+    if design is None:
+        run = run_scene(scene)
+    else:
+        drive, _ = _map(design, task, turn=True)
+        name = design.drive.name
+        run = run_scene(scene.with_drive(name), drives={name: drive})
+    row = row_of(scene.name, run, drive, level=None)
+    found = {name: getattr(row, name) for name in task.figures}
+    lost = [name for name in task.figures if name in RIPPLE]
+    if row.ripple_valid is not False or not lost:
+        return found, {}
+    why = f"not valid: the map {joint_doubt(row.to_json())}"
+    return found | dict.fromkeys(lost), dict.fromkeys(lost, why)

@@ -1,0 +1,175 @@
+"""Which values the parameters of a sweep or a search take."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, model_validator
+
+from swgjoint.explore.sweep.keys import BASE, find_key, kind_of, unknown
+from swgjoint.explore.sweep.tasks import Listed, Text
+from swgjoint.faults import Fault, Section, unit_of
+
+MOST = 1_000_000
+"""Designs of one sweep.
+
+The process that hands out holds about 1 kB of each, and some 5 kB while it writes the
+tables: 5 GB for so many.
+"""
+
+Count = Annotated[int, Field(ge=2, le=MOST)]
+Seed = Annotated[int, Field(ge=0, le=2**32 - 1)]
+
+
+class Parameter(Section):
+    """Keys that take the same value, and the values that they take."""
+
+    keys: Annotated[tuple[Text, ...], Listed]
+    values: Annotated[tuple[Any, ...], Listed] | None = None
+    low: float | int | None = None
+    high: float | int | None = None
+    count: Count | None = None
+    """Of equally spaced values of a grid."""
+
+    @model_validator(mode="after")
+    def _one_way(self) -> Parameter:
+        ends = (self.low, self.high)
+        if (self.values is None) == (ends == (None, None)):
+            raise Fault(("values", "accepted: values, or low and high, not both"))
+        if self.values is not None:
+            if self.count is not None:
+                raise Fault(("count", "read by nobody beside values"))
+            faults = [
+                (
+                    f"values[{k}]",
+                    f"{value}; accepted: number, text, true, false, list, table",
+                )
+                for k, value in enumerate(self.values)
+                if not _tabled(value)
+            ]
+            if faults:
+                raise Fault(*faults)
+            return self
+        key = self.keys[0]
+        unit = f" {unit_of(key)}".rstrip()
+        missing = [n for n in ("low", "high") if getattr(self, n) is None]
+        if missing:
+            raise Fault(*((name, "missing; accepted: a number") for name in missing))
+        assert self.low is not None and self.high is not None
+        if not self.low < self.high:
+            raise Fault(
+                (
+                    "high",
+                    f"{self.high:g}{unit}; accepted: above {self.low:g}{unit}",
+                )
+            )
+        return self
+
+    @property
+    def column(self) -> str:
+        """Name of the parameter in tables: its first key."""
+        return self.keys[0]
+
+
+def _tabled(value: Any) -> bool:
+    """Whether a value can stand in tables and in JSON: TOML also has times."""
+    if isinstance(value, dict):
+        return all(map(_tabled, value.values()))
+    if isinstance(value, list | tuple):
+        return all(map(_tabled, value))
+    return isinstance(value, bool | int | float | str)
+
+
+# not min_length, which would also complain where all parameters are faulty
+Parameters = Annotated[tuple[Parameter, ...], Field(strict=False)]
+
+
+class Grid(Section):
+    """Every value with every other; the last parameter changes first."""
+
+    kind: Literal["grid"] = "grid"
+    parameters: Parameters
+
+
+class LatinHypercube(Section):
+    """One value in each of equally likely parts of every parameter, strewn."""
+
+    kind: Literal["latin_hypercube"] = "latin_hypercube"
+    designs: Count
+    seed: Seed = 0
+    parameters: Parameters
+
+
+class List(Section):
+    """The first values of all parameters, then the second ones, and so on."""
+
+    kind: Literal["list"] = "list"
+    parameters: Parameters
+
+
+Plan = Annotated[Grid | LatinHypercube | List, Field(discriminator="kind")]
+
+
+class Search(Section):
+    """Values that a genetic search chooses, generation by generation (NSGA-II).
+
+    Source:
+        Deb, Pratap, Agarwal and Meyarivan (2002), "A fast and elitist multiobjective
+        genetic algorithm: NSGA-II", IEEE Transactions on Evolutionary Computation 6.
+    """
+
+    kind: Literal["nsga2"] = "nsga2"
+    designs: Count = 300
+    """That are tried, those that cannot be built among them."""
+    population: Annotated[int, Field(ge=2, le=10_000)] = 24
+    seed: Seed = 0
+    minutes: Annotated[float, Field(gt=0, le=1e6)] | None = None
+    """After which no further generation begins; without it, the same file gives the
+    same designs on any machine."""
+    parameters: Parameters
+
+
+AnyPlan = Grid | LatinHypercube | List | Search
+
+
+def plan_faults(plan: AnyPlan, kinds: tuple[str, ...]) -> list[tuple[str, str]]:
+    """Keys that exist, each once, with what the plan needs; not too many designs."""
+    faults = []
+    if not kinds:
+        return [("design", "missing; accepted: a design, a scene or both")]
+    if not plan.parameters:
+        return [("plan.parameters", "none; accepted: at least one")]
+    seen: set[str] = set()
+    for k, parameter in enumerate(plan.parameters):
+        where = f"plan.parameters[{k}]"
+        for n, key in enumerate(parameter.keys):
+            if kind_of(key, kinds) is None:
+                faults.append((f"{where}.keys[{n}]", unknown(key, kinds)))
+            if key in seen:
+                faults.append((f"{where}.keys[{n}]", f"{key!r} more than once"))
+            seen.add(key)
+        ranged = parameter.values is None
+        if isinstance(plan, List) and ranged:
+            faults.append((f"{where}.values", "missing; accepted: a list"))
+        if isinstance(plan, Grid) and ranged and parameter.count is None:
+            faults.append((f"{where}.count", "missing; accepted: a whole number >= 2"))
+        if isinstance(plan, LatinHypercube | Search) and parameter.count is not None:
+            faults.append((f"{where}.count", "read by nobody; see plan.designs"))
+        if ranged and BASE in parameter.keys:
+            faults.append((f"{where}.values", "missing; accepted: names of designs"))
+    lengths = [len(p.values) for p in plan.parameters if p.values is not None]
+    if isinstance(plan, List) and len(set(lengths)) > 1:
+        told = ", ".join(map(str, lengths))
+        faults.append(("plan.parameters", f"{told} values; accepted: equally many"))
+    if isinstance(plan, Grid):
+        total = 1
+        for parameter in plan.parameters:
+            total *= len(parameter.values or ()) or parameter.count or 1
+        if total > MOST:
+            faults.append(("plan", f"{total} designs; accepted: at most {MOST}"))
+    return faults
+
+
+def takes_whole_numbers(parameter: Parameter, kinds: tuple[str, ...]) -> bool:
+    """Whether numbers of a range are rounded for any of the keys."""
+    return any(find_key(key, kind) for key in parameter.keys for kind in kinds)

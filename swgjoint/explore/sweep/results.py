@@ -1,0 +1,204 @@
+"""Where the records of a sweep lie: a folder, or any place that fsspec reaches."""
+
+from __future__ import annotations
+
+import math
+import secrets
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any, Protocol
+
+from swgjoint.errors import InputError, MissingExtraError
+from swgjoint.explore.sweep.figures import Record
+from swgjoint.files import attempting, output_folder, read_regular, write_whole
+from swgjoint.json_text import json_text
+from swgjoint.store import DamagedError, ignored, json_content, json_file
+
+
+class Place(Protocol):
+    """A folder."""
+
+    def at(self, name: str) -> str:
+        """Path of a file."""
+
+    def read(self, name: str) -> bytes | None:
+        """Content of a file; None if there is none."""
+
+    def write(self, name: str, data: bytes) -> str:
+        """Write a file whole; returns its path."""
+
+    def remove(self, name: str) -> None:
+        """Take a file away that is there."""
+
+
+class Folder:
+    """A folder of this machine."""
+
+    def __init__(self, path: str | Path) -> None:
+        self.path = output_folder(path)
+
+    def at(self, name: str) -> str:
+        """See :class:`Place`."""
+        return str(self.path / name)
+
+    def read(self, name: str) -> bytes | None:
+        """See :class:`Place`."""
+        try:
+            return read_regular(self.path / name)
+        except FileNotFoundError:
+            return None
+        except OSError as error:  # a file where a folder should be, no permission
+            why = error.strerror or error
+            raise InputError(f"cannot read {self.at(name)}: {why}") from None
+
+    def write(self, name: str, data: bytes) -> str:
+        """See :class:`Place`."""
+        target = self.path / name
+        try:
+            target.parent.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InputError(f"cannot write {target}: {error.strerror}") from None
+        return str(write_whole(target, data))
+
+    def remove(self, name: str) -> None:
+        """See :class:`Place`."""
+        target = self.path / name
+        try:
+            target.unlink()
+        except OSError as error:
+            raise InputError(f"cannot remove {target}: {error.strerror}") from None
+
+
+class Remote:
+    """A folder of another file system, such as ``s3://bucket/sweep``."""
+
+    def __init__(self, address: str) -> None:
+        try:
+            from fsspec.core import url_to_fs
+        except ImportError:
+            raise MissingExtraError(
+                f"results at {address!r} need fsspec: pip install 'swgjoint[cluster]'"
+            ) from None
+        try:
+            self._files, self._root = url_to_fs(address)
+        except (ValueError, ImportError) as error:  # unknown protocol, its package
+            raise InputError(f"results at {address!r}: {error}") from None
+        self._scheme = address.partition("://")[0]
+
+    def at(self, name: str) -> str:
+        """See :class:`Place`."""
+        return f"{self._scheme}://{f'{self._root}/{name}'.lstrip('/')}"
+
+    def read(self, name: str) -> bytes | None:
+        """See :class:`Place`."""
+        try:
+            data: bytes = self._files.cat_file(f"{self._root}/{name}")
+        except FileNotFoundError:
+            return None
+        return data
+
+    def write(self, name: str, data: bytes) -> str:
+        """See :class:`Place`; beside and moved, for not every system writes whole."""
+        target = f"{self._root}/{name}"
+        folder, _, last = target.rpartition("/")
+        beside = f"{folder}/.{last}.{secrets.token_hex(4)}"
+        self._files.makedirs(folder, exist_ok=True)
+        self._files.pipe_file(beside, data)
+        self._files.mv(beside, target)
+        return self.at(name)
+
+    def remove(self, name: str) -> None:
+        """See :class:`Place`."""
+        self._files.rm_file(f"{self._root}/{name}")
+
+
+def place_of(where: str | Path) -> Place:
+    """The folder of a path or of an address with ``://``."""
+    return Remote(where) if isinstance(where, str) and "://" in where else Folder(where)
+
+
+def read_record(place: Place, key: str) -> Record | None:
+    """What is kept under a key; a damaged one is none."""
+    data = place.read(_name(key))
+    if data is None:
+        return None
+    try:
+        return json_content(data, Record)
+    except DamagedError as error:
+        ignored(place.at(_name(key)), error)
+        return None
+
+
+def write_record(
+    place: Place, key: str, record: Record, values: Mapping[str, Any]
+) -> None:
+    """Keep a record, with the values for whoever looks into the folder."""
+    place.write(_name(key), json_file({**asdict(record), "values": dict(values)}))
+
+
+def _name(key: str) -> str:
+    return f"results/{key[:2]}/{key}.json"
+
+
+def write_to(
+    place: Place, outputs: Mapping[str, Callable[[], bytes | None]]
+) -> list[str]:
+    """Write the outputs of a result by name; one that fails costs no other.
+
+    Returns:
+        Paths of those that were written; an output that is None is none.
+    """
+    files: list[str] = []
+    for name, make in outputs.items():
+        with attempting(place.at(name)):
+            data = make()
+            if data is not None:
+                files.append(place.write(name, data))
+    return files
+
+
+def csv_text(rows: Sequence[Mapping[str, Any]]) -> str:
+    """Rows with the same keys as CSV; empty where there is no value."""
+    import csv
+    import io
+
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow(rows[0].keys())
+    for row in rows:
+        writer.writerow(["" if v is None else v for v in row.values()])
+    return out.getvalue()
+
+
+def parquet_bytes(rows: Sequence[Mapping[str, Any]]) -> bytes | None:
+    """Rows with the same keys as Parquet; None where pyarrow is not installed."""
+    try:
+        import pyarrow
+        import pyarrow.parquet
+    except ImportError:
+        return None
+    columns = {key: _column([row[key] for row in rows]) for key in rows[0]}
+    out = pyarrow.BufferOutputStream()
+    pyarrow.parquet.write_table(pyarrow.table(columns), out)
+    data: bytes = out.getvalue().to_pybytes()
+    return data
+
+
+def _column(values: list[Any]) -> list[Any]:
+    """Values of one type: numbers where all are, else texts."""
+    kinds = {type(value) for value in values} - {type(None)}
+    if kinds == {int, float}:
+        return [None if value is None else float(value) for value in values]
+    if len(kinds) <= 1:
+        return values
+    return [None if value is None else str(value) for value in values]
+
+
+def flat(value: Any) -> Any:
+    """A value as it stands in one cell of a table."""
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    if isinstance(value, Mapping | list | tuple):
+        return json_text(value, indent=None)
+    return value

@@ -1,0 +1,156 @@
+"""What a sweep or a search computes of a design or scene, and on which cluster."""
+
+from __future__ import annotations
+
+from difflib import get_close_matches
+from typing import Annotated, ClassVar, Literal
+
+from pydantic import Field, model_validator
+
+from swgjoint.explore.sweep.figures import (
+    MESHING_FIGURES,
+    RUN_FIGURES,
+    SIZE_FIGURES,
+    SPEC_FIGURES,
+    STIFFNESS,
+)
+from swgjoint.faults import Fault, Section
+
+Listed = Field(strict=False, min_length=1)  # TOML has lists, the models tuples
+Text = Annotated[str, Field(min_length=1, max_length=200)]
+Reference = Annotated[str, Field(min_length=1, max_length=4096)]
+"""A bundled name or a path."""
+
+
+class FigureTask(Section):
+    """What is computed of a design."""
+
+    known: ClassVar[tuple[str, ...]]
+    figures: Annotated[tuple[Text, ...], Listed]
+
+    @model_validator(mode="after")
+    def _known(self) -> FigureTask:
+        faults = []
+        for k, name in enumerate(self.figures):
+            if name not in self.known:
+                near = get_close_matches(name, self.known, n=1)
+                hint = f"did you mean {near[0]}? " if near else ""
+                told = ", ".join(self.known)
+                faults.append((f"figures[{k}]", f"{name!r}: {hint}accepted: {told}"))
+        if faults:
+            raise Fault(*faults)
+        return self
+
+
+class MeshingTask(FigureTask):
+    """Simulation of meshing: stresses, errors, contact."""
+
+    known = MESHING_FIGURES
+    torque_Nm: Annotated[float, Field(ge=-1e6, le=1e6)] | None = None
+    """T; rated torque of the design without."""
+    positions: Annotated[int, Field(ge=1, le=10_000)] = 6
+    turn_deg: Annotated[float, Field(gt=0, le=360_000)] | None = None
+    """Of the input; without, one pitch of the fixed member, after which the pattern of
+    a perfect gear repeats."""
+    model: Literal["2d", "3d"] | None = None
+    """3d for a design with a cup, else 2d, without."""
+
+    @model_validator(mode="after")
+    def _loaded(self) -> MeshingTask:
+        if self.torque_Nm == 0 and STIFFNESS in self.figures:
+            # with play the output is free then
+            told = f"0 N·m with {STIFFNESS}; accepted: another torque"
+            raise Fault(("torque_Nm", told))
+        return self
+
+
+class SpecTask(FigureTask):
+    """The map of the drive and figures of its specification sheet."""
+
+    known = SPEC_FIGURES
+    model: Literal["ring", "2d", "3d"] | None = None
+    angles: Annotated[int, Field(ge=1, le=10_000)] | None = None
+    """Positions of the map over a pitch; see :func:`swgjoint.build_map`."""
+
+
+class RunTask(FigureTask):
+    """The scene with the drive in every driven joint; the worst joint counts."""
+
+    known = RUN_FIGURES
+    model: Literal["ring", "2d", "3d"] | None = None
+    angles: Annotated[int, Field(ge=1, le=10_000)] | None = None
+
+
+class SizeTask(FigureTask):
+    """How large the drive is."""
+
+    known = SIZE_FIGURES
+
+
+class SlurmCluster(Section):
+    """Jobs of a SLURM cluster, each with one process a core."""
+
+    kind: Literal["slurm"] = "slurm"
+    jobs: Annotated[int, Field(ge=1, le=10_000)]
+    cores: Annotated[int, Field(ge=1, le=1_000)]
+    memory_GB: Annotated[float, Field(gt=0, le=100_000)]
+    """Of a job."""
+    walltime: Annotated[str, Field(pattern=r"^(\d+-)?\d{1,3}:\d\d:\d\d$")]
+    queue: Text | None = None
+    account: Text | None = None
+    prologue: Annotated[tuple[Text, ...], Field(strict=False)] = ()
+    """Lines of shell before a worker starts, such as ``module load``."""
+    directives: Annotated[tuple[Text, ...], Field(strict=False)] = ()
+    """Further ``#SBATCH`` options."""
+
+
+class AskedFile(Section):
+    """What every file asks for: designs, a scene, and what is computed of them."""
+
+    description: Annotated[str, Field(max_length=1000)] = ""
+    source: Annotated[str, Field(max_length=1000)] = ""
+    design: Reference | None = None
+    """Base of the designs; a scene alone keeps its drives."""
+    scene: Reference | None = None
+    meshing: MeshingTask | None = None
+    spec: SpecTask | None = None
+    size: SizeTask | None = None
+    run: RunTask | None = None
+    cluster: SlurmCluster | None = None
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """What the keys of the parameters may belong to."""
+        bases = {"design": self.design, "scene": self.scene}
+        return tuple(kind for kind, base in bases.items() if base is not None)
+
+    @property
+    def figures(self) -> tuple[str, ...]:
+        """Names of the figures, in the order of the file's tables."""
+        tasks = (self.meshing, self.spec, self.size, self.run)
+        return tuple(
+            name for task in tasks if task is not None for name in task.figures
+        )
+
+
+def task_faults(file: AskedFile) -> list[tuple[str, str]]:
+    """What is asked for needs its base; nothing is asked for twice."""
+    faults = []
+    if not file.figures:
+        faults.append(
+            ("meshing", "nothing to compute; accepted: meshing, spec, size or run")
+        )
+    for name in ("meshing", "spec", "size"):
+        if getattr(file, name) is not None and file.design is None:
+            faults.append((f"{name}", "needs a design; accepted: with the key design"))
+    if (file.run is None) != (file.scene is None):
+        faults.append(("run", "accepted: exactly where the key scene is"))
+    twice = sorted({name for name in file.figures if file.figures.count(name) > 1})
+    faults += [("figures", f"{name!r} asked for more than once") for name in twice]
+    if file.run is not None and file.design is None:
+        faults += [
+            (f"run.{key}", "read by nobody without a design")
+            for key in ("model", "angles")
+            if getattr(file.run, key) is not None
+        ]
+    return faults

@@ -1,0 +1,1 @@
+"""Tuning of controller gains in the environments."""

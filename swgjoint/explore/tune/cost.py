@@ -1,0 +1,204 @@
+r"""Cost of gains: episodes of an environment, candidates times seeds side by side.
+
+The cost of an episode is, in terms of the environment's own reward
+:math:`1/(1 + (e/s)^2) - w u^2`,
+
+.. math:: J = s \sqrt{\langle (e/s)^2 + w u^2 \rangle}
+    = \sqrt{\langle e^2 \rangle + s^2 w \langle u^2 \rangle},
+
+with the error e of the true link angle, the motor torque u over its limit and the mean
+over the episode: the rms error, and for full torque all the time as much as
+:math:`s\sqrt{w}`. For small errors the mean reward is :math:`1 - (J/s)^2`; unlike the
+reward J does not level off when errors are large. After a broken limit, and for what is
+not a number, e is the limit of the link's angle and u is 1: no cost is larger than
+:attr:`Trials.worst`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from difflib import get_close_matches
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.control.motor_side import MotorPlan
+from swgjoint.errors import InputError
+from swgjoint.explore.tune.gains import Tunable, build, parts_of, weighted
+from swgjoint.sim.controller import KnownJoints, ReadingAge, Task
+from swgjoint.units import arcmin
+
+Array = NDArray[np.float64]
+
+PREFIX = "swgjoint/"
+TUNABLE = ("JointTracking-v0",)
+"""Environments whose action is the motor's torque and nothing else."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Trace:
+    """Signals of episodes, for pictures; shapes (n, n_episodes)."""
+
+    time: Array
+    """At the ends of the control periods [s]. Shape (n,)."""
+    reference: Array
+    """Of the link [rad]."""
+    error: Array
+    """Link minus reference [rad]; not a number after a broken limit."""
+    torque: Array
+    """Of the motor [N·m]."""
+
+
+def environment_named(name: str) -> str:
+    """Id of an environment whose controllers can be tuned.
+
+    Raises:
+        InputError: If there is none of the name, or its action is added to a loop.
+        MissingExtraError: If gymnasium is not installed.
+    """
+    from swgjoint.envs import ENVIRONMENTS
+
+    short = name.removeprefix(PREFIX)
+    if short in TUNABLE:
+        return PREFIX + short
+    if PREFIX + short in ENVIRONMENTS:
+        raise InputError(
+            f"environment {name!r}: its action is added to a loop of its own; accepted:"
+            f" {', '.join(TUNABLE)}"
+        )
+    near = get_close_matches(short, TUNABLE, n=1)
+    hint = f"did you mean {near[0]}? " if near else ""
+    raise InputError(f"environment {name!r}; {hint}accepted: {', '.join(TUNABLE)}")
+
+
+class Trials:
+    """The same seeded episodes for every candidate."""
+
+    def __init__(
+        self,
+        environment: str,
+        arguments: Mapping[str, Any],
+        *,
+        seeds: Sequence[int],
+        candidates: int,
+    ) -> None:
+        """Make the simulations.
+
+        Args:
+            environment: Id.
+            arguments: Of the environment.
+            seeds: Of the episodes of every candidate.
+            candidates: How many run side by side.
+
+        Raises:
+            InputError: If an argument is none of the environment's settings.
+        """
+        import gymnasium
+
+        from swgjoint.envs.bench import settings_of
+        from swgjoint.envs.joint_tracking import TrackingSettings
+
+        # what gymnasium itself takes, such as the mode of restarts, is not for tuning
+        settings_of(TrackingSettings, dict(arguments))
+        self.seeds, self.candidates = tuple(seeds), candidates
+        env = gymnasium.make_vec(
+            f"swgjoint.envs:{environment}",
+            num_envs=len(self.seeds) * candidates,
+            **arguments,
+        )
+        self.env = cast(Any, env.unwrapped)
+        settings, limits = self.env.core.settings, self.env.core.limits
+        self.joints: KnownJoints = self.env.core.joints
+        self.error_scale = float(settings.error_scale_arcmin * arcmin)
+        """s of the cost [rad]."""
+        self.effort_weight = float(settings.effort_weight)
+        """w of the cost."""
+        self._limit = float(limits.angle[0])
+        self.worst = float(np.hypot(self._limit, self._full_torque))
+        """Cost of an episode that breaks a limit at once [rad]."""
+        self._plans: dict[str, tuple[MotorPlan, MotorPlan]] = {}
+
+    @property
+    def _full_torque(self) -> float:
+        return self.error_scale * float(np.sqrt(self.effort_weight))
+
+    def costs(self, tunable: Tunable, values: Mapping[str, Array]) -> Array:
+        """Costs of candidates on all seeds [rad]. Shape (candidates, seeds).
+
+        Args:
+            tunable: The controller.
+            values: Of its parameters. Shape (candidates,) each.
+        """
+        return self._run(tunable, values, None)
+
+    def traced(
+        self, tunable: Tunable, values: Mapping[str, Array]
+    ) -> tuple[Array, Trace]:
+        """Costs [rad], shape (candidates, seeds), and what the episodes looked like."""
+        rows: list[tuple[Array, Array]] = []
+        costs = self._run(tunable, values, rows)
+        error, torque = (np.array(x) for x in zip(*rows, strict=True))
+        task = self._task
+        return costs, Trace(
+            time=task.period * np.arange(1, len(error) + 1),
+            reference=np.asarray(task.position[1:, :, 0]),
+            error=error,
+            torque=torque,
+        )
+
+    def close(self) -> None:
+        """Give the simulations back."""
+        self.env.close()
+
+    def _run(
+        self,
+        tunable: Tunable,
+        values: Mapping[str, Array],
+        rows: list[tuple[Array, Array]] | None,
+    ) -> Array:
+        env, count = self.env, len(self.seeds)
+        observation, _ = env.reset(seed=list(self.seeds) * self.candidates)
+        self._task = task = env.task
+        each = {key: np.repeat(x, count)[:, None] for key, x in values.items()}
+        limit = self.joints.torque_limit
+        controller = build(self._plan(tunable, task, each), each, limit)
+        # the age of the readings is tuned, not told
+        controller.start(replace(task, reading_age=ReadingAge()))
+        squares = np.zeros((2, env.num_envs))
+        alive = np.ones(env.num_envs, dtype=bool)
+        steps = len(task.position) - 1
+        for k in range(steps):
+            torque = controller.torque(k, env.measured(observation))
+            action = np.nan_to_num(torque / limit, posinf=1.0, neginf=-1.0)
+            observation, _, terminated, _, info = env.step(np.clip(action, -1.0, 1.0))
+            error = arcmin * info["link_error_arcmin"]
+            effort = info["motor_torque_Nm"] / limit[0]
+            valid = alive & np.isfinite(error) & np.isfinite(effort)
+            size = np.where(valid, np.minimum(np.abs(error), self._limit), self._limit)
+            squares += np.square([size, np.where(valid, effort, 1.0)])
+            if rows is not None:
+                rows.append(
+                    (np.where(valid, error, np.nan), info["motor_torque_Nm"].copy())
+                )
+            alive &= ~terminated
+        mean = squares / steps
+        cost = np.sqrt(mean[0] + self._full_torque**2 * mean[1])
+        return np.asarray(cost.reshape(self.candidates, count))
+
+    def _plan(
+        self, tunable: Tunable, task: Task, each: Mapping[str, Array]
+    ) -> MotorPlan:
+        """Of all motions; what the seeds have in common is planned once."""
+        count = len(self.seeds)
+        few = replace(
+            task,
+            position=task.position[:, :count],
+            velocity=task.velocity[:, :count],
+            acceleration=task.acceleration[:, :count],
+            link_torque=task.link_torque[:, :count],
+        )
+        if tunable.name not in self._plans:
+            self._plans[tunable.name] = parts_of(tunable, few)
+        return weighted(self._plans[tunable.name], few, each, repeats=self.candidates)

@@ -1,0 +1,174 @@
+"""What a tuning run is asked for, and what it found."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.errors import InputError
+from swgjoint.explore.tune.cost import Trace
+from swgjoint.explore.tune.gains import Parameter
+from swgjoint.explore.tune.search import OPTIMISERS, Search
+from swgjoint.units import arcmin
+
+Array = NDArray[np.float64]
+
+MINUTES = 3.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class TuneSettings:
+    """What is tuned, and how long."""
+
+    environment: str
+    controller: str = "pd-flexible"
+    optimiser: str = "de"
+    minutes: float | None = None
+    """Wall time; None: :data:`MINUTES`, unless ``evaluations`` are given."""
+    evaluations: int | None = None
+    """Candidates of both searches instead: the same result on every machine."""
+    seed: int = 0
+    arguments: Mapping[str, Any] = field(default_factory=dict)
+    """Of the environment; drives and loads differ within tolerances unless it says
+    ``randomise`` false."""
+    population: int = 16
+    """Candidates of a generation."""
+    training: int = 8
+    """Seeds that the searches see."""
+    held_out: int = 16
+    """Seeds that they do not see."""
+
+    def __post_init__(self) -> None:
+        if self.optimiser not in OPTIMISERS:
+            raise InputError(
+                f"optimiser {self.optimiser!r}; accepted: {', '.join(OPTIMISERS)}"
+            )
+        if self.minutes is not None and self.evaluations is not None:
+            raise InputError("minutes and evaluations given; accepted: one of them")
+        if self.minutes is not None and not 0.0 < self.minutes <= 1440.0:
+            raise InputError(f"minutes {self.minutes:g}; accepted: > 0 and <= 1440")
+        least = 2 * self.population
+        if self.evaluations is not None and self.evaluations < least:
+            raise InputError(
+                f"evaluations {self.evaluations}; accepted: at least {least}, a"
+                f" generation of {self.population} for each of two searches"
+            )
+        if not 0 <= self.seed < 10**6:
+            raise InputError(f"seed {self.seed}; accepted: 0 to 999999")
+
+    @property
+    def seeds(self) -> tuple[tuple[int, ...], tuple[int, ...]]:
+        """Of the episodes: those of the searches, and those kept from them."""
+        first = 1000 * self.seed
+        return (
+            tuple(range(first, first + self.training)),
+            tuple(range(first + 500, first + 500 + self.held_out)),
+        )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Candidate:
+    """A controller with its values and what it costs."""
+
+    name: str
+    controller: str
+    values: dict[str, float]
+    """Of its parameters."""
+    gains: dict[str, float]
+    """On the motor, in SI units."""
+    training: Array
+    """Cost by seed [rad]."""
+    held_out: Array
+    """Cost by seed that no search has seen [rad]."""
+    trace: Trace
+    """Of the held-out episodes."""
+
+    def to_json(self) -> dict[str, Any]:
+        """Figures of the candidate."""
+        got: dict[str, Any] = {
+            "name": self.name,
+            "controller": self.controller,
+            "parameters": self.values,
+            "gains": self.gains,
+        }
+        for key, costs in (("training", self.training), ("held_out", self.held_out)):
+            got[f"{key}_cost_arcmin"] = float(costs.mean() / arcmin)
+            got[f"{key}_spread_arcmin"] = float(costs.std(ddof=1) / arcmin)
+            got[f"{key}_costs_arcmin"] = (costs / arcmin).tolist()
+        error = self.trace.error
+        broken = ~np.isfinite(error).all(axis=0)
+        got["broken_limits"] = int(broken.sum())
+        return got
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Tuned:
+    """Result of a tuning run."""
+
+    settings: TuneSettings
+    environment: str
+    candidates: tuple[Candidate, ...]
+    """First the textbook's PD, last the tuned controller."""
+    searches: dict[str, Search]
+    parameters: tuple[Parameter, ...]
+    """Of the named controller."""
+    anti_resonance: float
+    """Of the nominal plant [Hz]."""
+    error_scale: float
+    effort_weight: float
+    worst: float
+    """Largest possible cost [rad]."""
+    wall: float
+    """With what was spent before an interruption [s]."""
+
+    @property
+    def baseline(self) -> Candidate:
+        """PD by the textbook rule."""
+        return self.candidates[0]
+
+    @property
+    def best(self) -> Candidate:
+        """The tuned controller."""
+        return self.candidates[-1]
+
+    def improvement(self, candidate: Candidate) -> float:
+        """Share of the baseline's held-out cost that a candidate saves."""
+        return float(1.0 - candidate.held_out.mean() / self.baseline.held_out.mean())
+
+    def to_json(self) -> dict[str, Any]:
+        """The JSON object, without files."""
+        rows = [
+            one.to_json() | {"improvement_percent": 100.0 * self.improvement(one)}
+            for one in self.candidates
+        ]
+        training, held_out = self.settings.seeds
+        return {
+            "best": rows[-1],
+            "baseline": rows[0],
+            "evaluations": sum(s.evaluations for s in self.searches.values()),
+            "improvement_percent": rows[-1]["improvement_percent"],
+            "candidates": rows,
+            "environment": self.environment,
+            "arguments": arguments_of(self.settings),
+            "controller": self.settings.controller,
+            "optimiser": self.settings.optimiser,
+            "seed": self.settings.seed,
+            "seeds": {"training": list(training), "held_out": list(held_out)},
+            "bounds": {p.key: [p.low, p.high] for p in self.parameters},
+            "anti_resonance_Hz": self.anti_resonance,
+            "cost": "sqrt(mean(e^2) + s^2 w mean(u^2)), e link error, u motor torque"
+            " over its limit",
+            "error_scale_arcmin": self.error_scale / arcmin,
+            "effort_weight": self.effort_weight,
+            "worst_cost_arcmin": self.worst / arcmin,
+            "wall_s": self.wall,
+        }
+
+
+def arguments_of(settings: TuneSettings) -> dict[str, Any]:
+    """Arguments of the environment."""
+    return {"randomise": True, **settings.arguments}

@@ -1,0 +1,279 @@
+"""Searches in the unit cube that can be taken up again where they were interrupted.
+
+All optimisers are seeded and ask for whole generations. What they asked for and what
+it cost is kept in a journal; a search that is taken up again is run from its beginning,
+its questions answered from the journal, so that it goes on as if nothing had happened.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.errors import InputError, MissingExtraError
+from swgjoint.files import read_regular, write_whole
+from swgjoint.store import arrays_content, arrays_file, told
+
+Array = NDArray[np.float64]
+Evaluate = Callable[[Array], Array]
+"""Places (n, d) to costs (n,)."""
+
+JOURNAL = "tune.npz"
+NEAR = 0.1
+"""Standard deviation about the start in the first generation of differential
+evolution, of the width of the cube."""
+STEP = 0.2
+"""First standard deviation of CMA-ES, of the width of the cube."""
+
+
+class Spent(Exception):
+    """The budget of a search is used up."""
+
+
+class _Failed(Exception):
+    """Carries an error of the cost through an optimiser unchanged."""
+
+    def __init__(self, error: Exception) -> None:
+        super().__init__(error)
+        self.error = error
+
+
+@dataclass(kw_only=True, eq=False)
+class Search:
+    """Generations of one search."""
+
+    places: list[Array] = field(default_factory=list)
+    """In the unit cube. Shape (n, d) each."""
+    costs: list[Array] = field(default_factory=list)
+    """Of every seed. Shape (n, seeds) each."""
+    seconds: list[float] = field(default_factory=list)
+    """That the generations took."""
+
+    @property
+    def evaluations(self) -> int:
+        """Candidates so far."""
+        return sum(map(len, self.places))
+
+    def best(self) -> Array:
+        """Place of the candidate of the lowest mean cost. Shape (d,)."""
+        mean = np.concatenate(self.costs).mean(axis=1)
+        return np.asarray(np.concatenate(self.places)[int(mean.argmin())])
+
+    def progress(self) -> Array:
+        """Lowest mean cost after every candidate. Shape (evaluations,)."""
+        mean = np.concatenate(self.costs).mean(axis=1)
+        return np.asarray(np.minimum.accumulate(mean))
+
+
+def run_search(
+    optimiser: str,
+    search: Search,
+    *,
+    costs: Callable[[Array], Array],
+    more: Callable[[], bool],
+    start: Array,
+    size: int,
+    seed: int,
+    clock: Callable[[], float],
+    after: Callable[[], None],
+) -> None:
+    """Let an optimiser go on with a search until its budget is spent.
+
+    Args:
+        optimiser: Key of :data:`OPTIMISERS`.
+        search: What is known; is added to.
+        costs: Places (n, d) to costs (n, seeds).
+        more: Whether another generation is allowed.
+        start: One of the first generation. Shape (d,).
+        size: Of a generation.
+        seed: Of all that is random.
+        clock: Time [s].
+        after: Called after every new generation.
+
+    Raises:
+        InputError: If the journal is of another search.
+    """
+    done = 0
+
+    def evaluate(places: Array) -> Array:
+        nonlocal done
+        places = np.clip(places, 0.0, 1.0)
+        if done == len(search.places):
+            if not more():
+                raise Spent
+            began = clock()
+            got = costs(places)
+            search.places.append(places.copy())
+            search.costs.append(got)
+            search.seconds.append(clock() - began)
+            after()
+        elif not np.array_equal(search.places[done], places):
+            raise InputError(
+                f"{JOURNAL} is of another search (generation {done + 1} differs);"
+                " accepted: the versions of swgjoint, scipy, cma, optuna that wrote it"
+            )
+        done += 1
+        return np.asarray(search.costs[done - 1].mean(axis=1))
+
+    def guarded(places: Array) -> Array:
+        try:
+            return evaluate(places)
+        # scipy would make another error of these, InputError among them
+        except (TypeError, ValueError) as error:
+            raise _Failed(error) from None
+
+    try:
+        OPTIMISERS[optimiser](guarded, start, size, seed)
+    except Spent:
+        pass
+    except _Failed as failed:
+        raise failed.error from None
+
+
+def _differential_evolution(
+    evaluate: Evaluate, start: Array, size: int, seed: int
+) -> None:
+    from scipy.optimize import differential_evolution
+
+    rng = np.random.default_rng(seed)
+    shape = (size, start.size)
+    # a Latin hypercube; half of it gives way to the start and its neighbourhood
+    strata = np.tile(np.arange(size)[:, None], start.size)
+    first = (rng.permuted(strata, axis=0) + rng.uniform(size=shape)) / size
+    near = start + NEAR * rng.standard_normal((size // 2, start.size))
+    first[: len(near)] = np.clip(near, 0.0, 1.0)
+    first[0] = start
+    differential_evolution(
+        lambda columns: evaluate(columns.T),
+        bounds=[(0.0, 1.0)] * start.size,
+        init=first,
+        maxiter=10**6,
+        tol=0.0,
+        atol=0.0,
+        polish=False,
+        updating="deferred",
+        vectorized=True,
+        seed=rng,
+    )
+
+
+def _cma(evaluate: Evaluate, start: Array, size: int, seed: int) -> None:
+    try:
+        import cma
+    except ImportError:
+        raise _missing("CMA-ES", "cma") from None
+    rng = np.random.default_rng(seed)
+    strategy = cma.CMAEvolutionStrategy(
+        start,
+        STEP,
+        {
+            "bounds": [0.0, 1.0],
+            "popsize": size,
+            # its own generator, not the global one of numpy
+            "seed": float("nan"),
+            "randn": lambda *shape: rng.standard_normal(shape),
+            "verbose": -9,
+        },
+    )
+    strategy.inject([start], force=True)
+    while not strategy.stop():
+        places = strategy.ask()
+        strategy.tell(places, evaluate(np.array(places)).tolist())
+
+
+def _optuna(evaluate: Evaluate, start: Array, size: int, seed: int) -> None:
+    try:
+        import optuna
+    except ImportError:
+        raise _missing("optimiser optuna", "optuna") from None
+    optuna.logging.set_verbosity(optuna.logging.WARNING)
+    names = [f"x{k}" for k in range(start.size)]
+    study = optuna.create_study(sampler=optuna.samplers.TPESampler(seed=seed))
+    study.enqueue_trial(dict(zip(names, start.tolist(), strict=True)))
+    while True:
+        trials = [study.ask() for _ in range(size)]
+        places = np.array(
+            [[t.suggest_float(x, 0.0, 1.0) for x in names] for t in trials]
+        )
+        for trial, cost in zip(trials, evaluate(places), strict=True):
+            study.tell(trial, float(cost))
+
+
+def _missing(what: str, package: str) -> MissingExtraError:
+    return MissingExtraError(
+        f"{what} needs {package}: pip install 'swgjoint[tune]'; without it: de"
+    )
+
+
+OPTIMISERS: dict[str, Callable[[Evaluate, Array, int, int], None]] = {
+    "de": _differential_evolution,
+    "cma": _cma,
+    "optuna": _optuna,
+}
+"""Differential evolution (scipy), CMA-ES (cma), tree-structured Parzen (optuna)."""
+
+
+def write_journal(
+    folder: Path, header: Mapping[str, Any], searches: Mapping[str, Search]
+) -> Path:
+    """Write all searches, whole or not at all."""
+    arrays: dict[str, Any] = {"header": json.dumps(header, sort_keys=True)}
+    for name, search in searches.items():
+        if search.places:
+            arrays[f"{name}.places"] = np.stack(search.places)
+            arrays[f"{name}.costs_rad"] = np.stack(search.costs)
+            arrays[f"{name}.seconds"] = np.array(search.seconds)
+    return write_whole(folder / JOURNAL, arrays_file(arrays))
+
+
+def read_journal(
+    folder: Path, header: Mapping[str, Any], names: tuple[str, ...]
+) -> dict[str, Search]:
+    """Searches of a run that is taken up again.
+
+    Raises:
+        InputError: If there is none, it cannot be read, or was of other settings.
+    """
+    path = folder / JOURNAL
+    try:
+        arrays = arrays_content(read_regular(path))
+        kept = json.loads(str(arrays["header"]))
+        if not isinstance(kept, dict):
+            raise ValueError("the header is no object")
+        found = {name: _search(arrays, name) for name in names}
+    except FileNotFoundError:
+        raise InputError(
+            f"{path}: nothing to resume; accepted: --out of an interrupted run"
+        ) from None
+    except Exception as error:  # a file may be anything
+        raise InputError(
+            f"{path} is no journal of a tuning run: {told(error)}; accepted: another"
+            " --out"
+        ) from None
+    for key, value in header.items():
+        if kept.get(key) != value:
+            raise InputError(
+                f"{path} is of {key} {kept.get(key)!r}, not {value!r}; accepted: the"
+                " same settings and files, or another --out"
+            )
+    return found
+
+
+def _search(arrays: Mapping[str, Array], name: str) -> Search:
+    if f"{name}.places" not in arrays:
+        return Search()
+    places, costs, seconds = (
+        arrays[f"{name}.{key}"] for key in ("places", "costs_rad", "seconds")
+    )
+    whole = places.shape[:2] == costs.shape[:2] and seconds.shape == places.shape[:1]
+    if not (whole and places.ndim == costs.ndim == 3 and np.isfinite(costs).all()):
+        raise ValueError(f"{name}: generations and costs do not match")
+    return Search(
+        places=list(places), costs=list(costs), seconds=[float(s) for s in seconds]
+    )

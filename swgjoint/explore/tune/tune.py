@@ -1,0 +1,273 @@
+"""``swgjoint tune``: gains of a named controller, held against a textbook rule.
+
+Four controllers are told apart on seeds that no search has seen, so that what feed-
+forward brings is not taken for what tuning brings: PD by the rule, the same PD with its
+two gains tuned, the named controller with gains by the rule, and that one tuned.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.errors import InputError
+from swgjoint.explore.tune.cost import Trace, Trials, environment_named
+from swgjoint.explore.tune.gains import (
+    CONTROLLERS,
+    Parameter,
+    Tunable,
+    anti_resonance,
+    controller_named,
+    gains_of,
+    parameters_of,
+)
+from swgjoint.explore.tune.result import (
+    MINUTES,
+    Candidate,
+    Tuned,
+    TuneSettings,
+    arguments_of,
+)
+from swgjoint.explore.tune.search import (
+    JOURNAL,
+    Search,
+    read_journal,
+    run_search,
+    write_journal,
+)
+from swgjoint.json_text import json_text, plain
+from swgjoint.maps.drive_map import DriveMap
+from swgjoint.progress import Progress, silent
+
+Array = NDArray[np.float64]
+
+PD_SHARE = 0.2
+"""Of the budget, for the two gains of plain PD."""
+RESERVE = 15.0
+"""Of the minutes, for the held-out seeds and the report [s]."""
+_PD, _NAMED = "pd", "named"
+
+
+def tune(
+    settings: TuneSettings,
+    *,
+    folder: Path | None = None,
+    resume: bool = False,
+    progress: Progress = silent,
+) -> Tuned:
+    """Tune a controller, and plain PD beside it.
+
+    Args:
+        settings: What, and how long. With ``evaluations`` the same settings give the
+            same result to the last bit; minutes end a search sooner or later.
+        folder: Receives the journal after every generation, and goes on with one of
+            the same settings that is there; None: none is kept.
+        resume: Whether there has to be such a journal.
+        progress: Called with the search, the candidates (or seconds) done and all.
+
+    Raises:
+        InputError: If a name, an argument or the journal is not accepted.
+        MissingExtraError: If gymnasium or the optimiser is not installed.
+    """
+    began = time.perf_counter()
+    environment = environment_named(settings.environment)
+    named, arguments = controller_named(settings.controller), arguments_of(settings)
+    tunables = {_PD: CONTROLLERS["pd"]}
+    if named.name != "pd":
+        tunables[_NAMED] = named
+    searches = {name: Search() for name in tunables}
+    if folder is None and resume:
+        raise InputError("resume without a folder; accepted: --out of the run")
+    training, held_out = settings.seeds
+    trials = Trials(
+        environment, arguments, seeds=training, candidates=settings.population
+    )
+    header = _header(settings, environment, arguments, trials.joints.drives[0])
+    if folder is not None:
+        if resume or (folder / JOURNAL).exists():
+            searches = read_journal(folder, header, tuple(tunables))
+            known = sum(search.evaluations for search in searches.values())
+            told = f"going on with {folder / JOURNAL}: candidates that are known"
+            progress(told, known, known)
+        folder.mkdir(parents=True, exist_ok=True)
+    before = sum(sum(s.seconds) for s in searches.values())
+
+    def elapsed() -> float:
+        return time.perf_counter() - began + before
+
+    for name, tunable in tunables.items():
+        search = searches[name]
+        parameters = parameters_of(tunable, trials.joints)
+        share = PD_SHARE if name == _PD and len(tunables) > 1 else 1.0
+        budget = _Budget(settings, searches, search, share, elapsed)
+
+        def after(budget: _Budget = budget, tunable: Tunable = tunable) -> None:
+            if folder is not None:
+                write_journal(folder, header, searches)
+            progress(f"tuning {tunable.name}", *budget.shown())
+
+        run_search(
+            settings.optimiser,
+            search,
+            costs=partial(_costs, trials, tunable, parameters),
+            more=budget.more,
+            start=np.array([p.start for p in parameters]),
+            size=settings.population,
+            seed=settings.seed,
+            clock=time.perf_counter,
+            after=after,
+        )
+    trials.close()
+    last = Trials(environment, arguments, seeds=training + held_out, candidates=1)
+    joints = last.joints
+    candidates: list[Candidate] = []
+    for name, tunable in tunables.items():
+        parameters = parameters_of(tunable, joints)
+        neutral = {p.key: np.array([p.neutral]) for p in parameters}
+        best = _values(parameters, searches[name].best()[None])
+        for label, values in (("by rule", neutral), ("tuned", best)):
+            progress("held-out seeds", len(candidates), 2 * len(tunables))
+            costs, trace = last.traced(tunable, values)
+            candidates.append(
+                _candidate(
+                    label,
+                    tunable,
+                    values,
+                    costs[0],
+                    trace,
+                    last,
+                    settings,
+                )
+            )
+    progress("held-out seeds", len(candidates), len(candidates))
+    last.close()
+    return Tuned(
+        settings=settings,
+        environment=environment,
+        candidates=tuple(candidates),
+        searches=searches,
+        parameters=parameters_of(named, joints),
+        anti_resonance=anti_resonance(joints),
+        error_scale=last.error_scale,
+        effort_weight=last.effort_weight,
+        worst=last.worst,
+        wall=elapsed(),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Budget:
+    """When a search has to end: after so many candidates, or in time."""
+
+    settings: TuneSettings
+    searches: Mapping[str, Search]
+    search: Search
+    share: float
+    elapsed: Any
+
+    @property
+    def _candidates(self) -> int:
+        """Of this search; the second has what the first left over."""
+        s = self.settings
+        assert s.evaluations is not None
+        if self.share < 1.0:
+            return max(s.population, int(self.share * s.evaluations))
+        others = sum(one.evaluations for one in self.searches.values())
+        return s.evaluations - (others - self.search.evaluations)
+
+    @property
+    def _seconds(self) -> float:
+        return 60.0 * (self.settings.minutes or MINUTES) - RESERVE
+
+    def more(self) -> bool:
+        """Whether another generation is allowed; the first always is."""
+        if not self.search.places:
+            return True
+        if self.settings.evaluations is not None:
+            return self.search.evaluations + self.settings.population <= (
+                self._candidates
+            )
+        one = float(np.median(self.search.seconds))
+        spent = sum(self.search.seconds) if self.share < 1.0 else self.elapsed()
+        return bool(spent + one <= self.share * self._seconds)
+
+    def shown(self) -> tuple[int, int]:
+        """Done and all: candidates, or seconds."""
+        if self.settings.evaluations is not None:
+            return self.search.evaluations, self._candidates
+        done = sum(self.search.seconds) if self.share < 1.0 else self.elapsed()
+        return int(done), int(max(done + 1, self.share * self._seconds))
+
+
+def _header(
+    settings: TuneSettings,
+    environment: str,
+    arguments: Mapping[str, Any],
+    drive: DriveMap,
+) -> dict[str, Any]:
+    """What a journal must agree in with the run that goes on with it."""
+    # a file of the same path may have changed; provenance does not move the joint
+    moved = json_text(replace(drive, info={}, fields=None), indent=None)
+    text: dict[str, Any] = json.loads(
+        json.dumps(
+            {
+                "environment": environment,
+                "arguments": plain(arguments),
+                "drive_content": hashlib.sha256(moved.encode()).hexdigest()[:16],
+                "controller": settings.controller,
+                "optimiser": settings.optimiser,
+                "seed": settings.seed,
+                "population": settings.population,
+                "training": settings.training,
+            }
+        )
+    )
+    return text
+
+
+def _values(parameters: tuple[Parameter, ...], places: Array) -> dict[str, Array]:
+    return {p.key: p.value(places[:, k]) for k, p in enumerate(parameters)}
+
+
+def _costs(
+    trials: Trials,
+    tunable: Tunable,
+    parameters: tuple[Parameter, ...],
+    places: Array,
+) -> Array:
+    return trials.costs(tunable, _values(parameters, places))
+
+
+def _candidate(
+    label: str,
+    tunable: Tunable,
+    values: Mapping[str, Array],
+    costs: Array,
+    trace: Trace,
+    trials: Trials,
+    settings: TuneSettings,
+) -> Candidate:
+    first = settings.training
+    return Candidate(
+        name=f"{tunable.name} {label}",
+        controller=tunable.name,
+        values={key: float(x[0]) for key, x in values.items()},
+        gains={key: float(x[0]) for key, x in gains_of(values, trials.joints).items()},
+        training=costs[:first],
+        held_out=costs[first:],
+        trace=Trace(
+            time=trace.time,
+            reference=trace.reference[:, first:],
+            error=trace.error[:, first:],
+            torque=trace.torque[:, first:],
+        ),
+    )

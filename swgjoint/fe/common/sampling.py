@@ -1,0 +1,302 @@
+"""Equilibria of a design over torque and input angle, for its map."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from functools import partial
+from math import pi
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.errors import ComputationError
+from swgjoint.fe.common.pattern import Effort, Pattern, solve_pattern
+from swgjoint.fe.common.stress_state import stress_state_label
+from swgjoint.fe.plane.continuation import Continuation
+from swgjoint.fe.plane.drive2d import can_halve, carries_bearing, left_out, ring_model
+from swgjoint.fe.plane.equilibrium import NewtonSolver
+from swgjoint.fe.plane.shape_fields import drive_fields, plane_fields, plane_surface
+from swgjoint.fe.solid.continuation import SolidContinuation
+from swgjoint.fe.solid.drive3d import solid_ring
+from swgjoint.fe.solid.shape_fields import solid_fields, solid_surface
+from swgjoint.fe.tolerances.rest import SMALL
+from swgjoint.fe.tolerances.sampling import STAGES, sample_tolerances
+from swgjoint.gear.catalogue import ratings_of
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.design.tolerances import has_errors, without_errors
+from swgjoint.gear.kinematics import angle_coefficients
+from swgjoint.gear.mounting import series_compliance, springs_of
+from swgjoint.maps.samples import MapSamples
+from swgjoint.maps.unfinished import Unfinished
+from swgjoint.progress import Progress, silent
+
+Array = NDArray[np.float64]
+
+ANGLES = 24
+"""Input positions over one pitch to begin with, doubled up to :data:`MOST_ANGLES`:
+contact events leave corners in the error, which some wave generators pass in a few
+torques and others at every angle."""
+MOST_ANGLES = 96
+SOLVES = 1050
+"""Equilibria of a map in the plane at most; ellipses take a half."""
+UNSEEN = (16, 7)
+"""Torques of one sign and angles of each that judge the map."""
+SOLID_ANGLES = 16
+"""The same in space, where an equilibrium takes fifty times longer."""
+SOLID_MOST_ANGLES = 16
+SOLID_SOLVES = 220
+SOLID_UNSEEN = (2, 2)
+TORQUES = 100
+"""Most torques of one sign in the table of a map."""
+TOLERANCED_TORQUES = 24
+"""The same with errors of the teeth, which give it ten times the harmonics."""
+FIXED_SOLVES = 14
+"""Equilibria per angle where the number of angles is given."""
+LEVELS = (0.05, 0.15, 0.35, 0.65, 1.0)
+"""Torques of every angle, of both signs, as parts of the repeated peak torque; others
+are added for all of them."""
+SOLVER = NewtonSolver(step_tolerance=1e-9, thorough_below=1e-6)
+"""A map needs no more: the output error moves by 1e-9 rad and the input torque by 2e-6
+N·m, in little more than half the iterations."""
+SYMMETRIC = ("elliptical", "simplified", "parabolic", "four_roller", "cosine")
+"""Wave generators that are their own mirror image; the teeth always are."""
+
+
+def sample_map(
+    design: Design,
+    *,
+    model: str = "2d",
+    angles: int | None = None,
+    progress: Progress = silent,
+    keep: Unfinished | None = None,
+) -> MapSamples:
+    """Equilibria over one pitch and both signs of torque, by the nonlinear models.
+
+    Angles and torques are added until they predict others, as far as the budget of
+    equilibria goes, see :func:`swgjoint.fe.common.pattern.solve_pattern`; a few
+    equilibria at other angles and torques are left to judge the map. One pitch suffices
+    with perfect teeth, and with a symmetric wave generator the negative torques are the
+    mirror image of the positive ones; both claims are checked at rated torque and
+    recorded. Torques at which a solve fails, and those beyond, are left out, and the
+    record says so. Manufacturing errors are superposed, see
+    :mod:`swgjoint.fe.tolerances.sampling`; a map with them has a rigid wave generator.
+
+    In the plane the balls of a bearing stand still on the cam, the first one on the
+    major axis: they pass at another rate than teeth, and what repeats after a pitch and
+    is its own mirror image is the drive without that passage.
+
+    Args:
+        design: The drive.
+        model: Fidelity, ``2d`` or ``3d``.
+        angles: Input positions over one pitch of the fixed member, with
+            :data:`FIXED_SOLVES` equilibria each; by default as many as the drive asks
+            for, from :data:`ANGLES`, in space :data:`SOLID_ANGLES`.
+        progress: Called with the stage, the solves done and their number.
+        keep: Where solved positions are kept and taken up again after an interruption;
+            the samples are the same, bit for bit. None keeps none.
+
+    Raises:
+        ComputationError: If the unloaded drive or small torques cannot be solved.
+    """
+    begin = time.perf_counter()
+    drive, ratings = design.drive, ratings_of(design)
+    symmetric = design.wave_generator.kind in SYMMETRIC
+    parts = [part * ratings.repeated_peak for part in LEVELS]
+    torques = parts if symmetric else [-t for t in parts[::-1]] + parts
+    period = 2.0 * pi / design.periodicity
+    effort = effort_of(
+        model, angles, both_signs=not symmetric, errors=has_errors(design)
+    )
+    total, done = effort.solves, 0
+
+    stages = len(STAGES) if has_errors(design) else 1
+    stage = f"{drive.name}: equilibria" + (f", part 1 of {stages}" * (stages > 1))
+
+    def tick(solves: int = 1) -> None:
+        nonlocal done
+        done += solves
+        progress(stage, min(done, total), total)
+
+    settings: dict[str, Any] = {
+        "small": SMALL * ratings.rated_torque,
+        "rated": ratings.rated_torque,
+        "symmetric": symmetric,
+        "tick": tick,
+        "keep": keep,
+        "restored": tick,
+    }
+    try:
+        # two calls: states in the plane and in space differ
+        found: Pattern[Any]
+        if model == "3d":
+            solid = _in_space(design)
+            found = solve_pattern(solid, period, torques, effort, **settings)
+            surface = solid_surface(solid.ring)
+            shown = partial(solid_fields, solid.ring, surface=surface)
+        else:
+            plane = follower_in_plane(design)
+            found = solve_pattern(plane, period, torques, effort, **settings)
+            surface = plane_surface(plane.model)
+            shown = partial(plane_fields, plane.model, surface=surface)
+    except ComputationError as failure:
+        raise ComputationError(f"{drive.name}: {failure}") from failure
+    used = found.torque
+    if used[0] >= 0.0 or used[-1] <= 0.0 or used.size < 5:
+        raise ComputationError(
+            f"{drive.name}: too few torques can be solved; the smallest is "
+            f"{parts[0]:g} N·m of {parts[-1]:g} N·m repeated peak"
+        )
+    error, energy, compliance, input_torque = found.table
+    # a cup that the plane lacks, boss and housing springs
+    series = series_compliance(design, cup=model == "2d")
+    error = error - (used * series)[:, None]
+    energy = energy + (0.5 * used**2 * series)[:, None]
+    compliance = compliance + series
+    unseen = replace(
+        found.unseen,
+        output_error=found.unseen.output_error - found.unseen.torque * series,
+    )
+    # progress may have counted more solves than were needed
+    progress(stage, total, total)
+    tolerances = None
+    if has_errors(design):
+        tolerances = sample_tolerances(
+            design,
+            repeated_peak=float(used[-1]),
+            rated_torque=ratings.rated_torque,
+            model=model,
+            progress=progress,
+            keep=keep,
+        )
+        tolerances = tolerances.in_series(series)
+    # the pattern follows the gear angle that depends on the input alone, written so
+    # that its phase grows with theta
+    alpha, beta = angle_coefficients(drive.layout)
+    cycles = design.periodicity
+    return MapSamples(
+        name=drive.name,
+        level=model,
+        layout=drive.layout,
+        teeth_flexspline=drive.teeth_flexspline,
+        teeth_circular_spline=drive.teeth_circular_spline,
+        ratings=ratings,
+        damping_ratio=design.joint.damping_ratio,
+        order=(cycles, 0) if alpha == (1, 0) else (0, cycles * beta[0]),
+        input_angle=found.theta,
+        torque=used,
+        output_error=error,
+        energy=energy,
+        compliance=compliance,
+        input_torque=input_torque,
+        tolerances=tolerances,
+        free=found.free,
+        solved=found.solved,
+        unseen=unseen,
+        shortfall=found.shortfall,
+        fields=drive_fields(design, found.states, shown, surface, symmetric=symmetric),
+        info=found.info
+        | {
+            "design_hash": design.content_hash(),
+            "label": {
+                "model": model,
+                "level": "nonlinear",
+                "circular_spline": "elastic, outside "
+                + design.circular_spline.outer_rim,
+                "cup": "closed-form torsion in series"
+                if model == "2d" and design.cup is not None
+                else None,
+                "bearing": "balls at rest on the cam, their passage left out"
+                if model == "2d" and on_bearing(design)
+                else None,
+                "stress_state": stress_state_label(design) if model == "2d" else None,
+                "springs_Nm_rad": springs_of(design),
+                "friction": "left out of the potential"
+                if design.friction.tooth_coefficient
+                else None,
+                "tolerances": _named(design),
+                "left_out": left_out(design, model, bearing=on_bearing(design)),
+            },
+            "ratings_source": ratings.source,
+            "truncated": found.truncated,
+            "solves": done,
+            "sampling_wall_s": time.perf_counter() - begin,
+        },
+    )
+
+
+def effort_of(
+    model: str, angles: int | None, *, both_signs: bool, errors: bool
+) -> Effort:
+    """Equilibria that a map may take.
+
+    Args:
+        model: Fidelity.
+        angles: Input positions over one pitch; as many as the drive asks for if None.
+        both_signs: Whether negative torques are sampled, too.
+        errors: Whether errors of the teeth are superposed.
+    """
+    solid = model == "3d"
+    unseen = SOLID_UNSEEN if solid else UNSEEN
+    if angles is not None:
+        # a quick map is judged by as many torques at fewer angles
+        unseen = unseen[0], min(unseen[1], max(2, angles // 4))
+        solves = angles * FIXED_SOLVES + unseen[0] * unseen[1]
+        most = angles
+    else:
+        solves = SOLID_SOLVES if solid else SOLVES
+        angles = SOLID_ANGLES if solid else ANGLES
+        most = angles
+        while 2 * most <= (SOLID_MOST_ANGLES if solid else MOST_ANGLES):
+            most *= 2
+    return Effort(
+        angles=angles,
+        most_angles=most,
+        solves=solves * (2 if both_signs else 1),
+        unseen=unseen,
+        torques=TOLERANCED_TORQUES if errors else TORQUES,
+        # in space a torque costs as much as the map gains from it elsewhere, and with
+        # errors of the teeth a map is continued beyond its samples anyway
+        beyond=not solid and not errors,
+    )
+
+
+def follower_in_plane(design: Design) -> Continuation:
+    """The drive in the plane as maps sample it, its teeth perfect."""
+    perfect, bearing = without_errors(design), on_bearing(design)
+    return Continuation(
+        model=ring_model(
+            perfect,
+            half=can_halve(perfect, bearing=bearing),
+            friction=False,
+            bearing=bearing,
+            cage_held=True,
+        ),
+        ratio=design.ratio,
+        layout=design.drive.layout,
+        solver=SOLVER,
+    )
+
+
+def _in_space(design: Design) -> SolidContinuation:
+    perfect = without_errors(design)
+    return SolidContinuation(
+        ring=solid_ring(perfect, half=can_halve(perfect, bearing=False)),
+        ratio=design.ratio,
+        layout=design.drive.layout,
+    )
+
+
+def on_bearing(design: Design) -> bool:
+    """Whether a map of the plane carries the bearing of the wave generator.
+
+    Errors are superposed on a rigid wave generator: a map with them is of that drive.
+    """
+    return carries_bearing(design) and not has_errors(design)
+
+
+def _named(design: Design) -> dict[str, float] | None:
+    """Errors of the drive, for the validity label."""
+    values = design.tolerances.model_dump()
+    return {k: v for k, v in values.items() if v} if has_errors(design) else None

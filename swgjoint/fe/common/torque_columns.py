@@ -1,0 +1,607 @@
+"""Equilibria of a drive in columns of one input angle each, over the torque."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Generic
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.errors import ComputationError
+from swgjoint.fe.common.clearance import across_clearance
+from swgjoint.fe.common.contact_changes import ContactChanges
+from swgjoint.fe.common.following import AnyState, Follower, Unloaded
+from swgjoint.fe.common.load_path import LoadPath
+from swgjoint.fe.common.torque_choice import common_torques, periodic, unseen_parts
+from swgjoint.fe.plane.state_arrays import packed, settled, unpacked
+from swgjoint.maps.samples import FullSolves
+from swgjoint.maps.unfinished import Unfinished
+
+Array = NDArray[np.float64]
+
+POTENTIAL_WAVES = 1.0
+"""Waves in a pitch of the estimated error of the complementary potential, whose
+derivative by the angle is one of the input torque."""
+LEAST_PEAK = 0.05
+"""Peak to peak that counts at least, in the largest one over the torques."""
+WORST = 0.5
+"""Part of the largest estimated error from which intervals are divided next."""
+REACH = 1.1
+"""Torque beyond the largest one at which the stiffest angle is turned as far as the
+softest one at the largest torque, in parts of the linear estimate."""
+BEYOND = (0.02, 0.15)
+"""Least and most of that torque, in parts of the largest one."""
+AHEAD = 0.4
+"""Reach of a prediction of contact changes, in parts of the largest torque: above the
+distance of any two common torques."""
+_SOLVES, _REST, _TORQUES = "solves-{:04d}", "rest", "torques"
+STATE = "state"
+"""Name of a state in the arrays of an interrupted run."""
+
+
+@dataclass(kw_only=True, eq=False)
+class AngleColumn(Generic[AnyState]):
+    """Equilibria at one angle."""
+
+    theta: float
+    rest: Unloaded[AnyState]
+    states: dict[float, AnyState] = field(default_factory=dict)
+    """By torque, that without torque excluded."""
+    failed: set[float] = field(default_factory=set)
+    """Torques that were tried in vain."""
+    changes: dict[tuple[float, float], ContactChanges | None] = field(
+        default_factory=dict
+    )
+    """Changes of contact that an equilibrium predicts, by its torque and the sign."""
+    paths: dict[float, tuple[LoadPath, tuple[Array, Array]]] = field(
+        default_factory=dict
+    )
+    """The last curve of each sign, see :meth:`ColumnGrid.path`."""
+
+    def towards(self, torque: float) -> AnyState:
+        """Where a torque of this sign begins."""
+        if self.rest.sides is None:
+            return self.rest.state
+        return self.rest.sides[0 if torque > 0.0 else 1]
+
+    def nearest(self, torque: float) -> AnyState:
+        """The equilibrium of the same sign at the nearest torque."""
+        near = {t: s for t, s in self.states.items() if t * torque > 0.0}
+        near[0.0] = self.towards(torque)
+        return near[min(near, key=lambda t: abs(t - torque))]
+
+
+@dataclass(kw_only=True, eq=False)
+class ColumnGrid(Generic[AnyState]):
+    """Columns of equilibria, added to until they suffice.
+
+    Angles are numbers on the finest grid of the pitch. All solves come in an order that
+    the results alone decide: an interrupted run repeats it and reads what it has.
+    """
+
+    follow: Follower[AnyState]
+    period: float
+    finest: int
+    levels: list[float]
+    """Torques of every column; those that fail, and those beyond, are taken out."""
+    small: float
+    tick: Callable[[], None]
+    keep: Unfinished | None
+    restored: Callable[[int], None]
+    columns: dict[float, AngleColumn[AnyState]] = field(default_factory=dict)
+    failed: list[float] = field(default_factory=list)
+    """Torques between the levels that were tried in vain."""
+    beyond: list[float] = field(default_factory=list)
+    """Torques of every column beyond the levels, at most one of each sign."""
+    solves: int = 0
+    parts: int = 0
+    """Kept so far."""
+
+    @property
+    def free(self) -> bool:
+        """Whether clearance leaves the output free without torque somewhere."""
+        return any(one.rest.sides is not None for one in self.columns.values())
+
+    @property
+    def signs(self) -> list[float]:
+        """Of the torques."""
+        return [s for s in (1.0, -1.0) if any(t * s > 0.0 for t in self.levels)]
+
+    def angles(self, count: int) -> Array:
+        """Input positions of so many columns (count,) [rad]."""
+        return self.period * np.arange(count) / count
+
+    def chosen(self, count: int) -> Iterator[tuple[int, AngleColumn[AnyState]]]:
+        """So many columns, equally spaced, with their numbers."""
+        for k in range(count):
+            yield k, self.columns[k * (self.finest // count)]
+
+    def states(
+        self, count: int, torques: Iterable[float]
+    ) -> dict[float, list[AnyState]]:
+        """Without torque, and at those of some torques that all columns have."""
+        columns = [column for _, column in self.chosen(count)]
+        found = {0.0: [one.rest.state for one in columns]}
+        levels = [t for t in torques if t in self.levels]
+        return found | {t: [one.states[t] for one in columns] for t in levels}
+
+    # -- solving -----------------------------------------------------------------------
+
+    def solve_columns(self, count: int) -> None:
+        """Make sure of so many columns, equally spaced."""
+        step = self.finest // count
+        for place in range(0, self.finest, step):
+            if place not in self.columns:
+                self.columns[place] = self._column(place)
+
+    def unseen_column(self, place: float) -> AngleColumn[AnyState]:
+        """A column between those of the samples; it is none of them."""
+        return self._column(place)
+
+    def _column(self, place: float) -> AngleColumn[AnyState]:
+        """Rest and the common torques, from the column before, if there is one."""
+        theta = self.period * place / self.finest
+        before = max((p for p in self.columns if p < place), default=None)
+        column = self._read(theta, self.levels)
+        if column is None:
+            if before is None:
+                column = self._first()
+            else:
+                column = self._beside(self.columns[before], theta)
+            self._write(column, list(column.states), rest=True)
+        lost = [t for t in self.levels if t not in column.states]
+        for sign in (1.0, -1.0):
+            first = min((abs(t) for t in lost if t * sign > 0.0), default=np.inf)
+            self.levels = [t for t in self.levels if t * sign < 0.0 or abs(t) < first]
+        return column
+
+    def _first(self) -> AngleColumn[AnyState]:
+        """Load the first position from zero torque outwards until a solve fails."""
+        state = self.follow.meshed(self.follow.deflected())
+        if not state.outcome.ok:
+            raise _no_rest(0.0, state)
+        column = self._rest(self.follow.unloaded(state, self.small), 0.0)
+        for sign in (1.0, -1.0):
+            state = column.towards(sign)
+            for torque in sorted((t for t in self.levels if t * sign > 0.0), key=abs):
+                state = self.follow.to_torque(state, torque)
+                if not state.outcome.ok:
+                    break
+                state = settled(state)
+                column.states[torque] = state
+                self._count()
+        return column
+
+    def _beside(
+        self, before: AngleColumn[AnyState], theta: float
+    ) -> AngleColumn[AnyState]:
+        """The same torques a step on; none beyond one that fails."""
+        column = self._rest(self.follow.unloaded_to(before.rest, theta), theta)
+        lost = set()
+        for torque in sorted(self.levels, key=abs):
+            if (torque > 0.0) not in lost:
+                state = self.follow.to_angle(before.states[torque], theta)
+                if not state.outcome.ok:
+                    state = self.follow.to_torque(column.nearest(torque), torque)
+                if state.outcome.ok:
+                    column.states[torque] = settled(state)
+                    self._count()
+                    continue
+            lost.add(torque > 0.0)
+        return column
+
+    def _rest(
+        self, unloaded: Unloaded[AnyState], theta: float
+    ) -> AngleColumn[AnyState]:
+        if not unloaded.state.outcome.ok:
+            raise _no_rest(theta, unloaded.state)
+        self._count()
+        return AngleColumn(theta=theta, rest=settled(unloaded))
+
+    def _more(
+        self,
+        column: AngleColumn[AnyState],
+        torques: list[float],
+        beside: Sequence[AngleColumn[AnyState]] = (),
+    ) -> None:
+        """Solve other torques of a column, each from the nearest equilibrium.
+
+        That is one at the same torque in a column beside, from which it takes half the
+        iterations, or else one at the same angle.
+        """
+        if self._read(column.theta, torques, column) is None:
+            found = []
+            for torque in sorted(torques, key=lambda t: (t < 0.0, abs(t))):
+                there = [one.states[torque] for one in beside if torque in one.states]
+                if there:
+                    state = self.follow.to_angle(there[0], column.theta)
+                else:
+                    state = self.follow.to_torque(column.nearest(torque), torque)
+                if state.outcome.ok:
+                    column.states[torque] = settled(state)
+                    found.append(torque)
+                self._count()
+            self._write(column, found, rest=False)
+        column.failed |= {t for t in torques if t not in column.states}
+
+    def _count(self) -> None:
+        self.solves += 1
+        self.tick()
+
+    # -- interruptions -----------------------------------------------------------------
+
+    def _write(
+        self, column: AngleColumn[AnyState], torques: list[float], *, rest: bool
+    ) -> None:
+        if self.keep is not None:
+            arrays = packed(column.rest, _REST) if rest else {}
+            arrays |= {_TORQUES: np.array(torques), "theta": np.array(column.theta)}
+            for j, t in enumerate(torques):
+                arrays |= packed(column.states[t], f"{STATE}-{j}")
+            self.keep.write(_SOLVES.format(self.parts), arrays)
+        self.parts += 1
+
+    def _read(
+        self,
+        theta: float,
+        torques: list[float],
+        column: AngleColumn[AnyState] | None = None,
+    ) -> AngleColumn[AnyState] | None:
+        """The next part of an interrupted run, added to a column if one is given."""
+        if self.keep is None:
+            return None
+        there = self.keep.read(
+            _SOLVES.format(self.parts),
+            lambda arrays: self._taken(arrays, theta, torques, column),
+        )
+        if there is None:
+            return None
+        found, solves = there
+        self.parts += 1
+        self.solves += solves
+        self.restored(solves)
+        return found
+
+    def _taken(
+        self,
+        arrays: Mapping[str, Any],
+        theta: float,
+        torques: list[float],
+        column: AngleColumn[AnyState] | None,
+    ) -> tuple[AngleColumn[AnyState], int]:
+        """A column from the arrays of a part, and the number of its solves.
+
+        Raises:
+            ValueError: If it does not follow the parts before.
+        """
+        if float(arrays["theta"]) != theta:
+            raise ValueError("a position at another angle")
+        solved: list[float] = np.asarray(arrays[_TORQUES]).tolist()
+        if not {*solved} <= {*torques}:
+            raise ValueError(f"other torques: {solved}")
+        found: dict[float, Any] = {
+            t: unpacked(arrays, f"{STATE}-{j}") for j, t in enumerate(solved)
+        }
+        if column is not None:
+            for state in found.values():
+                check_like(state, column.rest.state)
+            column.states |= found
+            return column, len(torques)
+        rest: Any = unpacked(arrays, _REST)
+        if not isinstance(rest, Unloaded):
+            raise ValueError("no position without torque")
+        like = self.columns[0].rest.state if self.columns else rest.state
+        for state in (rest.state, *(rest.sides or ()), *found.values()):
+            check_like(state, like)
+        return AngleColumn(theta=theta, rest=rest, states=found), 1 + len(found)
+
+    # -- figures -----------------------------------------------------------------------
+
+    def figures(self, state: AnyState, theta: float) -> Array:
+        """Output error, energy, compliance, input torque (4,)."""
+        follow = self.follow
+        error = follow.output_angle(state) - theta / follow.ratio
+        return np.array(
+            [error, state.energy, state.compliance, follow.input_torque(state)]
+        )
+
+    def path(
+        self, column: AngleColumn[AnyState], sign: float
+    ) -> tuple[LoadPath, tuple[Array, Array]]:
+        """The curve of one sign, and torque and input torque that were solved.
+
+        Of negative torques it is the curve of the mirrored drive.
+        """
+        common = [*self.levels, *self.beyond]
+        outward: list[float] = sorted(
+            (t for t in common if t * sign > 0.0 and t in column.states), key=abs
+        )
+        # a free output has no curve before its clearance is taken up
+        first = 0.0 if column.rest.sides is None else sign * self.small
+        torque = sign * np.array([first, *outward])
+        known = column.paths.get(sign)
+        if known is not None and np.array_equal(known[0].torque, torque):
+            return known
+        states: list[AnyState] = [column.towards(sign)]
+        states += [column.states[t] for t in outward]
+        top = abs(outward[-1])
+        figures = np.array([self.figures(s, column.theta) for s in states])
+        error, energy, compliance, moment = figures.T
+        curve = LoadPath(
+            torque=torque,
+            output_error=sign * error,
+            energy=energy,
+            compliance=compliance,
+            changes=tuple(self._changes(column, state, sign, top) for state in states),
+        )
+        column.paths[sign] = curve, (torque, sign * moment)
+        return column.paths[sign]
+
+    def _changes(
+        self, column: AngleColumn[AnyState], state: AnyState, sign: float, top: float
+    ) -> ContactChanges | None:
+        """Changes of contact that a state of a column predicts, see :meth:`path`."""
+        key = (state.torque, sign)
+        if key not in column.changes:
+            low, high = state.torque - AHEAD * top, state.torque + AHEAD * top
+            found = self.follow.predicted_changes(state, low, high)
+            if found is not None and sign < 0.0:
+                found = found.mirrored()
+            column.changes[key] = found
+        return column.changes[key]
+
+    def missed(
+        self, count: int, others: list[AngleColumn[AnyState]], torques: Iterable[float]
+    ) -> float:
+        """Largest part of the peak to peak that other angles are off by.
+
+        Output error, and input torque as the derivative of the complementary potential
+        by the angle.
+        """
+        worst, columns = 0.0, [column for _, column in self.chosen(count)]
+        parts = np.array([one.theta for one in others]) / self.period
+        for torque in torques:
+            if torque == 0.0 and self.free:
+                continue
+            if torque and any(torque not in one.states for one in others):
+                continue
+            error, energy = self._curves_at(columns, torque)
+            there, _, _, moment = self._row(others, torque)
+            predicted, _ = periodic(error, parts)
+            _, slope = periodic(
+                energy + torque * error, np.concatenate([parts, self._parts(count)])
+            )
+            moments = slope / self.period + torque / self.follow.ratio
+            predicted_moment, own_moment = np.split(moments, [len(parts)])
+            for own, truth, found in (
+                (error, there, predicted),
+                (own_moment, moment, predicted_moment),
+            ):
+                height = np.ptp(np.concatenate([own, truth]))
+                worst = max(worst, float(np.abs(found - truth).max() / height))
+        return worst
+
+    def _curves_at(
+        self, columns: list[AngleColumn[AnyState]], torque: float
+    ) -> tuple[Array, Array]:
+        """Output error and energy of some columns at any torque, by their curves."""
+        if torque == 0.0:
+            error, energy, _, _ = self._row(columns, 0.0)
+            return error, energy
+        sign = math.copysign(1.0, torque)
+        table = [self.path(one, sign)[0].at([abs(torque)]) for one in columns]
+        error, energy, _ = np.array(table)[:, :, 0].T
+        return sign * error, energy
+
+    @staticmethod
+    def _parts(count: int) -> Array:
+        return np.arange(count) / count
+
+    def _row(self, columns: list[AngleColumn[AnyState]], torque: float) -> Array:
+        """Figures of some columns at a torque that all of them have (4, n)."""
+        return np.array(
+            [
+                self.figures(c.states[torque] if torque else c.rest.state, c.theta)
+                for c in columns
+            ]
+        ).T
+
+    def peaks(self, count: int, sign: float) -> tuple[Array, Array, Array]:
+        """Torques, peak to peak over the angle of e and of the input torque there.
+
+        Positive torques also where ``sign`` is negative.
+        """
+        curves = [self.path(column, sign)[0] for _, column in self.chosen(count)]
+        first = max(curve.torque[0] for curve in curves)
+        top = max(abs(t) for t in self.levels if t * sign > 0.0)
+        torque = np.linspace(first, top, 49)
+        tables = np.array([curve.at(torque) for curve in curves])
+        errors = tables[:, 0]
+        potential = tables[:, 1] + torque * errors
+        _, slope = periodic(potential, self._parts(count))
+        moments = slope / self.period
+        heights = []
+        for table in (errors, moments):
+            height = np.ptp(table, axis=0)
+            height = np.maximum(height, LEAST_PEAK * height.max())
+            # two angles alone have no slope to be off from
+            heights.append(np.where(height > 0.0, height, np.inf))
+        return torque, heights[0], heights[1]
+
+    def cost(self, count: int) -> int:
+        """Solves of so many columns at the common torques."""
+        return count * (1 + len(self.levels))
+
+    def divide(self, count: int, most: int, goal: float) -> float:
+        """Add common torques until the estimated errors between them meet a goal.
+
+        All angles get the same torques: what the curves between them miss then changes
+        slowly from angle to angle, which leaves the input torque, a derivative by the
+        angle, alone.
+
+        Args:
+            count: Of the columns.
+            most: Solves in all.
+            goal: Largest estimated error, in the peak to peak.
+
+        Returns:
+            The largest estimate that is left, in the peak to peak.
+        """
+        while True:
+            wanted = self._doubts(count)
+            worst = max((part for part, _ in wanted), default=0.0)
+            limit = max(goal, WORST * worst)
+            chosen = sorted((w for w in wanted if w[0] > limit), reverse=True)
+            chosen = chosen[: max(0, (most - self.solves) // count)]
+            if not chosen:
+                return worst
+            for _, torque in chosen:
+                self._add_torque(count, torque)
+
+    def _doubts(self, count: int) -> list[tuple[float, float]]:
+        """Estimate the error of every interval between common torques.
+
+        Returns:
+            Estimated error, in the peak to peak, and where to divide it [N·m].
+        """
+        wanted: list[tuple[float, float]] = []
+        for sign in self.signs:
+            at, error, moment = self.peaks(count, sign)
+            parts, places = [], []
+            for _, column in self.chosen(count):
+                curve, _ = self.path(column, sign)
+                of_error, of_potential = curve.doubt
+                there = curve.division
+                parts.append(
+                    np.maximum(
+                        of_error / np.interp(there, at, error),
+                        POTENTIAL_WAVES
+                        * (2.0 * np.pi / self.period)
+                        * of_potential
+                        / np.interp(there, at, moment),
+                    )
+                )
+                places.append(there)
+            weights = np.array(parts) + 1e-12
+            torques = np.average(places, axis=0, weights=weights)
+            ends = curve.torque
+            tried = sign * np.array([t for t in self.failed if t * sign > 0.0])
+            for j, torque in enumerate(torques):
+                if not ((tried > ends[j]) & (tried < ends[j + 1])).any():
+                    part = float(weights[:, j].max())
+                    wanted.append((part, sign * float(torque)))
+        return wanted
+
+    def _add_torque(self, count: int, torque: float) -> None:
+        """Solve one more torque in every column, unless it fails in one."""
+        columns = [column for _, column in self.chosen(count)]
+        for k, column in enumerate(columns):
+            # no turn of the input by a whole pitch
+            self._more(column, [torque], columns[max(0, k - 1) : k])
+            if torque in column.failed:
+                self.failed.append(torque)
+                return
+        self.levels = sorted([*self.levels, torque])
+
+    def go_beyond(self, count: int) -> None:
+        """Solve one torque of each sign beyond the largest one in every column.
+
+        A map ends at the torsion that the stiffest angle reaches. With this torque that
+        is as far as the softest angle turns under the largest torque, so that no angle
+        leaves the map below it. Where one of the solves fails, the map ends at the
+        largest torque as before.
+        """
+        columns = [column for _, column in self.chosen(count)]
+        for sign in self.signs:
+            top = max((t for t in self.levels if t * sign > 0.0), key=abs)
+            rest = self._row(columns, 0.0)[0]
+            error, _, compliance, _ = self._row(columns, top)
+            apart = REACH * float(np.ptp(rest - error) / compliance.mean())
+            low, high = (abs(top) * part for part in BEYOND)
+            torque = top + sign * min(max(apart, low), high)
+            for k, column in enumerate(columns):
+                self._more(column, [torque], columns[max(0, k - 1) : k])
+                if torque in column.failed:
+                    break
+            else:
+                self.beyond.append(torque)
+
+    def unseen(self, others: list[AngleColumn[AnyState]], count: int) -> FullSolves:
+        """Equilibria at other angles, without torque and at so many other torques.
+
+        Args:
+            others: Columns at these angles.
+            count: Torques of one sign.
+        """
+        rows = []
+        for column in others:
+            theta = column.theta
+            error, _, _, moment = self.figures(column.rest.state, theta)
+            rows.append((theta, 0.0, error, moment))
+            torques = []
+            for sign in self.signs:
+                top = max(abs(t) for t in self.levels if t * sign > 0.0)
+                torques += [sign * top * part for part in unseen_parts(count)]
+            self._more(column, torques)
+            for torque in torques:
+                if torque in column.states:
+                    error, _, _, moment = self.figures(column.states[torque], theta)
+                    rows.append((theta, torque, error, moment))
+        angle, torque, errors, moments = np.array(rows).T
+        return FullSolves(
+            input_angle=angle,
+            torque=torque,
+            output_error=errors,
+            input_torque=moments,
+        )
+
+    def tables(self, count: int, most: int) -> tuple[dict[float, Array], set[float]]:
+        """Figures (4, count) by torque, and the torques that all columns solved.
+
+        At most so many torques of one sign, next to those that all columns solved.
+
+        Clearance adds rows, see :func:`across_clearance`.
+        """
+        columns = [column for _, column in self.chosen(count)]
+        rest = np.array([self.figures(c.rest.state, c.theta) for c in columns]).T
+        found = {0.0: rest}
+        for sign in self.signs:
+            paths = [self.path(column, sign) for column in columns]
+            own = {abs(t) for t in [*self.levels, *self.beyond] if t * sign > 0.0}
+            least = self.small if self.free else 0.0
+            torque = common_torques([curve for curve, _ in paths], own, least, most)
+            if self.free:
+                torque = np.concatenate([[least], torque])
+            values = np.array(
+                [
+                    np.vstack([curve.at(torque), np.interp(torque, *solved)])
+                    for curve, solved in paths
+                ]
+            )  # (count, 4, n)
+            values *= np.array([sign, 1.0, 1.0, sign])[:, None]
+            found |= {sign * float(t): values[:, :, j].T for j, t in enumerate(torque)}
+            if self.free:
+                taken_up = found[sign * self.small]
+                begin, onset = across_clearance(rest, taken_up, sign * self.small)
+                found[begin] = onset
+                # the same stiffness on both sides of the middle
+                rest[2] = onset[2]
+        return found, {0.0, *self.levels, *self.beyond}
+
+
+def check_like(state: Any, like: Any) -> None:
+    """Refuse a state that is not an equilibrium of the same model."""
+    if type(state) is not type(like) or state.faces.shape != like.faces.shape:
+        raise ValueError("a state of another model")
+    if not np.isfinite(state.faces).all():
+        raise ValueError("positions that are not finite")
+
+
+def _no_rest(theta: float, state: AnyState) -> ComputationError:
+    return ComputationError(
+        f"no equilibrium without torque at input angle {theta:g} rad:"
+        f" {state.outcome.value}"
+    )

@@ -1,0 +1,1 @@
+"""The 2D model of a drive: plane sectors, contact, equilibrium, stresses."""

@@ -1,0 +1,291 @@
+r"""The circular spline: rigid, or elastic with its outer diameter fixed or free.
+
+It strains little, so it is linear: the displacement of the flanks of tooth k under
+forces on the flanks of tooth j is a block :math:`G_{k-j}` of a block-circulant
+compliance, in the frames of the teeth. Where the outer diameter is fixed the blocks
+decay within a few teeth; a free one lets the ring become oval.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from swgjoint.fe.common.block_circulant import between, respond
+from swgjoint.fe.common.cyclic import CyclicFactor
+from swgjoint.fe.plane.corotation import rotate, turned
+from swgjoint.fe.plane.superelement import Superelement
+from swgjoint.gear.teeth.profile import ToothProfile
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+NEGLIGIBLE = 1e-9
+"""Blocks below this part of the largest one are left out."""
+CORNER = 0.05
+"""Part of the flank within which a corner is a candidate for contact."""
+BEYOND = 1e-9
+"""Part of the flank by which a foot must miss its end to be a corner."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Compliance:
+    """Response of the teeth to flank forces, by the offset k - j of the teeth."""
+
+    element: Superelement
+    offsets: Index
+    flank: Array
+    """G [m/N]. Shape (n_offsets, 2 n_b, 2 n_b)."""
+    skeleton: Array
+    """Displacement of the skeleton [m/N]. Shape (n_offsets, 2 n_a, 2 n_b)."""
+
+    def displacement(self, force: Array) -> Array:
+        """Flank displacement (N, 2 n_b) [m] under flank forces (N, 2 n_b) [N]."""
+        return respond(self.offsets, self.flank, force)
+
+    def skeleton_displacement(self, force: Array) -> Array:
+        """Skeleton displacement in the frames of the teeth (N, 2 n_a) [m]."""
+        return respond(self.offsets, self.skeleton, force)
+
+    def between(self, tooth: Index, weight: Array, teeth: int) -> Array:
+        """Compliance between contact points (n, n) [m/N].
+
+        Args:
+            tooth: Tooth of each point (n,).
+            weight: Derivative of its gap by the flank displacement (n, 2 n_b).
+            teeth: Teeth in the model.
+        """
+        return between(self.offsets, self.flank, tooth, weight, teeth)
+
+
+def ring_compliance(element: Superelement, *, free_rim: bool = False) -> Compliance:
+    """Compliance of a circular spline under forces on its flanks.
+
+    Args:
+        element: Condensed sector of the circular spline.
+        free_rim: Whether the outer diameter can deform: held in the mean over its
+            nodes, which carry the load away in equal shares; else it is fixed.
+    """
+    n_teeth, size = element.sectors, element.face_size
+    n_a = len(element.skeleton)
+    pitch = 2.0 * np.pi / n_teeth
+    # degrees of freedom of the last face are those of the next tooth's first face, in
+    # the next tooth's frame
+    turn = np.eye(2 * n_a)
+    corner = rotate(np.eye(2), np.array(pitch)).T
+    for node in range(n_a - size, n_a):
+        turn[2 * node : 2 * node + 2, 2 * node : 2 * node + 2] = corner
+    matrix = turn.T @ element.stiffness @ turn
+    load = turn.T @ element.flank_from_skeleton.T
+    rhs = np.zeros((n_teeth, *load.shape))
+    outside = np.r_[size - 1 : n_a - size, n_a - 1]  # outer diameter and its corners
+    scale = float(np.mean(np.diag(element.stiffness)))
+    blocks = np.broadcast_to(matrix, (n_teeth, *matrix.shape))
+    if free_rim:
+        own = outside[:-1]  # the last corner is the next tooth's first
+        rigid = _rigid_modes(element.skeleton, n_teeth)
+        held = rigid[:, own].reshape(n_teeth, -1, 3)
+        weight = np.einsum("tia,tib->ab", held, held)
+        # the rigid motion that the forces on the flanks do work on, shared out
+        resultant = (element.flank_from_skeleton @ rigid[0].reshape(-1, 3)).T
+        share = -held @ np.linalg.solve(weight, resultant)
+        dofs = (2 * own[:, None] + np.arange(2)).ravel()
+        rhs[:, dofs] = share
+        rhs[0] += load
+        # three springs that carry nothing keep the ring in place
+        blocks, first = blocks.copy(), 2 * own[0]
+        for tooth, dof in ((0, first), (0, first + 1), (n_teeth // 2, first)):
+            blocks[tooth, dof, dof] += scale
+    else:
+        fixed = (2 * outside[:, None] + np.arange(2)).ravel()
+        matrix[fixed] = 0.0
+        matrix[:, fixed] = 0.0
+        matrix[fixed, fixed] = scale
+        load[fixed] = 0.0
+        rhs[0] = load
+        blocks = np.broadcast_to(matrix, blocks.shape)
+    skeleton = turn @ CyclicFactor(blocks, 2 * size).solve(rhs)
+    if free_rim:
+        moved = np.einsum("tia,til->al", held, skeleton[:, dofs])
+        drift = np.linalg.solve(weight, moved)
+        skeleton -= rigid.reshape(n_teeth, -1, 3) @ drift
+    flank = element.flank_from_skeleton @ skeleton
+    flank[0] += element.flank_compliance
+    strength = np.abs(flank).max(axis=(1, 2))
+    kept = np.flatnonzero(strength > NEGLIGIBLE * strength.max())
+    offsets = np.where(kept > n_teeth // 2, kept - n_teeth, kept)
+    return Compliance(
+        element=element, offsets=offsets, flank=flank[kept], skeleton=skeleton[kept]
+    )
+
+
+def _rigid_modes(skeleton: Array, teeth: int) -> Array:
+    """Two translations and the rotation, in the frames of the teeth (N, n_a, 2, 3)."""
+    angle = np.asarray(2.0 * np.pi / teeth * np.arange(teeth), dtype=np.float64)
+    shape = (teeth, *skeleton.shape)
+    shifts = [
+        np.broadcast_to(rotate(axis, -angle)[:, None], shape) for axis in np.eye(2)
+    ]
+    return np.stack([*shifts, np.broadcast_to(turned(skeleton), shape)], axis=-1)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CircularSpline:
+    """Surface of the circular spline as the flexspline's teeth see it."""
+
+    profile: ToothProfile
+    compliance: Compliance | None = None
+    """None for a rigid circular spline, and for a plane of one in space."""
+    weights: CubicSpline | None = None
+    """Weights of the flank nodes in such a plane."""
+
+    @property
+    def flank_dofs(self) -> int:
+        """Degrees of freedom of the flanks of one tooth, 0 if rigid."""
+        if self.compliance is None and self.weights is None:
+            return 0
+        return 4 * int(self.spline.c.shape[-1])
+
+    @property
+    def spline(self) -> CubicSpline:
+        """Weights of the flank nodes at an arc length (elastic only)."""
+        if self.weights is not None:
+            return self.weights
+        assert self.compliance is not None
+        return self.compliance.element.spline
+
+    def feet(
+        self,
+        points: Array,
+        flanks: FlankSplines | None,
+        index: Index,
+        *,
+        facing: Array | None = None,
+        start: Array | None = None,
+        steps: int = 3,
+    ) -> Feet:
+        """Closest points of a right flank, exact for the deformed curve.
+
+        A point whose foot would lie beyond an end of the flank faces the corner there:
+        its gap is the distance of the corner along the normal of the surface on which
+        the point lies. Without that normal, and for a rigid flank, it has none (inf).
+
+        Args:
+            points: In the frame of a ring tooth, mirrored to its right flank (n, 2).
+            facing: Normals of the flexspline at the points, in that frame (n, 2).
+            flanks: Displacements of flanks in that frame; None for rigid ones.
+            index: Which of the flanks each point faces (n,).
+            start: Stations near the feet (n,); those of the rigid flank if None [m].
+            steps: Newton steps to the foot; each one leaves the share gap times
+                curvature of the error, and the gap is wrong by its square.
+        """
+        outside = np.zeros(len(points), dtype=bool)
+        if flanks is None or start is None:
+            gap, normal, curvature = self.profile.signed_distance(points)
+            if flanks is None:
+                return Feet(
+                    gap=gap,
+                    normal=normal,
+                    curvature=curvature,
+                    corner=outside,
+                    rest=np.zeros_like(points),
+                )
+            outside = ~np.isfinite(gap)
+            inside = np.where(outside, 0.0, gap)
+            start = self._station(points - inside[:, None] * normal)
+        low, high = float(flanks.breaks[0]), float(flanks.breaks[-1])
+        s, wanted = start, start
+        side = -1.0 if self.profile.internal else 1.0
+        for _ in range(steps):
+            base, outward, curvature = self.profile.evaluate(s)
+            moved, slope = flanks.at(index, s)
+            tangent = side * np.stack([outward[:, 1], -outward[:, 0]], axis=-1) + slope
+            rest = points - base - moved
+            size = np.hypot(tangent[:, 0], tangent[:, 1])
+            unit = tangent / size[:, None]
+            normal = side * np.stack([-unit[:, 1], unit[:, 0]], axis=-1)
+            gap = rest[:, 0] * normal[:, 0] + rest[:, 1] * normal[:, 1]
+            along = (rest[:, 0] * unit[:, 0] + rest[:, 1] * unit[:, 1]) / size
+            wanted = s + along / np.maximum(1.0 + curvature * gap, 0.1)
+            s = np.clip(wanted, low, high)
+        corner = np.abs(wanted - s) > BEYOND * (high - low)
+        rest = np.zeros_like(points)
+        gap = np.where(outside & ~corner, np.inf, gap)
+        if corner.any():
+            at = np.flatnonzero(corner)
+            end = self.profile.evaluate(s[at])[0] + flanks.at(index[at], s[at])[0]
+            rest[at] = points[at] - end
+            gap[at] = np.inf
+            if facing is not None:
+                normal = normal.copy()
+                normal[at] = -facing[at]
+                depth = np.einsum("ki,ki->k", rest[at], normal[at])
+                near = np.hypot(rest[at, 0], rest[at, 1]) < CORNER * (high - low)
+                gap[at] = np.where(near, depth, np.inf)
+        return Feet(
+            gap=gap,
+            normal=normal,
+            curvature=curvature,
+            corner=corner,
+            rest=rest,
+            station=s,
+        )
+
+    @cached_property
+    def _stations_by_radius(self) -> tuple[Array, Array]:
+        stations = self.spline.x
+        table = np.linspace(float(stations[0]), float(stations[-1]), 400)
+        points, _, _ = self.profile.evaluate(table)
+        radius = np.hypot(points[:, 0], points[:, 1])
+        order = np.argsort(radius)
+        return table[order], radius[order]
+
+    def _station(self, foot: Array) -> Array:
+        """Arc length of points on the rigid flank, from their distance to the axis."""
+        table, radius = self._stations_by_radius
+        return np.interp(np.hypot(foot[:, 0], foot[:, 1]), radius, table)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FlankSplines:
+    """Displacements of many flanks as cubic splines along the profile."""
+
+    breaks: Array
+    coefficients: Array
+    """Ascending powers of (s - break). Shape (n_flanks, n_intervals, 4, 2)."""
+
+    @classmethod
+    def through(cls, spline: CubicSpline, nodes: Array) -> FlankSplines:
+        """Splines through node displacements (n_flanks, n_nodes, 2)."""
+        cardinal = np.asarray(spline.c)[::-1]  # (4, n_intervals, n_nodes)
+        return cls(
+            breaks=np.asarray(spline.x),
+            coefficients=np.einsum("pjn,fni->fjpi", cardinal, nodes, optimize=True),
+        )
+
+    def at(self, flank: Index, s: Array) -> tuple[Array, Array]:
+        """Displacement and its derivative by s, (n, 2) each."""
+        j = np.searchsorted(self.breaks, s, side="right") - 1
+        j = np.clip(j, 0, len(self.breaks) - 2)
+        c, d = self.coefficients[flank, j], (s - self.breaks[j])[:, None]
+        value = c[:, 0] + d * (c[:, 1] + d * (c[:, 2] + d * c[:, 3]))
+        return value, c[:, 1] + d * (2.0 * c[:, 2] + d * 3.0 * c[:, 3])
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Feet:
+    """Feet of points on a flank of the circular spline."""
+
+    gap: Array
+    normal: Array
+    curvature: Array
+    corner: NDArray[np.bool_]
+    """Whether the foot is an end of the flank, not a point where it is normal."""
+    rest: Array
+    """From that end to the point, zero where there is none (n, 2) [m]."""
+    station: Array | None = None
+    """Arc length on the profile, of an elastic one [m]."""

@@ -1,0 +1,285 @@
+"""The drive in the plane linearised at an equilibrium, in its contacts alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.fe.common.cyclic import CyclicFactor
+from swgjoint.fe.common.indentation import Strips
+from swgjoint.fe.common.influence import Gaps, Influence, pivoted
+from swgjoint.fe.plane.corotation import turned
+from swgjoint.fe.plane.linearise import Linearised
+from swgjoint.fe.plane.ring import RingModel
+from swgjoint.fe.plane.state import State
+from swgjoint.fe.plane.tooth_contact import Contacts
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+
+REACH = 0.03
+"""Gap up to which a contact may close, in lobe heights."""
+ALIKE = 1e-5
+"""Distance of points of a flank below which they are one [m]: a tenth of the half
+length of a patch."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CondensedRing:
+    """A ring linearised at an equilibrium, solved for forces on its contacts."""
+
+    model: RingModel
+    state: State
+    ring: Linearised
+    ring_is_output: bool
+    contacts: Contacts
+    """Of teeth, n of them."""
+    carries: Mask
+    """Which of them carry force (n,)."""
+
+    @cached_property
+    def _factor(self) -> CyclicFactor:
+        return CyclicFactor(self.ring.anchored(), self.ring.face_dofs)
+
+    @cached_property
+    def _rows(self) -> Array:
+        """Derivatives of the gaps of the teeth (n, n_dofs)."""
+        return self.ring.gap_gradient(self.contacts)
+
+    @cached_property
+    def _loads(self) -> Array:
+        """Forces on teeth, anchor and rotation of the flexspline (N, n_dofs, n + 2)."""
+        ring, n = self.ring, len(self.contacts)
+        loads = np.zeros((*ring.gradient.shape, n + 2))
+        loads[self.contacts.sector, :, np.arange(n)] = self._rows
+        loads[:, :, n], loads[:, :, n + 1] = ring.anchor, ring.rotation_gradient
+        return loads
+
+    @cached_property
+    def _response(self) -> Array:
+        """To these loads and to the gradient (N, n_dofs, n + 3)."""
+        return self._solved(
+            np.concatenate([self._loads, -self.ring.gradient[:, :, None]], axis=2)
+        )
+
+    def _solved(self, right: Array) -> Array:
+        right[self.ring.fixed] = 0.0
+        return self._factor.solve(right)
+
+    def by_torque(self) -> Array:
+        """Displacements per torque on the output of the whole drive (N, n_dofs)."""
+        system, _ = self._teeth
+        n = len(self.contacts)
+        free = [n, n + 1, n + 2] if self.ring_is_output else [n]
+        inside = np.concatenate([np.flatnonzero(self.carries), free])
+        z, at = np.zeros(n + 3), np.ix_(inside, inside)
+        if self.ring_is_output:
+            right = (inside == n + 2) / self.model.copies
+        else:
+            z[n + 1] = -1.0 / self.model.copies
+            right = -system[inside, n + 1] * z[n + 1]
+        z[inside] = np.linalg.solve(system[at], right)
+        return np.asarray(self._response[:, :, :-1] @ z[: n + 2])
+
+    @cached_property
+    def _teeth(self) -> tuple[Array, Array]:
+        """Gaps of the teeth and three equations, linear in as many unknowns.
+
+        Behind the teeth come the anchor that keeps the rotation regular, the rotation
+        of the flexspline and that of the circular spline.
+
+        Returns:
+            Matrix (n + 3, n + 3) and offset (n + 3,).
+        """
+        model, state, ring = self.model, self.state, self.ring
+        contacts, element, n = self.contacts, model.element, len(self.contacts)
+        system, offset = np.zeros((n + 3, n + 3)), np.zeros(n + 3)
+        answers = self._answers(self._response)
+        system[: n + 2, : n + 2], offset[: n + 2] = answers[:, :-1], answers[:, -1]
+        local = contacts.weight @ element.flank_compliance
+        same = contacts.sector[:, None] == contacts.sector[None, :]
+        system[:n, :n] += np.where(same, local @ contacts.weight.T, 0.0)
+        compliance = model.circular_spline.compliance
+        if compliance is not None:
+            system[:n, :n] += compliance.between(
+                contacts.tooth, contacts.ring_weight, model.ring_teeth
+            )
+        system[n, n] -= 1.0 / ring.anchor_stiffness
+        # the circular spline turns towards the teeth with a lever arm
+        arm = np.einsum("ki,ki->k", turned(contacts.point), contacts.normal)
+        system[:n, n + 2] = system[n + 2, :n] = -arm
+        # gaps as if the tooth forces of the state were gone
+        old = np.einsum("kb,kb->k", local, state.flank_force[contacts.sector])
+        old += np.einsum(
+            "kb,kb->k", contacts.ring_weight, ring.ring_elastic[contacts.tooth]
+        )
+        offset[:n] += contacts.gap - old
+        if model.indentation is not None:
+            strips = Strips.of(
+                model.indentation, contacts, state.contacts, state.tooth_force
+            )
+            compliant, approach = strips.linearised()
+            system[:n, :n] += compliant
+            offset[:n] += approach
+        if self.ring_is_output:
+            offset[n + 2] = -state.torque / model.copies
+        return system, offset
+
+    def _answers(self, response: Array) -> Array:
+        """Gaps of teeth, anchor, rotation under displacements (n + 2, n_columns)."""
+        n = len(self.contacts)
+        return np.concatenate(
+            [
+                np.einsum("kn,knl->kl", self._rows, response[self.contacts.sector]),
+                np.einsum("snf,snl->fl", self._loads[:, :, n:], response),
+            ]
+        )
+
+    def _system(self, supports: Supports) -> tuple[Array, Array]:
+        """As :attr:`_teeth`, with k supports after the teeth (n + k + 3 unknowns)."""
+        n, sector = len(self.contacts), supports.intervals.sector
+        k = len(sector)
+        m = n + k
+        load = np.zeros((*self.ring.gradient.shape, k))
+        load[sector, :, np.arange(k)] = supports.loads
+        own = self._solved(load)
+        teeth = np.r_[0:n, m : m + 3]
+        system, offset = np.zeros((m + 3, m + 3)), np.zeros(m + 3)
+        system[np.ix_(teeth, teeth)], offset[teeth] = self._teeth
+        system[np.ix_(teeth[:-1], np.arange(n, m))] = self._answers(own)
+        answers = supports.answers(self._response)
+        system[n:m, teeth[:-1]], offset[n:m] = answers[:, :-1], answers[:, -1]
+        system[n:m, n:m] = supports.answers(own)
+        system[np.arange(n, m), np.arange(n, m)] += supports.own
+        offset[n:m] += supports.start
+        return system, offset
+
+    def influence(self, supports: Supports) -> Influence:
+        """Complementarity problem of teeth and of supports that may change sides."""
+        model, state, contacts = self.model, self.state, self.contacts
+        system, offset = self._system(supports)
+        n, m = len(contacts), len(contacts) + len(supports.intervals.sector)
+        return pivoted(
+            system,
+            offset,
+            Gaps(
+                sector=contacts.sector,
+                tooth=contacts.tooth,
+                direction=np.stack(
+                    [_by_shift(contacts.weight), _by_shift(contacts.ring_weight)]
+                ),
+                by_tilt=np.zeros((n, 2)),  # a plane has no axis
+                carries=self.carries,
+            ),
+            closed_supports=supports.closed,
+            free=[m, m + 1, m + 2] if self.ring_is_output else [m],
+            output=m + 2 if self.ring_is_output else m + 1,
+            sign=(1.0 if self.ring_is_output else -1.0) / model.copies,
+            angle=state.ring_rotation if self.ring_is_output else state.rotation,
+            torque=state.torque,
+        )
+
+
+def _by_shift(weight: Array) -> Array:
+    """Derivative by a common shift of all flank nodes (n, 2)."""
+    return np.asarray(weight.reshape(len(weight), -1, 2).sum(axis=1))
+
+
+def distinct(contacts: Contacts, state: State) -> tuple[Contacts, Mask]:
+    """Contacts that are not almost the same point, and which of them carry force.
+
+    Of two points of a flank closer than :data:`ALIKE` the one with the larger force
+    stays: two nearly dependent contacts would make the system ill-conditioned.
+    """
+    held = state.contacts
+    force = np.zeros(len(contacts))
+    if held is not None and len(held):
+        np.add.at(force, held.nearest_in(contacts), state.tooth_force)
+    key = 2 * contacts.sector + contacts.side
+    stays = np.ones(len(contacts), bool)
+    for k in np.argsort(-force, kind="stable"):
+        near = (key == key[k]) & stays
+        near &= np.abs(contacts.station - contacts.station[k]) < ALIKE
+        near[k] = False
+        if stays[k]:
+            stays &= ~near
+    index = np.flatnonzero(stays)
+    return contacts.chosen(index), force[index] > 0.0
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Intervals:
+    """Intervals of the bore between nodes, some of their stations; k of them."""
+
+    sector: Index
+    number: Index
+    """In its sector."""
+    share: Array
+    """Of the stations of the interval in a mean (k, p)."""
+
+    def mean(self, values: Array) -> Array:
+        """Means (k, ...) of values at the stations (N, q, ...)."""
+        p = self.share.shape[1]
+        shaped = values.reshape(len(values), -1, p, *values.shape[2:])
+        there = shaped[self.sector, self.number]
+        return np.asarray(np.einsum("kp,kp...->k...", self.share, there))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Supports:
+    """Intervals of the bore that touch the wave generator or may do so; k of them.
+
+    Stations of an interval share one force F and one mean gap g, K is their stiffness.
+    With the slack s = g + F/K of the layer below them F s = 0: an open support takes F
+    and answers with s, a closed one takes s and answers with F = K (s - g).
+    """
+
+    intervals: _Intervals
+    closed: Mask
+    rows: Array
+    """Derivative of g by the degrees of freedom of the sector (k, n)."""
+    stiffness: Array
+    """K (k,) [N/m]."""
+    start: Array
+    """F at the state where closed, elsewhere g (k,) [N], [m]."""
+
+    @classmethod
+    def of(cls, ring: Linearised, state: State, used: Mask) -> Supports:
+        """Supports of the intervals marked in ``used`` (N, intervals)."""
+        p = ring.stations.per_interval
+        touching = state.touching.reshape(len(used), -1, p)
+        sector, interval = np.nonzero(used)
+        touches = touching[sector, interval]
+        is_closed = np.asarray(touches.any(axis=1))
+        used_there = touches | ~is_closed[:, None]
+        k = used_there * ring.stations.stiffness.reshape(-1, p)[interval]
+        stiffness = k.sum(axis=1)
+        there = _Intervals(sector=sector, number=interval, share=k / stiffness[:, None])
+        rows = np.zeros((len(sector), ring.gradient.shape[1]))
+        rows[:, ring.gap_dofs] = there.mean(ring.gap_gradients())
+        return cls(
+            intervals=there,
+            closed=is_closed,
+            rows=rows,
+            stiffness=stiffness,
+            start=np.where(is_closed, -stiffness, 1.0) * there.mean(ring.gap),
+        )
+
+    @property
+    def loads(self) -> Array:
+        """Forces of what the supports take (k, n)."""
+        return np.where(self.closed, self.stiffness, 1.0)[:, None] * self.rows
+
+    @property
+    def own(self) -> Array:
+        """Answers of the layer itself to what the supports take (k,)."""
+        return np.where(self.closed, self.stiffness, 1.0 / self.stiffness)
+
+    def answers(self, response: Array) -> Array:
+        """Answers to displacements (N, n, n_columns), the layer's left out."""
+        moved = np.einsum("kn,knl->kl", self.rows, response[self.intervals.sector])
+        return np.asarray(np.where(self.closed, -self.stiffness, 1.0)[:, None] * moved)

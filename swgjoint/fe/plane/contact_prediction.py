@@ -1,0 +1,92 @@
+"""Changes of contact that an equilibrium of the drive in the plane predicts."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.fe.common.contact_changes import ContactChanges
+from swgjoint.fe.plane.condensed_ring import REACH, CondensedRing, Supports, distinct
+from swgjoint.fe.plane.linearise import linearise
+from swgjoint.fe.plane.ring import RingModel
+from swgjoint.fe.plane.state import State
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+MOST_SUPPORTS = 80
+"""Intervals of the bore of a prediction that may change sides."""
+FAR = 5.0
+"""Change of the torque within which they seem to do so at first, in the range of the
+prediction: other changes of contact come between."""
+
+
+def predicted_changes(
+    model: RingModel, state: State, *, ring_is_output: bool, low: float, high: float
+) -> ContactChanges | None:
+    """Changes of contact that the drive condensed at an equilibrium predicts.
+
+    Supports that seem to change sides far outside the range are left as they are.
+
+    Args:
+        model: Without friction.
+        state: The equilibrium.
+        ring_is_output: Whether the circular spline is the output.
+        low: Smallest torque of interest [N·m].
+        high: Largest one [N·m].
+
+    Returns:
+        None where no tooth carries force, or a single contact holds the output.
+    """
+    if state.contacts is None or not len(state.contacts):
+        return None
+    ring = linearise(model, state, None if ring_is_output else state.torque)
+    reach = REACH * model.lobe_height
+    found = ring.search.search(ring.flank, reach, state.contacts, thorough=False)
+    contacts, carries = distinct(found, state)
+    drive = CondensedRing(
+        model=model,
+        state=state,
+        ring=ring,
+        ring_is_output=ring_is_output,
+        contacts=contacts,
+        carries=carries,
+    )
+    apart = max(high - state.torque, state.torque - low)
+    supports = Supports.of(ring, state, _supports_within(drive, FAR * apart))
+    at = supports.intervals
+    numbers = np.concatenate(
+        [
+            2 * contacts.sector + contacts.side,
+            -1 - at.sector * ring.gap.shape[1] - at.number,
+        ]
+    )
+    try:
+        return drive.influence(supports).changes(low, high, numbers)
+    except np.linalg.LinAlgError:
+        # a contact without which nothing holds the flexspline
+        return None
+
+
+def _supports_within(drive: CondensedRing, torque: float) -> Mask:
+    """Intervals of the bore that change sides within a change of the torque.
+
+    As predicted without any other change of contact, at most :data:`MOST_SUPPORTS`
+    of them, the nearest ones.
+
+    Returns:
+        Shape (N, intervals).
+    """
+    ring, state = drive.ring, drive.state
+    p = ring.stations.per_interval
+    shape = (len(ring.gap), -1, p)
+    gap, touching = ring.gap.reshape(shape), state.touching.reshape(shape)
+    slope = (ring.gap_after(drive.by_torque()) - ring.gap).reshape(shape)
+    closed = touching.any(axis=2)
+    k = np.where(touching, ring.stations.stiffness.reshape(shape[1:]), 0.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        lasts = np.abs((k * gap).sum(axis=2) / (k * slope).sum(axis=2))
+        comes = np.where(gap / slope < np.inf, np.abs(gap / slope), np.inf)
+    away = np.where(closed, np.nan_to_num(lasts, nan=np.inf), comes.min(axis=2))
+    few = np.sort(away, axis=None)[min(MOST_SUPPORTS, away.size - 1)]
+    return np.asarray(away < min(torque, few))

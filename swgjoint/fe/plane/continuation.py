@@ -1,0 +1,132 @@
+"""Following equilibria in the plane, in any layout."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.fe.common.contact_changes import ContactChanges
+from swgjoint.fe.common.following import Follower
+from swgjoint.fe.common.influence import Influence
+from swgjoint.fe.plane.contact_prediction import predicted_changes
+from swgjoint.fe.plane.equilibrium import Load, NewtonSolver
+from swgjoint.fe.plane.ring import RingModel
+from swgjoint.fe.plane.state import State
+from swgjoint.fe.tolerances.influence import influence
+from swgjoint.gear.kinematics import Layout
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Continuation(Follower[State]):
+    """Follows equilibria of the 2D model.
+
+    With the circular spline fixed the flexspline is the output and turns freely. In the
+    other layouts the circular spline is the output; the rotation of the flexspline is
+    prescribed: zero, or, with the wave generator fixed, the input.
+    """
+
+    model: RingModel
+    ratio: float
+    layout: Layout = "circular_spline_fixed"
+    solver: NewtonSolver = field(default_factory=NewtonSolver)
+
+    @property
+    def ring_is_output(self) -> bool:
+        """Whether the circular spline turns."""
+        return self.layout != "circular_spline_fixed"
+
+    @property
+    def teeth(self) -> int:
+        """Of the flexspline."""
+        return self.model.element.sectors
+
+    def input_angle(self, state: State) -> float:
+        """Theta [rad]."""
+        if self.layout == "wave_generator_fixed":
+            return state.rotation
+        return state.wave_generator_angle
+
+    def input_torque(self, state: State) -> float:
+        """External torque on the input [N·m]."""
+        if self.layout == "wave_generator_fixed":
+            return state.holding_torque
+        return state.wave_generator_torque
+
+    def output_angle(self, state: State) -> float:
+        """Psi [rad]."""
+        return state.ring_rotation if self.ring_is_output else state.rotation
+
+    def deflected(self, angle: float = 0.0) -> State:
+        """Wave generator in place, members at the ideal ratio, no tooth contact."""
+        alpha, rotation, ring_rotation = self._ideal(angle)
+        start = self.model.at_rest(alpha, rotation)
+        load = Load(rotation=rotation, teeth=False)
+        state = self.solver(self.model, start, load)
+        return replace(state, ring_rotation=ring_rotation)
+
+    def loaded(self, start: State, torque: float, angle: float) -> State:
+        """Equilibrium under a torque, from a start with its input at that angle."""
+        if not self.ring_is_output:
+            return self.solver(self.model, start, Load(torque=torque))
+        held = angle if self.layout == "wave_generator_fixed" else 0.0
+        return self.solver(self.model, start, Load(torque=torque, rotation=held))
+
+    def held(self, state: State) -> State:
+        """Equilibrium with the output where it is; the torque is what that takes."""
+        found = self.solver(self.model, state, Load(rotation=state.rotation))
+        if self.ring_is_output:
+            return replace(found, torque=-found.tooth_moment)
+        return found
+
+    def turned(self, state: State, output: float) -> State:
+        """Predictor: the output turned at a fixed input."""
+        alpha = state.wave_generator_angle
+        if self.ring_is_output:
+            return self.model.moved(state, alpha, state.rotation, output)
+        return self.model.moved(state, alpha, output, state.ring_rotation)
+
+    def ahead(self, state: State, angle: float) -> State:
+        """Predictor: input and output turned by the ideal ratio."""
+        was, now = self._ideal(self.input_angle(state)), self._ideal(angle)
+        alpha, rotation, ring_rotation = (y - x for x, y in zip(was, now, strict=True))
+        return self.model.moved(
+            state,
+            state.wave_generator_angle + alpha,
+            state.rotation + rotation,
+            state.ring_rotation + ring_rotation,
+        )
+
+    def predicted_changes(
+        self, state: State, low: float, high: float
+    ) -> ContactChanges | None:
+        """Changes of contact over the torque that an equilibrium predicts."""
+        return predicted_changes(
+            self.model, state, ring_is_output=self.ring_is_output, low=low, high=high
+        )
+
+    def influence(self, state: State) -> Influence:
+        """How the gap of every tooth acts on the output, at an equilibrium."""
+        return influence(self.model, state, ring_is_output=self.ring_is_output)
+
+    def with_errors(
+        self, flexspline: Array, circular_spline: Array, tilt: Array
+    ) -> Continuation:
+        """The same drive with errors of its teeth; a plane has no axis to tilt."""
+        assert not tilt.any()
+        model = replace(
+            self.model, tooth_shift=flexspline, ring_tooth_shift=circular_spline
+        )
+        return replace(self, model=model)
+
+    def _ideal(self, theta: float) -> tuple[float, float, float]:
+        """Angles of wave generator, flexspline and circular spline."""
+        output = theta / self.ratio
+        if self.layout == "circular_spline_fixed":
+            return theta, output, 0.0
+        if self.layout == "flexspline_fixed":
+            return theta, 0.0, output
+        return 0.0, theta, output

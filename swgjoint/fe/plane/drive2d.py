@@ -1,0 +1,245 @@
+"""The 2D model of a design and the continuation of its equilibria."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.errors import DesignError
+from swgjoint.fe.common.contact_patch import half_length
+from swgjoint.fe.common.friction import STICK_STIFFNESS, Friction
+from swgjoint.fe.common.indentation import Indentation, softness_of
+from swgjoint.fe.common.stress_state import confinement
+from swgjoint.fe.plane.bore_contact import NARROW_POINTS, POINTS
+from swgjoint.fe.plane.circular_spline import CircularSpline, ring_compliance
+from swgjoint.fe.plane.race import PlaneRace
+from swgjoint.fe.plane.ring import RingModel
+from swgjoint.fe.plane.sector_mesh import sector_mesh
+from swgjoint.fe.plane.superelement import Superelement, condense
+from swgjoint.gear.bearing.checks import bearing_checks
+from swgjoint.gear.design.check import raise_faults
+from swgjoint.gear.design.design import Design, MemberName
+from swgjoint.gear.design.tolerances import (
+    flawed_wave_generator,
+    has_errors,
+    tooth_errors,
+    wave_generator_offset,
+)
+from swgjoint.gear.teeth.profile import ToothProfile, tooth_profile
+from swgjoint.gear.wave_generators.wave_generator import lobe_height, wave_generator
+from swgjoint.units import mm
+
+Array = NDArray[np.float64]
+
+NARROW = ("parabolic", "asymmetric_parabolic", "four_roller")
+"""Wave generators whose contact with the bore is narrower than its nodes are apart."""
+
+
+def can_halve(design: Design, *, bearing: bool = True) -> bool:
+    """Whether half a turn maps the drive onto itself: lobes, even teeth, no errors.
+
+    Args:
+        design: The drive.
+        bearing: Whether the model is plane and carries the bearing of the wave
+            generator where :func:`carries_bearing`: then of even balls.
+    """
+    drive, own = design.drive, design.wave_generator.bearing
+    odd = bearing and carries_bearing(design) and own is not None and own.balls % 2
+    return (
+        drive.teeth_flexspline % 2 == 0
+        and drive.teeth_circular_spline % 2 == 0
+        and wave_generator(design).folds % 2 == 0
+        and not has_errors(design)
+        and not odd
+    )
+
+
+def carries_bearing(design: Design) -> bool:
+    """Whether the plane model has the ball bearing of a design's wave generator.
+
+    It needs two lobes of an outline without corners or straights, that turns
+    against a circular spline at rest: the balls roll as the flexspline then does.
+    """
+    generator = design.wave_generator
+    return (
+        generator.bearing is not None
+        and generator.kind in ("elliptical", "cosine", "table")
+        and design.lobes == 2
+        and design.drive.layout == "circular_spline_fixed"
+    )
+
+
+def check_modelled(design: Design, model: str) -> None:
+    """Refuse what the 2D model does not contain, and what is no such model.
+
+    Raises:
+        DesignError: One line per key.
+    """
+    drive, tolerances = design.drive, design.tolerances
+    faults = []
+    if model != "2d":
+        faults.append(f"model {model!r} gives no map; available: 'ring', '2d', '3d'")
+    if tolerances.misalignment_arcmin:
+        faults.append(
+            f"tolerances.misalignment_arcmin = {tolerances.misalignment_arcmin:g}: the"
+            " 2d model is a plane section, without an axis to tilt; accepted: 0"
+        )
+    if faults:
+        raise DesignError("\n".join(f"{drive.name}: {fault}" for fault in faults))
+
+
+def left_out(design: Design, model: str = "2d", *, bearing: bool = True) -> str | None:
+    """Parts of the design that the model cannot see, for the validity label.
+
+    Args:
+        design: The drive.
+        model: Its fidelity.
+        bearing: Whether the plane model was built with the bearing.
+    """
+    carried = bearing and carries_bearing(design)
+    shapes = design.micro_geometry.model_dump(exclude={"crowning_kind"})
+    parts = {
+        "wave_generator.bearing": design.wave_generator.bearing is not None
+        and (model == "3d" or (model == "2d" and not carried)),
+        "micro_geometry": model != "3d" and any(shapes.values()),
+        "passage of teeth": model == "ring",
+        "rim of the circular spline": model == "ring",
+        "strips of tooth contact narrower than a patch": model != "2d",
+    }
+    return " and ".join(name for name, there in parts.items() if there) or None
+
+
+def ring_model(
+    design: Design,
+    *,
+    half: bool = False,
+    nonlinear: bool = True,
+    elastic_circular_spline: bool = True,
+    friction: bool = True,
+    bearing: bool = True,
+    cage_held: bool = False,
+    profiles: Mapping[MemberName, ToothProfile] | None = None,
+) -> RingModel:
+    """2D model of a design.
+
+    Args:
+        design: The drive.
+        half: Half of the drive, closed by its symmetry.
+        nonlinear: Large rotations of the sectors.
+        elastic_circular_spline: Whether the circular spline deforms; its outer
+            diameter is fixed or free as the design says.
+        friction: Whether the flanks rub, with the coefficient of the design; False for
+            the conservative part alone.
+        bearing: Whether the wave generator carries the rim on its ball bearing, if the
+            design has one that the plane can carry; False for its rigid surface.
+        cage_held: Whether the balls stand still on the cam instead of rolling.
+        profiles: Flanks to use instead of those of the design, by member.
+
+    Raises:
+        DesignError: If the design cannot be built or the half model does not apply.
+    """
+    if half and not can_halve(design, bearing=bearing):
+        drive, own = design.drive, design.wave_generator.bearing
+        balls = ""
+        if bearing and carries_bearing(design) and own is not None and own.balls % 2:
+            balls = f" on {own.balls} balls; accepted: an even number"
+        raise DesignError(
+            f"{drive.name}: a half model needs even tooth counts and a wave generator "
+            "that half a turn maps onto itself, without tolerances, not "
+            f"{drive.teeth_flexspline}/{drive.teeth_circular_spline} teeth and "
+            f"{design.wave_generator.kind}{balls}"
+        )
+    flanks: dict[MemberName, ToothProfile] = dict(profiles or {})
+    members: tuple[MemberName, ...] = ("flexspline", "circular_spline")
+    for name in members:
+        if name not in flanks:
+            flanks[name] = tooth_profile(design, name)
+    ring = CircularSpline(profile=flanks["circular_spline"])
+    if elastic_circular_spline:
+        element = sector(design, "circular_spline", ring.profile)
+        free = design.circular_spline.outer_rim == "free"
+        ring = replace(ring, compliance=ring_compliance(element, free_rim=free))
+    coefficient = design.friction.tooth_coefficient if friction else 0.0
+    law = None
+    if coefficient > 0.0:
+        if ring.compliance is None:
+            raise DesignError(
+                f"{design.drive.name}: friction.tooth_coefficient = {coefficient:g} "
+                "needs an elastic circular spline; accepted with a rigid one: 0"
+            )
+        modulus = design.material_of("flexspline").youngs_modulus
+        width = design.drive.face_width_mm * mm
+        law = Friction(
+            coefficient=coefficient, stiffness=STICK_STIFFNESS * modulus * width
+        )
+    shifts: dict[str, Array] = {}
+    if has_errors(design):
+        if ring.compliance is None:
+            raise DesignError(
+                f"{design.drive.name}: tolerances need an elastic circular spline"
+            )
+        shifts = {
+            "tooth_shift": tooth_errors(design, "flexspline").shift,
+            "ring_tooth_shift": tooth_errors(design, "circular_spline").shift,
+            "wave_generator_offset": wave_generator_offset(design),
+        }
+    element = sector(design, "flexspline", flanks["flexspline"])
+    height, race = lobe_height(design), None
+    if bearing and carries_bearing(design):
+        raise_faults(bearing_checks(design))
+        race = PlaneRace.of(design, element, half=half, cage_held=cage_held)
+        height = race.on_balls.lobe_height
+    return RingModel(
+        **shifts,
+        friction=law,
+        indentation=indentation(design, element, ring),
+        element=element,
+        wave_generator=flawed_wave_generator(design),
+        circular_spline=ring,
+        lobe_height=height,
+        half=half,
+        nonlinear=nonlinear,
+        layer=design.material_of("flexspline").youngs_modulus
+        * design.drive.face_width_mm
+        * mm,
+        points=NARROW_POINTS if design.wave_generator.kind in NARROW else POINTS,
+        race=race,
+    )
+
+
+def indentation(
+    design: Design, element: Superelement, ring: CircularSpline
+) -> Indentation:
+    """Indentation of the flanks of both members, of the elastic ones among them."""
+    members: list[tuple[MemberName, Superelement]] = [("flexspline", element)]
+    if ring.compliance is not None:
+        members.append(("circular_spline", ring.compliance.element))
+    softness, patch = [], []
+    for name, own in members:
+        material = design.material_of(name)
+        # E' of the plane, see in_plane_constants
+        modulus = material.youngs_modulus / (
+            1.0 - own.axial_stress * material.poisson_ratio
+        )
+        softness.append(softness_of(modulus, design.drive.face_width_mm * mm))
+        patch.append(half_length(own.spline.x))
+    return Indentation.of_members(
+        tuple(softness), tuple(patch), (element.profile, ring.profile)
+    )
+
+
+def sector(design: Design, member: MemberName, profile: ToothProfile) -> Superelement:
+    """Condensed sector of one tooth of a member."""
+    material = design.material_of(member)
+    rim = getattr(design, member).rim_mm * mm
+    return condense(
+        sector_mesh(profile, rim, design.mesh.refinement),
+        profile,
+        youngs_modulus=material.youngs_modulus,
+        poisson_ratio=material.poisson_ratio,
+        width=design.drive.face_width_mm * mm,
+        confinement=confinement(design, member, profile),
+    )

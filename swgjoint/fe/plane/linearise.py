@@ -1,0 +1,299 @@
+"""Gradient and tangent of the ring at one state, in the bases of its nodes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.fe.plane.bore_contact import BoreStations
+from swgjoint.fe.plane.corotation import (
+    Frames,
+    elastic_force,
+    projected,
+    rotate,
+    tangent,
+    turned,
+)
+from swgjoint.fe.plane.ring import RingModel
+from swgjoint.fe.plane.state import State
+from swgjoint.fe.plane.superelement import Superelement
+from swgjoint.fe.plane.tooth_contact import Contacts, ToothContact
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+
+FAR = 0.03
+"""Gap, in lobe heights, from which the stations of an interval of the bore count as
+one: on parabolas they are within 0.006 of their middle, on arcs within 0.011."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Linearised:
+    """Per sector, n degrees of freedom, see :attr:`RingModel.sector_dofs`.
+
+    Vectors are in the global frame. Where half a ring ends they have the opposite sign,
+    so that unknowns agree with those of the first sector.
+    """
+
+    element: Superelement
+    frames: Frames
+    dofs: Index
+    """Those of the skeleton (2 n_a,)."""
+    face_dofs: int
+    """Shared by neighbours."""
+    sign: Array
+    """-1 where half a ring ends, 1 elsewhere (N, n)."""
+    gradient: Array
+    """Derivative of energy and load potential (N, n) [N]."""
+    hessian: Array
+    """Second derivative (N, n, n) [N/m]."""
+    gap: Array
+    """Of the stations of the bore (N, q) [m]."""
+    gap_dofs: Index
+    """Degrees of freedom that move them (k,)."""
+    stations: BoreStations
+    """Of the bore."""
+    normal: Array
+    """Out of what it lies on, at the stations (N, q, 2)."""
+    race_rows: Array | None
+    """Derivative of the gaps to a race by ``gap_dofs`` (N, q, k)."""
+    fixed: Mask
+    """Coordinates of a race that do not move (N, n)."""
+    rotation: float
+    """Best-fit rotation of the bore [rad]."""
+    rotation_gradient: Array
+    """(N, n) [rad/m]."""
+    anchor: Array
+    """Tangential direction at one node (N, n)."""
+    anchor_stiffness: float
+    """[N/m]."""
+    flank: Array
+    """Displacement of the flank nodes in the sector frames, manufacturing errors
+    included (N, 2 n_b) [m]."""
+    ring_elastic: Array
+    """Elastic displacement of the circular spline's flanks (N_c, 2 n_c) [m]."""
+    search: ToothContact
+
+    @property
+    def no_contacts(self) -> Contacts:
+        """An empty set of candidates."""
+        ring = self.search.circular_spline
+        return Contacts.none(self.flank.shape[1], ring.flank_dofs)
+
+    def anchored(self) -> Array:
+        """Tangent with the anchor spring, fixed components replaced by identity."""
+        matrix = self.hessian.copy()
+        matrix[0] += self.anchor_stiffness * np.outer(self.anchor[0], self.anchor[0])
+        matrix[self.fixed] = 0.0
+        matrix.transpose(0, 2, 1)[self.fixed] = 0.0
+        np.einsum("sii->si", matrix)[self.fixed] = self.anchor_stiffness
+        return matrix
+
+    def gap_gradient(self, contacts: Contacts) -> Array:
+        """Derivative of the gaps of teeth (n_contacts, n)."""
+        s, frames = contacts.sector, self.frames
+        count, n = len(s), frames.spin.shape[1]
+        carried = contacts.weight @ self.element.flank_from_skeleton
+        j_y = turned(frames.position[s].reshape(count, n // 2, 2)).reshape(count, n)
+        arm = np.einsum("ki,ki->k", contacts.normal, turned(contacts.point))
+        lever = arm - np.einsum("kn,kn->k", carried, j_y)
+        seen = (carried + frames.spin[s] * lever[:, None]).reshape(count, n // 2, 2)
+        rows = np.zeros((count, self.gradient.shape[1]))
+        rows[:, self.dofs] = rotate(seen, frames.angle[s][:, None]).reshape(count, n)
+        return np.asarray(rows * self.sign[s])
+
+    def in_global_frame(self, increment: Array) -> Array:
+        """Increment of the skeletons as vectors (N, n_a, 2)."""
+        own = (increment * self.sign)[:, self.dofs]
+        return np.asarray(own.reshape(len(own), -1, 2))
+
+    def gap_after(self, increment: Array) -> Array:
+        """Gaps of the stations after an increment (N, q) [m]."""
+        moved = (increment * self.sign)[:, self.gap_dofs]
+        if self.race_rows is not None:
+            return np.asarray(self.gap + (self.race_rows @ moved[..., None])[..., 0])
+        shift = self.stations.positions(moved.reshape(len(moved), -1, 2))
+        return np.asarray(self.gap + np.einsum("sqi,sqi->sq", shift, self.normal))
+
+    def exchanged(self, stations: Mask, touching: Mask) -> Linearised:
+        """The tangent with the contact state of some stations (N, q) inverted.
+
+        For a rigid wave generator. Its curvature is neglected there, because the gap of
+        a station that changes sides is almost zero.
+        """
+        sectors = np.flatnonzero(stations.any(axis=1))
+        change = np.where(touching, -1.0, 1.0) * stations * self.stations.stiffness
+        k, normal = change[sectors], self.normal[sectors]
+        push = (k * self.gap[sectors])[..., None] * normal
+        into, sign = self.gap_dofs, self.sign[sectors][:, self.gap_dofs]
+        forces = self.stations.forces_of(push).reshape(sectors.size, -1)
+        springs = self.stations.stiffness_of(normal, k)
+        gradient, hessian = self.gradient.copy(), self.hessian.copy()
+        gradient[sectors[:, None], into] += sign * forces
+        hessian[sectors[:, None, None], into[:, None], into] += (
+            sign[:, :, None] * springs * sign[:, None, :]
+        )
+        return replace(self, gradient=gradient, hessian=hessian)
+
+    def gap_gradients(self) -> Array:
+        """Derivative of the gaps of the stations by ``gap_dofs`` (N, q, k)."""
+        rows = self.race_rows
+        if rows is None:
+            rows = self.stations.along(self.normal)
+        return np.asarray(rows * self.sign[:, None, self.gap_dofs])
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Bore:
+    """What the bore lies on, by the k degrees of freedom of ``contact_dofs``."""
+
+    gap: Array
+    normal: Array
+    gradient: Array
+    hessian: Array
+    fixed: Mask | bool = False
+    rows: Array | None = None
+
+
+def linearise(model: RingModel, state: State, torque: float | None) -> Linearised:
+    """Linearise the ring.
+
+    Args:
+        model: The ring.
+        state: Positions, active set and tooth forces.
+        torque: T on the load, whole drive, None if the rotation is prescribed [N·m].
+    """
+    element, sign, dofs = model.element, model.signs, model.dofs
+    frames, x = model.frames(state), model.skeleton(state)
+    n_a = len(element.skeleton)
+
+    # elastic forces and tangent in the sector frames, then in the global one
+    elastic = elastic_force(element, frames)
+    total = elastic - state.flank_force @ element.flank_from_skeleton
+    seen = projected(frames, elastic).reshape(model.sectors, n_a, 2)
+    gradient, hessian = np.zeros(sign.shape), np.zeros((*sign.shape, sign.shape[1]))
+    gradient[:, dofs] = rotate(seen, frames.angle[:, None]).reshape(model.sectors, -1)
+    hessian[:, dofs[:, None], dofs] = _in_global_frame(
+        tangent(element, frames, total), frames.angle
+    )
+
+    nodes = x[:, model.bore_nodes]
+    if model.race is not None and state.race is not None:
+        race = model.race.forces(
+            state.race, state.wave_generator_angle, nodes, state.touching
+        )
+        bore = _Bore(
+            gap=race.gap,
+            normal=race.normal,
+            rows=race.rows,
+            gradient=race.gradient,
+            hessian=race.hessian,
+            fixed=race.fixed,
+        )
+    else:
+        bore = _on_surface(model, state)
+    into = model.contact_dofs
+    gradient[:, into] += bore.gradient
+    hessian[:, into[:, None], into] += bore.hessian
+    fixed = np.zeros(sign.shape, dtype=bool)
+    fixed[:, into] = bore.fixed
+
+    rotation, slope = model.best_fit_rotation(nodes)
+    by_node = np.zeros((model.sectors, n_a, 2))
+    by_node[:, model.bore_nodes] = slope
+    rotation_gradient = np.zeros(sign.shape)
+    rotation_gradient[:, dofs] = by_node.reshape(model.sectors, -1)
+    if torque is not None:
+        gradient += torque / model.copies * rotation_gradient
+
+    anchor = np.zeros(sign.shape)
+    anchor[0, dofs[:2]] = turned(x[0, 0]) / np.hypot(*x[0, 0])
+    centre = frames.position.reshape(model.sectors, n_a, 2).mean(axis=1)
+    angle = frames.angle - state.ring_rotation
+    ring_elastic = model.ring_displacement(state)
+    flank = frames.displacement @ element.flank_from_skeleton.T
+    flank += state.flank_force @ element.flank_compliance
+    return Linearised(
+        element=element,
+        frames=frames,
+        dofs=dofs,
+        face_dofs=model.face_dofs,
+        sign=sign,
+        gradient=sign * gradient,
+        hessian=sign[:, :, None] * hessian * sign[:, None, :],
+        gap=bore.gap,
+        gap_dofs=into,
+        stations=model.stations,
+        normal=bore.normal,
+        race_rows=bore.rows,
+        fixed=fixed,
+        rotation=rotation,
+        rotation_gradient=sign * rotation_gradient,
+        anchor=anchor,
+        anchor_stiffness=float(np.mean(np.diag(element.stiffness))),
+        flank=model.placed(flank, model.tooth_shift),
+        ring_elastic=ring_elastic,
+        search=ToothContact(
+            rubs=model.friction is not None,
+            element=element,
+            circular_spline=model.circular_spline,
+            ring_flank=model.placed(ring_elastic, model.ring_tooth_shift),
+            angle=angle,
+            bearing=angle - np.arctan2(centre[:, 0], centre[:, 1]),
+        ),
+    )
+
+
+def _on_surface(model: RingModel, state: State) -> _Bore:
+    """The layer between the bore and a rigid wave generator."""
+    stations = model.stations
+    gap, normal, curvature = _gaps(model, state)
+    # only sectors that touch push back
+    on = np.flatnonzero(state.touching.any(axis=1))
+    k = np.where(state.touching[on], stations.stiffness, 0.0)
+    # sliding over a curved outline turns the contact force
+    bend = k * gap[on] * curvature[on]
+    size = model.contact_dofs.size
+    gradient = np.zeros((model.sectors, size))
+    hessian = np.zeros((model.sectors, size, size))
+    push = (k * gap[on])[..., None] * normal[on]
+    gradient[on] = stations.forces_of(push).reshape(on.size, size)
+    hessian[on] = stations.stiffness_of(normal[on], k)
+    hessian[on] += stations.stiffness_of(turned(normal[on]), bend)
+    return _Bore(gap=gap, normal=normal, gradient=gradient, hessian=hessian)
+
+
+def _gaps(model: RingModel, state: State) -> tuple[Array, Array, Array]:
+    """Gap, normal and curvature of the stations, see ``wave_generator_gap``.
+
+    Where no station of an interval touches and its middle is :data:`FAR` off, all of
+    them get the values of the middle, which decide no more than that they stay apart.
+    """
+    stations, alpha = model.stations, state.wave_generator_angle
+    points = model.bore_points(state)
+    p = stations.per_interval
+    shaped = points.reshape(model.sectors, -1, p, 2)
+    middle = model.wave_generator_gap(shaped[:, :, p // 2], alpha)
+    near = middle[0] < FAR * model.lobe_height
+    near |= state.touching.reshape(shaped.shape[:3]).any(axis=2)
+    found = []
+    exact = model.wave_generator_gap(shaped[near], alpha)
+    for coarse, fine in zip(middle, exact, strict=True):
+        values = np.repeat(coarse[:, :, None], p, axis=2)
+        values[near] = fine
+        found.append(values.reshape(*points.shape[:2], *coarse.shape[2:]))
+    return found[0], found[1], found[2]
+
+
+def _in_global_frame(matrices: Array, angle: Array) -> Array:
+    """Matrices of sectors (N, n, n), given in frames turned by angles (N,)."""
+    count, n, _ = matrices.shape
+    cos, sin = np.cos(angle), np.sin(angle)
+    turn = np.stack([np.stack([cos, -sin], -1), np.stack([sin, cos], -1)], -2)
+    blocks = matrices.reshape(count, n // 2, 2, n // 2, 2)
+    return np.asarray(
+        np.einsum("sab,snbmc,sdc->snamd", turn, blocks, turn, optimize=True)
+    ).reshape(count, n, n)

@@ -1,0 +1,192 @@
+r"""Ratcheting torque: the largest that the teeth hold with the wave generator locked.
+
+The output is turned against the locked wave generator, so that torque is a result and
+may fall; where it is largest the teeth begin to pass. Under that torque
+
+.. math:: \frac{dT}{d\psi} = 0,
+
+and above it no equilibrium is left. In the plane the wave generator is rigid and there
+is no bearing; the torsion of a cup is in series and changes nothing, but the radial
+softness of cup and bearing, which are not there, lets teeth pass earlier. What does
+give way is the circular spline: with its outside fixed teeth jam, and the torque at
+which the search ends is a lower bound of that model, far above what steel bears; with
+its outside free (:attr:`CircularSpline.outer_rim`) it becomes oval and lets go.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import pi
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.arrays import frozen_array
+from swgjoint.errors import ComputationError, Outcome
+from swgjoint.fe.plane.continuation import Continuation
+from swgjoint.fe.plane.drive2d import can_halve, ring_model
+from swgjoint.fe.plane.equilibrium import NewtonSolver
+from swgjoint.fe.plane.state import State
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.design.tolerances import without_errors
+from swgjoint.gear.wave_generators.wave_generator import lobe_height
+from swgjoint.progress import Progress, silent
+
+Array = NDArray[np.float64]
+
+STEP = 0.04
+"""Of the output, parts of a pitch."""
+SHORTEST = 1e-3
+"""Step at which the search is given up, parts of a pitch."""
+RING_RANGE = 2.0
+"""Displacement of the circular spline that is taken, in lobe heights. Its linear model
+errs by the square of its rotation: a lobe height on the pitch radius turns it by 0.02
+to 0.04 rad, of which the square is a few percent of the depth of a tooth."""
+ITERATIONS = 200
+"""Near the limit contact changes slowly; 120 do for a map."""
+TOLERANCE = 1e-4
+"""Increment at which the iteration ends, in lobe heights: flanks that conform change
+points of contact below it for many iterations, while the torque moves by as little."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RatchetingPath:
+    """Equilibria while the output is turned back against the locked wave generator."""
+
+    turned: Array
+    """By which the output was turned, growing from zero [rad]. Shape (n,)."""
+    torque: Array
+    """T at the output [N·m]. Shape (n,)."""
+    energy: Array
+    """Strain energy of the whole drive [J]. Shape (n,)."""
+    pairs: NDArray[np.int64]
+    """Teeth of the flexspline in contact, whole drive. Shape (n,)."""
+    pitch: float
+    """Of the flexspline [rad]."""
+    outcome: Outcome
+    """Of the solve that ended the path, converged where none failed."""
+
+    def __post_init__(self) -> None:
+        turned = frozen_array(self.turned, "turned [rad]", ndim=1)
+        object.__setattr__(self, "turned", turned)
+        for key in ("torque", "energy"):
+            values = frozen_array(getattr(self, key), key, shape=turned.shape)
+            object.__setattr__(self, key, values)
+
+    @property
+    def passed(self) -> bool:
+        """Whether the path goes beyond the largest torque that teeth carry.
+
+        Within the backlash torque is round-off, and its falls say nothing.
+        """
+        k = int(self.torque.argmax())
+        return bool(self.pairs[k] > 0 and self.torque[-1] < self.torque[k])
+
+    @property
+    def limit(self) -> float:
+        """Largest torque of the path; a lower bound unless :attr:`passed` [N·m].
+
+        The top of the parabola through the largest value and its neighbours.
+        """
+        k = int(self.torque.argmax())
+        if not 0 < k < self.torque.size - 1:
+            return float(self.torque[k])
+        x, y = self.turned[k - 1 : k + 2], self.torque[k - 1 : k + 2]
+        a, b, c = np.polyfit(x - x[1], y, 2)
+        return float(c - b**2 / (4.0 * a)) if a < 0.0 else float(y[1])
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values."""
+        parts, k = self.turned / self.pitch, int(self.torque.argmax())
+        return {
+            "limit_Nm": self.limit,
+            "passed": self.passed,
+            "at_largest_pitches": float(parts[k]),
+            "at_largest_pairs": int(self.pairs[k]),
+            "turned_pitches": parts.tolist(),
+            "torque_Nm": self.torque.tolist(),
+            "pairs": self.pairs.tolist(),
+            "outcome": self.outcome.name.lower(),
+        }
+
+
+def ratcheting_path(
+    design: Design,
+    *,
+    input_angle: float = 0.0,
+    step: float = STEP,
+    upto: float = 1.0,
+    progress: Progress = silent,
+) -> RatchetingPath:
+    """Turn the output until the torque that teeth carry falls, at most so far.
+
+    Teeth are perfect and without friction.
+
+    Args:
+        design: The drive; what the circular spline sits in decides, see above.
+        input_angle: Where the wave generator is locked [rad].
+        step: Of the output, parts of a pitch.
+        upto: Where to end in any case, parts of a pitch.
+        progress: Called with the stage and the part of the pitch in percent.
+
+    Raises:
+        DesignError: If the design cannot be built.
+        ComputationError: If the unloaded drive cannot be solved.
+    """
+    follow = path_follower(design)
+    pitch = 2.0 * pi / design.drive.teeth_flexspline
+    state = follow.meshed(follow.deflected(input_angle))
+    if not state.outcome.ok:
+        raise ComputationError(f"{design.drive.name}: {state.outcome.value}")
+    first = follow.output_angle(state)
+    states, turned = [state], [0.0]
+    part, increment, outcome = 0.0, step, Outcome.CONVERGED
+    while part < upto - 1e-9:
+        tried = follow.held(follow.turned(state, first - (part + increment) * pitch))
+        if not tried.outcome.ok:
+            increment *= 0.5
+            if increment < SHORTEST:
+                outcome = tried.outcome
+                break
+            continue
+        state, part = tried, part + increment
+        increment = min(step, 1.5 * increment)
+        states.append(state)
+        turned.append(part * pitch)
+        progress(f"{design.drive.name}: ratcheting", round(100 * part), 100)
+        if _pairs(states[-2]) and state.torque < states[-2].torque:
+            break
+    return RatchetingPath(
+        turned=np.array(turned),
+        torque=np.array([s.torque for s in states]),
+        energy=np.array([s.energy for s in states]),
+        pairs=np.array([follow.model.copies * _pairs(s) for s in states]),
+        pitch=pitch,
+        outcome=outcome,
+    )
+
+
+def path_follower(design: Design) -> Continuation:
+    """The drive in the plane, perfect and smooth, far from its map's torques."""
+    perfect = without_errors(design)
+    half = can_halve(perfect, bearing=False)
+    small = TOLERANCE * lobe_height(design)
+    solver = NewtonSolver(
+        max_iterations=ITERATIONS,
+        step_tolerance=small,
+        thorough_below=10.0 * small,
+        ring_range=RING_RANGE,
+    )
+    return Continuation(
+        model=ring_model(perfect, half=half, friction=False, bearing=False),
+        ratio=design.ratio,
+        layout=design.drive.layout,
+        solver=solver,
+    )
+
+
+def _pairs(state: State) -> int:
+    if state.contacts is None:
+        return 0
+    return int(np.unique(state.contacts.sector).size)

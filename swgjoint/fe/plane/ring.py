@@ -1,0 +1,365 @@
+"""The ring of sectors between wave generator and circular spline: its geometry.
+
+Everything in the frame of the circular spline, whose outside is fixed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.fe.common.friction import Friction
+from swgjoint.fe.common.indentation import Indentation
+from swgjoint.fe.plane.bore_contact import POINTS, BoreStations
+from swgjoint.fe.plane.circular_spline import CircularSpline
+from swgjoint.fe.plane.corotation import Frames, rotate, sector_frames, turned
+from swgjoint.fe.plane.race import NODE, PlaneRace
+from swgjoint.fe.plane.state import State
+from swgjoint.fe.plane.superelement import Superelement
+from swgjoint.gear.wave_generators.wave_generator import WaveGenerator
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+
+AT_LOBE = 0.9
+"""Cosine of twice the angle from the major axis, above which nodes of the bore lie on
+the race where a search begins."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RingModel:
+    """Flexspline ring, wave generator and rigid circular spline."""
+
+    element: Superelement
+    wave_generator: WaveGenerator
+    circular_spline: CircularSpline
+    lobe_height: float
+    """Radial deflection at the lobes [m]."""
+    half: bool = False
+    """Half of the ring, closed by a rotation of 180 deg."""
+    nonlinear: bool = True
+    friction: Friction | None = None
+    """Between the flanks; None without."""
+    indentation: Indentation | None = None
+    """Of the flanks; None gives them the patch of a contact alone."""
+    tooth_shift: Array | None = None
+    """Manufacturing errors of the flexspline's teeth in their frames (N, 2) [m]."""
+    ring_tooth_shift: Array | None = None
+    """The same of the circular spline, which must be elastic (N_c, 2) [m]."""
+    wave_generator_offset: Array | None = None
+    """Centre of the outline in the frame of the wave generator (2,) [m]."""
+    layer: float = 0.0
+    """E b of the bore's layer that a rigid wave generator presses [N/m]."""
+    points: int = POINTS
+    """Stations of the bore between neighbouring nodes."""
+    race: PlaneRace | None = None
+    """Outer race on balls in place of the rigid wave generator."""
+
+    @property
+    def sectors(self) -> int:
+        """Sectors in the model."""
+        return self.element.sectors // (2 if self.half else 1)
+
+    @property
+    def ring_teeth(self) -> int:
+        """Teeth of the circular spline in the model."""
+        return self.circular_spline.profile.teeth // self.copies
+
+    @property
+    def copies(self) -> int:
+        """How many times the model repeats in the drive."""
+        return 2 if self.half else 1
+
+    @property
+    def closure(self) -> float:
+        """Sign that closes the ring: the half model continues as its opposite."""
+        return -1.0 if self.half else 1.0
+
+    @cached_property
+    def place(self) -> Array:
+        """Angles of the sectors in the undeformed ring [rad]."""
+        return np.asarray(
+            2.0 * pi / self.element.sectors * np.arange(self.sectors), float
+        )
+
+    @cached_property
+    def reference(self) -> Array:
+        """Undeformed skeleton nodes in the global frame (N, n_a, 2) [m]."""
+        skeleton = np.broadcast_to(
+            self.element.skeleton, (self.sectors, *self.element.skeleton.shape)
+        )
+        return rotate(skeleton, self.place[:, None])
+
+    @cached_property
+    def bore_nodes(self) -> NDArray[np.int64]:
+        """Skeleton nodes of a sector that face the wave generator, one corner."""
+        size = self.element.face_size
+        return np.arange(size - 1, size + self.element.bore_size)
+
+    @cached_property
+    def stations(self) -> BoreStations:
+        """Where the bore presses: between its nodes, on a race at them."""
+        if self.race is not None:
+            return BoreStations.at_nodes(self.race.press)
+        skeleton = self.element.skeleton
+        own = skeleton[np.append(self.bore_nodes, len(skeleton) - 1)]
+        pitch = 2.0 * pi / self.element.sectors
+        before, after = rotate(own[-2], -pitch), rotate(own[1], pitch)
+        return BoreStations.between_nodes(
+            np.stack([before, *own, after]), layer=self.layer, points=self.points
+        )
+
+    @cached_property
+    def contact_dofs(self) -> Index:
+        """Degrees of freedom of a sector that move the gaps of its stations."""
+        nodes = self.bore_nodes
+        if self.race is not None:
+            return np.concatenate([self.dofs[_pairs(nodes)], self.race_dofs])
+        # one node of either neighbour; the last corner ends the skeleton
+        last = len(self.element.skeleton)
+        return _pairs(np.concatenate([[0], nodes + 1, [last, last + 1]]))
+
+    def station_nodes(self, skeleton: Array) -> Array:
+        """The nodes that carry the stations (N, m, 2) [m] from skeletons."""
+        nodes = skeleton[:, self.bore_nodes]
+        if self.race is not None:
+            return nodes
+        before = np.roll(nodes[:, -1:], 1, axis=0)
+        after = np.roll(nodes[:, 1:2], -1, axis=0)
+        before[0] *= self.closure
+        after[-1] *= self.closure
+        return np.concatenate([before, nodes, skeleton[:, -1:], after], axis=1)
+
+    def bore_points(self, state: State) -> Array:
+        """Stations of the bore (N, q, 2) [m]."""
+        return self.stations.positions(self.station_nodes(self.skeleton(state)))
+
+    @property
+    def face_dofs(self) -> int:
+        """Degrees of freedom that neighbours share.
+
+        Those of a face and of the bore nodes next to its corner; on a race those of a
+        face and of its node of the race.
+        """
+        if self.race is None:
+            return 2 * (self.element.face_size + 2)
+        return 2 * self.element.face_size + NODE
+
+    @cached_property
+    def dofs(self) -> Index:
+        """Those of the skeleton among the degrees of freedom of a sector (2 n_a,)."""
+        own, face = 2 * len(self.element.skeleton), 2 * self.element.face_size
+        if self.race is None:
+            return 2 + np.arange(own)
+        inside = self.race.size - 2 * NODE
+        return np.concatenate(
+            [
+                np.arange(own - face) + NODE * (np.arange(own - face) >= face),
+                np.arange(own - face, own) + NODE + inside,
+            ]
+        )
+
+    @property
+    def sector_dofs(self) -> int:
+        """Degrees of freedom of a sector.
+
+        Those of its skeleton and of the race below it, or of the bore nodes next to it.
+        """
+        beside = 2 * 2 if self.race is None else self.race.size
+        return 2 * len(self.element.skeleton) + beside
+
+    @cached_property
+    def signs(self) -> Array:
+        """-1 where half a ring ends and its start follows, 1 elsewhere (N, n)."""
+        signs = np.ones((self.sectors, self.sector_dofs))
+        signs[-1, -self.face_dofs :] = self.closure
+        return signs
+
+    @cached_property
+    def race_dofs(self) -> Index:
+        """Those of the race's nodes, first face to last; empty without."""
+        if self.race is None:
+            return np.zeros(0, dtype=np.int64)
+        return np.setdiff1d(np.arange(self.sector_dofs), self.dofs)
+
+    def skeleton(self, state: State) -> Array:
+        """Positions of all skeleton nodes per sector (N, n_a, 2) [m]."""
+        last = np.roll(state.faces, -1, axis=0)
+        last[-1] *= self.closure
+        return np.concatenate([state.faces, state.bores, last], axis=1)
+
+    def frames(self, state: State) -> Frames:
+        """Sector frames; at the linear level they turn with the flexspline only."""
+        fixed = None
+        if not self.nonlinear:
+            fixed = np.full(self.sectors, state.rotation)
+        return sector_frames(
+            self.element, self.skeleton(state), self.place, fixed=fixed
+        )
+
+    def at_rest(self, alpha: float = 0.0, rotation: float = 0.0) -> State:
+        """Start of a search: the inextensional two-lobe shape of a thin ring.
+
+        Radial w0 cos 2 phi, tangential -w0/2 sin 2 phi, cross-sections turned by
+        3 w0 sin 2 phi/(2 r); phi from the major axis.
+        """
+        element = self.element
+        x = self.reference
+        radius = np.hypot(x[..., 0], x[..., 1])
+        bore = float(radius.min())
+        phi = np.arctan2(-x[..., 0], x[..., 1]) - (alpha - rotation)
+        w0 = self.lobe_height
+        turn = 1.5 * w0 * np.sin(2 * phi) / bore
+        radial = w0 * np.cos(2 * phi)
+        tangential = -0.5 * w0 * np.sin(2 * phi) + (radius - bore) * turn
+        unit = x / radius[..., None]
+        moved = x + radial[..., None] * unit + tangential[..., None] * turned(unit)
+        moved = rotate(moved, rotation)
+        size, inside = element.face_size, element.bore_size
+        race = None
+        if self.race is None:
+            points = self.stations.positions(self.station_nodes(moved))
+            gap, _, _ = self.wave_generator_gap(points, alpha)
+            touching = gap < 0.01 * w0
+        else:
+            race = self.race.at_rest(alpha, rotation)
+            # nothing but the rim keeps the race on its balls
+            touching = np.cos(2.0 * phi[:, self.bore_nodes]) > AT_LOBE
+        return State(
+            race=race,
+            faces=moved[:, :size],
+            bores=moved[:, size : size + inside],
+            pressure=np.zeros(touching.shape),
+            touching=touching,
+            flank_force=np.zeros((self.sectors, 4 * element.flank_size)),
+            ring_force=np.zeros((self.ring_teeth, self.circular_spline.flank_dofs)),
+            wave_generator_angle=alpha,
+            rotation=rotation,
+        )
+
+    def wave_generator_gap(
+        self, nodes: Array, alpha: float
+    ) -> tuple[Array, Array, Array]:
+        """Gap, outward normal and curvature of parallel curves at points of the bore.
+
+        Args:
+            nodes: Positions (..., 2) [m].
+            alpha: Wave-generator angle [rad].
+        """
+        flat = rotate(nodes.reshape(-1, 2), -alpha)
+        if self.wave_generator_offset is not None:
+            flat = flat - self.wave_generator_offset
+        gap, normal, curvature = self.wave_generator.signed_distance(flat)
+        return (
+            gap.reshape(nodes.shape[:-1]),
+            rotate(normal, alpha).reshape(nodes.shape),
+            (curvature / (1.0 + curvature * gap)).reshape(nodes.shape[:-1]),
+        )
+
+    def wave_generator_normal(self, state: State) -> Array:
+        """Outward normal of what the bore lies on, at its stations (N, q, 2)."""
+        points, alpha = self.bore_points(state), state.wave_generator_angle
+        if self.race is None or state.race is None:
+            return self.wave_generator_gap(points, alpha)[1]
+        return self.race.forces(state.race, alpha, points, state.touching).normal
+
+    def wave_generator_force(self, state: State) -> Array:
+        """Force of a rigid wave generator on the bore nodes (N, n_bore + 1, 2) [N]."""
+        vectors = state.pressure[..., None] * self.wave_generator_normal(state)
+        nodal = self.stations.forces_of(vectors)
+        # what stations exert on the neighbours: their last inner node, the shared
+        # corner and the first inner node
+        found = nodal[:, 1:-2].copy()
+        before, after = np.roll(nodal[:, 0], -1, axis=0), np.roll(nodal[:, -2:], 1, 0)
+        before[-1] *= self.closure
+        after[0] *= self.closure
+        found[:, -1] += before
+        found[:, :2] += after
+        return np.asarray(found)
+
+    def best_fit_rotation(self, nodes: Array) -> tuple[float, Array]:
+        """Best-fit rotation of the bore nodes and its gradient (N, n_bore + 1, 2)."""
+        x0 = self.reference[:, self.bore_nodes]
+        sine = float(np.einsum("sni,sni->", turned(x0), nodes))
+        cosine = float(np.einsum("sni,sni->", x0, nodes))
+        gradient = (cosine * turned(x0) - sine * x0) / (sine**2 + cosine**2)
+        return float(np.arctan2(sine, cosine)), gradient
+
+    def moved(
+        self, state: State, alpha: float, rotation: float, ring_rotation: float
+    ) -> State:
+        """Predictor: the field turned with the wave generator and the members.
+
+        Displacements in polar components travel with the wave generator through the
+        teeth, interpolated between sectors; the flexspline turns rigidly.
+        """
+        pitch = 2.0 * pi / self.element.sectors
+        ring_pitch = 2.0 * pi / self.circular_spline.profile.teeth
+        d_alpha = alpha - state.wave_generator_angle
+        shift = (d_alpha - (rotation - state.rotation)) / pitch
+        size, inside = self.element.face_size, self.element.bore_size
+        local = rotate(
+            np.concatenate([state.faces, state.bores], axis=1),
+            -(self.place + state.rotation)[:, None],
+        )
+        # displacements in sector frames repeat after half a turn
+        still = self.element.skeleton[: size + inside]
+        x = rotate(
+            still + travelled(local - still, shift),
+            (self.place + rotation)[:, None],
+        )
+        race = state.race
+        if self.race is not None and race is not None:
+            race = travelled(self.race.displaced(race, state.rotation), shift)
+            race = self.race.placed(race, rotation)
+        return replace(
+            state,
+            race=race,
+            faces=x[:, :size],
+            bores=x[:, size:],
+            pressure=travelled(state.pressure, shift),
+            touching=np.roll(state.touching, round(shift), axis=0),
+            flank_force=travelled(state.flank_force, shift),
+            ring_force=travelled(
+                state.ring_force,
+                (d_alpha - (ring_rotation - state.ring_rotation)) / ring_pitch,
+            ),
+            wave_generator_angle=alpha,
+            rotation=rotation,
+            ring_rotation=ring_rotation,
+        )
+
+    def placed(self, flank: Array, shift: Array | None) -> Array:
+        """Displacements of flank nodes (N, 2 n) [m] with the errors of their teeth."""
+        if shift is None:
+            return flank
+        return flank + np.tile(shift, flank.shape[1] // 2)
+
+    def ring_displacement(self, state: State) -> Array:
+        """Flank displacement of the circular spline (N_c, 2 n_c) [m]."""
+        compliance = self.circular_spline.compliance
+        if compliance is None:
+            return state.ring_force
+        return compliance.displacement(state.ring_force)
+
+
+def _pairs(nodes: Index) -> Index:
+    """Degrees of freedom x, y of nodes."""
+    return np.asarray((2 * nodes[:, None] + np.arange(2)).ravel())
+
+
+def travelled(values: Array, shift: float) -> Array:
+    """Rows moved on by a fraction of the ring, cubic between four neighbours."""
+    whole = int(np.floor(shift))
+    t = shift - whole
+    return np.asarray(
+        t * (t + 1) * (t - 1) / 6 * np.roll(values, whole + 2, axis=0)
+        - t * (t - 2) * (t + 1) / 2 * np.roll(values, whole + 1, axis=0)
+        + (t - 1) * (t - 2) * (t + 1) / 2 * np.roll(values, whole, axis=0)
+        - t * (t - 1) * (t - 2) / 6 * np.roll(values, whole - 1, axis=0)
+    )

@@ -1,0 +1,97 @@
+"""Equilibria as named arrays, for files from which a run goes on bit for bit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import fields, is_dataclass, replace
+from typing import Any, TypeVar
+
+import numpy as np
+
+from swgjoint.errors import Outcome
+from swgjoint.fe.common.following import Unloaded
+from swgjoint.fe.common.friction import SlipHistory
+from swgjoint.fe.plane.state import State
+from swgjoint.fe.plane.tooth_contact import Contacts
+from swgjoint.fe.solid.state import SolidState
+from swgjoint.fe.solid.teeth import ToothRows
+
+_KINDS: dict[str, type[Any]] = {
+    kind.__name__: kind
+    for kind in (State, SolidState, Contacts, ToothRows, SlipHistory, Unloaded)
+}
+_KIND = "kind"
+_NUMBERS = {"float": float, "int": int}
+
+T = TypeVar("T")
+
+
+def packed(value: Any, name: str) -> dict[str, Any]:
+    """Arrays of a state, or of what is part of one; its type by name with them.
+
+    Args:
+        value: A state, an array, a number, an outcome, a tuple of these, or None.
+        name: First part of the name of every array.
+    """
+    if value is None:
+        return {}
+    if isinstance(value, Outcome):
+        return {name: value.name}
+    if isinstance(value, tuple) and any(is_dataclass(one) for one in value):
+        found: dict[str, Any] = {f"{name}.{_KIND}": f"tuple {len(value)}"}
+        for k, one in enumerate(value):
+            found |= packed(one, f"{name}.{k}")
+        return found
+    if is_dataclass(value):
+        found = {f"{name}.{_KIND}": type(value).__name__}
+        for item in fields(value):
+            found |= packed(getattr(value, item.name), f"{name}.{item.name}")
+        return found
+    return {name: value}
+
+
+def unpacked(arrays: Mapping[str, Any], name: str) -> Any:
+    """What :func:`packed` was given; None where nothing of that name is there.
+
+    Raises:
+        KeyError: If the arrays are not those of a state.
+        TypeError: As for ``KeyError``.
+        ValueError: As for ``KeyError``.
+    """
+    kind = arrays.get(f"{name}.{_KIND}")
+    if kind is None:
+        return arrays.get(name)
+    if str(kind).startswith("tuple "):
+        count = int(str(kind).removeprefix("tuple "))
+        return tuple(unpacked(arrays, f"{name}.{k}") for k in range(count))
+    cls = _KINDS[str(kind)]
+    given = {}
+    for item in fields(cls):
+        value = unpacked(arrays, f"{name}.{item.name}")
+        if value is None:
+            continue
+        if item.type in _NUMBERS:
+            value = _NUMBERS[str(item.type)](value)
+        elif item.type == "Outcome":
+            value = Outcome[str(value)]
+        elif item.type == "tuple[float, ...]":
+            value = tuple(float(one) for one in value)
+        given[item.name] = value
+    return cls(**given)
+
+
+def settled(value: T) -> T:
+    """The same with arrays that lie in memory as those of a file do.
+
+    Sums may depend on the order in memory in their last digit; a run that goes on from
+    a file shall not differ from one that never stopped.
+    """
+    changed: Any = value
+    if isinstance(value, np.ndarray):
+        changed = np.ascontiguousarray(value) if value.ndim else value
+    elif isinstance(value, tuple):
+        changed = tuple(settled(one) for one in value)
+    elif is_dataclass(value) and not isinstance(value, type):
+        parts: Iterable[str] = (item.name for item in fields(value))
+        changed = replace(value, **{key: settled(getattr(value, key)) for key in parts})
+    return changed  # type: ignore[no-any-return]

@@ -1,0 +1,193 @@
+"""Static condensation of one tooth sector to the nodes that a drive model needs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+from scipy.sparse.linalg import splu
+
+from swgjoint.fe.common.contact_patch import averaged_spline
+from swgjoint.fe.plane.elasticity import (
+    nodal_stress_operator,
+    plane_basis,
+    stiffness_matrix,
+)
+from swgjoint.fe.plane.sector_mesh import SectorMesh
+from swgjoint.gear.teeth.profile import ToothProfile
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Superelement:
+    r"""Condensed sector, in the frame of its tooth (tooth centred on +y).
+
+    Skeleton nodes (a): first face, inner bore nodes, last face. Flank nodes (b): right
+    then left flank, without those on the faces. With the flanks loaded by forces F,
+
+    .. math:: d_b = A d_a + C F, \quad
+        f_a = \hat K d_a - A^T F, \quad
+        \sigma = M_a d_a + M_F F .
+
+    Vectors list x and y of node after node.
+    """
+
+    sectors: int
+    skeleton: Array
+    """Reference positions of the skeleton nodes [m]. Shape (n_a, 2)."""
+    face_size: int
+    stiffness: Array
+    """K hat [N/m]. Shape (2 n_a, 2 n_a)."""
+    flank_from_skeleton: Array
+    """A. Shape (2 n_b, 2 n_a)."""
+    flank_compliance: Array
+    """C [m/N]. Shape (2 n_b, 2 n_b)."""
+    stress_from_skeleton: Array
+    """M_a [Pa/m]. Shape (n_nodes, 3, 2 n_a)."""
+    stress_from_flank: Array
+    """M_F [Pa/N]. Shape (n_nodes, 3, 2 n_b)."""
+    displacement_from_skeleton: Array
+    """Of all nodes, like the stress [-]. Shape (n_nodes, 2, 2 n_a)."""
+    displacement_from_flank: Array
+    """[m/N]. Shape (n_nodes, 2, 2 n_b)."""
+    axial_stress: float = 0.0
+    """Axial stress over the sum of the normal stresses in the plane, c nu [-]; see
+    :func:`swgjoint.fe.plane.elasticity.in_plane_constants`."""
+    mesh: SectorMesh
+    profile: ToothProfile
+    spline: CubicSpline
+    """Weights of the flank nodes in the displacement of a patch at an arc length."""
+
+    @property
+    def flank_size(self) -> int:
+        """Nodes of one flank."""
+        return int(self.flank_compliance.shape[0]) // 4
+
+    @property
+    def bore_size(self) -> int:
+        """Bore nodes inside the sector, faces excluded."""
+        return len(self.skeleton) - 2 * self.face_size
+
+    @cached_property
+    def rim_slopes(self) -> Array:
+        r"""Rows B of the rotations of the rim against the frame, at the bore.
+
+        One row per interval between bore nodes, times the root of its length:
+        :math:`\int \omega^2 ds = d^T B^T B d` [m^(-1/2)]. Shape (n_bore + 1, 2 n_a).
+        """
+        size, count = self.face_size, len(self.skeleton)
+        along = np.r_[size - 1 : size + self.bore_size, count - 1]
+        chord = np.diff(self.skeleton[along], axis=0)
+        length = np.hypot(chord[:, 0], chord[:, 1])
+        # rotation of a chord: its ends apart along its normal, over its length
+        row = np.stack([-chord[:, 1], chord[:, 0]], axis=-1) / length[:, None] ** 1.5
+        rows, interval = np.zeros((len(chord), count, 2)), np.arange(len(chord))
+        rows[interval, along[1:]] = row
+        rows[interval, along[:-1]] = -row
+        return rows.reshape(len(chord), -1)
+
+    @cached_property
+    def elongation(self) -> Array:
+        """Uniform elongation of the sector by a unit of its bore's length (2 n_a,)."""
+        size = self.face_size
+        x = self.skeleton[:, 0]
+        moved = np.zeros_like(self.skeleton)
+        moved[:, 0] = (x - x.mean()) / abs(x[size - 1] - x[-1])
+        return moved.ravel()
+
+    @property
+    def flank_range(self) -> tuple[float, float]:
+        """Arc length over which a flank can touch: between the lands [m]."""
+        low, high = self.profile.contact_range
+        return max(low, float(self.spline.x[0])), min(high, float(self.spline.x[-1]))
+
+
+def condense(
+    mesh: SectorMesh,
+    profile: ToothProfile,
+    *,
+    youngs_modulus: float,
+    poisson_ratio: float,
+    width: float,
+    confinement: float = 0.0,
+) -> Superelement:
+    """Condense a sector mesh, in real arithmetic, once per member.
+
+    Args:
+        mesh: Sector of one tooth.
+        profile: Its flank.
+        youngs_modulus: [Pa].
+        poisson_ratio: [-].
+        width: Face width [m].
+        confinement: 0 in plane stress, 1 in plane strain [-].
+    """
+    basis = plane_basis(mesh.mesh)
+    matrix = stiffness_matrix(basis, youngs_modulus, poisson_ratio, width, confinement)
+    skeleton = np.concatenate([mesh.face_first, mesh.bore[1:-1], mesh.face_last])
+    flank = np.concatenate([mesh.flank_right[:-1], mesh.flank_left[:-1]])
+
+    def dofs(nodes: Index) -> Index:
+        return np.asarray(basis.nodal_dofs[:, nodes].T.ravel(), dtype=np.int64)
+
+    a, b = dofs(skeleton), dofs(flank)
+    kept = np.concatenate([a, b])
+    inner = np.setdiff1d(np.arange(basis.N), kept)
+    columns = matrix.tocsc()
+    factor = splu(
+        columns[np.ix_(inner, inner)],
+        permc_spec="MMD_AT_PLUS_A",
+        options={"SymmetricMode": True},
+    )
+    inner_from_kept = -factor.solve(columns[np.ix_(inner, kept)].toarray())
+    reduced = columns[np.ix_(kept, kept)].toarray()
+    reduced += columns[np.ix_(kept, inner)] @ inner_from_kept
+    reduced = 0.5 * (reduced + reduced.T)
+
+    n = a.size
+    compliance = np.linalg.inv(reduced[n:, n:])
+    compliance = 0.5 * (compliance + compliance.T)
+    flank_from_skeleton = -compliance @ reduced[n:, :n]
+    stiffness = reduced[:n, :n] + reduced[:n, n:] @ flank_from_skeleton
+    stiffness = 0.5 * (stiffness + stiffness.T)
+
+    # all degrees of freedom from the kept ones, then from skeleton and flank forces
+    recovery = np.zeros((basis.N, kept.size))
+    recovery[kept, np.arange(kept.size)] = 1.0
+    recovery[inner] = inner_from_kept
+    all_from_a = recovery[:, :n] + recovery[:, n:] @ flank_from_skeleton
+    all_from_flank = recovery[:, n:] @ compliance
+    operator = nodal_stress_operator(basis, youngs_modulus, poisson_ratio, confinement)
+    from_a, from_flank = operator @ all_from_a, operator @ all_from_flank
+    at_nodes = basis.nodal_dofs.T.ravel()
+    # sectors travel a thousand times farther than they strain: make rigid translation
+    # free of force and stress to the last digit, not only to the solver's
+    move = np.tile(np.eye(2), (len(skeleton), 1)) / np.sqrt(len(skeleton))
+    strain = np.eye(n) - move @ move.T
+    stiffness = strain @ stiffness @ strain
+    from_a = from_a @ strain
+    carried = np.tile(np.eye(2), (len(flank), 1)) / np.sqrt(len(skeleton))
+    flank_from_skeleton += (carried - flank_from_skeleton @ move) @ move.T
+
+    nodes = mesh.mesh.p.shape[1]
+    stations = mesh.flank_stations[:-1]
+    return Superelement(
+        sectors=profile.teeth,
+        skeleton=np.ascontiguousarray(mesh.mesh.p[:, skeleton].T),
+        face_size=len(mesh.face_first),
+        stiffness=stiffness,
+        flank_from_skeleton=flank_from_skeleton,
+        flank_compliance=compliance,
+        stress_from_skeleton=from_a.reshape(nodes, 3, -1),
+        stress_from_flank=from_flank.reshape(nodes, 3, -1),
+        displacement_from_skeleton=all_from_a[at_nodes].reshape(nodes, 2, -1),
+        displacement_from_flank=all_from_flank[at_nodes].reshape(nodes, 2, -1),
+        axial_stress=confinement * poisson_ratio,
+        mesh=mesh,
+        profile=profile,
+        spline=averaged_spline(stations),
+    )

@@ -1,0 +1,456 @@
+"""Closest points between the deformed flexspline flanks and the circular spline.
+
+Both flanks are smooth: analytic profiles that carry displacements interpolated by cubic
+splines and averaged over the patch of a contact. Facets would leak their chord error,
+about a micrometre, into a kinematic error that is itself a matter of micrometres.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from math import pi
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from swgjoint.fe.plane.circular_spline import CircularSpline, Feet, FlankSplines
+from swgjoint.fe.plane.corotation import rotate
+from swgjoint.gear.teeth.profile import ToothProfile
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+SAMPLES_PER_NODE = 2
+DENSE_SAMPLES = 8
+REFINEMENTS = 6
+REFINED = 1e-12
+"""Change of the stations at which a refinement ends [m]."""
+MERGE = 1e-6  # of the flank: points closer than that are one contact
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Contacts:
+    """Candidate contact points; n of them."""
+
+    sector: Index
+    side: Index
+    """0 for the right (clockwise) flank of the flexspline tooth, 1 for the left."""
+    station: Array
+    """Arc length on the flexspline profile [m]."""
+    gap: Array
+    """Distance to the circular spline, positive when apart [m]."""
+    normal: Array
+    """Out of the circular spline's steel, in the sector frame. Shape (n, 2)."""
+    point: Array
+    """Position in the sector frame [m]. Shape (n, 2)."""
+    weight: Array
+    """Derivative of the gap by the flank displacements. Shape (n, 2 n_b)."""
+    tooth: Index
+    """Tooth of the circular spline."""
+    ring_weight: Array
+    """Derivative of the gap by that tooth's flank displacements; no columns if it is
+    rigid. Shape (n, 2 n_c)."""
+    tangent: Array
+    """Along the flank from tip to root, in the sector frame. Shape (n, 2)."""
+    sliding: Array
+    """Derivative of the motion along the tangent by the flank displacements, as
+    ``weight``; no columns without friction. Shape (n, 2 n_b)."""
+    ring_sliding: Array
+    """The same by the flank displacements of the circular spline. Shape (n, 2 n_c)."""
+    slip: Array
+    """Sum of the arc lengths of the two material points, tips to roots; NaN on a rigid
+    circular spline [m]. Shape (n,)."""
+
+    def __len__(self) -> int:
+        return len(self.sector)
+
+    @classmethod
+    def none(cls, flank_dofs: int, ring_dofs: int) -> Contacts:
+        """No contact at all."""
+        empty, index = np.zeros(0), np.zeros(0, dtype=np.int64)
+        return cls(
+            sector=index,
+            side=index,
+            station=empty,
+            gap=empty,
+            normal=np.zeros((0, 2)),
+            point=np.zeros((0, 2)),
+            weight=np.zeros((0, flank_dofs)),
+            tooth=index,
+            ring_weight=np.zeros((0, ring_dofs)),
+            tangent=np.zeros((0, 2)),
+            sliding=np.zeros((0, flank_dofs)),
+            ring_sliding=np.zeros((0, ring_dofs)),
+            slip=empty,
+        )
+
+    @classmethod
+    def joined(cls, first: Contacts, second: Contacts) -> Contacts:
+        """The points of both, one after the other."""
+        return cls(
+            **{
+                key: np.concatenate([getattr(first, key), getattr(second, key)])
+                for key in cls.__dataclass_fields__
+            }
+        )
+
+    def along_flanks(self, gap: Array) -> Contacts:
+        """The same points with the tangent in place of the normal."""
+        return replace(
+            self,
+            gap=gap,
+            normal=self.tangent,
+            weight=self.sliding,
+            ring_weight=self.ring_sliding,
+        )
+
+    def nearest_in(self, others: Contacts) -> Index:
+        """The nearest of others on the same pair of flanks, -1 without one (n,)."""
+        result = np.full(len(self), -1, dtype=np.int64)
+        if len(others) and len(self):
+            same = (
+                (self.sector[:, None] == others.sector)
+                & (self.side[:, None] == others.side)
+                & (self.tooth[:, None] == others.tooth)
+            )
+            apart = np.abs(self.station[:, None] - others.station)
+            apart = np.where(same, apart, np.inf)
+            near = apart.argmin(axis=1)
+            found = np.isfinite(apart[np.arange(len(self)), near])
+            result[found] = near[found]
+        return result
+
+    def on_flanks_of(self, others: Contacts) -> NDArray[np.bool_]:
+        """Which points lie on a flank on which others lie. Shape (n,)."""
+        key, other = 2 * self.sector + self.side, 2 * others.sector + others.side
+        return np.isin(key, other)
+
+    def chosen(self, index: Index) -> Contacts:
+        """The candidates with the given indices."""
+        return Contacts(
+            **{key: getattr(self, key)[index] for key in self.__dataclass_fields__}
+        )
+
+
+_MIRROR = np.array([[1.0, 1.0], [-1.0, 1.0]])  # by side, into the right flank's frame
+
+
+class Flanks(Protocol):
+    """Both flanks of the flexspline's teeth in one plane."""
+
+    @property
+    def profile(self) -> ToothProfile:
+        """The right flank."""
+
+    @property
+    def spline(self) -> CubicSpline:
+        """Weights of the flank nodes in the displacement at an arc length."""
+
+    @property
+    def flank_size(self) -> int:
+        """Nodes of one flank."""
+
+    @property
+    def flank_range(self) -> tuple[float, float]:
+        """Arc length over which a flank can touch [m]."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ToothContact:
+    """Search for contact candidates at one state."""
+
+    element: Flanks
+    circular_spline: CircularSpline
+    ring_flank: Array
+    """Displacement of the circular spline's flank nodes in the frames of its teeth,
+    manufacturing errors included, one row per tooth of the model; no columns if rigid
+    [m]. Shape (N_c, 2 n_c)."""
+    angle: Array
+    """Angles of the sector frames against the circular spline (N,) [rad]."""
+    bearing: Array
+    """Polar angles of the teeth against the circular spline, which tell the tooth space
+    that they enter (N,) [rad]."""
+    rubs: bool = False
+    """Whether the candidates need their rows along the flanks."""
+
+    @cached_property
+    def _ring_flanks(self) -> FlankSplines | None:
+        """Displacements of the ring's flanks, mirrored; flank 2 tooth + side."""
+        ring = self.circular_spline
+        if not ring.flank_dofs:
+            return None
+        shaped = self.ring_flank.reshape(-1, 2, ring.flank_dofs // 4, 2)
+        shaped = shaped * _MIRROR[:, None, :]
+        return FlankSplines.through(ring.spline, shaped.reshape(-1, *shaped.shape[2:]))
+
+    def search(
+        self,
+        flank: Array,
+        reach: float,
+        held: Contacts | None,
+        *,
+        thorough: bool = True,
+    ) -> Contacts:
+        """Local minima of the gap along every flank, and the points that held before.
+
+        The gap must not be negative anywhere on a flank: a condition on a continuum.
+        Where flanks conform (straight on straight) its minimum jumps from end to end of
+        the contact, so points that carry force stay in the working set beside the new
+        minima (exchange method of semi-infinite programming).
+
+        Args:
+            flank: Displacement of the flank nodes in the sector frames (N, 2 n_b) [m].
+            reach: Candidates with a larger gap are left out [m].
+            held: Points of the last iteration that carry force.
+            thorough: Whether to look between the nodes with the displaced circular
+                spline; conforming flanks have minima less than a node apart.
+        """
+        element = self.element
+        size = element.flank_size
+        low, high = element.flank_range
+        # flanks in their mirrored frames: (N, 2 sides, size, 2)
+        shaped = flank.reshape(-1, 2, size, 2) * _MIRROR[:, None, :]
+        sides = shaped.reshape(-1, size, 2)
+        sector, side = np.divmod(np.arange(len(sides)), 2)
+        s, gap, sector, side = self._sampled(
+            SAMPLES_PER_NODE, sides, sector, side, rigid=True
+        )
+        near = gap.min(axis=1, initial=np.inf) < reach + 0.02 * (high - low)
+        gap, sector, side = gap[near], sector[near], side[near]
+        if thorough:
+            s, gap, sector, side = self._sampled(
+                DENSE_SAMPLES, shaped[sector, side], sector, side, rigid=False
+            )
+        padded = np.pad(gap, ((0, 0), (1, 1)), constant_values=np.inf)
+        minimum = (
+            np.isfinite(gap)
+            & (gap <= padded[:, :-2])
+            & (gap < padded[:, 2:])
+            & (gap < reach + 0.02 * (high - low))
+        )
+        index, k = np.nonzero(minimum)
+        sector, side = sector[index], side[index]
+        station = self._refine(s[k], shaped[sector, side], sector, side, s[1] - s[0])
+        if held is not None and len(held):
+            key, old_key = 2 * sector + side, 2 * held.sector + held.side
+            same = (key[:, None] == old_key) & (
+                np.abs(station[:, None] - held.station) < MERGE * (high - low)
+            )
+            stay = ~same.any(axis=0)
+            sector = np.concatenate([sector, held.sector[stay]])
+            side = np.concatenate([side, held.side[stay]])
+            station = np.concatenate([station, held.station[stay]])
+        return self._gather(sector, side, station, flank, reach)
+
+    def _sampled(
+        self, per_node: int, sides: Array, sector: Index, side: Index, *, rigid: bool
+    ) -> tuple[Array, Array, Index, Index]:
+        """Gaps at equal steps along those flanks that reach into the circular spline.
+
+        Args:
+            per_node: Samples per flank node.
+            sides: Displacements of the flanks in their mirrored frames (n, size, 2).
+            sector: Sector of each flank (n,).
+            side: Side of each flank (n,).
+            rigid: Whether to leave the circular spline's own micrometres out.
+
+        Returns:
+            Stations (n_samples,), gaps (n_deep, n_samples), sectors and sides.
+        """
+        element = self.element
+        s = np.linspace(*element.flank_range, per_node * element.flank_size)
+        base, outward, _ = element.profile.evaluate(s)
+        points = base + element.spline(s) @ sides
+        # a flank can touch only where it reaches beyond the ring's tip circle
+        farthest = np.hypot(points[..., 0], points[..., 1]).max(axis=-1)
+        deep = farthest > self.circular_spline.profile.addendum_radius
+        sector, side = sector[deep], side[deep]
+        seen = self._feet(
+            points[deep].reshape(-1, 2),
+            np.tile(outward, (len(sector), 1)),
+            np.repeat(sector, s.size),
+            np.repeat(side, s.size),
+            rigid=rigid,
+            steps=2,
+        )
+        return s, seen.feet.gap.reshape(len(sector), s.size), sector, side
+
+    def _feet(
+        self,
+        points: Array,
+        outward: Array,
+        sector: Index,
+        side: Index,
+        *,
+        rigid: bool = False,
+        start: Array | None = None,
+        steps: int = 3,
+    ) -> _Seen:
+        """Feet on the circular spline of points in the mirrored sector frames.
+
+        Args:
+            points: On the displaced flanks (n, 2) [m].
+            outward: Normals of the flexspline there (n, 2).
+            sector: Sector of each point (n,).
+            side: Side of each point (n,).
+            rigid: Whether to leave the circular spline's own micrometres out.
+            start: Stations near the feet (n,) [m].
+            steps: Newton steps to the foot.
+        """
+        ring = self.circular_spline
+        teeth = ring.profile.teeth
+        pitch = 2.0 * pi / teeth
+        sign = np.where(side == 0, 1.0, -1.0)
+        # mirrored global frame: the tooth stands at sign * angle; a right flank faces
+        # the left flank of the next ring tooth clockwise, half a pitch from the space
+        space = np.round(sign * self.bearing[sector] / pitch)
+        turn = sign * self.angle[sector] - (space - 0.5) * pitch
+        seen = rotate(points, turn) * _MIRROR[1]
+        facing = rotate(outward, turn) * _MIRROR[1]
+        # ring tooth j stands half a pitch counter-clockwise from space j
+        tooth = np.where(side == 0, space - 1, -space).astype(np.int64)
+        tooth %= len(self.ring_flank)
+        flanks = None if rigid else self._ring_flanks
+        feet = ring.feet(
+            seen,
+            flanks,
+            2 * tooth + 1 - side,
+            facing=facing,
+            start=start,
+            steps=steps,
+        )
+        return _Seen(
+            feet=feet,
+            normal=rotate(feet.normal * _MIRROR[1], -turn),
+            rest=rotate(feet.rest * _MIRROR[1], -turn),
+            tooth=tooth,
+        )
+
+    def _displaced(self, s: Array, mirrored: Array) -> tuple[Array, Array, Array]:
+        """Points of displaced flanks, their tangents from tip to root, curvatures."""
+        element = self.element
+        base, outward, curvature = element.profile.evaluate(s)
+        point = base + np.einsum("ks,ksi->ki", element.spline(s), mirrored)
+        # tangent of the profile from tip to root: the outward normal turned back
+        tangent = np.stack([outward[:, 1], -outward[:, 0]], axis=-1)
+        slope = np.einsum("ks,ksi->ki", element.spline(s, 1), mirrored)
+        return point, tangent + slope, curvature
+
+    def _refine(
+        self,
+        station: Array,
+        mirrored: Array,
+        sector: Index,
+        side: Index,
+        spacing: float,
+    ) -> Array:
+        """Newton's method on the slope of the gap along the flank."""
+        element = self.element
+        low, high = element.flank_range
+        low_s = np.maximum(station - spacing, low)
+        high_s = np.minimum(station + spacing, high)
+        s, foot = station, None
+        for _ in range(REFINEMENTS):
+            point, tangent, curvature = self._displaced(s, mirrored)
+            seen = self._feet(
+                point,
+                _outward(tangent),
+                sector,
+                side,
+                start=foot,
+                steps=3 if foot is None else 2,
+            )
+            foot, corner = seen.feet.station, seen.feet.corner
+            slope = np.einsum("ki,ki->k", seen.normal, tangent)
+            relative = curvature + seen.feet.curvature
+            if corner.any():
+                # the point of the flank that is closest to the corner
+                beside = np.einsum("ki,ki->k", seen.rest, tangent)
+                slope = np.where(corner, beside, slope)
+                depth = np.einsum("ki,ki->k", seen.rest, seen.normal)
+                relative = np.where(corner, 1.0 + curvature * depth, relative)
+            # the bracket holds the minimum: shrink it, and stay inside
+            high_s = np.where(slope > 0.0, s, high_s)
+            low_s = np.where(slope <= 0.0, s, low_s)
+            newton = s - slope / np.where(np.abs(relative) > 1e-3, relative, 1e-3)
+            good = (relative > 1e-3) & (newton >= low_s) & (newton <= high_s)
+            last, s = s, np.where(good, newton, 0.5 * (low_s + high_s))
+            if np.abs(s - last).max(initial=0.0) < REFINED:
+                break
+        return s
+
+    def _gather(
+        self,
+        sector: Index,
+        side: Index,
+        station: Array,
+        flank: Array,
+        reach: float,
+    ) -> Contacts:
+        element = self.element
+        size = element.flank_size
+        n = len(sector)
+        shaped = flank.reshape(-1, 2, size, 2)[sector, side]
+        spline = element.spline(station) if n else np.zeros((0, size))
+        mirror = _MIRROR[side]
+        mirrored, tangent, _ = self._displaced(station, shaped * mirror[:, None, :])
+        point = mirrored * mirror
+        seen = self._feet(mirrored, _outward(tangent), sector, side)
+        normal = seen.normal * mirror
+        # in the mirrored frame the flexspline's normal is -n: its tangent is J n
+        tangent = np.stack([-seen.normal[:, 1], seen.normal[:, 0]], axis=-1) * mirror
+        # the mirror between a flank and the one that it faces turns tangents over
+        facing, out = _MIRROR[1 - side], seen.feet.normal
+        ring_normal = out * facing
+        ring_tangent = np.stack([out[:, 1], -out[:, 0]], axis=-1) * facing
+        ring_spline = np.zeros((n, 0))
+        slip, none = np.full(n, np.nan), np.zeros((n, 0))
+        if seen.feet.station is not None:
+            ring_spline = self.circular_spline.spline(seen.feet.station)
+            slip = station + seen.feet.station
+        found = Contacts(
+            sector=sector,
+            side=side,
+            station=station,
+            gap=seen.feet.gap,
+            normal=normal,
+            point=point,
+            weight=_on_flank(side, spline, normal),
+            tooth=seen.tooth,
+            ring_weight=-_on_flank(1 - side, ring_spline, ring_normal),
+            tangent=tangent,
+            sliding=_on_flank(side, spline, tangent) if self.rubs else none,
+            ring_sliding=-_on_flank(1 - side, ring_spline, ring_tangent)
+            if self.rubs
+            else none,
+            slip=slip,
+        )
+        return found.chosen(np.flatnonzero(found.gap < reach))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Seen:
+    """Feet of points, with their normals back in the mirrored sector frames."""
+
+    feet: Feet
+    normal: Array
+    rest: Array
+    """From a corner to the point (n, 2) [m]."""
+    tooth: Index
+
+
+def _outward(tangent: Array) -> Array:
+    """Unit normals out of the flexspline, tangents from tip to root."""
+    size = np.hypot(tangent[:, 0], tangent[:, 1])
+    return np.asarray(np.stack([-tangent[:, 1], tangent[:, 0]], -1) / size[:, None])
+
+
+def _on_flank(side: Index, spline: Array, direction: Array) -> Array:
+    """Rows over both flanks of a tooth (n, 4 n_nodes) that act on one of them."""
+    n, nodes = spline.shape
+    rows = np.zeros((n, 2, nodes, 2))
+    rows[np.arange(n), side] = spline[:, :, None] * direction[:, None, :]
+    return rows.reshape(n, 4 * nodes)

@@ -1,0 +1,126 @@
+"""Motion of the teeth as the finite elements find it, for conjugate profiles.
+
+The neutral line of :mod:`swgjoint.gear.teeth.neutral_line` follows the wave generator
+and does not stretch; a real rim also bends between its teeth, lifts where nothing
+carries it and holds some tension. Here every tooth goes where its flanks go when the
+wave generator deflects the flexspline.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from math import pi
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import CubicSpline
+
+from swgjoint.errors import ComputationError
+from swgjoint.fe.plane.continuation import Continuation
+from swgjoint.fe.plane.corotation import rotate, turned
+from swgjoint.fe.plane.drive2d import can_halve, ring_model
+from swgjoint.gear.design.design import Design, MemberName
+from swgjoint.gear.teeth.conjugate import conjugate_profile
+from swgjoint.gear.teeth.neutral_line import Pose
+from swgjoint.gear.teeth.profile import ToothProfile
+from swgjoint.gear.teeth.tooth_motion import tooth_motions
+from swgjoint.units import mm
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class DeflectedRim:
+    """Poses of the teeth on a deflected rim, smooth between the teeth."""
+
+    lobes: int
+    radius: float
+    """Radius of the point of the tooth that is followed [m]."""
+    place: Array
+    """Angles of the teeth on the undeflected rim, from a lobe (n + 1,) [rad]; the last
+    is the first again, a period later."""
+    moved: Array
+    """Tangential and radial displacement of that point [m] and rotation of the tooth
+    [rad], in the frame of its place (n + 1, 3)."""
+
+    @cached_property
+    def _spline(self) -> CubicSpline:
+        return CubicSpline(self.place, self.moved, bc_type="periodic")
+
+    def pose(self, theta: ArrayLike) -> Pose:
+        """Pose of a tooth at the rim angle theta, frame of the wave generator.
+
+        Args:
+            theta: Angles of the undeflected rim from a lobe, counter-clockwise (n,)
+                [rad].
+        """
+        theta = np.asarray(theta, dtype=float)
+        value, slope = self._spline(theta), self._spline(theta, 1)
+        # +x of the tooth frame points clockwise
+        local = np.stack([-value[:, 0], self.radius + value[:, 1]], axis=-1)
+        rate = np.stack([-slope[:, 0], slope[:, 1]], axis=-1)
+        rate += turned(local)
+        return Pose(
+            point=rotate(local, theta),
+            angle=theta + value[:, 2],
+            d_point=rotate(rate, theta),
+            d_angle=1.0 + slope[:, 2],
+        )
+
+
+def deflected_rim(design: Design) -> DeflectedRim:
+    """Deflect the flexspline and follow its teeth, each by its flanks.
+
+    Raises:
+        DesignError: If the design cannot be built.
+        ComputationError: If the deflection fails.
+    """
+    model = ring_model(
+        design,
+        half=can_halve(design, bearing=False),
+        elastic_circular_spline=False,
+        friction=False,
+        bearing=False,
+    )
+    state = Continuation(model=model, ratio=design.ratio).deflected()
+    if not state.outcome.ok:
+        raise ComputationError(
+            f"{design.drive.name}: deflection by the wave generator failed: "
+            f"{state.outcome.value}"
+        )
+    element, frames = model.element, model.frames(state)
+    stations = element.mesh.flank_stations[:-1]
+    right, _, _ = element.profile.evaluate(stations)
+    still = np.concatenate([right, right * np.array([-1.0, 1.0])])
+    flank = frames.displacement @ element.flank_from_skeleton.T
+    nodes = still + flank.reshape(model.sectors, -1, 2)
+    # rigid motion of the flanks of each tooth, seen in its sector frame
+    centre, middle = still.mean(axis=0), nodes.mean(axis=1)
+    about, seen = still - centre, nodes - middle[:, None]
+    cross = np.einsum("ni,sni->s", turned(about), seen)
+    turn = np.arctan2(cross, np.einsum("ni,sni->s", about, seen))
+    radius = design.flexspline_inner_radius + 0.5 * design.flexspline.rim_mm * mm
+    foot = middle + rotate(
+        np.broadcast_to(np.array([0.0, radius]) - centre, middle.shape), turn
+    )
+    spin = frames.angle - model.place
+    foot = rotate(foot, spin)
+    moved = np.stack([-foot[:, 0], foot[:, 1] - radius, spin + turn], axis=-1)
+    return DeflectedRim(
+        lobes=design.lobes,
+        radius=radius,
+        place=np.append(model.place, 2.0 * pi / model.copies),
+        moved=np.concatenate([moved, moved[:1]]),
+    )
+
+
+def conjugate_by_fe(design: Design, member: MemberName) -> ToothProfile:
+    """Profile of ``member`` conjugate to the other one under the true motion.
+
+    Raises:
+        DesignError: If there is no such tooth, in one line that names the key.
+        ComputationError: If the deflection fails.
+    """
+    motions = tooth_motions(design, line=deflected_rim(design))
+    return conjugate_profile(design, member, motions=motions)

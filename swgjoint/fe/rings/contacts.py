@@ -1,0 +1,151 @@
+"""Forces between the thin rings, the balls and the teeth, and their tangent."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.fe.plane.corotation import rotate, turned
+from swgjoint.fe.rings.assembly import Assembly
+from swgjoint.fe.rings.facing import Facing, facing
+from swgjoint.fe.rings.model import ThinRing
+from swgjoint.fe.rings.race_on_balls import PressedBalls, pressed_form
+from swgjoint.fe.rings.state import RingState
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+PARTS = ("rim", "race", "balls", "bore", "teeth")
+"""What stores energy; bore is what the rim presses on the race."""
+
+
+def linearised(
+    model: ThinRing, state: RingState, *, teeth: bool
+) -> tuple[RingState, Assembly, int]:
+    """Forces and tangent at the positions of a state, and the coordinate that is held.
+
+    Args:
+        model: The rings.
+        state: Their positions and where contacts were; forces are written anew.
+        teeth: Whether the teeth touch.
+    """
+    total = Assembly(model.size)
+    first = model.rim.size
+    rim, race = state.q[:first], state.q[first:]
+    both = (("rim", model.rim, rim, 0), ("race", model.race, race, first))
+    for name, ring, q, shift in both:
+        gradient, hessian = ring.forces(q)
+        total.energy += ring.energy(q)
+        total.gradient[shift : shift + ring.size] += gradient
+        total.add(name, ring.dofs + shift, None, hessian)
+    state = _balls(model, state, race, total)
+    state = _bore(model, state, rim, race, total)
+    if teeth:
+        state = _teeth(model, state, rim, total)
+    else:
+        state = replace(state, contacts=None, tooth_force=None, tooth_moment=0.0)
+    # the tangential coordinate of race node 0, whichever axis it is nearer to
+    node = race.reshape(-1, 2, 2)[0, 0]
+    held = first + (0 if abs(node[1]) > abs(node[0]) else 1)
+    total.gradient[held] = 0.0
+    return replace(state, energy=total.energy), total, held
+
+
+def race_on_balls(model: ThinRing, state: RingState, race: Array) -> PressedBalls:
+    """Balls of a state under a race with given coordinates."""
+    return model.pressed(race, state.alpha, state.phase, state.ball_feet)
+
+
+def _balls(
+    model: ThinRing, state: RingState, race: Array, total: Assembly
+) -> RingState:
+    pressed = race_on_balls(model, state, race)
+    on = np.flatnonzero(pressed.overlap > 0.0)
+    near, overlap, force = pressed.seen.chosen(on), pressed.overlap, pressed.force
+    slope = 1.5 * model.ball_constant * np.sqrt(overlap[on])
+    total.energy += pressed.energy
+    _press(
+        total, "balls", near, near.by_ring, near.dofs + model.rim.size, force[on], slope
+    )
+    return replace(
+        state,
+        ball_feet=pressed.seen.place,
+        ball_force=force,
+        wave_generator_torque=pressed.input_torque,
+    )
+
+
+def _bore(
+    model: ThinRing, state: RingState, rim: Array, race: Array, total: Assembly
+) -> RingState:
+    """Unilateral contact of the rim's bore with the race."""
+    points = model.bore.points(rim)[0]
+    seen = facing(model.race, race, points, state.bore_feet, inside=False)
+    overlap = 0.5 * model.bearing.race_thickness - seen.distance
+    on = np.flatnonzero(overlap > 0.0)
+    near, k = seen.chosen(on), model.press_per_point
+    force = k * overlap[on]
+    dofs, rows, bend = model.bore.chosen(on).rows(rim, near)
+    both = np.concatenate([dofs, near.dofs + model.rim.size], axis=1)
+    # the turn of the section has a row of its own
+    by_both = np.zeros((len(on), 4, 16))
+    by_both[:, :2, :8], by_both[:, 3, :8] = rows[:, :2], rows[:, 2]
+    by_both[:, :3, 8:] = near.by_ring
+    total.energy += 0.5 * float(force @ overlap[on])
+    _press(total, "bore", near, by_both, both, force, np.full(len(on), k), bend)
+    return replace(state, bore_feet=seen.place)
+
+
+def _teeth(model: ThinRing, state: RingState, rim: Array, total: Assembly) -> RingState:
+    """Contact of the flanks."""
+    nodes = rim.reshape(-1, 2, 2)[:: model.nodes_per_tooth]
+    foot, slope = nodes[:, 0], nodes[:, 1]
+    contacts, angle = model.teeth.seen(foot, slope)
+    rows, second = model.teeth.rows(contacts, foot, slope, angle)
+    k = model.teeth.stiffness
+    force = -k * contacts.gap
+    j = contacts.sector
+    dofs = 4 * model.nodes_per_tooth * j[:, None] + np.arange(4)
+    total.energy += -0.5 * float(force @ contacts.gap)
+    hessian = k * rows[:, :, None] * rows[:, None, :] - force[:, None, None] * second
+    total.add("teeth", dofs, -force[:, None] * rows, hessian)
+    point = rotate(contacts.point, angle[j])
+    push = force[:, None] * rotate(contacts.normal, angle[j])
+    return replace(
+        state,
+        contacts=contacts,
+        tooth_force=force,
+        tooth_moment=float(np.sum(turned(point) * push)),
+    )
+
+
+def _press(
+    total: Assembly,
+    name: str,
+    seen: Facing,
+    rows: Array,
+    dofs: Index,
+    force: Array,
+    stiffness: Array,
+    bend: Array | None = None,
+) -> None:
+    r"""Add contacts of normal force F and tangent k.
+
+    Gradient :math:`-F\,dg`, Hessian :math:`k\,dg\,dg - F\,d^2g`.
+
+    Args:
+        total: Where to.
+        name: Of the part.
+        seen: The points.
+        rows: u_n, u_t, beta and perhaps a turn by the coordinates (n, 3 or 4, m).
+        dofs: These coordinates (n, m).
+        force: F (n,) [N].
+        stiffness: k (n,) [N/m].
+        bend: Factor of that turn squared in n . d2p (n,).
+    """
+    hessian = np.swapaxes(rows, 1, 2) @ (
+        pressed_form(seen, rows.shape[1], force, stiffness, bend) @ rows
+    )
+    total.add(name, dofs, -force[:, None] * rows[:, 0], hessian)

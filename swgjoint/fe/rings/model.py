@@ -1,0 +1,159 @@
+"""The thin-ring model of a design: rim, outer race, balls on a rigid cam, teeth.
+
+Plane, in the frame of the circular spline; the wave generator is turned by alpha. The
+rim is a line with the stiffness of its toothed sector, the race another inside it. They
+press on each other through half of either thickness, and nowhere pull.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.errors import DesignError
+from swgjoint.fe.plane.drive2d import sector
+from swgjoint.fe.rings.facing import Surface
+from swgjoint.fe.rings.hermite_ring import GAUSS, HermiteRing
+from swgjoint.fe.rings.race_on_balls import RaceOnBalls
+from swgjoint.fe.rings.sections import rim_section, tooth_pair_stiffness
+from swgjoint.fe.rings.teeth import Teeth
+from swgjoint.gear.bearing.ball_bearing import BallBearing
+from swgjoint.gear.bearing.checks import bearing_checks
+from swgjoint.gear.design.check import raise_faults
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.design.tolerances import tooth_errors
+from swgjoint.gear.teeth.profile import tooth_profile
+from swgjoint.units import mm
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+ELEMENTS = 190
+"""Fewest elements of a ring: eight between neighbouring balls of 23."""
+PER_ELEMENT = GAUSS[0][[0, 2]]
+"""Where bore and race are held apart, two points of equal weight on an element."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ThinRing(RaceOnBalls):
+    """All that an equilibrium needs, in SI."""
+
+    rim: HermiteRing
+    nodes_per_tooth: int
+    teeth: Teeth
+    press: float
+    """Stiffness of bore against race per length [N/m^2]."""
+
+    @cached_property
+    def bore(self) -> Surface:
+        """Points of the rim's bore that face the race."""
+        place = np.arange(self.rim.elements)[:, None] + PER_ELEMENT
+        offset = self.bearing.bore_radius - self.rim.radius
+        return Surface(ring=self.rim, place=place.ravel(), offset=offset)
+
+    @property
+    def press_per_point(self) -> float:
+        """[N/m]."""
+        return self.press * self.rim.step / len(PER_ELEMENT)
+
+    @property
+    def size(self) -> int:
+        """Degrees of freedom of both rings."""
+        return self.rim.size + self.race.size
+
+    @cached_property
+    def order(self) -> Index:
+        """Places of the coordinates in a narrow band.
+
+        Both rings together, from node 0 both ways at once: the band of a closed ring is
+        twice that of an open one. Shape (size,).
+        """
+        count = self.rim.elements
+        place = np.arange(count)
+        place = np.where(2 * place < count, 2 * place, 2 * (count - place) - 1)
+        both = 8 * place[:, None] + np.arange(8)
+        return np.concatenate([both[:, :4].ravel(), both[:, 4:].ravel()])
+
+
+def check_modelled(design: Design) -> None:
+    """Refuse what the ring model does not contain.
+
+    Raises:
+        DesignError: One line per key.
+    """
+    drive, faults = design.drive, []
+    if design.wave_generator.bearing is None:
+        faults.append(
+            "wave_generator.bearing is absent: the ring model is that of a wave"
+            " generator with its ball bearing; accepted: the table, or the 2d model"
+        )
+    if drive.layout != "circular_spline_fixed":
+        faults.append(
+            f"drive.layout = {drive.layout!r}: accepted by the ring model:"
+            " 'circular_spline_fixed'"
+        )
+    if design.wave_generator.kind not in ("elliptical", "cosine", "table"):
+        faults.append(
+            f"wave_generator.kind = {design.wave_generator.kind!r}: a bearing of the"
+            " ring model runs on 'elliptical', 'cosine' or 'table'"
+        )
+    if design.tolerances.misalignment_arcmin:
+        faults.append(
+            f"tolerances.misalignment_arcmin ="
+            f" {design.tolerances.misalignment_arcmin:g}: the ring model is a plane;"
+            " accepted: 0"
+        )
+    if design.friction.tooth_coefficient:
+        faults.append(
+            f"friction.tooth_coefficient = {design.friction.tooth_coefficient:g}: the"
+            " ring model has no friction; accepted: 0, or the 2d model"
+        )
+    if faults:
+        raise DesignError("\n".join(f"{drive.name}: {fault}" for fault in faults))
+
+
+def thin_ring(design: Design) -> ThinRing:
+    """Ring model of a design.
+
+    Raises:
+        DesignError: If the design cannot be built or holds what is not modelled.
+    """
+    check_modelled(design)
+    raise_faults(bearing_checks(design))
+    bearing = BallBearing.of(design)
+    flexspline = tooth_profile(design, "flexspline")
+    circular_spline = tooth_profile(design, "circular_spline")
+    own = sector(design, "flexspline", flexspline)
+    other = sector(design, "circular_spline", circular_spline)
+    section = rim_section(own)
+    count = flexspline.teeth
+    per_tooth = max(1, -(-ELEMENTS // count))
+    rim = HermiteRing(
+        radius=section.neutral_radius,
+        elements=count * per_tooth,
+        stretching=section.stretching,
+        bending=section.bending,
+    )
+    thickness = design.flexspline.rim_mm * mm
+    rim_steel = design.material_of("flexspline").youngs_modulus
+    yielding = 0.5 * (
+        thickness / rim_steel + bearing.race_thickness / bearing.material.youngs_modulus
+    )
+    ring_errors = tooth_errors(design, "circular_spline").shift
+    return ThinRing(
+        **vars(RaceOnBalls.of(design, rim.elements)),
+        rim=rim,
+        nodes_per_tooth=per_tooth,
+        teeth=Teeth(
+            flexspline=flexspline,
+            circular_spline=circular_spline,
+            foot_radius=section.neutral_radius,
+            stiffness=tooth_pair_stiffness(own, other),
+            shift=tooth_errors(design, "flexspline").shift,
+            ring_shift=ring_errors if ring_errors.any() else None,
+        ),
+        press=bearing.race_width / yielding,
+    )

@@ -1,0 +1,111 @@
+r"""The toothed rim as a line: stiffness and neutral radius from its plane sector.
+
+The teeth stiffen the rim; by how much comes out of the condensed sector of the plane
+finite elements. Its faces stay radial planes under a uniform stretch and bending, free
+to slide along themselves, and the sector is held back evenly along its bore.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import cos, pi, sin
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.fe.plane.circular_spline import ring_compliance
+from swgjoint.fe.plane.superelement import Superelement
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class RimSection:
+    """Section of the rim with its teeth, smeared over the pitch."""
+
+    stretching: float
+    """E A [N]."""
+    bending: float
+    """E I about the neutral line [N m^2]."""
+    neutral_radius: float
+    """Where bending does not stretch [m]."""
+
+
+def rim_section(element: Superelement) -> RimSection:
+    r"""Stretching and bending of a sector between its faces.
+
+    Both faces, p apart, turn by :math:`\omega` and move apart by a, normal to
+    themselves: :math:`u_n = a + \omega(r - r_b)`. From the energy
+    :math:`\tfrac12 S_{aa}a^2 + S_{a\omega}a\omega + \tfrac12 S_{\omega\omega}\omega^2`
+    that this takes,
+
+    .. math:: r_n = r_b + \frac{S_{a\omega}}{S_{aa}}, \quad
+        EA = \tfrac14 p r_n S_{aa}, \quad
+        EI = \tfrac14 p r_n \Bigl(S_{\omega\omega} - \frac{S_{a\omega}^2}{S_{aa}}\Bigr)
+
+    because the stretch is :math:`2a/(p r_n)` and the change of curvature
+    :math:`2\omega/(p r_n)`.
+
+    Args:
+        element: Condensed sector of the flexspline.
+    """
+    x, size = element.skeleton, element.face_size
+    count, half = len(x), pi / element.sectors
+    bore = float(np.hypot(*x[size - 1]))
+    rows, values = [], []
+    for nodes, side in (
+        (range(size), np.sign(x[0, 0])),
+        (range(count - size, count), np.sign(x[-1, 0])),
+    ):
+        outwards = np.array([side * cos(half), -sin(half)])
+        for node in nodes:
+            row = np.zeros((count, 2))
+            row[node] = outwards
+            rows.append(row.ravel())
+            values.append([1.0, float(np.hypot(*x[node])) - bore])
+    along = np.arange(size - 1, count - size + 1)  # the bore, both corners
+    held = np.zeros((count, 2))
+    held[along] = x[along] / np.hypot(*x[along].T)[:, None]
+    rows.append(held.ravel() / len(along))
+    values.append([0.0, 0.0])
+    constraint, wanted = np.array(rows), np.array(values)
+    n, m = 2 * count, len(constraint)
+    scale = float(np.mean(np.diag(element.stiffness)))
+    system = np.zeros((n + m, n + m))
+    system[:n, :n] = element.stiffness / scale
+    system[n:, :n], system[:n, n:] = constraint, constraint.T
+    right = np.zeros((n + m, 2))
+    right[n:] = wanted
+    moved = np.linalg.solve(system, right)[:n]
+    s = moved.T @ element.stiffness @ moved
+    neutral = bore + s[0, 1] / s[0, 0]
+    arc = 2.0 * half * neutral
+    return RimSection(
+        stretching=float(0.25 * arc * s[0, 0]),
+        bending=float(0.25 * arc * (s[1, 1] - s[0, 1] ** 2 / s[0, 0])),
+        neutral_radius=float(neutral),
+    )
+
+
+def tooth_pair_stiffness(
+    flexspline: Superelement, circular_spline: Superelement
+) -> float:
+    """Stiffness of a pair of teeth along the normal, half-way up the flanks [N/m].
+
+    The tooth of the flexspline on its rim, whose skeleton is held, and the tooth of the
+    circular spline, whose outside is; forces are averaged over the patch of a contact.
+    """
+    ring = ring_compliance(circular_spline)
+    own = ring.flank[int(np.flatnonzero(ring.offsets == 0)[0])]
+    total = 0.0
+    for element, compliance in (
+        (flexspline, flexspline.flank_compliance),
+        (circular_spline, own),
+    ):
+        middle = np.array([0.5 * sum(element.flank_range)])
+        _, normal, _ = element.profile.evaluate(middle)
+        size = element.flank_size
+        row = np.zeros((2, size, 2))
+        row[0] = element.spline(middle)[0][:, None] * normal
+        total += float(row.ravel() @ compliance @ row.ravel())
+    return 1.0 / total

@@ -1,0 +1,75 @@
+"""How far teeth and race slide between two equilibria, times what presses them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.fe.plane.corotation import rotate
+from swgjoint.fe.rings.facing import facing
+from swgjoint.fe.rings.model import ThinRing
+from swgjoint.fe.rings.state import RingState
+
+Array = NDArray[np.float64]
+
+
+def rubbing(model: ThinRing, first: RingState, last: RingState) -> tuple[float, float]:
+    r"""Sums of N |sigma| between two equilibria, of the teeth and of the race [J].
+
+    The mean of the forces at both ends; teeth that come in or leave count half.
+    """
+    return (
+        0.5 * (_teeth(model, first, last) + _teeth(model, last, first)),
+        _race(model, first, last),
+    )
+
+
+def _teeth(model: ThinRing, state: RingState, other: RingState) -> float:
+    """Contacts of one state, slid as their steel moves to the other."""
+    contacts, force = state.contacts, state.tooth_force
+    if contacts is None or force is None or not len(force):
+        return 0.0
+    j = contacts.sector
+    feet, angles = zip(*(_tooth_frames(model, s) for s in (state, other)), strict=True)
+    point = rotate(contacts.point, angles[0][j])
+    turn = angles[1][j] - angles[0][j]
+    moved = feet[1][j] + rotate(point - feet[0][j], turn) - point
+    along = rotate(contacts.tangent, angles[0][j])
+    return float(force @ np.abs(np.einsum("ni,ni->n", moved, along)))
+
+
+def _tooth_frames(model: ThinRing, state: RingState) -> tuple[Array, Array]:
+    """Where the teeth stand (N, 2) and how they are turned (N,)."""
+    nodes = state.q[: model.rim.size].reshape(-1, 2, 2)[:: model.nodes_per_tooth]
+    slope = nodes[:, 1]
+    return nodes[:, 0], np.arctan2(-slope[:, 1], -slope[:, 0])
+
+
+def _race(model: ThinRing, first: RingState, last: RingState) -> float:
+    """Points of the bore on the race, which creeps so that the work is least."""
+    forces, places = zip(*(_pressed(model, s) for s in (first, last)), strict=True)
+    count = model.race.elements
+    slid = np.mod(places[1] - places[0] + 0.5 * count, count) - 0.5 * count
+    # from the mean line of the race to its outside, where the rim slides
+    outside = 1.0 + 0.5 * model.bearing.race_thickness / model.race.radius
+    slid *= model.race.step * outside
+    weight = 0.5 * (forces[0] + forces[1])
+    return float(weight @ np.abs(slid - weighted_median(slid, weight)))
+
+
+def _pressed(model: ThinRing, state: RingState) -> tuple[Array, Array]:
+    """Forces of the bore's points on the race [N], and their places on it."""
+    rim, race = np.split(state.q, [model.rim.size])
+    points = model.bore.points(rim)[0]
+    seen = facing(model.race, race, points, state.bore_feet, inside=False)
+    overlap = 0.5 * model.bearing.race_thickness - seen.distance
+    return model.press_per_point * np.maximum(overlap, 0.0), seen.place
+
+
+def weighted_median(values: Array, weight: Array) -> float:
+    """Where the weighted sum of distances is least; zero without weight."""
+    order = np.argsort(values)
+    total = np.cumsum(weight[order])
+    if not total[-1] > 0.0:
+        return 0.0
+    return float(values[order][np.searchsorted(total, 0.5 * total[-1])])

@@ -1,0 +1,154 @@
+"""Rigid teeth on the rim and their gaps to those of the circular spline.
+
+The flanks are exact and the search for contact is that of the plane finite elements: a
+tooth that moves as a whole is a flank whose nodes all move alike.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from swgjoint.fe.plane.circular_spline import CircularSpline
+from swgjoint.fe.plane.corotation import rotate, turned
+from swgjoint.fe.plane.tooth_contact import Contacts, ToothContact
+from swgjoint.gear.teeth.profile import ToothProfile
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+NODES = 10
+"""Of a flank; the search for minima of the gap begins at twice as many places."""
+
+
+def _flank_spline(profile: ToothProfile) -> CubicSpline:
+    """Weights of the nodes of a flank, whose displacements are all alike."""
+    return CubicSpline(np.linspace(*profile.contact_range, NODES), np.eye(NODES))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RigidFlanks:
+    """The flexspline's flanks as :mod:`swgjoint.fe.plane.tooth_contact` wants them."""
+
+    profile: ToothProfile
+    flank_size: int = NODES
+
+    @cached_property
+    def spline(self) -> CubicSpline:
+        """Weights of the nodes."""
+        return _flank_spline(self.profile)
+
+    @property
+    def flank_range(self) -> tuple[float, float]:
+        """Between the lands [m]."""
+        return self.profile.contact_range
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Teeth:
+    """Both members' teeth; those of the flexspline stand on a line of given radius."""
+
+    flexspline: ToothProfile
+    circular_spline: ToothProfile
+    foot_radius: float
+    """Of the mean line that carries them [m]."""
+    stiffness: float
+    """Of a pair along the common normal [N/m]."""
+    shift: Array
+    """Errors of the flexspline's teeth in their frames (N, 2) [m]."""
+    ring_shift: Array | None = None
+    """The same of the circular spline (N_c, 2) [m]; None for none."""
+
+    @cached_property
+    def _flanks(self) -> RigidFlanks:
+        return RigidFlanks(profile=self.flexspline)
+
+    @cached_property
+    def _facing(self) -> CircularSpline:
+        profile = self.circular_spline
+        if self.ring_shift is None:
+            return CircularSpline(profile=profile)
+        return CircularSpline(profile=profile, weights=_flank_spline(profile))
+
+    def seen(self, foot: Array, slope: Array) -> tuple[Contacts, Array]:
+        """Contacts of teeth on a deformed rim, and the angles of the teeth.
+
+        Args:
+            foot: Where the teeth stand (N, 2) [m].
+            slope: Tangents of the rim there (N, 2).
+        """
+        angle = np.arctan2(-slope[:, 1], -slope[:, 0])
+        own = rotate(foot, -angle)
+        own[:, 1] -= self.foot_radius
+        own = own + self.shift
+        ring_flank = np.zeros((self.circular_spline.teeth, 0))
+        if self.ring_shift is not None:
+            ring_flank = np.tile(self.ring_shift, 2 * NODES)
+        search = ToothContact(
+            element=self._flanks,
+            circular_spline=self._facing,
+            ring_flank=ring_flank,
+            angle=angle,
+            bearing=np.arctan2(-foot[:, 0], foot[:, 1]),
+        )
+        # only what overlaps is pressed, so nothing is followed before it touches
+        return search.search(np.tile(own, 2 * NODES), 0.0, None, thorough=False), angle
+
+    def rows(
+        self, contacts: Contacts, foot: Array, slope: Array, angle: Array
+    ) -> tuple[Array, Array]:
+        r"""How the gaps change with the coordinates of the nodes that carry the teeth.
+
+        With n out of the circular spline, t across it, the point p of contact moves by
+        :math:`dp = dr + J(p - r)\,d\varphi`, :math:`d\varphi = r' \times dr'/|r'|^2`;
+        flanks of curvatures :math:`\kappa` (flexspline) and :math:`\kappa_c` roll and
+        slide on each other:
+
+        .. math:: dg = n\cdot dp, \quad d^2g = \frac{\kappa\kappa_c\,(t\cdot dp)^2
+            - 2\kappa_c\,(t\cdot dp)\,d\varphi - d\varphi^2}{\kappa + \kappa_c}
+            - n\cdot(p - r)\,d\varphi^2
+
+        Returns:
+            First (n, 4) and second (n, 4, 4) derivatives by (r, r').
+        """
+        j = contacts.sector
+        normal = rotate(contacts.normal, angle[j])
+        tangent = -turned(normal)
+        arm = rotate(contacts.point, angle[j]) - foot[j]
+        square = np.einsum("ni,ni->n", slope[j], slope[j])
+        turn = np.zeros((len(j), 4))
+        turn[:, 2:] = turned(slope[j]) / square[:, None]
+
+        def moved(direction: Array) -> Array:
+            row = np.einsum("ni,ni->n", direction, turned(arm))[:, None] * turn
+            row[:, :2] += direction
+            return np.asarray(row)
+
+        across = moved(tangent)
+        _, _, own = self.flexspline.evaluate(contacts.station)
+        other = self.facing_curvature(contacts, arm + foot[j])
+        both = np.maximum(own + other, 1e-3 * np.abs(own))
+        form = np.empty((len(j), 2, 2))
+        form[:, 0, 0] = own * other / both
+        form[:, 0, 1] = form[:, 1, 0] = -other / both
+        form[:, 1, 1] = -1.0 / both - np.einsum("ni,ni->n", normal, arm)
+        pair = np.stack([across, turn], axis=1)
+        return moved(normal), np.swapaxes(pair, 1, 2) @ (form @ pair)
+
+    def facing_curvature(self, contacts: Contacts, points: Array) -> Array:
+        """Curvature of the circular spline's flank at contacts (n,) [1/m].
+
+        Args:
+            contacts: The contacts.
+            points: Where they are (n, 2) [m].
+        """
+        pitch = 2.0 * np.pi / self.circular_spline.teeth
+        place = np.asarray((contacts.tooth + 0.5) * pitch, dtype=np.float64)
+        local = rotate(points, -place)
+        # a right flank of the flexspline faces a left one, and flanks are right ones
+        local[:, 0] *= np.where(contacts.side == 0, -1.0, 1.0)
+        return np.asarray(self.circular_spline.signed_distance(local)[2])

@@ -1,0 +1,1 @@
+"""Figures of the 3D model: fatigue, radial stiffness, torsion, load cases."""

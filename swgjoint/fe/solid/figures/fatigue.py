@@ -1,0 +1,307 @@
+r"""Fatigue of the flexspline from the stresses of an equilibrium in space.
+
+A point of the flexspline meets all phases of the wave generator in half a turn, and at
+one position of it the equal points of all sectors are at just these phases: they are
+the history of one. Teeth are met at as many phases of mesh.
+
+Nominal stress is what the article's shell theory speaks of: in the section between two
+teeth, from the middle of the root land to the bore, the membrane and bending part of
+the stress at the root (linearised over the wall), to which the article's concentration
+factors apply. What the mesh itself makes of the fillet stands beside it as half of the
+largest range of von Mises stress, with no factor.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.errors import ComputationError, DesignError
+from swgjoint.fe.plane.drive2d import can_halve
+from swgjoint.fe.solid.continuation import SolidContinuation
+from swgjoint.fe.solid.drive3d import solid_ring
+from swgjoint.fe.solid.state import SolidState
+from swgjoint.fe.solid.stress import flexspline_stresses
+from swgjoint.fe.solid.strip.mesh import StripMesh
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.shell_theory import (
+    SafetyFactor,
+    ShellDimensions,
+    safety_factor,
+    shell_safety_factor,
+)
+from swgjoint.progress import Progress, silent
+from swgjoint.units import MPa, mm
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Limits:
+    """Endurance limits of the material [Pa]."""
+
+    bending: float
+    torsion: float
+
+    @classmethod
+    def of(cls, design: Design) -> Limits:
+        """Those of the flexspline.
+
+        Raises:
+            DesignError: If the design states none.
+        """
+        material = design.material_of("flexspline")
+        bending, torsion = (
+            material.fatigue_limit_bending,
+            material.fatigue_limit_torsion,
+        )
+        if bending is None or torsion is None:
+            raise DesignError(
+                f"{design.drive.name}: the fatigue safety factor needs"
+                " material.fatigue_limit_bending_MPa and"
+                " material.fatigue_limit_torsion_MPa"
+            )
+        return cls(bending=bending, torsion=torsion)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SectionFatigue:
+    """Nominal stress over a turn at the root of one section [Pa]."""
+
+    z: float
+    """Of the section, 0 in the middle of the face width [m]."""
+    normal_amplitude: float
+    """Around."""
+    normal_mean: float
+    """The article's formulas leave it out."""
+    axial_amplitude: float
+    shear_amplitude: float
+    shear_mean: float
+    safety: SafetyFactor
+
+    def to_json(self) -> dict[str, float]:
+        """Millimetres and MPa."""
+        return {
+            "z_mm": self.z / mm,
+            "normal_amplitude_MPa": self.normal_amplitude / MPa,
+            "normal_mean_MPa": self.normal_mean / MPa,
+            "axial_amplitude_MPa": self.axial_amplitude / MPa,
+            "shear_amplitude_MPa": self.shear_amplitude / MPa,
+            "shear_mean_MPa": self.shear_mean / MPa,
+            "S_normal": self.safety.normal,
+            "S_shear": self.safety.shear,
+            "S": self.safety.combined,
+        }
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fatigue:
+    """Safety factors at one torque."""
+
+    torque: float
+    """[N·m]."""
+    sections: tuple[SectionFatigue, ...]
+    """From the open edge to the back edge of the teeth."""
+    amplitude: Mapping[str, float]
+    """Half of the largest range of von Mises stress by part [Pa]; ``root`` is the
+    surface between the teeth, ``root, mid-face`` that in the middle of the face
+    width."""
+    shell: SafetyFactor
+    """From closed forms alone."""
+    limits: Limits
+
+    @property
+    def worst(self) -> SectionFatigue:
+        """Section with the least safety."""
+        return min(self.sections, key=lambda section: section.safety.combined)
+
+    @property
+    def middle(self) -> SectionFatigue:
+        """Section in the middle of the face width."""
+        return min(self.sections, key=lambda section: abs(section.z))
+
+    def local(self, part: str) -> float:
+        """Bending limit over the amplitude that the mesh gives, no factors."""
+        return self.limits.bending / self.amplitude[part]
+
+    def to_json(self) -> dict[str, Any]:
+        """The worst section, the middle one, the mesh's own peaks, closed forms."""
+        return {
+            "torque_Nm": self.torque,
+            "worst_section": self.worst.to_json(),
+            "mid_face": self.middle.to_json(),
+            "von_mises_amplitude_MPa": {k: v / MPa for k, v in self.amplitude.items()},
+            "S_without_factors_mid_face": self.local("root, mid-face"),
+            "shell_theory": {
+                "S_normal": self.shell.normal,
+                "S_shear": self.shell.shear,
+                "S": self.shell.combined,
+            },
+        }
+
+
+def fatigue(
+    design: Design, torques: Sequence[float], *, progress: Progress = silent
+) -> list[Fatigue]:
+    """Safety factors of a drive at several torques, on its own wave generator.
+
+    Args:
+        design: With a ``[cup]`` and endurance limits.
+        torques: T that the drive exerts on the output, followed in this order [N·m].
+        progress: Called after every equilibrium.
+
+    Raises:
+        DesignError: If the design cannot be built or lacks endurance limits.
+        ComputationError: If a solve fails or memory will not do.
+    """
+    limits, shell = Limits.of(design), ShellDimensions.of(design)
+    ring = solid_ring(design, half=can_halve(design, bearing=False))
+    follow = SolidContinuation(
+        ring=ring, ratio=design.ratio, layout=design.drive.layout
+    )
+    total = 2 + len(torques)
+
+    def reached(state: SolidState, what: str, count: int) -> SolidState:
+        if not state.outcome.ok:
+            name = design.drive.name
+            raise ComputationError(f"{name}: {what} failed: {state.outcome.value}")
+        progress("fatigue", count, total)
+        return state
+
+    state = reached(follow.deflected(), "deflection by the wave generator", 1)
+    state = reached(follow.meshed(state), "engagement of the teeth", 2)
+    found: list[Fatigue] = []
+    for torque in torques:
+        state = follow.to_torque(state, torque)
+        reached(state, f"loading to {torque:g} N·m", 3 + len(found))
+        stresses = flexspline_stresses(ring, state)
+        found.append(assess(ring.strip.mesh, stresses, torque, limits, shell))
+    return found
+
+
+def assess(
+    strip: StripMesh,
+    stresses: Mapping[str, Array],
+    torque: float,
+    limits: Limits,
+    shell: ShellDimensions,
+) -> Fatigue:
+    """Safety factors from the stresses of all sectors.
+
+    Args:
+        strip: Mesh of a sector.
+        stresses: xx, yy, zz, xy, yz, zx at the nodes by segment (N, n_nodes, 6) [Pa],
+            the sectors of half a turn or of a whole one.
+        torque: [N·m].
+        limits: Of the material.
+        shell: For the closed forms.
+    """
+    nominal = root_stress(strip, stresses[strip.teeth.segment.name])
+    low, high = nominal.min(axis=0), nominal.max(axis=0)
+    sections = []
+    for z, amplitude, mean in zip(
+        strip.teeth.z, 0.5 * (high - low), 0.5 * (high + low), strict=True
+    ):
+        safety = safety_factor(
+            bending_limit=limits.bending,
+            torsion_limit=limits.torsion,
+            normal_amplitude=float(amplitude[0]),
+            shear_amplitude=float(amplitude[2]),
+            shear_mean=float(mean[2]),
+        )
+        sections.append(
+            SectionFatigue(
+                z=float(z),
+                normal_amplitude=float(amplitude[0]),
+                normal_mean=float(mean[0]),
+                axial_amplitude=float(amplitude[1]),
+                shear_amplitude=float(amplitude[2]),
+                shear_mean=float(mean[2]),
+                safety=safety,
+            )
+        )
+    return Fatigue(
+        torque=torque,
+        sections=tuple(sections),
+        amplitude=_amplitudes(strip, stresses),
+        shell=shell_safety_factor(
+            shell, torque, bending_limit=limits.bending, torsion_limit=limits.torsion
+        ),
+        limits=limits,
+    )
+
+
+def root_stress(strip: StripMesh, stress: Array) -> Array:
+    r"""Nominal stress at the root between two teeth.
+
+    .. math:: \sigma = \frac1h\int\sigma\,dr
+        + \frac6{h^2}\int\sigma\,(r - \bar r)\,dr
+
+    over the wall on the face of a sector, at its outer surface.
+
+    Args:
+        strip: Mesh of a sector.
+        stress: Of the teeth (N, n_nodes, 6) [Pa].
+
+    Returns:
+        Around, along the axis, shear of both (N, n_planes, 3) [Pa].
+    """
+    teeth = strip.teeth
+    nodes = teeth.nodes[:, teeth.plane.face_first]
+    points = np.asarray(teeth.plane.mesh.p)[:, teeth.plane.face_first]
+    r = np.hypot(*points)
+    around = np.stack([points[1], -points[0]]) / r
+    xx, yy, zz, xy, yz, zx = np.moveaxis(stress[:, nodes], -1, 0)
+    x, y = around
+    parts = np.stack(
+        [x**2 * xx + y**2 * yy + 2.0 * x * y * xy, zz, x * zx + y * yz], axis=-1
+    )
+    # from the outside to the bore: linear between the nodes
+    height, middle = r[0] - r[-1], 0.5 * (r[0] + r[-1])
+    step = -np.diff(r)
+    weight = np.zeros_like(r)
+    weight[:-1] += 0.5 * step
+    weight[1:] += 0.5 * step
+    arm = r - middle
+    linear = weight @ arm**2  # h^3/12, so that a linear stress is met exactly
+    return np.asarray(
+        np.einsum(
+            "spdk,d->spk", parts, weight / height + 0.5 * height * weight * arm / linear
+        )
+    )
+
+
+def _amplitudes(strip: StripMesh, stresses: Mapping[str, Array]) -> dict[str, float]:
+    teeth, found = strip.teeth, {}
+    r = np.hypot(*np.asarray(teeth.plane.mesh.p))
+    land = r[teeth.plane.face_first]
+    root = np.flatnonzero(r < land[0] + 0.3 * (land[0] - land[-1]))
+    for name, stress in stresses.items():
+        if name != teeth.segment.name:
+            found[name] = float(half_range(stress).max())
+            continue
+        own = half_range(stress[:, teeth.nodes[:, root]])
+        found["root"] = float(own.max())
+        found["root, mid-face"] = float(own[np.argmin(np.abs(teeth.z))].max())
+    return found
+
+
+def half_range(stress: Array) -> Array:
+    """Half of the largest von Mises stress of the difference of two times.
+
+    Args:
+        stress: By time in the first axis, components in the last one [Pa].
+    """
+    largest = np.zeros(stress.shape[1:-1])
+    for shift in range(1, len(stress) // 2 + 1):
+        xx, yy, zz, xy, yz, zx = np.moveaxis(
+            stress - np.roll(stress, shift, axis=0), -1, 0
+        )
+        square = 0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2)
+        square += 3.0 * (xy**2 + yz**2 + zx**2)
+        largest = np.maximum(largest, square.max(axis=0))
+    return np.asarray(0.5 * np.sqrt(largest))

@@ -1,0 +1,120 @@
+r"""Load case of the article on stress and fatigue: four forces, no wave generator.
+
+Four small areas of the bore are pressed outward, at :math:`\pm\beta` from both ends of
+the major axis, until the teeth move by w_0 somewhere. Instead of mesh, the torque is
+equal tangential forces on 11 teeth around each end. The areas stay where they are while
+the torque rises: with forces that stay, too, the teeth would move by twice w_0 at 60
+N·m, the article finds 0.001 mm per N·m. Small deflections, so that loads add up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.fe.solid.figures.pinched_cup import PinchedCup
+from swgjoint.units import deg
+
+Array = NDArray[np.float64]
+
+ANGLE = 25.0 * deg
+"""beta of the article."""
+TEETH = 11
+"""The article spreads the torque over 11 nodes."""
+HALF_WIDTH, HALF_LENGTH = 2.5 * deg, 0.2
+"""Of the areas: around, and along the axis in face widths. The article has "small"."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FourForces:
+    """A cup under the four forces, without torque and per N·m; frames of the teeth."""
+
+    force: Array
+    """Of the areas after and before the major axis (2,) [N]."""
+    force_by_torque: Array
+    """(2,) [N/(N·m)]."""
+    radial: Array
+    """Outward displacement of the nodes of the teeth (N, n) [m]."""
+    radial_by_torque: Array
+    """(N, n) [m/(N·m)]."""
+    stress: Mapping[str, Array]
+    """By segment (N, n_nodes, 6) [Pa]."""
+    stress_by_torque: Mapping[str, Array]
+    """[Pa/(N·m)]."""
+
+    def largest_radial(self, torque: float) -> float:
+        """Largest outward displacement of the teeth [m]."""
+        return float((self.radial + torque * self.radial_by_torque).max())
+
+    def stresses(self, torque: float) -> dict[str, Array]:
+        """Stress at the nodes by segment [Pa]."""
+        return {
+            k: s + torque * self.stress_by_torque[k] for k, s in self.stress.items()
+        }
+
+
+def four_forces(cup: PinchedCup, deflection: float) -> FourForces:
+    """Load a cup as the article does.
+
+    Args:
+        cup: With teeth.
+        deflection: Largest outward displacement of the teeth without torque [m].
+    """
+    teeth = cup.segments[0]
+    points = np.asarray(teeth.mesh.mesh.p).T
+    out = points * np.array([1.0, 1.0, 0.0])
+    out /= np.linalg.norm(out, axis=-1)[:, None]
+    nodes = teeth.loaded[::3] // 3
+    at, outward = points[nodes], out[nodes]
+    bore = np.arange(len(at)) < cup.bore
+    angle = pi * np.arange(cup.sectors) / cup.sectors
+
+    width = np.ptp(cup.strip.teeth.z)
+    area = bore & (np.abs(at[:, 2]) <= (HALF_LENGTH + 1e-9) * width)
+    cases = []
+    for centre in (ANGLE, pi - ANGLE):
+        pressed = np.abs(angle - centre) <= HALF_WIDTH + 1e-9
+        load = np.zeros((cup.sectors, len(at), 3))
+        load[np.ix_(pressed, area)] = outward[area] / (pressed.sum() * area.sum())
+        cases.append(load.reshape(cup.sectors, -1))
+    meshing = np.argsort(np.minimum(angle, pi - angle), kind="stable")[:TEETH]
+    load = np.zeros_like(load)
+    around = np.stack([-outward[:, 1], outward[:, 0], outward[:, 2]], axis=-1)
+    lever = float(np.hypot(at[~bore, 0], at[~bore, 1]).sum())
+    # half of the torque in the half
+    load[np.ix_(meshing, ~bore)] = 0.5 / (TEETH * lever) * around[~bore]
+    cases.append(load.reshape(cup.sectors, -1))
+
+    found = [cup.respond(case) for case in cases]
+    radial = np.array([np.einsum("sni,ni->sn", u, out) for u, _ in found])
+    # motion of the areas, each weighted as its load
+    moved = np.array(
+        [
+            [np.sum(case * u[:, nodes].reshape(cup.sectors, -1)) for u, _ in found]
+            for case in cases[:2]
+        ]
+    )
+    both = radial[0] + radial[1]
+    without = deflection / float(both.max()) * np.array([1.0, 1.0, 0.0])
+    by_torque = np.append(-np.linalg.solve(moved[:, :2], moved[:, 2]), 1.0)
+
+    def summed(parts: Array) -> dict[str, Array]:
+        return {
+            name: np.asarray(
+                sum(f * s[name] for f, (_, s) in zip(parts, found, strict=True))
+            )
+            for name in found[0][1]
+        }
+
+    return FourForces(
+        force=without[:2],
+        force_by_torque=by_torque[:2],
+        radial=np.einsum("k,ksn->sn", without, radial),
+        radial_by_torque=np.einsum("k,ksn->sn", by_torque, radial),
+        stress=summed(without),
+        stress_by_torque=summed(by_torque),
+    )

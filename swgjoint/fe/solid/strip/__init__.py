@@ -1,0 +1,1 @@
+"""The condensed strip of the flexspline: one sector over the face width."""

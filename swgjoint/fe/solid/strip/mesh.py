@@ -1,0 +1,320 @@
+"""Mesh of one tooth sector of a member in space: a strip of segments along the axis.
+
+z runs from the open end to the closed one, 0 in the middle of the face width. The
+flexspline's strip has the teeth, three lengths of cylinder, the fillet and two lengths
+of diaphragm (thesis figures 3.21 to 3.23); the circular spline's has the teeth alone.
+Each segment turns on its own in the corotational model.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+from skfem import MeshHex
+
+from swgjoint.errors import DesignError
+from swgjoint.fe.plane.sector_mesh import (
+    BORE,
+    LOWER_RIM,
+    SectorMesh,
+    multiplied,
+    sector_mesh,
+)
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.teeth.profile import ToothProfile
+from swgjoint.units import mm
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+# elements of the thesis along the face width; the cup then has 24 stations of 33 nodes
+FACE_WIDTH = 10
+CYLINDER, FILLET, DIAPHRAGM = (2, 3, 4, 3), 4, (4, 4)
+# lengths of the parts of cylinder and diaphragm, from the teeth to the bore; the first
+# one belongs to the toothed segment, so that no section cuts its back edge
+CYLINDER_PARTS, DIAPHRAGM_PARTS = (0.05, 0.15, 0.5, 0.3), (0.3, 0.7)
+LARGEST_WALL = 0.9
+"""Of the rim: what is left of it above the cup's wall carries two rows of elements."""
+SMALLEST_INNER_FILLET = 0.1
+"""Inner radius of the fillet over the wall thickness that can be meshed."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SegmentMesh:
+    """One segment of a strip, in the frame of its tooth (tooth on +y).
+
+    Sections hold node numbers: around the sector from the first face to the last one,
+    both included, then from the outside to the bore side.
+    """
+
+    name: str
+    mesh: MeshHex
+    first: Index
+    """Nodes of the clockwise face (n,)."""
+    last: Index
+    """Their images on the counter-clockwise face (n,)."""
+    position: Array
+    """Where a face node lies between the ends of the segment, 0 to 1. (n,)."""
+    depth: Array
+    """Where it lies between outside and bore side, 0 to 1. (n,)."""
+    begin: Index | None
+    """Section towards the teeth (n_phi, n_wall); None at a free end."""
+    end: Index | None
+    """Section towards the bore of the diaphragm, the same."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TeethMesh:
+    """The toothed segment and its surfaces."""
+
+    segment: SegmentMesh
+    plane: SectorMesh
+    """The section that was extruded."""
+    z: Array
+    """Of the planes (n_planes,) [m]."""
+    nodes: Index
+    """Node numbers by plane and node of the section (n_planes, n_plane_nodes)."""
+
+    @property
+    def flank(self) -> Index:
+        """Right, then left flank without the nodes on the faces (n_planes, n_b)."""
+        plane = self.plane
+        return self.nodes[:, np.r_[plane.flank_right[:-1], plane.flank_left[:-1]]]
+
+    @property
+    def bore(self) -> Index:
+        """Bore without the nodes on the faces (n_planes, n_phi)."""
+        return self.nodes[:, self.plane.bore[1:-1]]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class StripMesh:
+    """Segments from the open end to the bore of the diaphragm."""
+
+    teeth: TeethMesh
+    cup: tuple[SegmentMesh, ...] = ()
+
+    @property
+    def segments(self) -> tuple[SegmentMesh, ...]:
+        """All of them, the teeth first."""
+        return (self.teeth.segment, *self.cup)
+
+    @property
+    def narrow(self) -> float:
+        """How deep below the roots of the teeth the cup's outside lies, in rims."""
+        end = self.teeth.segment.end
+        if end is None:
+            return 0.0
+        seen = np.flatnonzero(self.teeth.segment.first == end[0, 0])
+        return float(self.teeth.segment.depth[seen[0]])
+
+    @property
+    def nodes(self) -> int:
+        """Nodes, sections between segments counted once, both faces counted."""
+        shared = sum(seg.begin.size for seg in self.cup if seg.begin is not None)
+        return int(sum(seg.mesh.p.shape[1] for seg in self.segments) - shared)
+
+    @property
+    def elements(self) -> int:
+        """Hexahedra."""
+        return int(sum(seg.mesh.t.shape[1] for seg in self.segments))
+
+
+def cup_wall(design: Design) -> float:
+    """Thickness of the cup, thesis eq. (3.50) [m]."""
+    assert design.cup is not None
+    return design.cup.thickness_coefficient * design.flexspline.rim_mm * mm
+
+
+def flexspline_strip(design: Design, profile: ToothProfile) -> StripMesh:
+    """Strip of the flexspline; without a ``[cup]`` the toothed ring alone.
+
+    Raises:
+        DesignError: If the fillet is too small for the wall or the cup too short.
+    """
+    rim, n = design.flexspline.rim_mm * mm, design.mesh.refinement
+    wall = None if design.cup is None else min(cup_wall(design), LARGEST_WALL * rim)
+    plane = sector_mesh(profile, rim, n, lower_rim=wall)
+    width = design.drive.face_width_mm * mm
+    if wall is None:
+        return StripMesh(teeth=teeth_mesh(plane, width, n))
+    apron, *cup = cup_segments(design, plane, width, n)
+    return StripMesh(teeth=teeth_mesh(plane, width, n, apron), cup=tuple(cup))
+
+
+def circular_spline_strip(design: Design, profile: ToothProfile) -> StripMesh:
+    """Strip of the circular spline: the teeth over the face width."""
+    rim, n = design.circular_spline.rim_mm * mm, design.mesh.refinement
+    plane = sector_mesh(profile, rim, n)
+    return StripMesh(teeth=teeth_mesh(plane, design.drive.face_width_mm * mm, n))
+
+
+def teeth_mesh(
+    plane: SectorMesh, width: float, n: float, apron: SegmentMesh | None = None
+) -> TeethMesh:
+    """The section extruded over the face width, the first part of the cup behind."""
+    z = np.linspace(-0.5 * width, 0.5 * width, multiplied(FACE_WIDTH, n) + 1)
+    size = plane.mesh.p.shape[1]
+    nodes = np.arange(len(z))[:, None] * size + np.arange(size)
+    points = np.concatenate([np.vstack([plane.mesh.p, np.full(size, k)]).T for k in z])
+    quads = np.asarray(plane.mesh.t)
+    cells = np.concatenate(
+        [
+            np.vstack([quads + k * size, quads + (k + 1) * size])
+            for k in range(len(z) - 1)
+        ],
+        axis=1,
+    )
+    first, last = nodes[:, plane.face_first].ravel(), nodes[:, plane.face_last].ravel()
+    mesh, end = _hexahedra(points, cells), None
+    if apron is not None:
+        assert apron.begin is not None and apron.end is not None
+        mesh, number = _joined(mesh, apron.mesh)
+        behind = apron.position > 0.0
+        first = np.concatenate([first, number[apron.first[behind]]])
+        last = np.concatenate([last, number[apron.last[behind]]])
+        end = number[apron.end]
+    face = np.asarray(mesh.p)[:, first]
+    radius, along = np.hypot(face[0], face[1]), face[2]
+    segment = SegmentMesh(
+        name="teeth",
+        mesh=mesh,
+        first=first,
+        last=last,
+        position=(along - along.min()) / np.ptp(along),
+        depth=(radius - radius[0]) / (radius[len(plane.face_first) - 1] - radius[0]),
+        begin=None,
+        end=end,
+    )
+    return TeethMesh(segment=segment, plane=plane, z=z, nodes=nodes)
+
+
+def _joined(mesh: MeshHex, more: MeshHex) -> tuple[MeshHex, Index]:
+    """Two meshes that share nodes, and the new numbers of the second one's nodes."""
+    own, other = np.asarray(mesh.p).T, np.asarray(more.p).T
+    apart, nearest = cKDTree(own).query(other)
+    new = apart > 1e-9
+    number = np.where(new, len(own) + np.cumsum(new) - 1, nearest)
+    points = np.concatenate([own, other[new]])
+    cells = np.concatenate([np.asarray(mesh.t), number[np.asarray(more.t)]], axis=1)
+    return MeshHex(np.ascontiguousarray(points.T), cells), number
+
+
+def cup_segments(
+    design: Design, plane: SectorMesh, width: float, n: float
+) -> tuple[SegmentMesh, ...]:
+    """Cylinder, fillet and diaphragm or flange."""
+    cup = design.cup
+    assert cup is not None
+    name, wall = design.drive.name, cup_wall(design)
+    fillet, length, bore = (
+        value * mm for value in (cup.fillet_mm, cup.length_mm, cup.bore_radius_mm)
+    )
+    if fillet < (1.0 + SMALLEST_INNER_FILLET) * wall:
+        raise DesignError(
+            f"{name}: cup.fillet_mm = {cup.fillet_mm:g} around a wall of"
+            f" {wall / mm:.3g} mm cannot be meshed; accepted: at least"
+            f" {(1.0 + SMALLEST_INNER_FILLET) * wall / mm:.3g} mm"
+        )
+    if length < 2.0 * fillet:
+        raise DesignError(
+            f"{name}: cup.length_mm = {cup.length_mm:g} with a fillet of"
+            f" {cup.fillet_mm:g} mm; accepted: at least {2 * cup.fillet_mm:g} mm"
+        )
+    face = plane.mesh.p[:, plane.face_first]
+    inner = float(np.hypot(*face).min())
+    z0, z1 = 0.5 * width, 0.5 * width + length
+    inward = cup.kind == "cup"
+    # at the teeth the wall is the lower rim
+    rows = multiplied(LOWER_RIM, n) + 1
+    at_teeth = np.hypot(*face)[-rows:]
+    across = np.linspace(1.0, 0.0, rows)  # outside to bore side
+    # meridian: (r, z) of outside and bore side at every station of every part
+    parts = []
+    straight = z1 - fillet - z0
+    start = z0
+    radii = np.stack([inner + wall * across] * 2)
+    for k, (share, count) in enumerate(zip(CYLINDER_PARTS, CYLINDER, strict=True)):
+        stop = start + share * straight
+        z = np.linspace(start, stop, multiplied(count, n) + 1)
+        r = np.repeat(radii[:1], len(z), axis=0)
+        if k == 0:
+            r[0] = at_teeth
+        parts.append((f"cylinder {k + 1}", r, np.repeat(z[:, None], rows, axis=1)))
+        start = stop
+    turn = np.linspace(0.0, 0.5 * pi, multiplied(FILLET, n) + 1)[:, None]
+    if inward:
+        centre = inner + wall - fillet
+        radius = fillet - wall + wall * across
+        r = centre + radius * np.cos(turn)
+    else:
+        centre = inner + fillet
+        radius = fillet - wall * across
+        r = centre - radius * np.cos(turn)
+    parts.append(("fillet", r, z1 - fillet + radius * np.sin(turn)))
+    ends = np.cumsum([0.0, *DIAPHRAGM_PARTS])
+    disc = "diaphragm" if inward else "flange"
+    for k, count in enumerate(DIAPHRAGM):
+        along = np.linspace(ends[k], ends[k + 1], multiplied(count, n) + 1)[:, None]
+        r = np.repeat(centre + along * (bore - centre), rows, axis=1)
+        z = np.repeat((z1 - fillet + radius)[None], len(along), axis=0)
+        parts.append((f"{disc} {k + 1}", r, z))
+    half = plane.half_pitch
+    phi = np.linspace(half, -half, 2 * multiplied(BORE, n) + 1)  # clockwise face first
+    return tuple(_shell(title, r, z, phi) for title, r, z in parts)
+
+
+def _shell(name: str, r: Array, z: Array, phi: Array) -> SegmentMesh:
+    """A structured segment between two sections.
+
+    Args:
+        name: Of the segment.
+        r: Radii by station and across the wall (n_s, n_w) [m].
+        z: The same.
+        phi: Angles clockwise from the tooth axis, the first face's first (n_phi,).
+    """
+    shape = (len(r), len(phi), r.shape[1])
+    x = r[:, None, :] * np.sin(phi)[None, :, None]
+    y = r[:, None, :] * np.cos(phi)[None, :, None]
+    points = np.stack([x, y, np.broadcast_to(z[:, None, :], shape)], axis=-1)
+    grid = np.arange(points[..., 0].size).reshape(shape)
+    corner = [
+        grid[a : a - 1 or None, b : b - 1 or None, c : c - 1 or None]
+        for a in (0, 1)
+        for b in (0, 1)
+        for c in (0, 1)
+    ]
+    # quadrilateral of the section, then the same one station on
+    cells = np.stack([corner[k].ravel() for k in (0, 1, 3, 2, 4, 5, 7, 6)])
+    middle = np.hypot(np.diff(r.mean(axis=1)), np.diff(z.mean(axis=1)))
+    along = np.concatenate([[0.0], np.cumsum(middle)])
+    rows = r.shape[1]
+    return SegmentMesh(
+        name=name,
+        mesh=_hexahedra(points.reshape(-1, 3), cells),
+        first=grid[:, 0].ravel(),
+        last=grid[:, -1].ravel(),
+        position=np.repeat(along / along[-1], rows),
+        depth=np.tile(np.linspace(0.0, 1.0, rows), len(r)),
+        begin=grid[0],
+        end=grid[-1],
+    )
+
+
+def _hexahedra(points: Array, cells: Index) -> MeshHex:
+    """Mesh from cells that list a quadrilateral and the one opposite to it."""
+    # corners of the unit cube in scikit-fem's order
+    cube = np.array([7, 4, 1, 5, 6, 2, 0, 3])
+    sorted_cells = np.empty_like(cells)
+    # our order: (0,0,0) (1,0,0) (1,1,0) (0,1,0), then the same at z = 1
+    sorted_cells[[7, 4, 1, 5, 6, 2, 0, 3]] = cells
+    a, b, d, e = (points[cells[k]] for k in (0, 1, 3, 4))
+    volume = np.einsum("ei,ei->e", np.cross(b - a, d - a), e - a)
+    mirrored = np.empty_like(cells)
+    mirrored[cube] = cells[[0, 3, 2, 1, 4, 7, 6, 5]]
+    final = np.where(volume > 0.0, sorted_cells, mirrored)
+    return MeshHex(np.ascontiguousarray(points.T), np.ascontiguousarray(final))

@@ -1,0 +1,63 @@
+"""A flexspline without teeth: the wall alone, for closed forms and comparison."""
+
+from __future__ import annotations
+
+from math import pi
+
+import numpy as np
+from skfem import MeshQuad
+
+from swgjoint.fe.plane.sector_mesh import (
+    BORE,
+    LAYERS,
+    LOWER_RIM,
+    SectorMesh,
+    multiplied,
+)
+from swgjoint.fe.solid.strip.mesh import (
+    LARGEST_WALL,
+    StripMesh,
+    cup_segments,
+    cup_wall,
+    teeth_mesh,
+)
+from swgjoint.gear.design.design import Design
+from swgjoint.units import mm
+
+
+def smooth_strip(design: Design) -> StripMesh:
+    """Strip whose first segment is the rim without its tooth.
+
+    The rows of elements are those of the toothed strip, so that the cup joins alike.
+    """
+    n, rim = design.mesh.refinement, design.flexspline.rim_mm * mm
+    side = multiplied(BORE, n)
+    inner, half = design.flexspline_inner_radius, pi / design.drive.teeth_flexspline
+    wall = LARGEST_WALL * rim
+    if design.cup is not None:
+        wall = min(cup_wall(design), wall)
+    above = np.linspace(inner + rim, inner + wall, multiplied(LAYERS, n) + 1)
+    below = np.linspace(inner + wall, inner, multiplied(LOWER_RIM, n) + 1)
+    radius = np.concatenate([above, below[1:]])
+    phi = np.linspace(half, -half, 2 * side + 1)  # clockwise face first
+    grid = np.arange(len(radius) * len(phi)).reshape(len(radius), len(phi))
+    points = radius[:, None, None] * np.stack([np.sin(phi), np.cos(phi)], axis=-1)
+    cells = np.stack([grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]])
+    plane = SectorMesh(
+        mesh=MeshQuad(
+            np.ascontiguousarray(points.reshape(-1, 2).T),
+            np.ascontiguousarray(cells.reshape(4, -1)),
+        ),
+        half_pitch=half,
+        face_first=grid[:, 0],
+        face_last=grid[:, -1],
+        bore=grid[-1],
+        flank_right=grid[0, : side + 1],
+        flank_left=grid[0, : side - 1 : -1],
+        flank_stations=phi[: side + 1],
+    )
+    width = design.drive.face_width_mm * mm
+    if design.cup is None:
+        return StripMesh(teeth=teeth_mesh(plane, width, n))
+    apron, *cup = cup_segments(design, plane, width, n)
+    return StripMesh(teeth=teeth_mesh(plane, width, n, apron), cup=tuple(cup))

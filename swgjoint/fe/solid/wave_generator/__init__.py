@@ -1,0 +1,1 @@
+"""The wave generator in 3D: surface, bearing race, elastic cam."""

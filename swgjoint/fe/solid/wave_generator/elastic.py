@@ -1,0 +1,270 @@
+r"""What an elastic wave generator does to a cup: lobe force, deflection, play.
+
+An elastic wave generator presses its lobes outward with springs instead of setting
+their height. With w the deflection of a lobe, :math:`w_0` the height of the lobes of
+the drive, k the stiffness and :math:`F_0` the force of a lobe at that height,
+
+.. math:: F = F_0 + k\,(w_0 - w) = F_{cup}(w).
+
+:math:`F_{cup}` is the force of two opposite loads with large rotations
+(:mod:`swgjoint.fe.solid.figures.pinched_cup`): to first order the radial stiffness
+times w. A rigid wave generator is :math:`k \to \infty`, a soft one with preload k = 0.
+
+The play of the teeth is the rotation of the unloaded output between the contacts of its
+two directions, teeth undeformed. It falls as w grows; where it vanishes the teeth take
+up, and from there on they carry what the springs have beyond :math:`F_{cup}`
+(:mod:`swgjoint.fe.solid.wave_generator.lobe_pads`; the circular spline elastic).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import inf, isinf, nan
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline, PchipInterpolator
+from scipy.optimize import brentq
+
+from swgjoint.errors import ComputationError, InputError
+from swgjoint.fe.solid.drive3d import solid_ring
+from swgjoint.fe.solid.figures.pinched_cup import PinchedCup
+from swgjoint.fe.solid.figures.tooth_play import play
+from swgjoint.fe.solid.ring import SolidRing
+from swgjoint.fe.solid.wave_generator.lobe_pads import force_on_teeth
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.wave_generators.wave_generator import lobe_height
+from swgjoint.progress import Progress, silent
+from swgjoint.units import mm
+
+Array = NDArray[np.float64]
+
+HEIGHTS = (0.25, 0.5, 0.75, 0.85, 0.95, 1.05, 1.15, 1.25)
+"""Of the lobes over that of the drive, about, where the cup is solved."""
+BEYOND = (0.02, 0.05, 0.1, 0.15)
+"""Deflections beyond the take-up at which teeth are solved [lobe heights]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ElasticWaveGenerator:
+    """Springs behind two lobes."""
+
+    stiffness: float
+    """Of each lobe, inf if rigid [N/m]."""
+    preload: float
+    """Force of each lobe at the lobe height of the drive; without effect if rigid [N].
+    """
+
+
+@dataclass(frozen=True, kw_only=True)
+class WorkingPoint:
+    """Where an elastic wave generator and a cup balance, without torque."""
+
+    deflection: float
+    """Of a lobe, outward [m]."""
+    force: float
+    """Of a lobe [N]."""
+    on_teeth: float
+    """Part of the force that presses the teeth into the spaces [N]."""
+    play: float
+    """Of the output, 0 where teeth are pressed; NaN where the lobes are so low that
+    teeth beside them overlap [rad]."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LobeCharacteristic:
+    """A cup between two lobes, from rest on."""
+
+    height: float
+    """Of the lobes of the drive [m]."""
+    deflection: Array
+    """Of a lobe, increasing from 0 (n,) [m]."""
+    force: Array
+    """That it takes, the teeth free (n,) [N]."""
+    play: Array
+    """Of the output, see :mod:`swgjoint.fe.solid.figures.tooth_play` (n,) [rad]."""
+    pressed_deflection: Array
+    """From the take-up on; empty without one (m,) [m]."""
+    pressed_force: Array
+    """Part of the force of a lobe that the teeth take there, from 0 on (m,) [N]."""
+
+    def force_at(self, deflection: float) -> float:
+        """Force of a lobe [N].
+
+        Raises:
+            InputError: Outside the range that was solved.
+        """
+        self._check(deflection)
+        return float(CubicSpline(self.deflection, self.force)(deflection))
+
+    def deflection_at(self, force: float) -> float:
+        """Deflection of a lobe [m].
+
+        Raises:
+            InputError: Outside the range that was solved.
+        """
+        if not self.force[0] <= force <= self.force[-1]:
+            raise InputError(
+                f"lobe force {force:.4g} N; accepted: 0 to {self.force[-1]:.4g} N"
+            )
+        return float(CubicSpline(self.force, self.deflection)(force))
+
+    def play_at(self, deflection: float) -> float:
+        """Play of the output, NaN where it has none that is finite [rad]."""
+        self._check(deflection)
+        finite = np.isfinite(self.play)
+        w, play = self.deflection[finite], self.play[finite]
+        if len(w) < 2 or not w[0] <= deflection <= w[-1]:
+            return nan
+        return float(PchipInterpolator(w, play)(deflection))
+
+    @property
+    def take_up(self) -> float:
+        """Deflection at which the play vanishes, inf beyond the range [m]."""
+        finite = np.isfinite(self.play)
+        w, play = self.deflection[finite], self.play[finite]
+        free = np.flatnonzero(play > 0.0)
+        if not len(free):
+            return float(w[0]) if len(w) else inf
+        if free[-1] == len(w) - 1:
+            return inf
+        return float(brentq(self.play_at, w[free[-1]], w[free[-1] + 1]))
+
+    def on_teeth_at(self, deflection: float) -> float:
+        """Part of the force of a lobe that the teeth take [N].
+
+        Raises:
+            InputError: Outside the range that was solved.
+        """
+        self._check(deflection)
+        if not deflection > self.take_up:
+            return 0.0
+        if deflection > self.highest:
+            raise InputError(
+                f"deflection {deflection / mm:.4g} mm; accepted: up to"
+                f" {self.highest / mm:.4g} mm, the teeth in contact"
+            )
+        through = PchipInterpolator(self.pressed_deflection, self.pressed_force)
+        return float(through(deflection))
+
+    @property
+    def highest(self) -> float:
+        """Deflection up to which force and contact of the teeth are known [m]."""
+        last = float(self.deflection[-1])
+        if isinf(self.take_up):
+            return last
+        return min(last, float(np.max(self.pressed_deflection, initial=self.take_up)))
+
+    def working_point(self, generator: ElasticWaveGenerator) -> WorkingPoint:
+        """Balance of springs, cup and teeth.
+
+        Raises:
+            InputError: If they balance outside the range that was solved.
+        """
+        k, w = generator.stiffness, self.height
+        if not isinf(k):
+            low, high = float(self.deflection[0]), self.highest
+
+            def pushed(w: float) -> float:
+                springs = generator.preload + k * (self.height - w)
+                return springs - self.force_at(w) - self.on_teeth_at(w)
+
+            if not pushed(low) >= 0.0 >= pushed(high):
+                least, most = (generator.preload - pushed(end) for end in (low, high))
+                raise InputError(
+                    f"preload {generator.preload:.4g} N with {k / 1e3:.4g} N/mm;"
+                    f" accepted: {least:.4g} to {most:.4g} N"
+                )
+            w = float(brentq(pushed, low, high, xtol=1e-15))
+        on_teeth = self.on_teeth_at(w)
+        return WorkingPoint(
+            deflection=w,
+            force=self.force_at(w) + on_teeth,
+            on_teeth=on_teeth,
+            play=0.0 if w >= self.take_up else self.play_at(w),
+        )
+
+    def _check(self, deflection: float) -> None:
+        low, high = self.deflection[0], self.deflection[-1]
+        if not low <= deflection <= high:
+            raise InputError(
+                f"deflection {deflection / mm:.4g} mm; accepted: {low / mm:.4g} to"
+                f" {high / mm:.4g} mm"
+            )
+
+
+def lobe_characteristic(
+    design: Design,
+    *,
+    place: str = "mid_face",
+    heights: Sequence[float] = HEIGHTS,
+    progress: Progress = silent,
+) -> LobeCharacteristic:
+    """Press the flexspline of a design apart and look at its teeth.
+
+    Args:
+        design: The drive, with a ``[cup]``.
+        place: One of :data:`swgjoint.fe.solid.figures.pinched_cup.PLACES`.
+        heights: Deflections over the lobe height of the drive, about, increasing.
+        progress: Called after every one.
+
+    Raises:
+        DesignError: If it cannot be meshed, has an odd number of teeth or is not
+            modelled in space.
+        ComputationError: If a solve fails or memory will not do.
+    """
+    ring = solid_ring(design, half=True)
+    cup, height = cup_of(ring, design), lobe_height(design)
+    stiffness = cup.pull(1.0, place).stiffness
+    total = len(heights) + len(BEYOND)
+    rows = [(0.0, 0.0, nan)]  # at rest the teeth of every drive overlap
+    for k, share in enumerate(heights):
+        pulled = cup.pull(share * stiffness * height, place, nonlinear=True)
+        frame = cup.frames(pulled.masters, nonlinear=True)[0]
+        load = np.zeros((ring.sectors, len(pulled.load)))
+        load[0] = pulled.load
+        free = play(ring, frame, load, design.ratio)
+        rows.append((pulled.force, pulled.deflection, free))
+        progress("lobe force", k + 1, total)
+    force, deflection, plays = np.array(rows).T
+    none = np.zeros(0)
+    found = LobeCharacteristic(
+        height=height,
+        force=force,
+        deflection=deflection,
+        play=plays,
+        pressed_deflection=none,
+        pressed_force=none,
+    )
+    if isinf(found.take_up):
+        return found
+    pressed, planes = [(found.take_up, 0.0)], cup.share(place)
+    for k, part in enumerate(BEYOND):
+        w = found.take_up + part * height
+        if w > deflection[-1]:
+            break
+        pulled = cup.pull(found.force_at(w), place, nonlinear=True)
+        try:
+            taken = force_on_teeth(ring, design.ratio, planes, pulled.of_planes)
+        except ComputationError:
+            break  # the range ends here
+        pressed.append((pulled.deflection, taken))
+        progress("lobe force", len(heights) + k + 1, total)
+    beyond, taken_by_teeth = np.array(pressed).T
+    return replace(found, pressed_deflection=beyond, pressed_force=taken_by_teeth)
+
+
+def cup_of(ring: SolidRing, design: Design) -> PinchedCup:
+    """The flexspline of half a drive, to be pulled apart."""
+    strip, flank = ring.strip, ring.strip.flank_dofs // 3
+    return PinchedCup(
+        name=design.drive.name,
+        sectors=ring.sectors,
+        strip=strip.mesh,
+        masters=strip.masters,
+        segments=strip.segments,
+        root=design.flexspline_inner_radius + design.flexspline.rim_mm * mm,
+        bore=len(strip.bore),
+        first=flank,
+    )

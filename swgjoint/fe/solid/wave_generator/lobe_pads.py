@@ -1,0 +1,110 @@
+"""Two opposite pads in the bore: a lobe height that the teeth may resist.
+
+Loads leave the deflection free, so that teeth that touch would only stop it. A pad over
+one pitch of the bore sets it, plane by plane to what the loads do, and the solver of
+the drive finds the contacts. Its force with teeth less that without is what they take.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.errors import ComputationError
+from swgjoint.fe.solid.across import spread_over
+from swgjoint.fe.solid.continuation import SolidContinuation
+from swgjoint.fe.solid.ring import SolidRing
+from swgjoint.fe.solid.state import SolidState
+from swgjoint.fe.solid.wave_generator.surface import WaveGeneratorSurface
+
+Array = NDArray[np.float64]
+
+NEAR = 0.49
+"""Half of the width of a pad [pitches]: the nodes of one tooth."""
+AWAY = 1.0
+"""Gap where there is no pad [m]."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LobePads(WaveGeneratorSurface):
+    """Two pads on the y axis, round as the bore, in the planes of a load."""
+
+    planes: Array
+    """z where they press (n,) [m]."""
+    radius: Array
+    """There, from the axis of the drive (n,) [m]."""
+    half: float
+    """Half of their width [m]."""
+    reach: float
+    """Along z, around these planes [m]."""
+
+    def gap(self, points: Array, alpha: float) -> tuple[Array, Array, Array]:
+        """As that of a wave generator; the pads stand at angle zero."""
+        x, y, z = points.T
+        radius = np.hypot(x, y)
+        away = np.abs(z[:, None] - self.planes)
+        on = (away.min(axis=1) < self.reach) & (np.abs(x) < self.half)
+        normal = np.stack([x / radius, y / radius, np.zeros(len(x))], axis=-1)
+        gap = np.where(on, radius - self.radius[away.argmin(axis=1)], AWAY)
+        return gap, normal, np.where(on, 1.0 / radius, 0.0)
+
+
+def with_pads(ring: SolidRing, share: Array, deflection: Array) -> SolidRing:
+    """The drive with pads in place of its wave generator.
+
+    Args:
+        ring: Half of it.
+        share: Part of the load in every plane, as in
+            :meth:`swgjoint.fe.solid.figures.pinched_cup.PinchedCup.share` (n_planes,).
+        deflection: Of the lobe in every plane (n_planes,) [m].
+    """
+    bore = float(np.hypot(ring.strip.bore[:, 0], ring.strip.bore[:, 1]).min())
+    z, loaded = ring.strip.mesh.teeth.z, share > 0.0
+    # contact sees displacements averaged over a part of the width
+    deflection = spread_over(z, 1).T @ deflection
+    pads = LobePads(
+        outline=ring.wave_generator.outline,
+        width=ring.wave_generator.width,
+        planes=z[loaded],
+        radius=bore + deflection[loaded],
+        half=NEAR * 2.0 * np.pi * bore / ring.strip.sectors,
+        reach=0.25 * float(np.diff(z).min()),
+    )
+    height = float(share @ deflection)
+    return replace(ring, wave_generator=pads, lobe_height=height)
+
+
+def force_on_teeth(
+    ring: SolidRing, ratio: float, share: Array, deflection: Array
+) -> float:
+    """What the teeth add to the force of a lobe [N].
+
+    Args:
+        ring: Half of the drive.
+        ratio: Signed i.
+        share: As in :func:`with_pads`.
+        deflection: The same.
+
+    Raises:
+        ComputationError: If a solve fails.
+    """
+    padded = with_pads(ring, share, deflection)
+    follow = SolidContinuation(ring=padded, ratio=ratio)
+    alone = _checked(follow.deflected(), padded.lobe_height)
+    meshed = _checked(follow.meshed(alone), padded.lobe_height)
+    return pad_force(padded, meshed) - pad_force(padded, alone)
+
+
+def pad_force(ring: SolidRing, state: SolidState) -> float:
+    """Outward force of a pad on the half [N]."""
+    turn = ring.frames(state)[0].turn
+    force = state.bore_force.reshape(ring.sectors, -1, 3)
+    return float(np.einsum("sj,spj->", turn[:, 1], force))
+
+
+def _checked(state: SolidState, height: float) -> SolidState:
+    if not state.outcome.ok:
+        raise ComputationError(f"lobes at {1e3 * height:.4g} mm: {state.outcome.value}")
+    return state

@@ -1,0 +1,226 @@
+"""The bearing of the wave generator in space: its outer race on its balls.
+
+The race bends and stretches in its plane as the nonlinear ring of
+:mod:`swgjoint.fe.rings`, on Hertz balls with clearance on the cam. Its outside
+(:mod:`swgjoint.fe.solid.wave_generator.race_outside`) is straight over its width and
+rolls about the circumferential direction
+(:mod:`swgjoint.fe.solid.wave_generator.race_roll`), by u(s) at its edges.
+
+Assumed: all balls roll in the middle plane of race and face width, and their grooves
+take no moment about the circumferential direction. Along the axis the grooves give way
+(normal clearances leave tenths of a millimetre; the race may warp) or hold (it may not,
+and rolls sixteen times as hard at two lobes): two bounds. The axial motion does not
+shift the outside. A slope of the wave generator is none of the race's, which takes the
+slope of the bore; a crown is ground on its outside.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.fe.plane.corotation import rotate
+from swgjoint.fe.plane.race import RaceForces
+from swgjoint.fe.rings.race_on_balls import RaceOnBalls, pressed_form
+from swgjoint.fe.solid.wave_generator.race_outside import RaceOutside
+from swgjoint.fe.solid.wave_generator.race_roll import RaceRoll
+from swgjoint.gear.design.design import Design
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+
+KINDS = ("x", "y", "roll", "axial")
+"""Of a node; values, then derivatives by the parameter of an element."""
+NODE = 2 * len(KINDS)
+SIGN = np.tile([-1.0, -1.0, 1.0, 1.0], 2)
+"""Factors that close half a ring."""
+# of both nodes of an element: value and derivative, first and last
+PLANE = np.array([0, 1, 4, 5, 8, 9, 12, 13])
+ROLL = np.array([2, 6, 10, 14])
+AXIAL = np.array([3, 7, 11, 15])
+ANCHOR = 1e-11
+"""Part of the largest stiffness that holds back in every step what nothing holds. At
+1e-9 the race of size 25 and ratio 100 went half of the way left at every step."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SolidRace:
+    """Outer race, balls and cam around the sectors of a model.
+
+    Coordinates have the shape (sectors, 2, 4): nodes at the first faces of the sectors,
+    value and derivative, x and y of the mean line, u and w, all in metres.
+    """
+
+    on_balls: RaceOnBalls
+    half: bool
+    outside: RaceOutside
+    roll: RaceRoll
+    axially_free: bool = True
+    phase: float = 0.0
+    """Angle of ball 0 from the major axis at alpha = 0 [rad]."""
+
+    @classmethod
+    def of(cls, design: Design, *, half: bool, axially_free: bool = True) -> SolidRace:
+        """That of a design; its flexspline has as many sectors as the race elements."""
+        own = RaceOnBalls.of(design, design.drive.teeth_flexspline)
+        return cls(
+            on_balls=own,
+            half=half,
+            outside=RaceOutside.of(design),
+            roll=RaceRoll.of(own.bearing, own.race),
+            axially_free=axially_free,
+        )
+
+    @property
+    def sectors(self) -> int:
+        """Elements in the model."""
+        return self.on_balls.race.elements // (2 if self.half else 1)
+
+    @property
+    def pitch(self) -> float:
+        """Angle of an element [rad]."""
+        return 2.0 * pi / self.on_balls.race.elements
+
+    def covers(self, z: Array) -> Mask:
+        """Which places along the axis lie on the race."""
+        return self.outside.covers(z)
+
+    def at_rest(self, alpha: float, rotation: float, closed: float) -> Array:
+        """Start of a search: deflected by the lobes, pressed on the balls there.
+
+        Args:
+            alpha: Wave-generator angle [rad].
+            rotation: Of race and flexspline [rad].
+            closed: Where the coned bore would meet the undeformed one [m].
+        """
+        own = self.on_balls
+        w0 = 1.01 * (own.lobe_height + 0.5 * own.bearing.clearance)
+        phi = self.pitch * (np.arange(self.sectors) - 0.5) + rotation
+        wave = 2.0 * (phi - alpha)
+        race = np.zeros((self.sectors, 2, len(KINDS)))
+        race[..., :2] = own.race.two_lobes(w0, phi, alpha)
+        roll = -0.5 * self.outside.width / closed * w0
+        race[:, 0, 2] = roll * np.cos(wave)
+        race[:, 1, 2] = -2.0 * self.pitch * roll * np.sin(wave)
+        return race
+
+    @property
+    def _still(self) -> Array:
+        """Undeformed coordinates in the frames of the teeth, of all nodes (2, 4)."""
+        still = np.zeros((2, len(KINDS)))
+        still[:, :2] = self.on_balls.race.reference[0]
+        still[:, :2] = rotate(still[:, :2], -0.5 * self.pitch)
+        return still
+
+    def displaced(self, race: Array, rotation: float) -> Array:
+        """Motion of the nodes in the frames of the teeth, turned with the flexspline.
+
+        Args:
+            race: Coordinates.
+            rotation: Of the flexspline [rad].
+        """
+        angle = self.pitch * np.arange(self.sectors, dtype=np.float64) + rotation
+        flat = rotate(race[..., :2], -angle[:, None])
+        return np.concatenate([flat, race[..., 2:]], axis=-1) - self._still
+
+    def placed(self, displaced: Array, rotation: float) -> Array:
+        """Coordinates of nodes that have moved so in the frames of the teeth."""
+        race = displaced + self._still
+        angle = self.pitch * np.arange(self.sectors, dtype=np.float64) + rotation
+        flat = rotate(race[..., :2], angle[:, None])
+        return np.concatenate([flat, race[..., 2:]], axis=-1)
+
+    def elements(self, race: Array) -> Array:
+        """Coordinates of both nodes of the elements (N, 16)."""
+        nodes = race.reshape(len(race), NODE)
+        last = np.roll(nodes, -1, axis=0)
+        if self.half:
+            last[-1] *= SIGN
+        return np.concatenate([nodes, last], axis=1)
+
+    def forces(self, race: Array, alpha: float) -> RaceForces:
+        """Race and balls at given coordinates."""
+        own, n = self.on_balls.race, self.sectors
+        plane = race[..., :2]
+        whole = np.concatenate([plane, -plane]) if self.half else plane
+        q = whole.ravel()
+        nodal, blocks = own.forces(q)
+        gradient, hessian = np.zeros((n, 2 * NODE)), np.zeros((n, 2 * NODE, 2 * NODE))
+        gradient[:, PLANE[:4]] = nodal.reshape(-1, 4)[:n]
+        hessian[:, PLANE[:, None], PLANE] = blocks[:n]
+        balls = self.on_balls.pressed(q, alpha, self.phase, self._feet(race, alpha))
+        on = np.flatnonzero(balls.overlap > 0.0)
+        on = on[balls.seen.dofs[on, 0] // 4 < n]
+        near, force = balls.seen.chosen(on), balls.force[on]
+        slope = 1.5 * self.on_balls.ball_constant * np.sqrt(balls.overlap[on])
+        rows = near.by_ring
+        form = pressed_form(near, rows.shape[1], force, slope)
+        sector = near.dofs[:, 0] // 4
+        np.add.at(gradient, (sector[:, None], PLANE), -force[:, None] * rows[:, 0])
+        np.add.at(
+            hessian,
+            (sector[:, None, None], PLANE[:, None], PLANE),
+            np.swapaxes(rows, 1, 2) @ (form @ rows),
+        )
+        out = np.concatenate([ROLL, AXIAL])
+        moved = self.elements(race)[:, out]
+        pulled = moved @ self.roll.stiffness
+        gradient[:, out] += pulled
+        hessian[:, out[:, None], out] += self.roll.stiffness
+        bent = 0.5 * float(np.einsum("si,si->", moved, pulled))
+        largest = float(np.abs(np.einsum("sii->si", hessian)).max())
+        every = np.arange(2 * NODE)
+        hessian[:, every, every] += ANCHOR * largest
+        fixed = self._fixed(race)
+        gradient[fixed] = 0.0
+        return RaceForces(
+            gradient=gradient,
+            hessian=hessian,
+            fixed=fixed,
+            balls=balls,
+            energy=own.energy(q) + balls.energy + (2.0 if self.half else 1.0) * bent,
+        )
+
+    def _feet(self, race: Array, alpha: float) -> Array:
+        """Places of the balls on the race, about."""
+        centre = self.on_balls.balls(alpha, self.phase)[0]
+        angle = np.arctan2(-centre[:, 0], centre[:, 1])
+        begin = np.arctan2(-race[0, 0, 0], race[0, 0, 1])
+        return np.asarray(np.mod(angle - begin, 2.0 * pi) / self.pitch)
+
+    def _fixed(self, race: Array) -> Mask:
+        """The race turns and moves along the axis in its place: node 0 does not."""
+        fixed = np.zeros((len(race), 2 * NODE), dtype=bool)
+        x, y = race[0, 0, :2]
+        first = [0 if abs(y) > abs(x) else 1, 3]
+        fixed[0, first] = True
+        fixed[-1, NODE + np.array(first)] = True
+        if not self.axially_free:
+            fixed[:, AXIAL] = True
+        return fixed
+
+    def gap(self, race: Array, points: Array, start: Array) -> tuple[Array, ...]:
+        """Gap of bore nodes to the outside of the race, and its derivatives.
+
+        Args:
+            race: Coordinates.
+            points: Of every sector, global frame (N, b, 3) [m].
+            start: Their places on the elements of their sectors, about (b,).
+
+        Returns:
+            Gap (N, b) [m], derivatives by the points (N, b, 3) and by the coordinates
+            of both nodes of the elements (N, b, 16).
+        """
+        own = self.elements(race)
+        line = own[:, PLANE].reshape(-1, 4, 2)
+        gap, by_point, by_line, by_edge = self.outside.gap(
+            line, own[:, ROLL], points, start
+        )
+        by_race = np.zeros((*gap.shape, 2 * NODE))
+        by_race[..., PLANE] = by_line.reshape(*gap.shape, 8)
+        by_race[..., ROLL] = by_edge
+        return gap, by_point, by_race

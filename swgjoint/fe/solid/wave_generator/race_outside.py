@@ -1,0 +1,104 @@
+r"""Outside of the wave generator's outer race: where the bore of the rim lies on it.
+
+It is straight over its width but for a crown c, and rolls by u at its edges. With z
+from its middle, the bore at a distance d outside of the mean line of a race of
+thickness t and width b has
+
+.. math:: g = d - \tfrac12 t + c(z) - \frac{2z}{b}\,u .
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.fe.rings.hermite_ring import hermite
+from swgjoint.fe.solid.wave_generator.surface import crown
+from swgjoint.gear.bearing.ball_bearing import BallBearing
+from swgjoint.gear.design.design import Design
+from swgjoint.units import mm, um
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, kw_only=True)
+class RaceOutside:
+    """Surface that carries the bore, in SI."""
+
+    thickness: float
+    """t of the race [m]."""
+    width: float
+    """b of the race [m]."""
+    crowning: float
+    """At the edges of the face width [m]."""
+    face_width: float
+    """[m]."""
+    circular: bool
+
+    @classmethod
+    def of(cls, design: Design) -> RaceOutside:
+        """That of a design."""
+        bearing, shape = BallBearing.of(design), design.micro_geometry
+        return cls(
+            thickness=bearing.race_thickness,
+            width=bearing.race_width,
+            crowning=shape.wave_generator_crowning_um * um,
+            face_width=design.drive.face_width_mm * mm,
+            circular=shape.crowning_kind == "circular",
+        )
+
+    def covers(self, z: Array) -> Mask:
+        """Which places along the axis lie on the race."""
+        return np.asarray(np.abs(z) <= 0.5 * self.width * (1.0 + 1e-9))
+
+    def gap(
+        self, line: Array, edge: Array, points: Array, start: Array
+    ) -> tuple[Array, ...]:
+        """Gap of points to the outside, and its derivatives.
+
+        Args:
+            line: Mean line: both nodes of the elements, values and derivatives by
+                their parameters, x and y (N, 4, 2) [m].
+            edge: u in the same order (N, 4) [m].
+            points: Of every sector, global frame (N, b, 3) [m].
+            start: Their places on the elements of their sectors, about (b,).
+
+        Returns:
+            Gap (N, b) [m], derivatives by the points (N, b, 3), by the mean line
+            (N, b, 4, 2) and by u (N, b, 4). Points beyond an element see its cubic go
+            on.
+        """
+        flat, z = points[..., :2], points[..., 2]
+        xi = np.broadcast_to(start, z.shape).copy()
+        for _ in range(8):
+            value, first, second = hermite(xi)
+            r, v, w = (h @ line for h in (value, first, second))
+            rest = flat - r
+            step = np.sum(rest * v, axis=-1) / np.sum(v * v - rest * w, axis=-1)
+            xi += np.clip(step, -1.0, 1.0)
+            if np.abs(step).max() < 1e-12:
+                break
+        value, first, second = hermite(xi)
+        r, v, w = (h @ line for h in (value, first, second))
+        length = np.hypot(v[..., 0], v[..., 1])
+        tangent = v / length[..., None]
+        normal = np.stack([tangent[..., 1], -tangent[..., 0]], -1)
+        distance = np.sum((flat - r) * normal, axis=-1)
+        spread = 1.0 - distance * np.sum(normal * w, axis=-1) / length**2
+        lever = 2.0 * z / self.width
+        roll = np.einsum("sba,sa->sb", value, edge)
+        rolls = np.einsum("sba,sa->sb", first, edge) / (length * spread)
+        lowered, by_z = crown(z, self.crowning, self.face_width, circular=self.circular)
+        gap = distance - 0.5 * self.thickness + lowered - lever * roll
+        # along the outside: the foot moves by u_t + d beta
+        along = (lever * rolls)[..., None]
+        by_point = np.empty(points.shape)
+        by_point[..., :2] = normal - along * tangent
+        by_point[..., 2] = by_z - 2.0 / self.width * roll
+        turn = (lever * rolls * distance / length)[..., None]
+        moved = -value[..., :, None] * by_point[..., None, :2]
+        moved -= (turn * first)[..., :, None] * normal[..., None, :]
+        return gap, by_point, moved, -lever[..., None] * value

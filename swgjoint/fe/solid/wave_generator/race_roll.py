@@ -1,0 +1,61 @@
+r"""Roll of the wave generator's outer race about the circumferential direction.
+
+The edge at z = b/2 goes out by u, the other one in. Roll :math:`\vartheta = 2u/b` and
+motion w along the axis resist as in a curved beam (Timoshenko, Strength of Materials
+II, circular rings out of their plane; textbook, not checked):
+
+.. math:: U = \int \tfrac12 EI_z\Bigl(\frac\vartheta r - w''\Bigr)^2
+    + \tfrac12 GJ\Bigl(\vartheta' + \frac{w'}r\Bigr)^2 ds, \quad
+    I_z = \tfrac1{12} t b^3, \quad J \approx \tfrac13 b t^3 (1 - 0.63\,t/b) .
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.fe.rings.hermite_ring import HermiteRing, hermite
+from swgjoint.gear.bearing.ball_bearing import BallBearing
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RaceRoll:
+    """Out-of-plane stiffness of the elements of a ring, in SI."""
+
+    ring: HermiteRing
+    width: float
+    """b of the race [m]."""
+    rolling: float
+    """E I_z [N m^2]."""
+    twisting: float
+    """G J [N m^2]."""
+
+    @classmethod
+    def of(cls, bearing: BallBearing, ring: HermiteRing) -> RaceRoll:
+        """That of a bearing; the groove takes its part of J, none of I_z."""
+        t, b, steel = bearing.race_thickness, bearing.race_width, bearing.material
+        torsion = bearing.groove_inertia_factor * b * t**3 / 3.0 * (1.0 - 0.63 * t / b)
+        shear = 0.5 * steel.youngs_modulus / (1.0 + steel.poisson_ratio)
+        return cls(
+            ring=ring,
+            width=b,
+            rolling=steel.youngs_modulus * t * b**3 / 12.0,
+            twisting=shear * torsion,
+        )
+
+    @cached_property
+    def stiffness(self) -> Array:
+        """Of an element by u and w of its nodes (8, 8) [N/m]."""
+        points, weights = np.polynomial.legendre.leggauss(4)
+        value, first, second = hermite(0.5 * (points + 1.0))
+        h, r, per_u = self.ring.step, self.ring.radius, 2.0 / self.width
+        bent = np.concatenate([per_u * value / r, -second / h**2], axis=1)
+        twist = np.concatenate([per_u * first / h, first / (h * r)], axis=1)
+        weight = 0.5 * h * weights
+        matrix = self.rolling * (bent.T * weight) @ bent
+        return np.asarray(matrix + self.twisting * (twist.T * weight) @ twist)

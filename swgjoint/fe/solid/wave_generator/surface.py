@@ -1,0 +1,105 @@
+r"""Surface of the wave generator over the face width: crowning and slope.
+
+Crowning lowers both edges by :math:`c (2 z/b)^2` (parabolic) or a circular arc through
+the same points. Slope raises the edge at the open end (z < 0) by s at the major axis
+and lowers it at the minor axis, :math:`-s\,(2 z/b) \cos 2\varphi`: with positive s the
+surface follows the cone of the deflected cup (thesis figure 7.27; its figure 7.33 is
+described with the opposite sign). Beyond the edges there is no surface.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.fe.plane.corotation import rotate
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.design.tolerances import flawed_wave_generator, wave_generator_offset
+from swgjoint.gear.wave_generators.wave_generator import WaveGenerator
+from swgjoint.units import mm, um
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class WaveGeneratorSurface:
+    """Outline and micro-geometry."""
+
+    outline: WaveGenerator
+    width: float
+    """Face width b [m]."""
+    crowning: float = 0.0
+    """c [m]."""
+    slope: float = 0.0
+    """s [m]."""
+    circular: bool = False
+    offset: Array | None = None
+    """Centre of the outline in the frame that turns with it (2,) [m]."""
+
+    @classmethod
+    def of(cls, design: Design) -> WaveGeneratorSurface:
+        """That of a design."""
+        shape = design.micro_geometry
+        return cls(
+            outline=flawed_wave_generator(design),
+            width=design.drive.face_width_mm * mm,
+            crowning=shape.wave_generator_crowning_um * um,
+            slope=shape.wave_generator_slope_um * um,
+            circular=shape.crowning_kind == "circular",
+            offset=wave_generator_offset(design),
+        )
+
+    def gap(self, points: Array, alpha: float) -> tuple[Array, Array, Array]:
+        """Gap, its gradient and its curvature along the outline.
+
+        Args:
+            points: Positions in the global frame (n, 3) [m].
+            alpha: Angle of the wave generator [rad].
+
+        Returns:
+            Gap (n,) [m], gradient (n, 3), curvature (n,) [1/m].
+        """
+        flat = rotate(points[:, :2], -alpha)
+        if self.offset is not None:
+            flat = flat - self.offset
+        gap, normal, curvature = self.outline.signed_distance(flat)
+        lowered, by_z = crown(
+            points[:, 2], self.crowning, self.width, circular=self.circular
+        )
+        # angle from the major axis, which lies along y
+        radius = np.hypot(flat[:, 0], flat[:, 1])
+        double = 2.0 * np.arctan2(-flat[:, 0], flat[:, 1])
+        z = 2.0 * points[:, 2] / self.width
+        lowered = lowered + self.slope * z * np.cos(double)
+        by_z = by_z + self.slope * 2.0 / self.width * np.cos(double)
+        by_angle = -2.0 * self.slope * z * np.sin(double) / radius
+        around = np.stack([-flat[:, 1], flat[:, 0]], axis=-1) / radius[:, None]
+        plane = rotate(normal + by_angle[:, None] * around, alpha)
+        return (
+            gap + lowered,
+            np.concatenate([plane, by_z[:, None]], axis=1),
+            curvature / (1.0 + curvature * gap),
+        )
+
+
+def crown(
+    z: Array, height: float, width: float, *, circular: bool
+) -> tuple[Array, Array]:
+    """How far a crowned surface lies below a straight one, and the slope of that.
+
+    Args:
+        z: From the middle of the face width (n,) [m].
+        height: At the edges [m].
+        width: Face width [m].
+        circular: An arc through the same points instead of a parabola.
+    """
+    if not height:
+        return np.zeros_like(z), np.zeros_like(z)
+    half = 0.5 * width
+    if circular:
+        radius = 0.5 * (half**2 + height**2) / height
+        depth = np.sqrt(radius**2 - np.minimum(np.abs(z), 0.999 * radius) ** 2)
+        return radius - depth, z / depth
+    return height * (z / half) ** 2, 2.0 * height * z / half**2

@@ -1,0 +1,1 @@
+"""Drives with manufacturing errors of the teeth, in 2D."""

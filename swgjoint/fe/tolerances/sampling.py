@@ -1,0 +1,303 @@
+"""Equilibria of a drive with manufacturing errors over the whole cycle of its teeth.
+
+Errors of the circular spline repeat with alpha, those of the flexspline with beta; both
+together after as many pitches as the least common multiple of the tooth counts, a turn
+of the output or a part of it. Full solves would take hours: the drive is linearised at
+a few positions within one pitch, and the errors of all pitches are superposed there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.errors import ComputationError
+from swgjoint.fe.common.clearance import FAINT, across_clearance
+from swgjoint.fe.common.following import Follower
+from swgjoint.fe.tolerances.cycle import gap_errors, pitch_of, pitches_of
+from swgjoint.fe.tolerances.rest import SMALL, Rest, influences
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.design.tolerances import (
+    has_errors,
+    with_perfect_teeth,
+    without_errors,
+)
+from swgjoint.maps.samples import FullSolves, ToleranceSamples
+from swgjoint.maps.unfinished import Unfinished
+from swgjoint.progress import Progress, silent
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+PHASES = {"2d": 6, "3d": 4}
+"""Positions within a pitch: what the errors add varies slowly within one."""
+ALONE = 24
+"""Positions within a pitch without errors of the teeth, where one is all there is."""
+POSITIONS = 40_000
+"""Positions of the cycle, if that leaves two in a pitch: what two minutes allow."""
+LEVELS = (0.15, 0.45, 1.0)
+"""Sampled torques, of both signs, as parts of the repeated peak torque."""
+CHECKS = {"2d": 12, "3d": 3}
+"""Positions that are solved without linearisation, too, to judge the map; in space one
+takes half a minute."""
+STAGES = ("equilibria", "linearised positions", "superposition", "full solves")
+"""Of the sampling of a drive with errors, as the progress counts them."""
+FREE = 100.0
+"""Compliance, in the median of all positions, from which the output counts as free."""
+CHUNK = 128
+"""Sets of errors that are superposed between two calls of the progress: of drives with
+many teeth a torque takes minutes."""
+_PHASE = "superposition-{:04d}"
+
+
+def sample_tolerances(
+    design: Design,
+    *,
+    repeated_peak: float,
+    rated_torque: float,
+    phases: int | None = None,
+    model: str = "2d",
+    progress: Progress = silent,
+    keep: Unfinished | None = None,
+) -> ToleranceSamples:
+    """Superposed equilibria over the cycle of the teeth.
+
+    Args:
+        design: A drive with errors of its teeth.
+        repeated_peak: Largest torque [N·m].
+        rated_torque: [N·m].
+        phases: Positions within a pitch; fewer than usual for many pitches if None.
+        model: Fidelity, ``2d`` or ``3d``.
+        progress: Called with the stage, the parts done and their number.
+        keep: Where finished positions are kept and taken up again; None keeps none.
+
+    Raises:
+        ComputationError: If the drive without errors or without torque, or a torque
+            with errors cannot be solved.
+    """
+    drive = design.drive
+    if phases is None:
+        most = PHASES[model] if pitches_of(design) > 1 else ALONE
+        phases = int(np.clip(POSITIONS // pitches_of(design), 2, most))
+    own_reference = has_errors(with_perfect_teeth(design))
+    tick = _stage(progress, design, 1, phases * (2 if own_reference else 1))
+    options: dict[str, Any] = {"phases": phases, "model": model, "tick": tick}
+    follow, linear = influences(design, **options)
+    reference = linear
+    if own_reference:
+        reference = influences(without_errors(design), **options)[1]
+    pitches = np.arange(pitches_of(design), dtype=np.int64)
+    errors = gap_errors(design, pitches)
+    none = tuple(np.zeros_like(one[:1]) for one in errors)
+    levels = np.array([part * repeated_peak for part in LEVELS])
+    small = SMALL * rated_torque
+    has_play = any(rest.opposite is not None for rest in (*linear, *reference))
+    if has_play:
+        levels = np.append(small, levels)
+    tables, perfect, free = [], [], 0
+    loads = 2 * levels.size + 1
+    steps = loads * -(-pitches.size // CHUNK)  # rounded up
+    tick = _stage(progress, design, 2, phases * steps)
+    for k, (rest, flawless) in enumerate(zip(linear, reference, strict=True)):
+        there = _kept(keep, k, (3, loads, pitches.size))
+        if there is None:
+            found, count = _over_torque(rest, errors, levels, small, tick)
+        else:
+            found, count = there
+            tick(steps)
+        if not np.isfinite(found).all():
+            lost = np.isnan(found).any(axis=(0, 1)).sum()
+            raise ComputationError(
+                f"{drive.name}: no equilibrium with the errors of the teeth at {lost}"
+                f" of {pitches.size} pitches; try smaller tolerances"
+            )
+        if keep is not None and there is None:
+            keep.write(_PHASE.format(k), {"table": found, "free": count})
+        alone, _ = _over_torque(flawless, none, levels, small)
+        if has_play:
+            found, alone = _with_onsets(found, small), _with_onsets(alone, small)
+        ideal = pitch_of(design) * k / phases / design.ratio
+        found[0] -= ideal
+        alone[0] -= ideal
+        tables.append(found)
+        perfect.append(alone[:, :, 0])
+        free += count
+    # (3, n_torques, n_pitches, n_phases)
+    table = np.stack(tables, axis=-1)
+    # spread over the cycle and the phases of a pitch
+    count = pitches.size * phases
+    checks = CHECKS[model]
+    chosen = np.arange(checks) * (count // checks) + np.arange(checks) % phases
+    torques = (0.0, rated_torque)
+    tick = _stage(progress, design, 3, checks)
+    solved = full_solves(design, follow, linear, chosen % count, torques, tick)
+    if has_play:
+        levels = np.append(FAINT * small, levels)
+    return ToleranceSamples(
+        pitches=pitches.size,
+        phases=phases,
+        torque=np.concatenate([-levels[::-1], [0.0], levels]),
+        table=table.reshape(*table.shape[:2], -1),
+        perfect=np.stack(perfect, axis=-1),
+        free=free,
+        solved=solved,
+    )
+
+
+def full_solves(
+    design: Design,
+    follow: Follower[Any],
+    rests: Sequence[Rest],
+    positions: Index,
+    torques: Sequence[float],
+    tick: Callable[[], None] = lambda: None,
+) -> FullSolves:
+    """Equilibria with errors at some positions of the cycle, without linearisation.
+
+    Args:
+        design: A drive with errors of its teeth.
+        follow: The same without them.
+        rests: It without load at positions in a pitch.
+        positions: Numbers of positions in the cycle, ``len(rests)`` a pitch.
+        torques: T at each of them [N·m].
+        tick: Called after every position.
+    """
+    rows = []
+    step = pitch_of(design) / len(rests)
+    pitch, phase = np.divmod(positions, len(rests))
+    for k, errors in enumerate(zip(*gap_errors(design, pitch), strict=True)):
+        flawed, rest = follow.with_errors(*errors), rests[phase[k]]
+        state = rest.state
+        for torque in torques:
+            if torque == 0.0 and rest.opposite is not None:
+                # in the middle of the clearance
+                found = [flawed.to_torque(s, at.torque) for s, at in rest.sides]
+            else:
+                state = flawed.to_torque(state, torque)
+                found = [state]
+            angle = np.mean(
+                [flawed.output_angle(s) if s.outcome.ok else np.nan for s in found]
+            )
+            error = angle - step * phase[k] / follow.ratio
+            moment = np.mean([flawed.input_torque(s) for s in found])
+            rows.append((step * positions[k], torque, error, moment))
+        tick()
+    table = np.array(rows).T
+    table = table[:, np.isfinite(table[2])]
+    return FullSolves(
+        input_angle=table[0],
+        torque=table[1],
+        output_error=table[2],
+        input_torque=table[3],
+    )
+
+
+def _over_torque(
+    rest: Rest,
+    errors: tuple[Array, ...],
+    levels: Array,
+    small: float,
+    tick: Callable[[], None] = lambda: None,
+) -> tuple[Array, int]:
+    """Output angle, strain energy, compliance at all torques (3, n_torques, n_sets).
+
+    And the number of sets whose unloaded output is free. ``tick`` is called after
+    :data:`CHUNK` sets at a torque.
+    """
+    gaps = [at.gap_change(*errors) for _, at in rest.sides]
+
+    def row(
+        torque: float, chosen: Any, start: Any, tick: Callable[[], None]
+    ) -> tuple[Array, Any]:
+        side = 0 if torque >= 0.0 else 1
+        state, at = rest.sides[side]
+        change = gaps[side][chosen]
+        tables, active = [], []
+        for k in range(0, len(change), CHUNK):
+            part = slice(k, k + CHUNK)
+            begin = None if start is None else start[part]
+            found = at.respond(change[part], torque, begin)
+            # of the equilibrium at which it is linearised
+            potential = found.potential + state.energy + at.torque * at.angle
+            energy = potential - torque * found.output_angle
+            tables.append(np.stack([found.output_angle, energy, found.compliance]))
+            active.append(found.active)
+            tick()
+        return np.concatenate(tables, axis=1), np.concatenate(active)
+
+    unloaded, at_rest = np.zeros((3, len(gaps[0]))), None
+    free = np.ones(len(gaps[0]), dtype=bool)
+    if rest.opposite is None:
+        unloaded, at_rest = row(0.0, slice(None), None, tick)
+        # a few free positions leave the median as it is
+        free = ~(unloaded[2] < FREE * np.nanmedian(unloaded[2]))
+    if free.any():
+        ends = [row(t, free, None, lambda: None)[0] for t in (small, -small)]
+        middle = 0.5 * (ends[0] + ends[1])
+        middle[1] -= 0.5 * small**2 * middle[2]  # what the small torque stores
+        middle[2] = 0.5 * (ends[1][0] - ends[0][0]) / small
+        unloaded[:, free] = middle
+    if rest.opposite is not None:
+        for _ in range(0, len(gaps[0]), CHUNK):
+            tick()
+    sides = []
+    for sign in (-1.0, 1.0):
+        active, rows = at_rest, []
+        for level in levels:
+            found, active = row(sign * level, slice(None), active, tick)
+            rows.append(found)
+        sides.append(rows)
+    table = [*sides[0][::-1], unloaded, *sides[1]]
+    return np.stack(table, axis=1), int(free.sum())
+
+
+def _stage(
+    progress: Progress, design: Design, number: int, total: int
+) -> Callable[..., None]:
+    """What counts the parts of one stage of the sampling."""
+    done = 0
+    name = f"{design.drive.name}: {STAGES[number]}, part {number + 1} of {len(STAGES)}"
+    progress(name, 0, total)
+
+    def tick(parts: int = 1) -> None:
+        nonlocal done
+        done += parts
+        progress(name, done, total)
+
+    return tick
+
+
+def _kept(
+    keep: Unfinished | None, phase: int, shape: tuple[int, ...]
+) -> tuple[Array, int] | None:
+    """Table and free sets of a phase of an interrupted run."""
+
+    def taken(arrays: Mapping[str, Any]) -> tuple[Array, int]:
+        table = np.asarray(arrays["table"], float)
+        if table.shape != shape:
+            raise ValueError(f"a table of shape {table.shape}")
+        return table, int(arrays["free"])
+
+    return None if keep is None else keep.read(_PHASE.format(phase), taken)
+
+
+def _with_onsets(table: Array, small: float) -> Array:
+    """Rows where the teeth begin to hold a free output, on both sides of the middle.
+
+    Args:
+        table: Output angle, strain energy, compliance (3, n_torques, n_sets).
+        small: Torque of the rows beside the middle [N·m].
+    """
+    zero = table.shape[1] // 2
+    # the fourth quantity of a pattern, the input torque, has no part here
+    rows = np.concatenate([table, np.zeros_like(table[:1])])
+    sides = [
+        across_clearance(rows[:, zero], rows[:, zero + side], side * small)[1][:3]
+        for side in (-1, 1)
+    ]
+    table[2, zero] = sides[1][2]  # the same stiffness on both sides of the middle
+    table = np.insert(table, zero + 1, sides[1], axis=1)
+    return np.insert(table, zero, sides[0], axis=1)

@@ -1,0 +1,1 @@
+"""The thin-race ball bearing between wave generator and flexspline."""

@@ -1,0 +1,102 @@
+"""Whether the bearing of the wave generator can be built into the flexspline."""
+
+from __future__ import annotations
+
+from math import pi
+
+import numpy as np
+
+from swgjoint.errors import DesignError
+from swgjoint.gear.bearing.ball_bearing import BallBearing
+from swgjoint.gear.design.check import Check
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.wave_generators.wave_generator import lobe_height, with_checks
+from swgjoint.units import mm, um
+
+THINNEST_RACE = 0.08
+"""Of the ball diameter: grooves are a tenth to a fifth of it deep (customary, not
+checked), and flexible races some 0.25 thick. At 0.02 the search for rest fails."""
+WIDEST_RACE = 2.0
+"""Of the face width: all of it counts as pressed, and the rim ends near the teeth."""
+
+
+def bearing_checks(design: Design) -> list[Check]:
+    """Balls fit on their circle, all inside the outline, and the lobes remain."""
+    bearing = design.wave_generator.bearing
+    assert bearing is not None
+    bore = design.flexspline_inner_radius / mm
+    circle = bore - bearing.race_thickness_mm - 0.5 * bearing.ball_diameter_mm
+    # chord between neighbours on the undeformed circle
+    pitch = 2.0 * circle * np.sin(pi / bearing.balls)
+    clearance = float(pitch) - bearing.ball_diameter_mm
+    where = f"{design.drive.name}: wave_generator.bearing"
+    lobes = lobe_height(design) / mm
+    fit_um = bearing.fit_clearance_um or 0.0
+    lobes_left = lobes - 0.5 * (bearing.clearance_um + fit_um) * um / mm
+    thinnest = THINNEST_RACE * bearing.ball_diameter_mm
+    width = BallBearing.of(design).race_width / mm
+    widest = WIDEST_RACE * design.drive.face_width_mm
+    return [
+        *_cam(design),
+        Check.above(
+            "bearing: deflection that its clearances leave",
+            lobes_left,
+            0.0,
+            "mm",
+            f"{where}: clearance_um = {bearing.clearance_um:g} and"
+            f" fit_clearance_um = {fit_um:g}: half of both takes up the lobes of"
+            f" {lobes:.4g} mm; accepted: below {2.0 * lobes * mm / um:.4g} um together",
+        ),
+        Check.at_least(
+            "bearing: thickness of the race",
+            bearing.race_thickness_mm,
+            thinnest,
+            "mm",
+            f"{where}.race_thickness_mm = {bearing.race_thickness_mm:g}: the groove of"
+            f" balls of {bearing.ball_diameter_mm:g} mm would cut through; accepted: at"
+            f" least {thinnest:.4g} mm",
+        ),
+        Check.at_most(
+            "bearing: width of the race",
+            width,
+            widest,
+            "mm",
+            f"{where}.race_width_mm = {width:g}: far wider than the teeth; accepted: at"
+            f" most {widest:.4g} mm",
+        ),
+        Check.above(
+            "bearing: clearance between balls",
+            clearance,
+            0.0,
+            "mm",
+            f"{where}.balls = {bearing.balls}: balls of"
+            f" {bearing.ball_diameter_mm:g} mm overlap by {-clearance:.4g} mm;"
+            " accepted: fewer or smaller balls",
+        ),
+    ]
+
+
+def _cam(design: Design) -> list[Check]:
+    """The cam below race and balls is a curve without corners."""
+    bearing = BallBearing.of(design)
+    try:
+        outline = with_checks(design)[0]
+    except DesignError:
+        return []
+    inner, _ = bearing.raceways
+    depth = bearing.bore_radius - inner
+    stations = np.linspace(0.0, outline.perimeter, 721)
+    sharpest = 1.0 / float(outline.evaluate(stations)[2].max())
+    value = (sharpest - depth) / mm
+    return [
+        Check.above(
+            "bearing: sharpest radius of the cam below it",
+            value,
+            0.0,
+            "mm",
+            f"{design.drive.name}: wave_generator.bearing: race, balls and"
+            f" clearances of {depth / mm:.4g} mm do not fit inside the outline, whose"
+            f" radius of curvature falls to {sharpest / mm:.4g} mm; accepted: a smaller"
+            " ball_diameter_mm or race_thickness_mm",
+        )
+    ]

@@ -1,0 +1,195 @@
+"""What the shipped catalogue tables state of a drive, and whether they agree."""
+
+from __future__ import annotations
+
+from statistics import median
+from typing import Any
+
+from swgjoint.errors import InputError
+from swgjoint.gear.catalogue import CatalogueRow, catalogue_rows, named_rows, table
+from swgjoint.maps.fit.friction_fit import StatedLosses
+
+SIMILAR = 1.6
+"""Torsion at T1 varies by less than this factor about the median of its ratio class:
+T1 and K1 both grow with the cube of the size, so a misplaced digit stands out."""
+
+_PER_TABLE = 1e4  # K1 to K3 are in 1e4 N·m/rad
+_STATED = (
+    "transmission_accuracy_arcmin",
+    "hysteresis_loss_arcmin",
+    "lost_motion_arcmin",
+    "repeatability_arcmin",
+)
+
+
+LOSS_KEYS = (
+    "no_load_running_torque_Nm",
+    "starting_torque_Nm",
+    "back_driving_torque_Nm",
+    "efficiency_percent",
+)
+"""Losses at speed, as ``swgjoint spec`` names them."""
+_LOSS_RATIO = 100
+"""Ratio of every row of ``losses.csv``."""
+_MILLI = 1e-3
+LOSS_CONDITIONS = "+20 C, grease, RT1-H-CS of the same rated torque, second-hand"
+"""Of all figures of ``losses.csv``; running torque and efficiency at 2000 rpm."""
+
+
+def stated_losses(row: CatalogueRow) -> StatedLosses | None:
+    """Row of ``losses.csv`` for a component set of the same ratio and rated torque.
+
+    The table is another maker's (RT1-H-CS), with the sizes and rated torques of CSG at
+    a ratio of 100, and second-hand.
+    """
+    if row.series != "CSG" or row.ratio != _LOSS_RATIO:
+        return None
+    for found in table("losses"):
+        if (found["size"], found["rated_Nm"]) == (row.size, row.rated_torque):
+            return StatedLosses(
+                rated_torque=_number(found, "rated_Nm"),
+                efficiency=0.01 * _number(found, "efficiency_percent"),
+                no_load_running=_MILLI * _number(found, "no_load_running_mNm"),
+                starting=_MILLI * _number(found, "starting_mNm"),
+                back_driving=_number(found, "back_driving_Nm"),
+            )
+    return None
+
+
+def stiffness_of(size: int, ratio: int) -> dict[str, float]:
+    """Row of ``stiffness.csv`` for a size and ratio: T1, T2 [N·m], K1 to K3 [N·m/rad].
+
+    Raises:
+        InputError: If the table has no such row or the row contradicts itself.
+    """
+    row = _of_class("stiffness", size, ratio)
+    if row is None:
+        raise InputError(
+            f"models/catalogue/stiffness.csv has no row for size {size}, ratio {ratio}"
+        )
+    values = {
+        "T1": _number(row, "T1_Nm"),
+        "T2": _number(row, "T2_Nm"),
+        **{k: _PER_TABLE * _number(row, f"{k}_1e4Nm_rad") for k in ("K1", "K2", "K3")},
+    }
+    if faults := _faults(row):
+        raise InputError("; ".join(faults))
+    return values
+
+
+def stated_figures(row: CatalogueRow) -> dict[str, float | None]:
+    """What the tables state of one drive beside stiffness and ratings; None if not.
+
+    A ratio class holds from its own ratio up to the next class of the series. The
+    torques of ratcheting and buckling and the inertia are those of CSG, the losses
+    those of :func:`stated_losses`.
+    """
+    accuracy = _of_class("accuracy", row.size, row.ratio, series=row.series) or {}
+    figures: dict[str, float | None] = dict.fromkeys(LOSS_KEYS)
+    for key in _STATED:
+        value = accuracy.get(key)
+        figures[key] = value if isinstance(value, float) else None
+    if row.series != "CSG":
+        return figures | dict.fromkeys(
+            ("ratcheting_torque_Nm", "buckling_torque_Nm", "input_inertia_kgm2")
+        )
+    ratings = next(
+        r for r in table("ratings") if (r["size"], r["ratio"]) == (row.size, row.ratio)
+    )
+    inertia = ratings["input_inertia_1e-4kgm2"]
+    losses = stated_losses(row)
+    if losses is not None:
+        figures |= {
+            "no_load_running_torque_Nm": losses.no_load_running,
+            "starting_torque_Nm": losses.starting,
+            "back_driving_torque_Nm": losses.back_driving,
+            "efficiency_percent": 100.0 * losses.efficiency,
+        }
+    return figures | {
+        "ratcheting_torque_Nm": row.ratcheting_torque,
+        "buckling_torque_Nm": _number(ratings, "buckling_Nm"),
+        "input_inertia_kgm2": 1e-4 * inertia if isinstance(inertia, float) else None,
+    }
+
+
+def catalogue_faults() -> list[str]:
+    """Contradictions in the shipped tables, one line each; none in a sound release.
+
+    K1 < K2 < K3 and T1 < T2; torsion T1/K1 similar over the sizes of a ratio class;
+    rated <= repeated peak <= momentary peak, T2 below the repeated peak.
+    """
+    faults = [fault for row in table("stiffness") for fault in _faults(row)]
+    for row in catalogue_rows():
+        if not row.rated_torque <= row.repeated_peak <= row.momentary_peak:
+            faults.append(f"{row.name}: torques of ratings.csv do not increase")
+        if row.T2 >= row.repeated_peak:
+            faults.append(f"{row.name}: T2 {row.T2:g} N·m is above the repeated peak")
+    return faults
+
+
+def catalogue_gaps() -> list[dict[str, Any]]:
+    """Rows with values that the tables do not hold: ``row`` and ``missing``."""
+    gaps = []
+    for row in named_rows():
+        absent = [key for key, value in stated_figures(row).items() if value is None]
+        if absent:
+            gaps.append({"row": row.name, "missing": absent})
+    rated = {row.size for row in catalogue_rows()}
+    smallest = min(row.ratio for row in catalogue_rows())
+    for line in table("stiffness"):
+        size, ratio = int(_number(line, "size")), int(_number(line, "ratio_class"))
+        if size not in rated or ratio < smallest:
+            gaps.append({"row": f"stiffness {size}-{ratio}", "missing": ["ratings"]})
+    for line in table("accuracy"):
+        if line["series"] != "CSG":
+            name = f"{line['series']}-{line['size']:g}-{line['ratio_class']:g}"
+            gaps.append({"row": f"accuracy {name}", "missing": ["ratings"]})
+    return gaps
+
+
+def _faults(row: dict[str, float | str | None]) -> list[str]:
+    """Contradictions in one row of ``stiffness.csv``."""
+    where = (
+        f"models/catalogue/stiffness.csv, size {row['size']:g}, class"
+        f" {row['ratio_class']:g}"
+    )
+    K1, K2, K3 = (_number(row, f"{k}_1e4Nm_rad") for k in ("K1", "K2", "K3"))
+    T1, T2 = _number(row, "T1_Nm"), _number(row, "T2_Nm")
+    faults = []
+    if not 0.0 < K1 < K2 < K3:
+        faults.append(f"{where}: needed 0 < K1 < K2 < K3, has {K1:g}, {K2:g}, {K3:g}")
+    if not 0.0 < T1 < T2:
+        faults.append(f"{where}: needed 0 < T1 < T2, has {T1:g}, {T2:g} N·m")
+    alike = [
+        _number(other, "T1_Nm") / _number(other, "K1_1e4Nm_rad")
+        for other in table("stiffness")
+        if other["ratio_class"] == row["ratio_class"]
+    ]
+    factor = T1 / K1 / median(alike)
+    if not 1.0 / SIMILAR < factor < SIMILAR:
+        faults.append(
+            f"{where}: torsion T1/K1 is {factor:.3g} times the median of its class;"
+            f" accepted: within a factor {SIMILAR:g}"
+        )
+    return faults
+
+
+def _of_class(
+    name: str, size: int, ratio: int, *, series: str | None = None
+) -> dict[str, float | str | None] | None:
+    """Row of the size and of the largest ratio class that is not above the ratio."""
+    rows = [
+        row
+        for row in table(name)
+        if row["size"] == size
+        and (series is None or row["series"] == series)
+        and _number(row, "ratio_class") <= ratio
+    ]
+    return max(rows, key=lambda row: _number(row, "ratio_class"), default=None)
+
+
+def _number(row: dict[str, float | str | None], key: str) -> float:
+    value = row[key]
+    if not isinstance(value, float):
+        raise InputError(f"models/catalogue: {key} is missing in a row ({row})")
+    return value

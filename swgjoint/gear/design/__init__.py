@@ -1,0 +1,1 @@
+"""The design file: its tables, defaults, feasibility, families and outlines."""

@@ -1,0 +1,273 @@
+"""A strain wave gear as a design file describes it."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Literal, Self
+
+from pydantic import model_validator
+
+from swgjoint.errors import DesignError, InputError
+from swgjoint.faults import Fault, Section, parse_toml, read_toml, validated
+from swgjoint.gear import kinematics
+from swgjoint.gear.design.family import family_design, family_member
+from swgjoint.gear.design.material import Material
+from swgjoint.gear.design.sections import (
+    Boss,
+    CircularSplineMember,
+    Coupling,
+    Cup,
+    Drive,
+    Friction,
+    Housing,
+    JointSection,
+    MaterialSection,
+    Member,
+    MeshSection,
+    MicroGeometry,
+    RatingsSection,
+    Tolerances,
+)
+from swgjoint.gear.wave_generators.sections import WaveGenerator
+from swgjoint.models_path import bundled_names, find
+from swgjoint.toml_text import toml_text
+from swgjoint.units import GPa, MPa, mm
+
+MemberName = Literal["flexspline", "circular_spline"]
+
+
+class Design(Section):
+    """One drive: attributes mirror the tables and keys of the file, units included.
+
+    ``design.flexspline.profile.tip_radius_mm`` is the file's key; the properties of
+    this class are in SI. Immutable; :meth:`with_changes` gives a changed copy.
+    """
+
+    drive: Drive
+    material: MaterialSection = MaterialSection()
+    flexspline: Member
+    circular_spline: CircularSplineMember
+    wave_generator: WaveGenerator
+    cup: Cup | None = None
+    boss: Boss | None = None
+    housing: Housing | None = None
+    coupling: Coupling | None = None
+    micro_geometry: MicroGeometry = MicroGeometry()
+    tolerances: Tolerances = Tolerances()
+    friction: Friction = Friction()
+    ratings: RatingsSection = RatingsSection()
+    joint: JointSection = JointSection()
+    mesh: MeshSection = MeshSection()
+
+    @model_validator(mode="after")
+    def _members_fit(self) -> Self:
+        faults: list[tuple[str, str]] = []
+        radius = self.flexspline_inner_radius / mm
+        if radius <= 0:
+            limit = radius + self.flexspline.rim_mm
+            faults.append(
+                (
+                    "flexspline.rim_mm",
+                    f"{self.flexspline.rim_mm:g} mm leaves no bore;"
+                    f" accepted: < {limit:g} mm",
+                )
+            )
+        if self.lobes == 3 and self.wave_generator.kind not in ("cosine", "table"):
+            faults.append(
+                (
+                    "wave_generator.kind",
+                    f"{self.wave_generator.kind!r} has two lobes, a tooth difference of"
+                    f" {self.tooth_difference} needs three; accepted: cosine, table",
+                )
+            )
+        if self.cup is not None and radius > 0:
+            if self.cup.bore_radius_mm >= radius and self.cup.kind == "cup":
+                faults.append(
+                    (
+                        "cup.bore_radius_mm",
+                        f"{self.cup.bore_radius_mm:g} mm; accepted: below the inner"
+                        f" radius of the flexspline, {radius:g} mm",
+                    )
+                )
+            if self.cup.length_mm <= self.drive.face_width_mm:
+                faults.append(
+                    (
+                        "cup.length_mm",
+                        f"{self.cup.length_mm:g} mm; accepted: more than the face width"
+                        f" {self.drive.face_width_mm:g} mm",
+                    )
+                )
+        profiles = (self.flexspline.profile.kind, self.circular_spline.profile.kind)
+        if profiles == ("conjugate", "conjugate"):
+            faults.append(
+                (
+                    "circular_spline.profile.kind",
+                    "'conjugate' in both members; accepted: in one of them",
+                )
+            )
+        if faults:
+            raise Fault(*faults)
+        return self
+
+    # -- constructors -----------------------------------------------------------
+
+    @classmethod
+    def load(cls, reference: str | Path) -> Self:
+        """Read a design file, given as a path or as the name of a bundled one.
+
+        ``size-NN-RRR`` names a drive of the family by rule, shipped file or not; see
+        :mod:`swgjoint.gear.design.family`.
+
+        Raises:
+            DesignError: With one line per fault of the file.
+        """
+        try:
+            path = find(reference, "drives", ".toml", what="design")
+        except InputError as exc:
+            member = family_member(str(reference).removesuffix(".toml"))
+            if member is None:
+                raise DesignError(f"{exc}; any size-NN-RRR by rule") from None
+            return cls.model_validate(family_design(*member))
+        data = read_toml(path, what="design", error=DesignError)
+        return validated(cls, data, where=str(path), error=DesignError)
+
+    @classmethod
+    def preset(cls, name: str) -> Self:
+        """A bundled design by its name, whatever files lie in the current folder."""
+        names = bundled_names("drives", ".toml")
+        if name not in names:
+            if (member := family_member(name)) is not None:
+                return cls.model_validate(family_design(*member))
+            raise DesignError(
+                f"design {name!r} not in models/drives; available: {', '.join(names)}"
+            )
+        from swgjoint.models_path import models_path
+
+        return cls.load(models_path() / "drives" / f"{name}.toml")
+
+    @classmethod
+    def from_toml(cls, text: str, where: str = "design") -> Self:
+        """A design from the text of a design file; ``where`` names it in messages."""
+        data = parse_toml(text, where=where, error=DesignError)
+        return validated(cls, data, where=where, error=DesignError)
+
+    def with_changes(
+        self, changes: Mapping[str, Any] | None = None, /, **dotted: Any
+    ) -> Self:
+        """A checked copy with other values for some keys.
+
+        Args:
+            changes: Dotted keys of the file, e.g. ``{"flexspline.rim_mm": 0.5}``; a
+                table is replaced whole, ``None`` removes a key.
+            **dotted: The same with two underscores for the dot,
+                ``flexspline__rim_mm=0.5``.
+
+        Raises:
+            DesignError: With one line per fault.
+        """
+        data = self.model_dump(exclude_unset=True)
+        merged = {
+            **(changes or {}),
+            **{k.replace("__", "."): v for k, v in dotted.items()},
+        }
+        where = f"design {self.drive.name!r} with changes"
+        for key, value in merged.items():
+            *tables, last = key.split(".")
+            table = data
+            for name in tables:
+                table = table.setdefault(name, {})
+                if not isinstance(table, dict):
+                    raise DesignError(f"{where}: {key}: {name} is not a table")
+            if value is None:
+                table.pop(last, None)
+            else:
+                table[last] = value
+        return validated(type(self), data, where=where, error=DesignError)
+
+    # -- text and identity ------------------------------------------------------
+
+    def to_toml(self) -> str:
+        """The design as the text of a design file, defaults written out."""
+        return toml_text(self.model_dump(exclude_none=True))
+
+    def content_hash(self) -> str:
+        """SHA-256 of everything that a result depends on: all but name and source.
+
+        Keys that are younger than kept results are left out where these results hold:
+        without a coupling, and in plane stress.
+        """
+        data = self.model_dump(exclude={"drive": {"name", "source"}})
+        if self.coupling is None:
+            del data["coupling"]
+        if self.mesh.stress_state == "plane_stress":
+            del data["mesh"]["stress_state"]
+        text = json.dumps(data, sort_keys=True, separators=(",", ":"), allow_nan=False)
+        return hashlib.sha256(text.encode()).hexdigest()
+
+    # -- figures in SI ----------------------------------------------------------
+
+    @property
+    def ratio(self) -> float:
+        """Signed ratio i; see :func:`swgjoint.gear.kinematics.ratio`."""
+        return kinematics.ratio(
+            self.drive.layout,
+            self.drive.teeth_flexspline,
+            self.drive.teeth_circular_spline,
+        )
+
+    @property
+    def periodicity(self) -> int:
+        """Pitches in a turn of the input; see :mod:`swgjoint.gear.kinematics`."""
+        return kinematics.periodicity(
+            self.drive.layout,
+            self.drive.teeth_flexspline,
+            self.drive.teeth_circular_spline,
+        )
+
+    @property
+    def tooth_difference(self) -> int:
+        """Teeth of the circular spline minus teeth of the flexspline."""
+        return self.drive.teeth_circular_spline - self.drive.teeth_flexspline
+
+    @property
+    def lobes(self) -> int:
+        """Lobes of the wave generator: two wherever the tooth difference is even."""
+        return 2 if self.tooth_difference % 2 == 0 else 3
+
+    @property
+    def pitch_diameter(self) -> float:
+        """Pitch diameter of the flexspline, m z_fs [m]."""
+        return self.drive.module_mm * mm * self.drive.teeth_flexspline
+
+    @property
+    def flexspline_inner_radius(self) -> float:
+        """Undeformed inner radius of the flexspline [m], thesis eq. (3.1)."""
+        module = self.drive.module_mm
+        return mm * (
+            module * self.drive.teeth_flexspline / 2.0
+            - self.flexspline.dedendum_coefficient * module
+            - self.flexspline.rim_mm
+        )
+
+    def material_of(self, member: MemberName) -> Material:
+        """Material of one member in SI: its own keys over those of ``[material]``."""
+        base, own = self.material, getattr(self.material, member)
+
+        def value(key: str, unit: float = 1.0) -> Any:
+            chosen = getattr(own, key)
+            chosen = getattr(base, key) if chosen is None else chosen
+            return None if chosen is None else chosen * unit
+
+        material = Material(
+            youngs_modulus=value("youngs_modulus_GPa", GPa),
+            poisson_ratio=value("poisson_ratio"),
+            density=value("density_kg_m3"),
+            fatigue_limit_bending=value("fatigue_limit_bending_MPa", MPa),
+            fatigue_limit_torsion=value("fatigue_limit_torsion_MPa", MPa),
+        )
+        assert math.isfinite(material.youngs_modulus)
+        return material

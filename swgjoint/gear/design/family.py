@@ -1,0 +1,167 @@
+"""A family of drives by rule, in the style of catalogue component sets.
+
+``size-NN-RRR`` is a drive of pitch diameter NN/10 inch and ratio RRR with the circular
+spline fixed. All lengths are the same multiples of the pitch diameter d or of the
+module for every size, so members of one ratio are similar.
+"""
+
+from __future__ import annotations
+
+import re
+from math import inf
+from typing import Any
+
+from swgjoint.errors import DesignError
+from swgjoint.toml_text import toml_text
+
+SIZES = (8, 100)
+RATIOS = (30, 200)
+"""Smallest and largest of the rule; the tooth count is twice the ratio."""
+
+# Multiples of the pitch diameter d; thesis lengths are over its 120 mm. FACE to GROOVE
+# are proportions of a study of catalogue component sets, a "hard" cup: assumed there,
+# no drawing of a cup or of a flexible bearing was at hand.
+FACE = 0.20
+RIM = 0.0125
+WALL_OVER_RIM = 0.0095 / 0.0125
+SMOOTH_CUP = 0.60 - FACE  # of the whole length 0.60 d, behind the teeth
+BORE_RADIUS = 0.58 * 0.5
+BALL = 0.083
+RACE = 0.021
+RACE_WIDTH = 0.145
+GROOVE = 0.8  # second moment of the race's section over that of its rectangle
+BALLS = 23  # odd: the lobes do not pass balls in phase
+BEARING_BORE = 0.71
+RING_RIM = 2.0 / 120.0  # thesis Table 4.1
+FILLET = 2.0 / 120.0  # thesis Table 7.3
+# multiples of the module: improved quadruple arc of thesis Table 6.7
+PROFILE = {
+    "tip_radius_mm": 0.5,
+    "addendum_radius_mm": 1.0,
+    "straight_mm": 0.0,
+    "dedendum_radius_mm": 20.0,
+    "root_radius_mm": 0.6,
+}
+# Thesis 7.13: 100, 90 and 45 um at w0 = 1 mm, face 10 mm, flexspline 50 mm long. The
+# coning over the face, w0 face/length, is the scale.
+CONING = 1.0e3 * 10.0 / 50.0
+MICRO_GEOMETRY = {
+    "wave_generator_crowning_um": 100.0 / CONING,
+    "wave_generator_slope_um": 90.0 / CONING,
+    "flexspline_crowning_um": 45.0 / CONING,
+}
+# radial ball bearings, normal class of ISO 5753-1: bore up to [mm], clearance [um]
+CLEARANCE = (
+    (18.0, (3, 18)),
+    (30.0, (5, 20)),
+    (40.0, (6, 20)),
+    (50.0, (6, 23)),
+    (65.0, (8, 28)),
+    (80.0, (10, 30)),
+    (100.0, (12, 36)),
+    (120.0, (15, 41)),
+    (140.0, (18, 48)),
+    (160.0, (18, 53)),
+    (inf, (20, 61)),
+)
+
+_NAME = re.compile(r"size-(\d{1,4})-(\d{1,4})")
+
+
+def family_member(name: str) -> tuple[int, int] | None:
+    """Size and ratio of a ``size-NN-RRR`` name, None for any other name.
+
+    Raises:
+        DesignError: If the rule does not reach that size or ratio.
+    """
+    match = _NAME.fullmatch(name)
+    if match is None:
+        return None
+    size, ratio = int(match[1]), int(match[2])
+    faults = [
+        f"design {name!r}: {what} {value}; accepted: {low} to {high}"
+        for what, value, (low, high) in (
+            ("size", size, SIZES),
+            ("ratio", ratio, RATIOS),
+        )
+        if not low <= value <= high
+    ]
+    if faults:
+        raise DesignError("\n".join(faults))
+    return size, ratio
+
+
+def family_design(size: int, ratio: int) -> dict[str, Any]:
+    """Tables of the design file of one member."""
+    d = 2.54 * size  # mm
+    teeth = 2 * ratio
+    module = d / teeth
+    profile = {
+        "kind": "qca",
+        **{k: _figure(v * module) for k, v in PROFILE.items()},
+        "straight_split": 0.5,
+    }
+    member = {
+        "addendum_coefficient": 0.6,
+        "dedendum_coefficient": 0.8,
+        "pressure_angle_deg": 20.0,
+        "thickness_coefficient": 1.0,
+        "profile": profile,
+    }
+    coning = 1.0e3 * module * FACE / (FACE + SMOOTH_CUP)  # um, w0 = module
+    bore = BEARING_BORE * d
+    clearance = next(band for limit, band in CLEARANCE if bore <= limit)
+    return {
+        "drive": {
+            "name": f"size-{size}-{ratio}",
+            "source": "family by rule, swgjoint.gear.design.family: pitch diameter"
+            " size/10 inch, proportions of a study of component sets (hard cup), tooth"
+            " profile of thesis Table 6.7, micro-geometry of thesis 7.13 scaled by the coning",
+            "layout": "circular_spline_fixed",
+            "teeth_flexspline": teeth,
+            "teeth_circular_spline": teeth + 2,
+            "module_mm": round(module, 9),
+            "face_width_mm": _figure(FACE * d),
+        },
+        "material": {"youngs_modulus_GPa": 210.0, "poisson_ratio": 0.29},
+        "flexspline": {"rim_mm": _figure(RIM * d), **member},
+        "circular_spline": {"rim_mm": _figure(RING_RIM * d), **member},
+        "wave_generator": {
+            "kind": "elliptical",
+            "minor_axis_coefficient": 1.0,
+            "bearing": {
+                "balls": BALLS,
+                "ball_diameter_mm": _figure(BALL * d),
+                "race_thickness_mm": _figure(RACE * d),
+                "clearance_um": 0.5 * sum(clearance),
+                "race_width_mm": _figure(RACE_WIDTH * d),
+                "groove_inertia_factor": GROOVE,
+            },
+        },
+        "cup": {
+            "kind": "cup",
+            "length_mm": _figure(SMOOTH_CUP * d),
+            "thickness_coefficient": _figure(WALL_OVER_RIM),
+            "fillet_mm": _figure(FILLET * d),
+            "bore_radius_mm": _figure(BORE_RADIUS * d),
+        },
+        "micro_geometry": {
+            **{k: round(v * coning, 1) for k, v in MICRO_GEOMETRY.items()},
+            "crowning_kind": "parabolic",
+        },
+    }
+
+
+def family_text(size: int, ratio: int) -> str:
+    """The design file of one member, as shipped."""
+    head = (
+        "# Written by the rule of swgjoint/gear/design/family.py, which says where\n"
+        "# every proportion comes from; the same for all sizes. Ratings come from the\n"
+        "# catalogue row of this size and ratio.\n"
+    )
+    return head + toml_text(family_design(size, ratio))
+
+
+def _figure(value: float) -> float:
+    """Rounded to a nanometre in mm, so that files show no binary remainder."""
+    return round(value, 6)

@@ -1,0 +1,151 @@
+"""Manufacturing errors of one drive: where its teeth and its wave generator really are.
+
+Every error is drawn from the seed of the design, each in its own stream, so that a key
+that is added does not change what the others are.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.gear.design.design import Design, MemberName
+from swgjoint.gear.wave_generators.oval import Oval
+from swgjoint.gear.wave_generators.wave_generator import WaveGenerator, wave_generator
+from swgjoint.units import arcmin, um
+
+Array = NDArray[np.float64]
+
+HARMONICS = (1, 2, 3, 4)
+"""Of the cumulative pitch error, with amplitudes 1/k."""
+
+TEETH = (
+    "flexspline_cumulative_pitch_um",
+    "circular_spline_cumulative_pitch_um",
+    "random_pitch_um",
+    "circular_spline_eccentricity_um",
+    "circular_spline_ovality_um",
+)
+"""Keys of errors that shift teeth."""
+
+# streams of the random parts
+_PITCH = {"flexspline": 1, "circular_spline": 2}
+_RANDOM = {"flexspline": 3, "circular_spline": 4}
+_OVALITY, _ECCENTRICITY, _WAVE_GENERATOR, _OUTLINE, _TILT = 5, 6, 7, 8, 9
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ToothErrors:
+    """Displacement of the teeth of one member from their nominal places."""
+
+    tangential: Array
+    """Counter-clockwise, along the pitch circle (n_teeth,) [m]."""
+    radial: Array
+    """Outwards (n_teeth,) [m]."""
+
+    @property
+    def shift(self) -> Array:
+        """In the frames of the teeth, +y outwards (n_teeth, 2) [m]."""
+        return np.stack([-self.tangential, self.radial], axis=-1)
+
+
+def tooth_errors(design: Design, member: MemberName) -> ToothErrors:
+    r"""Errors of the teeth of a member.
+
+    Cumulative pitch error: :math:`\sum_{k=1}^4 \cos(k\varphi - \varphi_k)/k` scaled to
+    the given peak to peak; random pitch error: normal, the key is its standard
+    deviation; ovality of the circular spline: radial, the key is the largest minus the
+    smallest radius; eccentricity: a translation of all teeth.
+
+    Args:
+        design: The drive.
+        member: Whose teeth.
+    """
+    spec = design.tolerances
+    count = getattr(design.drive, f"teeth_{member}")
+    angle = 2.0 * np.pi / count * np.arange(count)
+    tangential, radial = np.zeros(count), np.zeros(count)
+    cumulative = getattr(spec, f"{member}_cumulative_pitch_um") * um
+    if cumulative:
+        phases = _stream(spec.seed, _PITCH[member]).uniform(0.0, 2.0 * np.pi, 4)
+        wave = sum(
+            np.cos(k * angle - phase) / k
+            for k, phase in zip(HARMONICS, phases, strict=True)
+        )
+        tangential += cumulative * wave / np.ptp(wave)
+    if spec.random_pitch_um:
+        noise = _stream(spec.seed, _RANDOM[member]).standard_normal(count)
+        tangential += spec.random_pitch_um * um * (noise - noise.mean())
+    if member == "circular_spline":
+        turn = _stream(spec.seed, _OVALITY).uniform(0.0, np.pi)
+        radial += (
+            0.5 * spec.circular_spline_ovality_um * um * np.cos(2 * (angle - turn))
+        )
+        turn = _stream(spec.seed, _ECCENTRICITY).uniform(0.0, 2.0 * np.pi)
+        offset = spec.circular_spline_eccentricity_um * um
+        radial += offset * np.cos(angle - turn)
+        tangential -= offset * np.sin(angle - turn)
+    return ToothErrors(tangential=tangential, radial=radial)
+
+
+def wave_generator_offset(design: Design) -> Array:
+    """Centre of the wave generator's outline in the frame that turns with it (2,) [m].
+
+    It turns about the gear axis, not about its centre.
+    """
+    turn = _stream(design.tolerances.seed, _WAVE_GENERATOR).uniform(0.0, 2.0 * np.pi)
+    size = design.tolerances.wave_generator_eccentricity_um * um
+    return size * np.array([-np.sin(turn), np.cos(turn)])
+
+
+def axis_tilt(design: Design) -> Array:
+    """Slope in x and y, over z, of the axis of the circular spline (2,) [rad].
+
+    The axis meets that of flexspline and wave generator in the middle of the face width
+    and leans from it by the key, towards a direction that the seed gives; it stands
+    still with the bearings, also where the circular spline turns about it. At z from
+    the middle its teeth stand off by z times that.
+    """
+    turn = _stream(design.tolerances.seed, _TILT).uniform(0.0, 2.0 * np.pi)
+    size = design.tolerances.misalignment_arcmin * arcmin
+    return size * np.array([-np.sin(turn), np.cos(turn)])
+
+
+def flawed_wave_generator(design: Design) -> WaveGenerator:
+    """Outline of the wave generator with its ovality, about its centre.
+
+    The key is the largest minus the smallest deviation along the normal; the seed turns
+    it against the major axis.
+    """
+    outline = wave_generator(design)
+    ovality = design.tolerances.wave_generator_ovality_um * um
+    if ovality == 0.0:
+        return outline
+    angle = _stream(design.tolerances.seed, _OUTLINE).uniform(0.0, np.pi)
+    return Oval(nominal=outline, ovality=ovality, angle=float(angle))
+
+
+def with_perfect_teeth(design: Design) -> Design:
+    """The same drive without errors of its teeth and of its axis.
+
+    Those of the wave generator stay.
+    """
+    keys = (*TEETH, "misalignment_arcmin")
+    return design.with_changes({f"tolerances.{key}": 0.0 for key in keys})
+
+
+def without_errors(design: Design) -> Design:
+    """The same drive as drawn."""
+    keys = set(type(design.tolerances).model_fields) - {"seed"}
+    return design.with_changes({f"tolerances.{key}": 0.0 for key in keys})
+
+
+def has_errors(design: Design) -> bool:
+    """Whether the design has any manufacturing error."""
+    return any(design.tolerances.model_dump(exclude={"seed"}).values())
+
+
+def _stream(seed: int, number: int) -> np.random.Generator:
+    return np.random.default_rng([seed, number])

@@ -1,0 +1,172 @@
+"""What every tooth profile starts from: circles, pitch and thickness of a member."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import pi
+from typing import Any
+
+from swgjoint.errors import DesignError
+from swgjoint.faults import unit_of
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.design.sections import Member
+from swgjoint.gear.teeth.profile import ToothProfile
+from swgjoint.gear.teeth.segments import Piece, Segment, arc
+from swgjoint.units import deg, mm
+
+
+class ToothFault(DesignError):
+    """A tooth that cannot be built, and the key of the member that shows it."""
+
+    def __init__(self, where: str, key: str, shown: str, what: str) -> None:
+        super().__init__(f"{where}.{key} = {shown}: {what}")
+        self.where, self.key, self.shown, self.what = where, key, shown, what
+
+    def __reduce__(self) -> tuple[type[DesignError], tuple[str]]:
+        """What other processes get: the line."""
+        return DesignError, (str(self),)
+
+    def bounded(self, accepted: str) -> ToothFault:
+        """The same with what is accepted as values."""
+        cause = self.what.partition("; accepted")[0]
+        return ToothFault(
+            self.where, self.key, self.shown, f"{cause}; accepted: {accepted}"
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Blank:
+    """Figures of one member in SI, thesis eqs 3.13, 3.16, 3.17, 3.21, 3.22."""
+
+    member: str
+    where: str
+    """Design and member, for messages."""
+    spec: Member
+    teeth: int
+    internal: bool
+    module: float
+    pitch: float
+    tip: float
+    root: float
+
+    @property
+    def side(self) -> float:
+        """+1 for external teeth, -1 for internal ones."""
+        return -1.0 if self.internal else 1.0
+
+    @property
+    def half_pitch(self) -> float:
+        """Half the angular pitch, alpha_T [rad]."""
+        return pi / self.teeth  # (3.21)
+
+    @property
+    def half_thickness(self) -> float:
+        """Half the angular thickness at the pitch circle, alpha_P [rad]."""
+        return self.spec.thickness_coefficient * self.half_pitch / 2.0  # (3.22)
+
+    @property
+    def pressure_angle(self) -> float:
+        """Inclination of the flank to the radius at the pitch circle [rad]."""
+        return self.spec.pressure_angle_deg * deg
+
+    def fault(self, key: str, what: str) -> ToothFault:
+        """Error that names a key of the member, its value and unit."""
+        value = self.value(key)
+        unit = f" {unit_of(key)}".rstrip()
+        shown = "its default" if value is None else f"{value}{unit}"
+        return ToothFault(self.where, key, shown, what)
+
+    def value(self, key: str) -> Any:
+        """Value of a dotted key of the member."""
+        value: Any = self.spec
+        for name in key.split("."):
+            value = getattr(value, name)
+        return value
+
+    def changed(self, key: str, value: float) -> Blank:
+        """The blank of a member with another value for a dotted key, not checked."""
+        table, _, last = key.rpartition(".")
+        update = {last: value}
+        if table:
+            update = {table: getattr(self.spec, table).model_copy(update=update)}
+        spec = self.spec.model_copy(update=update)
+        tip, root = circles(spec, self.pitch, self.module, self.side)
+        return replace(self, spec=spec, tip=tip, root=root)
+
+    def lands(self, top: float, bottom: float) -> tuple[list[Piece], list[Piece]]:
+        """Top land out to the angle ``top`` and root land from ``bottom`` [rad]."""
+        convex = not self.internal
+        first: list[Piece] = []
+        last: list[Piece] = []
+        if top > 0.0:
+            first = [
+                arc("top_land", (0.0, 0.0), self.tip, pi / 2, pi / 2 - top, convex)
+            ]
+        if bottom < self.half_pitch:
+            end = pi / 2 - self.half_pitch
+            last = [
+                arc("root_land", (0.0, 0.0), self.root, pi / 2 - bottom, end, convex)
+            ]
+        return first, last
+
+    def profile(
+        self,
+        top: float,
+        pieces: list[Piece],
+        bottom: float,
+        straight_length: float = 0.0,
+    ) -> ToothProfile:
+        """Chain of the lands and the pieces between them, empty pieces left out."""
+        first, last = self.lands(top, bottom)
+        kept = [
+            piece
+            for piece in [*first, *pieces, *last]
+            # a land or an arc that vanishes has no direction of its own
+            if piece.length > 0.0 or not isinstance(piece, Segment)
+        ]
+        return ToothProfile(
+            member=self.member,
+            teeth=self.teeth,
+            internal=self.internal,
+            pitch_radius=self.pitch,
+            addendum_radius=self.tip,
+            dedendum_radius=self.root,
+            segments=tuple(kept),
+            straight_length=straight_length,
+        )
+
+
+def blank(design: Design, member: str) -> Blank:
+    """Blank of ``flexspline`` or ``circular_spline``.
+
+    Raises:
+        DesignError: If the dedendum reaches the axis.
+    """
+    internal = member == "circular_spline"
+    drive = design.drive
+    spec = design.circular_spline if internal else design.flexspline
+    teeth = drive.teeth_circular_spline if internal else drive.teeth_flexspline
+    module = drive.module_mm * mm
+    pitch = teeth * module / 2.0  # (3.13)
+    tip, root = circles(spec, pitch, module, -1.0 if internal else 1.0)
+    return Blank(
+        member=member,
+        where=f"{drive.name}: {member}",
+        spec=spec,
+        teeth=teeth,
+        internal=internal,
+        module=module,
+        pitch=pitch,
+        tip=tip,
+        root=root,
+    )
+
+
+def circles(
+    spec: Member, pitch: float, module: float, side: float
+) -> tuple[float, float]:
+    """Radii of tip and root circle of a member [m]."""
+    return (
+        pitch + side * spec.addendum_coefficient * module,  # (3.16)
+        pitch - side * spec.dedendum_coefficient * module,  # (3.17)
+    )

@@ -1,0 +1,496 @@
+"""Conjugate tooth profiles by the envelope method, in both directions.
+
+Given the flexspline the circular spline is generated, or the reverse: the flank is the
+boundary that the other member's moving flank leaves (80:1 article, "Derivation of the
+conjugate circular spline profile"; there with w = w_0 cos 2 theta, here with the
+kinematics of :mod:`swgjoint.gear.teeth.neutral_line`). Below it a straight line leaves
+the envelope, and a round fillet ends on the root circle: clear of the mating tip.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cached_property
+from itertools import pairwise
+from math import atan2, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.errors import DesignError
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.design.sections import Conjugate
+from swgjoint.gear.teeth.blank import Blank, blank
+from swgjoint.gear.teeth.envelope import Envelope, Run
+from swgjoint.gear.teeth.profile import TANGENCY_RAD, ToothProfile, tooth_profile
+from swgjoint.gear.teeth.segments import Piece, Point, arc, line
+from swgjoint.gear.teeth.smooth_curve import smooth_curve
+from swgjoint.gear.teeth.tooth_motion import Receiver, ToothMotion, tooth_motions
+from swgjoint.units import deg, mm
+
+Array = NDArray[np.float64]
+
+DEPARTURES = (45.0 * deg, 30.0 * deg, 20.0 * deg, 12.0 * deg)
+"""Inclinations at which the flank may leave the envelope towards the root [rad].
+
+The first with a good fillet, else that with the largest: narrow spaces need a steep
+departure.
+"""
+WANTED_FILLET = 0.1
+"""Radius of a good fillet, multiple of the module."""
+ROOT_END = 0.98
+"""A fillet of our choice leaves that much of half the pitch, and a short root land."""
+SHARPEST = 0.1
+"""Smallest radius of curvature of an edge's path that is followed, of the module."""
+SHORTEST = 4e-6
+"""Pieces shorter than that are left out, the chain goes on tangentially [m]."""
+OVERLAP = 1e-9
+"""Largest overlap of the pair that is accepted [m]."""
+NODES, EDGE_NODES, DENSE, SAMPLES = 41, 121, 161, 33
+
+
+def conjugate_profile(
+    design: Design, member: str, *, motions: tuple[ToothMotion, ...] | None = None
+) -> ToothProfile:
+    """Profile of ``member`` conjugate to the other one under the wave generator.
+
+    Without backlash at c_P = 1 of this member; a smaller thickness coefficient turns
+    the flank back by (1 - c_P) alpha_T / 2 as for other profiles (6.3).
+
+    Args:
+        design: The drive; the profile key of ``member`` counts for its root only.
+        member: ``flexspline`` or ``circular_spline``.
+        motions: Of the teeth; by default those of the neutral line.
+
+    Raises:
+        DesignError: If there is no such tooth, in one line that names the key.
+    """
+    start = blank(design, member)
+    receiver: Receiver = "circular_spline" if start.internal else "flexspline"
+    other = "flexspline" if start.internal else "circular_spline"
+    given = tooth_profile(design, other)
+    envelope = Envelope(
+        given=given,
+        receiver=receiver,
+        motions=motions or tooth_motions(design),
+        tip=start.tip,
+    )
+    return _Builder(start, envelope).build()
+
+
+class _Builder:
+    """From the branches of an envelope to a closed flank."""
+
+    def __init__(self, start: Blank, envelope: Envelope) -> None:
+        self.start, self.envelope = start, envelope
+        if start.spec.thickness_coefficient > 1.0:
+            raise start.fault(
+                "thickness_coefficient",
+                "thicker than the conjugate tooth; accepted: <= 1",
+            )
+        # clockwise turn of the envelope: backlash makes the tooth thinner
+        turn = start.half_thickness - 0.5 * start.half_pitch
+        c, d = np.cos(turn), np.sin(turn)
+        self.turn = np.array([[c, -d], [d, c]])
+
+    def build(self) -> ToothProfile:
+        start, envelope = self.start, self.envelope
+        reach, floor = envelope.summit, envelope.floor
+        if start.side * (reach - start.root) <= 0.0:
+            limit = start.side * (start.pitch - reach) / start.module
+            raise start.fault(
+                "dedendum_coefficient",
+                f"the other member's tip reaches the root; accepted: > {limit:.4g}",
+            )
+        if start.side * (start.tip - floor) >= 0.0:
+            limit = start.side * (floor - start.pitch) / start.module
+            raise start.fault(
+                "addendum_coefficient",
+                "the tip reaches the root fillet of the other member; accepted: < "
+                f"{limit:.4g}, or a larger dedendum_coefficient there",
+            )
+        runs = envelope.runs() if start.side * (start.tip - envelope.reach) > 0 else []
+        if not runs:
+            raise start.fault(
+                "addendum_coefficient",
+                "the other member's flank does not reach the tip; accepted: more",
+            )
+        runs = self._with_edge(runs)
+        best: tuple[list[Piece], list[Piece], float] | None = None
+        largest = 0.0
+        for departure in DEPARTURES:
+            found = self._flank(runs, departure)
+            root = None if found is None else self._root(found[1])
+            if found is None or root is None:
+                continue
+            radius = root[0][-1].radius
+            if radius > largest:
+                best, largest = (found[0], *root), radius
+            if largest >= WANTED_FILLET * start.module:
+                break
+        if best is None:
+            assert isinstance(start.spec.profile, Conjugate)
+            if start.spec.profile.root_radius_mm is not None:
+                raise start.fault(
+                    "profile.root_radius_mm",
+                    "the fillet does not fit below the flank or cuts into the other "
+                    "member's path; accepted: a smaller one",
+                )
+            raise start.fault(
+                "dedendum_coefficient",
+                "no fillet fits between flank and root; accepted: another value "
+                f"above {start.side * (start.pitch - reach) / start.module:.4g}, or a "
+                "wider tip of the other member",
+            )
+        pieces, below, end = best
+        top = _angle(pieces[0].start)
+        if top <= 0.0:
+            raise start.fault(
+                "addendum_coefficient",
+                "the conjugate tooth is pointed; accepted: a smaller one",
+            )
+        pieces[0] = replace(pieces[0], edge=True)  # type: ignore[type-var]
+        profile = start.profile(top, [*pieces, *below], end)
+        if not self._sound(profile):
+            raise self._split_fault()
+        return profile
+
+    def _sound(self, profile: ToothProfile) -> bool:
+        """Whether the chain is a flank, and the other member overlaps it nowhere.
+
+        Branches of the envelope may end or cross inside a piece where the curvature of
+        the wave generator jumps; such a chain is not handed out.
+        """
+        for junction in profile.junctions():
+            tangent = junction.edge or junction.corner < TANGENCY_RAD
+            if junction.gap > 1e-12 or not tangent:
+                return False
+        s = np.linspace(*profile.contact_range, 1500)
+        points, _, _ = profile.evaluate(s)
+        chords = np.hypot(*np.diff(points, axis=0).T) / np.diff(s)
+        if chords.max() > 1.001 or chords.min() < 0.3:  # a corner shortens them
+            return False
+        if (np.diff(profile.side * np.hypot(*points.T)) > 1e-15).any():
+            return False
+        gap, _, _ = profile.signed_distance(self._tips)
+        return bool(gap.min() > -OVERLAP)
+
+    # -- the flank ----------------------------------------------------------------
+
+    def _with_edge(self, runs: list[Run]) -> list[Run]:
+        """The runs, closed by the path of the edge where the flank begins at one."""
+        low, last = self.envelope.given.contact_range[0], runs[-1]
+        close = last.station[-1] - low < 0.05 * (runs[0].station[0] - low)
+        if last.edge or not self.envelope.starts_at_edge or not close:
+            return runs
+        station, guess = np.array([low]), last.theta[-1:]
+        theta = self.envelope.contact(last.motion, station, guess)
+        edge = Run(motion=last.motion, station=station, theta=theta, edge=True)
+        return [*runs, edge]
+
+    def _trace(self, run: Run) -> Callable[[Array], tuple[Array, Array]]:
+        """Points and normals of the thinned tooth, at stations or edge positions."""
+
+        def trace(t: Array) -> tuple[Array, Array]:
+            if run.edge:
+                points, normals = self.envelope.trace_edge(run, t)
+            else:
+                points, normals, _ = self.envelope.trace(run, t)
+            return points @ self.turn, normals @ self.turn
+
+        return trace
+
+    def _radius(self, trace: Callable[[Array], tuple[Array, Array]], t: float) -> float:
+        points, _ = trace(np.array([t]))
+        return float(np.hypot(points[0, 0], points[0, 1]))
+
+    def _flank(
+        self, runs: list[Run], departure: float
+    ) -> tuple[list[Piece], tuple[Point, Array]] | None:
+        """Pieces from the tip circle to the departure, and where that is.
+
+        None where the flank is nowhere as steep as the departure.
+        """
+        from scipy.optimize import brentq
+
+        start, envelope = self.start, self.envelope
+        low = envelope.given.contact_range[0]
+        pieces: list[Piece] = []
+        first: float | None = None
+        edge = False
+        for k, run in enumerate(runs):
+            trace = self._trace(run)
+            values = run.theta if run.edge else run.station
+            if first is None:  # where the flank crosses the tip circle
+                first = _crossing(
+                    lambda t, trace=trace: self._radius(trace, t) - start.tip,  # type: ignore[misc]
+                    float(values[0]),
+                    float(values[0] - values[-1]) / len(values),
+                )
+            following = runs[k + 1] if k + 1 < len(runs) else None
+            last = float(values[-1])
+            next_first, next_edge = 0.0, False
+            smooth = following is not None and self._runs_on(run, following, low)
+            if following is None:
+                if run.edge:
+                    # its path ends at the summit, or before, where it turns sharply
+                    last = self._round_part(trace, first, self._summit(run, first))
+            elif smooth:
+                last = low
+                _, _, theta = envelope.trace(run, np.array([low]))
+                next_first = float(theta[0])
+            else:
+                last, next_first = self._meet(run, following)
+                next_edge = True
+            # leave where the flank inclines too much, below its steepest part
+
+            def inclined(t: Array | float, trace=trace) -> Array:  # type: ignore[no-untyped-def]
+                _, normals = trace(np.atleast_1d(t))
+                angle = np.arctan2(start.side * normals[:, 1], normals[:, 0])
+                return np.asarray(angle - departure)
+
+            samples = np.linspace(first, last, SAMPLES)
+            steep = np.flatnonzero(inclined(samples) < 0.0)
+            if not steep.size and not pieces:
+                return None
+            leaves = not steep.size or steep[-1] < SAMPLES - 1
+            if steep.size and leaves:
+                a, b = samples[steep[-1]], samples[steep[-1] + 1]
+                last = float(brentq(lambda t: inclined(t)[0], a, b, xtol=1e-13))
+            elif leaves:
+                last = first
+            ends, _ = trace(np.array([first, last]))
+            if pieces and np.hypot(*(ends[1] - ends[0])) < SHORTEST:
+                last, leaves = first, True
+            if last != first:
+                pieces += self._curves(run, trace, first, last, edge)
+            if leaves and not pieces:
+                return None
+            if leaves or following is None:
+                points, normals = trace(np.array([last]))
+                return pieces, ((float(points[0, 0]), float(points[0, 1])), normals[0])
+            first, edge = next_first, next_edge
+        raise AssertionError("a flank has at least one run")
+
+    def _split_fault(self) -> DesignError:
+        return self.start.fault(
+            "profile.kind",
+            "the envelope breaks up under this wave generator; accepted: other "
+            "profiles or thickness_coefficient there, or a smoother wave generator",
+        )
+
+    def _round_part(
+        self, trace: Callable[[Array], tuple[Array, Array]], first: float, last: float
+    ) -> float:
+        """Where the path of an edge begins to turn too sharply, or its end."""
+        t = np.linspace(first, last, 401)
+        points, normals = trace(t)
+        turn = np.unwrap(np.arctan2(normals[:, 1], normals[:, 0]))
+        walked = np.hypot(*np.diff(points, axis=0).T)
+        sharp = np.abs(np.diff(turn)) * SHARPEST * self.start.module > walked
+        return float(t[np.argmax(sharp)]) if sharp.any() else last
+
+    def _summit(self, run: Run, first: float) -> float:
+        """Position at which the path of the edge is farthest into the receiver."""
+        from scipy.optimize import minimize_scalar
+
+        trace, side = self._trace(run), self.start.side
+        near = 0.2 * run.motion.half_range
+        found = minimize_scalar(
+            lambda t: side * self._radius(trace, t),
+            bounds=(min(-near, first), max(near, first)),
+            method="bounded",
+            options={"xatol": 1e-9},
+        )
+        return float(found.x)
+
+    def _runs_on(self, run: Run, following: Run, low: float) -> bool:
+        """Whether a branch goes over into the path of the edge at its own end."""
+        near = abs(run.station[-1] - low) < 0.05 * abs(run.station[0] - low)
+        step = abs(following.theta[0] - run.theta[-1])
+        return (
+            following.edge
+            and not run.edge
+            and bool(near)
+            and following.motion is run.motion
+            and bool(step < 0.03 * run.motion.half_range)
+        )
+
+    def _meet(self, one: Run, two: Run) -> tuple[float, float]:
+        """Parameters (stations, positions of an edge) at which two branches cross."""
+        from scipy.optimize import root
+
+        first, second = self._trace(one), self._trace(two)
+        module = self.start.module
+        scale = np.array([0.01 if run.edge else module for run in (one, two)])
+
+        def apart(x: Array) -> Array:
+            a, _ = first(x[:1] * scale[0])
+            b, _ = second(x[1:] * scale[1])
+            return np.asarray((a - b)[0] / module)
+
+        ends = (
+            (one.theta if one.edge else one.station)[-1],
+            (two.theta if two.edge else two.station)[0],
+        )
+        found = root(apart, np.array(ends) / scale, tol=1e-13)
+        values = found.x * scale
+        low, high = self.envelope.given.contact_range
+        inside = [
+            run.edge or low <= x <= high
+            for run, x in zip((one, two), values, strict=True)
+        ]
+        if not np.abs(apart(found.x)).max() < 1e-10 or not all(inside):
+            raise self._split_fault()
+        return float(values[0]), float(values[1])
+
+    def _curves(
+        self,
+        run: Run,
+        trace: Callable[[Array], tuple[Array, Array]],
+        first: float,
+        last: float,
+        edge: bool,
+    ) -> list[Piece]:
+        """Smooth curves, divided where the given flank changes its curvature."""
+        given = self.envelope.given
+        names = [part.name for part in given.segments]
+        cuts: list[float] = []
+        if not run.edge:
+            inner = given.stations
+            inside = (inner < first - SHORTEST) & (inner > last + SHORTEST)
+            cuts = sorted((float(s) for s in inner[inside]), reverse=True)
+        ends = [first, *cuts, last]
+        pieces: list[Piece] = []
+        for a, b in pairwise(ends):
+            name = "edge_path"
+            if not run.edge:
+                middle = 0.5 * (a + b)
+                k = int(np.searchsorted(given.stations, middle)) - 1
+                name = f"conjugate_{names[k]}"
+            pieces.append(
+                smooth_curve(
+                    name,
+                    trace,
+                    a,
+                    b,
+                    self.start.side,
+                    nodes=EDGE_NODES if run.edge else NODES,
+                    dense=DENSE,
+                    edge=edge and not pieces,
+                )
+            )
+        return pieces
+
+    # -- the root -----------------------------------------------------------------
+
+    def _fillet(
+        self, leave: tuple[Point, Array], radius: float, limit: float
+    ) -> tuple[float, Point] | None:
+        """Length of the line and centre of the arc for a fillet radius, if it fits.
+
+        The line starts at the departure P with tangent t, normal n: the centre
+        P + l t + r n lies at the distance r_D +- r from the axis, quadratic in l.
+        """
+        start = self.start
+        (px, py), n = leave
+        t = start.side * np.array([n[1], -n[0]])
+        q = np.array([px, py]) + radius * n
+        goal = start.root + start.side * radius
+        along = float(q @ t)
+        square = along**2 - float(q @ q) + goal**2
+        if square < 0.0 or goal <= 0.0:
+            return None
+        length = -along - start.side * sqrt(square)
+        centre = q + length * t
+        if length < SHORTEST or _angle((centre[0], centre[1])) > limit:
+            return None
+        return length, (float(centre[0]), float(centre[1]))
+
+    def _root(self, leave: tuple[Point, Array]) -> tuple[list[Piece], float] | None:
+        """Line and fillet: as asked, or the largest that clears the mating tip."""
+        spec = self.start.spec.profile
+        assert isinstance(spec, Conjugate)
+        if spec.root_radius_mm is not None:
+            return self._root_with(
+                leave, spec.root_radius_mm * mm, self.start.half_pitch
+            )
+        low, high = 0.0, 2.0 * self.start.module
+        best: tuple[list[Piece], float] | None = None
+        for _ in range(14):
+            middle = 0.5 * (low + high)
+            built = self._root_with(leave, middle, ROOT_END * self.start.half_pitch)
+            if built is None:
+                high = middle
+            else:
+                low, best = middle, built
+        return best
+
+    def _root_with(
+        self, leave: tuple[Point, Array], radius: float, limit: float
+    ) -> tuple[list[Piece], float] | None:
+        """Pieces of the root for one fillet radius, None where they do not fit.
+
+        The arc must end within the angle ``limit`` from the tooth axis [rad].
+        """
+        start = self.start
+        found = self._fillet(leave, radius, limit)
+        if found is None:
+            return None
+        length, centre = found
+        (px, py), n = leave
+        side = start.side
+        t = side * np.array([n[1], -n[0]])
+        first = atan2(-n[1], -n[0])
+        # the arc ends on the ray from the axis through its centre
+        last = atan2(-side * centre[1], -side * centre[0])
+        turn = (last - first + np.pi) % (2.0 * np.pi) - np.pi
+        if side * turn <= 0.0:
+            return None
+        corner = (float(px + length * t[0]), float(py + length * t[1]))
+        pieces: list[Piece] = [
+            line("straight", (px, py), corner),
+            arc("fillet", centre, radius, first, first + turn, False),
+        ]
+        return (pieces, _angle(centre)) if self._clear(pieces) else None
+
+    def _clear(self, pieces: list[Piece]) -> bool:
+        """Whether the mating tip keeps off the line and the fillet."""
+        points = self._tips
+        for piece in pieces:
+            distance, _, _, inside = piece.project(points, self.start.side)
+            if (distance[inside] < -1e-12).any():
+                return False
+        return True
+
+    @cached_property
+    def _tips(self) -> Array:
+        """Points of the given flank at all positions near the lobe (n, 2) [m]."""
+        envelope = self.envelope
+        points, _, _ = envelope.given.evaluate(
+            np.linspace(*envelope.given.contact_range, 150)
+        )
+        parts = []
+        for motion in envelope.motions:
+            theta = np.linspace(-0.25, 0.25, 201) * motion.half_range
+            moved = motion.to(envelope.receiver, theta)
+            wide = np.broadcast_to(points, (len(theta), *points.shape))
+            parts.append(moved.points(wide).reshape(-1, 2))
+        return np.asarray(np.concatenate(parts) @ self.turn)
+
+
+def _angle(point: Point) -> float:
+    return atan2(point[0], point[1])
+
+
+def _crossing(f: Callable[[float], float], guess: float, step: float) -> float:
+    """Root of a monotone function near a guess."""
+    from scipy.optimize import brentq
+
+    low, high = guess - abs(step), guess + abs(step)
+    for _ in range(8):
+        if f(low) * f(high) <= 0.0:
+            return float(brentq(f, low, high, xtol=1e-15))
+        low, high = low - abs(step), high + abs(step)
+    return guess

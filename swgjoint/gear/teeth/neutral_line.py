@@ -1,0 +1,171 @@
+"""Kinematics of the deflected neutral line: where rigid flexspline teeth go.
+
+The rim follows the wave generator: its neutral line is the outline offset by half the
+rim, and a tooth stands normal to it. The undeflected neutral line is a circle of radius
+r_m; points keep their arc length from the lobe.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from swgjoint.errors import DesignError
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.wave_generators.wave_generator import WaveGenerator, wave_generator
+from swgjoint.units import mm
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pose:
+    """Rigid motion from the tooth frame, with its derivative by the motion parameter.
+
+    A point p of the tooth frame goes to R(angle) (p - (0, r_m)) + point.
+    """
+
+    point: Array
+    """Where the tooth's point of the neutral line is (n, 2) [m]."""
+    angle: Array
+    """Rotation of the tooth, counter-clockwise (n,) [rad]."""
+    d_point: Array
+    """Derivative of ``point`` by the parameter (n, 2) [m/rad]."""
+    d_angle: Array
+    """Derivative of ``angle`` by the parameter (n,)."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class NeutralLine:
+    r"""Neutral line of the rim on a wave generator, as a motion of one tooth.
+
+    A tooth at the angle :math:`\theta` of the undeflected rim (counter-clockwise from
+    a lobe) stands at the arc length :math:`\sigma(\theta)` of the deflected line. The
+    offset outline is longer or shorter than the circle by a small amount, which no
+    inextensible rim could take; it is put where teeth do not touch:
+
+    .. math:: \sigma = r_m\theta + \delta\,\bigl(u - \tfrac{\sin 2\pi u}{2\pi}\bigr)
+
+    between neighbouring lobes (u from 0 to 1), so the line is inextensible at the
+    lobes, to second order, and stretched most half-way between them. Outlines that the
+    rim leaves (minor axis reduced, rollers) are followed as a string would: the teeth
+    near a lobe are right, those half-way between lobes are not.
+    """
+
+    outline: WaveGenerator
+    lobes: int
+    radius: float
+    """Radius r_m of the undeflected neutral line [m]."""
+    offset: float
+    """Half the rim: from the outline to the neutral line [m]."""
+
+    @property
+    def length(self) -> float:
+        """Length of the deflected neutral line [m]."""
+        return self.outline.perimeter + 2.0 * np.pi * self.offset
+
+    @cached_property
+    def _lobe_stations(self) -> Array:
+        """Arc length of the deflected line at the polar angles of the lobes [m]."""
+        wanted = 2.0 * np.pi * np.arange(self.lobes + 1) / self.lobes
+        perimeter = self.outline.perimeter
+        low = np.full(self.lobes + 1, -0.25 * perimeter)
+        high = np.full(self.lobes + 1, 1.25 * perimeter)
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            point, normal, _ = self.outline.evaluate(middle)
+            below = _turn(point + self.offset * normal, middle, perimeter) < wanted
+            low, high = np.where(below, middle, low), np.where(below, high, middle)
+        s = 0.5 * (low + high)
+        _, normal, _ = self.outline.evaluate(s)
+        return np.asarray(s + self.offset * _turn(normal, s, perimeter))
+
+    @property
+    def extension(self) -> float:
+        """Largest stretch that closes the line, half-way between the lobes."""
+        gaps = np.diff(self._lobe_stations)
+        arc = 2.0 * np.pi * self.radius / self.lobes
+        return float(np.max(np.abs(2.0 * (gaps - arc) / arc)))
+
+    def _arc_length(self, theta: Array) -> tuple[Array, Array]:
+        """Arc length sigma of the deflected line, and its derivative by theta."""
+        pitch = 2.0 * np.pi / self.lobes
+        turns = np.floor(theta / pitch)
+        u = theta / pitch - turns
+        k = np.mod(turns, self.lobes).astype(int)
+        gaps = np.diff(self._lobe_stations)[k]
+        delta = gaps - pitch * self.radius
+        wave = 2.0 * np.pi * u
+        start = self._lobe_stations[k] + np.floor(turns / self.lobes) * self.length
+        sigma = start + pitch * self.radius * u + delta * (u - np.sin(wave) / 2 / np.pi)
+        rate = self.radius + delta * (1.0 - np.cos(wave)) / pitch
+        return sigma, rate
+
+    def pose(self, theta: ArrayLike) -> Pose:
+        """Pose of the tooth at the rim angle theta, frame of the wave generator.
+
+        Args:
+            theta: Angles of the undeflected rim from the first lobe, counter-clockwise,
+                any number of turns (n,) [rad].
+        """
+        theta = np.asarray(theta, dtype=float)
+        sigma, rate = self._arc_length(theta)
+        perimeter, d = self.outline.perimeter, self.offset
+        # the offset line has the arc length s + d turn(s)
+        s = sigma * perimeter / self.length
+        for _ in range(50):
+            points, normals, curvature = self.outline.evaluate(s)
+            step = (s + d * _turn(normals, s, perimeter) - sigma) / (1 + d * curvature)
+            s = s - step
+            # Newton's method: the next step is below the last digit
+            if np.max(np.abs(step), initial=0.0) < 1e-9 * self.radius:
+                break
+        points, normals, curvature = self.outline.evaluate(s)
+        tangent = np.stack([-normals[:, 1], normals[:, 0]], axis=-1)
+        return Pose(
+            point=points + d * normals,
+            angle=_turn(normals, s, perimeter),
+            d_point=rate[:, None] * tangent,
+            d_angle=rate * curvature / (1.0 + d * curvature),
+        )
+
+
+def _turn(vectors: Array, s: Array, perimeter: float) -> Array:
+    """Angle of vectors from +y, on the branch that goes with the arc length."""
+    angle = np.arctan2(-vectors[:, 0], vectors[:, 1])
+    near = 2.0 * np.pi * s / perimeter
+    return np.asarray(angle + 2.0 * np.pi * np.round((near - angle) / (2.0 * np.pi)))
+
+
+def neutral_line(design: Design) -> NeutralLine:
+    """Neutral line of a design's rim on its wave generator.
+
+    Raises:
+        DesignError: If the wave generator cannot be built.
+    """
+    half = 0.5 * design.flexspline.rim_mm * mm
+    outline = wave_generator(design)
+    line = NeutralLine(
+        outline=outline,
+        lobes=design.lobes,
+        radius=design.flexspline_inner_radius + half,
+        offset=half,
+    )
+    at_lobe = line.pose(2.0 * np.pi * np.arange(line.lobes) / line.lobes)
+    if not (at_lobe.d_angle > 0.1).all():
+        raise DesignError(
+            f"{design.drive.name}: wave_generator.kind = "
+            f"{design.wave_generator.kind!r}: the rim bridges the lobe, where it does "
+            "not follow the outline; accepted for rigid tooth kinematics: a kind that "
+            "carries the rim at the lobe"
+        )
+    if line.extension >= 0.5:
+        raise DesignError(
+            f"{design.drive.name}: wave_generator: its outline of "
+            f"{outline.perimeter / mm:.4g} mm is too far from the bore of "
+            f"{2 * np.pi * design.flexspline_inner_radius / mm:.4g} mm"
+        )
+    return line

@@ -1,0 +1,228 @@
+"""Tooth flanks as chains of circular arcs, straight lines and smooth curves.
+
+A flank lies in the frame of its tooth: the tooth is centred on the +y axis, the origin
+is the gear axis, and the right flank (x > 0) is described. The chain runs from the
+middle of the top land to the middle of the root land; normals point out of the steel.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+from math import pi
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.teeth.segments import Piece, Segment
+
+Array = NDArray[np.float64]
+
+TANGENCY_RAD = 1e-10
+"""Largest corner at a junction of two segments that counts as tangent [rad]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Junction:
+    """Where two segments meet, seen from both."""
+
+    gap: float
+    """Distance between the end of one and the start of the next [m]."""
+    corner: float
+    """Angle between their normals [rad]."""
+    edge: bool
+    """Whether the source puts an edge there (tip of an involute, for one)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ToothProfile:
+    """Right flank of one tooth of a member, from top-land to root-land middle [m]."""
+
+    member: str
+    teeth: int
+    internal: bool
+    pitch_radius: float
+    addendum_radius: float
+    dedendum_radius: float
+    segments: tuple[Piece, ...]
+    straight_length: float
+
+    @property
+    def half_pitch(self) -> float:
+        """Half the angular pitch, pi/N [rad]."""
+        return pi / self.teeth
+
+    @property
+    def side(self) -> float:
+        """+1 for external teeth, -1 for internal ones."""
+        return -1.0 if self.internal else 1.0
+
+    @cached_property
+    def stations(self) -> Array:
+        """Arc length at the ends of the segments [m]. Shape (n_segments + 1,)."""
+        stations = np.concatenate([[0.0], np.cumsum([p.length for p in self.segments])])
+        stations.setflags(write=False)
+        return stations
+
+    @property
+    def contact_range(self) -> tuple[float, float]:
+        """Arc length from the end of the top land to the start of the root land [m]."""
+        s = self.stations
+        low = s[1] if self.segments[0].name == "top_land" else s[0]
+        high = s[-2] if self.segments[-1].name == "root_land" else s[-1]
+        return float(low), float(high)
+
+    def range_of(self, first: str, last: str) -> tuple[float, float]:
+        """Arc length at the start of one segment and the end of another [m]."""
+        names = [p.name for p in self.segments]
+        s = self.stations
+        return float(s[names.index(first)]), float(s[names.index(last) + 1])
+
+    def junctions(self) -> tuple[Junction, ...]:
+        """Gap and corner at every junction, each segment evaluated at its very end."""
+        found = []
+        for left, right in pairwise(self.segments):
+            (end,), (before,), _ = left.at(np.array([left.length]), self.side)
+            (start,), (after,), _ = right.at(np.array([0.0]), self.side)
+            cross = before[0] * after[1] - before[1] * after[0]
+            corner = abs(float(np.arctan2(cross, before @ after)))
+            gap = float(np.hypot(*(end - start)))
+            found.append(Junction(gap=gap, corner=corner, edge=right.edge))
+        return tuple(found)
+
+    def evaluate(self, s: ArrayLike) -> tuple[Array, Array, Array]:
+        """Point, outward normal and signed curvature at arc length s.
+
+        Returns:
+            Points (n, 2) [m], unit normals (n, 2), curvatures (n,) [1/m].
+        """
+        s = np.asarray(s, dtype=float)
+        stations = self.stations
+        index = np.clip(
+            np.searchsorted(stations, s, side="right") - 1, 0, len(self.segments) - 1
+        )
+        if self._arcs is not None:
+            return self._at_once(s - stations[index], index)
+        points = np.empty((*s.shape, 2))
+        normals = np.empty((*s.shape, 2))
+        curvature = np.empty(s.shape)
+        for k, part in enumerate(self.segments):
+            here = index == k
+            if not here.any():
+                continue
+            found = part.at(s[here] - stations[k], self.side)
+            points[here], normals[here], curvature[here] = found
+        return points, normals, curvature
+
+    @cached_property
+    def _arcs(self) -> Array | None:
+        """Arcs and lines as numbers; None if there is a piece of another kind.
+
+        Point = base + s way + radius (cos, sin) and normal = sign (cos, sin) of an
+        angle that begins at ``first`` and grows by ``rate`` s, which is 0 on a line.
+        Rows base x, y, way x, y, radius, first, rate, sign, curvature (9, n_segments).
+        """
+        columns = []
+        for part in self.segments:
+            if not isinstance(part, Segment):
+                return None
+            if part.radius == 0.0:
+                way = (np.array(part.end) - np.array(part.start)) / part.length
+                turn = float(np.arctan2(self.side * way[0], -self.side * way[1]))
+                columns.append([*part.start, *way, 0.0, turn, 0.0, 1.0, 0.0])
+                continue
+            rate = (part.angle_end - part.angle_start) / part.length
+            sign = 1.0 if part.convex else -1.0
+            arc = [*part.centre, 0.0, 0.0, part.radius, part.angle_start, rate]
+            columns.append([*arc, sign, part.curvature])
+        return np.array(columns).T
+
+    def _at_once(
+        self, along: Array, index: NDArray[np.int64]
+    ) -> tuple[Array, Array, Array]:
+        """:meth:`evaluate` by number and arc length of the segments, without a loop."""
+        assert self._arcs is not None
+        x, y, way_x, way_y, radius, first, rate, sign, bend = self._arcs[:, index]
+        angle = first + rate * along
+        cos, sin = np.cos(angle), np.sin(angle)
+        points = np.empty((*along.shape, 2))
+        normals = np.empty((*along.shape, 2))
+        points[..., 0] = x + along * way_x + radius * cos
+        points[..., 1] = y + along * way_y + radius * sin
+        normals[..., 0], normals[..., 1] = sign * cos, sign * sin
+        return points, normals, bend
+
+    def signed_distance(self, points: Array) -> tuple[Array, Array, Array]:
+        """Distance of points near the flank, positive outside the steel.
+
+        The closest foot over all segments on which the point projects, and over the
+        edges; a point that projects on none (beyond the ends of the chain) gets
+        infinity.
+
+        Args:
+            points: Shape (n, 2) [m].
+
+        Returns:
+            Distances (n,) [m], outward normals at the foot (n, 2), curvatures (n,).
+        """
+        n = len(points)
+        best = np.full(n, np.inf)
+        normals = np.zeros((n, 2))
+        curvature = np.zeros(n)
+        for part in self.segments:
+            distance, normal, bend, inside = part.project(points, self.side)
+            take = inside & (np.abs(distance) < np.abs(best))
+            best[take] = distance[take]
+            normals[take] = normal[take]
+            curvature[take] = bend if isinstance(bend, float) else bend[take]
+        for vertex, before, after in self._edges:
+            # outside an edge lies a wedge from which the edge itself is closest
+            rel = points - vertex
+            r = np.hypot(rel[:, 0], rel[:, 1])
+            wedge = (rel @ before >= 0.0) & (rel @ after <= 0.0)
+            take = wedge & (r < np.abs(best)) & (r > 0.0)
+            best[take] = r[take]
+            normals[take] = rel[take] / r[take, None]
+            curvature[take] = 1.0 / np.maximum(r[take], 1e-9)
+        return best, normals, curvature
+
+    @cached_property
+    def _edges(self) -> tuple[tuple[Array, Array, Array], ...]:
+        """Edge points with the directions of travel before and after them."""
+        found = []
+        for left, right in pairwise(self.segments):
+            if right.edge:
+                (vertex,), (after,), _ = right.at(np.array([0.0]), self.side)
+                _, (before,), _ = left.at(np.array([left.length]), self.side)
+                travel = [self.side * np.array([n[1], -n[0]]) for n in (before, after)]
+                found.append((vertex, travel[0], travel[1]))
+        return tuple(found)
+
+
+def tooth_profile(design: Design, member: str, *, bounds: bool = True) -> ToothProfile:
+    """Tooth profile of ``flexspline`` or ``circular_spline``.
+
+    Args:
+        design: The drive.
+        member: Which of both.
+        bounds: Whether a refusal says which values would be accepted, which takes as
+            long as a thousand profiles of arcs.
+
+    Raises:
+        DesignError: If the tooth cannot be built; one line that names the key.
+    """
+    # builders are imported here, they import this module
+    spec = design.flexspline if member == "flexspline" else design.circular_spline
+    if spec.profile.kind == "involute":
+        from swgjoint.gear.teeth.involute import involute_profile
+
+        return involute_profile(design, member)
+    if spec.profile.kind == "conjugate":
+        from swgjoint.gear.teeth.conjugate import conjugate_profile
+
+        return conjugate_profile(design, member)
+    from swgjoint.gear.teeth.arc_profiles import arc_profile
+
+    return arc_profile(design, member, bounds=bounds)

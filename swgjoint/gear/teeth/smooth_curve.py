@@ -1,0 +1,227 @@
+"""Pieces of a flank that are smooth curves: generated and conjugate profiles."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.arrays import frozen_array
+from swgjoint.gear.teeth.segments import Bools, Point
+
+Array = NDArray[np.float64]
+
+NODES = 33
+"""Nodes of a generated curve; involutes and fillets then err below 1e-13 m."""
+CLOSEST = 1e-6
+"""Nodes nearer than that lose their tangent in the rounding of coordinates [m]."""
+DENSE = 1025
+"""Points that lay out the nodes."""
+STEPS = 8
+"""Newton steps to a foot; they start near it and converge in four."""
+
+# nodes and weights of Gauss and Legendre on [0, 1]
+_GAUSS = np.polynomial.legendre.leggauss(6)
+_GAUSS_X, _GAUSS_W = 0.5 * (_GAUSS[0] + 1.0), 0.5 * _GAUSS[1]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SmoothCurve:
+    """Quintic curve by arc length, exact in point, normal and curvature at its nodes.
+
+    Twice continuously differentiable, as the Newton iterations of contact want it.
+    """
+
+    name: str
+    stations: Array
+    """Arc length at the nodes, from zero [m]. Shape (n,)."""
+    coefficients: Array
+    """Power coefficients per interval, of the arc length since its node, in units of
+    its length. Shape (n - 1, 6, 2)."""
+    edge: bool = False
+    """Whether it starts at an edge of the steel, not tangent to the piece before."""
+
+    def __post_init__(self) -> None:
+        for key in ("stations", "coefficients"):
+            object.__setattr__(self, key, frozen_array(getattr(self, key), key))
+
+    @property
+    def radius(self) -> float:
+        """A smooth curve has no radius: zero."""
+        return 0.0
+
+    @property
+    def length(self) -> float:
+        """Arc length [m]."""
+        return float(self.stations[-1])
+
+    @property
+    def start(self) -> Point:
+        """First point [m]."""
+        x, y = self.coefficients[0, 0]
+        return float(x), float(y)
+
+    @property
+    def end(self) -> Point:
+        """Last point [m]."""
+        x, y = self.coefficients[-1].sum(axis=0)
+        return float(x), float(y)
+
+    def _derivatives(self, s: Array) -> tuple[Array, Array, Array]:
+        """Points and their first two derivatives by arc length, each (n, 2)."""
+        k = np.searchsorted(self.stations[1:-1], s, side="right")
+        h = self._steps[k]
+        t = (s - self.stations[k]) / h
+        # Horner's scheme with its derivatives in place, coordinates as rows; the first
+        # steps, in which the derivatives are still zero, are left out
+        c = self._rows.take(k, axis=2)
+        first = c[5]
+        value = first * t + c[4]
+        second = 2.0 * first
+        first = first * t + value
+        value = value * t + c[3]
+        for j in (2, 1, 0):
+            second *= t
+            second += 2.0 * first
+            first *= t
+            first += value
+            value *= t
+            value += c[j]
+        return value.T, (first / h).T, (second / h**2).T
+
+    def at(self, s: Array, side: float) -> tuple[Array, Array, Array]:
+        """Points, outward normals and curvatures at arc length s from the start."""
+        points, tangent, bend = self._derivatives(s)
+        size = np.hypot(tangent[:, 0], tangent[:, 1])
+        normal = side * np.stack([-tangent[:, 1], tangent[:, 0]], -1) / size[:, None]
+        return points, normal, -np.sum(bend * normal, axis=-1) / size**2
+
+    @cached_property
+    def _steps(self) -> Array:
+        return np.diff(self.stations)
+
+    @cached_property
+    def _rows(self) -> Array:
+        """Coefficients by power and coordinate (6, 2, n - 1)."""
+        return np.ascontiguousarray(self.coefficients.transpose(1, 2, 0))
+
+    @cached_property
+    def _coarse(self) -> tuple[Array, Array]:
+        """Every fourth node and its point, where the search for a foot starts."""
+        index = np.unique(np.append(np.arange(0, len(self.stations), 4), -1))
+        s = self.stations[index % len(self.stations)]
+        return np.sort(s), self._derivatives(np.sort(s))[0]
+
+    def project(self, points: Array, side: float) -> tuple[Array, Array, Array, Bools]:
+        """Foot of the perpendicular by Newton's method from the nearest coarse node."""
+        coarse_s, coarse = self._coarse
+        # square distances but for a term common to all nodes
+        near = np.sum(coarse**2, axis=-1) - 2.0 * points @ coarse.T
+        s = coarse_s[np.argmin(near, axis=1)]
+        moving = np.arange(len(s))
+        for _ in range(STEPS):
+            foot, tangent, bend = self._derivatives(s[moving])
+            rel = foot - points[moving]
+            slope = rel[:, 0] * tangent[:, 0] + rel[:, 1] * tangent[:, 1]
+            # beyond the centre of curvature the distance has no minimum
+            gain = 1.0 + rel[:, 0] * bend[:, 0] + rel[:, 1] * bend[:, 1]
+            old = s[moving]
+            new = np.clip(old - slope / np.maximum(gain, 0.2), 0.0, self.length)
+            s[moving] = new
+            # the step after one of a nanometre is below the last digit
+            moving = moving[np.abs(new - old) > 1e-9]
+            if not moving.size:
+                break
+        foot, normal, curvature = self.at(s, side)
+        rel = points - foot
+        distance = np.sum(rel * normal, axis=-1)
+        # beyond the ends the rest of the step points outwards
+        tangent = side * np.stack([normal[:, 1], -normal[:, 0]], axis=-1)
+        along = np.abs(np.sum(rel * tangent, axis=-1))
+        inside = along <= 1e-9 * self.length
+        return distance, normal, curvature, inside
+
+
+def smooth_curve(
+    name: str,
+    trace: Callable[[Array], tuple[Array, Array]],
+    first: float,
+    last: float,
+    side: float,
+    *,
+    nodes: int = NODES,
+    dense: int = DENSE,
+    edge: bool = False,
+) -> SmoothCurve:
+    """Curve through points and outward normals given by a smooth parameter.
+
+    Args:
+        name: Name of the piece.
+        trace: Points (n, 2) [m] and outward unit normals (n, 2) at parameters (n,).
+        first: Parameter at the tip end.
+        last: Parameter at the root end.
+        side: +1 for an external tooth, -1 for an internal one.
+        nodes: Largest number of nodes, equally spaced along the curve.
+        dense: Number of points that lay out the nodes.
+        edge: Whether the piece starts at an edge.
+    """
+    from scipy.interpolate import make_interp_spline
+
+    # nodes at equal arc lengths, whatever the parameter does
+    steps = np.linspace(first, last, dense)
+    chord = np.hypot(*np.diff(trace(steps)[0], axis=0).T)
+    walked = np.concatenate([[0.0], np.cumsum(chord)])
+    nodes = max(9, min(nodes, int(walked[-1] / CLOSEST)))
+    share = np.linspace(0.0, walked[-1], nodes)
+    points, normals = trace(np.interp(share, walked, steps))
+    # arc length: the speed of a quintic spline over the chords, by quadrature
+    chord = np.hypot(*np.diff(points, axis=0).T)
+    u = np.concatenate([[0.0], np.cumsum(chord)])
+    spline = make_interp_spline(u, points, k=5)
+    inner = (u[:-1, None] + chord[:, None] * _GAUSS_X).ravel()
+    speed = np.linalg.norm(spline(inner, 1), axis=-1).reshape(-1, _GAUSS_X.size)
+    stations = np.concatenate([[0.0], np.cumsum(speed @ _GAUSS_W * chord)])
+    # the normal turns by -curvature per arc length, seen from the side of the steel
+    turn = np.unwrap(np.arctan2(normals[:, 1], normals[:, 0]))
+    rate = make_interp_spline(u, turn, k=5)(u, 1)
+    curvature = -side * rate / np.linalg.norm(spline(u, 1), axis=-1)
+    return from_nodes(name, stations, points, normals, curvature, side, edge=edge)
+
+
+def from_nodes(
+    name: str,
+    stations: Array,
+    points: Array,
+    normals: Array,
+    curvature: Array,
+    side: float,
+    *,
+    edge: bool = False,
+) -> SmoothCurve:
+    """Quintic Hermite curve through points, outward normals and curvatures."""
+    h = np.diff(stations)[:, None]
+    tangent = side * np.stack([normals[:, 1], -normals[:, 0]], axis=-1)
+    bend = -curvature[:, None] * normals
+    p0, p1 = points[:-1], points[1:]
+    d0, d1 = tangent[:-1] * h, tangent[1:] * h
+    b0, b1 = 0.5 * bend[:-1] * h**2, 0.5 * bend[1:] * h**2
+    a = p1 - p0 - d0 - b0
+    b = d1 - d0 - 2.0 * b0
+    c = 2.0 * (b1 - b0)
+    coefficients = np.stack(
+        [
+            p0,
+            d0,
+            b0,
+            10.0 * a - 4.0 * b + 0.5 * c,
+            -15.0 * a + 7.0 * b - c,
+            6.0 * a - 3.0 * b + 0.5 * c,
+        ],
+        axis=1,
+    )
+    return SmoothCurve(
+        name=name, stations=stations, coefficients=coefficients, edge=edge
+    )

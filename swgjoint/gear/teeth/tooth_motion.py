@@ -1,0 +1,212 @@
+"""Motion of one flexspline tooth relative to the circular spline, and its inverse.
+
+Rigid teeth on the deflected neutral line. The parameter theta is the angle of the tooth
+on the undeflected rim, counter-clockwise from the lobe of the wave generator; at zero
+the tooth stands in the middle of its tooth space, whatever the layout.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.teeth.neutral_line import Pose, neutral_line
+
+Array = NDArray[np.float64]
+Receiver = Literal["flexspline", "circular_spline"]
+
+SAME = 1e-9
+"""Motions closer than that, relative to the radius, are one."""
+
+_MIRROR = np.array([-1.0, 1.0])
+
+
+@dataclass(frozen=True, kw_only=True)
+class Moved:
+    """Rigid motions of vectors, one per parameter: q = turn (p) + shift."""
+
+    turn: Array
+    """Rotation or reflection matrices (n, 2, 2)."""
+    shift: Array
+    """(n, 2) [m]."""
+    d_turn: Array
+    """Derivative of ``turn`` by theta (n, 2, 2)."""
+    d_shift: Array
+    """Derivative of ``shift`` by theta (n, 2) [m/rad]."""
+
+    def points(self, p: Array) -> Array:
+        """Images of points p (n, ..., 2), the first axis going with the motions."""
+        return _apply(self.turn, p) + _wide(self.shift, p)
+
+    def vectors(self, v: Array) -> Array:
+        """Images of directions v (n, ..., 2)."""
+        return _apply(self.turn, v)
+
+    def velocities(self, p: Array) -> Array:
+        """Derivative of the images of points p by theta (n, ..., 2) [m/rad]."""
+        return _apply(self.d_turn, p) + _wide(self.d_shift, p)
+
+
+def _apply(matrix: Array, v: Array) -> Array:
+    return np.asarray(np.einsum("nij,n...j->n...i", matrix, v))
+
+
+def _wide(shift: Array, like: Array) -> Array:
+    return shift.reshape(shift.shape[0], *(1,) * (like.ndim - 2), 2)
+
+
+def _rotation(angle: Array) -> tuple[Array, Array]:
+    """Rotation matrices and their derivative by the angle, each (n, 2, 2)."""
+    c, d = np.cos(angle), np.sin(angle)
+    turn = np.stack([np.stack([c, -d], -1), np.stack([d, c], -1)], axis=-2)
+    return turn, np.stack([np.stack([-d, -c], -1), np.stack([c, -d], -1)], axis=-2)
+
+
+class TeethOnRim(Protocol):
+    """Where teeth of the deflected rim go: the neutral line, or finite elements."""
+
+    @property
+    def lobes(self) -> int:
+        """Lobes of the wave generator."""
+
+    @property
+    def radius(self) -> float:
+        """Radius of the point of the tooth that is followed [m]."""
+
+    def pose(self, theta: ArrayLike) -> Pose:
+        """Pose of a tooth at an angle of the undeflected rim from a lobe [rad]."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ToothMotion:
+    """Relative motion of the teeth at one lobe of the wave generator."""
+
+    line: TeethOnRim
+    teeth_flexspline: int
+    teeth_circular_spline: int
+    lobe: int = 0
+    mirrored: bool = False
+    """Whether left and right are exchanged: what the other flanks do."""
+
+    @property
+    def half_range(self) -> float:
+        """Half the angle between two lobes [rad]."""
+        return np.pi / self.line.lobes
+
+    def in_space(self, theta: Array) -> Moved:
+        """From the flexspline tooth frame to the frame of the tooth space.
+
+        The space of the circular spline is centred on +y, the gear axis is the origin.
+        """
+        sign = -1.0 if self.mirrored else 1.0
+        at_lobe = 2.0 * np.pi * self.lobe / self.line.lobes
+        pose = self.line.pose(sign * theta + at_lobe)
+        # the wave generator turns by alpha = -theta z_fs/z_cs about the circular spline
+        rate = -self.teeth_flexspline / self.teeth_circular_spline
+        alpha = sign * theta * rate - at_lobe
+        turn, d_turn = _rotation(pose.angle + alpha)
+        carry, d_carry = _rotation(alpha)
+        foot = np.array([0.0, self.line.radius])
+        d_turn = d_turn * (pose.d_angle + rate)[:, None, None]
+        shift = _apply(carry, pose.point) - _apply(turn, _like(foot, turn))
+        d_shift = (
+            _apply(d_carry, pose.point) * rate
+            + _apply(carry, pose.d_point)
+            - _apply(d_turn, _like(foot, turn))
+        )
+        if not self.mirrored:
+            return Moved(turn=turn, shift=shift, d_turn=d_turn, d_shift=d_shift)
+        both = _MIRROR[:, None] * _MIRROR
+        return Moved(
+            turn=turn * both,
+            shift=shift * _MIRROR,
+            d_turn=-d_turn * both,
+            d_shift=-d_shift * _MIRROR,
+        )
+
+    def to_circular_spline(self, theta: Array) -> Moved:
+        """From a right flexspline flank to the right flank of the tooth it faces.
+
+        The tooth of the circular spline half a pitch clockwise, mirrored so that its
+        left flank becomes the right one.
+        """
+        space = self.in_space(theta)
+        matrix = _facing(self.teeth_circular_spline)
+        return Moved(
+            turn=matrix @ space.turn,
+            shift=space.shift @ matrix.T,
+            d_turn=matrix @ space.d_turn,
+            d_shift=space.d_shift @ matrix.T,
+        )
+
+    def to_flexspline(self, theta: Array) -> Moved:
+        """The inverse: from a right flank of the circular spline to the flexspline."""
+        there = self.to_circular_spline(theta)
+        turn = np.swapaxes(there.turn, -1, -2)
+        d_turn = np.swapaxes(there.d_turn, -1, -2)
+        return Moved(
+            turn=turn,
+            shift=-_apply(turn, there.shift),
+            d_turn=d_turn,
+            d_shift=-_apply(d_turn, there.shift) - _apply(turn, there.d_shift),
+        )
+
+    def to(self, receiver: Receiver, theta: Array) -> Moved:
+        """From the other member's right flank to that of the receiver."""
+        if receiver == "flexspline":
+            return self.to_flexspline(theta)
+        return self.to_circular_spline(theta)
+
+
+def _like(vector: Array, matrix: Array) -> Array:
+    return np.broadcast_to(vector, (matrix.shape[0], 2))
+
+
+def _facing(teeth: int) -> Array:
+    """From the frame of a tooth space to that of its right wall's mirrored tooth."""
+    c, d = np.cos(np.pi / teeth), np.sin(np.pi / teeth)
+    return np.array([[-c, d], [d, c]])
+
+
+def tooth_motions(
+    design: Design, line: TeethOnRim | None = None
+) -> tuple[ToothMotion, ...]:
+    """Motions that differ: every lobe, and both flanks where these are not alike.
+
+    Args:
+        design: The drive.
+        line: Where the teeth go; by default the neutral line of the design.
+
+    Raises:
+        DesignError: If the wave generator cannot be built.
+    """
+    line = line or neutral_line(design)
+    first = ToothMotion(
+        line=line,
+        teeth_flexspline=design.drive.teeth_flexspline,
+        teeth_circular_spline=design.drive.teeth_circular_spline,
+    )
+    theta = np.linspace(-1.0, 1.0, 41) * first.half_range
+
+    def path(motion: ToothMotion) -> Array:
+        moved = motion.in_space(theta)
+        return np.concatenate([moved.turn.ravel(), moved.shift.ravel() / line.radius])
+
+    found: list[tuple[ToothMotion, Array]] = []
+    for lobe in range(line.lobes):
+        for mirrored in (False, True):
+            motion = ToothMotion(
+                line=line,
+                teeth_flexspline=first.teeth_flexspline,
+                teeth_circular_spline=first.teeth_circular_spline,
+                lobe=lobe,
+                mirrored=mirrored,
+            )
+            new = path(motion)
+            if all(np.abs(new - old).max() > SAME for _, old in found):
+                found.append((motion, new))
+    return tuple(motion for motion, _ in found)

@@ -1,0 +1,189 @@
+"""The table of the wave generator in a design file, one class per kind."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from swgjoint.faults import Fault, Section
+from swgjoint.gear.design.sections import Micrometre, Millimetre, Positive, Reduction
+
+
+class Bearing(Section):
+    """Thin-race ball bearing between wave generator and flexspline.
+
+    Absent optional keys take what
+    :class:`swgjoint.gear.bearing.ball_bearing.BallBearing` says.
+    """
+
+    balls: Annotated[int, Field(ge=3, le=200)]
+    """Number of balls."""
+    ball_diameter_mm: Millimetre
+    """Diameter of a ball."""
+    race_thickness_mm: Millimetre
+    """Thickness of the outer race over its grooves."""
+    clearance_um: Micrometre = 0.0
+    """Radial clearance, on the diameter."""
+    race_width_mm: Millimetre | None = None
+    """Width along the axis."""
+    groove_inertia_factor: Reduction | None = None
+    """Second moment of the race's section over that of its rectangle."""
+    groove_conformity: Annotated[float, Field(gt=0.5, le=1)] | None = None
+    """Radius of the groove over the diameter of the ball."""
+    fit_clearance_um: Micrometre | None = None
+    """Clearance between race and flexspline, on the diameter."""
+    youngs_modulus_GPa: Annotated[float, Field(gt=0, le=2_000)] | None = None
+    """Of the races."""
+    poisson_ratio: Annotated[float, Field(ge=0, lt=0.5)] | None = None
+    """Of the races."""
+
+
+class WaveGeneratorBase(Section):
+    """What every wave generator may carry."""
+
+    bearing: Bearing | None = None
+    """Ball bearing below the flexspline; without one the cam slides."""
+
+
+class Elliptical(WaveGeneratorBase):
+    """Ellipse, thesis 3.2.2."""
+
+    kind: Literal["elliptical"] = "elliptical"
+    minor_axis_coefficient: Reduction = 1.0
+    """C: half minor axis over bore radius less deflection."""
+
+
+class Simplified(WaveGeneratorBase):
+    """Two semicircles joined by straight lines, thesis 3.2.1."""
+
+    kind: Literal["simplified"] = "simplified"
+    minor_axis_coefficient: Reduction
+    """C: half minor axis over bore radius less deflection."""
+
+
+class Parabolic(WaveGeneratorBase):
+    """Two parabolas joined by circular arcs, thesis 3.2.3."""
+
+    kind: Literal["parabolic"] = "parabolic"
+    minor_axis_coefficient: Reduction = 1.0
+    """C: half minor axis over bore radius less deflection."""
+    parabola_coefficient_per_mm: Positive
+    """c of the parabola y = a - c x² at the lobe."""
+    parabola_length_coefficient: Reduction
+    """Half width of the parabola over the half minor axis."""
+    connector_radius_mm: Millimetre
+    """Radius of the arc that joins it to the lateral arc."""
+
+
+class ParabolaSide(Section):
+    """One side of a bilateral asymmetric parabolic wave generator."""
+
+    parabola_coefficient_per_mm: Positive
+    """c of the parabola y = a - c x² at the lobe."""
+    parabola_length_coefficient: Reduction
+    """Half width of the parabola over the half minor axis."""
+    connector_radius_mm: Millimetre
+    """Radius of the arc that joins it to the lateral arc."""
+
+
+class AsymmetricParabolic(WaveGeneratorBase):
+    """Parabolic with turned lobes (``rotation_deg``) or with two different sides."""
+
+    kind: Literal["asymmetric_parabolic"] = "asymmetric_parabolic"
+    minor_axis_coefficient: Reduction = 1.0
+    """C: half minor axis over bore radius less deflection."""
+    rotation_deg: Annotated[float, Field(gt=-45, lt=45)] | None = None
+    """By which each lobe is turned about its apex."""
+    parabola_coefficient_per_mm: Positive | None = None
+    """c of the parabola y = a - c x², with rotation_deg."""
+    parabola_length_coefficient: Reduction | None = None
+    """Half width of the parabola over the half minor axis."""
+    connector_radius_mm: Millimetre | None = None
+    """Radius of the arc that joins it to the lateral arc."""
+    left: ParabolaSide | None = None
+    """Side at x < 0 of the upper lobe, in place of rotation_deg."""
+    right: ParabolaSide | None = None
+    """Side at x > 0 of the upper lobe."""
+
+    @model_validator(mode="after")
+    def _one_of_two_forms(self) -> AsymmetricParabolic:
+        keys = (
+            "parabola_coefficient_per_mm",
+            "parabola_length_coefficient",
+            "connector_radius_mm",
+        )
+        turned = ("rotation_deg", *keys)
+        sides = ("left", "right")
+        given = {key for key in (*turned, *sides) if getattr(self, key) is not None}
+        if given not in (set(turned), set(sides)):
+            raise Fault(
+                (
+                    "kind",
+                    "'asymmetric_parabolic' needs either rotation_deg with"
+                    f" {', '.join(keys)}, or both tables left and right",
+                )
+            )
+        return self
+
+
+class FourRoller(WaveGeneratorBase):
+    """Four rollers, thesis 3.2.4."""
+
+    kind: Literal["four_roller"] = "four_roller"
+    aperture_deg: Annotated[float, Field(gt=0, lt=45)]
+    """Angle of a roller's centre from the major axis."""
+    roller_radius_mm: Millimetre
+    """Radius of the rollers."""
+
+
+class Cosine(WaveGeneratorBase):
+    """Cosine of the lobes about the neutral circle."""
+
+    kind: Literal["cosine"] = "cosine"
+    minor_axis_coefficient: Reduction = 1.0
+    """C: half minor axis over bore radius less deflection."""
+
+
+class Table(WaveGeneratorBase):
+    """Radius over the angle from the major axis, one turn."""
+
+    kind: Literal["table"] = "table"
+    angle_deg: Annotated[tuple[float, ...], Field(strict=False)]
+    """Angles from the major axis, increasing within one turn."""
+    radius_mm: Annotated[tuple[Millimetre, ...], Field(strict=False)]
+    """Radius at every angle."""
+
+    @model_validator(mode="after")
+    def _same_length(self) -> Table:
+        if len(self.angle_deg) < 8:
+            raise Fault(
+                ("angle_deg", f"{len(self.angle_deg)} values; accepted: 8 or more")
+            )
+        if len(self.angle_deg) != len(self.radius_mm):
+            raise Fault(
+                (
+                    "radius_mm",
+                    f"{len(self.radius_mm)} values; accepted: as many as angle_deg,"
+                    f" {len(self.angle_deg)}",
+                )
+            )
+        steps = [b - a for a, b in pairwise(self.angle_deg)]
+        if min(steps) <= 0 or self.angle_deg[-1] - self.angle_deg[0] >= 360:
+            raise Fault(
+                ("angle_deg", "accepted: increasing angles within one turn, 360 deg")
+            )
+        return self
+
+
+WaveGenerator = Annotated[
+    Elliptical
+    | Simplified
+    | Parabolic
+    | AsymmetricParabolic
+    | FourRoller
+    | Cosine
+    | Table,
+    Field(discriminator="kind"),
+]

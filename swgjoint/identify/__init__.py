@@ -1,0 +1,1 @@
+"""From measurements to a map: bench logs and measured torque-torsion loops."""

@@ -1,0 +1,172 @@
+"""Logs of a test bench: angles of motor and link, torque of motor and output."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.csv_columns import header_of, read_columns
+from swgjoint.errors import InputError
+from swgjoint.units import arcmin, deg
+
+Array = NDArray[np.float64]
+
+NEEDED = {
+    "time": {"time_s": 1.0},
+    "motor_angle": {"motor_angle_deg": deg, "motor_angle_rad": 1.0},
+    "link_angle": {
+        "link_angle_deg": deg,
+        "link_angle_rad": 1.0,
+        "link_angle_arcmin": arcmin,
+    },
+}
+TORQUES = {
+    "output_torque": {"output_torque_Nm": 1.0},
+    "motor_torque": {"motor_torque_Nm": 1.0},
+}
+FEWEST = 200
+"""Averaged samples that a fit needs."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Averaged:
+    """Means over windows of equal time; arrays of shape (n,)."""
+
+    time: Array
+    motor_angle: Array
+    link_angle: Array
+    output_torque: Array | None
+    motor_torque: Array | None
+    window: NDArray[np.intp]
+    """That holds each sample of the log. Shape (n_samples,)."""
+
+    def mean(self, values: Array) -> Array:
+        """Means of what belongs to the samples of the log, (n_samples, ...)."""
+        total = np.zeros((len(self.time), *values.shape[1:]))
+        np.add.at(total, self.window, values)
+        counts = np.bincount(self.window)
+        return total / counts.reshape(-1, *[1] * (values.ndim - 1))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class BenchLog:
+    """Samples of a bench; arrays of shape (n,). At least one torque is there."""
+
+    time: Array
+    """Increasing [s]."""
+    motor_angle: Array
+    """theta, of the input member [rad]."""
+    link_angle: Array
+    """psi, of the output member [rad]."""
+    output_torque: Array | None = None
+    """That the drive exerts on the output [N·m]."""
+    motor_torque: Array | None = None
+    """That the motor exerts on the input [N·m]."""
+    where: str = "log"
+    """Name for messages."""
+
+    def __post_init__(self) -> None:
+        if self.output_torque is None and self.motor_torque is None:
+            raise InputError(
+                f"{self.where}: no torque; needed: output_torque_Nm, motor_torque_Nm"
+                " or both"
+            )
+        n = len(self.time)
+        for key in ("motor_angle", "link_angle", "output_torque", "motor_torque"):
+            values = getattr(self, key)
+            if values is not None and len(values) != n:
+                raise InputError(
+                    f"{self.where}: {len(values)} values of {key}, {n} times"
+                )
+        back = np.flatnonzero(np.diff(self.time) <= 0.0)
+        if back.size:
+            raise InputError(
+                f"{self.where}: time_s {self.time[back[0] + 1]:g} after"
+                f" {self.time[back[0]]:g}; accepted: increasing"
+            )
+
+    def averaged(self, window: float) -> Averaged:
+        """Means over windows [s]; a window with no sample is left out.
+
+        Raises:
+            InputError: If too few are left.
+        """
+        if not (np.isfinite(window) and window > 0.0):
+            raise InputError(f"window {window:g} s; accepted: > 0 s")
+        # a little early, so that round-off of the time moves no sample
+        step = float(np.median(np.diff(self.time))) if len(self.time) > 1 else 1.0
+        if window < 0.5 * step:
+            raise InputError(
+                f"window {window:g} s; accepted: at least the {step:g} s from sample to"
+                f" sample of {self.where}"
+            )
+        bins = np.floor((self.time - self.time[0] + 0.5 * step) / window).astype(int)
+        gap = np.diff(bins).max(initial=0)
+        if gap > 1:
+            at = float(self.time[np.diff(bins).argmax()])
+            raise InputError(
+                f"{self.where}: no sample for {gap * window:g} s after {at:g} s;"
+                f" accepted: one in every {window:g} s"
+            )
+        _, place, counts = np.unique(bins, return_inverse=True, return_counts=True)
+        if counts.size < FEWEST:
+            raise InputError(
+                f"{self.where}: {len(self.time)} samples over"
+                f" {np.ptp(self.time):g} s are {counts.size} averages over {window:g}"
+                f" s; accepted: at least {FEWEST}"
+            )
+
+        def mean(values: Array | None) -> Array | None:
+            return None if values is None else np.bincount(place, values) / counts
+
+        time, motor, link = (
+            np.bincount(place, x) / counts
+            for x in (self.time, self.motor_angle, self.link_angle)
+        )
+        return Averaged(
+            time=time,
+            motor_angle=motor,
+            link_angle=link,
+            output_torque=mean(self.output_torque),
+            motor_torque=mean(self.motor_torque),
+            window=np.asarray(place, dtype=np.intp),
+        )
+
+
+def read_log(path: str | Path) -> BenchLog:
+    """A log from a CSV file.
+
+    Columns ``time_s``, ``motor_angle_deg`` and ``link_angle_deg`` (or ``_rad``), and
+    ``output_torque_Nm``, ``motor_torque_Nm`` or both; others are not read.
+
+    Raises:
+        InputError: If the file cannot be used; names file, line and column.
+    """
+    has = {*header_of(path)}
+    torques = {key: names for key, names in TORQUES.items() if has & set(names)}
+    data = read_columns(path, {**NEEDED, **torques})
+    return BenchLog(**data, where=str(path))
+
+
+def mean_rate(means: Array, step: float) -> Array:
+    """Mean rate over windows from the means of a signal, of fourth order. (n,).
+
+    The values between two windows from the four around them.
+    """
+    out = np.gradient(means, step)
+    x = means
+    faces = (7.0 * (x[1:-2] + x[2:-1]) - x[:-3] - x[3:]) / 12.0
+    out[2:-2] = np.diff(faces) / step
+    return np.asarray(out)
+
+
+def mean_acceleration(means: Array, step: float) -> Array:
+    """Mean second derivative over windows, of fourth order. (n,)."""
+    out = np.gradient(np.gradient(means, step), step)
+    x = means
+    faces = (15.0 * (x[2:-1] - x[1:-2]) - (x[3:] - x[:-3])) / (12.0 * step)
+    out[2:-2] = np.diff(faces) / step
+    return np.asarray(out)

@@ -1,0 +1,91 @@
+"""Whether a measured loop has the units that its head says."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from swgjoint.errors import InputError
+from swgjoint.identify.torsion_fit import fit_torsion
+from swgjoint.maps.sheet.loop import TorqueLoop
+from swgjoint.units import arcmin
+
+TORSION_AT_RATED = (0.3, 60.0)
+"""Torsion at rated torque of a strain wave gear [arcmin], else a warning.
+
+models/catalogue: 4.9 to 7.4 arcmin for the 22 sets of CSG with rating and stiffness
+(sizes 14 to 32); the range reaches about ten times beyond on both sides.
+"""
+IMPOSSIBLE = (0.02, 1200.0)
+"""The same, beyond which the record is refused: no gear is so stiff, and 20 degrees
+are several teeth."""
+TORQUE = (0.005, 200.0)
+"""Largest torque of a loop over the rated one. Lost motion is read at 0.04 and teeth
+ratchet below 20; a factor of a thousand is far beyond on both sides."""
+
+
+def check_units(path: str | Path, loop: TorqueLoop, rated_torque: float) -> list[str]:
+    """Refuse a loop in other units than its head says; warnings where one may doubt.
+
+    Args:
+        path: For the message.
+        loop: As read.
+        rated_torque: Of the drive [N·m].
+
+    Raises:
+        InputError: If torque or torsion are far from any drive of that rated torque.
+    """
+    largest = float(np.abs(loop.torque).max())
+    times, (least, most) = largest / rated_torque, TORQUE
+    if not least <= times <= most:
+        other = "mN·m" if times > most else "kN·m"
+        raise InputError(
+            f"{path}: torque_Nm to {largest:.4g} N·m is {times:.4g} x the rated"
+            f" torque of {rated_torque:g} N·m: is it {other}? accepted: {least:g} to"
+            f" {most:g} x"
+        )
+    slope = float(np.ptp(loop.torsion) / np.ptp(loop.torque))
+    torsion = slope * rated_torque / arcmin
+    where = f"{path}: torsion {torsion:.4g} arcmin at the rated {rated_torque:g} N·m"
+    low, high = TORSION_AT_RATED
+    if not IMPOSSIBLE[0] <= torsion <= IMPOSSIBLE[1]:
+        fitting = [
+            name
+            for name, factor in (
+                ("arcmin under torsion_rad", arcmin),
+                ("rad under torsion_arcmin", 1.0 / arcmin),
+            )
+            if low <= torsion * factor <= high
+        ]
+        hint = f": is it {' or '.join(fitting)}?" if fitting else ""
+        raise InputError(
+            f"{where}{hint}; accepted: {IMPOSSIBLE[0]:g} to {IMPOSSIBLE[1]:g} arcmin,"
+            f" catalogue drives have 5 to 7 arcmin"
+        )
+    if not low <= torsion <= high:
+        return [
+            f"{where}; plausible: {low:g} to {high:g} arcmin (the catalogue's are 5 to"
+            " 7): see the units of the torsion and the rated torque"
+        ]
+    return []
+
+
+def check_direction(path: str | Path, loop: TorqueLoop) -> None:
+    """Refuse a loop that runs the wrong way round, beyond its noise.
+
+    Raises:
+        InputError: If the torsion lags behind the torque backwards in time.
+    """
+    width = loop.hysteresis_loss()
+    if not width < 0.0:
+        return
+    backwards = TorqueLoop(torque=loop.torque[::-1], torsion=loop.torsion[::-1])
+    if not fit_torsion(backwards).hysteresis:
+        return
+    raise InputError(
+        f"{path}: the loop runs the wrong way round: its hysteresis loss is"
+        f" {width / arcmin:.4g} arcmin, a drive that gives energy; accepted: >= 0, with"
+        " torque and torsion of one sign, rows in order of time and both columns of one"
+        " instant (reversed rows or a late torque turn the sign)"
+    )

@@ -1,0 +1,220 @@
+"""A monotone torsion curve and hysteresis from a measured loop."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.maps.hysteresis import Jenkin, stretches
+from swgjoint.maps.sheet.loop import TorqueLoop
+from swgjoint.maps.torsion_law import torque_at_knots
+from swgjoint.units import arcmin
+
+Array = NDArray[np.float64]
+
+INTERVALS = 48
+SOFTEST = 0.02
+"""Smallest stiffness of the fit, of the mean one: the curve stays monotone."""
+REACHES = 0.25 * 2.0 ** -np.arange(0.0, 8.5, 0.5)
+"""Yield torsions of the elements that are tried, parts of the travel: from a quarter,
+above which an element sticks too long to be told from the spring, to 0.1 %."""
+FAINT = 1e-3
+"""Hysteresis below this part of the largest torque is none."""
+
+_SMOOTH = 1e-4  # weight of the bend of the stiffness: decides only where data is absent
+_SIGNIFICANT = 20.0  # of an F test: far beyond what noise does
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Record:
+    """What of a loop the least squares see."""
+
+    loop: TorqueLoop
+    torque: Array
+    """Of the samples that count [N·m]. Shape (n,)."""
+    torsion: Array
+    """[rad]. Shape (n,)."""
+    knots: Array
+    """[rad]. Shape (n_knots,)."""
+    reaches: Array
+    """Yield torsions that are tried [rad]. Shape (n_elements,)."""
+    signals: Array
+    """Torque of each of these elements over its yield torque (n, n_elements)."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TorsionFit:
+    """Monotone spring and hysteresis of a measured loop."""
+
+    knots: Array
+    """Torsion from the position of zero torque [rad]."""
+    stiffness: Array
+    """At the knots, positive [N·m/rad]."""
+    hysteresis: tuple[Jenkin, ...]
+    report: dict[str, Any]
+    record: Record
+    yields: Array
+    """Yield torques of the elements that were tried [N·m]."""
+
+    def with_yields(self, yields: Array) -> TorsionFit:
+        """The spring that follows the loop best with these yield torques [N·m]."""
+        record = self.record
+        rest = record.torque - record.signals @ yields
+        found = _solve(record.torsion, rest, record.knots, record.signals[:, :0])
+        return _fit_of(record, found, yields, self.report)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Solution:
+    values: Array
+    """Torque at the first knot, stiffness at the knots, yield torques."""
+    error: Array
+    """Torque of the model minus that of the samples [N·m]."""
+    bounded: Array
+    """-1 where a value is at its lower bound."""
+
+    @property
+    def rms(self) -> float:
+        return float(np.sqrt(np.mean(self.error**2)))
+
+
+def fit_torsion(loop: TorqueLoop, *, intervals: int = INTERVALS) -> TorsionFit:
+    """Spring with piecewise linear, positive stiffness, and Jenkin elements.
+
+    Bounded linear least squares on the torque of the samples: with its yield torsion
+    given, the torque of an element along the record is its yield torque times a known
+    signal. Samples count once the torsion has moved twice the largest yield torsion,
+    when no element remembers how the record began. Elements are kept where they take
+    away more of the residual than noise could; a record of one direction has none.
+    A loop of another kind, such as one whose width in torque is smallest in the middle,
+    leaves a residual; the report has it.
+
+    Args:
+        loop: Both signs of the torque.
+        intervals: Equal pieces of the torsion, fewer for few samples.
+    """
+    travel = np.maximum.accumulate(loop.torsion) - np.minimum.accumulate(loop.torsion)
+    reaches = REACHES * travel[-1]
+    width = loop.hysteresis_loss()
+    known = travel >= 2.0 * reaches[0]
+    if np.isnan(width):
+        known[:] = True
+    torque, x = loop.torque[known], loop.torsion[known]
+    count = max(1, min(intervals, np.unique(torque).size // 3))
+    record = Record(
+        loop=loop,
+        torque=torque,
+        torsion=x,
+        knots=np.linspace(x.min(), x.max(), count + 1),
+        reaches=reaches,
+        signals=np.column_stack(
+            [stretches(loop.torsion, d)[known] / d for d in reaches]
+        ),
+    )
+    plain = _solve(x, torque, record.knots, record.signals[:, :0])
+    found = plain
+    if width > 0.0 and torque.size > count + 2 + reaches.size:
+        slipping = _solve(x, torque, record.knots, record.signals)
+        better = plain.rms**2 > slipping.rms**2 * (
+            1.0 + _SIGNIFICANT * reaches.size / torque.size
+        )
+        yields = slipping.values[count + 2 :]
+        if better and yields.sum() > FAINT * np.abs(torque).max():
+            found = slipping
+    yields = np.zeros(reaches.size)
+    yields[: found.values.size - (count + 2)] = found.values[count + 2 :]
+    report = {"residual_rms_without_hysteresis_Nm": plain.rms}
+    return _fit_of(record, found, yields, report)
+
+
+def _fit_of(
+    record: Record, found: _Solution, yields: Array, report: dict[str, Any]
+) -> TorsionFit:
+    """Spring and elements of a solution, and how well they follow the loop."""
+    loop, knots, x = record.loop, record.knots, record.torsion
+    stiffness = found.values[1 : knots.size + 1]
+    elements = tuple(
+        Jenkin(stiffness=float(f / d), yield_torque=float(f))
+        for f, d in zip(yields, record.reaches, strict=True)
+        if f > FAINT * yields.sum()
+    )
+    steps = 0.5 * np.diff(knots) * (stiffness[1:] + stiffness[:-1])
+    at_knots = found.values[0] + np.concatenate([[0.0], np.cumsum(steps)])
+    zero = _inverse(0.0, knots, stiffness, at_knots)
+    shifted = knots - zero
+    turned = np.abs(found.error / np.interp(x, knots, stiffness)) / arcmin
+    width = loop.hysteresis_loss()
+    return TorsionFit(
+        knots=shifted,
+        stiffness=stiffness,
+        hysteresis=elements,
+        record=record,
+        yields=yields,
+        report=report
+        | {
+            "samples": int(loop.torque.size),
+            "samples_used": int(record.torque.size),
+            "branches": "one" if np.isnan(width) else "both",
+            "intervals": knots.size - 1,
+            "elements": len(elements),
+            "yield_torque_Nm": float(sum(e.yield_torque for e in elements)),
+            "residual_rms_Nm": found.rms,
+            "residual_max_Nm": float(np.abs(found.error).max()),
+            "residual_rms_arcmin": float(np.sqrt(np.mean(turned**2))),
+            "residual_max_arcmin": float(turned.max()),
+            "torsion_at_zero_torque_arcmin": zero / arcmin,
+            "hysteresis_loss_arcmin": None if np.isnan(width) else width / arcmin,
+            "torque_range_Nm": [
+                float(v) for v in torque_at_knots(shifted, stiffness)[[0, -1]]
+            ],
+            "at_softest": int((found.bounded[1 : knots.size + 1] != 0).sum()),
+        },
+    )
+
+
+def _solve(x: Array, torque: Array, knots: Array, signals: Array) -> _Solution:
+    """Torque at the first knot, stiffness at the knots and yield torques."""
+    from scipy.optimize import lsq_linear
+
+    count, elements = knots.size - 1, signals.shape[1]
+    h, secant = float(knots[1] - knots[0]), float(np.ptp(torque) / np.ptp(x))
+    # unknowns: torques over h secant, stiffness over the secant
+    basis = np.column_stack([np.ones_like(x), _integrals(x, knots) / h, signals])
+    bend = np.zeros((max(0, count - 1), basis.shape[1]))
+    for row in range(len(bend)):
+        bend[row, row + 1 : row + 4] = (1.0, -2.0, 1.0)
+    matrix = np.vstack([basis, _SMOOTH * np.sqrt(torque.size) * bend])
+    wanted = np.concatenate([torque / (h * secant), np.zeros(len(bend))])
+    # the triangle has the same least squares and as many rows as unknowns
+    q, r = np.linalg.qr(matrix)
+    lowest = np.r_[-np.inf, np.full(count + 1, SOFTEST), np.zeros(elements)]
+    solution = lsq_linear(r, q.T @ wanted, bounds=(lowest, np.inf), method="bvls")
+    unit = np.r_[h * secant, np.full(count + 1, secant), np.full(elements, h * secant)]
+    return _Solution(
+        values=solution.x * unit,
+        error=(basis @ solution.x) * (h * secant) - torque,
+        bounded=solution.active_mask,
+    )
+
+
+def _integrals(x: Array, knots: Array) -> Array:
+    """Integral of every hat function from the first knot to x. (n, n_knots)."""
+    h = float(knots[1] - knots[0])
+    s = np.clip((x[:, None] - knots[:-1]) / h, 0.0, 1.0)  # way through each interval
+    table = np.zeros((x.size, knots.size))
+    table[:, :-1] += h * (s - 0.5 * s**2)  # the falling half
+    table[:, 1:] += h * 0.5 * s**2  # the rising half
+    return table
+
+
+def _inverse(torque: float, knots: Array, stiffness: Array, at: Array) -> float:
+    """Torsion at a torque inside the range, on the parabola of its interval."""
+    j = int(np.clip(np.searchsorted(at, torque) - 1, 0, knots.size - 2))
+    bend = 0.5 * (stiffness[j + 1] - stiffness[j]) / (knots[j + 1] - knots[j])
+    rest = torque - at[j]
+    # the root in the form that does not cancel for a small bend
+    root = np.sqrt(max(0.0, stiffness[j] ** 2 + 4.0 * bend * rest))
+    return float(knots[j] + 2.0 * rest / (stiffness[j] + root))

@@ -1,0 +1,1 @@
+"""From sampled equilibria and stated figures to the coefficients of a map."""

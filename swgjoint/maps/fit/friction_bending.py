@@ -1,0 +1,70 @@
+r"""Loss of the rim that is bent all around as the wave generator turns.
+
+The rim of radius r, bent to :math:`w_0 \cos n\varphi` without stretching, has the
+strain energy
+
+.. math:: U = \tfrac12 E I \oint \kappa^2\,ds
+        = \frac{\pi E I w_0^2 (n^2 - 1)^2}{2 r^3}, \qquad I = b t^3/12.
+
+Every point goes through n cycles of bending per turn of the wave generator relative to
+the flexspline. The peaks of its energy sum to 2 U, and a cycle loses 2 pi times the
+loss factor of its peak: a torque of :math:`2 n \eta\,U`, at any speed. Teeth and cup
+are left out: the finite elements of the reference drive, with teeth and on an ellipse,
+hold 24.1 mJ where this is 12.2.
+
+Source:
+    Thesis, appendix A: efficiency losses of a constantly deflected turning body (what
+    was measured there is the deflection, not the torque). Ring: Timoshenko,
+    Young, "Vibration Problems in Engineering", inextensional flexure.
+"""
+
+from __future__ import annotations
+
+from math import pi
+
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.wave_generators.wave_generator import lobe_height
+from swgjoint.maps.fit.friction_fit import PRESLIDING, RELAXATION
+from swgjoint.maps.friction import Friction
+from swgjoint.units import mm
+
+STEEL_LOSS_FACTOR = 1e-3
+"""eta of steel, by order of magnitude: tables state 1e-4 at small and 1e-3 at large
+stress. Assumed: it depends on alloy, hardness and stress, and must be measured."""
+
+
+def rim_bending_energy(design: Design) -> float:
+    """Strain energy of the plain rim, bent by the wave generator [J]."""
+    material = design.material_of("flexspline")
+    n, rim = design.lobes, design.flexspline.rim_mm * mm
+    radius = design.flexspline_inner_radius + 0.5 * rim
+    second_moment = design.drive.face_width_mm * mm * rim**3 / 12.0
+    bend = lobe_height(design) * (n**2 - 1)
+    return 0.5 * pi * material.youngs_modulus * second_moment * bend**2 / radius**3
+
+
+def bending_torque(design: Design, loss_factor: float = STEEL_LOSS_FACTOR) -> float:
+    """Torque that bending the rim takes at the input [N·m]."""
+    return 2.0 * design.lobes * loss_factor * rim_bending_energy(design)
+
+
+def bending_friction(
+    design: Design, loss_factor: float = STEEL_LOSS_FACTOR
+) -> Friction:
+    """Friction of the bent rim alone, for a map without bearing, seals and grease."""
+    torque = bending_torque(design, loss_factor)
+    return Friction(
+        stiffness=torque / PRESLIDING,
+        damping=RELAXATION * torque / PRESLIDING,
+        bending=torque,
+        source=f"bending of the plain rim, loss factor {loss_factor:g} (assumed)",
+    )
+
+
+def without_friction(design: Design) -> str:
+    """Why a map of finite elements tells no losses, and what bending alone takes."""
+    return (
+        "the finite elements have no friction of bearing, seals and grease; bending of"
+        f" the plain rim alone takes about {1e3 * bending_torque(design):.2g} mN·m"
+        f" (loss factor {STEEL_LOSS_FACTOR:g}, assumed)"
+    )

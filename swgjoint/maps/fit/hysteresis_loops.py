@@ -1,0 +1,246 @@
+r"""Hysteresis from computed loops with and without friction.
+
+At every input position the loop with friction gives the torsion x(T), the drive without
+friction the torsion :math:`x_0(T)`, whose inverse is the torque :math:`T_0(x)` of the
+potential. What friction adds at the same torsion,
+
+.. math:: R = T - T_0(x), \qquad \oint R\,dx = \oint T\,dx = \text{work of friction},
+
+is what Jenkin elements have to follow. With its yield torsion given, an element is its
+yield torque times a known signal, so that the yield torques are a least-squares problem
+with bounds. It is weighted with the torsion travelled: an element that slips all the
+way then takes the mean of R, and with it the work of a round.
+
+Elements yield at a constant torque; friction of the teeth changes with their loads and
+with how they slide. Where its loop is narrower in the middle than under load, which
+no parallel elements can be, they come out too wide there and too narrow elsewhere. The
+report says by how much.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicHermiteSpline
+
+from swgjoint.arrays import frozen_array
+from swgjoint.identify.torsion_fit import FAINT
+from swgjoint.maps.drive_map import DriveMap
+from swgjoint.maps.equilibrium import output_angle
+from swgjoint.maps.hysteresis import Jenkin, Sliders, stretches
+from swgjoint.units import arcmin
+
+Array = NDArray[np.float64]
+
+REACHES = 2.0 ** -np.arange(0.0, 10.5, 0.5)
+"""Yield torsions of the elements that are tried, parts of the travel: from that of an
+element that sticks all the way, as teeth that do not slide stiffen a drive, to 0.1 %.
+"""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FrictionLoop:
+    """Torque loop at a locked input: from zero, in the end T -> 0 -> -T -> 0 -> T.
+
+    The drive has forgotten its first loading when the last round begins.
+    """
+
+    input_angle: float
+    """theta [rad]."""
+    quarter: int
+    """Steps n of each quarter of the last round."""
+    torque: Array
+    """T along the path (n_points,), at least 4 n + 1 [N·m]."""
+    torsion: Array
+    """theta/i - psi with friction (n_points,) [rad]."""
+    elastic_torsion: Array
+    """The same without friction, at the same torques (n_points,) [rad]."""
+    stiffness: Array
+    """Tangent dT/dx without friction (n_points,) [N·m/rad]."""
+    work: Array
+    """Work of friction since the start (n_points,) [J]."""
+
+    def __post_init__(self) -> None:
+        torque = frozen_array(self.torque, "torque [N·m]", ndim=1)
+        falling, rising = self.branches(torque)
+        if rising.size != 2 * self.quarter + 1 or (falling != rising).any():
+            raise ValueError(
+                f"{torque.size} torques do not end with a round of equal branches, in"
+                f" quarters of {self.quarter} steps"
+            )
+        object.__setattr__(self, "torque", torque)
+        for key, unit in (
+            ("torsion", "rad"),
+            ("elastic_torsion", "rad"),
+            ("stiffness", "N·m/rad"),
+            ("work", "J"),
+        ):
+            values = frozen_array(
+                getattr(self, key), f"{key} [{unit}]", shape=(torque.size,)
+            )
+            object.__setattr__(self, key, values)
+
+    @property
+    def round(self) -> slice:
+        """The last round, closed, from T to T."""
+        return slice(-4 * self.quarter - 1, None)
+
+    def branches(self, values: Array) -> tuple[Array, Array]:
+        """Values while the torque falls and while it rises, from -T to T (2 n + 1,)."""
+        n = self.quarter
+        last = values[self.round]
+        return last[: 2 * n + 1][::-1], last[2 * n :]
+
+    @property
+    def width(self) -> Array:
+        """Torsion while the torque falls less that while it rises (2 n + 1,) [rad]."""
+        falling, rising = self.branches(self.torsion)
+        return np.asarray(falling - rising)
+
+    @property
+    def shift(self) -> Array:
+        """Mid-line less the torsion without friction (2 n + 1,) [rad]."""
+        falling, rising = self.branches(self.torsion - self.elastic_torsion)
+        return np.asarray(0.5 * (falling + rising))
+
+    @property
+    def loss(self) -> float:
+        """Full width at zero torque [rad]."""
+        return float(self.width[self.quarter])
+
+    @property
+    def area(self) -> float:
+        """Work that the round takes, of T dx [J]."""
+        return float(np.trapezoid(self.torque[self.round], self.torsion[self.round]))
+
+    @property
+    def friction_work(self) -> float:
+        """Work of friction over the round [J]."""
+        return float(np.ptp(self.work[self.round]))
+
+    @property
+    def gap(self) -> float:
+        """By how much the round does not close [rad]."""
+        return float(self.torsion[-1] - self.torsion[self.round][0])
+
+    @property
+    def friction_torque(self) -> Array:
+        """R = T - T_0(x) along the path (n_points,) [N·m]."""
+        torque, place = np.unique(self.torque, return_index=True)
+        # between the samples by their values and slopes: friction moves x a little
+        elastic = CubicHermiteSpline(
+            self.elastic_torsion[place], torque, self.stiffness[place]
+        )
+        return np.asarray(self.torque - elastic(self.torsion))
+
+
+def fit_elements(loops: Sequence[FrictionLoop]) -> tuple[Jenkin, ...]:
+    """Jenkin elements that follow what friction adds, one set for all positions."""
+    from scipy.optimize import nnls
+
+    travel = max(float(np.ptp(loop.torsion)) for loop in loops)
+    reaches = REACHES * travel
+    rows, wanted = [], []
+    for loop in loops:
+        path = loop.torsion - loop.torsion[0]
+        signals = np.column_stack([stretches(path, d) / d for d in reaches])
+        step = np.abs(np.gradient(path))[loop.round]
+        weight = np.sqrt(step / step.sum())
+        rows.append(weight[:, None] * signals[loop.round])
+        wanted.append(weight * loop.friction_torque[loop.round])
+    target = np.concatenate(wanted)
+    unit = float(np.abs(target).max())
+    if unit == 0.0:
+        return ()
+    yields = unit * nnls(np.concatenate(rows), target / unit)[0]
+    return tuple(
+        Jenkin(stiffness=float(f / d), yield_torque=float(f))
+        for f, d in zip(yields, reaches, strict=True)
+        if f > FAINT * yields.sum()
+    )
+
+
+def with_hysteresis(drive: DriveMap, loops: Sequence[FrictionLoop]) -> DriveMap:
+    """The map with elements fitted to the loops, compared with them in its info.
+
+    Args:
+        drive: The map of the drive without friction.
+        loops: With friction, at input positions that stand for all.
+    """
+    found = replace(drive, hysteresis=fit_elements(loops))
+    width = np.array([loop.width for loop in loops])
+    shift = np.array([loop.shift for loop in loops])
+    played = [played_loop(found, loop) for loop in loops]
+    widths = np.array([loop.width for loop in played])
+    shifts = np.array([loop.shift for loop in played])
+    grid = loops[0].branches(loops[0].torque)[1]
+    at = int(width.mean(axis=0).argmax())
+    loss, own = (np.array([one.loss for one in some]) for some in (loops, played))
+    work = np.array([loop.friction_work for loop in loops])
+    taken = np.array([one.area for one in played])
+    report: dict[str, Any] = {
+        "torque_Nm": float(grid[-1]),
+        "input_angles_rad": [loop.input_angle for loop in loops],
+        "hysteresis_loss_arcmin": (loss / arcmin).tolist(),
+        "hysteresis_loss_map_arcmin": (own / arcmin).tolist(),
+        "widest_arcmin": float(width.mean(axis=0)[at] / arcmin),
+        "widest_map_arcmin": float(widths.mean(axis=0)[at] / arcmin),
+        "widest_at_Nm": float(grid[at]),
+        "mid_line_shift_arcmin": float(np.abs(shift).max() / arcmin),
+        "residual_width_rms_arcmin": _rms(widths - width) / arcmin,
+        "residual_width_max_arcmin": float(np.abs(widths - width).max() / arcmin),
+        "residual_mid_line_rms_arcmin": _rms(shifts - shift) / arcmin,
+        "residual_mid_line_max_arcmin": float(np.abs(shifts - shift).max() / arcmin),
+        "width_rms_arcmin": _rms(width) / arcmin,
+        "friction_work_J": work.tolist(),
+        "round_area_J": [loop.area for loop in loops],
+        "round_area_map_J": taken.tolist(),
+        "not_closed_arcmin": float(max(abs(loop.gap) for loop in loops) / arcmin),
+        "elements": len(found.hysteresis),
+        "yield_torque_Nm": float(sum(e.yield_torque for e in found.hysteresis)),
+    }
+    mean, low, high = loss.mean(), loss.min(), loss.max()
+    label = (
+        f"tooth friction of the finite elements at {len(loops)} input positions to"
+        f" {grid[-1]:.4g} N·m: loop {mean / arcmin:.3g} arcmin wide at zero torque"
+        f" ({low / arcmin:.3g} to {high / arcmin:.3g}), at most"
+        f" {report['widest_arcmin']:.3g} at {grid[at]:.3g} N·m; that of the map"
+        f" {own.mean() / arcmin:.3g} and {report['widest_map_arcmin']:.3g} arcmin; work"
+        f" of a round {taken.mean() / work.mean():.2f} of theirs"
+    )
+    info = {**drive.info, "friction_loop": report, "hysteresis": label}
+    return replace(found, info=info)
+
+
+def played_loop(drive: DriveMap, loop: FrictionLoop) -> FrictionLoop:
+    """What the map does along the torques of a loop."""
+    theta = loop.input_angle
+    free = float(output_angle(drive, theta, 0.0))
+    sliders = Sliders.relaxed(drive.hysteresis, float(drive.torsion(theta, free)))
+    psi = np.full(loop.torque.size, free)
+    turns = np.flatnonzero(np.diff(np.sign(np.diff(loop.torque)))) + 1
+    for begin, end in pairwise([0, *turns.tolist(), loop.torque.size - 1]):
+        leg = slice(begin + 1, end + 1)
+        psi[leg] = output_angle(drive, theta, loop.torque[leg], sliders)
+        sliders = sliders.moved(float(drive.torsion(theta, psi[end])))
+    elastic = output_angle(replace(drive, hysteresis=()), theta, loop.torque)
+    ideal = theta / drive.ratio
+    x = drive.torsion(theta, elastic)
+    return FrictionLoop(
+        input_angle=theta,
+        quarter=loop.quarter,
+        torque=loop.torque,
+        torsion=ideal - psi,
+        elastic_torsion=ideal - elastic,
+        stiffness=drive.stiffness(x, theta, elastic),
+        work=np.zeros(loop.torque.size),
+    )
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))

@@ -1,0 +1,219 @@
+"""Harmonics that manufacturing errors of the teeth add to a map.
+
+Along the motion the phases of the teeth of both members go together, z_cs alpha and
+z_fs beta by 2 pi a pitch, so that one record over the cycle of the teeth holds all
+harmonics (p, q); those that differ by a multiple of the tooth order are the same there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.maps.fit.torsion_table import on_knots
+from swgjoint.maps.quartic import evaluated, quartic_chain
+from swgjoint.maps.samples import MapSamples
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+KEEP_TORQUE = 0.05
+"""Harmonics of toleranced drives are kept whose input torque reaches this part of the
+largest one. Random errors of the teeth spread it over thousands of orders: at 1 % ten
+times as many would be kept, of orders that hardly any step of a simulation carries."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ToleranceModes:
+    """Amplitudes over the cycle: with errors minus without."""
+
+    waves: Index
+    """Waves in the cycle of each harmonic (n,)."""
+    orders: Index
+    """(p, q) (n, 2)."""
+    potential: Array
+    """Cosine and sine of V, V', V'' at the knots. Shape (n, 2, 3, n_knots)."""
+    error: Array
+    """Cosine and sine of e0 [rad]. Shape (n, 2)."""
+
+
+def tolerance_modes(samples: MapSamples, knots: Array) -> ToleranceModes:
+    """All harmonics of the record.
+
+    Args:
+        samples: With tolerances.
+        knots: Torsions [rad].
+    """
+    found = samples.tolerances
+    assert found is not None
+    zero = int(np.flatnonzero(found.torque == 0.0)[0])
+
+    def tabulated(table: Array) -> Array:
+        error, energy, compliance = table
+        torsion = error[zero] - error
+        torque = np.broadcast_to(found.torque[:, None], torsion.shape)
+        curve = on_knots(torsion, np.stack([energy, torque, 1.0 / compliance]), knots)
+        # (n_angles, 3, n_knots), the error at rest as one more column
+        return np.concatenate(
+            [curve.reshape(len(curve), -1), error[zero][:, None]], axis=1
+        )
+
+    change = tabulated(found.table)
+    change -= np.tile(tabulated(found.perfect), (found.pitches, 1))
+    spectrum = np.fft.rfft(change, axis=0)[: (len(change) + 1) // 2] / len(change)
+    spectrum[1:] *= 2.0
+    modes = np.stack([spectrum.real, -spectrum.imag], axis=1)
+    waves = np.arange(len(modes))
+    return ToleranceModes(
+        waves=waves,
+        orders=orders_of(waves, samples),
+        potential=modes[:, :, :-1].reshape(len(modes), 2, 3, knots.size),
+        error=modes[:, :, -1],
+    )
+
+
+def orders_of(waves: Index, samples: MapSamples) -> Index:
+    """(p, q) of harmonics with so many waves in the cycle (n, 2).
+
+    The tooth order of the perfect pattern where one is near, plus a low order of alpha
+    and beta; of the pairs that go together along the motion the one with the smallest
+    sum of magnitudes.
+    """
+    found = samples.tolerances
+    assert found is not None
+    cycle, z_fs, z_cs = (
+        found.pitches,
+        samples.teeth_flexspline,
+        samples.teeth_circular_spline,
+    )
+    tooth = np.round(waves / cycle).astype(np.int64)
+    rest = waves - tooth * cycle
+    if cycle % z_fs:  # errors of the circular spline alone
+        low = np.stack([rest, np.zeros_like(rest)], axis=-1)
+    elif cycle % z_cs:
+        low = np.stack([np.zeros_like(rest), rest], axis=-1)
+    else:
+        # p a + q b = rest, with a and b without common factor
+        a, b = cycle // z_cs, cycle // z_fs
+        first = rest * pow(a, -1, b) % b if b > 1 else np.zeros_like(rest)
+        p = first[:, None] + b * np.arange(-a - 1, a + 2)
+        q = (rest[:, None] - a * p) // b
+        best = (np.abs(p) + np.abs(q)).argmin(axis=1)[:, None]
+        low = np.concatenate(
+            [np.take_along_axis(p, best, 1), np.take_along_axis(q, best, 1)], axis=1
+        )
+    pattern = np.array(samples.order, dtype=np.int64)
+    return np.asarray(tooth[:, None] * pattern + np.sign(pattern.sum()) * low)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Combined:
+    """Harmonics of the perfect pattern and of the errors that are worth keeping."""
+
+    orders: Index
+    """(p, q), the mean first (n, 2)."""
+    potential: Array
+    """Shape (n, 2, 3, n_knots)."""
+    error: Array
+    """Shape (n, 2)."""
+    record: dict[str, Any]
+
+
+def combined(
+    samples: MapSamples,
+    knots: Array,
+    potential: Array,
+    error: Array,
+    *,
+    coarse: NDArray[np.bool_],
+    keep: float,
+) -> Combined:
+    """Add the harmonics of the errors to those of the perfect pattern.
+
+    Args:
+        samples: With tolerances.
+        knots: Torsions [rad].
+        potential: Of the perfect pattern, as in :class:`Combined`.
+        error: The same of e0.
+        coarse: Knots at which the errors are compared, both ends among them (n_knots,).
+        keep: Harmonics are kept whose e0 reaches this part of the largest one, or
+            whose input torque reaches :data:`KEEP_TORQUE`, if ``keep`` is not zero.
+    """
+    found, count = samples.tolerances, len(potential)
+    assert found is not None
+    modes = tolerance_modes(samples, knots[coarse])
+    cycle = found.pitches
+    # what repeats with every pitch belongs to the perfect pattern
+    whole = modes.waves[: count * cycle : cycle]
+    potential, error = potential.copy(), error.copy()
+    potential[: whole.size] += _refined(modes.potential[whole], knots, coarse)
+    error[: whole.size] += modes.error[whole]
+    potential[0, 0, 0] -= np.interp(0.0, knots, potential[0, 0, 0])
+    error[0] = 0.0
+    others = np.setdiff1d(modes.waves, modes.waves[::cycle])
+    pattern = np.arange(count)
+    waves = np.concatenate([pattern * cycle, others])
+    orders = np.concatenate(
+        [pattern[:, None] * np.array([samples.order]), modes.orders[others]]
+    )
+    # at the coarse knots: there are thousands of harmonics before most are dropped
+    weighed = np.concatenate([potential[..., coarse], modes.potential[others]])
+    error = np.concatenate([error, modes.error[others]])
+
+    # amplitudes of e0 and of the input torque T de0/dtheta + dV/dtheta at every knot
+    per_turn = waves * abs(sum(samples.order)) / cycle
+    work = weighed[:, :, 0] + weighed[0, 0, 1] * error[:, :, None]
+    ripple = per_turn[:, None] * np.hypot(work[:, 0], work[:, 1])
+    size = np.hypot(*error.T)
+    kept = size > keep * size.max()
+    middle = int(np.argmin(np.abs(knots[coarse])))
+    if keep:
+        large = ripple > KEEP_TORQUE * ripple.max(axis=0)
+        # between the torques that were solved, which all positions share at rest
+        # only, interpolation leaves noise in the high orders of the pattern
+        large[:count] = large[:count, middle][:, None]
+        kept |= large.any(axis=1)
+    kept[0] = True
+    chosen = modes.potential[others[kept[count:]]]
+    potential = np.concatenate(
+        [potential[kept[:count]], _refined(chosen, knots, coarse)]
+    )
+
+    def left(power: Array) -> float:
+        """Root mean square of what is dropped, in that of everything."""
+        return float(np.sqrt(power[~kept].sum() / max(power.sum(), 1e-300)))
+
+    return Combined(
+        orders=orders[kept],
+        potential=potential,
+        error=error[kept],
+        record={
+            "cycle_pitches": cycle,
+            "positions_per_pitch": found.phases,
+            "free_positions": found.free,
+            "kept": int(kept.sum()),
+            "dropped": int((~kept).sum()),
+            "dropped_kinematic_error_rms": left(size**2),
+            "dropped_input_torque_rms": left(ripple[:, middle] ** 2),
+            "transmission_error": [
+                {"torque_Nm": float(torque), "peak_to_peak_rad": float(np.ptp(row))}
+                for torque, row in zip(found.torque, found.table[0], strict=True)
+            ],
+        },
+    )
+
+
+def _refined(potential: Array, knots: Array, coarse: NDArray[np.bool_]) -> Array:
+    """V, V', V'' of harmonics at all knots, from the coarse ones (n, 2, 3, n_knots)."""
+    found = np.empty((*potential.shape[:3], knots.size))
+    for one, given in zip(
+        found.reshape(-1, 3, knots.size),
+        potential.reshape(-1, *potential.shape[2:]),
+        strict=True,
+    ):
+        one[:] = evaluated(*quartic_chain(knots[coarse], given), knots)
+        one[:, coarse] = given
+    return found

@@ -1,0 +1,1 @@
+"""The catalogue-style sheet of a map and how far its figures hold."""

@@ -1,0 +1,170 @@
+"""The torque-torsion loop and what a catalogue reads from it.
+
+Works on any loop, computed or measured, with hysteresis or without: the mid-line is
+the mean of the branch of rising torque and the branch of falling torque.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from swgjoint.arrays import frozen_array
+from swgjoint.gear.catalogue import CatalogueRow
+from swgjoint.maps.drive_map import DriveMap, Ratings
+from swgjoint.maps.equilibrium import output_angle
+from swgjoint.maps.hysteresis import Sliders
+
+Array = NDArray[np.float64]
+
+POINTS = 80
+"""Torques on each of the four legs of a computed loop."""
+LOST_MOTION_TORQUE = 0.04
+"""Part of the rated torque at which lost motion is read."""
+_TURNS_AT = 0.02
+"""A torque path turns where it comes back by this part of its range: not for noise."""
+REST = 1e-9
+"""Torque left at zero, of rated: a free output rests where the load left it."""
+NO_WIDTH = 1e-7
+"""A loop narrower than this part of its travel has no hysteresis [-]."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TorqueLoop:
+    """Torsion along a path of the output torque, input locked."""
+
+    torque: Array
+    """T along the path [N·m]. Shape (n,)."""
+    torsion: Array
+    """Same sign as the torque [rad]. Shape (n,)."""
+
+    def __post_init__(self) -> None:
+        torque = frozen_array(self.torque, "torque [N·m]", ndim=1)
+        if torque.size < 2 or torque.min() == torque.max():
+            raise ValueError("torque [N·m] does not change along the loop")
+        torsion = frozen_array(self.torsion, "torsion [rad]", shape=(torque.size,))
+        object.__setattr__(self, "torque", torque)
+        object.__setattr__(self, "torsion", torsion)
+
+    def turns(self) -> list[tuple[int, int]]:
+        """First and last sample of every part of one direction of the torque."""
+        band = _TURNS_AT * float(np.ptp(self.torque))
+        turns, extreme, rising = [0], 0, None
+        for k, value in enumerate(self.torque):
+            move = value - self.torque[extreme]
+            if rising is None:
+                if abs(move) > band:
+                    rising, extreme = bool(move > 0.0), k
+            elif (move >= 0.0) == rising:
+                extreme = k
+            elif abs(move) > band:
+                turns.append(extreme)
+                rising, extreme = not rising, k
+        turns.append(self.torque.size - 1)
+        return list(pairwise(turns))
+
+    def legs(self) -> list[tuple[bool, Array, Array]]:
+        """Parts of one direction of the torque: rising, torque and torsion.
+
+        Torque increases strictly in every part, also in a falling one; samples of the
+        same torque are averaged.
+        """
+        found = []
+        for a, b in self.turns():
+            part = slice(a, b + 1)
+            torque, place = np.unique(self.torque[part], return_inverse=True)
+            counts = np.bincount(place)
+            torsion = np.bincount(place, self.torsion[part]) / counts
+            found.append((bool(self.torque[b] > self.torque[a]), torque, torsion))
+        return found
+
+    def branch(self, torque: ArrayLike, *, rising: bool) -> Array:
+        """Torsion while the torque rises or falls [rad], NaN where it never did.
+
+        A later part of the loop goes before an earlier one, so that a first loading
+        from rest counts only where nothing else does.
+        """
+        wanted = np.asarray(torque, float)
+        values = np.full(wanted.shape, np.nan)
+        for direction, at, torsion in reversed(self.legs()):
+            if direction == rising:
+                inside = (wanted >= at[0]) & (wanted <= at[-1]) & np.isnan(values)
+                values = np.where(inside, np.interp(wanted, at, torsion), values)
+        return values
+
+    def mid_line(self, torque: ArrayLike) -> Array:
+        """Mean of both branches [rad], one branch where the other never was.
+
+        NaN outside the torques of the loop.
+        """
+        both = np.stack([self.branch(torque, rising=r) for r in (True, False)])
+        known = ~np.isnan(both)
+        total = np.where(known, both, 0.0).sum(axis=0)
+        count = known.sum(axis=0)
+        return np.asarray(np.where(count, total / np.maximum(count, 1), np.nan))
+
+    def hysteresis_loss(self) -> float:
+        """Full width of the loop at zero torque [rad], NaN if a branch is absent."""
+        falling, rising = (self.branch(0.0, rising=r) for r in (False, True))
+        return float(falling - rising)
+
+    def stiffness(self, low: float, high: float) -> float:
+        """Slope of the mid-line over low..high and -high..-low [N·m/rad].
+
+        The chord over both signs of the torque; over the one that was measured where
+        the other is absent; NaN if neither reaches.
+        """
+        x = self.mid_line([low, high, -low, -high])
+        travel = [x[1] - x[0], x[2] - x[3]]
+        sides = [value for value in travel if not np.isnan(value)]
+        if not sides:
+            return float("nan")
+        return float((high - low) * len(sides) / sum(sides))
+
+    def lost_motion(self, rated_torque: float) -> float:
+        """Mid-line torsion at +4 % of rated torque minus at -4 % [rad]."""
+        at = LOST_MOTION_TORQUE * rated_torque
+        return float(np.diff(self.mid_line([-at, at]))[0])
+
+
+def largest_torque(ratings: Ratings | CatalogueRow) -> float:
+    """Torque of the standard loop: repeated peak, at least 1.5 T2 [N·m]."""
+    return max(ratings.repeated_peak, 1.5 * ratings.T2)
+
+
+def torque_loop(drive: DriveMap, *, theta: float = 0.0) -> TorqueLoop:
+    """The standard loop 0 -> Tmax -> 0 -> -Tmax -> 0 with the input locked.
+
+    T1, T2 and the torques of the lost motion are among the points. Torsion is counted
+    from the unloaded position (e0), as an angle sensor at the output sees it. With
+    hysteresis the loop is played twice and the second time counts: it is closed, and a
+    first loading from rest is no branch of it.
+
+    Args:
+        drive: The map.
+        theta: Where the input is locked [rad].
+    """
+    r = drive.ratings
+    top = largest_torque(r)
+    named = [r.T1, r.T2, LOST_MOTION_TORQUE * r.rated_torque]
+    up = np.unique(np.concatenate([np.linspace(0.0, top, POINTS), named]))
+    # at rest on the side from which the load left; the start is the middle
+    side = REST * r.rated_torque
+    legs = [
+        up,
+        np.concatenate([up[-2:0:-1], [side], -up[1:]]),
+        np.append(-up[-2:0:-1], -side),
+    ]
+    free = output_angle(drive, theta, 0.0)
+    sliders = Sliders.relaxed(drive.hysteresis, float(drive.torsion(theta, free)))
+    parts: list[Array] = []
+    for leg in legs * (2 if drive.hysteresis else 1):
+        psi = output_angle(drive, theta, leg, sliders)
+        sliders = sliders.moved(float(drive.torsion(theta, psi[-1])))
+        parts.append(float(free) - psi)
+    torque = np.concatenate(legs)
+    torque[np.abs(torque) == side] = 0.0
+    return TorqueLoop(torque=torque, torsion=np.concatenate(parts[-3:]))

@@ -1,0 +1,61 @@
+"""Figures of a spec sheet that the validation of a map puts in doubt."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from swgjoint.maps.sheet.map_validity import (
+    LIMIT,
+    STIFFNESS,
+    WARNING,
+    Difference,
+    map_validation,
+    percent,
+)
+
+if TYPE_CHECKING:
+    from swgjoint.maps.drive_map import DriveMap
+
+RIPPLE_KEYS = ("ripple_rms_percent", "ripple_pp_percent")
+STIFFNESS_KEYS = ("K1_Nm_rad", "K2_Nm_rad", "K3_Nm_rad")
+
+
+def judge_figures(
+    drive: DriveMap, values: dict[str, Any], missing: dict[str, str]
+) -> dict[str, Difference]:
+    """Judge figures by the validation of the map at the torque where they are read.
+
+    A ripple above :data:`~swgjoint.maps.sheet.map_validity.LIMIT` is taken out of
+    ``values`` and gets its reason in ``missing``.
+
+    Args:
+        drive: The map.
+        values: Figures by key, changed.
+        missing: Reasons by key, changed.
+
+    Returns:
+        By key the difference that makes a figure uncertain.
+    """
+    found, _ = map_validation(drive)
+    if found is None:
+        return {}
+    rated = drive.ratings.rated_torque
+    no_load, loaded = (found.between(load, load) for load in (0.0, rated))
+    worst = max(loaded.values(), key=lambda one: one.largest)
+    if worst.largest > LIMIT:
+        for key in RIPPLE_KEYS:
+            if values.get(key) is not None:
+                values[key] = None
+                missing[key] = (
+                    f"not valid: the map {worst} (accepted: {percent(LIMIT)})"
+                )
+        for line in values.get("orders") or ():
+            line["ripple_percent"] = None
+    of = {
+        **dict.fromkeys((*RIPPLE_KEYS, "orders"), worst),
+        "transmission_accuracy_arcmin": no_load["output_error"],
+        "transmission_accuracy_rated_arcmin": loaded["output_error"],
+    }
+    if STIFFNESS in found.totals:
+        of |= dict.fromkeys(STIFFNESS_KEYS, found.totals[STIFFNESS])
+    return {key: one for key, one in of.items() if one.largest > WARNING}

@@ -1,0 +1,1 @@
+"""Arms: reading a file, holding joints, payloads, a scene around a bare arm."""

@@ -1,0 +1,344 @@
+"""A user's arm, MJCF or URDF, as the bare mechanics that a scene puts drives into."""
+
+from __future__ import annotations
+
+import warnings
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import dataclass
+from itertools import count
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from swgjoint.errors import InputError
+from swgjoint.models_path import is_file
+from swgjoint.sim.arm.compiling import skeleton
+from swgjoint.sim.arm.holding import FREE, NOT_CHOSEN, choose_held, hold
+from swgjoint.sim.arm.number_checks import check_numbers
+from swgjoint.sim.arm.reading import ArmReading
+
+MESHES = (".stl", ".obj", ".msh")
+"""What the engine reads."""
+_ON_JOINT = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)
+_OF_ACTUATORS = (
+    *("ctrllimited", "ctrlrange", "forcelimited", "forcerange", "actlimited"),
+    *("actrange", "actdim", "actearly", "inheritrange", "gear", "gaintype", "gainprm"),
+    *("biastype", "biasprm", "dyntype", "dynprm", "delay", "nsample", "interp"),
+    *("damping", "armature", "cranklength", "lengthrange"),
+)
+"""What a class may say of actuators."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ArmFile:
+    """What a scene takes from the file of an arm."""
+
+    spec: mujoco.MjSpec
+    """Links, joints, shapes, tendons; without actuators, sensors, keyframes, limits of
+    motor torque and armature, all of which are the drive's and the scene's."""
+    held: dict[str, str]
+    """Joints that do not move in a scene, and why: their type, or what ties them."""
+    keyframes: dict[str, dict[str, float]]
+    """Poses that the file names: angles of all hinges [rad]."""
+    effort: dict[str, float]
+    """Torque that the file lets motors exert on a joint, where it says so [N·m]."""
+
+
+def read_arm(path: Path, reading: ArmReading | None = None) -> ArmFile:
+    """Read an arm and leave out what belongs to the scene.
+
+    Joints that are no hinges, or that an equality ties to others, are held in the pose
+    of ``reading``. Shapes of a URDF whose meshes are missing or of a kind that the
+    engine does not read are left out: the file states the inertia. Forces that carry
+    the weight of bodies (``gravcomp``) are left out, for in the arm the drives do. Each
+    gives a warning of one line. Shapes of a URDF do not collide, for neighbours overlap
+    and the format cannot say which may; those of an MJCF file do as it says.
+
+    Args:
+        path: MJCF or URDF file.
+        reading: What moves, and where the rest is held; None: every hinge.
+
+    Raises:
+        InputError: If the file is no arm, or none of its hinges moves on its own.
+    """
+    reading = reading or ArmReading()
+    spec = _spec_of(path)
+    if reading.balance_inertia:
+        _balance_inertia(spec)
+    spec.compiler.fusestatic = False  # every link keeps its name
+    if path.suffix.lower() == ".urdf":
+        spec.compiler.discardvisual = False  # what does not collide is seen, still
+        _find_meshes(spec, path)
+        for geom in spec.geoms:
+            geom.contype = geom.conaffinity = 0
+    for kind, elements in (
+        ("body", spec.bodies),
+        ("joint", spec.joints),
+        ("key", spec.keys),
+    ):
+        named = {element.name for element in elements}
+        for k, element in enumerate(elements):
+            if not element.name:
+                names = (f"{kind}_{j}" for j in count(k))
+                element.name = next(name for name in names if name not in named)
+                named.add(element.name)
+    _check_references(spec, path)
+    limits = _effort(spec)
+    for name, limit in limits.items():
+        if np.isnan(limit):
+            raise InputError(
+                f"{path}: torque limit {limit} N·m of joint {name[:60]!r}; accepted: a"
+                " number, or none"
+            )
+    for element in [*spec.sensors, *spec.actuators]:
+        spec.delete(element)
+    for key in spec.keys:
+        key.ctrl, key.act = [], []  # of actuators that are gone
+    bones = skeleton(spec, where=str(path))
+    check_numbers(bones, where=str(path))
+    keyframes = _keyframes(bones)
+    if reading.pose is not None and reading.pose not in keyframes:
+        known = ", ".join(keyframes) or "none in this file"
+        raise InputError(f"{path}: no keyframe {reading.pose!r}; accepted: {known}")
+    holding = choose_held(spec, reading, path)
+    hold(spec, holding, reading, bones, path)
+    for key in list(spec.keys):
+        spec.delete(key)
+    _tell_held(holding.held, reading, path, moves=bool(spec.joints))
+    _let_weigh(spec, path)
+    _solve_well(spec)
+    _forget_actuators(spec)
+    for joint in spec.joints:
+        joint.armature = 0.0
+        joint.actfrclimited = mujoco.mjtLimited.mjLIMITED_FALSE
+        joint.actfrcrange = [0.0, 0.0]
+    effort = {
+        name: limit
+        for name, limit in limits.items()
+        if name not in holding.held and np.isfinite(limit)  # inf is no limit
+    }
+    return ArmFile(spec=spec, held=holding.held, keyframes=keyframes, effort=effort)
+
+
+def _check_references(spec: mujoco.MjSpec, path: Path) -> None:
+    """Refuse tendons, equalities and pairs of what the file does not have.
+
+    The engine refuses them, too, but not before joints are held.
+    """
+    tendons = [
+        (f"tendon {tendon.name!r}", wrap.target)
+        for tendon in spec.tendons
+        for wrap in tendon.path
+        if wrap.type != mujoco.mjtWrap.mjWRAP_PULLEY
+    ]
+    equalities = [
+        (f"equality {equality.name!r}", _tied_element(spec, equality, name))
+        for equality in spec.equalities
+        for name in (equality.name1, equality.name2)
+        if name
+    ]
+    pairs = [
+        (f"contact pair {pair.name!r}", spec.geom(name))
+        for pair in spec.pairs
+        for name in (pair.geomname1, pair.geomname2)
+    ]
+    for what, target in [*tendons, *equalities, *pairs]:
+        if target is None:
+            raise InputError(
+                f"{path}: {what} names what is not in the file; accepted: its joints,"
+                " sites, bodies, geoms and tendons"
+            )
+
+
+def _tied_element(
+    spec: mujoco.MjSpec, equality: mujoco.MjsEquality, name: str
+) -> object:
+    """What an equality names; None if there is none, or the name for other kinds."""
+    if equality.type == mujoco.mjtEq.mjEQ_JOINT:
+        return spec.joint(name)
+    if equality.type == mujoco.mjtEq.mjEQ_TENDON:
+        return spec.tendon(name)
+    if equality.type not in (mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtEq.mjEQ_WELD):
+        return name
+    on_site = equality.objtype == mujoco.mjtObj.mjOBJ_SITE
+    return spec.site(name) if on_site else spec.body(name)
+
+
+def _forget_actuators(spec: mujoco.MjSpec) -> None:
+    """Undo what the main class says of actuators: those of the scene would take it."""
+    fresh = mujoco.MjSpec()
+    own, plain = spec.default.actuator, fresh.default.actuator
+    for key in _OF_ACTUATORS:
+        setattr(own, key, getattr(plain, key))
+
+
+def _spec_of(path: Path) -> mujoco.MjSpec:
+    """What the engine reads; a suffix counts in upper case, too."""
+    suffix = path.suffix.lower()
+    if suffix == ".xacro":
+        raise InputError(
+            f"{path}: a template of a URDF; accepted: what 'xacro {path.name}' makes of"
+            " it, as a file ending .urdf"
+        )
+    try:
+        if suffix == path.suffix or suffix not in (".urdf", ".xml"):
+            return mujoco.MjSpec.from_file(str(path))
+        # the engine chooses its reader by the suffix, and knows it in lower case only
+        spec = mujoco.MjSpec.from_string(path.read_text(encoding="utf-8"))
+        spec.modelfiledir = str(path.parent)
+        return spec
+    except (ValueError, OSError) as exc:
+        line = " ".join(str(exc).split())
+        raise InputError(f"{path}: not an MJCF arm and no URDF: {line}") from None
+
+
+def _balance_inertia(spec: mujoco.MjSpec) -> None:
+    """Repair inertias that no rigid body has: three moments become their mean."""
+    spec.compiler.balanceinertia = True  # those that break the triangle inequality
+    for body in spec.bodies:
+        full = np.array(body.fullinertia)
+        if not np.isfinite(full).all():
+            continue
+        xx, yy, zz, xy, xz, yz = full
+        tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        if (xx + yy + zz) > 0.0 and np.linalg.eigvalsh(tensor)[0] <= 0.0:
+            body.fullinertia = [*3 * [(xx + yy + zz) / 3.0], 0.0, 0.0, 0.0]
+
+
+def _keyframes(model: mujoco.MjModel) -> dict[str, dict[str, float]]:
+    """Hinge angles of all keyframes [rad]."""
+    hinges = [model.joint(j) for j in range(model.njnt)]
+    hinges = [j for j in hinges if j.type[0] == mujoco.mjtJoint.mjJNT_HINGE]
+    return {
+        model.key(k).name: {
+            j.name: float(model.key_qpos[k, j.qposadr[0]]) for j in hinges
+        }
+        for k in range(model.nkey)
+    }
+
+
+def _tell_held(
+    held: dict[str, str], reading: ArmReading, path: Path, *, moves: bool
+) -> None:
+    """One line about joints that nobody asked to hold."""
+    told = {name: why for name, why in held.items() if why != NOT_CHOSEN}
+    if not told or not moves:
+        return
+    where = "the reference position"
+    if reading.pose is not None:
+        where = f"keyframe {reading.pose!r}"
+    hangs = ""
+    if FREE in told.values():
+        hangs = "; a robot without its free joint hangs and does not feel the floor"
+    which = ", ".join(f"{name} ({why})" for name, why in told.items())
+    warnings.warn(
+        f"{path}: held at {where}, because a drive needs a hinge that moves on its own:"
+        f" {which}{hangs}",
+        stacklevel=3,
+    )
+
+
+def _let_weigh(spec: mujoco.MjSpec, path: Path) -> None:
+    """Take out forces that carry bodies without any drive."""
+    carried = [body for body in spec.bodies if body.gravcomp]
+    for body in carried:
+        body.gravcomp = 0.0
+    if carried:
+        warnings.warn(
+            f"{path}: gravcomp of {len(carried)} bodies is left out, because the drives"
+            f" carry the weight: {', '.join(body.name for body in carried)}",
+            stacklevel=3,
+        )
+
+
+def _effort(spec: mujoco.MjSpec) -> dict[str, float]:
+    """Largest motor torque on every joint that the file limits [N·m]."""
+    limits: dict[str, float] = {}
+    for actuator in spec.actuators:
+        force = max(map(abs, actuator.forcerange))
+        plain = actuator.biastype == mujoco.mjtBias.mjBIAS_NONE
+        if not force and plain:
+            force = abs(actuator.gainprm[0]) * max(map(abs, actuator.ctrlrange))
+        if force and actuator.trntype in _ON_JOINT:
+            limits[actuator.target] = float(force * abs(actuator.gear[0]))
+    for joint in spec.joints:  # of URDF: <limit effort="...">
+        if force := max(map(abs, joint.actfrcrange)):
+            limits[joint.name] = float(force)
+    return limits
+
+
+def _solve_well(spec: mujoco.MjSpec) -> None:
+    """Let the engine iterate as much as it does by default.
+
+    Files made for learning allow it a few iterations. The drives are part of the system
+    that it solves in a step: unfinished, they exert wrong torques.
+    """
+    usual = mujoco.MjSpec().option
+    option = spec.option
+    option.solver = usual.solver
+    option.noslip_iterations = usual.noslip_iterations
+    for name in ("iterations", "ls_iterations"):
+        setattr(option, name, max(getattr(option, name), getattr(usual, name)))
+    for name in ("tolerance", "ls_tolerance"):
+        setattr(option, name, min(getattr(option, name), getattr(usual, name)))
+
+
+def _find_meshes(spec: mujoco.MjSpec, path: Path) -> None:
+    """Resolve ``package://`` and leave out shapes whose mesh cannot be read."""
+    unknown: list[str] = []
+    missing: list[str] = []
+    for mesh in list(spec.meshes):
+        file = _mesh_file(mesh.file, path.parent, spec.meshdir)
+        if file is not None and file.suffix.lower() in MESHES:
+            mesh.file = str(file)
+            continue
+        (missing if file is None else unknown).append(mesh.file)
+        for geom in [g for g in spec.geoms if g.meshname == mesh.name]:
+            spec.delete(geom)
+        spec.delete(mesh)
+    reasons = []
+    if unknown:
+        kinds = Counter(Path(file).suffix for file in unknown)
+        of = ", ".join(f"{n} {kind}" for kind, n in kinds.items())
+        reasons.append(
+            f"{of} that the engine cannot read (accepted: {', '.join(MESHES)}), the"
+            f" first is {unknown[0]}"
+        )
+    if missing:
+        reasons.append(f"{len(missing)} not found, the first is {missing[0]}")
+    if reasons:
+        warnings.warn(
+            f"{path}: shapes are left out for want of their meshes:"
+            f" {'; '.join(reasons)}",
+            stacklevel=3,
+        )
+
+
+def _mesh_file(reference: str, folder: Path, meshdir: str) -> Path | None:
+    """Where a mesh of a URDF lies; None if nowhere."""
+    for file in _places(reference, folder, meshdir):
+        if is_file(file):
+            return file.resolve()
+    return None
+
+
+def _places(reference: str, folder: Path, meshdir: str) -> Iterable[Path]:
+    """Where a mesh may lie, the likeliest first."""
+    scheme, colon, rest = reference.partition("://")
+    if not colon:
+        return [folder / meshdir / reference, folder / reference]
+    if scheme != "package":
+        return [Path(rest)]
+    # a package is a folder above the file, or beside one above it
+    package, _, inside = rest.partition("/")
+    above = folder.resolve()
+    parents = (above, *above.parents)
+    places = [
+        place / inside
+        for parent in parents
+        for place in ((parent,) if parent.name == package else (parent / package,))
+    ]
+    # a copy of the package under another name keeps its folders
+    return [*places, *(parent / inside for parent in parents[:4])]

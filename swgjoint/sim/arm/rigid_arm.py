@@ -1,0 +1,208 @@
+"""The arm without drives: torques, inertia and poses on a commanded motion."""
+
+from __future__ import annotations
+
+import warnings
+from copy import copy
+from functools import cached_property
+from pathlib import Path
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.errors import InputError
+from swgjoint.models_path import find
+from swgjoint.sim.arm.compiling import compile_spec as compile_spec
+from swgjoint.sim.arm.file import read_arm
+from swgjoint.sim.arm.number_checks import check_numbers
+from swgjoint.sim.arm.reading import ArmReading
+
+Array = NDArray[np.float64]
+
+
+class RigidArm:
+    """One MJCF or URDF arm with ideal joints; the reference for control and errors.
+
+    Attributes:
+        reference: As it was given.
+        path: The file.
+        reading: What moves, and where the rest is held.
+        model: The compiled arm, see :class:`~swgjoint.sim.arm.file.ArmFile`.
+        joints: Names of its joints, in the order of all arrays.
+        held: Joints of the file that do not move, and why: their type, or what ties
+            them.
+        keyframes: Poses that the file names: angles of all hinges, those that are held
+            included [rad].
+        effort: Torque limits of joints that the file states [N·m].
+    """
+
+    def __init__(
+        self,
+        reference: str,
+        *,
+        tool_site: str = "tool",
+        reading: ArmReading | None = None,
+    ) -> None:
+        """Load an arm, given as a path or as the name of a bundled one.
+
+        Args:
+            reference: Path or bundled name.
+            tool_site: Site whose place is the tool, or a body whose frame it is.
+            reading: What moves, and where the rest is held; None: every hinge.
+
+        Raises:
+            InputError: If the file is missing, neither MJCF nor URDF, or has no hinge.
+        """
+        self.reference = reference
+        self.path: Path = find(reference, "arms", ".xml", what="arm")
+        self.reading = reading or ArmReading()
+        file = read_arm(self.path, self.reading)
+        self.held, self.effort = file.held, file.effort
+        self.keyframes = file.keyframes
+        self._spec = file.spec
+        self._mark_tool(tool_site)
+        if not self._spec.joints:
+            others = ", ".join(f"{name} is a {why}" for name, why in self.held.items())
+            raise InputError(
+                f"{self.path}: the arm has no hinge joint"
+                f"{f' ({others})' if others else ''}; a drive needs one"
+            )
+        self.model = compile_spec(self.spec(), where=str(self.path))
+        check_numbers(self.model, where=str(self.path))
+        model = self.model
+        self.joints = tuple(model.joint(j).name for j in range(model.njnt))
+        self.tool = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, tool_site)
+        self._data = mujoco.MjData(model)
+
+    def spec(self) -> mujoco.MjSpec:
+        """A fresh editable copy of the arm."""
+        return self._spec.copy()
+
+    def _mark_tool(self, name: str) -> None:
+        """Give a body that stands for the tool a site of its name."""
+        spec = self._spec
+        if spec.site(name) is not None:
+            return
+        body = spec.body(name)
+        if body is not None:
+            body.add_site(name=name)
+        elif name != "tool":
+            known = [e.name for e in [*spec.sites, *spec.bodies[1:]] if e.name]
+            raise InputError(
+                f"{self.path}: site {name!r} does not exist; accepted:"
+                f" {', '.join(known) or 'none in this arm'}"
+            )
+
+    def torques(self, position: Array, velocity: Array, acceleration: Array) -> Array:
+        """Joint torques that the motion needs, gravity included [N·m].
+
+        Args:
+            position: [rad]. Shape (n, n_joints).
+            velocity: [rad/s]. Shape (n, n_joints).
+            acceleration: [rad/s²]. Shape (n, n_joints).
+        """
+        model, data, out, touching = self.model, self._data, np.empty_like(position), ""
+        # a lookup costs as much as a copy
+        qpos, qvel, qacc, needed = data.qpos, data.qvel, data.qacc, data.qfrc_inverse
+        motion = zip(position, velocity, acceleration, strict=True)
+        for k, (q, v, a) in enumerate(motion):
+            qpos[:], qvel[:], qacc[:] = q, v, a
+            mujoco.mj_inverse(model, data)
+            out[k] = needed
+            if data.ncon and not touching:
+                bodies = model.geom_bodyid[data.contact.geom[0]]
+                names = sorted(model.body(b).name for b in bodies)
+                touching = " and ".join(map(repr, names))
+        if touching:
+            warnings.warn(
+                f"{self.path}: bodies {touching} touch on the commanded motion and push"
+                " each other; where that is not meant: an <exclude> of the pair, or"
+                " contype and conaffinity 0 for their geoms",
+                stacklevel=1,  # once, whoever asks
+            )
+        return out
+
+    def gravity(self, position: Array) -> Array:
+        """Joint torques that carry the weight at rest [N·m]. Shapes (n, n_joints)."""
+        zero = np.zeros_like(position)
+        return self.torques(position, zero, zero)
+
+    def contacts(
+        self, position: Array, *, within: float = 0.0
+    ) -> list[tuple[str, str, float]]:
+        """Pairs of bodies that touch on a motion, the deepest first.
+
+        Args:
+            position: [rad]. Shape (n, n_joints).
+            within: Distance at which bodies count as touching [m].
+
+        Returns:
+            Two bodies and how deep they are in each other at worst [m], negative for a
+            distance. Bodies that the model keeps from contact are not among them.
+        """
+        model, data = self._probe, self._probe_data
+        model.geom_margin[:] = np.maximum(self.model.geom_margin, within)
+        model.pair_margin[:] = np.maximum(self.model.pair_margin, within)
+        deepest: dict[tuple[int, int], float] = {}
+        for q in position:
+            data.qpos[:] = q
+            mujoco.mj_kinematics(model, data)
+            mujoco.mj_collision(model, data)
+            found = data.contact
+            near = found.dist < within
+            bodies = np.sort(model.geom_bodyid[found.geom[near]], axis=1)
+            for (a, b), distance in zip(bodies, found.dist[near], strict=True):
+                pair = (int(a), int(b))
+                deepest[pair] = max(deepest.get(pair, -np.inf), -float(distance))
+        pairs = [
+            (model.body(a).name, model.body(b).name, depth)
+            for (a, b), depth in deepest.items()
+        ]
+        return sorted(pairs, key=lambda pair: -pair[2])
+
+    @cached_property
+    def _probe(self) -> mujoco.MjModel:
+        """A copy whose margins may change."""
+        return copy(self.model)
+
+    @cached_property
+    def _probe_data(self) -> mujoco.MjData:
+        return mujoco.MjData(self._probe)
+
+    def inertia(self, position: Array) -> Array:
+        """Inertia about every joint, the others locked [kg·m²]. Shape (n_joints,)."""
+        data, nv = self._data, self.model.nv
+        data.qpos[:], data.qvel[:] = position, 0.0
+        mujoco.mj_forward(self.model, data)
+        full = np.zeros((nv, nv))
+        mujoco.mj_fullM(self.model, data, full)
+        return np.diag(full).copy()
+
+    def tool_positions(self, position: Array) -> Array:
+        """Tool in the world [m]. Shape (n, 3); empty rows where the arm has none."""
+        if self.tool < 0:
+            return np.empty((len(position), 0))
+        model, data, out = self.model, self._data, np.empty((len(position), 3))
+        qpos, place = data.qpos, data.site_xpos[self.tool]  # as in torques
+        for k, q in enumerate(position):
+            qpos[:] = q
+            mujoco.mj_kinematics(model, data)
+            out[k] = place
+        return out
+
+    def body_poses(self, position: Array) -> tuple[Array, Array]:
+        """World positions [m] and quaternions (w, x, y, z) of all bodies.
+
+        Returns:
+            Shapes (n, n_bodies, 3) and (n, n_bodies, 4), the world body first.
+        """
+        model, data, count = self.model, self._data, len(position)
+        places = np.empty((count, model.nbody, 3))
+        turns = np.empty((count, model.nbody, 4))
+        qpos, xpos, xquat = data.qpos, data.xpos, data.xquat  # as in torques
+        for k, q in enumerate(position):
+            qpos[:] = q
+            mujoco.mj_kinematics(model, data)
+            places[k], turns[k] = xpos, xquat
+        return places, turns

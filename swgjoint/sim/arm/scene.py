@@ -1,0 +1,303 @@
+"""A scene around any arm: a drive in every hinge and a gentle motion."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.drives.rotors import catalogue_rotor_inertia
+from swgjoint.errors import InputError
+from swgjoint.models_path import bundled_names, is_file
+from swgjoint.sim.arm.drive_choice import DriveChoice, choose_drives
+from swgjoint.sim.arm.gentle_sweep import (
+    StartWarning,
+    bent_starts,
+    gentle_sweep,
+    place_arm,
+)
+from swgjoint.sim.arm.motions import TOOL_MOTIONS, tables_of
+from swgjoint.sim.arm.payload import arms_of
+from swgjoint.sim.arm.reading import ArmReading, patterns_of
+from swgjoint.sim.arm.rigid_arm import RigidArm
+from swgjoint.sim.motion.commanded import trajectory_of
+from swgjoint.sim.scene.scene import Scene, parse_override
+from swgjoint.sim.step_choice import resolving_step
+from swgjoint.units import deg
+
+Array = NDArray[np.float64]
+
+ROTOR_INERTIA = 1e-4
+"""Where the drive is not of the catalogue [kg·m²]: assumed, as in scene ``bench``."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ArmScene:
+    """A scene made around an arm."""
+
+    scene: Scene
+    drive_choice: dict[str, DriveChoice]
+    """Drives that the rule chose; empty where a drive was given for all joints."""
+
+
+def is_arm(reference: str) -> bool:
+    """Whether a reference names an arm and no scene: a file or a bundled name."""
+    if Path(reference).suffix.lower() in (".xml", ".urdf", ".xacro"):
+        return True
+    return (
+        not is_file(reference)
+        and reference in bundled_names("arms", ".xml")
+        and reference not in bundled_names("scenes", ".toml")
+    )
+
+
+def scene_of_arm(
+    reference: str,
+    *,
+    drive: str | None = None,
+    joints: Iterable[str] = (),
+    pose: str | None = None,
+    motion: str | None = None,
+    balance_inertia: bool = False,
+    overrides: Mapping[str, Any] | Iterable[str] | None = None,
+) -> Scene:
+    """The scene of :func:`arm_scene` alone."""
+    return arm_scene(
+        reference,
+        drive=drive,
+        joints=joints,
+        pose=pose,
+        motion=motion,
+        balance_inertia=balance_inertia,
+        overrides=overrides,
+    ).scene
+
+
+def arm_scene(
+    reference: str,
+    *,
+    drive: str | None = None,
+    joints: Iterable[str] = (),
+    pose: str | None = None,
+    motion: str | None = None,
+    balance_inertia: bool = False,
+    overrides: Mapping[str, Any] | Iterable[str] | None = None,
+) -> ArmScene:
+    """All hinges, or those that are named, turn gently, each with a drive.
+
+    Without a drive each joint gets the one that
+    :func:`swgjoint.sim.arm.drive_choice.choose_drives` finds: a rule to start from, not
+    the choice of the arm's maker. The rotor has twice the inertia of the wave generator
+    of its size: a motor of the same inertia is assumed.
+
+    Args:
+        reference: Path of an MJCF or URDF file, or the name of a bundled arm.
+        drive: Drive of all joints: design, map or catalogue name.
+        joints: Names or patterns of the hinges that move, each text one or several
+            after commas; none: all. The others are held in the start pose.
+        pose: Where the arm starts, see :func:`swgjoint.sim.arm.gentle_sweep.place_arm`.
+        motion: Kind of the trajectory; None: ``trajectory.kind`` of the overrides, else
+            ``sweep``. A motion of the tool that is out of reach from the start begins
+            where the joints are bent, unless a start is given.
+        balance_inertia: Whether inertias that no rigid body has are repaired.
+        overrides: Changes of the scene, as for :meth:`Scene.load_file`. Unless they
+            state ``simulation.step_s``, the step carries the strongest order of every
+            drive, see :mod:`swgjoint.sim.step_choice`.
+
+    Raises:
+        InputError: If the arm cannot be used.
+    """
+    changes = _as_mapping(overrides)
+    kind = str(changes.get("trajectory.kind", motion or "sweep"))
+    reading = ArmReading(
+        driven=patterns_of(list(joints)), balance_inertia=balance_inertia
+    )
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        arm, start = place_arm(reference, reading=reading, pose=pose)
+        start = _started(arm, start, changes)
+        by_tool = kind in TOOL_MOTIONS
+        end = start if by_tool or kind == "csv" else gentle_sweep(arm, start)[1]
+    _say_once(said)
+    data: dict[str, Any] = {
+        "name": _name(arm.path),
+        "description": f"{kind.capitalize()} of {arm.path.name}",
+        "arm": reference,
+        "tool_site": _tool(arm),
+        "defaults": {"level": "full"},
+        # the integral carries the friction of the drives, which would else be a lag
+        "controller": {"kind": "pid", "feedforward": "gravity_inertia"},
+    }
+    if reading.driven:
+        data["driven"] = list(reading.driven)
+    if arm.reading.pose is not None:
+        data["pose"] = arm.reading.pose
+    if balance_inertia:
+        data["balance_inertia"] = True
+    held = {name: q / deg for name, q in arm.reading.angles.items()}
+    try:
+        scene, rigid = _with_motion(data, kind, arm, start, end, held, changes)
+    except InputError:
+        own = pose or any(key.startswith("trajectory.start_deg") for key in changes)
+        bent = [] if own or not by_tool else bent_starts(arm, start)
+        for other in bent:  # stretched out, a tool cannot go every way
+            with suppress(InputError):
+                scene, rigid = _with_motion(data, kind, arm, other, end, held, changes)
+                break
+        else:
+            raise
+    if drive is not None:
+        data["defaults"] |= {"drive": drive, "rotor_inertia_kgm2": _rotor(drive)}
+        choice = {}
+    else:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # the run says it
+            choice = choose_drives(rigid, trajectory_of(scene, rigid))
+        data["joints"] = {
+            joint: {"drive": one.drive, "rotor_inertia_kgm2": _rotor(one.drive)}
+            for joint, one in choice.items()
+        }
+    where = f"scene of {reference}"
+    scene = Scene.from_data(data, where=where, overrides=changes)
+    if not changes.keys() & {"simulation", "simulation.step_s"}:
+        data["simulation"]["step_s"] = resolving_step(scene, rigid)
+        scene = Scene.from_data(data, where=where, overrides=changes)
+    kept = {
+        joint: one
+        for joint, one in choice.items()
+        if scene.of_joint(joint).drive == one.drive
+    }
+    return ArmScene(scene=scene, drive_choice=kept)
+
+
+def _with_motion(
+    data: dict[str, Any],
+    kind: str,
+    arm: RigidArm,
+    start: Array,
+    end: Array,
+    held: dict[str, float],
+    changes: Mapping[str, Any],
+) -> tuple[Scene, RigidArm]:
+    """Put a motion into the data: the first of a kind that the arm can make freely.
+
+    Returns:
+        The scene, still without drives, and its arm with its payload.
+    """
+    where = f"scene of {data['arm']}"
+    tables, duration = tables_of(kind, arm, start, end)
+    data["simulation"] = {"duration_s": duration}
+    reachable: dict[str, Any] | None = None
+    refused: InputError | None = None
+    for candidate in tables:
+        candidate["start_deg"] |= held
+        data["trajectory"] = candidate
+        scene = Scene.from_data(data, where=where, overrides=changes)
+        rigid = arm
+        if scene.payload is not None or kind in TOOL_MOTIONS or _read_anew(scene, arm):
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # the run says it
+                rigid = rigid_arm_of(scene)
+        try:
+            path = trajectory_of(scene, rigid)
+        except InputError as exc:
+            refused = refused or exc
+            continue
+        if not _collides(rigid, path.position, start):
+            return scene, rigid
+        reachable = reachable or candidate
+    if reachable is None:
+        raise InputError(
+            f"{refused}; or another start: --pose NAME, --set"
+            " trajectory.start_deg.JOINT=ANGLE"
+        )
+    data["trajectory"] = reachable
+    return Scene.from_data(data, where=where, overrides=changes), rigid
+
+
+def _read_anew(scene: Scene, arm: RigidArm) -> bool:
+    """Whether the changes of a user make it another arm."""
+    there, here = scene.reading, arm.reading
+    return scene.arm != arm.reference or (
+        there.driven,
+        there.pose,
+        there.balance_inertia,
+    ) != (here.driven, here.pose, here.balance_inertia)
+
+
+def rigid_arm_of(scene: Scene) -> RigidArm:
+    """The arm of a scene with its payload."""
+    arm, _ = arms_of(
+        scene.arm,
+        tool_site=scene.tool_site,
+        payload=scene.payload,
+        where=scene.where,
+        reading=scene.reading,
+    )
+    return arm
+
+
+def _collides(arm: RigidArm, path: Array, start: Array) -> bool:
+    """Whether bodies touch on a motion that do not where the arm starts."""
+    before = {pair[:2] for pair in arm.contacts(start[None])}
+    few = path[:: max(1, len(path) // 100)]
+    return any(pair[:2] not in before for pair in arm.contacts(few))
+
+
+def _as_mapping(
+    overrides: Mapping[str, Any] | Iterable[str] | None,
+) -> dict[str, Any]:
+    if isinstance(overrides, Mapping):
+        return dict(overrides)
+    return dict(parse_override(text) for text in overrides or ())
+
+
+def _started(arm: RigidArm, start: Array, changes: Mapping[str, Any]) -> Array:
+    """The start with the angles that a user sets; wrong ones are the scene's to say."""
+    start = start.copy()
+    for key, value in changes.items():
+        table, _, name = key.rpartition(".")
+        if (
+            table == "trajectory.start_deg"
+            and name in arm.joints
+            and isinstance(value, int | float)
+        ):
+            start[arm.joints.index(name)] = value * deg
+    return start
+
+
+def _say_once(said: list[warnings.WarningMessage]) -> None:
+    """Pass on what concerns the start; the run says again what concerns the file."""
+    for one in said:
+        if issubclass(one.category, StartWarning):
+            warnings.warn(one.message, stacklevel=3)
+
+
+def _name(path: Path) -> str:
+    """What a scene is called: its arm's file, or its folder where that says more."""
+    folder = path.resolve().parent.name
+    return folder if path.stem.lower() == "scene" and folder else path.stem
+
+
+def _rotor(drive: str) -> float:
+    """Rotor with wave generator of a drive [kg·m²]."""
+    return catalogue_rotor_inertia(drive) or ROTOR_INERTIA
+
+
+def _tool(arm: RigidArm) -> str:
+    """The site ``tool``, else the last body of the longest chain."""
+    if arm.tool >= 0:
+        return "tool"
+    model = arm.model
+    depth = np.zeros(model.nbody, dtype=int)
+    for body in range(1, model.nbody):
+        depth[body] = depth[model.body_parentid[body]] + 1
+    last = int(np.flatnonzero(depth == depth.max())[0])
+    return str(mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_BODY, last))

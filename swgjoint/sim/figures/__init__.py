@@ -1,0 +1,1 @@
+"""Figures of a run: ripple, orders, accuracy, energy, validity, verdict."""

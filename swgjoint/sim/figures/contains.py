@@ -1,0 +1,280 @@
+"""What a compiled model contains, and what was left out and why."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from swgjoint.faults import Section
+from swgjoint.joint.prescribed import ratio_variation
+from swgjoint.joint.step_damping import StepMode, step_mode
+from swgjoint.units import hertz
+
+if TYPE_CHECKING:
+    from swgjoint.joint.drive import JointDrive
+    from swgjoint.sim.assembly import Assembly
+    from swgjoint.sim.figures.transmission import Transmission
+
+OFF_DAMPING = 0.02
+"""Damping ratio by steps from which the model is said to be without the drive's."""
+_LOSSY = ("native", "full")
+_ERRING = ("kinematic", "full")
+_LEFT_OUT = {
+    "rigid": "torsion, kinematic error and torque ripple (level rigid)",
+    "kinematic": "torsion and the torque ripple of the stiffness (level kinematic)",
+    "linear": "kinematic error, torque ripple and hardening (level linear)",
+    "native": "kinematic error and torque ripple (level native)",
+}
+
+
+def contents(assembly: Assembly) -> dict[str, Any]:
+    """Counts of the compiled model and the content of every joint; JSON values only."""
+    model = assembly.model
+    return {
+        "degrees_of_freedom": int(model.nv),
+        "tendons": int(model.ntendon),
+        "plugin_instances": int(model.nplugin),
+        "actuators": int(model.nactuator),
+        "integrator": assembly.scene.simulation.integrator,
+        "step_s": assembly.scene.simulation.step_s,
+        "sub_steps": assembly.sub_steps,
+        "sub_stepped_for": dict(assembly.outside),
+        "joints": {t.joint: _joint(assembly, t) for t in assembly.transmissions},
+        **_features(assembly),
+        "left_out": [
+            {"joint": t.joint, **item}
+            for t in assembly.transmissions
+            for item in (*_left_out(t), *_off_damping(assembly, t))
+        ],
+        "absent": _absent(assembly),
+    }
+
+
+def _features(assembly: Assembly) -> dict[str, Any]:
+    """Controller, and of limits, payload, sensors, disturbances what there is."""
+    scene, loops = assembly.scene, assembly.loops
+    step = scene.simulation.step_s
+    given = assembly.controlled_by
+    found: dict[str, Any] = {
+        "controller": {
+            "kind": scene.controller.kind if given is None else given,
+            "feedback": scene.controller.feedback,
+            "control_period_s": (scene.controller.control_period_s or step)
+            if loops.sampled
+            else None,
+            "runs_in": "Python, sampled" if loops.sampled else "the engine's actuators",
+        }
+    }
+    limits = {
+        name: _given(one)
+        for name, one in zip(assembly.joints, loops.limits, strict=True)
+        if one is not None
+    }
+    if limits:
+        found["motor_limits"] = limits
+    if scene.payload is not None:
+        found["payload"] = scene.payload.model_dump()
+    if scene.sensors is not None:
+        found["sensors"] = _given(scene.sensors)
+    if scene.disturbance:
+        found["disturbances"] = [_given(one) for one in scene.disturbance]
+    return found
+
+
+def _absent(assembly: Assembly) -> list[dict[str, str]]:
+    """Optional parts of a scene that this one does not have, so the model has none."""
+    scene, loops, tables = assembly.scene, assembly.loops, "the scene has no"
+    plugin = any(t.attached.plugin for t in assembly.transmissions)
+    parts = (
+        ("motor limits", any(loops.limits), f"{tables} motor table"),
+        ("payload", scene.payload, f"{tables} [payload]"),
+        ("sensors", scene.sensors, f"{tables} [sensors]: angles are read as they are"),
+        ("disturbances", scene.disturbance, f"{tables} [[disturbance]]"),
+        ("load torques", any(assembly.load), f"{tables} [load] that is not zero"),
+        ("integral of the error", any(loops.integral), "the controller is no pid"),
+        (
+            "sampled controller",
+            loops.sampled,
+            "nothing in the scene asks for one: it acts within every step",
+        ),
+        ("engine plugin", plugin, "no joint has a level that needs it"),
+    )
+    return [{"part": part, "reason": why} for part, there, why in parts if not there]
+
+
+def _given(section: Section) -> dict[str, Any]:
+    return section.model_dump(exclude_none=True)
+
+
+def _joint(assembly: Assembly, transmission: Transmission) -> dict[str, Any]:
+    attached = transmission.attached
+    return {
+        "level": attached.level,
+        "drive": transmission.drive.name,
+        "source": transmission.drive.level,
+        "ratio": attached.ratio,
+        "rotor": attached.rotor,
+        "tendon": attached.tendon,
+        "plugin": attached.plugin,
+        "rotor_inertia_kgm2": attached.rotor_inertia,
+        "stiffness_Nm_rad": None if attached.rotor is None else attached.stiffness,
+        "damping_Nms_rad": attached.damping,
+        "natural_frequency_Hz": attached.natural_frequency / hertz,
+        **_at_step(assembly, transmission),
+        "orders": list(attached.kept_orders)
+        if attached.level in ("kinematic", "full")
+        else [],
+        "kinematic_error": _error(attached),
+        "hysteresis_elements": len(attached.drive.hysteresis)
+        if attached.level in _LOSSY
+        else 0,
+        "friction": attached.drive.friction.source
+        if attached.drive.friction and attached.level in _LOSSY
+        else None,
+        **_native(attached),
+    }
+
+
+def _at_step(assembly: Assembly, transmission: Transmission) -> dict[str, Any]:
+    """Damping and frequency of the torsion as the steps leave them."""
+    mode, loaded = _modes(assembly, transmission)
+    if mode is None or loaded is None:
+        return {}
+    return {
+        "damping_ratio": mode.own_damping_ratio,
+        "step_damping_ratio": mode.damping_ratio,
+        "step_damping_ratio_rated": loaded.damping_ratio,
+        "step_frequency_Hz": mode.frequency / hertz,
+    }
+
+
+def _modes(
+    assembly: Assembly, transmission: Transmission
+) -> tuple[StepMode | None, StepMode | None]:
+    """Torsional vibration about zero and about the rated torque."""
+    if assembly.scene.simulation.integrator != "discrete":
+        return None, None
+    rated = transmission.drive.ratings.rated_torque
+    zero, loaded = (
+        step_mode(transmission.attached, timestep=assembly.step, torque=torque)
+        for torque in (0.0, rated)
+    )
+    return zero, loaded
+
+
+def _off_damping(
+    assembly: Assembly, transmission: Transmission
+) -> list[dict[str, str]]:
+    """Where steps damp the torsion much more than the drive does."""
+    for mode, where in zip(
+        _modes(assembly, transmission), ("", " at rated torque"), strict=True
+    ):
+        if mode is None or mode.damping_ratio < mode.own_damping_ratio + OFF_DAMPING:
+            continue
+        own, got = mode.own_damping_ratio, mode.damping_ratio
+        part = f"the damping ratio {own:.2g} of the drive: {got:.2g} results{where}"
+        reason = (
+            f"steps of {1e3 * assembly.step:.3g} ms damp the torsion at"
+            f" {mode.own_frequency / hertz:.3g} Hz; a shorter simulation.step_s, or"
+            " joints.*.level = 'full'"
+        )
+        return [{"part": part, "reason": reason}]
+    return []
+
+
+def _error(attached: JointDrive) -> str | None:
+    """Where the kinematic error that the model has comes from; None without one."""
+    drive = attached.drive
+    if attached.level not in _ERRING or not drive.kinematic_error[1:].any():
+        return None
+    return str(drive.info.get("kinematic_error", "of the map"))
+
+
+def _no_error(transmission: Transmission) -> str | None:
+    """Why a level that could carry one has no kinematic error of a catalogue drive."""
+    drive = transmission.drive
+    if (
+        transmission.level not in _ERRING
+        or drive.level != "catalogue"
+        or drive.kinematic_error[1:].any()
+    ):
+        return None
+    return str(drive.info.get("kinematic_error", "joints.*.kinematic_error_arcmin = 0"))
+
+
+def _native(attached: JointDrive) -> dict[str, Any]:
+    """The elements of level ``native``; nothing for others."""
+    spring = attached.native
+    if spring is None:
+        return {}
+    return {
+        "native": {
+            "linear_Nm_rad": spring.linear,
+            "cubic_Nm_rad3": spring.cubic,
+            "corners": [
+                {"torsion_rad": c.torsion, "stiffness_Nm_rad": c.stiffness}
+                for c in spring.corners
+            ],
+            "residual_Nm": spring.residual,
+            "fitted_to_Nm": spring.fitted_to,
+            "hysteresis": list(attached.hysteresis),
+            "friction_Nm": spring.friction,
+            "viscous_Nms_rad": spring.viscous,
+        }
+    }
+
+
+def _left_out(transmission: Transmission) -> list[dict[str, str]]:
+    attached = transmission.attached
+    items = []
+    if attached.level in _LEFT_OUT:
+        reason = (
+            "no native form"
+            if attached.level == "native"
+            else f"not at level {attached.level}; joints.*.level = 'full' has it"
+        )
+        items.append({"part": _LEFT_OUT[attached.level], "reason": reason})
+    lossless = f"not at level {attached.level}; native and full have it"
+    if attached.drive.hysteresis and attached.level not in _LOSSY:
+        part = f"hysteresis ({len(attached.drive.hysteresis)} elements)"
+        items.append({"part": part, "reason": lossless})
+    if count := transmission.drive.info.get("hysteresis_left_out"):
+        part = f"hysteresis ({count} elements)"
+        items.append({"part": part, "reason": "joints.*.hysteresis = false"})
+    if why := _no_error(transmission):
+        items.append({"part": "kinematic error of the drive", "reason": why})
+    if (pruned := transmission.drive.info.get("pruned")) and pruned["dropped"]:
+        bounds = (
+            f"at most {pruned['output_angle_bound_arcmin']:.3g} arcmin and"
+            f" {pruned['torque_bound_Nm']:.3g} N·m in all, below the tolerance of"
+            f" {pruned['tolerance_arcmin']:.3g} arcmin"
+        )
+        part = f"{len(pruned['dropped'])} harmonics of the map"
+        items.append({"part": part, "reason": bounds})
+    friction = transmission.drive.friction
+    if friction and not (attached.drive.friction and attached.level in _LOSSY):
+        off = attached.level in _LOSSY
+        reason = "joints.*.friction = false" if off else lossless
+        items.append({"part": "friction of the drive", "reason": reason})
+    if attached.level == "kinematic" and attached.kept_orders:
+        share = 100.0 * ratio_variation(attached.drive)
+        items.append(
+            {
+                "part": f"change of the ratio in the torque, up to {share:.2g} %",
+                "reason": "the error is prescribed on the commanded motion",
+            }
+        )
+    if attached.native is not None and attached.native.note:
+        items.append({"part": "the stiffness curve", "reason": attached.native.note})
+    if attached.native is not None and attached.native.friction_note:
+        part = f"of the friction {attached.native.friction_note}"
+        items.append({"part": part, "reason": "no native form"})
+    if attached.unresolved:
+        left = [f"{u.order:.4g}" for u in attached.unresolved]
+        orders = f"orders {left[0]} to {left[-1]}" if left[1:] else f"order {left[0]}"
+        items.append(
+            {
+                "part": f"{orders} per input turn ({len(left)} harmonics)",
+                "reason": "the step cannot carry them at the speed of this joint",
+            }
+        )
+    return items

@@ -1,0 +1,240 @@
+r"""Where the energy of a run goes: works, losses, storage, and whether they balance.
+
+.. math:: W_\text{motor} + W_\text{load} = \Delta E_\text{kinetic}
+    + \Delta E_\text{weight} + \Delta E_\text{elastic} + D
+    + \text{what the balance misses}
+
+The miss is the integrator's own damping and the error of sums over samples. Each term
+is computed by itself: none is a remainder of the others.
+
+A torque that acts over a step does the work of the mean of the speeds before and after
+it, which is the change of kinetic energy exactly. The way of that step would not do:
+positions of the discrete integrator follow the speed after the step, half a step late.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.sim.actuators import disturbance_at
+from swgjoint.sim.scene.feature_sections import ToolForce
+
+if TYPE_CHECKING:
+    from swgjoint.sim.run import Run
+
+Array = NDArray[np.float64]
+
+IDLE = 1e-3
+"""Mean torque over rated torque below which a joint does no work to speak of."""
+
+
+def run_energy(run: Run) -> dict[str, float]:
+    """Energies of the whole arm over the whole run [J]."""
+    joints = [joint_energy(run, j) for j in range(len(run.joints))]
+    motor = sum(joint["motor_work_J"] for joint in joints)
+    in_arm = arm_dissipation(run)
+    dissipated = in_arm + sum(joint["dissipated_J"] for joint in joints)
+    load = load_work(run)
+    kinetic, weight = _rigid_energies(run)
+    elastic = sum(_elastic(run, j) for j in range(len(run.joints)))
+    springs = _arm_springs(run)
+    stored = kinetic + weight + elastic + springs
+    return {
+        "motor_work_J": motor,
+        "load_work_J": load,
+        "dissipated_J": dissipated,
+        "arm_dissipated_J": in_arm,
+        "kinetic_change_J": kinetic,
+        "weight_change_J": weight,
+        "elastic_change_J": elastic,
+        "spring_change_J": springs,
+        "stored_J": stored,
+        "balance_error_J": motor + load - stored - dissipated,
+    }
+
+
+def joint_energy(run: Run, j: int) -> dict[str, Any]:
+    """Works at both sides of one drive and what it dissipates over the run [J].
+
+    ``efficiency`` is work out over work in over the part at constant speed, whichever
+    side drives; None where the joint has no such part or carries no torque there.
+    """
+    window = run.steady
+    motor = _motor_work(run, j, slice(None))
+    out = _link_work(run, j, slice(None))
+    efficiency, missing = None, None
+    if run.assembly.trajectory.steady_velocity[j] == 0.0:
+        missing = "the joint has no constant speed"
+    else:
+        given, taken = _motor_work(run, j, window), _link_work(run, j, window)
+        rated = run.assembly.transmissions[j].drive.ratings.rated_torque
+        mean = np.abs(run.output_torque[window, j]).mean()
+        if mean < IDLE * rated or given * taken <= 0.0:
+            missing = "the joint runs idle"
+        else:
+            efficiency = taken / given if taken > 0.0 else given / taken
+    return {
+        "motor_work_J": motor,
+        "link_work_J": out,
+        "dissipated_J": dissipation(run, j),
+        "efficiency": efficiency,
+        **({} if missing is None else {"missing": {"efficiency": missing}}),
+    }
+
+
+def load_work(run: Run) -> float:
+    """Work of loads and disturbances on the arm [J]."""
+    assembly = run.assembly
+    moved = run.position[-1] - run.position[0]
+    total = -float(assembly.load @ moved)
+    middle = 0.5 * (run.time[1:] + run.time[:-1])
+    for disturbance in assembly.disturbances:
+        value = disturbance_at(disturbance, middle)
+        if isinstance(disturbance, ToolForce):
+            # the tool's way over two steps, as that of the speeds
+            way = np.gradient(run.tool_position @ np.array(disturbance.force_N))[:-1]
+        else:
+            way = _way(run, run.velocity[:, run.joints.index(disturbance.joint)])
+        total += float(value @ way)
+    return total
+
+
+def dissipation(run: Run, j: int) -> float:
+    """Damping, slipping and friction of one drive [J]; none without a rotor."""
+    transmission = run.assembly.transmissions[j]
+    attached = transmission.attached
+    if transmission.law is None:
+        return 0.0
+    step = run.assembly.scene.simulation.step_s
+    twist = np.diff(run.torsion[:, j])
+    total = attached.damping / step * float(twist @ twist)
+    slipping = run.slipping_torque[:, j]
+    total += _work(slipping, run.torsion[:, j])
+    total -= transmission.held(run.torsion[:, j])
+    turn = np.diff(run.motor_position[:, j])
+    if attached.native is not None:
+        total += attached.native.friction * float(np.abs(turn).sum())
+        total += attached.native.viscous / step * float(turn @ turn)
+    elif attached.friction is not None:
+        by_theta, by_psi = transmission.drive.friction_direction
+        rotation = by_theta * run.motor_position[:, j] + by_psi * run.position[:, j]
+        total += _work(run.friction_torque[:, j], rotation)
+    return total
+
+
+def arm_dissipation(run: Run) -> float:
+    """What damping and dry friction of the arm's own joints and tendons take [J]."""
+    model = run.assembly.arm.model
+    step = run.assembly.scene.simulation.step_s
+    speeds = 0.5 * (run.velocity[1:] + run.velocity[:-1])
+    accelerations = np.diff(run.velocity, axis=0) / step
+    total = step * float(np.sum(_dry_friction(run, speeds, accelerations) * speeds))
+    damped = (model.dof_damping, model.dof_dampingpoly, model.tendon_damping)
+    if not any(values.any() for values in damped):
+        return total
+    data = mujoco.MjData(model)
+    middle = 0.5 * (run.position[1:] + run.position[:-1])
+    for q, v in zip(middle, speeds, strict=True):
+        data.qpos[:], data.qvel[:] = q, v
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        mujoco.mj_tendon(model, data)
+        mujoco.mj_comVel(model, data)
+        mujoco.mj_fwdVelocity(model, data)
+        total -= step * float(data.qfrc_damper @ v)
+    return total
+
+
+def _dry_friction(run: Run, speeds: Array, accelerations: Array) -> Array:
+    r"""Torque that dry friction of the arm's joints takes as the engine has it [N·m].
+
+    .. math:: \tau = \operatorname{clip}\left((b v + a)/R, \pm f\right), \quad
+        R = A (1 - d)/d, \quad b = 2/(d_\text{max} t_c)
+
+    with A the inverse inertia at the joint, d the impedance and t_c the time constant
+    of the constraint: it creeps where a rigid law would stick.
+
+    Source:
+        MuJoCo documentation, chapter Computation, "Constraint model".
+    """
+    assembly = run.assembly
+    model, dofs = assembly.model, assembly.link_velocity
+    impedance = model.dof_solimp[dofs, 0]
+    slip = model.dof_invweight0[dofs] * (1.0 - impedance) / impedance
+    constant = np.maximum(model.dof_solref[dofs, 0], 2.0 * assembly.step)
+    rate = 2.0 / (model.dof_solimp[dofs, 1] * constant)
+    most = model.dof_frictionloss[dofs]
+    asked = (rate * speeds + accelerations) / np.maximum(slip, 1e-15)
+    return np.asarray(np.clip(asked, -most, most))
+
+
+def _arm_springs(run: Run) -> float:
+    """Change of the energy in springs of the arm's joints and tendons [J]."""
+    model, found = run.assembly.arm.model, []
+    data = mujoco.MjData(model)
+    for q in run.position[[0, -1]]:
+        data.qpos[:] = q
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        mujoco.mj_tendon(model, data)
+        mujoco.mj_energyPos(model, data)
+        weight = -float(model.body_mass @ (data.xipos @ model.opt.gravity))
+        found.append(float(data.energy[0]) - weight)
+    return found[1] - found[0]
+
+
+def _motor_work(run: Run, j: int, part: slice) -> float:
+    # the torque beside a state is that of the whole way to it
+    torque = run.motor_torque[part, j][1:]
+    if run.assembly.scene.simulation.integrator == "discrete":
+        return float(torque @ _way(run, run.motor_velocity[part, j]))
+    return float(torque @ np.diff(run.motor_position[part, j]))
+
+
+def _way(run: Run, speed: Array) -> Array:
+    """Step times the mean of the speeds before and after it. Shape (n - 1, ...)."""
+    step = run.assembly.scene.simulation.step_s
+    return np.asarray(0.5 * step * (speed[1:] + speed[:-1]))
+
+
+def _link_work(run: Run, j: int, part: slice) -> float:
+    return _work(run.output_torque[part, j], run.position[part, j])
+
+
+def _work(torque: Array, angle: Array) -> float:
+    """Integral of a torque over its angle, by trapezoids [J]."""
+    return float(0.5 * (torque[1:] + torque[:-1]) @ np.diff(angle))
+
+
+def _elastic(run: Run, j: int) -> float:
+    """Change of the energy in the spring of one drive [J]."""
+    transmission = run.assembly.transmissions[j]
+    law = transmission.law
+    if law is None:
+        return 0.0
+    theta, psi = run.motor_position[[0, -1], j], run.position[[0, -1], j]
+    first, last = law.energy(law.torsion(theta, psi), theta, psi)
+    return float(last - first) + transmission.held(run.torsion[:, j])
+
+
+def _rigid_energies(run: Run) -> tuple[float, float]:
+    """Change of the kinetic energy and of that of the weight [J]."""
+    assembly, model = run.assembly, run.assembly.model
+    data, found = mujoco.MjData(model), []
+    flexible = assembly.motor_position >= 0
+    for k in (0, -1):
+        data.qpos[assembly.link_position] = run.position[k]
+        data.qvel[assembly.link_velocity] = run.velocity[k]
+        data.qpos[assembly.motor_position[flexible]] = run.motor_position[k, flexible]
+        data.qvel[assembly.motor_velocity[flexible]] = run.motor_velocity[k, flexible]
+        mujoco.mj_fwdPosition(model, data)
+        mujoco.mj_fwdVelocity(model, data)
+        mujoco.mj_energyVel(model, data)
+        weight = -float(model.body_mass @ (data.xipos @ model.opt.gravity))
+        found.append((float(data.energy[1]), weight))
+    (first_kinetic, first_weight), (last_kinetic, last_weight) = found
+    return last_kinetic - first_kinetic, last_weight - first_weight

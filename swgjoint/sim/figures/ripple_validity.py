@@ -1,0 +1,169 @@
+r"""How far the torque ripple of a joint may be believed.
+
+The ripple comes from the harmonics of the maps, which :func:`map_label` judges. A run
+without any harmonics has no ripple, only vibration and round-off. A run that leaves
+harmonics out, because its step cannot carry them, has less ripple than the drive. The
+missing part is estimated from the map: inertia on either side resists fast orders, so
+that order n of the kinematic error, :math:`e_n`, becomes torsion, with the torque
+
+.. math:: T_n = K e_n + |\partial_\Delta V_n|
+
+at rated torque. The rms of the ripple is then at least the recorded one and about
+:math:`\sqrt{r^2 + \sum T_n^2/2}`.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.maps.sheet.map_validity import LIMIT, map_validation
+from swgjoint.sim.figures.verdict import PHASE_STEP
+from swgjoint.units import deg
+
+if TYPE_CHECKING:
+    from swgjoint.sim.run import Run
+
+Array = NDArray[np.float64]
+
+HARMONIC_LEVELS = ("kinematic", "full")
+SHARE = 0.05
+"""Part of the ripple that may be left out before the figure is a lower bound."""
+ABOVE_NOISE = 3.0
+"""Smallest ratio of ripple to integration noise at which the ripple is reported."""
+ROUND_OFF = 1e-6
+"""Share of the rated torque below which no ripple is reported."""
+
+
+def ripple_label(run: Run, j: int, ripple: Array) -> dict[str, Any]:
+    """Validity of the ripple of one joint.
+
+    Args:
+        run: The run.
+        j: Number of the joint.
+        ripple: Of the joint [N·m]. Shape (n_window,).
+
+    Returns:
+        ``ripple_missing``: why there is none to tell, None where there is.
+        ``ripple_noise_percent``: rms of the noise of the integration, of the rated
+        torque. ``ripple_left_out_percent``: rms of the orders that the step leaves out.
+        ``ripple_is_lower_bound``: whether they matter. ``resolving``: the strongest
+        order that is left out with the step, and the speed of the joint at the step of
+        the run, that carry it; None where nothing is left out.
+    """
+    transmission = run.assembly.transmissions[j]
+    rated = transmission.drive.ratings.rated_torque
+    rms = float(np.sqrt(np.mean(ripple**2)))
+    noise = integration_noise(ripple)
+    left = left_out_torque(run, j)
+    missing = None
+    if not any(has_harmonics(run, k) for k in range(len(run.joints))):
+        missing = "no drive of the run has a kinematic error or harmonics at its level"
+    elif rms < max(ABOVE_NOISE * noise, ROUND_OFF * rated):
+        missing = "below the noise of the integration"
+        if left:
+            missing = "the step carries none of its orders"
+    whole = float(np.hypot(rms, left))
+    return {
+        "ripple_missing": missing,
+        "ripple_noise_percent": 100.0 * noise / rated,
+        "ripple_left_out_percent": 100.0 * left / rated,
+        "ripple_is_lower_bound": bool(left > 0.0 and whole > (1.0 + SHARE) * rms),
+        "resolving": resolving(run, j),
+    }
+
+
+def map_label(run: Run, j: int, *, told: bool) -> dict[str, Any]:
+    """What the map of one joint misses at the torques of the figures.
+
+    The validation of the map is read over the torques of the part of the motion that
+    the figures are taken from.
+
+    Args:
+        run: The run.
+        j: Number of the joint.
+        told: Whether the run tells a ripple of the joint.
+
+    Returns:
+        ``ripple_valid``: whether the map is within the limit there, None where it has
+        no ripple to judge or no record. ``map_difference``: the largest differences
+        under ``input_torque`` and ``output_error``, and ``torque_range_Nm``; None with
+        the reason in ``map_difference_missing``.
+    """
+    transmission = run.assembly.transmissions[j]
+    found, reason = map_validation(transmission.drive)
+    if transmission.level != "full":
+        found, reason = None, f"level {transmission.level} has no ripple of a map"
+    elif not transmission.attached.kept_orders:
+        found, reason = None, "the step carries no order of the map"
+    if found is None:
+        return {
+            "ripple_valid": None,
+            "map_difference": None,
+            "map_difference_missing": reason,
+        }
+    torque = run.output_torque[run.steady, j]
+    low, high = float(torque.min()), float(torque.max())
+    differences = found.between(low, high)
+    worst = max(one.largest for one in differences.values())
+    return {
+        "ripple_valid": worst <= LIMIT if told else None,
+        "map_difference": {
+            **{key: one.to_json() for key, one in differences.items()},
+            "torque_range_Nm": [low, high],
+        },
+        "map_difference_missing": None,
+    }
+
+
+def has_harmonics(run: Run, j: int) -> bool:
+    """Whether the map of a joint makes ripple at the level of the joint."""
+    attached = run.assembly.transmissions[j].attached
+    return attached.level in HARMONIC_LEVELS and bool(
+        len(attached.drive.orders) > 1 or attached.unresolved
+    )
+
+
+def integration_noise(signal: Array) -> float:
+    r"""Noise between neighbouring samples, rms, unit of the signal.
+
+    White noise of standard deviation s has second differences of
+    :math:`\sqrt 6\, s`; a wave that the step carries has next to none.
+    """
+    if signal.size < 3:
+        return 0.0
+    return float(np.sqrt(np.mean(np.diff(signal, 2) ** 2) / 6.0))
+
+
+def left_out_torque(run: Run, j: int) -> float:
+    """Estimated rms of the ripple that unresolved orders would add [N·m]."""
+    attached = run.assembly.transmissions[j].attached
+    return float(
+        np.sqrt(
+            sum(
+                0.5 * (attached.stiffness * order.error + order.torque) ** 2
+                for order in attached.unresolved
+            )
+        )
+    )
+
+
+def resolving(run: Run, j: int) -> dict[str, float] | None:
+    """Step and speed that carry the strongest order that is left out."""
+    transmission = run.assembly.transmissions[j]
+    attached = transmission.attached
+    speed = float(run.assembly.trajectory.top_speed[j])
+    if not attached.unresolved or speed == 0.0:
+        return None
+    strongest = max(
+        attached.unresolved, key=lambda u: attached.stiffness * u.error + u.torque
+    )
+    step = run.assembly.scene.simulation.step_s
+    per_radian = strongest.order * abs(transmission.ratio)
+    return {
+        "order": strongest.order,
+        "step_s": PHASE_STEP / (per_radian * speed),
+        "speed_deg_s": PHASE_STEP / (per_radian * step) / deg,
+    }

@@ -1,0 +1,177 @@
+"""One driven joint of a run: the law between motor and link, evaluated on arrays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.joint.drive import JointDrive, JointSignals
+from swgjoint.joint.native import native_map
+from swgjoint.maps.drive_map import DriveMap
+from swgjoint.maps.fit.error_spectrum import with_error
+from swgjoint.maps.friction import play_friction
+from swgjoint.maps.hysteresis import play_hysteresis, stretches
+
+Array = NDArray[np.float64]
+
+_CHUNK = 1024  # samples at once: the coefficient table of a chunk stays in the cache
+STIFF = 1e3
+"""Stiffness of the map that stands for a drive without torsion, over that of the drive:
+0.01 arcmin at rated torque, and its torque is still told apart from round-off."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PlayedSignals(JointSignals):
+    """Signals of a record, with the torques that have a history; shapes (n,)."""
+
+    slipping: Array
+    """Of the hysteresis, along the torsion [N·m]."""
+    friction: Array
+    """Of the wave generator against the flexspline [N·m]."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Transmission:
+    """Drive of one joint as the compiled model contains it."""
+
+    attached: JointDrive
+    drive: DriveMap
+    """The whole map; ratings, name and validity come from it."""
+    law: DriveMap | None
+    """The map that the model carries between motor and link: without unresolved
+    harmonics, of constant stiffness at level ``linear``, the elastic polynomial at
+    ``native``; friction where the model has it. None at the levels without a rotor,
+    ``rigid`` and ``kinematic``."""
+
+    @property
+    def joint(self) -> str:
+        """Name of the link joint."""
+        return self.attached.joint
+
+    @property
+    def level(self) -> str:
+        """One of :data:`swgjoint.joint.attach.LEVELS`."""
+        return self.attached.level
+
+    @property
+    def ratio(self) -> float:
+        """Signed ratio i, output = input / i."""
+        return self.attached.ratio
+
+    @property
+    def rotor_inertia(self) -> float:
+        """[kg·m²] about the motor axis."""
+        return self.attached.rotor_inertia
+
+    @property
+    def told(self) -> DriveMap:
+        """The drive as it is simulated, for a controller.
+
+        :attr:`law`, and at the levels without a rotor a map of level ``rigid``: no
+        torsion (a spring :data:`STIFF` times as stiff stands for it), no friction, the
+        kinematic error at ``kinematic`` alone.
+        """
+        if self.law is not None:
+            return self.law
+        drive = self.attached.drive
+        spring = _linear(drive, STIFF * self.attached.stiffness)
+        if self.level == "kinematic":
+            spring = with_error(spring, drive.orders, drive.kinematic_error)
+        return replace(spring, level="rigid")
+
+    def signals(
+        self, theta: Array, psi: Array, theta_rate: Array, psi_rate: Array
+    ) -> PlayedSignals:
+        """Torsion, transmission error and output torque of recorded states. (n,).
+
+        The law at the true positions and velocities of each state; hysteresis and
+        friction are played over the whole record. Not for the levels without a rotor.
+        """
+        pieces = [
+            self.attached.signals(
+                theta[k : k + _CHUNK],
+                psi[k : k + _CHUNK],
+                theta_rate[k : k + _CHUNK],
+                psi_rate[k : k + _CHUNK],
+            )
+            for k in range(0, theta.size, _CHUNK)
+        ]
+        torsion = np.concatenate([p.torsion for p in pieces])
+        torque = np.concatenate([p.torque for p in pieces])
+        played, rubs = np.zeros((2, theta.size))
+        elements = self.attached.elements
+        if elements:
+            played = play_hysteresis(elements, torsion - self._relaxed(torsion))
+            slopes = [
+                self.attached.output_slope(theta[k : k + _CHUNK], psi[k : k + _CHUNK])
+                for k in range(0, theta.size, _CHUNK)
+            ]
+            torque = torque + played * np.concatenate(slopes)
+        friction = self.attached.friction
+        if friction is not None:
+            by_theta, by_psi = self.drive.friction_direction
+            rubs = play_friction(
+                friction,
+                by_theta * theta + by_psi * psi,
+                by_theta * theta_rate + by_psi * psi_rate,
+                torque / self.ratio,
+            )
+            torque = torque - by_psi * rubs
+        return PlayedSignals(
+            torsion=torsion,
+            transmission_error=np.concatenate([p.transmission_error for p in pieces]),
+            torque=torque,
+            slipping=played,
+            friction=rubs,
+        )
+
+    def held(self, torsion: Array) -> float:
+        """Change of the energy in the springs of the hysteresis over a record [J].
+
+        Args:
+            torsion: [rad]. Shape (n,).
+        """
+        total, torsion = 0.0, torsion - self._relaxed(torsion)
+        for element in self.attached.elements:
+            first, last = stretches(torsion, element.yield_torsion)[[0, -1]]
+            total += 0.5 * element.stiffness * float(last**2 - first**2)
+        return total
+
+    def _relaxed(self, torsion: Array) -> float:
+        """Torsion at which a run's hysteresis starts relaxed [rad].
+
+        ``native`` relaxed at zero torsion, ``full`` where it stands.
+        """
+        return float(torsion[0]) if self.level == "full" else 0.0
+
+
+def transmission_of(attached: JointDrive, drive: DriveMap) -> Transmission:
+    """What the compiled model contains of one joint's drive.
+
+    Args:
+        attached: What attaching left behind.
+        drive: The whole map.
+    """
+    law: DriveMap | None = None
+    if attached.level == "full":
+        law = attached.drive
+    elif attached.native is not None:
+        law = native_map(attached.drive, attached.native)
+    elif attached.level == "linear":
+        law = _linear(drive, attached.stiffness)
+    return Transmission(attached=attached, drive=drive, law=law)
+
+
+def _linear(drive: DriveMap, stiffness: float) -> DriveMap:
+    """A drive as a constant spring alone; name and ratings are its own."""
+    spring = DriveMap.linear(
+        stiffness,
+        layout=drive.layout,
+        teeth_flexspline=drive.teeth_flexspline,
+        teeth_circular_spline=drive.teeth_circular_spline,
+        rated_torque=drive.ratings.rated_torque,
+        name=drive.name,
+    )
+    return replace(spring, ratings=drive.ratings)

@@ -1,0 +1,190 @@
+"""Whether the figures of a run describe the scene: the verdict and its reasons.
+
+A run is ``NOT VALID`` where it left what its model covers: bodies collide, so that the
+torque ripple and the tool error have no reference; a torque leaves the map of its
+drive; teeth would skip; a rotor turns too fast for the orders that the step carries;
+the ripple of a map differs too much from unseen finite elements at the torques of the
+run; the energies do not add up.
+A drive above its ratings is a fault of the design and not of the figures: it is a
+warning.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import mujoco
+import numpy as np
+
+from swgjoint.maps.sheet.map_validity import LIMIT, percent
+from swgjoint.maps.sheet.validity_marks import joint_doubt
+from swgjoint.units import mm
+
+if TYPE_CHECKING:
+    from swgjoint.sim.run import Run
+
+VALID, NOT_VALID = "VALID", "NOT VALID"
+PHASE_STEP = 0.5
+"""Largest phase of an order per step that counts as resolved [rad]."""
+FAST = 1.5
+"""Phase of an order in a step, over :data:`PHASE_STEP`, that invalidates a run."""
+POSES = 400
+"""Recorded states at which collisions are looked for, at most."""
+ENERGY_SHARE, ENERGY_FLOOR = 0.1, 1e-3
+"""Energy that may be missing: of all works and losses, or, where they are small, of the
+rated torques times a radian. Bundled scenes miss 0.4 % at most."""
+MAPPED = ("native", "full")
+"""Levels whose torque comes from the map."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Collision:
+    """Two bodies that touch during a run."""
+
+    bodies: tuple[str, str]
+    time: float
+    """Of the first state that was looked at and has the contact [s]."""
+    depth: float
+    """Largest penetration [m]."""
+
+    def to_json(self) -> dict[str, Any]:
+        """Keys of the JSON output."""
+        return {
+            "bodies": list(self.bodies),
+            "time_s": self.time,
+            "depth_mm": self.depth / mm,
+        }
+
+
+def collisions(run: Run) -> list[Collision]:
+    """Bodies that touch, the deepest first; looked for at :data:`POSES` states."""
+    assembly, model = run.assembly, run.assembly.model
+    if not (model.geom_contype.any() and model.geom_conaffinity.any()):
+        return []
+    data = mujoco.MjData(model)
+    flexible = assembly.motor_position >= 0
+    found: dict[tuple[int, int], tuple[float, float]] = {}
+    count = min(POSES, run.time.size)
+    for k in np.linspace(0, run.time.size - 1, count).astype(int):
+        data.qpos[assembly.link_position] = run.position[k]
+        data.qpos[assembly.motor_position[flexible]] = run.motor_position[k, flexible]
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        mujoco.mj_collision(model, data)
+        contact = data.contact
+        for geoms, depth in zip(contact.geom, -contact.dist, strict=True):
+            if depth <= 0.0 or (geoms < 0).any():
+                continue
+            first, second = sorted(int(b) for b in model.geom_bodyid[geoms])
+            time, most = found.get((first, second), (float(run.time[k]), 0.0))
+            found[first, second] = (time, max(most, float(depth)))
+    return sorted(
+        (
+            Collision(
+                bodies=(model.body(first).name, model.body(second).name),
+                time=time,
+                depth=depth,
+            )
+            for (first, second), (time, depth) in found.items()
+        ),
+        key=lambda one: -one.depth,
+    )
+
+
+def judge_run(
+    run: Run, joints: Mapping[str, Any], energy: Mapping[str, float]
+) -> dict[str, Any]:
+    """``verdict``, ``reasons`` and ``collisions`` of a run.
+
+    Args:
+        run: The run.
+        joints: Figures of its joints, see :meth:`swgjoint.sim.run.Run.metrics`.
+        energy: Its energies, see :mod:`swgjoint.sim.figures.energy` [J].
+    """
+    touching = collisions(run)
+    reasons = []
+    if touching and not run.assembly.scene.metrics.contacts_expected:
+        reasons.append(_collision_reason(touching))
+    for name, joint in joints.items():
+        reasons += joint_reasons(name, joint)
+    rated = sum(joint["ratings"]["rated_Nm"] for joint in joints.values())
+    reasons += energy_reasons(energy, rated)
+    return {
+        "verdict": NOT_VALID if reasons else VALID,
+        "reasons": reasons,
+        "collisions": [one.to_json() for one in touching],
+    }
+
+
+def joint_reasons(name: str, joint: Mapping[str, Any]) -> list[str]:
+    """What takes the figures of one joint out of its model, one line each."""
+    lines = []
+    ratings = joint["ratings"]
+    if not ratings["within_map"] and joint["level"] in MAPPED:
+        low, high = ratings["map_range_Nm"]
+        lines.append(
+            f"{name}: torque up to {ratings['peak_Nm']:.4g} N·m leaves the map of its"
+            f" drive ({low:.4g} to {high:.4g} N·m), which continues linearly there"
+        )
+    if skips := ratings["ratcheting"]:
+        lines.append(
+            f"{name}: teeth would skip at {skips['time_s']:.4g} s with"
+            f" {skips['torque_Nm']:.4g} N·m; ratcheting torque"
+            f" {ratings['ratcheting_Nm']:.4g} N·m"
+        )
+    if joint["ripple_valid"] is False and (doubt := joint_doubt(joint)):
+        seen = _range(joint["map_difference"]["torque_range_Nm"])
+        lines.append(
+            f"{name}: torque ripple not valid from {seen}: the map of {joint['drive']}"
+            f" {doubt}; accepted: {percent(LIMIT)}; 'swgjoint meshing DESIGN --torque"
+            " NM' computes the ripple of the drive itself, level 'linear' runs without"
+            " ripple"
+        )
+    if joint["phase_step_rad"] > FAST * PHASE_STEP:
+        lines.append(
+            f"{name}: its rotor turned faster than commanded, the highest order of its"
+            f" drive by {joint['phase_step_rad']:.2g} rad a step; accepted: up to"
+            f" {PHASE_STEP:g} rad; use a smaller simulation.step_s"
+        )
+    return lines
+
+
+def _range(torques: Sequence[float]) -> str:
+    """Torques from the smallest to the largest."""
+    low, high = torques
+    return f"{low:.4g} to {high:.4g} N·m"
+
+
+def energy_reasons(energy: Mapping[str, float], rated: float) -> list[str]:
+    """One line where more energy is missing than integration and sums can explain.
+
+    Args:
+        energy: See :func:`judge_run` [J].
+        rated: Sum of the rated torques [N·m].
+    """
+    works = ("motor_work_J", "load_work_J", "dissipated_J")
+    turnover = sum(abs(energy[key]) for key in works) + abs(energy["stored_J"])
+    missing = energy["balance_error_J"]
+    if abs(missing) <= max(ENERGY_SHARE * turnover, ENERGY_FLOOR * rated):
+        return []
+    return [
+        f"{missing:.3g} J are missing in the balance of energies, with {turnover:.3g} J"
+        " of works and losses: a joint works against its stops, or the step is too"
+        " long; use another motion or a smaller simulation.step_s"
+    ]
+
+
+def _collision_reason(touching: list[Collision]) -> str:
+    """The deepest collisions in one line."""
+    some = [
+        f"{' and '.join(one.bodies)} ({one.depth / mm:.3g} mm deep, from"
+        f" {one.time:.3g} s)"
+        for one in touching[:3]
+    ]
+    more = f" and {len(touching) - 3} other pairs" if len(touching) > 3 else ""
+    return (
+        f"bodies collide: {', '.join(some)}{more}; use another start or travel, or"
+        " metrics.contacts_expected = true where contact is part of the task"
+    )

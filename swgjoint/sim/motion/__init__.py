@@ -1,0 +1,1 @@
+"""Commanded motions of joints and tool."""

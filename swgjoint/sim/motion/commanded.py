@@ -1,0 +1,183 @@
+"""The commanded motion of a scene on its time grid."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.errors import InputError
+from swgjoint.sim.arm.rigid_arm import RigidArm
+from swgjoint.sim.control import answer_speed
+from swgjoint.sim.motion import joint_motions, tool_motions
+from swgjoint.sim.motion.inverse_kinematics import ToolKinematics
+from swgjoint.sim.motion.trajectory import Trajectory, constant_speed, sweep, time_grid
+from swgjoint.sim.scene.scene import Scene
+from swgjoint.sim.scene.trajectory_sections import (
+    Chirp,
+    Circle,
+    ConstantSpeed,
+    FromFile,
+    Iso9283,
+    Line,
+    Step,
+    Sweep,
+    Trapezoid,
+)
+from swgjoint.units import deg, mm
+
+Array = NDArray[np.float64]
+
+HOLDS_ORIENTATION = 6
+"""Joints from which on the tool keeps its orientation unless the scene says."""
+
+
+def trajectory_of(scene: Scene, arm: RigidArm, *, sub_steps: int = 1) -> Trajectory:
+    """The commanded motion of all joints of an arm, at every step or part of one.
+
+    Raises:
+        InputError: If the arm cannot make the motion, or no sample of the run is left
+            for the metrics.
+    """
+    path = _motion_of(scene, arm, sub_steps)
+    if path.steady.stop <= path.steady.start:
+        raise InputError(
+            f"{scene.where}: simulation.step_s: {scene.simulation.step_s:g} s leaves no"
+            " sample in the part of the motion that the metrics use; accepted: a"
+            " smaller step or a longer motion"
+        )
+    return path
+
+
+def _motion_of(scene: Scene, arm: RigidArm, sub_steps: int) -> Trajectory:
+    """The motion by its kind."""
+    section, timing = scene.trajectory, scene.simulation
+    joints = arm.joints
+    start = _angles(section.start_deg, joints)
+    grid: dict[str, Any] = {
+        "duration": timing.duration_s,
+        "step": timing.step_s,
+        "sub_steps": sub_steps,
+    }
+    if isinstance(section, Sweep):
+        end = {**section.start_deg, **section.end_deg}
+        return sweep(
+            start=start,
+            end=_angles(end, joints),
+            hold=section.hold_s,
+            ramp=section.ramp_s,
+            settle=section.settle_s,
+            **grid,
+        )
+    if isinstance(section, ConstantSpeed):
+        return constant_speed(
+            start=start,
+            speed=_angles(section.speed_deg_s, joints),
+            settle=section.settle_s,
+            **grid,
+        )
+    time, where = time_grid(**grid), f"{scene.where}: trajectory"
+    if isinstance(section, Step):
+        jump = _angles(section.step_deg, joints)
+        return joint_motions.step(
+            time,
+            start=start,
+            jump=jump,
+            at=section.at_s,
+            answer_speed=answer_speed(scene.controller, jump),
+        )
+    if isinstance(section, Trapezoid):
+        return joint_motions.trapezoid(
+            time,
+            start=start,
+            end=_angles({**section.start_deg, **section.end_deg}, joints),
+            hold=section.hold_s,
+            max_speed=section.max_speed_deg_s * deg,
+            max_acceleration=section.max_acceleration_deg_s2 * deg,
+            where=where,
+        )
+    if isinstance(section, Chirp):
+        return joint_motions.chirp(
+            time,
+            start=start,
+            joint=joints.index(section.joint),
+            amplitude=section.amplitude_deg * deg,
+            first_frequency=section.from_Hz,
+            last_frequency=section.to_Hz,
+            hold=section.hold_s,
+            ramp=section.ramp_s,
+        )
+    if isinstance(section, FromFile):
+        points_time, points = joint_motions.read_points(section.file, joints, start)
+        return joint_motions.through_points(
+            time, points_time=points_time, points=points, hold=section.hold_s
+        )
+    hold = section.orientation or (
+        "hold" if len(joints) >= HOLDS_ORIENTATION else "free"
+    )
+    kinematics = ToolKinematics(arm, hold_orientation=hold == "hold", where=where)
+    return _tool_motion(section, time, kinematics, start)
+
+
+def _tool_motion(
+    section: Line | Circle | Iso9283,
+    time: Array,
+    kinematics: ToolKinematics,
+    start: Array,
+) -> Trajectory:
+    if isinstance(section, Line):
+        return tool_motions.line(
+            time,
+            kinematics,
+            start=start,
+            displacement=np.array(section.displacement_mm) * mm,
+            cycles=section.cycles,
+            hold=section.hold_s,
+            ramp=section.ramp_s,
+        )
+    if isinstance(section, Circle):
+        return tool_motions.circle(
+            time,
+            kinematics,
+            start=start,
+            radius=section.radius_mm * mm,
+            normal=np.array(section.normal),
+            towards=np.array(section.towards),
+            cycles=section.cycles,
+            hold=section.hold_s,
+            ramp=section.ramp_s,
+        )
+    return tool_motions.iso9283(
+        time,
+        kinematics,
+        start=start,
+        edge=section.edge_mm * mm,
+        plane=section.plane,
+        cycles=section.cycles,
+        hold=section.hold_s,
+        rest=section.rest_s,
+    )
+
+
+def _angles(values: dict[str, float], joints: tuple[str, ...]) -> Array:
+    """Values of a table of degrees in the order of the joints [rad]."""
+    return np.array([values.get(name, 0.0) for name in joints]) * deg
+
+
+def check_motion(scene: Scene, levels: set[str | None]) -> None:
+    """Refuse what a level cannot make of a motion.
+
+    Args:
+        scene: The scene.
+        levels: Those of all joints.
+
+    Raises:
+        InputError: For a step at level ``kinematic``.
+    """
+    if scene.trajectory.kind == "step" and "kinematic" in levels:
+        raise InputError(
+            f"{scene.where}: trajectory.kind = 'step' at level kinematic, which"
+            " prescribes its error on the commanded motion, and that jumps; accepted:"
+            " rigid, linear, native, full"
+        )

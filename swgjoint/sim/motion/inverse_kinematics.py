@@ -1,0 +1,164 @@
+r"""Joint angles that carry the tool along a path, by damped least squares.
+
+.. math:: \Delta q = J^T (J J^T + \lambda^2 I)^{-1} e, \qquad \lambda = c\,|e|,
+
+so that the damping vanishes with the error :math:`e` and the last steps are Newton's
+(Wampler 1986, IEEE Trans. SMC 16:93-101, with :math:`\lambda` constant there). Each
+solution starts from the one before, which keeps the arm in one configuration. A spline
+of degree five through the solutions is refined until it carries the tool along the path
+between them, too; its derivatives are the joint speeds and accelerations.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.errors import InputError
+from swgjoint.sim.arm.rigid_arm import RigidArm
+from swgjoint.units import mm
+
+Array = NDArray[np.float64]
+
+TOLERANCE = 1e-12
+"""Error of a pose, metres and radians together."""
+PATH_TOLERANCE = 1e-10
+"""Error of the path between two solutions [m]."""
+DAMPING = 0.1
+"""c: damping over error [1/m]."""
+MAX_STEPS = 200
+MAX_NODES = 8192
+LONGEST_STEP = 0.2
+"""Of a joint in one step of the iteration [rad]."""
+
+
+class ToolKinematics:
+    """Forward and inverse kinematics of the tool site of one arm."""
+
+    def __init__(self, arm: RigidArm, *, hold_orientation: bool, where: str) -> None:
+        """Use an arm that has a tool; ``where`` begins the messages."""
+        if arm.tool < 0:
+            raise InputError(
+                f"{where}: arm {arm.path.stem!r} has no site for the tool; needed for"
+                " this trajectory: tool_site"
+            )
+        self.arm, self.where = arm, where
+        self.rows = 6 if hold_orientation else 3
+        self._data = mujoco.MjData(arm.model)
+
+    def pose(self, q: Array) -> tuple[Array, Array]:
+        """Tool position [m], shape (3,), and rotation matrix, shape (9,)."""
+        data = self._data
+        data.qpos[:] = q
+        mujoco.mj_kinematics(self.arm.model, data)
+        return (
+            data.site_xpos[self.arm.tool].copy(),
+            data.site_xmat[self.arm.tool].copy(),
+        )
+
+    def solve(self, guess: Array, position: Array, rotation: Array) -> Array:
+        """Joint angles [rad] near a guess that put the tool at a pose.
+
+        Raises:
+            InputError: If the tool does not get there.
+        """
+        model, data, tool = self.arm.model, self._data, self.arm.tool
+        q, jacobian = guess.copy(), np.zeros((6, model.nv))
+        goal, turn = np.zeros(4), np.zeros(3)
+        mujoco.mju_mat2Quat(goal, rotation)
+        here, best, waited = np.zeros(4), np.inf, 0
+        for _ in range(MAX_STEPS):
+            self.pose(q)
+            mujoco.mj_comPos(model, data)
+            mujoco.mj_jacSite(model, data, jacobian[:3], jacobian[3:], tool)
+            mujoco.mju_mat2Quat(here, data.site_xmat[tool])
+            mujoco.mju_subQuat(turn, goal, here)  # in the frame of the tool
+            about = data.site_xmat[tool].reshape(3, 3) @ turn
+            error = np.concatenate([position - data.site_xpos[tool], about])
+            error, J = error[: self.rows], jacobian[: self.rows]
+            size = float(np.linalg.norm(error))
+            if size <= TOLERANCE:
+                return q
+            waited = 0 if size < 0.99 * best else waited + 1
+            best = min(best, size)
+            if waited > 20:
+                break
+            damped = J @ J.T + (DAMPING * size) ** 2 * np.eye(self.rows)
+            step = J.T @ np.linalg.solve(damped, error)
+            q += step * min(1.0, LONGEST_STEP / max(np.abs(step).max(), 1e-300))
+        place = ", ".join(f"{x / mm:.4g}" for x in position)
+        off = float(np.linalg.norm(error[:3])) / mm
+        raise InputError(
+            f"{self.where}: the tool cannot reach ({place}) mm"
+            f"{' in its orientation' if self.rows == 6 else ''}: {off:.3g} mm short;"
+            " accepted: a path within reach of the arm from start_deg"
+        )
+
+
+def follow(
+    kinematics: ToolKinematics,
+    start: Array,
+    place: Callable[[Array], Array],
+    *,
+    length: float,
+    nodes: int = 32,
+) -> Any:
+    """Joint angles along a path at the tool's first orientation.
+
+    Args:
+        kinematics: Of the arm.
+        start: Joint angles whose tool is the start of the path [rad]. (n_joints,).
+        place: Points of the path [m], shape (m, 3), at parameters of shape (m,).
+        length: The parameter runs from 0 to this.
+        nodes: Solutions of the first attempt.
+
+    Returns:
+        A spline of the parameter with values of shape (m, n_joints).
+
+    Raises:
+        InputError: If the tool cannot reach the path, leaves the range of a joint, or
+            passes a singular pose.
+    """
+    from scipy.interpolate import make_interp_spline
+
+    _, rotation = kinematics.pose(start)
+    s = np.linspace(0.0, length, nodes + 1)
+    while True:
+        q = np.empty((s.size, start.size))
+        guess = start
+        for k, point in enumerate(place(s)):
+            q[k] = guess = kinematics.solve(guess, point, rotation)
+        spline = make_interp_spline(s, q, k=5)
+        middle = 0.5 * (s[1:] + s[:-1])
+        off = kinematics.arm.tool_positions(np.asarray(spline(middle))) - place(middle)
+        if np.abs(off).max() <= PATH_TOLERANCE:
+            break
+        if s.size > MAX_NODES:
+            worst = place(middle)[int(np.abs(off).max(axis=1).argmax())]
+            raise InputError(
+                f"{kinematics.where}: the joints jump where the tool passes"
+                f" ({', '.join(f'{x / mm:.4g}' for x in worst)}) mm, a singular pose;"
+                " accepted: a path away from it"
+            )
+        s = np.linspace(0.0, length, 2 * (s.size - 1) + 1)
+    _check_limits(kinematics, q)
+    return spline
+
+
+def _check_limits(kinematics: ToolKinematics, q: Array) -> None:
+    """Refuse a path that leaves the range of a joint."""
+    model = kinematics.arm.model
+    for j, name in enumerate(kinematics.arm.joints):
+        low, high = model.jnt_range[j]
+        if model.jnt_limited[j] and (q[:, j].min() < low or q[:, j].max() > high):
+            reached = np.rad2deg([q[:, j].min(), q[:, j].max()])
+            limits = np.rad2deg([low, high])
+            raise InputError(
+                f"{kinematics.where}: {name} would go from {reached[0]:.4g} to"
+                f" {reached[1]:.4g} deg; accepted: {limits[0]:.4g} to"
+                f" {limits[1]:.4g} deg"
+            )

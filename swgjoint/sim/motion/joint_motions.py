@@ -1,0 +1,265 @@
+"""Motions that are given joint by joint: step, trapezoid, chirp, points of a file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.csv_columns import header_of, read_columns
+from swgjoint.errors import InputError
+from swgjoint.sim.motion.trajectory import Trajectory, smooth_ramp, window
+from swgjoint.units import deg
+
+Array = NDArray[np.float64]
+
+CLOSEST, LONGEST = 1e-6, 1e4
+"""Times between points of a file and of the whole motion [s]: the shortest step and the
+longest duration of a simulation."""
+LARGEST = 1e4
+"""Angle of a point of a file [rad]: more than a thousand turns."""
+
+
+def step(
+    time: Array, *, start: Array, jump: Array, at: float, answer_speed: Array
+) -> Trajectory:
+    """Rest, and rest somewhere else from ``at`` [s] on; not continuous.
+
+    Args:
+        time: [s]. Shape (n,).
+        start: [rad]. Shape (n_joints,).
+        jump: [rad]. Shape (n_joints,).
+        at: [s]; the reference is already there at a sample of that time.
+        answer_speed: Largest speed that the controller's answer is expected to have
+            [rad/s]. Shape (n_joints,).
+    """
+    after = time >= at - 1e-9
+    position = start + after[:, None] * jump
+    return Trajectory(
+        time=time,
+        position=position,
+        velocity=np.zeros_like(position),
+        acceleration=np.zeros_like(position),
+        steady=window(time, at, time[-1]),
+        steady_velocity=np.zeros_like(start),
+        arrival=at,
+        answer_speed=np.abs(answer_speed),
+    )
+
+
+def trapezoid(
+    time: Array,
+    *,
+    start: Array,
+    end: Array,
+    hold: float,
+    max_speed: float,
+    max_acceleration: float,
+    where: str = "trajectory",
+) -> Trajectory:
+    """Constant acceleration, constant speed, constant deceleration, rest.
+
+    All joints follow one law from 0 to 1, the fastest that keeps every joint within
+    its limits. The velocity is continuous, the acceleration jumps.
+
+    Args:
+        time: [s]. Shape (n,).
+        start: [rad]. Shape (n_joints,).
+        end: [rad]. Shape (n_joints,).
+        hold: Rest before [s].
+        max_speed: Limit of every joint [rad/s].
+        max_acceleration: Limit of every joint [rad/s²].
+        where: Begins the message.
+
+    Raises:
+        InputError: If start and end are the same.
+    """
+    way = float(np.abs(end - start).max())
+    if way == 0.0:
+        raise InputError(f"{where}.end_deg: where the arm starts; needed: a way to go")
+    speed, acceleration = max_speed / way, max_acceleration / way
+    ramp = min(speed / acceleration, acceleration**-0.5)
+    speed = acceleration * ramp
+    cruise = max(1.0 / speed - ramp, 0.0)
+    first, second = hold + ramp, hold + ramp + cruise
+    up = np.clip(time - hold, 0.0, ramp)
+    even = np.clip(time - first, 0.0, cruise)
+    down = np.clip(time - second, 0.0, ramp)
+    path = 0.5 * acceleration * up**2 + speed * (even + down)
+    path -= 0.5 * acceleration * down**2
+    rate = acceleration * (up - down)
+    bend = acceleration * (
+        ((time >= hold) & (time < first)).astype(float)
+        - ((time >= second) & (time < second + ramp)).astype(float)
+    )
+    steady = window(time, first, second)
+    travels = steady.stop - steady.start >= 16
+    return Trajectory(
+        time=time,
+        position=start + path[:, None] * (end - start),
+        velocity=rate[:, None] * (end - start),
+        acceleration=bend[:, None] * (end - start),
+        steady=steady if travels else window(time, hold, second + ramp),
+        steady_velocity=speed * (end - start) if travels else np.zeros_like(start),
+        arrival=second + ramp,
+    )
+
+
+def chirp(
+    time: Array,
+    *,
+    start: Array,
+    joint: int,
+    amplitude: float,
+    first_frequency: float,
+    last_frequency: float,
+    hold: float,
+    ramp: float,
+) -> Trajectory:
+    r"""One joint swings, its frequency changing evenly; twice differentiable.
+
+    .. math:: q = q_0 + A\,w(t)\sin\phi(t), \quad
+        \dot\phi = 2\pi\left(f_0 + (f_1 - f_0)\,t/T\right)
+
+    with :math:`w` the smooth step from 0 to 1 and back over ``ramp``.
+
+    Args:
+        time: [s]. Shape (n,).
+        start: [rad]. Shape (n_joints,).
+        joint: Which one.
+        amplitude: [rad].
+        first_frequency: At the start of the swing [Hz].
+        last_frequency: At its end [Hz].
+        hold: Rest before and after [s].
+        ramp: Time in which the amplitude grows, and fades [s].
+    """
+    length = time[-1] - 2.0 * hold
+    t = np.clip(time - hold, 0.0, length)
+    growth = np.pi * (last_frequency - first_frequency) / length
+    phase = 2.0 * np.pi * first_frequency * t + growth * t**2
+    rate = 2.0 * np.pi * first_frequency + 2.0 * growth * t
+    _, up, up_1 = smooth_ramp(np.clip(t / ramp, 0.0, 1.0))
+    _, down, down_1 = smooth_ramp(np.clip((length - t) / ramp, 0.0, 1.0))
+    up_2, down_2 = (
+        60.0 * x * (1.0 - x) * (1.0 - 2.0 * x)
+        for x in (np.clip(s / ramp, 0.0, 1.0) for s in (t, length - t))
+    )
+    # the two ramps do not overlap: where one changes the other is 1
+    w, w_1 = up * down, (up_1 - down_1) / ramp
+    w_2 = (up_2 + down_2) / ramp**2
+    sine, cosine = np.sin(phase), np.cos(phase)
+    position = np.tile(start, (time.size, 1))
+    velocity, acceleration = np.zeros_like(position), np.zeros_like(position)
+    position[:, joint] += amplitude * w * sine
+    velocity[:, joint] = amplitude * (w_1 * sine + w * rate * cosine)
+    acceleration[:, joint] = amplitude * (
+        w_2 * sine
+        + 2.0 * w_1 * rate * cosine
+        + w * (2.0 * growth * cosine - rate**2 * sine)
+    )
+    return Trajectory(
+        time=time,
+        position=position,
+        velocity=velocity,
+        acceleration=acceleration,
+        steady=window(time, hold + ramp, time[-1] - hold - ramp),
+        steady_velocity=np.zeros_like(start),
+        arrival=float(time[-1] - hold),
+    )
+
+
+def through_points(
+    time: Array, *, points_time: Array, points: Array, hold: float
+) -> Trajectory:
+    """Rest, a smooth motion through all points, rest; twice differentiable throughout.
+
+    A spline of degree five that starts and ends at rest without acceleration.
+
+    Args:
+        time: [s]. Shape (n,).
+        points_time: Increasing [s]; the first is where the rest ends. Shape (m,).
+        points: [rad]. Shape (m, n_joints).
+        hold: Rest before [s].
+    """
+    from scipy.interpolate import make_interp_spline
+
+    still = [(1, np.zeros(points.shape[1])), (2, np.zeros(points.shape[1]))]
+    spline = make_interp_spline(
+        points_time - points_time[0], points, k=5, bc_type=(still, still)
+    )
+    length = float(points_time[-1] - points_time[0])
+    t = np.clip(time - hold, 0.0, length)
+    moving = ((time > hold) & (time < hold + length))[:, None]
+    return Trajectory(
+        time=time,
+        position=np.asarray(spline(t)),
+        velocity=np.where(moving, spline(t, 1), 0.0),
+        acceleration=np.where(moving, spline(t, 2), 0.0),
+        steady=window(time, hold, min(hold + length, time[-1])),
+        steady_velocity=np.zeros(points.shape[1]),
+        arrival=hold + length if hold + length <= time[-1] + 1e-9 else None,
+    )
+
+
+def read_points(
+    path: str | Path, joints: tuple[str, ...], start: Array
+) -> tuple[Array, Array]:
+    """Times [s] and joint angles [rad] of a CSV file. Shapes (m,) and (m, n_joints).
+
+    Args:
+        path: Columns ``time_s`` and ``<joint>_deg`` or ``<joint>_rad``; a joint without
+            a column stays at its start.
+        joints: Of the arm.
+        start: [rad]. Shape (n_joints,).
+
+    Raises:
+        InputError: If the file cannot be used; names file, line or column.
+    """
+    accepted = {
+        name: {f"{name}_deg": deg, f"{name}_rad": 1.0} for name in joints
+    }  # fmt: skip
+    header = header_of(path)
+    unknown = [
+        cell
+        for cell in header
+        if cell != "time_s" and not any(cell in units for units in accepted.values())
+    ]
+    moved = [
+        name
+        for name, units in accepted.items()
+        if any(cell in units for cell in header)
+    ]
+    if header and (unknown or not moved):
+        what = f"column {unknown[0][:40]!r}" if unknown else "no column of a joint"
+        raise InputError(
+            f"{path}: {what}; accepted: time_s and <joint>_deg or <joint>_rad of"
+            f" {', '.join(joints)}"
+        )
+    columns = read_columns(
+        path, {"time": {"time_s": 1.0}, **{name: accepted[name] for name in moved}}
+    )
+    time = columns["time"]
+    if time.size < 2 or not (np.diff(time) > 0.0).all():
+        raise InputError(
+            f"{path}: time_s does not increase from line to line; needed: two points"
+            " or more, each later than the one before"
+        )
+    nearest, length = float(np.diff(time).min()), float(time[-1] - time[0])
+    if nearest < CLOSEST or length > LONGEST:
+        raise InputError(
+            f"{path}: time_s: points {nearest:.3g} s apart at the closest,"
+            f" {length:.3g} s in all; accepted: at least {CLOSEST:g} s and at most"
+            f" {LONGEST:g} s"
+        )
+    for name in moved:
+        largest = float(np.abs(columns[name]).max())
+        if largest > LARGEST:
+            raise InputError(
+                f"{path}: {name}: an angle of {largest / deg:.3g} deg; accepted: up to"
+                f" {LARGEST / deg:.3g} deg"
+            )
+    points = np.tile(start, (time.size, 1))
+    for name in moved:
+        points[:, joints.index(name)] = columns[name]
+    return time, points

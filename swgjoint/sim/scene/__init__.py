@@ -1,0 +1,1 @@
+"""Scene files: their tables, checks and text."""

@@ -1,0 +1,357 @@
+"""A scene file: an arm, its drives, a motion, a controller and a time step."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Annotated, Any, Self
+
+from pydantic import Field, PrivateAttr, model_validator
+
+from swgjoint.errors import InputError
+from swgjoint.faults import (
+    MAX_DEPTH,
+    Fault,
+    Section,
+    parse_toml,
+    parse_value,
+    read_toml,
+    shortened,
+    validated,
+)
+from swgjoint.models_path import find, is_file
+from swgjoint.sim.arm.reading import ArmReading
+from swgjoint.sim.scene.feature_sections import (
+    Disturbance,
+    Payload,
+    Sensors,
+    misfits,
+    too_fast,
+)
+from swgjoint.sim.scene.sections import (
+    Controller,
+    JointSection,
+    Level,
+    Load,
+    Metrics,
+    Recording,
+    Several,
+    Simulation,
+)
+from swgjoint.sim.scene.trajectory_sections import MOTIONS, Chirp, TrajectorySection
+from swgjoint.units import deg
+
+MAX_STEPS = 2_000_000
+"""Recorded steps of a run; memory bounds the sub-steps of the engine."""
+
+
+class Scene(Section):
+    """One scene: attributes mirror the tables and keys of the file, units included."""
+
+    name: str
+    description: str = ""
+    arm: str
+    """Path or bundled name of an MJCF file."""
+    tool_site: str = "tool"
+    """Site whose position is the tool; the arm may have none."""
+    driven: Annotated[tuple[str, ...], Several] = ()
+    """Names or patterns (``*``, ``?``) of the hinges that have drives; none: all. The
+    others are held, where ``trajectory.start_deg`` or ``pose`` has them."""
+    pose: str | None = None
+    """Keyframe of the arm's file at which joints without a drive are held; None: the
+    reference position."""
+    balance_inertia: bool = False
+    """Whether inertias that no rigid body has are repaired."""
+    defaults: JointSection = JointSection()
+    """Drive of every hinge joint that does not say otherwise."""
+    joints: dict[str, JointSection] = Field(default_factory=dict)
+    trajectory: TrajectorySection
+    controller: Controller = Controller()
+    load: dict[str, Load] = Field(default_factory=dict)
+    """Constant torque that the load exerts against a joint."""
+    sensors: Sensors | None = None
+    """What the controller reads; None reads every angle exactly and at once."""
+    payload: Payload | None = None
+    disturbance: list[Disturbance] = Field(default_factory=list)
+    """Torques and forces that the controller does not know of."""
+    simulation: Simulation
+    recording: Recording = Recording()
+    metrics: Metrics = Metrics()
+
+    _where: str = PrivateAttr(default="scene")
+
+    @property
+    def reading(self) -> ArmReading:
+        """How the file of the arm is read."""
+        angles = {name: q * deg for name, q in self.trajectory.start_deg.items()}
+        return ArmReading(
+            driven=self.driven,
+            pose=self.pose,
+            angles=angles,
+            balance_inertia=self.balance_inertia,
+        )
+
+    @property
+    def where(self) -> str:
+        """What messages call this scene: its file or its name."""
+        return self._where
+
+    @model_validator(mode="after")
+    def _times_fit(self) -> Self:
+        duration, step = self.simulation.duration_s, self.simulation.step_s
+        needed = self.trajectory.shortest_s
+        faults = []
+        run = round(duration / step) * step
+        if run <= needed + 1e-9:
+            rounded = (
+                "" if abs(run - duration) < 1e-9 else f", {run:g} s in whole steps"
+            )
+            faults.append(
+                (
+                    "simulation.duration_s",
+                    f"{duration:g} s{rounded}; accepted: more than the {needed:g} s"
+                    " that holds, ramps and settling of the trajectory take",
+                )
+            )
+        if duration / step > MAX_STEPS:
+            faults.append(
+                (
+                    "simulation.step_s",
+                    f"{step:g} s makes {duration / step:.3g} steps; accepted: at most"
+                    f" {MAX_STEPS} steps in a run",
+                )
+            )
+        times = {"controller.control_period_s": self.controller.control_period_s}
+        for side in ("motor", "link", "torque") if self.sensors else ():
+            sensor = getattr(self.sensors, side)
+            if sensor is not None:
+                times[f"sensors.{side}.delay_s"] = sensor.delay_s
+        if self.sensors and self.sensors.link and self.controller.feedback == "motor":
+            faults.append(
+                (
+                    "sensors.link",
+                    "read by nobody; accepted: with controller.feedback = 'link'",
+                )
+            )
+        faults += [
+            (key, f"{value:g} s; accepted: a multiple of step_s, {step:g} s")
+            for key, value in times.items()
+            if value
+            and (
+                round(value / step) < 1
+                or abs(value / step - round(value / step)) > 1e-6
+            )
+        ]
+        if isinstance(self.trajectory, Chirp):
+            faults += [
+                (f"trajectory.{key}", fault)
+                for key in ("from_Hz", "to_Hz")
+                for fault in too_fast(getattr(self.trajectory, key), step)
+            ]
+        for k, one in enumerate(self.disturbance):
+            found = misfits(one, run=run, step=step)
+            faults += [(f"disturbance[{k}].{key}", fault) for key, fault in found]
+        if faults:
+            raise Fault(*faults)
+        return self
+
+    @property
+    def sampled(self) -> bool:
+        """Whether the controller is a loop of its own, once a control period."""
+        controller = self.controller
+        return (
+            controller.kind == "computed_torque"
+            or controller.control_period_s is not None
+            or controller.feedback == "link"
+            or self.sensors is not None
+        )
+
+    @classmethod
+    def load_file(
+        cls,
+        reference: str | Path,
+        overrides: Mapping[str, Any] | Iterable[str] | None = None,
+    ) -> Self:
+        """Read a scene file, given as a path or as the name of a bundled one.
+
+        Args:
+            reference: Path or bundled name.
+            overrides: Dotted keys with new values, as a mapping or as ``key=value``
+                texts whose value is read as TOML (a bare word is a text).
+
+        Raises:
+            InputError: With one line per fault of the file.
+        """
+        path = find(reference, "scenes", ".toml", what="scene")
+        data = read_toml(path, what="scene")
+        _anchor_paths(data, path.parent)
+        return cls.from_data(data, where=str(path), overrides=overrides)
+
+    @classmethod
+    def from_toml(cls, text: str, where: str = "scene") -> Self:
+        """A scene from the text of a scene file; ``where`` names it in messages."""
+        return cls.from_data(parse_toml(text, where=where), where=where)
+
+    @classmethod
+    def from_data(
+        cls,
+        data: Mapping[str, Any],
+        *,
+        where: str = "scene",
+        overrides: Mapping[str, Any] | Iterable[str] | None = None,
+    ) -> Self:
+        """A scene from plain tables; all faults are listed at once."""
+        merged = _merged(data, overrides, where)
+        lines: list[str] = []
+        # tables keyed by joint are checked one by one, so that messages know their keys
+        for table, model in (("joints", JointSection), ("load", Load)):
+            entries = merged.get(table)
+            if not isinstance(entries, dict):
+                continue
+            faulty = [
+                line
+                for joint, entry in entries.items()
+                if isinstance(entry, dict)
+                for line in _faults_of(model, entry, f"{where}: {table}.{joint}")
+            ]
+            if faulty:
+                lines += faulty
+                merged[table] = {}
+        try:
+            scene = validated(cls, merged, where=where)
+        except InputError as exc:
+            lines += str(exc).split("\n")
+        if lines:
+            raise InputError("\n".join(dict.fromkeys(lines)))
+        scene._where = where
+        return scene
+
+    def with_changes(self, overrides: Mapping[str, Any] | Iterable[str]) -> Self:
+        """A checked copy with other values for some dotted keys."""
+        data = self.model_dump(exclude_unset=True)
+        return self.from_data(data, where=self.where, overrides=overrides)
+
+    def with_drive(self, drive: str) -> Self:
+        """A copy in which every joint has this drive, at its default fidelity."""
+        return self._with_all(drive=drive, linear=None, model=None)
+
+    def with_model(self, model: str) -> Self:
+        """A copy in which every drive, a design, has a map of this fidelity."""
+        return self._with_all(model=model)
+
+    def with_level(self, level: Level) -> Self:
+        """A copy in which every joint has this level."""
+        return self._with_all(level=level)
+
+    def with_friction(self, friction: bool) -> Self:
+        """A copy in which every joint has the friction of its drive, or none has."""
+        return self._with_all(friction=friction)
+
+    def with_kinematic_error(self, arcmin: float | None) -> Self:
+        """A copy in which every joint has this assumed error; None: that stated."""
+        return self._with_all(kinematic_error_arcmin=arcmin)
+
+    def _with_all(self, **values: Any) -> Self:
+        defaults = self.defaults.model_copy(update=values)
+        joints = {
+            name: joint.model_copy(update={key: None for key in values})
+            for name, joint in self.joints.items()
+        }
+        copy = self.model_copy(update={"defaults": defaults, "joints": joints})
+        copy._where = self._where
+        return copy
+
+    def of_joint(self, name: str) -> JointSection:
+        """Settings of one joint, its own over the defaults."""
+        return self.joints.get(name, JointSection()).over(self.defaults)
+
+
+def _faults_of(model: type[Section], entry: dict[str, Any], path: str) -> list[str]:
+    """Lines about one table that lies at a dotted path of the file."""
+    try:
+        validated(model, entry, where="\0")
+    except InputError as exc:
+        return [line.replace("\0: ", f"{path}.", 1) for line in str(exc).split("\n")]
+    return []
+
+
+def _merged(
+    data: Mapping[str, Any],
+    overrides: Mapping[str, Any] | Iterable[str] | None,
+    where: str,
+) -> dict[str, Any]:
+    """Deep copy of the tables with the overrides in place."""
+
+    def copied(value: Any) -> Any:
+        if isinstance(value, Mapping):
+            return {key: copied(item) for key, item in value.items()}
+        return value
+
+    merged: dict[str, Any] = copied(data)
+    pairs = (
+        list(overrides.items())
+        if isinstance(overrides, Mapping)
+        else [parse_override(text) for text in overrides or ()]
+    )
+    # another kind of motion first: keys that only the old one has go with it
+    for key, value in sorted(pairs, key=lambda pair: pair[0] != "trajectory.kind"):
+        if key == "trajectory.kind":
+            _switch_motion(merged.get("trajectory"), value)
+        *tables, last = key.split(".")
+        table = merged
+        for name in tables:
+            _make_room(table, name)
+            table = table.setdefault(name, {})
+            if not isinstance(table, dict):
+                raise InputError(f"{where}: {key}: {name} is not a table")
+        _make_room(table, last)
+        table[last] = value
+    return merged
+
+
+def _switch_motion(table: Any, kind: Any) -> None:
+    """Leave of a motion what a motion of another kind has, too."""
+    if not isinstance(table, dict) or table.get("kind") == kind:
+        return
+    model = MOTIONS.get(kind) if isinstance(kind, str) else None
+    if model is not None:
+        for key in set(table) - set(model.model_fields):
+            del table[key]
+
+
+def _make_room(table: dict[str, Any], key: str) -> None:
+    """A drive by name and a linear one exclude each other: the new one wins."""
+    table.pop({"drive": "linear", "linear": "drive"}.get(key, ""), None)
+
+
+def parse_override(text: str) -> tuple[str, Any]:
+    """``key=value`` of the command line as a dotted key and a TOML value."""
+    key, equals, value = text.partition("=")
+    key = key.strip()
+    if not equals or not all(key.split(".")):
+        raise InputError(
+            f"override {shortened(text)!r}: accepted: key=value with a dotted key, for"
+            " example simulation.step_s=0.0005"
+        )
+    if key.count(".") >= MAX_DEPTH:
+        raise InputError(
+            f"override {shortened(key)}: accepted: a dotted key of at most {MAX_DEPTH}"
+            " parts"
+        )
+    return key, parse_value(value, where=key)  # a bare word: a name or a path
+
+
+def _anchor_paths(data: dict[str, Any], folder: Path) -> None:
+    """Make paths in a scene file relative to that file, names stay names."""
+
+    def anchor(table: Any, key: str) -> None:
+        value = table.get(key) if isinstance(table, dict) else None
+        if isinstance(value, str) and is_file(folder / value):
+            table[key] = str(folder / value)
+
+    anchor(data, "arm")
+    anchor(data.get("trajectory"), "file")
+    anchor(data.get("defaults"), "drive")
+    joints = data.get("joints")
+    for joint in joints.values() if isinstance(joints, dict) else ():
+        anchor(joint, "drive")

@@ -1,0 +1,22 @@
+"""A scene as the text of a scene file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from swgjoint.sim.scene.scene import Scene
+from swgjoint.toml_text import toml_text
+
+
+def scene_toml(scene: Scene) -> str:
+    """What the scene sets, as TOML that :meth:`Scene.load_file` reads anywhere.
+
+    Files that it names stand with their whole paths.
+    """
+    data = scene.model_dump(exclude_unset=True, exclude_none=True)
+    named = (data, data["trajectory"], data.get("defaults", {}))
+    for table in (*named, *data.get("joints", {}).values()):
+        for key in ("arm", "file", "drive"):
+            if Path(table.get(key, "")).is_file():
+                table[key] = str(Path(table[key]).resolve())
+    return toml_text(data)

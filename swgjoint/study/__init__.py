@@ -1,1 +1,0 @@
-"""Comparisons with sources: one function a study, plugged into ``swgjoint study``."""

@@ -1,0 +1,1 @@
+"""Comparisons with published sources, one function per study."""

@@ -1,0 +1,1 @@
+"""Three articles on flexsplines, computed again."""

@@ -1,0 +1,191 @@
+"""``swgjoint study articles``: three articles on flexsplines, computed again.
+
+Parts: ``deflection`` of the 80:1 drive, ``force`` that deforms XB1-100-80, ``stress``
+and ``fatigue`` of a cup. Closed forms as printed stand beside finite elements in space;
+``converged`` is the same on a finer mesh, where computed: twice the elements of the
+thesis per direction for small deflections, those of the thesis instead of 0.6 of them
+where a wave generator is in contact.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from swgjoint.errors import InputError
+from swgjoint.files import Outputs
+from swgjoint.gear.design.design import Design
+from swgjoint.json_text import json_text
+from swgjoint.pool import run_all
+from swgjoint.validation.articles.file import ArticlesFile, changed
+from swgjoint.validation.articles.lobes import lobe_rows
+from swgjoint.validation.articles.rows import (
+    deflection_rows,
+    fatigue_rows,
+    force_rows,
+    stress_rows,
+)
+from swgjoint.validation.articles.runs import Found, Task, run_task
+from swgjoint.validation.rows import Row, StudyOptions, StudyResult
+
+PARTS = ("deflection", "force", "stress", "fatigue")
+FINE = {"mesh.refinement": 2}
+COARSE = {"mesh.refinement": 0.6}
+"""The coarsest mesh with a plane in the middle of the face width."""
+FINE_TORQUES = slice(0, None, 3)
+"""Torques at which the finer mesh is computed, too."""
+
+
+def run_articles(options: StudyOptions) -> StudyResult:
+    """Run the chosen parts, or all of them.
+
+    Raises:
+        InputError: If a part or the fidelity is unknown.
+    """
+    if options.model not in (None, "3d"):
+        raise InputError(f"--model {options.model}: the articles need solids, 3d")
+    parts = options.chosen(PARTS)
+    study = ArticlesFile.load()
+    tasks = {task.name: task for part in parts for task in tasks_of(study, part)}
+    ordered = sorted(tasks.values(), key=lambda task: -task.size)
+    results = run_all(
+        run_task,
+        ordered,
+        jobs=options.jobs,
+        stage="computations",
+        progress=options.progress,
+    )
+    found = dict(zip((task.name for task in ordered), results, strict=True))
+    rows = [row for part in parts for row in rows_of(study, part, found)]
+    failed = [name for name, result in found.items() if "fault" in result]
+    summary = [_summary(part, study, found) for part in parts]
+    summary += [f"failed: {name}: {found[name]['fault']}" for name in failed]
+    more = {"source": study.source, "computations": found, "failed": failed}
+    files = _write(options, rows, parts, found)
+    return StudyResult(
+        rows=tuple(rows), summary=tuple(filter(None, summary)), more=more, files=files
+    )
+
+
+def tasks_of(study: ArticlesFile, part: str) -> list[Task]:
+    """What a part computes."""
+    if part == "deflection":
+        own = changed(study.deflection.base)
+        tasks = _deflected("deflection", own, fine=True)
+        for v in study.deflection.variations:
+            tasks += _deflected(f"deflection, {v.name}", own.with_changes(v.changes))
+        return tasks
+    if part == "force":
+        force = study.force
+        design = changed(force.base)
+        tasks = [
+            Task(name="force", kind="pinched", design=design),
+            Task(name="force, smooth", kind="pinched", design=design, toothless=True),
+            Task(name="force, large", kind="rotated", design=design, size=2),
+            Task(name="force, lobes", kind="lobes", design=design, size=4),
+            Task(
+                name="force, fine",
+                kind="pinched",
+                design=design.with_changes(FINE),
+                size=15,
+            ),
+        ]
+        return tasks + [
+            Task(
+                name=f"force, {v.name}",
+                kind="pinched",
+                design=changed(force.base, v.changes),
+            )
+            for v in force.variations
+        ]
+    stress = study.stress
+    design, torques = changed(stress.base), stress.torques_Nm
+    crowned = design.with_changes(stress.crowned)
+    tasks = [
+        Task(name="four", kind="four", design=design, torques=torques, size=2),
+        Task(
+            name="four, fine",
+            kind="four",
+            design=design.with_changes(FINE),
+            torques=torques,
+            size=16,
+        ),
+    ]
+    if part == "stress":
+        tasks += _deflected("ellipse", design, fine=True)
+        return tasks + _deflected("crowned", crowned)
+    for name, on, size in (
+        ("fatigue", design.with_changes(COARSE), 5),
+        ("fatigue, crowned", crowned.with_changes(COARSE), 5),
+        ("fatigue, fine", design, 20),
+    ):
+        few = torques[FINE_TORQUES] if name == "fatigue, fine" else torques
+        tasks.append(Task(name=name, kind="fatigue", design=on, torques=few, size=size))
+    return tasks
+
+
+def _deflected(name: str, design: Design, *, fine: bool = False) -> list[Task]:
+    """On the wave generator, on one mesh or two."""
+    coarse = design.with_changes(COARSE)
+    tasks = [Task(name=name, kind="deflected", design=coarse, size=2)]
+    if fine:
+        more = Task(name=f"{name}, fine", kind="deflected", design=design, size=8)
+        tasks.append(more)
+    return tasks
+
+
+def rows_of(study: ArticlesFile, part: str, found: Mapping[str, Found]) -> list[Row]:
+    """Rows of a part from what its tasks found."""
+    build = {
+        "deflection": lambda: deflection_rows(study.deflection, found),
+        "force": lambda: [
+            *force_rows(study.force, found),
+            *lobe_rows(study.force, found["force, lobes"]),
+        ],
+        "stress": lambda: stress_rows(study.stress, found),
+        "fatigue": lambda: fatigue_rows(study.stress, found),
+    }
+    return build[part]()
+
+
+def _summary(part: str, study: ArticlesFile, found: Mapping[str, Found]) -> str:
+    if part == "force" and "fault" not in found["force"]:
+        values = [
+            result["mid_face"]
+            for name, result in found.items()
+            if name.startswith("force, ")
+            and "mid_face" in result
+            and name not in ("force, smooth", "force, fine")
+        ]
+        return (
+            f"radial stiffness of {study.force.base}: {found['force']['mid_face']:.3g}"
+            f" N/mm at mid-face; {min(values):.3g} to {max(values):.3g} with what the"
+            " article leaves open, each changed alone"
+        )
+    if part == "fatigue" and "fault" not in found["fatigue"]:
+        rows = found["fatigue"]["by_torque"]
+        first, last = rows[0], rows[-1]
+        return (
+            f"safety factor from {first['torque_Nm']:g} to {last['torque_Nm']:g} N·m:"
+            f" shell theory {first['shell_theory']['S']:.3g} to"
+            f" {last['shell_theory']['S']:.3g}, finite elements at mid-face"
+            f" {first['mid_face']['S']:.3g} to {last['mid_face']['S']:.3g}, worst"
+            f" section {first['worst_section']['S']:.3g} to"
+            f" {last['worst_section']['S']:.3g}"
+        )
+    return ""
+
+
+def _write(
+    options: StudyOptions,
+    rows: Sequence[Row],
+    parts: Sequence[str],
+    found: Mapping[str, Found],
+) -> tuple[str, ...]:
+    if options.folder is None:
+        return ()
+    from swgjoint.view.plots.articles import articles_picture
+
+    outputs, table = Outputs(options.folder), [row.to_json() for row in rows]
+    outputs.write("articles.json", lambda: json_text(table) + "\n")
+    outputs.write("articles.png", lambda: articles_picture(parts, found))
+    return tuple(outputs.files)

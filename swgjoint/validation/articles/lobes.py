@@ -1,0 +1,107 @@
+"""Rows on an elastic wave generator, which the deformation-force article is for."""
+
+from __future__ import annotations
+
+from math import isfinite, isinf
+
+import numpy as np
+
+from swgjoint.errors import InputError
+from swgjoint.fe.solid.wave_generator.elastic import (
+    ElasticWaveGenerator,
+    LobeCharacteristic,
+)
+from swgjoint.units import arcmin, mm
+from swgjoint.validation.articles.file import Force
+from swgjoint.validation.articles.runs import Found
+from swgjoint.validation.rows import Row
+
+PLACE = "two loads at mid-face, large rotations"
+LOADED = (
+    "2P at each of two points in the article's text, P at each in its work and in the"
+    " formula that follows"
+)
+PRELOAD = (
+    "the article has this force preload the teeth; it bends the cup, and teeth chosen"
+    " here take up at the force below"
+)
+
+
+def characteristic_of(found: Found) -> LobeCharacteristic:
+    """What :func:`swgjoint.validation.articles.runs.run_task` computed, in SI."""
+    return LobeCharacteristic(
+        height=found["height_mm"] * mm,
+        deflection=np.array(found["deflection_mm"]) * mm,
+        force=np.array(found["force_N"]),
+        play=1e-3 * np.array(found["play_mrad"]),
+        pressed_deflection=np.array(found["pressed_mm"]) * mm,
+        pressed_force=np.array(found["on_teeth_N"]),
+    )
+
+
+def lobe_rows(own: Force, found: Found) -> list[Row]:
+    """Force and play of the deflected cup, and what springs make of them."""
+    cup = None if "fault" in found else characteristic_of(found)
+
+    def row(quantity: str, unit: str, ours: float | None, reason: str) -> Row:
+        known = ours is not None and isfinite(ours)
+        return Row(
+            case=own.base,
+            quantity=quantity,
+            unit=unit,
+            source_value=None,
+            ours=ours if known else None,
+            reason=str(found.get("fault", reason)),
+            more={"part": "force"},
+        )
+
+    nominal = wedged = closed = slope = None
+    if cup is not None:
+        nominal = cup.force_at(cup.height)
+        if cup.height <= cup.highest:
+            wedged = nominal + cup.on_teeth_at(cup.height)
+        take_up = cup.take_up
+        if not isinf(take_up):
+            closed = cup.force_at(take_up)
+            step = 0.01 * take_up
+            before = cup.play_at(take_up - step)
+            slope = before / arcmin / (step / 1e-6)
+    rows = [
+        row("lobe force at w_0", "N", nominal, f"{PLACE}; {LOADED}; {PRELOAD}"),
+        row("the same with teeth", "N", wedged, "teeth and circular spline elastic"),
+        row(
+            "lobe deflection at which play vanishes",
+            "mm",
+            None if cup is None else cup.take_up / mm,
+            "not printed; under two loads, less than on an ellipse: the cup is pointed",
+        ),
+        row("lobe force at which play vanishes", "N", closed, "not printed"),
+        row(
+            "play that a micrometre of lobe takes up",
+            "arcmin",
+            slope,
+            "not printed; nearly 2 tan(alpha)/r of the flanks",
+        ),
+    ]
+    for springs in own.springs:
+        generator = ElasticWaveGenerator(
+            stiffness=1e3 * springs.stiffness_N_mm, preload=springs.preload_N
+        )
+        name, reason = f"springs, {springs.name}", "chosen: the article prints none"
+        values: tuple[float | None, ...] = (None,) * 4
+        if cup is not None:
+            try:
+                at = cup.working_point(generator)
+                values = (
+                    at.deflection / mm,
+                    at.force,
+                    at.play / arcmin,
+                    at.on_teeth,
+                )
+            except InputError as error:
+                reason = str(error)
+        parts = ("lobe deflection", "lobe force", "play", "force on the teeth")
+        units = ("mm", "N", "arcmin", "N")
+        for part, unit, value in zip(parts, units, values, strict=True):
+            rows.append(row(f"{name}: {part}", unit, value, reason))
+    return rows

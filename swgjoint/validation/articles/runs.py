@@ -1,0 +1,159 @@
+"""Computations of the study of the articles, each a picklable task."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from swgjoint.errors import ComputationError, DesignError
+from swgjoint.fe.plane.drive2d import can_halve
+from swgjoint.fe.solid.continuation import SolidContinuation
+from swgjoint.fe.solid.drive3d import solid_ring
+from swgjoint.fe.solid.figures.fatigue import Limits, assess, fatigue
+from swgjoint.fe.solid.figures.four_forces import four_forces
+from swgjoint.fe.solid.figures.pinched_cup import pinched_cup
+from swgjoint.fe.solid.stress import SolidMaxima, flexspline_stresses
+from swgjoint.fe.solid.strip.elasticity import stress_maxima
+from swgjoint.fe.solid.wave_generator.elastic import lobe_characteristic
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.shell_theory import ShellDimensions
+from swgjoint.units import MPa, deg, mm
+
+Found = dict[str, Any]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Task:
+    """One computation; ``fault`` is the one key of what it returns where it failed."""
+
+    name: str
+    kind: str
+    """Key of :data:`KINDS`."""
+    design: Design
+    toothless: bool = False
+    torques: tuple[float, ...] = ()
+    """[N·m]."""
+    size: float = 1.0
+    """Rough work, to start long ones first."""
+
+
+def run_task(task: Task) -> Found:
+    """Compute; what fails is part of the result, not an error."""
+    try:
+        return KINDS[task.kind](task)
+    except (ComputationError, DesignError) as error:
+        return {"fault": str(error)}
+
+
+def _pinched(task: Task) -> Found:
+    """Radial stiffness by place [N/mm]."""
+    cup = pinched_cup(task.design, toothless=task.toothless)
+    return {
+        place: cup.pull(1.0, place).stiffness / 1e3
+        for place in ("mid_face", "open_edge", "face_width")
+    }
+
+
+def _rotated(task: Task) -> Found:
+    """The same at mid-face with large rotations, at about the lobe height."""
+    cup = pinched_cup(task.design)
+    deflection = 0.5 * task.design.drive.module_mm * task.design.tooth_difference * mm
+    force = cup.pull(1.0).stiffness * deflection
+    return {
+        "outward": cup.pull(force, nonlinear=True).stiffness / 1e3,
+        "inward": cup.pull(-force, nonlinear=True).stiffness / 1e3,
+    }
+
+
+def _lobes(task: Task) -> Found:
+    """Force [N] and play [mrad] over the deflection of a lobe [mm]."""
+    found = lobe_characteristic(task.design)
+    return {
+        "height_mm": found.height / mm,
+        "deflection_mm": (found.deflection / mm).tolist(),
+        "force_N": found.force.tolist(),
+        "play_mrad": (1e3 * found.play).tolist(),
+        "pressed_mm": (found.pressed_deflection / mm).tolist(),
+        "on_teeth_N": found.pressed_force.tolist(),
+    }
+
+
+def _four(task: Task) -> Found:
+    """Load case of the article by torque; radial displacement [mm], stress [MPa]."""
+    cup = pinched_cup(task.design)
+    shell = ShellDimensions.of(task.design)
+    loaded = four_forces(cup, shell.deflection)
+    limits = Limits.of(task.design)
+    rows = []
+    for torque in (0.0, *task.torques):
+        stresses = loaded.stresses(torque)
+        found = assess(cup.strip, stresses, torque, limits, shell)
+        rows.append(
+            found.to_json()
+            | {
+                "von_mises_MPa": max(
+                    float(stress_maxima(part)[2].max()) / MPa
+                    for part in stresses.values()
+                ),
+                "largest_radial_mm": loaded.largest_radial(torque) / mm,
+                "least_force_N": float(
+                    (loaded.force + torque * loaded.force_by_torque).min()
+                ),
+            }
+        )
+    return {"by_torque": rows}
+
+
+def _fatigue(task: Task) -> Found:
+    """Safety factors on the wave generator of the design."""
+    return {"by_torque": [a.to_json() for a in fatigue(task.design, task.torques)]}
+
+
+def _deflected(task: Task) -> Found:
+    """On the wave generator, no tooth contact: displacement [mm], stress [MPa]."""
+    half = can_halve(task.design, bearing=False)
+    ring = solid_ring(task.design, half=half, elastic_circular_spline=False)
+    state = SolidContinuation(ring=ring, ratio=task.design.ratio).deflected()
+    if not state.outcome.ok:
+        raise ComputationError(f"{task.name}: {state.outcome.value}")
+    frame, teeth = ring.frames(state)[0], ring.strip.teeth
+    rest = np.asarray(teeth.mesh.mesh.p).T
+    moved = teeth.displacement(frame.displacement, ring.loads(state))
+    points = np.einsum("sij,snj->sni", frame.turn, rest + moved)
+    radial = np.hypot(points[..., 0], points[..., 1]) - np.hypot(rest[:, 0], rest[:, 1])
+    sector, node = np.unravel_index(int(radial.argmax()), radial.shape)
+    angle = 2.0 * np.pi * np.arange(ring.sectors) / ring.strip.sectors
+    from_major = np.abs((angle + 0.5 * np.pi) % np.pi - 0.5 * np.pi)
+
+    maxima = SolidMaxima.at(ring, state)
+    by_sector = np.max(
+        [
+            stress_maxima(part)[2].max(axis=1)
+            for part in flexspline_stresses(ring, state).values()
+        ],
+        axis=0,
+    )
+    middle = ring.strip.mesh.teeth.nodes[np.argmin(np.abs(ring.strip.mesh.teeth.z))]
+    return {
+        "largest_radial_mm": float(radial.max()) / mm,
+        "at_mid_face_mm": float(radial[:, middle].max()) / mm,
+        "radial_z_mm": float(rest[node, 2]) / mm,
+        "radial_from_major_deg": float(from_major[sector]) / deg,
+        "von_mises_MPa": maxima.flexspline.von_mises / MPa,
+        "von_mises_part": maxima.place.part,
+        "von_mises_from_major_deg": float(from_major[maxima.place.sector]) / deg,
+        "at_minor_MPa": float(by_sector[from_major > 80.0 * deg].max()) / MPa,
+    }
+
+
+KINDS: dict[str, Callable[[Task], Found]] = {
+    "pinched": _pinched,
+    "rotated": _rotated,
+    "lobes": _lobes,
+    "four": _four,
+    "fatigue": _fatigue,
+    "deflected": _deflected,
+}

@@ -1,0 +1,1 @@
+"""A family of drives compared with a catalogue."""

@@ -1,0 +1,63 @@
+"""Transmission accuracy from errors at a few angles of an output turn."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.kinematics import angle_coefficients
+from swgjoint.units import arcmin
+from swgjoint.validation.catalogue.runs import Found
+
+Array = NDArray[np.float64]
+
+ORDERS = tuple(pq for k in range(2, 13, 2) for pq in ((k, 0), (0, k)))
+"""(p, q) of p alpha + q beta that are told from the rest of the error: two lobes leave
+the even orders of the errors of either member."""
+HIGHEST = 12
+"""Of them."""
+REST = 2.0
+"""What the rest adds to either peak at most, in its rms. In trials with a rest of 30
+orders as strong as the rings show the middle of the bracket is 0.95 of the dense peak
+to peak, with a standard deviation of 0.07; the largest difference of as many samples is
+0.77 of it."""
+
+
+def peaks(theta: Array, error: Array, design: Design) -> tuple[float, float]:
+    """Peak to peak of the low orders over an output turn, and rms of the rest [rad].
+
+    Few angles meet no peak of an error that repeats after an output turn only: the low
+    orders are fitted by least squares and looked at densely. No order dominates the
+    rest, so of it the rms is told.
+
+    Args:
+        theta: Input angles, strewn over an output turn (n,) [rad].
+        error: There (n,) [rad].
+        design: The drive.
+    """
+    n = np.array(ORDERS) @ np.array(angle_coefficients(design.drive.layout))
+
+    def waves(theta: Array) -> Array:
+        phases = np.stack([theta, theta / design.ratio], axis=-1) @ n.T.astype(float)
+        ones = np.ones((theta.size, 1))
+        return np.hstack([ones, np.cos(phases), np.sin(phases)])
+
+    seen = waves(theta)
+    weights = np.linalg.lstsq(seen, error, rcond=None)[0]
+    rest = error - seen @ weights
+    turns = abs(design.ratio)
+    dense = np.linspace(0.0, 2.0 * np.pi * turns, round(10 * HIGHEST * turns))
+    low = float(np.ptp(waves(dense) @ weights))
+    return low, float(np.sqrt(rest @ rest / (rest.size - weights.size)))
+
+
+def accuracy_bracket(found: Found, design: Design) -> tuple[float, float]:
+    """Peak to peak that is sure, and with all that the rest may add [arcmin].
+
+    Sure is that of the low orders, or what the samples themselves show.
+    """
+    theta, error = (np.array(found[key]) for key in ("input_angles_rad", "error_rad"))
+    low, rest = peaks(theta, error, design)
+    sure = max(low, float(np.ptp(error)))
+    return sure / arcmin, max(sure, low + 2.0 * REST * rest) / arcmin

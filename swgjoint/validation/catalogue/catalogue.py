@@ -1,0 +1,227 @@
+"""``swgjoint study catalogue``: the family of drives beside a catalogue.
+
+Parts: ``stiffness`` (K1, K2, K3, hysteresis loss and lost motion by the thin rings
+with the bearing of the wave generator, and the share of each mechanism),
+``individuals`` (gears with errors of their own) and ``accuracy`` (transmission error
+over an output turn) by the same rings, ``ratcheting`` (finite elements in the plane),
+``losses`` (no-load running and starting torque, from the friction of teeth and race).
+``coning``, when asked for: the wave generator in space, rigid and on its
+bearing, at two ratios (some twenty minutes of a core). What is run is stated in
+``models/studies/catalogue.toml``; where no source decides, variants are run: ``ours``
+is the middle of their bracket.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from swgjoint.errors import InputError
+from swgjoint.files import Outputs
+from swgjoint.gear.design.design import Design
+from swgjoint.json_text import json_text
+from swgjoint.pool import run_all
+from swgjoint.validation.catalogue.coning import (
+    coning_picture,
+    coning_summary,
+    coning_tasks,
+)
+from swgjoint.validation.catalogue.file import CatalogueFile, variant_design
+from swgjoint.validation.catalogue.losses import loss_lines, loss_rows, loss_tasks
+from swgjoint.validation.catalogue.printed import catalogue_row, edges, torques_of
+from swgjoint.validation.catalogue.rows import (
+    accuracy_rows,
+    ratcheting_rows,
+    stiffness_rows,
+)
+from swgjoint.validation.catalogue.runs import Found, Task, oval, run_task
+from swgjoint.validation.catalogue.shares import (
+    friction,
+    individual_summary,
+    scaling,
+    shares,
+)
+from swgjoint.validation.catalogue.summary import (
+    ratcheting_orders,
+    scaled_against_computed,
+    summary,
+)
+from swgjoint.validation.rows import Row, StudyOptions, StudyResult
+
+PARTS = ("stiffness", "individuals", "ratcheting", "accuracy", "losses")
+EXTRA = ("coning",)
+"""Parts that run when they are asked for."""
+REFERENCE = 25
+"""Size at which a computation stands for all, scaled."""
+CHECK = (14, 80)
+"""Size and ratio at which that is computed, too."""
+
+
+def run_catalogue(options: StudyOptions) -> StudyResult:
+    """Run the chosen parts, or all of them.
+
+    Raises:
+        InputError: If a part is unknown or a fidelity is given.
+    """
+    if options.model is not None:
+        raise InputError(
+            f"--model {options.model}: every quantity here has a level of its own"
+        )
+    parts = options.chosen((*PARTS, *EXTRA) if options.only else PARTS)
+    study = CatalogueFile.load()
+    tasks = [task for part in parts for task in tasks_of(study, part)]
+    ordered = sorted(tasks, key=lambda task: -task.work)
+    results = run_all(
+        run_task,
+        ordered,
+        jobs=options.jobs,
+        stage="computations",
+        progress=options.progress,
+    )
+    found = dict(zip((task.name for task in ordered), results, strict=True))
+    rows = [row for part in parts for row in rows_of(study, part, found)]
+    failed = {name: f["fault"] for name, f in found.items() if "fault" in f}
+    lines = summary(study, rows) + loss_lines(rows)
+    if "ratcheting" in parts:
+        lines += ratcheting_orders(study, found, REFERENCE)
+    lines += scaled_against_computed(study, found, REFERENCE, CHECK)
+    more: dict[str, Any] = {
+        "source": study.source,
+        "variants": [v.name for v in study.variants],
+        "computations": found,
+        "failed": sorted(failed),
+    }
+    if "stiffness" in parts:
+        more["scaling"] = scaling(study, found, REFERENCE)
+        more["shares"] = shares(study, found, REFERENCE)
+        more["friction"] = friction(study, found, REFERENCE)
+        for key in ("scaling", "shares", "friction"):
+            lines += more[key]["lines"]
+    if "individuals" in parts:
+        more["individuals"] = individual_summary(study, found)
+        lines += more["individuals"]["lines"]
+    if "coning" in parts:
+        more["coning"] = coning_summary(study, found)
+        lines += more["coning"]["lines"]
+    lines += [f"failed: {name}: {fault}" for name, fault in failed.items()]
+    coning = more["coning"]["rows"] if "coning" in parts else None
+    files = _write(options.folder, rows, lines, coning)
+    return StudyResult(rows=tuple(rows), summary=tuple(lines), more=more, files=files)
+
+
+def tasks_of(study: CatalogueFile, part: str) -> list[Task]:
+    """What a part computes."""
+    if part == "losses":
+        return loss_tasks(study)
+    if part == "coning":
+        return coning_tasks(study)
+    flanks = {v.flank_deg: v for v in reversed(study.variants)}
+    if part == "stiffness":
+        tasks = [
+            _path(size, ratio, variant_design(size, ratio, variant), flank)
+            for flank, variant in flanks.items()
+            for ratio in study.ratios
+            for size in study.sizes
+        ]
+        first = study.variants[0]
+        for ratio in study.ratios:
+            design = variant_design(REFERENCE, ratio, first)
+            tight = design.with_changes({"wave_generator.bearing.clearance_um": 0.0})
+            tasks.append(_path(REFERENCE, ratio, tight, first.flank_deg, " tight"))
+        return tasks
+    if part == "individuals":
+        own = study.individuals
+        torques = edges(catalogue_row(own.size, own.ratio))[1:]
+        return [
+            Task(
+                name=f"individual {seed}",
+                kind="individual",
+                design=study.individual(seed),
+                torques=torques,
+                work=8,
+            )
+            for seed in own.seeds
+        ]
+    cases = [(REFERENCE, ratio) for ratio in study.ratios] + [CHECK]
+    if part == "accuracy":
+        changes = {**study.individuals.changes, "tolerances.seed": 1}
+        return [
+            Task(
+                name=f"accuracy {size} {ratio}",
+                kind="accuracy",
+                design=variant_design(size, ratio, study.variants[0]).with_changes(
+                    changes
+                ),
+                work=0.1 * ratio,
+            )
+            for size, ratio in cases
+        ]
+    tasks = []
+    for flank, variant in flanks.items():
+        for size, ratio in cases:
+            design = variant_design(size, ratio, variant)
+            if (size, ratio) == CHECK and variant is not study.variants[0]:
+                continue
+            name = f"ratcheting {size} {ratio} {flank:g}"
+            tasks.append(_teeth(name, oval(design), ratio))
+            if size == REFERENCE and variant is study.variants[0]:
+                tasks.append(_teeth(f"{name} fixed", design, 0.5 * ratio))
+    return tasks
+
+
+def _path(size: int, ratio: int, design: Design, flank: float, end: str = "") -> Task:
+    return Task(
+        name=f"path {size} {ratio} {flank:g}{end}",
+        kind="path",
+        design=design,
+        torques=torques_of(catalogue_row(size, ratio)),
+        work=0.02 * ratio,
+    )
+
+
+def _teeth(name: str, design: Design, work: float) -> Task:
+    return Task(name=name, kind="ratcheting", design=design, work=work)
+
+
+def rows_of(study: CatalogueFile, part: str, found: Mapping[str, Found]) -> list[Row]:
+    """Rows of a part from what its tasks found."""
+    cases = [(size, ratio) for ratio in study.ratios for size in study.sizes]
+    build = {
+        "stiffness": lambda row: stiffness_rows(study, row, found),
+        "ratcheting": lambda row: ratcheting_rows(study, row, found, REFERENCE),
+        "accuracy": lambda row: accuracy_rows(study, row, found, REFERENCE),
+        "losses": lambda row: loss_rows(study, row, found),
+    }
+    if part not in build:
+        return []
+    return [one for case in cases for one in build[part](catalogue_row(*case))]
+
+
+def _write(
+    folder: Path | None,
+    rows: Sequence[Row],
+    lines: Sequence[str],
+    coning: Sequence[Any] | None,
+) -> tuple[str, ...]:
+    if folder is None:
+        return ()
+    from swgjoint.view.plots.catalogue import catalogue_picture
+
+    plain = [row.to_json() for row in rows]
+    outputs = Outputs(folder)
+    outputs.write(
+        "catalogue.json", lambda: json_text({"rows": plain, "summary": lines})
+    )
+    if plain:
+        text = io.StringIO()
+        writer = csv.DictWriter(text, fieldnames=list(plain[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(plain)
+        outputs.write("catalogue.csv", text.getvalue)
+    outputs.write("catalogue.png", lambda: catalogue_picture(rows))
+    if coning is not None:
+        outputs.write("coning.png", lambda: coning_picture(coning))
+    return tuple(outputs.files)

@@ -1,0 +1,144 @@
+"""What the study of the catalogue runs, from ``models/studies/catalogue.toml``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import Field
+
+from swgjoint.errors import InputError
+from swgjoint.faults import Section, read_toml, validated
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.design.family import BEARING_BORE, CLEARANCE
+from swgjoint.models_path import find
+
+Whole = Annotated[int, Field(gt=0, le=1000)]
+Numbers = Annotated[tuple[Whole, ...], Field(strict=False)]
+Text = Annotated[str, Field(min_length=1, max_length=300)]
+
+
+class Variant(Section):
+    """Changes of the family design, where no source decides."""
+
+    name: Text
+    cup: Text
+    flank_deg: float
+    per_pitch_diameter: Mapping[str, float] = {}
+    per_module: Mapping[str, float] = {}
+    changes: Mapping[str, Any] = {}
+
+
+class Goal(Section):
+    """Deviation of the middle of the bracket that is aimed at."""
+
+    ratios: Numbers
+    sizes: Numbers
+    K1: float
+    K2: float
+    K3: float
+
+
+class NoClaim(Section):
+    """Sizes that are reported without a goal."""
+
+    sizes: Numbers
+
+
+class Individuals(Section):
+    """Individual gears of one design, one a seed."""
+
+    seeds: Numbers
+    variant: Text
+    size: Whole
+    ratio: Whole
+    clearance: Mapping[str, Any]
+    changes: Mapping[str, Any]
+    source: Text
+
+
+class Coning(Section):
+    """The wave generator in space, rigid and on its bearing, at one size."""
+
+    size: Whole
+    ratios: Numbers
+    variant: Text
+    refinement: float
+    straight: Mapping[str, Any]
+    assumptions: Annotated[tuple[Text, ...], Field(strict=False)]
+
+
+class CatalogueFile(Section):
+    """The study file."""
+
+    source: Text
+    sizes: Numbers
+    ratios: Numbers
+    goals: Annotated[tuple[Goal, ...], Field(strict=False)]
+    no_claim: Annotated[tuple[NoClaim, ...], Field(strict=False)] = ()
+    middle: Literal["mean of smallest and largest"]
+    stated: Mapping[str, Mapping[str, Any]]
+    variants: Annotated[tuple[Variant, ...], Field(strict=False, min_length=1)]
+    individuals: Individuals
+    coning: Coning
+
+    @classmethod
+    def load(cls, reference: str = "catalogue") -> CatalogueFile:
+        """Read a study file, given as a path or as the name of a bundled one.
+
+        Raises:
+            InputError: With one line per fault of the file.
+        """
+        path = find(reference, "studies", ".toml", what="study")
+        data = read_toml(path, what="study", error=InputError)
+        return validated(cls, data, where=str(path), error=InputError)
+
+    @property
+    def coefficients(self) -> tuple[float, ...]:
+        """Coefficients of friction."""
+        return tuple(float(mu) for mu in self.stated["tooth_friction"]["coefficients"])
+
+    def goal(self, size: int, ratio: int, quantity: str) -> float | None:
+        """Deviation that is aimed at; None where nothing is claimed."""
+        for goal in self.goals:
+            if ratio in goal.ratios and size in goal.sizes:
+                value = getattr(goal, quantity, None)
+                return None if value is None else float(value)
+        return None
+
+    def coned(self, ratio: int, *, straight: bool) -> Design:
+        """A design in space; straight: without relief along the face width."""
+        own = self.coning
+        variant = next(v for v in self.variants if v.name == own.variant)
+        design = variant_design(own.size, ratio, variant)
+        changes = {"mesh.refinement": own.refinement}
+        return design.with_changes({**changes, **(own.straight if straight else {})})
+
+    def individual(self, seed: int) -> Design:
+        """A gear with errors of its own and a clearance drawn from its class."""
+        own = self.individuals
+        variant = next(v for v in self.variants if v.name == own.variant)
+        design = variant_design(own.size, own.ratio, variant)
+        bore = BEARING_BORE * 2.54 * own.size
+        low, high = next(band for limit, band in CLEARANCE if bore <= limit)
+        drawn = float(np.random.default_rng(seed).uniform(low, high))
+        return design.with_changes(
+            {
+                **own.changes,
+                "tolerances.seed": seed,
+                "wave_generator.bearing.clearance_um": drawn,
+            }
+        )
+
+
+def variant_design(size: int, ratio: int, variant: Variant) -> Design:
+    """A member of the family with the changes of a variant."""
+    design = Design.preset(f"size-{size}-{ratio}")
+    changes = dict(variant.changes)
+    for table, unit in (
+        (variant.per_pitch_diameter, 2.54 * size),
+        (variant.per_module, design.drive.module_mm),
+    ):
+        changes |= {key: value * unit for key, value in table.items()}
+    return design.with_changes(changes)

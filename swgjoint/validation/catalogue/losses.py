@@ -1,0 +1,132 @@
+"""No-load running torque and starting torque beside the catalogue's.
+
+Only sliding teeth and the rim on its race are in ours; the catalogue's has grease,
+seals and the rolling of balls besides, so ours is a lower bound. Whether it is one, the
+summary says.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from swgjoint.fe.rings.running import LEFT_OUT, RunningFriction
+from swgjoint.gear.catalogue import CatalogueRow
+from swgjoint.gear.catalogue_stated import LOSS_CONDITIONS, stated_losses
+from swgjoint.maps.fit.friction_bending import bending_torque
+from swgjoint.validation.catalogue.file import CatalogueFile, variant_design
+from swgjoint.validation.catalogue.printed import catalogue_row
+from swgjoint.validation.catalogue.rows import bracket_row
+from swgjoint.validation.catalogue.runs import Found, Task
+from swgjoint.validation.rows import Row
+
+RUNNING = "no-load running torque"
+STARTING = "starting torque"
+_MILLI = 1e-3
+
+
+def loss_tasks(study: CatalogueFile) -> list[Task]:
+    """Every drive whose losses are stated, with either flank; the cup takes nothing."""
+    flanks = {v.flank_deg: v for v in reversed(study.variants)}
+    return [
+        Task(
+            name=_name(size, ratio, flank),
+            kind="running",
+            design=variant_design(size, ratio, variant),
+            work=0.5,
+        )
+        for ratio in study.ratios
+        for size in study.sizes
+        if stated_losses(catalogue_row(size, ratio)) is not None
+        for flank, variant in flanks.items()
+    ]
+
+
+def _name(size: int, ratio: int, flank: float) -> str:
+    return f"running {size} {ratio} {flank:g}"
+
+
+def running_of(found: Found) -> RunningFriction:
+    """What a task found, as it was computed."""
+    return RunningFriction(
+        input_angle=np.array(found["input_angles_rad"]),
+        elastic=np.array(found["elastic_Nm"]),
+        teeth=np.array(found["teeth_per_mu_Nm"]),
+        race=np.array(found["race_per_mu_Nm"]),
+        tooth_pairs=np.array(found["tooth_pairs"]),
+    )
+
+
+def loss_rows(
+    study: CatalogueFile, row: CatalogueRow, found: Mapping[str, Found]
+) -> list[Row]:
+    """Both torques, brackets over flanks and coefficients; none that is not stated."""
+    stated = stated_losses(row)
+    if stated is None:
+        return []
+    values: dict[str, list[float]] = {RUNNING: [], STARTING: []}
+    faults, slows = list[str](), list[RunningFriction]()
+    for flank in dict.fromkeys(v.flank_deg for v in study.variants):
+        one = found[_name(row.size, row.ratio, flank)]
+        if "fault" in one:
+            faults.append(f"{flank:g} deg: {one['fault']}")
+            continue
+        slow = running_of(one)
+        slows.append(slow)
+        for mu in study.coefficients:
+            values[RUNNING].append(slow.running_torque(mu) / _MILLI)
+            values[STARTING].append(slow.starting_torque(mu) / _MILLI)
+    why = list(faults)
+    if slows:
+        share = 100.0 * max(slow.teeth_share for slow in slows)
+        pairs = max(float(slow.tooth_pairs.mean()) for slow in slows)
+        bending = bending_torque(variant_design(row.size, row.ratio, study.variants[0]))
+        coefficients = " to ".join(f"{mu:g}" for mu in study.coefficients)
+        why.append(
+            f"slow, Coulomb friction {coefficients} of the rim on its race and of the"
+            f" teeth alone ({share:.3g} % of it, {pairs:.2g} pairs touch); not in it:"
+            f" {LEFT_OUT} ({bending / _MILLI:.2g} mN·m, loss factor assumed)"
+        )
+    printed = {
+        RUNNING: (stated.no_load_running, f"2000 rpm, {LOSS_CONDITIONS}"),
+        STARTING: (stated.starting, LOSS_CONDITIONS),
+    }
+    return [
+        bracket_row(
+            row,
+            quantity,
+            "mN·m",
+            source / _MILLI,
+            values[quantity],
+            "; ".join(why),
+            whole=not faults,
+            conditions=conditions,
+        )
+        for quantity, (source, conditions) in printed.items()
+    ]
+
+
+def loss_lines(rows: Sequence[Row]) -> list[str]:
+    """Whether ours is below the catalogue's, as what lacks grease and seals must be."""
+    lines = []
+    for quantity in (RUNNING, STARTING):
+        over = {
+            row.case: row.more["high_over_source"]
+            for row in rows
+            if row.quantity == quantity and row.more["high_over_source"] is not None
+        }
+        if not over:
+            continue
+        above = [case for case, part in over.items() if part >= 1.0]
+        least, most = (
+            100.0 * part for part in (min(over.values()), max(over.values()))
+        )
+        lines.append(
+            f"{quantity}: friction of teeth and race is at most {least:.2g} to"
+            f" {most:.2g} % of the catalogue's; a lower bound in"
+            f" {len(over) - len(above)} of {len(over)} cases"
+            + f", above it in {', '.join(above)}"
+            * bool(above)
+        )
+    return lines

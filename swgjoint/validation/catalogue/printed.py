@@ -1,0 +1,63 @@
+"""What the catalogue prints of a component set."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.errors import InputError
+from swgjoint.gear.catalogue import CatalogueRow, catalogue_rows, table
+from swgjoint.maps.sheet.loop import LOST_MOTION_TORQUE, largest_torque
+
+Array = NDArray[np.float64]
+
+STIFFNESS = ("K1", "K2", "K3")
+RATIO_CLASS = 80
+"""Of the stiffness and accuracy tables: this ratio and above."""
+
+
+def catalogue_row(size: int, ratio: int) -> CatalogueRow:
+    """Ratings of a component set.
+
+    Raises:
+        InputError: If the catalogue has none.
+    """
+    for row in catalogue_rows():
+        if (row.size, row.ratio) == (size, ratio):
+            return row
+    raise InputError(f"the catalogue has no size {size}, ratio {ratio}")
+
+
+def edges(row: CatalogueRow) -> tuple[float, float, float, float]:
+    """0, T1, T2 and the end of the standard loop [N·m]."""
+    return 0.0, row.T1, row.T2, largest_torque(row)
+
+
+def torques_of(row: CatalogueRow) -> tuple[float, ...]:
+    """Torques of a path: lost motion, rated, and the ends of the segments [N·m]."""
+    lost = LOST_MOTION_TORQUE * row.rated_torque
+    return tuple(sorted({lost, row.rated_torque, *edges(row)[1:]}))
+
+
+def catalogue_stiffness(row: CatalogueRow) -> Array:
+    """K1, K2, K3 as printed [N·m/rad]."""
+    ratio_class = float(min(row.ratio, RATIO_CLASS))
+    for line in table("stiffness"):
+        if (line["size"], line["ratio_class"]) == (float(row.size), ratio_class):
+            values = [line[f"{key}_1e4Nm_rad"] for key in STIFFNESS]
+            return 1e4 * np.array([float(v) for v in values if v is not None])
+    raise ValueError(f"no stiffness of size {row.size}, ratio {row.ratio}")
+
+
+def printed_accuracy(row: CatalogueRow) -> dict[str, float | None]:
+    """Upper bounds of transmission accuracy, hysteresis loss and lost motion."""
+    ratio_class = float(min(row.ratio, RATIO_CLASS))
+    keys = ("transmission_accuracy_arcmin", "hysteresis_loss_arcmin")
+    for line in table("accuracy"):
+        same = (line["size"], line["ratio_class"]) == (float(row.size), ratio_class)
+        if line["series"] == "CHA" and same:
+            return {
+                key: None if line[key] is None else float(line[key])  # type: ignore[arg-type]
+                for key in (*keys, "lost_motion_arcmin")
+            }
+    return dict.fromkeys((*keys, "lost_motion_arcmin"))

@@ -1,0 +1,211 @@
+"""Computations of the comparison with the catalogue, kept from run to run."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.code_hash import code_hash
+from swgjoint.errors import ComputationError, DesignError
+from swgjoint.gear.design.design import Design
+from swgjoint.maps.cache import recalled
+
+if TYPE_CHECKING:
+    from swgjoint.fe.rings.friction import RubbedPath
+
+Array = NDArray[np.float64]
+
+Found = dict[str, Any]
+
+OUTSIDE = 1.37
+"""Outer diameter of the circular spline over the pitch diameter, for ratcheting: mean
+of 1.34 to 1.41 of component sets of sizes 14 to 32 (50, 60, 70, 85, 110 mm; dimension
+tables from memory, not checked)."""
+ANGLES = 96
+"""Input angles over one output turn from which the accuracy is read."""
+INDIVIDUAL_ANGLES = 8
+"""Input angles over one output turn at which an individual gear is loaded."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Task:
+    """One computation."""
+
+    name: str
+    kind: str
+    """Key of :data:`KINDS`."""
+    design: Design
+    torques: tuple[float, ...] = ()
+    """[N·m]."""
+    work: float = 1.0
+    """Rough, to start long ones first."""
+
+
+def run_task(task: Task) -> Found:
+    """The result of a task, kept or computed; ``fault`` where it failed."""
+    parts = {
+        "study": _own_version(),
+        "kind": task.kind,
+        "design": task.design.content_hash(),
+        "torques": task.torques,
+    }
+    return recalled("studies", parts, Found, lambda: _computed(task))
+
+
+def _computed(task: Task) -> Found:
+    begin = time.perf_counter()
+    try:
+        found = KINDS[task.kind](task)
+    except (ComputationError, DesignError) as error:
+        found = {"fault": str(error).splitlines()[0]}
+    found["wall_s"] = time.perf_counter() - begin
+    return found
+
+
+@lru_cache
+def _own_version() -> str:
+    return code_hash("validation/catalogue/runs.py")
+
+
+def _whole_path(task: Task, angles: Array | None = None) -> RubbedPath:
+    """The path of the rings to the last torque of a task."""
+    from swgjoint.fe.rings.friction import rubbed_path
+
+    path = rubbed_path(task.design, task.torques, angles=angles)
+    if not path.outcome.ok:
+        reached = path.torque[-1] if path.torque.size else 0.0
+        raise ComputationError(
+            f"rings reach {reached:.4g} of {max(task.torques):.4g} N·m:"
+            f" {path.outcome.value}"
+        )
+    return path
+
+
+def _path(task: Task) -> Found:
+    """Torsion behind the cup [rad] and sliding work per mu [J] over the torque."""
+    path = _whole_path(task)
+    work = path.teeth_work + path.race_work
+    return {
+        "torque_Nm": path.torque.tolist(),
+        "ring_torsion_rad": (path.torsion - path.series * path.torque).tolist(),
+        "work_per_mu_J": work.tolist(),
+        "race_part": (path.race_work / np.maximum(work, 1e-300)).tolist(),
+        "ring_compliance_rad_Nm": (path.compliance - path.series).tolist(),
+        "ring_shares": {
+            name: (share * path.compliance / (path.compliance - path.series)).tolist()
+            for name, share in path.shares.items()
+        },
+        "balls": path.balls.tolist(),
+        "tooth_pairs": path.tooth_pairs.tolist(),
+    }
+
+
+def _ratcheting(task: Task) -> Found:
+    """Largest torque in the plane, with what the design's circular spline sits in."""
+    from swgjoint.fe.plane.ratcheting import ratcheting_path
+
+    return ratcheting_path(task.design).as_dict()
+
+
+def _individual(task: Task) -> Found:
+    """Torsion behind the cup [rad] over the torque, at angles over an output turn."""
+    from swgjoint.fe.rings.accuracy import over_output_turn
+
+    angles = over_output_turn(task.design, INDIVIDUAL_ANGLES)
+    paths = [_whole_path(task, angles[k : k + 1]) for k in range(angles.size)]
+    return {
+        "input_angles_rad": angles.tolist(),
+        "torque_Nm": paths[0].torque.tolist(),
+        "ring_torsion_rad": [
+            (path.torsion - path.series * path.torque).tolist() for path in paths
+        ],
+    }
+
+
+def _accuracy(task: Task) -> Found:
+    """Error of the rings over one output turn, hardly loaded."""
+    from swgjoint.fe.rings.accuracy import over_output_turn, transmission_error
+
+    angles = over_output_turn(task.design, ANGLES)
+    error = transmission_error(task.design, angles)
+    return {"input_angles_rad": angles.tolist(), "error_rad": error.tolist()}
+
+
+def _running(task: Task) -> Found:
+    """Input torque of slow turning without load, and what rubs takes per mu."""
+    from swgjoint.fe.rings.running import running_friction
+
+    found = running_friction(task.design)
+    return {
+        "input_angles_rad": found.input_angle.tolist(),
+        "elastic_Nm": found.elastic.tolist(),
+        "teeth_per_mu_Nm": found.teeth.tolist(),
+        "race_per_mu_Nm": found.race.tolist(),
+        "tooth_pairs": found.tooth_pairs.tolist(),
+    }
+
+
+def _coning(task: Task) -> Found:
+    """Torsion in space over the torque; the kind ends with that of the bearing."""
+    from swgjoint.fe.solid.figures.torsion import solid_torsion
+
+    bearing = {"rigid": None, "free": "free", "held": "held"}[task.kind.split()[1]]
+    found = solid_torsion(task.design, task.torques, bearing=cast(Any, bearing))
+    return {
+        "torque_Nm": found.torque.tolist(),
+        "torsion_rad": found.torsion.tolist(),
+        "compliance_rad_Nm": found.compliance.tolist(),
+        "tooth_centre_over_face": found.tooth_centre.tolist(),
+        "tooth_force_N": found.tooth_force.tolist(),
+        "bore_centre_over_face": found.bore_centre.tolist(),
+        "balls": found.balls.tolist(),
+        "half_play_rad": found.half_play,
+    }
+
+
+def _coning_ring(task: Task) -> Found:
+    """The same by the thin rings, the closed-form cup in series."""
+    path = _whole_path(task, np.zeros(1))
+    at = np.searchsorted(path.torque, task.torques)
+    return {
+        "torque_Nm": list(task.torques),
+        "torsion_rad": path.torsion[at].tolist(),
+        "compliance_rad_Nm": path.compliance[at].tolist(),
+        "balls": path.balls[at].tolist(),
+        "half_play_rad": float(path.torsion[0] - path.compliance[0] * path.torque[0]),
+    }
+
+
+KINDS: dict[str, Callable[[Task], Found]] = {
+    "path": _path,
+    "individual": _individual,
+    "ratcheting": _ratcheting,
+    "accuracy": _accuracy,
+    "running": _running,
+    "coning rigid": _coning,
+    "coning free": _coning,
+    "coning held": _coning,
+    "coning ring": _coning_ring,
+}
+
+
+def oval(design: Design) -> Design:
+    """The design with a circular spline as thick as those of component sets, free."""
+    drive = design.drive
+    own = design.circular_spline
+    root = drive.module_mm * (
+        drive.teeth_circular_spline + 2.0 * own.dedendum_coefficient
+    )
+    outside = OUTSIDE * drive.module_mm * drive.teeth_flexspline
+    return design.with_changes(
+        {
+            "circular_spline.outer_rim": "free",
+            "circular_spline.rim_mm": 0.5 * (outside - root),
+        }
+    )

@@ -1,0 +1,223 @@
+"""What lies behind the stiffness: size, mechanisms, the scatter of single gears."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicHermiteSpline
+
+from swgjoint.fe.rings.friction import RubbedPath
+from swgjoint.gear.catalogue import CatalogueRow
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.mounting import series_compliance
+from swgjoint.units import arcmin
+from swgjoint.validation.catalogue.file import CatalogueFile, variant_design
+from swgjoint.validation.catalogue.printed import STIFFNESS, catalogue_row, edges
+from swgjoint.validation.catalogue.rows import rubbed, stiffnesses
+from swgjoint.validation.catalogue.runs import Found
+
+Array = NDArray[np.float64]
+
+
+def scaling(
+    study: CatalogueFile, found: Mapping[str, Found], size: int
+) -> dict[str, Any]:
+    """How far the cube of the size goes: K of every size over that scaled from one.
+
+    Segments end where both sizes have been loaded. Between their own torques curves
+    are cubics with the tangents that the rings tell: no value of one size is at the
+    scaled torque of another.
+    """
+    rows, worst = [], np.zeros(len(STIFFNESS))
+    first = study.variants[0]
+    for ratio in study.ratios:
+        base = found[f"path {size} {ratio} {first.flank_deg:g}"]
+        if "fault" in base:
+            continue
+        here = rubbed(base, variant_design(size, ratio, first))
+        for other in study.sizes:
+            one = found[f"path {other} {ratio} {first.flank_deg:g}"]
+            if "fault" in one or other == size:
+                continue
+            scale = (other / size) ** 3
+            there = rubbed(one, variant_design(other, ratio, first))
+            reach = min(float(there.torque[-1]), scale * float(here.torque[-1]))
+            torques = np.minimum(edges(catalogue_row(other, ratio)), reach)
+            own = np.diff(_smooth(there, torques))
+            scaled = np.diff(_smooth(here, torques / scale))
+            both = np.diff(torques) > 0.0  # a last segment that neither reaches is none
+            ratios = scaled[both] / own[both]
+            worst[both] = np.maximum(worst[both], np.abs(ratios - 1.0))
+            rows.append(
+                {
+                    "size": other,
+                    "ratio": ratio,
+                    "up_to_Nm": reach,
+                    "K_over_scaled": ratios.tolist(),
+                }
+            )
+    percent = "/".join(f"{100 * value:.0f}" for value in worst)
+    line = (
+        f"K1/K2/K3 computed at each size are within {percent} % of those of size"
+        f" {size} scaled by the cube, up to the torque that both reach: clearances do"
+        " not scale"
+    )
+    return {"rows": rows, "lines": [line]}
+
+
+def _smooth(path: RubbedPath, torques: Array) -> Array:
+    """Torsion, zero at no torque, on cubics with the tangents of the path [rad]."""
+    curve = CubicHermiteSpline(path.torque, path.torsion, path.compliance)
+    return np.concatenate([[0.0], curve(torques[1:])])
+
+
+def shares(
+    study: CatalogueFile, found: Mapping[str, Found], size: int
+) -> dict[str, Any]:
+    """Parts of the compliance over the torque, and K without the clearance.
+
+    Parts are of the tangent: clearance that is taken up has none, but shows in K.
+    """
+    rows, lines = [], []
+    first = study.variants[0]
+    for ratio in study.ratios:
+        name = f"path {size} {ratio} {first.flank_deg:g}"
+        if "fault" in found[name]:
+            continue
+        row, design = catalogue_row(size, ratio), variant_design(size, ratio, first)
+        path = rubbed(found[name], design)
+        parts = {f"{first.cup} cup": path.series / path.compliance, **path.shares}
+        rows += [
+            {
+                "size": size,
+                "ratio": ratio,
+                "mechanism": key,
+                "torque_Nm": path.torque.tolist(),
+                "share": share.tolist(),
+            }
+            for key, share in parts.items()
+        ]
+        text = ", ".join(
+            f"{key} {'/'.join(f'{100 * part:.0f}' for part in share)}"
+            for key, share in parts.items()
+        )
+        torques = "/".join(f"{torque:.3g}" for torque in path.torque)
+        lines.append(
+            f"share in the compliance [%], size {size}, ratio {ratio}, at {torques}"
+            f" N·m: {text}"
+        )
+        tight = found[f"{name} tight"]
+        if "fault" not in tight:
+            K, free = stiffnesses(path, row), stiffnesses(rubbed(tight, design), row)
+            less = "/".join(f"{value:.2f}" for value in free / K)
+            rising = [f"{k[2] / k[0]:.2f}" for k in (K, free)]
+            lines[-1] += (
+                f"; without bearing clearance K1/K2/K3 times {less}, K3/K1"
+                f" {rising[1]} instead of {rising[0]}"
+            )
+            rows.append(
+                {
+                    "size": size,
+                    "ratio": ratio,
+                    "mechanism": "bearing clearance",
+                    "K_without_over_with": (free / K).tolist(),
+                }
+            )
+    return {"rows": rows, "lines": lines}
+
+
+def individual_summary(
+    study: CatalogueFile, found: Mapping[str, Found]
+) -> dict[str, Any]:
+    """Mean of K over the individual gears, scatter among them and within each."""
+    own = study.individuals
+    row = catalogue_row(own.size, own.ratio)
+    tables = [
+        single_stiffnesses(one, study.individual(seed), row)
+        for seed in own.seeds
+        if "fault" not in (one := found[f"individual {seed}"])
+    ]
+    if len(tables) < 2:
+        return {"rows": [], "lines": ["fewer than two individual gears were solved"]}
+    K = np.array(tables)
+    within, between = scatter(K)
+    mean = K.mean(axis=(0, 1))
+    percent = ["/".join(f"{100 * v:.1f}" for v in s / mean) for s in (between, within)]
+    line = (
+        f"{len(K)} individual gears, size {own.size}, ratio {own.ratio}: K1/K2/K3"
+        f" scatter by {percent[0]} % (one sigma) from gear to gear, and within a gear"
+        f" by {percent[1]} % with the wave-generator angle ({K.shape[1]} over an"
+        " output turn)"
+    )
+    rows = [
+        {"quantity": key, "mean_Nm_rad": m, "sigma_Nm_rad": s, "within_Nm_rad": w}
+        for key, m, s, w in zip(
+            STIFFNESS, mean.tolist(), between.tolist(), within.tolist(), strict=True
+        )
+    ]
+    return {"rows": rows, "lines": [line]}
+
+
+def single_stiffnesses(found: Found, design: Design, row: CatalogueRow) -> Array:
+    """K1, K2, K3 at each wave-generator angle by itself (n_angles, 3) [N·m/rad]."""
+    torque = np.array(found["torque_Nm"])
+    series = series_compliance(design, cup=True)
+    x = np.array(found["ring_torsion_rad"]) + series * torque
+    torques = edges(row)
+    at = np.searchsorted(torque, torques[1:])
+    return np.diff(torques) / np.diff(x[:, at], axis=1, prepend=0.0)
+
+
+def scatter(values: Array) -> tuple[Array, Array]:
+    """Standard deviations within and between gears, analysis of variance (textbook).
+
+    Args:
+        values: Shape (n_gears, n_angles, n). The mean of a gear over its angles still
+            scatters by the angles, which is taken off.
+    """
+    within = values.var(axis=1, ddof=1).mean(axis=0)
+    means = values.mean(axis=1).var(axis=0, ddof=1)
+    between = np.maximum(means - within / values.shape[1], 0.0)
+    return np.sqrt(within), np.sqrt(between)
+
+
+def friction(
+    study: CatalogueFile, found: Mapping[str, Found], size: int
+) -> dict[str, Any]:
+    """Loop by coefficient of friction and torque amplitude, at one size."""
+    rows, lines = [], []
+    first = study.variants[0]
+    for ratio in study.ratios:
+        one = found[f"path {size} {ratio} {first.flank_deg:g}"]
+        if "fault" in one:
+            continue
+        path = rubbed(one, variant_design(size, ratio, first))
+        torque = path.torque.tolist()
+        for mu in (0.0, *study.coefficients):
+            rows.append(
+                {
+                    "size": size,
+                    "ratio": ratio,
+                    "mu": mu,
+                    "hysteresis_loss_arcmin": path.hysteresis_loss(mu) / arcmin,
+                    "torque_Nm": torque,
+                    "width_arcmin": (path.widths(mu) / arcmin).tolist(),
+                    "round_loss_J": path.round_loss(mu).tolist(),
+                }
+            )
+        some = rows[-1 - len(study.coefficients) :]
+        loss = "/".join(f"{row['hysteresis_loss_arcmin']:.3f}" for row in some)
+        wide = "/".join(f"{width:.3f}" for width in some[-1]["width_arcmin"])
+        work = np.array(some[-1]["round_loss_J"])
+        grows = np.polyfit(np.log(torque[2:]), np.log(work[2:]), 1)[0]
+        mus = "/".join(f"{row['mu']:g}" for row in some)
+        lines.append(
+            f"friction, size {size}, ratio {ratio}: {loss} arcmin wide at no load with"
+            f" mu {mus} (play included); with mu {some[-1]['mu']:g} {wide} arcmin wide"
+            f" between {', '.join(f'{t:.3g}' for t in torque)} N·m; work of a round"
+            f" grows with torque to the {grows:.1f}"
+        )
+    return {"rows": rows, "lines": lines}

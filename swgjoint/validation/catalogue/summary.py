@@ -1,0 +1,150 @@
+"""What the rows of the comparison with the catalogue add up to."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+from swgjoint.validation.catalogue.accuracy import accuracy_bracket
+from swgjoint.validation.catalogue.file import CatalogueFile, variant_design
+from swgjoint.validation.catalogue.printed import STIFFNESS, catalogue_row
+from swgjoint.validation.catalogue.runs import Found
+from swgjoint.validation.rows import Row
+
+
+def summary(study: CatalogueFile, rows: Sequence[Row]) -> list[str]:
+    """Range of model over catalogue by quantity and ratio, goals that are met.
+
+    A case without a value, or that lost a variant, counts as one that fails.
+    """
+    lines = []
+    for quantity in dict.fromkeys(row.quantity for row in rows):
+        for ratio in study.ratios:
+            every = [
+                row
+                for row in rows
+                if (row.quantity, row.more["ratio"]) == (quantity, ratio)
+            ]
+            some = [row for row in every if row.more["over_source"] is not None]
+            judged = [row for row in every if row.more["goal"] is not None]
+            floor = [
+                row.more["low_over_source"]
+                for row in every
+                if row not in some and row.more["low_over_source"] is not None
+            ]
+            if not some and not judged and not floor:
+                continue
+            text = f"{quantity}, ratio {ratio}: {_range(some)}"
+            if 0 < len(some) < len(every):
+                text += f"; {len(every) - len(some)} of {len(every)} without a middle"
+            if floor:
+                text += f", more than {min(floor):.2f} to {max(floor):.2f}"
+            if judged:
+                met = sum(bool(row.more["met"]) for row in judged)
+                goal = 100.0 * judged[0].more["goal"]
+                text += f"; within {goal:.0f} %: {met} of {len(judged)}"
+                lost = sum(not row.more["whole"] for row in judged)
+                if lost:
+                    text += f" ({lost} lack variants: not met)"
+            lines.append(text)
+    return lines + _rising(rows)
+
+
+def _range(rows: Sequence[Row]) -> str:
+    """Smallest and largest middle over the catalogue, and ends of the brackets."""
+    if not rows:
+        return "no middle"
+    middle = [row.more["over_source"] for row in rows]
+    ends = [row.more[f"{end}_over_source"] for row in rows for end in ("low", "high")]
+    return (
+        f"model over catalogue {_part(min(middle))} to {_part(max(middle))} (brackets"
+        f" {_part(min(ends))} to {_part(max(ends))})"
+    )
+
+
+def _part(value: float) -> str:
+    """Two decimals; two digits of what is far smaller."""
+    return f"{value:.2f}" if value >= 0.05 else f"{value:.2g}"
+
+
+def _rising(rows: Sequence[Row]) -> list[str]:
+    """In how many cases K1 < K2 < K3 fails, and in how many it cannot be told."""
+    cases: dict[str, list[float]] = {}
+    for row in rows:
+        if row.quantity in STIFFNESS:
+            values = cases.setdefault(row.case, [])
+            values += [] if row.ours is None else [row.ours]
+    if not cases:
+        return []
+    told = [values for values in cases.values() if len(values) == len(STIFFNESS)]
+    fails = sum(not values[0] < values[1] < values[2] for values in told)
+    line = f"K1 < K2 < K3 fails in {fails} of {len(cases)} cases"
+    lost = len(cases) - len(told)
+    return [line + f" and cannot be told in {lost}" * (lost > 0)]
+
+
+def ratcheting_orders(
+    study: CatalogueFile, found: Mapping[str, Found], size: int
+) -> list[str]:
+    """Ratios from the largest ratcheting torque to the smallest, ours and theirs.
+
+    By flank, among the ratios for which a limit was found.
+    """
+    lines = []
+    for flank in dict.fromkeys(v.flank_deg for v in study.variants):
+        limits = {}
+        for ratio in study.ratios:
+            one = found[f"ratcheting {size} {ratio} {flank:g}"]
+            if "fault" not in one and one["passed"]:
+                limits[ratio] = one["limit_Nm"]
+        if len(limits) < 2:
+            continue
+        theirs = {r: catalogue_row(size, r).ratcheting_torque for r in limits}
+        orders = [
+            " > ".join(str(ratio) for ratio in sorted(of, key=lambda r: -of[r]))
+            for of in (limits, theirs)
+        ]
+        lines.append(
+            f"ratcheting torque, size {size}, flank {flank:g} deg, by ratio: model"
+            f" {orders[0]}, catalogue {orders[1]}"
+        )
+    return lines
+
+
+def scaled_against_computed(
+    study: CatalogueFile,
+    found: Mapping[str, Found],
+    size: int,
+    check: tuple[int, int],
+) -> list[str]:
+    """What is scaled from one size over what is computed at another, where both are."""
+    other, ratio = check
+    first = study.variants[0]
+
+    def over(kind: str, end: str, factor: float, value: Callable[..., float]) -> str:
+        values = []
+        for one in (size, other):
+            result = found.get(f"{kind} {one} {ratio}{end}", {"fault": "not run"})
+            if "fault" in result or not result.get("passed", True):
+                return ""
+            values.append(value(result, variant_design(one, ratio, first)))
+        return (
+            f"{kind}, ratio {ratio}: scaled from size {size} over computed at size"
+            f" {other}: {factor * values[0] / values[1]:.3f}"
+        )
+
+    scale = other / size
+    lines = [
+        over(
+            "ratcheting",
+            f" {first.flank_deg:g}",
+            scale**3,
+            lambda result, design: float(result["limit_Nm"]),
+        ),
+        over(
+            "accuracy",
+            "",
+            1.0 / scale,
+            lambda result, design: sum(accuracy_bracket(result, design)),
+        ),
+    ]
+    return [line for line in lines if line]

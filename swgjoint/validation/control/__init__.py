@@ -1,0 +1,1 @@
+"""Baseline controllers of one joint, from PD to learning."""

@@ -1,0 +1,183 @@
+"""Motions of the bench joint that tell controllers apart, and what they tell.
+
+A fast move (tracking), one slow turn of the output in one direction (positioning), a
+turn at constant speed after some turns of learning (ripple), each of one specimen of a
+drive under a load that the controllers know but for a part, read by noisy encoders
+whose readings are a control period old.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.control.kinematic_error import JointRecord, KinematicErrorTable, Recorder
+from swgjoint.control.motor_side import MotorPID, rigid_plan
+from swgjoint.maps.drive_map import DriveMap
+from swgjoint.sim.controller import Controller
+from swgjoint.sim.run import Run, run_scene
+from swgjoint.sim.scene.scene import Scene
+from swgjoint.units import arcmin
+from swgjoint.validation.control.specimens import nominal, specimen
+
+Array = NDArray[np.float64]
+
+FREQUENCY = 20.0
+"""Natural frequency of every rung's loop on the motor [Hz]; damping ratio 1."""
+LOAD, RECORD_LOAD = 0.3, 0.6
+"""Known load of the motions and of the record, over the rated torque."""
+UNKNOWN = 0.1
+"""Largest part of the load that the controllers do not know."""
+MOTOR_COUNTS, LINK_NOISE, DELAY = 2**17, 2.0, 1e-3
+"""Counts of the motor's encoder; noise of the link's [arcsec]; age of the readings of
+both [s], one period, which the controllers know."""
+TWO_PER_TURN = ((2, 0), (0, 2), (1, 1))
+
+UNITS = {
+    "tracking_rms": "arcmin",
+    "tracking_peak": "arcmin",
+    "positioning_pp": "arcmin",
+    "ripple_rms": "% of rated torque",
+    "two_per_turn": "N·m",
+    "effort_rms": "N·m",
+}
+"""Figures of a rung: error of the link on the move, its peak to peak on the slow turn,
+ripple of the output torque at constant speed and its part of 2 per turn, torque of the
+motor on the move."""
+
+MOVE: dict[str, Any] = {
+    "trajectory": {
+        "kind": "sweep",
+        "hold_s": 0.3,
+        "ramp_s": 0.25,
+        "end_deg": {"joint": 20.0},
+    },
+    "simulation": {"duration_s": 1.3},
+}
+SLOW: dict[str, Any] = {
+    "trajectory": {
+        "kind": "constant_speed",
+        "speed_deg_s": {"joint": 8.0},
+        "settle_s": 1.0,
+    },
+    "simulation": {"duration_s": 46.0},
+}
+EVEN: dict[str, Any] = {
+    "trajectory": {
+        "kind": "constant_speed",
+        "speed_deg_s": {"joint": 30.0},
+        "settle_s": 15.0,
+    },
+    "simulation": {"duration_s": 27.0},
+}
+MOTIONS = {"move": MOVE, "slow": SLOW, "even": EVEN}
+
+
+def record_turn(drive: DriveMap, seed: int) -> JointRecord:
+    """A noisy slow turn at another load, of a drive with another random part."""
+    recorder = Recorder(MotorPID(rigid_plan, frequency=FREQUENCY))
+    plant = specimen(drive, seed, random_seed=1)
+    run_motion(drive, plant, recorder, "slow", seed + 1000, load=RECORD_LOAD)
+    return recorder.record(skip=500)
+
+
+def run_motion(
+    drive: DriveMap,
+    plant: DriveMap,
+    controller: Controller,
+    motion: str,
+    seed: int,
+    load: float = LOAD,
+    delay: float = DELAY,
+) -> Run:
+    """One motion of a specimen under an unknown share of the load, delay and noise."""
+    torque = load * drive.ratings.rated_torque
+    more = UNKNOWN * torque * np.random.default_rng([seed, 2]).uniform(-1.0, 1.0)
+    scene = Scene.from_data(
+        {
+            "name": f"control, {motion}",
+            "arm": "bench",
+            "defaults": {
+                "drive": "specimen",
+                "level": "full",
+                "rotor_inertia_kgm2": 1e-4,
+                "friction": drive.friction is not None,
+            },
+            "load": {"joint": {"torque_Nm": torque}},
+            "disturbance": [
+                {
+                    "kind": "joint_pulse",
+                    "joint": "joint",
+                    "torque_Nm": -more,
+                    "start_s": 0.0,
+                    "duration_s": 1000.0,
+                }
+            ],
+            "controller": {"feedback": "link"},
+            "sensors": {
+                "motor": {"counts_per_turn": MOTOR_COUNTS, "delay_s": delay},
+                "link": {"noise_arcsec": LINK_NOISE, "delay_s": delay},
+                "seed": seed,
+            },
+            **MOTIONS[motion],
+        }
+    )
+    return run_scene(
+        scene,
+        drives={"specimen": plant},
+        known_drives={"joint": nominal(drive)},
+        controller=controller,
+    )
+
+
+def figures_of(runs: dict[str, Run]) -> dict[str, float]:
+    """Figures of :data:`UNITS` from the runs of all motions."""
+    move, slow, even = (runs[motion] for motion in MOTIONS)
+    moving = move.time >= MOVE["trajectory"]["hold_s"]
+    off = (move.position - move.reference)[moving, 0] / arcmin
+    turned = (slow.position - slow.reference)[slow.steady, 0] / arcmin
+    ripple = even.metrics()["joints"]["joint"]["ripple_rms_percent"]
+    return {
+        "tracking_rms": float(np.sqrt(np.mean(off**2))),
+        "tracking_peak": float(np.abs(off).max()),
+        "positioning_pp": float(np.ptp(turned)),
+        "ripple_rms": float(ripple),
+        "two_per_turn": two_per_turn(even),
+        "effort_rms": float(np.sqrt(np.mean(move.motor_torque[moving] ** 2))),
+    }
+
+
+def two_per_turn(run: Run) -> float:
+    """Amplitude of the ripple of 2 per turn, root of the squares of its lines [N·m]."""
+    theta, psi, torque = (
+        x[run.steady, 0] for x in (run.motor_position, run.position, run.output_torque)
+    )
+    law = run.assembly.transmissions[0].law
+    assert law is not None
+    angles = KinematicErrorTable(
+        orders=np.array(TWO_PER_TURN), amplitudes=np.zeros((len(TWO_PER_TURN), 2))
+    )
+    phases = angles.on(law.with_harmonics(np.zeros(len(law.orders), bool)))
+    waves = phases.phases(theta, psi)[:, 1:]
+    line = np.linspace(-1.0, 1.0, theta.size)[:, None]
+    basis = np.hstack([np.ones_like(line), line, np.cos(waves), np.sin(waves)])
+    weights = np.linalg.lstsq(basis, torque, rcond=None)[0][2:]
+    return float(np.sqrt(weights @ weights))
+
+
+def shown_of(runs: dict[str, Run]) -> dict[str, Array]:
+    """Signals of the runs for the picture."""
+    move, slow, even = (runs[motion] for motion in MOTIONS)
+    turn = slice(slow.steady.start, slow.steady.stop, 10)
+    last = slice(even.time.size - 1000, even.time.size)
+    torque = even.output_torque[last, 0]
+    return {
+        "time": move.time,
+        "tracking": (move.position - move.reference)[:, 0] / arcmin,
+        "output": np.degrees(slow.reference[turn, 0]),
+        "positioning": (slow.position - slow.reference)[turn, 0] / arcmin,
+        "even_time": even.time[last],
+        "ripple": torque - torque.mean(),
+    }

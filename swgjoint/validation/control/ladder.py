@@ -1,0 +1,277 @@
+"""``swgjoint study control``: the ladder of baselines for the control of one joint.
+
+Specimens of a drive on the bench joint, ten by default: phases of the errors, friction,
+load and sensor noise are drawn. Every controller adds one thing to the one before it
+and is made for one figure, named in :data:`RUNGS` before any run; that of predictive
+control after a trial on two specimens. Three motions tell the figures: a fast move
+(tracking), one slow turn of the output in one direction (positioning), a turn at
+constant speed after learning (ripple). All loops read the motor alone, but for learning
+and predictive control, which read the link's encoder, too; the table was recorded with
+it. Readings are one control period of 1 ms old, as in the environments, and the
+controllers know it: they hold a reading against the plan of the instant it was taken.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.control.flexible import flexible_plan
+from swgjoint.control.kinematic_error import (
+    KinematicErrorTable,
+    compensated,
+    identify_kinematic_error,
+)
+from swgjoint.control.learning import LearningCompensation
+from swgjoint.control.motor_side import MotorPID, ideal_plan, rigid_plan
+from swgjoint.control.mpc import PredictiveController
+from swgjoint.drives.references import load_drive
+from swgjoint.files import Outputs, file_name
+from swgjoint.json_text import json_text
+from swgjoint.maps.drive_map import DriveMap
+from swgjoint.pool import run_all
+from swgjoint.progress import Progress, silent
+from swgjoint.sim.controller import Controller
+from swgjoint.validation.control.bench import (
+    DELAY,
+    FREQUENCY,
+    MOTIONS,
+    UNITS,
+    figures_of,
+    record_turn,
+    run_motion,
+    shown_of,
+)
+from swgjoint.validation.control.specimens import nominal, specimen
+from swgjoint.validation.rows import Row, StudyOptions, StudyResult
+
+Array = NDArray[np.float64]
+
+DRIVE = "CSG-25-100"
+SEEDS = 10
+LEARNED = ((1, 1), *((p, 0) for p in range(1, 9)), *((0, q) for q in range(1, 9)))
+"""Orders that are learned: up to 8 of either member."""
+
+Build = Callable[[KinematicErrorTable], Controller]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rung:
+    """One controller of the ladder."""
+
+    name: str
+    build: Build
+    """From the table of the specimen."""
+    made_for: str | None = None
+    """Figure of :data:`UNITS` that it shall improve."""
+    over: str | None = None
+    """Rung that it adds to; None for the first."""
+
+
+def _plan(planner: Any) -> Build:
+    return lambda table: MotorPID(planner, frequency=FREQUENCY)
+
+
+def _compensated(table: KinematicErrorTable) -> Controller:
+    return MotorPID(compensated([table]), frequency=FREQUENCY)
+
+
+def _predictive(table: KinematicErrorTable) -> Controller:
+    return PredictiveController(compensated([table]))
+
+
+def _learning(inner: Build, table: KinematicErrorTable) -> Controller:
+    return LearningCompensation(inner(table), orders=LEARNED, rate=0.7)
+
+
+RUNGS = (
+    Rung(name="PD", build=_plan(ideal_plan)),
+    Rung(
+        name="+ feed-forward",
+        build=_plan(rigid_plan),
+        made_for="tracking_rms",
+        over="PD",
+    ),
+    Rung(
+        name="+ flexible joint",
+        build=_plan(flexible_plan),
+        made_for="tracking_rms",
+        over="+ feed-forward",
+    ),
+    Rung(
+        name="+ kinematic error",
+        build=_compensated,
+        made_for="positioning_pp",
+        over="+ flexible joint",
+    ),
+    Rung(
+        name="+ learning",
+        build=partial(_learning, _compensated),
+        made_for="ripple_rms",
+        over="+ kinematic error",
+    ),
+    Rung(
+        name="MPC",
+        build=_predictive,
+        made_for="tracking_peak",
+        over="+ kinematic error",
+    ),
+    Rung(
+        name="flexible joint, learning",
+        build=partial(_learning, _plan(flexible_plan)),
+        made_for="two_per_turn",
+        over="+ flexible joint",
+    ),
+)
+NAMES = tuple(rung.name for rung in RUNGS)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Ladder:
+    """What the rungs came to on one drive."""
+
+    drive: DriveMap
+    figures: dict[str, dict[str, Array]]
+    """By rung and figure, one value a seed."""
+    shown: dict[str, dict[str, Array]]
+    """Of the first seed, by rung: signals for the picture."""
+
+    def improvement(self, rung: Rung) -> tuple[float, int]:
+        """Figure of a rung over that of the one below, mean; seeds that got better."""
+        assert rung.made_for is not None and rung.over is not None
+        after, before = (
+            self.figures[name][rung.made_for] for name in (rung.name, rung.over)
+        )
+        return float(after.mean() / before.mean()), int((after < before).sum())
+
+
+def climb(
+    drive: DriveMap,
+    *,
+    seeds: int = SEEDS,
+    jobs: int = 1,
+    rungs: tuple[str, ...] = NAMES,
+    progress: Progress = silent,
+) -> Ladder:
+    """Run the rungs on specimens of a drive.
+
+    Args:
+        drive: Of which specimens are drawn; the controllers know its mean curve.
+        seeds: Specimens.
+        jobs: Processes.
+        rungs: Names of those that are run.
+        progress: Called with the stage, the specimens done and their number.
+    """
+    tasks = [(drive, seed, rungs) for seed in range(seeds)]
+    found = run_all(_one_seed, tasks, jobs=jobs, stage="specimens", progress=progress)
+    return Ladder(
+        drive=drive,
+        figures={
+            name: {key: np.array([one[0][name][key] for one in found]) for key in UNITS}
+            for name in rungs
+        },
+        shown=found[0][1],
+    )
+
+
+def _one_seed(
+    task: tuple[DriveMap, int, tuple[str, ...]],
+) -> tuple[dict[str, dict[str, float]], dict[str, dict[str, Array]]]:
+    """Figures and shown signals of all rungs on one specimen."""
+    drive, seed, names = task
+    table = identify_kinematic_error(record_turn(drive, seed), nominal(drive))
+    plant = specimen(drive, seed)
+    figures, shown = {}, {}
+    for rung in RUNGS:
+        if rung.name not in names:
+            continue
+        runs = {
+            motion: run_motion(drive, plant, rung.build(table), motion, seed)
+            for motion in MOTIONS
+        }
+        figures[rung.name] = figures_of(runs)
+        shown[rung.name] = shown_of(runs) if seed == 0 else {}
+    return figures, shown
+
+
+def run_control(options: StudyOptions) -> StudyResult:
+    """The ladder; ``only`` names other drives, maps or designs.
+
+    Raises:
+        InputError: If a drive is unknown or a fidelity does not fit it.
+    """
+    from swgjoint.view.plots.control import ladder_picture, ladder_table
+
+    outputs = None if options.folder is None else Outputs(options.folder)
+    references, seeds = options.only or (DRIVE,), options.seeds or SEEDS
+    drives = {
+        # the errors of specimens are the study's own, of more orders
+        name: load_drive(name, model=options.model, kinematic_error_arcmin=0.0)
+        for name in references
+    }
+    rows: list[Row] = []
+    summary, more = [], {}
+    for name, drive in drives.items():
+        found = climb(drive, seeds=seeds, jobs=options.jobs, progress=options.progress)
+        rows += ladder_rows(name, found)
+        summary += [
+            f"{name}, {seeds} specimens, readings {1e3 * DELAY:g} ms old,"
+            " mean ± standard deviation:"
+        ]
+        summary += [*ladder_table(found), *ladder_claims(found)]
+        more[name] = {
+            rung: {key: values.tolist() for key, values in figures.items()}
+            for rung, figures in found.figures.items()
+        }
+        if outputs is not None:
+            outputs.write(
+                f"control-{file_name(drive.name)}.png",
+                partial(ladder_picture, name, found),
+            )
+    if outputs is not None:
+        content = {"rows": [row.to_json() for row in rows], "values": more}
+        outputs.write("control.json", lambda: json_text(content) + "\n")
+    return StudyResult(
+        rows=tuple(rows),
+        summary=tuple(summary),
+        more={"values": more},
+        files=() if outputs is None else tuple(outputs.files),
+    )
+
+
+def ladder_rows(name: str, found: Ladder) -> list[Row]:
+    """One row for every rung and figure."""
+    made_for = {rung.name: rung.made_for for rung in RUNGS}
+    return [
+        Row(
+            case=f"{name}, {rung}",
+            quantity=key,
+            unit=UNITS[key],
+            source_value=None,
+            ours=float(values.mean()),
+            reason="what it is made for" if made_for[rung] == key else None,
+            more={"spread": float(values.std(ddof=min(1, values.size - 1)))},
+        )
+        for rung, figures in found.figures.items()
+        for key, values in figures.items()
+    ]
+
+
+def ladder_claims(found: Ladder) -> list[str]:
+    """What each rung did to the figure that it is made for, a line each."""
+    lines = []
+    for rung in RUNGS:
+        if rung.made_for is None or not {rung.name, rung.over} <= set(found.figures):
+            continue
+        share, better = found.improvement(rung)
+        count = len(found.figures[rung.name][rung.made_for])
+        lines.append(
+            f"{rung.name}: {rung.made_for} {share:.3g} of that of {rung.over!r},"
+            f" better on {better} of {count}"
+        )
+    return lines

@@ -1,0 +1,109 @@
+"""Specimens of one drive: what a maker's tolerances leave different between two.
+
+The errors of a drive are drawn, not built: amplitudes are those of finite elements of a
+drive at the limits of its tolerances (:mod:`swgjoint.maps.fit.error_spectrum`), phases
+come from a seed. The *systematic* part, low orders of cumulative pitch, roundness and
+centring, belongs to the specimen; the *random* part, higher orders of single pitches,
+is drawn from a seed of its own, so that a record may be taken on a drive that differs
+from the one that is compensated.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.control.kinematic_error import KinematicErrorTable
+from swgjoint.maps.drive_map import DriveMap
+from swgjoint.maps.fit.error_spectrum import AMPLITUDES
+from swgjoint.units import arcmin
+
+Array = NDArray[np.float64]
+
+RANDOM = 0.07
+"""Over the amplitude of 2 alpha: what single pitches leave in every order of
+:data:`RANDOM_ORDERS`."""
+RANDOM_ORDERS = (*((p, 0) for p in range(5, 13)), *((0, q) for q in range(5, 13)))
+LOW = 4
+"""Orders of a map up to this belong to its systematic part."""
+ACCURACY = 1.0
+"""Transmission accuracy of a drive for which none is stated [arcmin]."""
+FRICTION = 0.2
+"""Friction of a specimen is within this share of the nominal one."""
+
+
+def specimen(base: DriveMap, seed: int, *, random_seed: int = 0) -> DriveMap:
+    """One specimen of a drive.
+
+    A map with kinematic error keeps its amplitudes and gets other phases, potential and
+    error alike; others get the orders of :mod:`swgjoint.maps.fit.error_spectrum` and
+    the random ones, with a peak to peak over one turn that is the transmission accuracy
+    which the catalogue states.
+
+    Args:
+        base: Nominal drive.
+        seed: Of systematic part and friction.
+        random_seed: Of the random part.
+    """
+    systematic = np.random.default_rng([seed, 0])
+    random = np.random.default_rng([seed, 1, random_seed])
+    drive = _turned(base, systematic, random)
+    if not base.kinematic_error.any():
+        drive = _drawn(base, systematic, random)
+    if base.friction is None:
+        return drive
+    share = 1.0 + FRICTION * float(systematic.uniform(-1.0, 1.0))
+    law = base.friction
+    parts = {
+        key: share * getattr(law, key)
+        for key in ("coulomb", "static", "viscous", "load")
+    }
+    return replace(drive, friction=replace(law, **parts))
+
+
+def nominal(base: DriveMap) -> DriveMap:
+    """What is known of every specimen of a drive: its mean curve and friction."""
+    return base.with_harmonics(np.zeros(len(base.orders), dtype=bool))
+
+
+def _drawn(
+    base: DriveMap, systematic: np.random.Generator, random: np.random.Generator
+) -> DriveMap:
+    orders = np.array([*AMPLITUDES, *RANDOM_ORDERS])
+    size = [*AMPLITUDES.values(), *np.full(len(RANDOM_ORDERS), RANDOM)]
+    phase = (
+        2.0
+        * np.pi
+        * np.concatenate(
+            [
+                systematic.uniform(size=len(AMPLITUDES)),
+                random.uniform(size=len(RANDOM_ORDERS)),
+            ]
+        )
+    )
+    pairs = np.array(size)[:, None] * np.stack([np.cos(phase), np.sin(phase)], axis=-1)
+    stated = (base.info.get("stated") or {}).get("transmission_accuracy_arcmin")
+    wanted = (stated or ACCURACY) * arcmin
+    table = KinematicErrorTable(orders=orders, amplitudes=pairs)
+    return table.sized(base, wanted).on(base)
+
+
+def _turned(
+    base: DriveMap, systematic: np.random.Generator, random: np.random.Generator
+) -> DriveMap:
+    low = (np.abs(base.orders) <= LOW).all(axis=1)
+    phase = np.where(
+        low,
+        systematic.uniform(0.0, 2.0 * np.pi, low.size),
+        random.uniform(0.0, 2.0 * np.pi, low.size),
+    )
+    phase[0] = 0.0
+    turn = np.array([[np.cos(phase), -np.sin(phase)], [np.sin(phase), np.cos(phase)]])
+    return replace(
+        base,
+        kinematic_error=np.einsum("abk,kb->ka", turn, base.kinematic_error),
+        potential=np.einsum("abk,kbmc->kamc", turn, base.potential),
+        end_stiffness=np.einsum("abk,kbe->kae", turn, base.end_stiffness),
+    )

@@ -1,0 +1,1 @@
+"""The studies of the thesis, computed again."""

@@ -1,0 +1,234 @@
+"""Cases of a study file: designs, loads and the values that a source prints."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, model_validator
+
+from swgjoint.errors import DesignError, InputError
+from swgjoint.faults import Fault, Section, read_toml, validated
+from swgjoint.gear.design.design import Design
+from swgjoint.models_path import find
+
+Kind = Literal["tensile", "compressive", "von_mises"]
+KINDS: tuple[Kind, ...] = ("tensile", "compressive", "von_mises")
+
+Stress = Annotated[float, Field(gt=0, le=10_000)]
+Refinement = Annotated[float, Field(gt=1, le=16)]
+Torque = Annotated[float, Field(ge=0, le=1e6)]
+Text = Annotated[str, Field(min_length=1, max_length=200)]
+Listed = Field(strict=False)  # TOML has lists, the models tuples
+
+
+class CaseEntry(Section):
+    """One case: a design, a load and what the source prints for it."""
+
+    name: Text | None = None
+    """Without it the case is named after the group's parameter."""
+    value: float | None = None
+    """Value of the group's parameter."""
+    base: Text | None = None
+    changes: Mapping[str, Any] = {}
+    torque_Nm: Torque | None = None
+    state: Literal["turn", "wave_generator", "meshed"] = "turn"
+    """Mean of the per-position maxima over the turn, or one state of the set-up."""
+    angle_deg: Annotated[float, Field(gt=0, le=360)] | None = None
+    """Read at this position of the wave generator instead of over the turn."""
+    tensile_MPa: Stress | None = None
+    compressive_MPa: Stress | None = None
+    von_mises_MPa: Stress | None = None
+    note: str = ""
+    """What the source leaves open about this case."""
+
+    @property
+    def printed(self) -> dict[Kind, float | None]:
+        """Values of the source [MPa]."""
+        return {kind: getattr(self, f"{kind}_MPa") for kind in KINDS}
+
+
+class GroupEntry(Section):
+    """Cases of one section or table of the source."""
+
+    id: Annotated[str, Field(pattern=r"^[\w.-]+$", max_length=40)]
+    title: Text
+    source: Text
+    base: Text
+    changes: Mapping[str, Any] = {}
+    torque_Nm: Torque | None = None
+    positions: Annotated[int, Field(ge=1, le=1000)] | None = None
+    """Of the wave generator over the turn; those of the file without."""
+    turn_deg: Annotated[float, Field(gt=0, le=360)] | None = None
+    """Of the input; that of the file without."""
+    keys: Annotated[tuple[str, ...], Listed] = ()
+    """Dotted keys of the design that take the value of a case: the parameter."""
+    symbol: str = ""
+    unit: str = ""
+    lowest: Mapping[Kind, float] = {}
+    """Parameter with the lowest stress, as the source states it."""
+    highest: Mapping[Kind, float] = {}
+    flat: Annotated[tuple[Kind, ...], Listed] = ()
+    """Stresses that do not depend on the parameter, as the source states it."""
+    flat_range: Annotated[tuple[float, float], Listed] | None = None
+    """Values of the parameter between which that holds; all without."""
+    over: str | None = None
+    """Group of the same parameter whose von Mises stress this one is compared with."""
+    statement: str = ""
+    note: str = ""
+    converge: bool = False
+    """Whether the cases are also computed on finer meshes."""
+    rank: bool = False
+    """Whether the order of the printed values is compared with ours."""
+    cases: Annotated[tuple[CaseEntry, ...], Field(strict=False, min_length=1)]
+
+    @model_validator(mode="after")
+    def _consistent(self) -> GroupEntry:
+        faults = []
+        values = [case.value for case in self.cases]
+        for k, case in enumerate(self.cases):
+            if (case.value is not None) != bool(self.keys):
+                faults.append(
+                    (f"cases[{k}].value", "accepted: exactly where the group has keys")
+                )
+            if case.name is None and case.value is None:
+                faults.append((f"cases[{k}].name", "missing; accepted: a text"))
+        given = [value for value in values if value is not None]
+        if any(b <= a for a, b in pairwise(given)):
+            faults.append(("cases", "accepted: values in increasing order"))
+        for key in ("lowest", "highest"):
+            faults += [
+                (f"{key}.{kind}", f"{value:g}; accepted: the value of a case")
+                for kind, value in getattr(self, key).items()
+                if value not in given
+            ]
+        names = [self.name_of(case) for case in self.cases]
+        if len(set(names)) < len(names):
+            faults.append(("cases", "accepted: names that differ"))
+        if faults:
+            raise Fault(*faults)
+        return self
+
+    def name_of(self, case: CaseEntry) -> str:
+        """Name of a case inside the group."""
+        if case.value is None:
+            return case.name or ""
+        text = f"{self.symbol} = {case.value:g} {self.unit}".rstrip()
+        return text if case.name is None else f"{text}, {case.name}"
+
+
+class StudyFile(Section):
+    """A file of ``models/studies``."""
+
+    source: Text
+    torque_Nm: Torque
+    model: Literal["2d", "3d"] = "2d"
+    positions: Annotated[int, Field(ge=1, le=1000)]
+    """Of the wave generator over the turn."""
+    turn_deg: Annotated[float, Field(gt=0, le=360)] = 180.0
+    """Of the input."""
+    refinements: Annotated[tuple[Refinement, ...], Listed] = (2.0, 3.0)
+    """Meshes beyond that of the thesis for the groups that converge."""
+    fine_positions: Annotated[int, Field(ge=1, le=1000)] = 12
+    """On those meshes, over one pitch of the fixed member. Without tolerances the
+    pattern repeats with that pitch, and 35 positions over half a turn (61 pitches) are
+    35 equidistant phases of it: the mean over 12 phases agrees to 0.1 %."""
+    contradictions: Annotated[tuple[Text, ...], Listed] = ()
+    """Of the source with itself, and what the cases follow."""
+    group: Annotated[tuple[GroupEntry, ...], Field(strict=False, min_length=1)]
+
+    @model_validator(mode="after")
+    def _groups_fit(self) -> StudyFile:
+        ids = [group.id for group in self.group]
+        twice = sorted({i for i in ids if ids.count(i) > 1})
+        if twice:
+            raise Fault(("group", f"id {', '.join(twice)} more than once"))
+        keys = {group.id: group.keys for group in self.group}
+        faults = [
+            (f"group[{k}].over", f"{g.over!r}; accepted: a group of the same keys")
+            for k, g in enumerate(self.group)
+            if g.over is not None and (keys.get(g.over) != g.keys or not g.keys)
+        ]
+        if faults:
+            raise Fault(*faults)
+        return self
+
+    @classmethod
+    def load(cls, reference: str | Path) -> StudyFile:
+        """Read a study file, given as a path or as the name of a bundled one.
+
+        Raises:
+            InputError: With one line per fault of the file.
+        """
+        path = find(reference, "studies", ".toml", what="study")
+        return validated(cls, read_toml(path, what="study"), where=str(path))
+
+    @property
+    def by_tenth(self) -> bool:
+        """Whether rows are judged at T/10: in the plane only, in space at T."""
+        return self.model == "2d"
+
+    def chosen(self, only: tuple[str, ...]) -> tuple[GroupEntry, ...]:
+        """Groups whose id is, or starts with, one of the given parts; all without.
+
+        ``5.4`` chooses 5.4.1 to 5.4.4, ``table-5.6`` one table.
+
+        Raises:
+            InputError: If a part chooses nothing.
+        """
+
+        def chooses(part: str, group: GroupEntry) -> bool:
+            rest = group.id.removeprefix(part)
+            return group.id.startswith(part) and rest[:1] in ("", ".", "-")
+
+        unknown = [p for p in only if not any(chooses(p, g) for g in self.group)]
+        if unknown:
+            accepted = ", ".join(group.id for group in self.group)
+            raise InputError(f"part {', '.join(unknown)}; accepted: {accepted}")
+        return tuple(
+            g for g in self.group if not only or any(chooses(p, g) for p in only)
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Case:
+    """One case, ready to compute."""
+
+    group: GroupEntry
+    entry: CaseEntry
+    design: Design | None
+    """None where the design is refused; ``fault`` says why."""
+    fault: str | None
+    torque: float
+    """Nominal torque T [N·m]."""
+
+    @property
+    def name(self) -> str:
+        """Group and case."""
+        return f"{self.group.id} {self.group.name_of(self.entry)}"
+
+    @property
+    def note(self) -> str:
+        """What the source leaves open."""
+        return self.entry.note or self.group.note
+
+
+def case_of(study: StudyFile, group: GroupEntry, entry: CaseEntry) -> Case:
+    """Build the design of a case: its base with the changes of group and case."""
+    base = Design.preset(entry.base or group.base)
+    changes: Mapping[str, Any] = {
+        **group.changes,
+        **dict.fromkeys(group.keys, entry.value),
+        **entry.changes,
+    }
+    torque = next(
+        t for t in (entry.torque_Nm, group.torque_Nm, study.torque_Nm) if t is not None
+    )
+    try:
+        design, fault = base.with_changes(changes), None
+    except DesignError as error:
+        design, fault = None, str(error)
+    return Case(group=group, entry=entry, design=design, fault=fault, torque=torque)

@@ -1,0 +1,185 @@
+"""One simulation of meshing as the small record that a study keeps."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from swgjoint.code_hash import code_hash
+from swgjoint.errors import ComputationError, DesignError
+from swgjoint.gear.design.design import Design
+from swgjoint.maps.cache import key_of, recalled
+from swgjoint.units import MPa
+from swgjoint.validation.thesis.cases import KINDS
+
+NUMBER = float | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunSpec:
+    """What a simulation of meshing depends on."""
+
+    design: Design
+    torque: float
+    """T [N·m]."""
+    positions: int
+    turn: float
+    """Turns of the input that the positions divide."""
+    model: str = "2d"
+
+    @property
+    def parts(self) -> dict[str, Any]:
+        """The design, the load and the code of the record."""
+        return {
+            "study": _own_version(),
+            "design": self.design.content_hash(),
+            "torque": self.torque,
+            "positions": self.positions,
+            "turn": self.turn,
+            "model": self.model,
+        }
+
+    @property
+    def key(self) -> str:
+        """Hash of the parts and of all other code."""
+        return key_of(self.parts)
+
+    @property
+    def size(self) -> float:
+        """Rough work, to start long runs first: positions times nodes."""
+        fine = float(self.design.mesh.refinement)
+        work = fine**2 if self.model == "2d" else 30.0 * fine**3
+        return self.positions * work
+
+
+@lru_cache
+def _own_version() -> str:
+    """Hash of the code of this part that decides a record."""
+    here = "validation/thesis"
+    return code_hash(f"{here}/record.py", f"{here}/stress_places.py")
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunRecord:
+    """Stresses of the flexspline in MPa by kind; None where there is none."""
+
+    outcome: str
+    """``converged``, the outcome of the first position that failed, ``failed`` where
+    not even the set-up was solved, or ``refused`` for a design that is no drive."""
+    message: str | None = None
+    failed_positions: int = 0
+    wall_s: float = 0.0
+    average: Mapping[str, NUMBER] = field(default_factory=dict)
+    """Mean over the positions of the largest nodal stress."""
+    away: Mapping[str, NUMBER] = field(default_factory=dict)
+    """The same without the nodes beside loaded tooth contacts."""
+    last: Mapping[str, NUMBER] = field(default_factory=dict)
+    """Largest nodal stress at the last position."""
+    places: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
+    """How often the largest stress sat where."""
+    setup: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    """By state of the set-up."""
+    per_position: Mapping[str, list[NUMBER]] = field(default_factory=dict)
+    angle_deg: list[float] = field(default_factory=list)
+    pairs_in_contact: list[int | None] = field(default_factory=list)
+
+    @property
+    def ok(self) -> bool:
+        """Whether every position was solved."""
+        return self.outcome == "converged"
+
+
+def recorded(spec: RunSpec) -> RunRecord:
+    """The record of a run, from the cache or computed and then kept."""
+    return recalled("studies", spec.parts, RunRecord, lambda: compute(spec))
+
+
+def compute(spec: RunSpec) -> RunRecord:
+    """Simulate meshing; what fails is part of the record, not an error."""
+    from swgjoint.fe.meshing import simulate_meshing
+    from swgjoint.fe.plane.drive2d import can_halve
+
+    begin = time.perf_counter()
+    try:
+        run = simulate_meshing(
+            spec.design,
+            model=spec.model,
+            torque=spec.torque,
+            steps=spec.positions,
+            turn=spec.turn,
+            half=can_halve(spec.design, bearing=spec.model == "2d"),
+            throw=False,
+        )
+    except (ComputationError, DesignError) as error:
+        outcome = "refused" if isinstance(error, DesignError) else "failed"
+        wall = time.perf_counter() - begin
+        return RunRecord(outcome=outcome, message=str(error), wall_s=wall)
+    return _record(run, spec.model, begin)
+
+
+_Largest = tuple[dict[str, float], dict[str, float], dict[str, str]]
+"""By kind: stress over all nodes, the same away from tooth contacts [Pa], the place."""
+
+
+def _plane(run: Any) -> list[_Largest | None]:
+    from swgjoint.validation.thesis.stress_places import StressPlaces
+
+    places = StressPlaces(model=run.model)
+    return [
+        None if step.state is None else places.largest(step.state) for step in run.steps
+    ]
+
+
+def _solid(run: Any) -> list[_Largest | None]:
+    """The same in space, where nodes beside contacts are not told from others."""
+    rows: list[_Largest | None] = []
+    for step in run.steps:
+        if step.stress is None:
+            rows.append(None)
+            continue
+        largest = step.stress.flexspline
+        values: dict[str, float] = {kind: getattr(largest, kind) for kind in KINDS}
+        rows.append((values, {}, {"von_mises": step.stress.place.part}))
+    return rows
+
+
+def _record(run: Any, model: str, begin: float) -> RunRecord:
+    rows = _plane(run) if model == "2d" else _solid(run)
+    solved = [row for row in rows if row is not None]
+
+    def mean(which: int, kind: str) -> NUMBER:
+        values: list[float] = [
+            row[which][kind]  # type: ignore[misc]
+            for row in solved
+            if kind in row[which]
+        ]
+        return float(np.mean(values)) / MPa if values else None
+
+    bad = [step for step in run.steps if not step.outcome.ok]
+    last = rows[-1]
+    return RunRecord(
+        outcome=run.outcome.name.lower(),
+        message=bad[0].outcome.value if bad else None,
+        failed_positions=len(bad),
+        average={kind: mean(0, kind) for kind in KINDS},
+        away={kind: mean(1, kind) for kind in KINDS},
+        last={kind: None if last is None else last[0][kind] / MPa for kind in KINDS},
+        places={
+            kind: dict(Counter(row[2][kind] for row in solved if kind in row[2]))
+            for kind in KINDS
+        },
+        setup={state.name: state.stress.flexspline.to_json() for state in run.setup},
+        per_position={
+            kind: [None if row is None else row[0][kind] / MPa for row in rows]
+            for kind in KINDS
+        },
+        angle_deg=[float(np.rad2deg(step.input_angle)) for step in run.steps],
+        pairs_in_contact=[step.pairs_in_contact for step in run.steps],
+        wall_s=time.perf_counter() - begin,
+    )

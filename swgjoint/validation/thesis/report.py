@@ -1,0 +1,148 @@
+"""Tables, report and plots of a study of the thesis, written to a folder."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterator, Sequence
+from functools import partial
+from itertools import groupby
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from swgjoint.files import Outputs
+from swgjoint.json_text import json_text
+from swgjoint.validation.rows import Row
+from swgjoint.validation.thesis.cases import StudyFile
+from swgjoint.validation.thesis.checks import TrendCheck
+from swgjoint.view.plots.thesis import group_picture
+
+if TYPE_CHECKING:
+    from swgjoint.validation.thesis.rows import CaseRecords
+
+_COLUMNS = {
+    "case": "case",
+    "quantity": "quantity",
+    "source_value": "thesis",
+    "ours": "T",
+    "ours_tenth": "T/10",
+    "deviation_percent": "T [%]",
+    "deviation_tenth_percent": "T/10 [%]",
+    "converged": "T, fine",
+    "converged_tenth": "T/10, fine",
+    "run_s": "run [s]",
+}
+
+_HEAD = """\
+# {source}: the studies in {space}, run again
+
+Largest nodal stress of the flexspline in MPa, mean over {positions} positions of the
+wave generator in half a turn (refinement 1, the mesh of the thesis). T is the stated
+torque, T/10 {tenth}. Deviations are
+of ours from the thesis. "fine" is the finest mesh computed (refinement {finest:g}, mean
+over {fine_positions} positions in one pitch).
+
+{summary}
+"""
+_TENTH = {
+    "2d": """an inference about what the thesis applied: its stresses rise with torque
+about ten times less than statics of a ring of the stated width asks for""",
+    "3d": """stands beside it because in the plane the thesis' stresses speak for it;
+in space rows are judged at T, and finer meshes are at T only""",
+}
+
+
+def write_report(
+    folder: Path,
+    study: StudyFile,
+    results: Sequence[CaseRecords],
+    rows: Sequence[Row],
+    trends: Sequence[TrendCheck],
+    summary: Sequence[str],
+) -> tuple[str, ...]:
+    """Write ``thesis.csv``, ``thesis.md``, ``thesis.json`` and one plot a part.
+
+    Returns:
+        The paths.
+    """
+    plain_rows = [row.to_json() for row in rows]
+    outputs = Outputs(folder)
+    outputs.write("thesis.csv", lambda: _csv(plain_rows))
+    outputs.write("thesis.md", lambda: _markdown(study, results, rows, trends, summary))
+    outputs.write("thesis.json", lambda: json_text(plain_rows) + "\n")
+    for part, found in groupby(results, key=lambda result: result.case.group.id):
+        outputs.write(f"{part}.png", partial(group_picture, list(found)))
+    return tuple(outputs.files)
+
+
+def _csv(rows: Sequence[dict[str, Any]]) -> str:
+    """All columns; the counts of places as text."""
+    out = io.StringIO()
+    writer = csv.DictWriter(out, fieldnames=list(rows[0]), lineterminator="\n")
+    writer.writeheader()
+    for row in rows:
+        writer.writerow(
+            {
+                key: " ".join(f"{k}:{n}" for k, n in value.items())
+                if isinstance(value, dict)
+                else value
+                for key, value in row.items()
+            }
+        )
+    return out.getvalue()
+
+
+def _markdown(
+    study: StudyFile,
+    results: Sequence[CaseRecords],
+    rows: Sequence[Row],
+    trends: Sequence[TrendCheck],
+    summary: Sequence[str],
+) -> str:
+    head = _HEAD.format(
+        source=study.source[:1].upper() + study.source[1:],
+        space="the plane" if study.model == "2d" else "space",
+        positions=study.positions,
+        tenth=_TENTH[study.model],
+        finest=study.refinements[-1],
+        fine_positions=study.fine_positions,
+        summary="\n".join(f"- {line}" for line in summary),
+    )
+    groups = {result.case.group.id: result.case.group for result in results}
+    parts = [head]
+    for part, found in groupby(rows, key=lambda row: row.more["part"]):
+        group = groups[part]
+        lines = [f"## {part}: {group.title}", "", group.source]
+        if group.statement:
+            lines[-1] += f": {group.statement}"
+        stated = [f"- {check.text}" for check in trends if check.part == part]
+        stated += [""] if stated else []
+        parts.append("\n".join([*lines, "", *stated, *_table(list(found))]))
+    return "\n\n".join(parts) + "\n"
+
+
+def _table(rows: Sequence[Row]) -> Iterator[str]:
+    """Markdown table of one part, then its reasons."""
+    plain_rows = [row.to_json() for row in rows]
+    # columns that are empty throughout say nothing
+    keys = [k for k in _COLUMNS if any(row[k] is not None for row in plain_rows)]
+    yield "| " + " | ".join(_COLUMNS[key] for key in keys) + " |"
+    yield "|" + "---|" * len(keys)
+    for columns in plain_rows:
+        yield "| " + " | ".join(_cell(key, columns[key]) for key in keys) + " |"
+    reasons: dict[str, list[str]] = {}
+    for row in rows:
+        if row.reason:
+            reasons.setdefault(row.reason, []).append(f"{row.case} {row.quantity}")
+    if reasons:
+        yield ""
+    for reason, names in reasons.items():
+        yield f"- {', '.join(names)}: {reason}"
+
+
+def _cell(key: str, value: Any) -> str:
+    if value is None:
+        return ""
+    if not isinstance(value, float):
+        return str(value)
+    return f"{value:+.1f}" if key.startswith("deviation") else f"{value:.1f}"

@@ -1,0 +1,199 @@
+"""Rows of the thesis study: one case and stress, at T and T/10, with its reason."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from swgjoint.validation.reasons import Facts, percent, reason_for
+from swgjoint.validation.rows import Row
+from swgjoint.validation.thesis.cases import KINDS, Case, Kind
+from swgjoint.validation.thesis.record import RunRecord
+
+
+@dataclass(frozen=True, kw_only=True)
+class CaseRecords:
+    """All runs of a case: nominal and tenth torque, by refinement."""
+
+    case: Case
+    nominal: Mapping[float, RunRecord]
+    tenth: Mapping[float, RunRecord]
+    by_tenth: bool = True
+    """Whether the rows are judged at T/10; else at T."""
+
+    @property
+    def meshes(self) -> tuple[float, ...]:
+        """Refinements, that of the thesis first."""
+        return tuple(sorted(self.nominal))
+
+    def by_mesh(self, kind: Kind, *, tenth: bool) -> dict[float, float]:
+        """Stress by refinement, where known [MPa]."""
+        found = {
+            mesh: self.value(kind, tenth=tenth, refinement=mesh) for mesh in self.meshes
+        }
+        return {mesh: value for mesh, value in found.items() if value is not None}
+
+    def value(
+        self, kind: Kind, *, tenth: bool, refinement: float = 1, away: bool = False
+    ) -> float | None:
+        """Stress [MPa]; None where the run failed or was not made."""
+        record = (self.tenth if tenth else self.nominal).get(refinement)
+        entry = self.case.entry
+        if record is None:
+            return None
+        if away:
+            return record.away.get(kind) if self.over_turn else None
+        if entry.state != "turn":
+            return record.setup.get(entry.state, {}).get(kind)
+        if entry.angle_deg is not None:
+            return record.last.get(kind)
+        return record.average.get(kind)
+
+    @property
+    def over_turn(self) -> bool:
+        """Whether the case is a mean over the turn, not one state or position."""
+        return self.case.entry.state == "turn" and self.case.entry.angle_deg is None
+
+    def places(self, kind: Kind, *, tenth: bool) -> dict[str, int]:
+        """How often the largest stress sat where; empty for a single state."""
+        record = (self.tenth if tenth else self.nominal)[1]
+        return dict(record.places.get(kind, {})) if self.over_turn else {}
+
+    @property
+    def failures(self) -> tuple[str, ...]:
+        """What failed at which torque, each advice once."""
+        lines: dict[str, list[str]] = {}
+        for name, record in (("T", self.nominal[1]), ("T/10", self.tenth[1])):
+            if not record.ok:
+                count = f" at {record.failed_positions} of {len(record.angle_deg)}"
+                where = f"{count} positions" if record.failed_positions else ""
+                lines.setdefault(str(record.message), []).append(name + where)
+        return tuple(f"{', '.join(who)}: {what}" for what, who in lines.items())
+
+
+def stress_rows(results: Sequence[CaseRecords]) -> list[Row]:
+    """Three rows a case."""
+    return [_row(result, kind) for result in results for kind in KINDS]
+
+
+def increase_rows(results: Sequence[CaseRecords]) -> list[Row]:
+    """Von Mises stress over that of the group with less torque, where both were run."""
+    known = {(r.case.group.id, r.case.entry.value): r for r in results}
+    rows = []
+    for result in results:
+        case = result.case
+        base = known.get((case.group.over or "", case.entry.value))
+        if base is None:
+            continue
+        nominal, tenth = (
+            percent(
+                result.value("von_mises", tenth=tenth),
+                base.value("von_mises", tenth=tenth),
+            )
+            for tenth in (False, True)
+        )
+        rows.append(
+            Row(
+                case=case.name,
+                quantity=f"von Mises stress over that at {base.case.torque:g} N·m",
+                unit="%",
+                source_value=None,
+                ours=nominal,
+                reason="; ".join(dict.fromkeys(result.failures + base.failures))
+                or None,
+                more=_columns(result, "von_mises", ours_tenth=tenth),
+            )
+        )
+    return rows
+
+
+def _row(result: CaseRecords, kind: Kind) -> Row:
+    case, tenth = result.case, result.by_tenth
+    before, finest = (None, None, *result.meshes)[-2:]
+    if len(result.meshes) == 1:
+        finest = None
+    printed = case.entry.printed[kind]
+
+    def ours(
+        tenth: bool, refinement: float | None = 1, away: bool = False
+    ) -> float | None:
+        if refinement is None:
+            return None
+        return result.value(kind, tenth=tenth, refinement=refinement, away=away)
+
+    facts = Facts(
+        printed=printed,
+        value=ours(tenth),
+        load="T/10" if tenth else "T",
+        tenth=None if tenth else ours(True),
+        nominal=ours(False),
+        away=ours(tenth, away=True),
+        fine=ours(tenth, finest),
+        by_mesh={} if tenth else result.by_mesh(kind, tenth=False),
+        places=result.places(kind, tenth=tenth),
+        failures=result.failures,
+        note=case.note,
+    )
+    return Row(
+        case=case.name,
+        quantity=kind.replace("_", " ").replace("mises", "Mises") + " stress",
+        unit="MPa",
+        source_value=printed,
+        ours=facts.nominal,
+        converged=ours(False, finest),
+        reason=reason_for(facts),
+        more=_columns(
+            result,
+            kind,
+            ours_tenth=ours(True),
+            converged_tenth=ours(True, finest),
+            deviation_percent=percent(facts.nominal, printed),
+            deviation_tenth_percent=percent(ours(True), printed),
+            deviation_converged_percent=percent(ours(False, finest), printed),
+            deviation_converged_tenth_percent=percent(ours(True, finest), printed),
+            last_refinement_percent=percent(facts.fine, ours(tenth, before)),
+            by_refinement={
+                f"{mesh:g}": value
+                for mesh, value in result.by_mesh(kind, tenth=False).items()
+            },
+            away_from_contacts=ours(False, away=True),
+            away_from_contacts_tenth=ours(True, away=True),
+            places=result.places(kind, tenth=False),
+            places_tenth=result.places(kind, tenth=True),
+        ),
+    )
+
+
+_NUMBERS = (
+    "ours_tenth",
+    "converged_tenth",
+    "deviation_percent",
+    "deviation_tenth_percent",
+    "deviation_converged_percent",
+    "deviation_converged_tenth_percent",
+    "last_refinement_percent",
+    "by_refinement",
+    "away_from_contacts",
+    "away_from_contacts_tenth",
+    "places",
+    "places_tenth",
+)
+
+
+def _columns(result: CaseRecords, kind: Kind, **known: Any) -> dict[str, Any]:
+    """The study's own columns, the same for every row; what is not known is None."""
+    case = result.case
+    return {
+        "part": case.group.id,
+        "kind": kind,
+        "source": case.group.source,
+        "parameter": case.entry.value,
+        "torque_Nm": case.torque,
+        **dict.fromkeys(_NUMBERS),
+        **known,
+        "outcome": result.nominal[1].outcome,
+        "outcome_tenth": result.tenth[1].outcome,
+        "run_s": result.nominal[1].wall_s,
+        "run_tenth_s": result.tenth[1].wall_s,
+    }

@@ -1,0 +1,84 @@
+"""Where the largest stress of the flexspline sits: fillet, bore, contact or inside."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.fe.plane.elasticity import stress_maxima
+from swgjoint.fe.plane.ring import RingModel
+from swgjoint.fe.plane.state import State
+from swgjoint.fe.plane.stress import KINDS, flexspline_stress
+
+Array = NDArray[np.float64]
+
+PLACES = ("fillet", "flank", "bore", "inside", "contact")
+NEAR = 0.25
+"""A node this near to a tooth contact that carries force counts as its neighbourhood
+[modules]; a length, not elements, so that it means the same on every mesh. The patches
+of the contacts are smaller."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class StressPlaces:
+    """Place of every node of a model's flexspline sector."""
+
+    model: RingModel
+
+    @cached_property
+    def _of_node(self) -> NDArray[np.int64]:
+        """Index into :data:`PLACES`, contacts apart. Shape (n_nodes,)."""
+        element = self.model.element
+        mesh, profile = element.mesh, element.profile
+        place = np.full(mesh.mesh.p.shape[1], PLACES.index("inside"))
+        names = [part.name for part in profile.segments]
+        # the fillet is the last segment before the root land, whatever its name
+        fillet = len(names) - (2 if names[-1] == "root_land" else 1)
+        at_flank = mesh.flank_stations < profile.stations[fillet]
+        for side in (mesh.flank_right, mesh.flank_left):
+            place[side] = np.where(
+                at_flank, PLACES.index("flank"), PLACES.index("fillet")
+            )
+        place[mesh.bore] = PLACES.index("bore")
+        return place
+
+    def near_contact(self, state: State) -> NDArray[np.bool_]:
+        """Nodes beside a tooth contact that carries force. Shape (N, n_nodes)."""
+        element = self.model.element
+        points = element.mesh.mesh.p.T
+        near = np.zeros((self.model.sectors, len(points)), dtype=bool)
+        if state.contacts is None:
+            return near
+        profile = element.profile
+        module = 2.0 * profile.pitch_radius / profile.teeth
+        loaded = state.tooth_force > 0.0
+        feet, _, _ = profile.evaluate(state.contacts.station[loaded])
+        feet[:, 0] *= np.where(state.contacts.side[loaded] == 0, 1.0, -1.0)
+        distance = np.linalg.norm(points[None] - feet[:, None], axis=-1)
+        np.logical_or.at(near, state.contacts.sector[loaded], distance < NEAR * module)
+        return near
+
+    def largest(
+        self, state: State
+    ) -> tuple[dict[str, float], dict[str, float], dict[str, str]]:
+        """Largest nodal stress, the same away from tooth contacts, and where it is.
+
+        Returns:
+            By kind: over all nodes [Pa]; over the nodes that are not beside a tooth
+            contact [Pa]; the place of the first.
+        """
+        near = self.near_contact(state)
+        stresses = stress_maxima(flexspline_stress(self.model, state))
+        overall, away, place = {}, {}, {}
+        for kind, values in zip(KINDS, stresses, strict=True):
+            sector, node = np.unravel_index(int(values.argmax()), values.shape)
+            overall[kind] = float(values[sector, node])
+            away[kind] = float(np.where(near, 0.0, values).max())
+            index = PLACES.index("contact")
+            place[kind] = PLACES[
+                index if near[sector, node] else int(self._of_node[node])
+            ]
+        return overall, away, place

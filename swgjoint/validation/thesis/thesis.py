@@ -1,0 +1,220 @@
+"""``swgjoint study thesis``: the studies of the thesis, run again.
+
+Chapters 4 to 6 by default, with the 2D model; chapter 7 with ``--model 3d``.
+
+Every case is simulated at the nominal torque T and at T/10: the stress increments with
+torque that the thesis prints are about ten times too small for its stated torque and
+face width, so T is the physics and T/10 an inference about what the thesis applied.
+Nothing else is scaled. One mesh (refinement 1) and one extraction rule hold for all
+rows: the mean over the positions of the largest nodal stress of the flexspline. The
+mean over the same positions away from loaded tooth contacts stands beside it. In space
+T is what the rows are judged by, T/10 stands beside it, and finer meshes are at T only.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+
+from swgjoint.gear.design.design import Design
+from swgjoint.pool import run_all
+from swgjoint.validation.reasons import WITHIN
+from swgjoint.validation.rows import Row, StudyOptions, StudyResult
+from swgjoint.validation.thesis.cases import Case, StudyFile, case_of
+from swgjoint.validation.thesis.checks import (
+    RankCheck,
+    TrendCheck,
+    rank_checks,
+    trend_checks,
+)
+from swgjoint.validation.thesis.record import RunRecord, RunSpec, recorded
+from swgjoint.validation.thesis.rows import CaseRecords, increase_rows, stress_rows
+
+TENTH = 0.1
+
+
+def run_thesis(options: StudyOptions) -> StudyResult:
+    """Run the chosen parts, or all of them.
+
+    Raises:
+        InputError: If a part is unknown.
+    """
+    name = "thesis-3d" if options.model == "3d" else "thesis"
+    return run_cases(StudyFile.load(name), options)
+
+
+def run_cases(study: StudyFile, options: StudyOptions) -> StudyResult:
+    """Simulate the cases of a study file and compare them with its printed values."""
+    begin = time.perf_counter()
+    cases = [
+        case_of(study, group, entry)
+        for group in study.chosen(options.only)
+        for entry in group.cases
+    ]
+    plan = {case.name: _specs(study, case) for case in cases}
+    specs = {spec.key: spec for row in plan.values() for spec in row.values()}
+    ordered = sorted(specs.values(), key=lambda spec: -spec.size)
+    records = run_all(
+        recorded,
+        ordered,
+        jobs=options.jobs,
+        stage="simulations of meshing",
+        progress=options.progress,
+    )
+    found = dict(zip((spec.key for spec in ordered), records, strict=True))
+    results = [_collect(study, case, plan[case.name], found) for case in cases]
+    return _result(study, results, options, begin, len(ordered))
+
+
+def _specs(study: StudyFile, case: Case) -> dict[tuple[bool, float], RunSpec]:
+    """Runs of a case by (whether at T/10, refinement)."""
+    if case.design is None:
+        return {}
+    specs: dict[tuple[bool, float], RunSpec] = {}
+    for tenth in (False, True):
+        torque = case.torque * (TENTH if tenth else 1.0)
+        angle, group = case.entry.angle_deg, case.group
+        turn = (group.turn_deg or study.turn_deg) / 360.0
+        specs[tenth, 1] = RunSpec(
+            design=case.design,
+            torque=torque,
+            positions=group.positions or study.positions if angle is None else 2,
+            turn=turn if angle is None else 2.0 * angle / 360.0,
+            model=study.model,
+        )
+        fine = study.refinements if group.converge else ()
+        for refinement in fine if study.by_tenth or not tenth else ():
+            specs[tenth, refinement] = RunSpec(
+                design=case.design.with_changes({"mesh.refinement": refinement}),
+                torque=torque,
+                positions=study.fine_positions,
+                turn=1.0 / _fixed_teeth(case.design),
+                model=study.model,
+            )
+    return specs
+
+
+def _fixed_teeth(design: Design) -> int:
+    """Teeth of the member that stands: the pattern repeats with their pitch."""
+    drive = design.drive
+    if drive.layout == "flexspline_fixed":
+        return drive.teeth_flexspline
+    return drive.teeth_circular_spline
+
+
+def _collect(
+    study: StudyFile,
+    case: Case,
+    specs: Mapping[tuple[bool, float], RunSpec],
+    found: Mapping[str, RunRecord],
+) -> CaseRecords:
+    records = {key: found[spec.key] for key, spec in specs.items()}
+    if case.fault is not None:
+        refused = RunRecord(outcome="refused", message=case.fault)
+        records = {(False, 1): refused, (True, 1): refused}
+    nominal = {fine: r for (tenth, fine), r in records.items() if not tenth}
+    tenth = {fine: r for (tenth, fine), r in records.items() if tenth}
+    return CaseRecords(case=case, nominal=nominal, tenth=tenth, by_tenth=study.by_tenth)
+
+
+def _result(
+    study: StudyFile,
+    results: Sequence[CaseRecords],
+    options: StudyOptions,
+    begin: float,
+    runs: int,
+) -> StudyResult:
+    order = list(dict.fromkeys(result.case.group.id for result in results))
+    rows = sorted(
+        [*stress_rows(results), *increase_rows(results)],
+        key=lambda row: order.index(row.more["part"]),
+    )
+    ranks, trends = rank_checks(results), trend_checks(results)
+    shares = {
+        key: _share(rows, column)
+        for key, column in (
+            ("tenth", "deviation_tenth_percent"),
+            ("nominal", "deviation_percent"),
+            ("converged_tenth", "deviation_converged_tenth_percent"),
+            ("converged", "deviation_converged_percent"),
+        )
+    }
+    failed = [
+        result.case.name
+        for result in results
+        if not (result.nominal[1].ok and result.tenth[1].ok)
+    ]
+    more = {
+        "source": study.source,
+        "within_percent": WITHIN,
+        "shares": shares,
+        "ranks": [check.to_json() for check in ranks],
+        "trends": [check.to_json() for check in trends],
+        "failed_cases": failed,
+        "contradictions": list(study.contradictions),
+        "runs": runs,
+    }
+    summary = (
+        *_summary(shares, ranks, trends, failed, runs),
+        *(f"the source contradicts itself: {text}" for text in study.contradictions),
+    )
+    files: tuple[str, ...] = ()
+    if options.folder is not None:
+        from swgjoint.validation.thesis.report import write_report
+
+        seconds = time.perf_counter() - begin
+        files = write_report(
+            options.folder, study, results, rows, trends, (*summary, f"{seconds:.0f} s")
+        )
+    return StudyResult(rows=tuple(rows), summary=summary, more=more, files=files)
+
+
+def _share(rows: Sequence[Row], column: str) -> dict[str, int]:
+    """Rows with a printed value, those computed, and those within the limit."""
+    printed = [row for row in rows if row.source_value is not None]
+    found = [d for row in printed if (d := row.more[column]) is not None]
+    within = sum(abs(d) <= WITHIN for d in found)
+    return {"printed": len(printed), "computed": len(found), "within": within}
+
+
+def _summary(
+    shares: Mapping[str, Mapping[str, int]],
+    ranks: Sequence[RankCheck],
+    trends: Sequence[TrendCheck],
+    failed: Sequence[str],
+    runs: int,
+) -> tuple[str, ...]:
+    lines = [
+        f"{runs} simulations of meshing; {len(failed)} cases with a failure"
+        + (f": {'; '.join(failed)}" if failed else "")
+    ]
+    names = {
+        "tenth": "T/10",
+        "nominal": "T",
+        "converged_tenth": "T/10, finest mesh",
+        "converged": "T, finest mesh",
+    }
+    for key, share in shares.items():
+        total = share["computed" if key.startswith("converged") else "printed"]
+        if total:
+            lines.append(
+                f"at {names[key]}: {share['within']} of {total} printed values within"
+                f" {WITHIN:g} % ({100 * share['within'] / total:.0f} %)"
+            )
+    lines += [check.text for check in ranks]
+    for tenth, name in ((True, "T/10"), (False, "T")):
+        for refinement in sorted({check.refinement for check in trends}):
+            here = [
+                check
+                for check in trends
+                if check.tenth == tenth and check.refinement == refinement
+            ]
+            if not here:
+                continue
+            agree = sum(check.agrees for check in here)
+            lines.append(
+                f"at {name}, refinement {refinement:g}: {agree} of {len(here)} stated"
+                " trends found"
+            )
+            lines += [f"{c.part} at {c.text}" for c in here if not c.agrees]
+    return tuple(lines)

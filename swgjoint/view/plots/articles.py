@@ -1,0 +1,124 @@
+"""Picture of the study of the articles."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from swgjoint.pictures import save_png
+from swgjoint.validation.articles.runs import Found
+
+
+def articles_picture(parts: Sequence[str], found: Mapping[str, Found]) -> bytes | None:
+    """PNG: radial stiffness by what is open, stress and safety over the torque.
+
+    Args:
+        parts: That were run.
+        found: Results by task.
+
+    Returns:
+        None if no part that was run has a panel.
+    """
+    panels: list[Callable[[Any, Mapping[str, Found]], None]] = []
+    if "force" in parts:
+        panels += [_force, _lobes]
+    if "fatigue" in parts:
+        panels += [_amplitude, _safety]
+    if not panels:
+        return None
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(1 + 4.6 * len(panels), 4.6), layout="constrained")
+    axes = figure.subplots(1, len(panels), squeeze=False)[0]
+    for ax, draw in zip(axes, panels, strict=True):
+        draw(ax, found)
+    out = io.BytesIO()
+    save_png(figure, out, dpi=110)
+    return out.getvalue()
+
+
+def _force(ax: Any, found: Mapping[str, Found]) -> None:
+    """Stiffness of every variant at three places."""
+    named = {
+        name.removeprefix("force, ").replace("force", "as bundled"): result
+        for name, result in found.items()
+        if name.startswith("force") and "mid_face" in result
+    }
+    order = sorted(named, key=lambda name: named[name]["mid_face"])
+    height = range(len(order))
+    for place, mark in (("mid_face", "o"), ("open_edge", "<"), ("face_width", "|")):
+        values = [named[name][place] for name in order]
+        ax.plot(values, height, mark, label=place.replace("_", " "))
+    ax.set_yticks(height, order, fontsize="small")
+    ax.set_xlim(left=0.0)
+    ax.set_xlabel("radial stiffness [N/mm]")
+    ax.set_title("XB1-100-80, boss clamped", fontsize="medium")
+    ax.legend(fontsize="small")
+    ax.grid(alpha=0.3)
+
+
+def _lobes(ax: Any, found: Mapping[str, Found]) -> None:
+    """Force and play over the deflection of a lobe."""
+    result = found.get("force, lobes", {})
+    ax.set_title("between two lobes, large rotations", fontsize="medium")
+    ax.set_xlabel("deflection of a lobe [mm]")
+    ax.set_ylabel("force of a lobe [N]")
+    ax.grid(alpha=0.3)
+    if "force_N" not in result:
+        return
+    deflection = result["deflection_mm"]
+    ax.plot(deflection, result["force_N"], "tab:blue", marker=".", label="cup")
+    pressed = np.array(result["pressed_mm"])
+    cup = np.interp(pressed, deflection, result["force_N"])
+    both = cup + np.array(result["on_teeth_N"])
+    ax.plot(pressed, both, "tab:green", marker=".", label="cup and teeth")
+    ax.set_ylim(0.0, 2.0 * max(result["force_N"]))
+    ax.legend(fontsize="small")
+    ax.axvline(result["height_mm"], color="0.6", lw=0.8)
+    right = ax.twinx()
+    right.plot(deflection, result["play_mrad"], "tab:red", marker=".", ls="--")
+    right.axhline(0.0, color="tab:red", lw=0.5)
+    right.set_ylabel("play of the output [mrad]; line: w_0", color="tab:red")
+
+
+_LINES = (
+    ("four", "mid_face", "four forces, mid-face", "tab:green", "-"),
+    ("fatigue", "mid_face", "ellipse, mid-face", "tab:blue", "-"),
+    ("fatigue", "worst_section", "ellipse, worst", "tab:blue", "--"),
+    ("fatigue, crowned", "mid_face", "crowned, mid-face", "tab:red", "-"),
+    ("fatigue, crowned", "worst_section", "crowned, worst", "tab:red", "--"),
+)
+
+
+def _amplitude(ax: Any, found: Mapping[str, Found]) -> None:
+    """Nominal stress around at the roots."""
+    _over_torque(ax, found, "normal_amplitude_MPa")
+    ax.set_ylabel("nominal amplitude at the roots [MPa]")
+
+
+def _safety(ax: Any, found: Mapping[str, Found]) -> None:
+    """Safety factors, shell theory among them."""
+    _over_torque(ax, found, "S")
+    known = [f["by_torque"] for f in found.values() if "by_torque" in f]
+    rows = known[0] if known else []
+    torque = [row["torque_Nm"] for row in rows]
+    theory = [row["shell_theory"]["S"] for row in rows]
+    ax.plot(torque, theory, "k:", label="shell theory")
+    ax.axhline(1.5, color="0.6", lw=0.8)
+    ax.set_ylim(0.0, 1.05 * max([1.5, *theory]))
+    ax.set_ylabel("safety factor")
+    ax.legend(fontsize="small")
+
+
+def _over_torque(ax: Any, found: Mapping[str, Found], key: str) -> None:
+    for name, section, label, colour, style in _LINES:
+        rows = found.get(name, {}).get("by_torque", [])
+        torque = [row["torque_Nm"] for row in rows]
+        values = [row[section][key] for row in rows]
+        ax.plot(torque, values, color=colour, ls=style, marker=".", label=label)
+    ax.set_xlabel("torque [N·m]")
+    ax.set_ylim(bottom=0.0)
+    ax.grid(alpha=0.3)

@@ -1,0 +1,70 @@
+"""The picture of ``swgjoint bench fe``."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping
+from typing import Any
+
+from swgjoint.bench.fe.rows import BOUNDS, QUANTITIES, seconds
+from swgjoint.pictures import save_png
+
+STYLES = {
+    "ring": ("C2", "^", "ring"),
+    "2d linear": ("C0", "x", "plane, linear"),
+    "2d": ("C0", "s", "plane"),
+    "3d linear": ("C3", "x", "space, linear"),
+    "3d": ("C3", "o", "space"),
+}
+"""Colour, marker and name of every kind."""
+LEAST = 1e-3
+"""Errors below are drawn here [%]."""
+
+
+def cost_picture(result: Mapping[str, Any]) -> bytes:
+    """PNG: size of the error over the time of one core, one panel a quantity.
+
+    The line is the Pareto front: nothing cheaper comes nearer to the reference.
+    """
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(12.0, 8.4), layout="constrained")
+    rows = [row for row in result["rows"] if row["error_percent"] is not None]
+    reference = rows[0]["reference"]
+    panels = figure.subplots(2, 2)
+    for ax, quantity in zip(panels.flat, QUANTITIES, strict=True):
+        here = [row for row in rows if row["quantity"] == quantity]
+        shown = [r for r in here if f"{r['model']}, {r['setting']}" != r["reference"]]
+        for kind, (colour, marker, name) in STYLES.items():
+            of_kind = [row for row in shown if row["kind"] == kind]
+            x = [seconds(row) for row in of_kind]
+            y = [max(row["error_percent"], LEAST) for row in of_kind]
+            ax.plot(x, y, marker, color=colour, label=name, ms=7)
+            for row, a, b in zip(of_kind, x, y, strict=True):
+                short = row["setting"].removeprefix("thin rings, ")
+                short = short.removeprefix("refinement ").removesuffix(", linear")
+                ax.annotate(
+                    short, (a, b), xytext=(5, 4), textcoords="offset points", fontsize=7
+                )
+        front = sorted((row for row in shown if row["pareto"]), key=seconds)
+        ax.plot(
+            [seconds(row) for row in front],
+            [max(row["error_percent"], LEAST) for row in front],
+            "-",
+            color="0.6",
+            zorder=0,
+            label="Pareto front",
+        )
+        for row in here:
+            if f"{row['model']}, {row['setting']}" == row["reference"]:
+                ax.axvline(seconds(row), color="0.6", ls=":", label="reference")
+        for bound in BOUNDS:
+            ax.axhline(bound, color="0.9", zorder=0)
+        ax.set(xscale="log", yscale="log", title=quantity)
+        ax.set(xlabel="seconds of one core", ylabel="error [%]")
+        ax.margins(x=0.12, y=0.1)
+    panels[0, 0].legend(fontsize="small")
+    figure.suptitle(f"{result['design']} against {reference}")
+    out = io.BytesIO()
+    save_png(figure, out, dpi=100)
+    return out.getvalue()

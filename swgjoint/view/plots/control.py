@@ -1,0 +1,77 @@
+"""The ladder of controllers as a text table and a picture."""
+
+from __future__ import annotations
+
+import io
+
+import numpy as np
+
+from swgjoint.pictures import save_png
+from swgjoint.validation.control.bench import UNITS
+from swgjoint.validation.control.ladder import RUNGS, Ladder
+
+COLORS = ("0.6", "C1", "C0", "C2", "C3", "C5", "C4")
+
+
+def ladder_table(found: Ladder) -> list[str]:
+    """Lines of a table, one a rung, mean ± standard deviation."""
+    made_for = {rung.name: rung.made_for for rung in RUNGS}
+    header = ["", *UNITS]
+    rows = [["", *UNITS.values()]]
+    for rung, figures in found.figures.items():
+        cells = [
+            f"{values.mean():.3g} ± {values.std(ddof=min(1, values.size - 1)):.2g}"
+            + ("*" if made_for[rung] == key else " ")
+            for key, values in figures.items()
+        ]
+        rows.append([rung, *cells])
+    wide = [max(len(row[k]) for row in [header, *rows]) for k in range(len(header))]
+    lines = [
+        "  ".join(cell.ljust(w) for cell, w in zip(row, wide, strict=True)).rstrip()
+        for row in [header, *rows]
+    ]
+    return [*lines, "* what this controller is made for"]
+
+
+def ladder_picture(name: str, found: Ladder) -> bytes:
+    """PNG: signals of the first specimen, and the figures of all."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(12.0, 7.5), layout="constrained")
+    axes = figure.subplots(2, 3)
+    signals = (
+        (axes[0, 0], "time", "tracking", "time [s]", "link error, move [arcmin]"),
+        (
+            axes[0, 1],
+            "output",
+            "positioning",
+            "output [deg]",
+            "slow turn, mean off [arcmin]",
+        ),
+        (axes[0, 2], "even_time", "ripple", "time [s]", "output torque - mean [N·m]"),
+    )
+    rungs = dict(zip((rung.name for rung in RUNGS), COLORS, strict=True))
+    for ax, x, y, along, label in signals:
+        for rung, shown in found.shown.items():
+            off = shown[y].mean() if y == "positioning" else 0.0
+            ax.plot(shown[x], shown[y] - off, lw=0.9, color=rungs[rung], label=rung)
+        ax.set(xlabel=along, ylabel=label)
+        ax.grid(alpha=0.3)
+    axes[0, 0].legend(fontsize="x-small")
+    bars = ("tracking_rms", "positioning_pp", "ripple_rms")
+    for ax, key in zip(axes[1], bars, strict=True):
+        names = list(found.figures)
+        values = np.array([found.figures[rung][key] for rung in names])
+        place = np.arange(len(names))
+        ax.bar(place, values.mean(axis=1), color=[rungs[rung] for rung in names])
+        for k, row in enumerate(values):
+            ax.plot(np.full(row.size, k), row, "k.", ms=2)
+        ax.set_yscale("log")
+        ax.set_xticks(place, names, rotation=30, ha="right", fontsize="small")
+        ax.set(title=f"{key} [{UNITS[key]}]")
+        ax.grid(alpha=0.3, axis="y")
+    count = next(iter(found.figures.values()))[bars[0]].size
+    figure.suptitle(f"{name}: above one specimen, below {count} (dots) and their mean")
+    out = io.BytesIO()
+    save_png(figure, out, dpi=100)
+    return out.getvalue()

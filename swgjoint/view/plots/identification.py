@@ -1,0 +1,96 @@
+"""Picture of an identification: torques measured and modelled, loop, what is left."""
+
+from __future__ import annotations
+
+import io
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from swgjoint.pictures import save_png
+from swgjoint.units import arcmin
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from swgjoint.identify.identification import Identified
+
+_TURNS = 4
+_LABELS = {"output_torque": "output torque", "motor_torque": "motor torque"}
+
+
+def png(found: Identified) -> bytes:
+    """The picture as a file."""
+    out = io.BytesIO()
+    save_png(picture(found), out, dpi=120)
+    return out.getvalue()
+
+
+def picture(found: Identified) -> Figure:
+    """Every channel over time with its residual; torsion loop; kinematic error."""
+    from matplotlib.figure import Figure
+
+    measured = found.model.measured()
+    figure = Figure(figsize=(12.0, 3.2 * (len(measured) + 1)), layout="constrained")
+    axes = figure.subplots(len(measured) + 1, 2)
+    time = found.samples.time[found.model.kept]
+    for row, (key, torque) in zip(axes, measured.items(), strict=False):
+        left = found.residuals[key]
+        _line(row[0], time, torque, "measured", color="0.6", lw=2.0)
+        _line(row[0], time, torque - left, "model", color="tab:blue", lw=0.8)
+        row[0].set_ylabel(f"{_LABELS[key]} [N·m]")
+        row[0].legend(loc="upper right")
+        _line(row[1], time, left, "", color="tab:red", lw=0.6)
+        row[1].set_ylabel(
+            f"measured less model, {np.sqrt(np.mean(left**2)):.2g} N·m rms"
+        )
+        for ax in row:
+            ax.set_xlabel("time [s]")
+    _loop(axes[-1, 0], found)
+    _error(axes[-1, 1], found)
+    figure.suptitle(found.drive.info["source"])
+    return figure
+
+
+def _line(ax: Any, x: Any, y: Any, label: str, **style: Any) -> None:
+    """A line that breaks where samples were left out."""
+    gaps = np.flatnonzero(np.diff(x) > 1.5 * np.median(np.diff(x))) + 1
+    broken = np.insert(np.asarray(y, float), gaps, np.nan)
+    ax.plot(np.insert(np.asarray(x, float), gaps, np.nan), broken, label=label, **style)
+
+
+def _loop(ax: Any, found: Identified) -> None:
+    """Torque over the torsion of the log, and the spring of the map."""
+    drive, model = found.drive, found.model
+    values = np.array([e.value for e in found.estimates.values()])
+    a, b = model.amplitudes(values).T
+    error = found.estimates["zero"].value + model.cos @ a + model.sin @ b
+    torque = model.measured().get("output_torque")
+    if torque is None:
+        torque = model.ratio * model.measured()["motor_torque"]
+    x = (model.torsion + error)[model.kept]
+    ax.plot(x / arcmin, torque, ".", ms=1.5, color="0.6", label="log")
+    along = np.linspace(x.min(), x.max(), 400)
+    ax.plot(
+        along / arcmin,
+        drive.coefficients(along, 1)[:, 0, 0],
+        color="tab:blue",
+        label="spring of the map",
+    )
+    ax.set_xlabel("torsion [arcmin]")
+    ax.set_ylabel("torque [N·m]")
+    ax.legend(loc="upper left")
+
+
+def _error(ax: Any, found: Identified) -> None:
+    """No-load error of the map over the first turns of the input."""
+    ax.set_xlabel("turns of the input")
+    ax.set_ylabel("kinematic error [arcmin]")
+    if not len(found.model.orders):
+        ax.text(0.5, 0.5, "not looked for", ha="center", transform=ax.transAxes)
+        return
+    drive = found.drive
+    turns = np.linspace(0.0, _TURNS, 200 * _TURNS)
+    theta = 2.0 * np.pi * turns
+    error = drive.error_at(drive.phases(theta, theta / drive.ratio))[0]
+    ax.plot(turns, error / arcmin)

@@ -1,0 +1,62 @@
+"""Picture of a lot: how its figures are distributed, and the yield over the limit."""
+
+from __future__ import annotations
+
+import io
+from typing import Any
+
+import numpy as np
+
+from swgjoint.explore.lot import LOWER
+from swgjoint.pictures import save_png
+
+_LABELS = {
+    "transmission_accuracy_arcmin": "transmission accuracy [arcmin]",
+    "ripple_rms_percent": "torque ripple, output held [% of rated, rms]",
+    "torsional_stiffness_Nm_rad": "torsional stiffness at rated torque [N·m/rad]",
+}
+
+
+def lot_picture(result: dict[str, Any]) -> bytes | None:
+    """PNG of a lot; None where no drive was solved.
+
+    Args:
+        result: Of :func:`swgjoint.explore.lot.run_lot`.
+    """
+    from matplotlib.figure import Figure
+    from matplotlib.ticker import PercentFormatter
+
+    rows = result["rows"]
+    keys = [key for key, found in result["figures"].items() if found is not None]
+    if not keys:
+        return None
+    figure = Figure(figsize=(1.0 + 4.2 * len(keys), 6.0), layout="constrained")
+    axes = figure.subplots(2, len(keys), sharex="col", squeeze=False)
+    for (above, below), key in zip(axes.T, keys, strict=True):
+        values = np.sort([row[key] for row in rows if row[key] is not None])
+        above.hist(values, bins="auto", color="tab:blue", alpha=0.6)
+        # drives that cannot be solved meet no limit
+        part = np.arange(1, values.size + 1) / len(rows)
+        if key in LOWER:
+            part = part[::-1]
+        below.step(values, part, where="post", color="tab:blue")
+        below.yaxis.set_major_formatter(PercentFormatter(1.0))
+        below.set_ylim(0.0, 1.02)
+        below.set_xlabel(_LABELS[key])
+        below.grid(alpha=0.3)
+        limit = (result["spec"] or {}).get(key)
+        if limit is not None:
+            for axis in (above, below):
+                axis.axvline(limit, color="tab:red", lw=1.2)
+            alone = result["yield"]["by_limit"][key]["part"]
+            below.set_title(f"limit {limit:g}: {100 * alone:.1f} % pass", fontsize=10)
+    axes[0][0].set_ylabel("drives")
+    axes[1][0].set_ylabel("yield at this limit alone")
+    meaning = {
+        "limit": "errors as large as the tolerances",
+        "uniform": "errors drawn between zero and the tolerances",
+    }[result["sizes"]]
+    figure.suptitle(f"{result['design']}: {len(rows)} drives, {meaning}", fontsize=11)
+    out = io.BytesIO()
+    save_png(figure, out, dpi=110)
+    return out.getvalue()

@@ -1,0 +1,158 @@
+"""The front of a search, how it was reached, and which values make it."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from itertools import cycle
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from swgjoint.explore.optimise.front import Candidate
+from swgjoint.explore.sweep.plan import Parameter
+from swgjoint.pictures import save_png
+from swgjoint.view.plots.sweep import label_of
+
+if TYPE_CHECKING:
+    from swgjoint.explore.optimise.optimise import Optimum
+
+Axes = Any  # of matplotlib, which is imported when a picture is made
+
+
+def optimum_picture(found: Optimum) -> bytes:
+    """PNG of three axes: the front, the best so far, the values along the front."""
+    from matplotlib.figure import Figure
+
+    canvas = Figure(figsize=(16.0, 5.4), layout="constrained")
+    front, course, values = canvas.subplots(1, 3)
+    _front(front, found)
+    _course(course, found)
+    _values(values, found)
+    canvas.suptitle(found.file.description or "search", fontsize=11)
+    out = io.BytesIO()
+    save_png(canvas, out, dpi=100)
+    return out.getvalue()
+
+
+def _figures(candidates: Sequence[Candidate], name: str, *, confirmed: bool) -> Any:
+    """A figure of designs, NaN where there is none."""
+    found = []
+    for candidate in candidates:
+        record = candidate.confirmed if confirmed else candidate.record
+        value = None if record is None else record.figures.get(name)
+        found.append(np.nan if value is None else value)
+    return np.array(found)
+
+
+def _front(axis: Axes, found: Optimum) -> None:
+    """The first two objectives; of a single one over the order of trial."""
+    names = [o.figure for o in found.file.objectives]
+
+    def places(candidates: Sequence[Candidate], *, confirmed: bool) -> tuple[Any, Any]:
+        first = _figures(candidates, names[0], confirmed=confirmed)
+        if len(names) == 1:
+            return np.arange(len(candidates)), first
+        return first, _figures(candidates, names[1], confirmed=confirmed)
+
+    x, y = places(found.tried, confirmed=False)
+    axis.plot(x, y, ".", color="0.75", ms=4, label="tried")
+    if len(names) > 1:
+        x, y = places(found.front, confirmed=False)
+        axis.plot(x, y, "o-", color="tab:blue", ms=5, lw=1.0, label="front")
+        axis.plot(
+            *places(found.front, confirmed=True),
+            "o",
+            mfc="none",
+            color="tab:red",
+            ms=9,
+            label="front, confirmed",
+        )
+        rivals = (found.start, *found.beside)
+        for rival, mark in zip(rivals, cycle("sD^vP*X"), strict=False):
+            name = rival.values["design"]
+            there = places([rival], confirmed=False)
+            axis.plot(*there, mark, color="black", ms=8, label=name)
+            there = places([rival], confirmed=True)
+            axis.plot(*there, mark, mfc="none", color="tab:red", ms=11)
+        _view(axis, found, names)
+    axis.set_xlabel(label_of(names[0]) if len(names) > 1 else "designs tried")
+    axis.set_ylabel(label_of(names[min(1, len(names) - 1)]))
+    axis.legend(fontsize=8)
+    axis.grid(alpha=0.3)
+    goals = ", ".join(f"{label_of(o.figure)}: {o.goal}" for o in found.file.objectives)
+    axis.set_title(goals, fontsize=9)
+
+
+def _view(axis: Axes, found: Optimum, names: Sequence[str]) -> None:
+    """Limits that show the front and its rivals; designs far off are left outside."""
+    near = [*found.front, found.start, *found.beside]
+    for name, limit in zip(names[:2], (axis.set_xlim, axis.set_ylim), strict=True):
+        values = np.concatenate(
+            [_figures(near, name, confirmed=c) for c in (False, True)]
+        )
+        low, high = np.nanmin(values), np.nanmax(values)
+        margin = 0.15 * (high - low) or 0.05 * abs(high) or 1.0
+        limit(low - margin, high + margin)
+
+
+def _course(axis: Axes, found: Optimum) -> None:
+    """Best value so far of every objective against the start's."""
+    for objective in found.file.objectives:
+        values = _figures(found.tried, objective.figure, confirmed=False)
+        kept = [
+            c.record.ok and not any(found.file.violations(c.record.figures).values())
+            for c in found.tried
+        ]
+        signed = np.where(kept, objective.sign * values, np.inf)
+        best = objective.sign * np.fmin.accumulate(signed)
+        first = found.start.record.figures.get(objective.figure)
+        there = np.isfinite(best)
+        if first:
+            best = best / first
+        axis.step(
+            1 + np.flatnonzero(there),
+            best[there],
+            where="post",
+            label=label_of(objective.figure),
+        )
+    axis.axhline(1.0, color="black", lw=0.8)
+    axis.set_xlabel("designs tried")
+    axis.set_ylabel("best so far / start")
+    axis.legend(fontsize=8)
+    axis.grid(alpha=0.3)
+
+
+def _values(axis: Axes, found: Optimum) -> None:
+    """Parameters of the front, each over its range, coloured by the first objective."""
+    import matplotlib
+
+    parameters = found.file.plan.parameters
+    first = found.file.objectives[0]
+    height = first.sign * _figures(found.front, first.figure, confirmed=False)
+    scale = matplotlib.colors.Normalize(height.min(), height.max())
+    colours = matplotlib.colormaps["viridis"]
+    places = range(len(parameters))
+    for candidate, value in zip(found.front, height, strict=True):
+        parts = [_part(p, candidate.values[p.column]) for p in parameters]
+        axis.plot(parts, places, "o-", color=colours(scale(value)), lw=0.9, ms=4)
+    labels = []
+    for parameter in parameters:
+        if parameter.values is None:
+            labels.append(
+                f"{label_of(parameter.column)}\n{parameter.low:g} to {parameter.high:g}"
+            )
+        else:
+            labels.append(label_of(parameter.column))
+    axis.set_yticks(range(len(labels)), labels, fontsize=8)
+    axis.set_xlim(-0.05, 1.05)
+    axis.set_xlabel("part of the range; dark: best of the first objective")
+    axis.grid(alpha=0.3)
+
+
+def _part(parameter: Parameter, value: Any) -> float:
+    """Where a value lies in its range or list, 0 to 1."""
+    if parameter.values is not None:
+        return parameter.values.index(value) / max(len(parameter.values) - 1, 1)
+    assert parameter.low is not None and parameter.high is not None
+    return float((value - parameter.low) / (parameter.high - parameter.low))

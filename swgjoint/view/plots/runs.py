@@ -1,0 +1,166 @@
+"""One picture that compares runs of the same motion."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable, Mapping
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from swgjoint.files import write_whole
+from swgjoint.pictures import save_png
+from swgjoint.sim.figures.metrics import (
+    highest_resolved_order,
+    strongest_left_out,
+    torque_ripple,
+)
+from swgjoint.sim.figures.orders import order_spectrum
+from swgjoint.units import arcmin, mm
+from swgjoint.view.recording.blueprint import is_rigid, joints_by_interest
+from swgjoint.view.recording.entities import COLORS
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from swgjoint.sim.run import Run
+
+
+def comparison_png(
+    runs: Mapping[str, Run], path: str | Path, *, rigid: Run | None = None
+) -> Path:
+    """Write the picture of :func:`comparison_figure`.
+
+    Args:
+        runs: Runs by name.
+        path: PNG file to write.
+        rigid: The run that tool errors refer to; None for the commanded path.
+
+    Returns:
+        The path.
+    """
+    buffer = io.BytesIO()
+    save_png(comparison_figure(runs, rigid=rigid), buffer, dpi=110)
+    return write_whole(path, buffer.getvalue())
+
+
+def comparison_figure(runs: Mapping[str, Run], *, rigid: Run | None = None) -> Figure:
+    """Torsion, transmission error, ripple with its orders, and tool error of runs.
+
+    The time plots show the joint with the largest ripple among those whose strongest
+    order is resolved; the bars show all joints.
+
+    Args:
+        runs: Runs by name.
+        rigid: The run that tool errors refer to; None for the commanded path.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    first = next(iter(runs.values()))
+    joint = joints_by_interest(runs)[0]
+    j = first.joints.index(joint)
+    shown = {label: run for label, run in runs.items() if not is_rigid(run)} or runs
+    colors = {
+        label: tuple(c / 255 for c in COLORS[k % len(COLORS)])
+        for k, label in enumerate(runs)
+    }
+    figure = Figure(figsize=(13.0, 10.5), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.subplots(3, 2)
+    for label, run in shown.items():
+        style: dict[str, Any] = {"color": colors[label], "label": label, "lw": 1.0}
+        axes[0, 0].plot(run.time, run.torsion[:, j] / arcmin, **style)
+        axes[0, 1].plot(run.time, run.transmission_error[:, j] / arcmin, **style)
+        draw_ripple(axes[1, 0], axes[1, 1], run, j, style)
+        if run.tool_position.shape[1]:
+            axes[2, 0].plot(run.time, run.tool_error(rigid) / mm, **style)
+    _bars(axes[2, 1], shown, colors)
+
+    name = joint.removesuffix("_joint")
+    steady = first.time[first.steady][[0, -1]]
+    for axis in (axes[0, 0], axes[0, 1], axes[2, 0]):
+        axis.axvspan(*steady, color="0.94", zorder=0)
+        axis.set_xlabel("time [s]   (shaded: constant speed, used for the figures)")
+        axis.margins(x=0)
+    _label(axes[0, 0], f"{name}: torsion", "torsion [arcmin]")
+    _label(axes[0, 1], f"{name}: transmission error", "output − ideal output [arcmin]")
+    _label(axes[1, 0], f"{name}: torque ripple", "ripple [% of rated torque]")
+    axes[1, 0].set_xlabel("turns of the input")
+    _label(axes[1, 1], f"{name}: orders of the ripple", "amplitude [% of rated torque]")
+    axes[1, 1].set_xlabel("order [cycles per turn of the input]")
+    against = "the rigid arm" if rigid is not None else "the commanded path"
+    _label(axes[2, 0], f"tool: distance from {against}", "distance [mm]")
+    _label(axes[2, 1], "all joints: torque ripple", "peak to peak [% of rated torque]")
+    handles, names = axes[0, 0].get_legend_handles_labels()
+    figure.legend(handles, names, loc="outside upper right", ncols=len(names))
+    figure.suptitle(f"scene {first.assembly.scene.name}", fontsize=13)
+    return figure
+
+
+def draw_ripple(
+    over_turns: Any,
+    over_order: Any,
+    run: Run,
+    j: int,
+    style: Mapping[str, Any],
+    *,
+    line: Callable[..., Any] | None = None,
+) -> None:
+    """Ripple over the last half turn of the input, and its order spectrum.
+
+    Args:
+        over_turns: Axes of the ripple.
+        over_order: Axes of the spectrum.
+        run: The run.
+        j: Number of the joint.
+        style: Of the lines.
+        line: What draws the spectrum, given its axes; their own plot if None.
+    """
+    transmission = run.assembly.transmissions[j]
+    scale = 100.0 / transmission.drive.ratings.rated_torque
+    angle = run.motor_position[run.steady, j]
+    ripple = scale * torque_ripple(run, j)
+    turns = np.abs(angle - angle[0]) / (2.0 * np.pi)
+    part = turns >= turns[-1] - 0.5  # half a turn: the tooth order stays readable
+    over_turns.plot(turns[part], ripple[part], **style)
+    over_turns.margins(x=0)
+    spectrum, highest = order_spectrum(angle, ripple), highest_resolved_order(run, j)
+    if spectrum is None or highest is None:
+        return
+    inside = (spectrum.order >= 0.5) & (spectrum.order <= highest)
+    draw = over_order.plot if line is None else partial(line, over_order)
+    draw(spectrum.order[inside], spectrum.amplitude[inside], **style)
+    over_order.set_xlim(0.0, highest)
+    over_order.set_ylim(bottom=0.0)
+
+
+def _bars(axis: Any, runs: Mapping[str, Run], colors: Mapping[str, Any]) -> None:
+    first = next(iter(runs.values()))
+    width = 0.8 / len(runs)
+    ticks = []
+    for j, joint in enumerate(first.joints):
+        left_out = any(
+            strongest_left_out(run.assembly.transmissions[j]) for run in runs.values()
+        )
+        name = joint.removesuffix("_joint").replace("_", " ")
+        ticks.append(f"{name} *" if left_out else name)
+    for k, (label, run) in enumerate(runs.items()):
+        heights = [
+            100.0
+            * float(np.ptp(torque_ripple(run, j)))
+            / run.assembly.transmissions[j].drive.ratings.rated_torque
+            for j in range(len(run.joints))
+        ]
+        places = np.arange(len(heights)) + (k - 0.5 * (len(runs) - 1)) * width
+        axis.bar(places, heights, width, color=colors[label], label=label)
+    axis.set_xticks(range(len(ticks)), ticks, fontsize=8)
+    axis.set_xlabel("* too fast for the step: strongest order left out")
+
+
+def _label(axis: Any, title: str, y: str) -> None:
+    axis.set_title(title, fontsize=10)
+    axis.set_ylabel(y)
+    axis.grid(alpha=0.3)

@@ -1,0 +1,170 @@
+"""Pictures of a simulation of meshing in space: contact patterns and sections."""
+
+from __future__ import annotations
+
+import io
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.pictures import save_png
+from swgjoint.units import deg, mm
+
+if TYPE_CHECKING:
+    from swgjoint.fe.solid.meshing import SolidRun
+    from swgjoint.fe.solid.ring import SolidRing
+    from swgjoint.fe.solid.state import SolidState
+
+Array = NDArray[np.float64]
+
+SHOWN = 0.2
+"""Largest drawn deflection over the size of the section, at most."""
+STATES = {
+    "wave_generator": "wave generator alone",
+    "meshed": "meshed",
+    "torque": "torque",
+}
+"""Of the set-up, as the legend has them."""
+
+
+def solid_pictures(run: SolidRun) -> dict[str, bytes]:
+    """PNG by name: the cup at torque, its coning, contacts of the last position."""
+    pictures = {
+        "cup_section": section_picture(run, run.setup[-1].state),
+        "coning": coning_picture(run),
+    }
+    if run.states:
+        pictures["contact_pattern"] = contact_picture(run, run.states[-1])
+    return pictures
+
+
+def contact_picture(run: SolidRun, state: SolidState) -> bytes:
+    """Where over the face width teeth and wave generator carry, over the lobe angle."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(11.0, 6.5), layout="constrained")
+    above, below = figure.subplots(2, 1)
+    z = run.model.strip.mesh.teeth.z / mm
+    angle, flanks, bore = contact_forces(run.model, state)
+    width = float(np.median(np.diff(np.sort(angle)))) / deg
+    for ax, force, title in (
+        (above, flanks, "force of the teeth of the circular spline [N per plane]"),
+        (below, bore, "force of the wave generator [N per plane and tooth]"),
+    ):
+        order = np.argsort(angle)
+        edges = np.append(angle[order] / deg - 0.5 * width, angle[order[-1]] / deg)
+        lines = np.concatenate([[z[0]], 0.5 * (z[1:] + z[:-1]), [z[-1]]])
+        shown = np.ma.masked_less_equal(force[order].T, 0.0)
+        mesh = ax.pcolormesh(edges, lines, shown, cmap="viridis")
+        figure.colorbar(mesh, ax=ax)
+        ax.set(title=title, xlabel="tooth from the lobe [deg]")
+        ax.set_ylabel("z [mm], open end below")
+        ax.set_facecolor("0.95")
+    return _png(figure)
+
+
+def contact_forces(ring: SolidRing, state: SolidState) -> tuple[Array, Array, Array]:
+    """Forces over the face width, tooth by tooth.
+
+    Returns:
+        Angle of every tooth of the model from the nearer of two lobes [rad] (N,);
+        forces of the circular spline and of the wave generator (N, n_planes) [N].
+    """
+    sectors, planes = ring.sectors, ring.strip.planes
+    x = ring.masters(state).mean(axis=1)
+    angle = np.arctan2(-x[:, 0], x[:, 1]) - state.wave_generator_angle
+    angle = np.remainder(angle + 0.5 * np.pi, np.pi) - 0.5 * np.pi
+    teeth, first = ring.strip.teeth, ring.strip.flank_dofs
+    nodal = teeth.nodal_force(ring.loads(state))
+    by_side = nodal[:, :first].reshape(sectors, planes, 2, -1, 3).sum(axis=3)
+    flanks = np.linalg.norm(by_side, axis=3).sum(axis=2)
+    bore = np.linalg.norm(nodal[:, first:].reshape(sectors, planes, -1, 3), axis=3)
+    return angle, flanks, bore.sum(axis=2)
+
+
+def section_picture(run: SolidRun, state: SolidState) -> bytes:
+    """The cup along its major and its minor axis at rest and deflected, enlarged."""
+    from matplotlib.collections import LineCollection, PolyCollection
+    from matplotlib.figure import Figure
+
+    from swgjoint.fe.solid.figures.axial_section import axial_sections, on_axes
+
+    figure = Figure(figsize=(11.0, 6.0), layout="constrained")
+    axes = figure.subplots(1, 2, sharex=True, sharey=True)
+    both = [axial_sections(run.model, state, k) for k in on_axes(run.model, state)]
+    rest, moved = (
+        np.concatenate([getattr(part, name) for found in both for part in found])
+        for name in ("rest", "moved")
+    )
+    most, size = float(np.abs(moved - rest).max()), float(np.ptp(rest, axis=0).max())
+    larger = magnification(most, size)
+    for ax, title, found in zip(axes, ("major", "minor"), both, strict=True):
+        for part in found:
+            drawn = part.rest + larger * (part.moved - part.rest)
+            mesh = PolyCollection(
+                list(drawn[part.cells] / mm),
+                facecolor="lightsteelblue",
+                edgecolor="tab:blue",
+                linewidth=0.3,
+            )
+            ax.add_collection(mesh)
+            still = part.rest[outline(part.cells)] / mm
+            ax.add_collection(LineCollection(list(still), colors="k", linewidths=0.6))
+        ax.autoscale()
+        ax.set_title(f"{title} axis: deflection x {larger:g}, at rest in black")
+        ax.set_xlabel("z [mm], open end on the left")
+        ax.set_aspect("equal")
+        ax.grid(alpha=0.3)
+    axes[0].set_ylabel("radius [mm]")
+    return _png(figure)
+
+
+def magnification(most: float, size: float) -> float:
+    """Factor 1, 2 or 5 times a power of ten that shows a deflection clearly.
+
+    Args:
+        most: Largest deflection [m].
+        size: Of the picture [m].
+    """
+    wanted = SHOWN * size / max(most, 1e-12)
+    power = 10.0 ** np.floor(np.log10(wanted))
+    return float(power * max(k for k in (1.0, 2.0, 5.0) if k * power <= wanted))
+
+
+def outline(cells: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Edges of one quadrilateral alone (n, 2)."""
+    edges = np.stack([cells, np.roll(cells, -1, axis=1)], axis=-1).reshape(-1, 2)
+    found, count = np.unique(np.sort(edges, axis=1), axis=0, return_counts=True)
+    return np.asarray(found[count == 1])
+
+
+def coning_picture(run: SolidRun) -> bytes:
+    """Radial displacement under the teeth over the face width, state by state."""
+    from matplotlib.figure import Figure
+
+    from swgjoint.fe.solid.figures.axial_section import coning
+
+    figure = Figure(figsize=(10.0, 4.2), layout="constrained")
+    axes = figure.subplots(1, 2)
+    lines = dict(zip(STATES, ("--", ":", "-"), strict=True))
+    for state in run.setup:
+        found = coning(run.model, state.state)
+        label = STATES[state.name]
+        if state.name == "torque":
+            label = f"{run.torque:g} N·m"
+        for ax, radial in zip(axes, (found.major, found.minor), strict=True):
+            ax.plot(found.z / mm, radial / mm, lines[state.name], lw=1.5, label=label)
+    for ax, title in zip(axes, ("major", "minor"), strict=True):
+        ax.set_title(f"{title} axis: radial displacement of the bore")
+        ax.set_xlabel("z [mm], open edge on the left")
+        ax.grid(alpha=0.3)
+    axes[0].set_ylabel("outward [mm]")
+    axes[0].legend()
+    return _png(figure)
+
+
+def _png(figure: Any) -> bytes:
+    out = io.BytesIO()
+    save_png(figure, out, dpi=110)
+    return out.getvalue()

@@ -1,0 +1,149 @@
+"""Picture of a spec sheet: loop, error over a turn, order spectrum, losses."""
+
+from __future__ import annotations
+
+import io
+from textwrap import fill
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from swgjoint.pictures import save_png
+from swgjoint.units import arcmin, rpm
+
+if TYPE_CHECKING:
+    from swgjoint.maps.sheet.spec_sheet import SpecSheet
+
+_AT_MOST = 20_000
+_MANY = 200
+_FEW = 5
+"""Orders that have a tick each."""
+_ERRORS = {"no_load": ("without load", "tab:blue"), "rated": ("rated load", "tab:red")}
+
+
+def spec_picture(name: str, sheet: SpecSheet) -> bytes:
+    """PNG of the curves behind the figures; what was not measured is said so.
+
+    Args:
+        name: Name of the drive.
+        sheet: Figures and curves.
+    """
+    from matplotlib.figure import Figure
+
+    panels = [_loop, _turn, _orders] + ([_losses] if sheet.losses else [])
+    figure = Figure(figsize=(1 + 4 * len(panels), 4.2), layout="constrained")
+    for ax, draw in zip(figure.subplots(1, len(panels)), panels, strict=True):
+        draw(ax, sheet)
+    figure.suptitle(f"{name}: spec sheet")
+    out = io.BytesIO()
+    save_png(figure, out, dpi=130)
+    return out.getvalue()
+
+
+def _loop(ax: Any, sheet: SpecSheet) -> None:
+    ax.set_title("torque loop, input locked")
+    ax.set_xlabel("torque [N·m]")
+    ax.set_ylabel("torsion [arcmin]")
+    if sheet.loop is None:
+        _absent(ax, "not asked for")
+        return
+    loop, figures = sheet.loop, sheet.figures
+    ax.plot(loop.torque, loop.torsion / arcmin, color="0.6", lw=2.5, label="loop")
+    limits = [0.0, figures.get("T1_Nm"), figures.get("T2_Nm"), loop.torque.max()]
+    colours = ("tab:blue", "tab:orange", "tab:green")
+    for k, colour in enumerate(colours, 1):
+        low, high = limits[k - 1], limits[k]
+        K = figures.get(f"K{k}_Nm_rad")
+        if K is None or low is None or high is None:
+            continue
+        for sign in (1.0, -1.0):
+            at = sign * np.array([low, high])
+            label = f"K{k} {K:.3g} N·m/rad" if sign > 0 else None
+            x = loop.mid_line(at) / arcmin
+            ax.plot(at, x, color=colour, lw=1.2, marker=".", label=label)
+    ax.legend(fontsize="small")
+    ax.grid(alpha=0.3)
+
+
+def _turn(ax: Any, sheet: SpecSheet) -> None:
+    ax.set_title("transmission error over one output turn")
+    ax.set_xlabel("output angle [deg]")
+    ax.set_ylabel("deviation from its mean [arcmin]")
+    shown = [key for key in _ERRORS if key in sheet.turns]
+    if not shown:
+        _absent(ax, sheet.missing.get("transmission_accuracy_arcmin", "not asked for"))
+        return
+    for key in reversed(shown):
+        label, colour = _ERRORS[key]
+        turn = sheet.turns[key]
+        periods = turn.turns / float(turn.period_turns)
+        angle, error = turn.over_output_turn()
+        if periods > _MANY:  # a whole turn would be a solid block
+            part = slice(0, 2 * turn.signal.size + 1)
+            angle, error = angle[part], error[part]
+            ax.set_title(f"transmission error, 2 of {periods:.0f} equal periods a turn")
+        else:
+            stride = -(-angle.size // _AT_MOST)
+            angle, error = angle[::stride], error[::stride]
+        error = (error - turn.signal.mean()) / arcmin
+        output = 360.0 * angle / (2.0 * np.pi * turn.turns)
+        ax.plot(output, error, color=colour, lw=0.9, alpha=0.8, label=label)
+    ax.legend(fontsize="small", loc="upper right")
+    ax.grid(alpha=0.3)
+
+
+def _orders(ax: Any, sheet: SpecSheet) -> None:
+    ax.set_title("order spectrum of the transmission error")
+    ax.set_xlabel("cycles per input turn")
+    ax.set_ylabel("amplitude [arcmin]")
+    shown = [key for key in _ERRORS if key in sheet.turns]
+    if not shown:
+        _absent(ax, sheet.missing.get("orders", "not asked for"))
+        return
+    from matplotlib.ticker import NullFormatter
+
+    largest, drawn = 0.0, set()
+    for k, key in enumerate(shown):
+        label, colour = _ERRORS[key]
+        order, amplitude = sheet.turns[key].lines()
+        amplitude = amplitude / arcmin
+        largest = max(largest, float(amplitude.max(initial=0.0)))
+        keep = amplitude > 1e-4 * amplitude.max(initial=1e-300)
+        drawn |= set(order[keep].tolist())
+        shift = 1.0 + 0.02 * k  # side by side on the logarithmic axis
+        ax.vlines(order[keep] * shift, 0.0, amplitude[keep], color=colour, label=label)
+    ax.set_xscale("log")
+    ax.xaxis.set_minor_formatter(NullFormatter())
+    if len(drawn) <= _FEW:  # they may lie between two powers of ten
+        ax.set_xticks(sorted(drawn), [f"{order:.4g}" for order in sorted(drawn)])
+    if largest > 0.0:
+        ax.set_yscale("log")
+        ax.set_ylim(1e-4 * largest, 2.0 * largest)
+    ax.legend(fontsize="small")
+    ax.grid(alpha=0.3)
+
+
+def _losses(ax: Any, sheet: SpecSheet) -> None:
+    ax.set_title("efficiency against the load")
+    ax.set_xlabel("output torque [N·m]")
+    ax.set_ylabel("efficiency [%]")
+    assert sheet.losses is not None
+    for speed, values in sheet.losses.efficiency.items():
+        label = f"{speed / rpm:.0f} rpm at the input"
+        ax.plot(sheet.losses.load, 100.0 * values, label=label)
+    rated = sheet.figures.get("rated_torque_Nm")
+    if rated:
+        ax.axvline(rated, color="0.6", lw=1.0, ls="--", label="rated torque")
+    ax.set_xlim(left=0.0)
+    ax.set_ylim(0.0, 100.0)
+    ax.legend(fontsize="small", loc="lower right")
+    ax.grid(alpha=0.3)
+
+
+def _absent(ax: Any, reason: str) -> None:
+    ax.set_xlabel("")
+    ax.set_ylabel("")
+    ax.set_xticks([])
+    ax.set_yticks([])
+    text = fill(reason, 40)
+    ax.text(0.5, 0.5, text, ha="center", va="center", transform=ax.transAxes)

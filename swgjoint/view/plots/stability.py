@@ -1,0 +1,159 @@
+"""The picture of the stability study."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from typing import Any
+
+from swgjoint.bench.stability.rows import DEFAULT, FREE, OUTCOMES, StabilityRow
+from swgjoint.pictures import save_png
+
+_COLOURS = {
+    "ok": "tab:green",
+    "sub_stepped": "tab:blue",
+    "refused": "0.6",
+    "diverged": "tab:red",
+    "energy_gain": "tab:orange",
+}
+_SCHEMES = {
+    DEFAULT: "tab:blue",
+    "discrete, never cut": "tab:purple",
+    "native tendon": "tab:olive",
+    "RK4": "tab:red",
+}
+
+
+def stability_picture(rows: Sequence[StabilityRow]) -> bytes:
+    """PNG: outcomes by situation, sub-steps, numerical damping, error, free running."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(14, 8.5), layout="constrained")
+    axes: dict[str, Any] = figure.subplot_mosaic(
+        [["outcomes", "outcomes", "parts"], ["damping", "error", "free"]]
+    )
+    _outcomes(axes["outcomes"], rows)
+    _parts(axes["parts"], rows)
+    _damping(axes["damping"], rows)
+    _error(axes["error"], rows)
+    _free(axes["free"], rows)
+    out = io.BytesIO()
+    save_png(figure, out, dpi=100)
+    return out.getvalue()
+
+
+def _outcomes(axis: Any, rows: Sequence[StabilityRow]) -> None:
+    """Share of every outcome, one bar for a situation and scheme."""
+    names = list(dict.fromkeys((row.scheme, row.group) for row in rows))
+    names.sort(key=lambda name: list(_SCHEMES).index(name[0]))
+    left = [0.0] * len(names)
+    for outcome in OUTCOMES:
+        share = []
+        for name in names:
+            own = [r.outcome for r in rows if (r.scheme, r.group) == name]
+            share.append(100.0 * own.count(outcome) / len(own))
+        axis.barh(
+            range(len(names)), share, left=left, color=_COLOURS[outcome], label=outcome
+        )
+        left = [a + b for a, b in zip(left, share, strict=True)]
+    axis.set_yticks(
+        range(len(names)), [f"{scheme}: {group}" for scheme, group in names], fontsize=8
+    )
+    axis.invert_yaxis()
+    axis.set_xlim(0.0, 100.0)
+    axis.set_xlabel("share of the runs [%]")
+    axis.legend(
+        fontsize="small", ncols=5, loc="lower center", bbox_to_anchor=(0.5, 1.0)
+    )
+
+
+def _parts(axis: Any, rows: Sequence[StabilityRow]) -> None:
+    """How many sub-steps the grid takes."""
+    for step in sorted({row.step_s for row in rows}):
+        parts = sorted(
+            row.sub_steps or 100
+            for row in rows
+            if row.scheme == DEFAULT and row.step_s == step
+        )
+        share = [100.0 * (k + 1) / len(parts) for k in range(len(parts))]
+        axis.step(parts, share, where="post", label=f"{1e3 * step:g} ms")
+    axis.axvline(64, color="0.6", lw=1)
+    axis.set_xscale("log")
+    axis.set_xlim(0.9, 100)
+    axis.set_ylim(0, 101)
+    axis.set_xlabel("sub-steps (beyond 64: refused)")
+    axis.set_ylabel("share of the runs [%]")
+    axis.legend(fontsize="small", title="step")
+    axis.grid(alpha=0.3)
+
+
+def _damping(axis: Any, rows: Sequence[StabilityRow]) -> None:
+    """Damping ratio that the steps give, beside that of the drives."""
+    for scheme, colour in _SCHEMES.items():
+        if scheme == "discrete, never cut":
+            continue
+        points = {
+            (row.phase_step, row.numerical_damping_ratio)
+            for row in rows
+            if row.scheme == scheme
+            and row.phase_step is not None
+            and (row.numerical_damping_ratio or 0.0) > 1e-9
+        }
+        if points:
+            x, y = zip(*points, strict=True)
+            axis.plot(x, y, ".", color=colour, label=scheme, ms=4)
+    physical = {r.physical_damping_ratio for r in rows} - {None}
+    for value in physical:
+        axis.axhline(value, color="black", lw=1, ls="--")
+        axis.text(1.2e-3, 1.15 * float(value or 0.0), "drive", fontsize=8)
+    axis.set_xscale("log")
+    axis.set_yscale("log")
+    axis.set_xlim(1e-3, None)
+    axis.set_ylim(1e-7, 2.0)
+    axis.set_xlabel("step times torsion frequency [rad]")
+    axis.set_title("numerical damping ratio", fontsize=10)
+    _legend(axis)
+    axis.grid(alpha=0.3)
+
+
+def _error(axis: Any, rows: Sequence[StabilityRow]) -> None:
+    """Largest error of the link while it turns freely."""
+    for scheme, colour in _SCHEMES.items():
+        points = [
+            (row.phase_step, row.error)
+            for row in rows
+            if row.scheme == scheme and row.group == "free" and row.error
+        ]
+        if points:
+            x, y = zip(*points, strict=True)
+            axis.plot(x, y, ".", color=colour, label=scheme, ms=4)
+    axis.set_xscale("log")
+    axis.set_yscale("log")
+    axis.set_xlabel("step times torsion frequency [rad]")
+    axis.set_title("error of the link, free [arcmin]", fontsize=10)
+    _legend(axis)
+    axis.grid(alpha=0.3)
+
+
+def _free(axis: Any, rows: Sequence[StabilityRow]) -> None:
+    """Energy left after ten seconds."""
+    own = [row for row in rows if row.group == FREE and row.energy_balance is not None]
+    axis.plot(
+        [row.phase_step for row in own],
+        [100.0 * (row.energy_balance or 0.0) for row in own],
+        ".",
+        color=_SCHEMES[DEFAULT],
+    )
+    for limit in (-5.0, 5.0):
+        axis.axhline(limit, color="0.6", lw=1)
+    axis.set_xlabel("step times torsion frequency [rad]")
+    axis.set_title(
+        "catalogue drives, 10 s free at 1 ms: energy change [%]", fontsize=10
+    )
+    axis.grid(alpha=0.3)
+
+
+def _legend(axis: Any) -> None:
+    """A legend where there is something to tell apart."""
+    if axis.get_legend_handles_labels()[0]:
+        axis.legend(fontsize="small")

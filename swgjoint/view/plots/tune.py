@@ -1,0 +1,280 @@
+"""A tuning run as a picture, as text and as a page."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from swgjoint.explore.tune.result import Candidate, Tuned
+from swgjoint.files import Outputs
+from swgjoint.json_text import json_text
+from swgjoint.pictures import save_png
+from swgjoint.units import arcmin
+from swgjoint.view.report.report import Cell, Table, write_tables
+from swgjoint.view.words import shown
+
+COLORS = ("0.45", "C1", "C2", "C0")
+"""Of the candidates; the tuned controller has the last."""
+
+
+def claims(found: Tuned) -> list[str]:
+    """What came out, a line each; none says more than the figures do."""
+    baseline, best = found.baseline, found.best
+    better = int((best.held_out < baseline.held_out).sum())
+    count = best.held_out.size
+    lines = [
+        f"{best.name}: {_cost(best)} on {count} seeds that no search has seen,"
+        f" {_less(found, best)} than PD by the textbook rule ({_cost(baseline)}),"
+        f" better on {better} of them"
+    ]
+    if len(found.candidates) > 2:
+        _, pd, ruled, _ = found.candidates
+        lines += [
+            f"of that, tuning the two gains of PD alone: {_cost(pd)},"
+            f" {_less(found, pd)}",
+            f"feed-forward alone, gains by the rule: {_cost(ruled)},"
+            f" {_less(found, ruled)}; tuning it changes that by"
+            f" {100.0 * (best.held_out.mean() / ruled.held_out.mean() - 1.0):+.0f} %",
+        ]
+    wide = best.held_out.mean() / best.training.mean() - 1.0
+    lines.append(
+        f"on the seeds of the search it costs {best.training.mean() / arcmin:.3g}"
+        f" arcmin; the others are {abs(100 * wide):.0f} %"
+        f" {'above' if wide > 0 else 'below'} that"
+    )
+    at_bound = [
+        p.key
+        for p, place in zip(found.parameters, _best_place(found), strict=True)
+        if not 0.01 < place < 0.99
+    ]
+    if at_bound:
+        lines.append(f"at a bound of the search: {', '.join(at_bound)}")
+    return lines
+
+
+def write_files(found: Tuned, folder: Path) -> list[str]:
+    """``tune.png``, ``tune.json`` and ``report.html``; returns their paths."""
+    outputs, pictures = Outputs(folder), {}
+
+    def drawn() -> bytes:
+        png = picture(found)
+        pictures["Search, held-out seeds and one episode"] = png
+        return png
+
+    outputs.write("tune.png", drawn)
+    outputs.write("tune.json", lambda: json_text(found.to_json()) + "\n")
+    outputs.hand_over(
+        "report.html",
+        lambda path: write_tables(
+            path,
+            title=f"Tuning of {found.settings.controller} in {found.environment}",
+            description="; ".join(claims(found)) + ".",
+            tables=[_summary(found), _gains(found), _by_seed(found)],
+            pictures=pictures,
+            settings={
+                "Run": json_text(
+                    {k: v for k, v in found.to_json().items() if k != "candidates"}
+                )
+            },
+        ),
+    )
+    return outputs.files
+
+
+def picture(found: Tuned) -> bytes:
+    """PNG: searches, costs by held-out seed, one episode of baseline and best."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(12.5, 7.5), layout="constrained")
+    axes = figure.subplots(2, 2)
+    _draw_search(axes[0, 0], found)
+    _draw_seeds(axes[0, 1], found)
+    _draw_episode(axes[1], found)
+    out = io.BytesIO()
+    save_png(figure, out, dpi=110)
+    return out.getvalue()
+
+
+def _draw_search(ax: Any, found: Tuned) -> None:
+    names = [one.controller for one in found.candidates[1::2]]
+    colors = (COLORS[1], COLORS[3]) if len(names) > 1 else (COLORS[3],)
+    for name, color, search in zip(names, colors, found.searches.values(), strict=True):
+        best = search.progress() / arcmin
+        ax.step(np.arange(1, best.size + 1), best, where="post", color=color)
+        ax.plot([], [], color=color, label=f"{name}, best so far")
+    for one, color in zip(found.candidates[::2], (COLORS[0], COLORS[2]), strict=False):
+        level = one.training.mean() / arcmin
+        ax.axhline(level, color=color, ls="--", lw=1.0, label=one.name)
+    ax.set(
+        yscale="log",
+        xlabel="candidates",
+        ylabel="mean cost [arcmin]",
+        title=f"search on {found.settings.training} seeds",
+    )
+    _plain_ticks(ax)
+    ax.legend()
+
+
+def _draw_seeds(ax: Any, found: Tuned) -> None:
+    seeds = found.settings.seeds[1]
+    for one, color in _colored(found):
+        cost = one.held_out / arcmin
+        ax.plot(seeds, cost, "o", ms=5, color=color, label=one.name)
+        ax.axhline(cost.mean(), color=color, lw=1.0)
+    ax.set(
+        yscale="log",
+        xlabel="seed",
+        ylabel="cost [arcmin]",
+        title="seeds that no search has seen, and their means",
+    )
+    # room above the points for their names
+    ax.set_ylim(top=4.0 * found.baseline.held_out.max() / arcmin)
+    ax.ticklabel_format(axis="x", useOffset=False)
+    _plain_ticks(ax)
+    ax.legend(loc="upper center", ncols=2)
+
+
+def _draw_episode(axes: Any, found: Tuned) -> None:
+    """The held-out episode in which the cost of the baseline is the median."""
+    order = np.argsort(found.baseline.held_out)
+    k = int(order[order.size // 2])
+    seed = found.settings.seeds[1][k]
+    for one, color in ((found.baseline, COLORS[0]), (found.best, COLORS[3])):
+        trace = one.trace
+        style = {"color": color, "lw": 1.0, "label": one.name}
+        axes[0].plot(trace.time, trace.error[:, k] / arcmin, **style)
+        axes[1].plot(trace.time, trace.torque[:, k], **style)
+    axes[0].set(ylabel="link minus reference [arcmin]", title=f"seed {seed}: error")
+    axes[1].set(ylabel="motor torque [N·m]", title=f"seed {seed}: torque, reference")
+    other = axes[1].twinx()
+    trace = found.best.trace
+    other.plot(trace.time, np.degrees(trace.reference[:, k]), color="0.75", lw=1.0)
+    other.set_ylabel("reference of the link [deg], grey")
+    for ax in axes:
+        ax.set_xlabel("time [s]")
+        ax.margins(x=0)
+        ax.legend()
+
+
+def _plain_ticks(ax: Any) -> None:
+    """Numbers instead of powers of ten on a short logarithmic axis."""
+    from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
+
+    ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    ax.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+    ax.yaxis.set_minor_formatter(NullFormatter())
+    ax.grid(axis="y", color="0.92")
+
+
+def _colored(found: Tuned) -> list[tuple[Candidate, str]]:
+    colors = COLORS if len(found.candidates) > 2 else (COLORS[0], COLORS[3])
+    return list(zip(found.candidates, colors, strict=True))
+
+
+def _summary(found: Tuned) -> Table:
+    rows = []
+    for one in found.candidates:
+        costs = [one.held_out.mean(), one.held_out.std(ddof=1), one.training.mean()]
+        saved = 100.0 * found.improvement(one)
+        rows.append(
+            [
+                Cell(one.name, "text"),
+                *[Cell(shown(float(x / arcmin))) for x in costs],
+                Cell("-" if one is found.baseline else f"{saved:.1f}"),
+                Cell(str(one.to_json()["broken_limits"])),
+            ]
+        )
+    s = found.settings
+    plant = ", ".join(f"{k} {v}" for k, v in found.to_json()["arguments"].items())
+    return Table(
+        header=[
+            ("", ""),
+            ("cost, held-out seeds", "arcmin"),
+            ("spread", "arcmin"),
+            ("cost, seeds of the search", "arcmin"),
+            ("less than the textbook", "%"),
+            ("broken limits", f"of {s.training + s.held_out}"),
+        ],
+        rows=rows,
+        notes=[
+            "Cost of an episode: square root of the mean of e² + s² w u², with the"
+            " error e of the link, the motor torque u over its limit, s ="
+            f" {found.error_scale / arcmin:g} arcmin, w = {found.effort_weight:g}; at"
+            f" most {found.worst / arcmin:.0f} arcmin.",
+            "Textbook rule: natural frequency a third of the anti-resonance of the"
+            f" nominal link on its drive, {found.anti_resonance:.3g} Hz, damping ratio"
+            " 0.7.",
+            f"Environment: {plant}. Optimiser {s.optimiser}, seed {s.seed},"
+            f" {sum(x.evaluations for x in found.searches.values())} candidates,"
+            f" {found.wall:.0f} s.",
+        ],
+    )
+
+
+def _gains(found: Tuned) -> Table:
+    keys = [*found.best.values, *found.best.gains]
+    bounds = {p.key: (p.low, p.high) for p in found.parameters}
+    rows = []
+    for key in keys:
+        cells = [
+            Cell(shown(value) if np.isfinite(value) else "none")
+            if (value := (one.values | one.gains).get(key)) is not None
+            else Cell("-")
+            for one in found.candidates
+        ]
+        low, high = bounds.get(key, (None, None))
+        searched = "-" if low is None else f"{shown(low)} to {shown(high)}"
+        rows.append([Cell(key, "text"), *cells, Cell(searched)])
+    return Table(
+        title="Gains",
+        header=[
+            ("", ""),
+            *((one.name, "") for one in found.candidates),
+            ("bounds", ""),
+        ],
+        rows=rows,
+    )
+
+
+def _by_seed(found: Tuned) -> Table:
+    rows = []
+    for k, seed in enumerate(found.settings.seeds[1]):
+        costs = [float(one.held_out[k] / arcmin) for one in found.candidates]
+        better = costs[-1] < costs[0]
+        rows.append(
+            [
+                Cell(str(seed), "text"),
+                *[Cell(shown(x)) for x in costs],
+                Cell(
+                    f"{100.0 * (1.0 - costs[-1] / costs[0]):.1f}",
+                    "" if better else "bad",
+                ),
+            ]
+        )
+    names = [(one.name, "arcmin") for one in found.candidates]
+    return Table(
+        title="Cost by held-out seed",
+        header=[("seed", ""), *names, ("tuned less than textbook", "%")],
+        rows=rows,
+    )
+
+
+def _best_place(found: Tuned) -> list[float]:
+    values = found.best.values
+    return [
+        float(np.log(values[p.key] / p.low) / np.log(p.high / p.low))
+        for p in found.parameters
+    ]
+
+
+def _cost(one: Candidate) -> str:
+    mean, spread = one.held_out.mean() / arcmin, one.held_out.std(ddof=1) / arcmin
+    return f"{mean:.3g} ± {spread:.2g} arcmin"
+
+
+def _less(found: Tuned, one: Candidate) -> str:
+    saved = 100.0 * found.improvement(one)
+    return f"{abs(saved):.1f} % {'less' if saved >= 0 else 'more'}"

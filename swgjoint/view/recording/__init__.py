@@ -1,0 +1,1 @@
+"""Runs as recordings for the rerun viewer."""

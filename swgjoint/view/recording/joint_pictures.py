@@ -1,0 +1,169 @@
+"""Pictures of a joint in a recording: orders of its ripple, torque against torsion."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.sim.figures.metrics import highest_resolved_order, torque_ripple
+from swgjoint.units import arcmin
+from swgjoint.view.recording.columns import Column, Numbers
+
+if TYPE_CHECKING:
+    from swgjoint.sim.run import Run
+
+Array = NDArray[np.float64]
+
+BARS = 400
+"""Bars of a spectrum at most; each is the largest amplitude of its part."""
+WIDTH = 1.6
+"""Of the phase picture, its height from the middle is 1."""
+Scales = dict[str, tuple[float, float] | None]
+_POINTS = 2000
+_FRAME = 0x787878FF
+
+
+def ripple_bars(run: Run, j: int) -> tuple[Array, Array] | None:
+    """Orders and amplitudes of the torque ripple of one joint.
+
+    Returns:
+        Middle of every bar [cycles per turn of the input] and largest amplitude in it,
+        zero to peak [% of rated torque]; both of shape (n,). None for a joint that
+        stands still.
+    """
+    from scipy.fft import next_fast_len
+
+    highest = highest_resolved_order(run, j)
+    if highest is None:
+        return None
+    angle = run.motor_position[run.steady, j]
+    travel = np.maximum.accumulate((angle - angle[0]) * np.sign(angle[-1] - angle[0]))
+    if travel.size < 16 or travel[-1] < np.pi:
+        return None
+    rated = run.assembly.transmissions[j].drive.ratings.rated_torque
+    # a picture: straight lines between the samples lower the highest orders by 2 %,
+    # the splines of the metrics would take half of the time of a recording
+    grid = np.linspace(0.0, travel[-1], travel.size)
+    ripple = np.interp(grid, travel, torque_ripple(run, j)) * np.hanning(grid.size)
+    size = next_fast_len(2 * grid.size, real=True)
+    amplitude = np.abs(np.fft.rfft(ripple, size)) * (400.0 / rated / (grid.size - 1))
+    order = 2.0 * np.pi * np.fft.rfftfreq(size, grid[1])
+    inside = slice(1, int(np.searchsorted(order, highest, side="right")))
+    order, amplitude = order[inside], amplitude[inside]
+    if not order.size:
+        return None
+    per = -(-order.size // BARS)
+    starts = np.arange(0, order.size, per)
+    middle = np.add.reduceat(order, starts) / np.diff(np.append(starts, order.size))
+    return middle, np.maximum.reduceat(amplitude, starts)
+
+
+def log_ripple(stream: Any, path: str, bars: tuple[Array, Array], color: int) -> None:
+    """Spectrum of a joint's ripple, from :func:`ripple_bars`."""
+    import rerun as rr
+
+    # as rr.BarChart would have it, which takes longer than the spectrum
+    chart = (
+        (Numbers(bars[1]), rr.BarChart.descriptor_values()),
+        (Numbers(bars[0]), rr.BarChart.descriptor_abscissa()),
+        (rr.components.ColorBatch([color]), rr.BarChart.descriptor_color()),
+    )
+    parts = [rr.DescribedComponentBatch(*part) for part in chart]
+    stream.log(f"{path}/ripple_orders", parts, static=True)
+
+
+def phase_scales(runs: Mapping[str, Run]) -> Scales:
+    """Largest torsion [arcmin] and torque [N·m] by joint; None without torsion."""
+    first = next(iter(runs.values()))
+    torsion, torque = (
+        np.max([np.abs(one).max(axis=0) for one in signals], axis=0)
+        for signals in (
+            [run.torsion for run in runs.values()],
+            [run.output_torque for run in runs.values()],
+        )
+    )
+    return {
+        joint: (float(x) / arcmin, float(y)) if x > 0.0 and y > 0.0 else None
+        for joint, x, y in zip(first.joints, torsion, torque, strict=True)
+    }
+
+
+def phase_points(
+    run: Run,
+    j: int,
+    scales: tuple[float, float],
+    rows: slice | NDArray[np.intp] = slice(None),
+) -> Array:
+    """Torsion to the right, torque upwards, in the units of the picture. (n, 2).
+
+    Args:
+        run: The run.
+        j: Number of the joint.
+        scales: Of :func:`phase_scales`.
+        rows: Samples, all by default.
+    """
+    x = WIDTH * run.torsion[rows, j] / (scales[0] * arcmin)
+    return np.column_stack([x, -run.output_torque[rows, j] / scales[1]])
+
+
+def log_phase_axes(stream: Any, joint: str) -> None:
+    """Axes of the picture of one joint."""
+    import rerun as rr
+
+    axes = [[[-WIDTH, 0.0], [WIDTH, 0.0]], [[0.0, 1.0], [0.0, -1.0]]]
+    strips = rr.LineStrips2D(axes, colors=[_FRAME], radii=[0.004])
+    stream.log(f"phase/{joint}/axes", strips, static=True)
+
+
+def log_phase_ends(stream: Any, joint: str, scales: tuple[float, float]) -> None:
+    """Values at the ends of the axes."""
+    import rerun as rr
+
+    torsion, torque = scales
+    stream.log(
+        f"phase/{joint}/ends",
+        rr.Points2D(
+            [[WIDTH, 0.0], [0.0, -1.0]],
+            labels=[f"{torsion:.3g} arcmin", f"{torque:.3g} N·m"],
+            colors=[_FRAME],
+            radii=[0.01],
+            show_labels=True,
+        ),
+        static=True,
+    )
+
+
+def log_phase_path(
+    stream: Any,
+    path: str,
+    run: Run,
+    j: int,
+    scales: tuple[float, float],
+    color: int,
+) -> None:
+    """Torque against torsion of one run."""
+    import rerun as rr
+
+    thinned = slice(None, None, -(-run.time.size // _POINTS))
+    points = phase_points(run, j, scales, thinned)
+    line = rr.LineStrips2D([points], colors=[color], radii=[0.004])
+    stream.log(f"{path}/path", line, static=True)
+
+
+def log_phase_point(stream: Any, path: str, color: int) -> None:
+    """Look of the point that moves."""
+    import rerun as rr
+
+    point = rr.Points2D.from_fields(radii=[0.03], colors=[color])
+    stream.log(f"{path}/now", point, static=True)
+
+
+def send_phase(stream: Any, path: str, points: Array, time: Any) -> None:
+    """Where the run is at some samples. Points of shape (n, 2)."""
+    import rerun as rr
+
+    column = Column(rr.Points2D.descriptor_positions(), points, np.float32)
+    stream.send_columns(f"{path}/now", indexes=[time], columns=[column])

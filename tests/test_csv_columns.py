@@ -1,0 +1,55 @@
+"""Columns of numbers from files as benches and spreadsheets write them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from messages import naming
+
+from swgjoint.csv_columns import header_of, read_columns
+from swgjoint.errors import InputError
+
+WANTED = {"torque": {"torque_Nm": 1.0}, "torsion": {"torsion_rad": 1.0}}
+
+
+def read(tmp_path, text: str):
+    path = tmp_path / "a.csv"
+    path.write_text(text)
+    return read_columns(path, WANTED)
+
+
+@pytest.mark.parametrize("separator", [",", ";", "\t"])
+@pytest.mark.parametrize(
+    "head",
+    [
+        "torque_Nm,torsion_rad,note\n",
+        "# rig 3\n\n# torque, then torsion\ntorque_Nm,torsion_rad,note\n",
+        '"# rig 3, cold"\n"torque_Nm", torsion_rad ,note\n',
+        "# rig 3\n# torque_Nm,torsion_rad,note\n",
+    ],
+    ids=["plain", "comments", "quoted", "savetxt"],
+)
+def test_separator_and_comments_are_seen(tmp_path, separator, head):
+    """The same numbers, whatever separates them and whatever stands above."""
+    text = head + "1,2e-3,0\n# a pause\n-3.5, 4 ,0\n"
+    found = read(tmp_path, text.replace(",", separator))
+    np.testing.assert_array_equal(found["torque"], [1.0, -3.5])
+    np.testing.assert_array_equal(found["torsion"], [2e-3, 4.0])
+    assert header_of(tmp_path / "a.csv") == ["torque_Nm", "torsion_rad", "note"]
+
+
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [
+        ("T [Nm];angle\n1;2\n", ("torque_Nm", "';'", "'T [Nm]'", "'angle'")),
+        ("torque_Nm torsion_rad\n1 2\n", ("torque_Nm", "','", "torsion_rad'")),
+        ("1,2\n3,4\n", ("torque_Nm", "','", "'1'", "'2'")),
+        ("torque_Nm;torsion_rad\n1,5;2\n", ("line 2", "torque_Nm", "'1,5'", "point")),
+        ("torque_Nm\ttorsion_rad\n1\n", ("line 2", "1", "2", "a tab")),
+        ('torque_Nm,torsion_rad\n1,"2\n3"\n', ("CSV",)),
+    ],
+)
+def test_what_was_read_is_said(tmp_path, text, parts):
+    """Names that were found, what was taken to separate them, a decimal comma."""
+    with pytest.raises(InputError, match=naming("a.csv", *parts)):
+        read(tmp_path, text)
