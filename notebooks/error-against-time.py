@@ -25,9 +25,9 @@ import numpy as np
 import swgjoint
 from swgjoint.drives.references import load_drive
 from swgjoint.gear.design.design import Design
-from swgjoint.sim.run import run_scene
 from swgjoint.sim.scene.scene import Scene
 from swgjoint.units import arcmin
+from swgjoint.view.run import run_scene
 from swgjoint.view.validity import step_error
 
 # %% [markdown]

@@ -24,7 +24,7 @@ import numpy as np
 
 import swgjoint
 from swgjoint.gear.catalogue import ratings_of
-from swgjoint.gear.teeth.profile import tooth_profile
+from swgjoint.gear.teeth.tooth_profile import tooth_profile
 from swgjoint.models_path import models_path
 from swgjoint.sim.scene.scene import Scene
 from swgjoint.units import arcmin, deg, mm

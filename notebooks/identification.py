@@ -32,10 +32,10 @@ from swgjoint.identify.identification import identify
 from swgjoint.identify.log import read_log
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.hysteresis import Jenkin
-from swgjoint.sim.run import run_scene
 from swgjoint.sim.scene.scene import Scene
 from swgjoint.units import arcmin
 from swgjoint.view.plots.identification import picture
+from swgjoint.view.run import run_scene
 
 catalogue = DriveMap.from_catalogue("CSG-25-100", kinematic_error_arcmin=0.0)
 

@@ -28,9 +28,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from swgjoint.explore.compare.compare import compare, missed
-from swgjoint.sim.run import run_scene
 from swgjoint.sim.scene.scene import Scene
 from swgjoint.units import mm
+from swgjoint.view.run import run_scene
 from swgjoint.view.words import short, shown
 
 LOAD = {"payload.mass_kg": 5.0, "payload.centre_mm": [0.0, 0.0, 60.0]}

@@ -26,10 +26,10 @@ import numpy as np
 
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.sheet.spec_sheet import measure_spec
-from swgjoint.sim.run import run_scene
 from swgjoint.sim.scene.scene import Scene
 from swgjoint.units import arcmin, mm
 from swgjoint.view.plots.runs import comparison_figure
+from swgjoint.view.run import run_scene
 
 DESIGNS = {
     "elliptical": "reference-2d",

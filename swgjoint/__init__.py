@@ -13,7 +13,7 @@ _PUBLIC = {
     "attach": "swgjoint.drives.attach",
     "build_map": "swgjoint.fe.build_map",
     "load_plugin": "swgjoint.joint.plugin",
-    "run_scene": "swgjoint.sim.run",
+    "run_scene": "swgjoint.view.run",
     "simulate_meshing": "swgjoint.fe.meshing",
 }
 __all__ = ["__version__", *sorted(_PUBLIC)]

@@ -11,7 +11,8 @@ for _pool in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
 import numpy as np  # noqa: E402
 import pytest  # noqa: E402
 
-from swgjoint.maps.drive_map import DriveMap, Ratings  # noqa: E402
+from swgjoint.gear.ratings import Ratings  # noqa: E402
+from swgjoint.maps.drive_map import DriveMap  # noqa: E402
 from swgjoint.maps.fields import DriveFields  # noqa: E402
 from swgjoint.maps.friction import Friction  # noqa: E402
 

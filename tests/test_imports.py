@@ -6,7 +6,9 @@ import ast
 import json
 import subprocess
 import sys
+from collections import Counter
 from functools import cache
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -15,15 +17,19 @@ from messages import naming
 import swgjoint
 
 PACKAGE = Path(swgjoint.__file__).parent
-CHAIN = ("gear", "maps", ("fe", "joint"), "sim", "view", "control", "envs", "study")
-CHAIN = (*CHAIN, "cli")
-RANK = {
-    name: rank
-    for rank, level in enumerate(CHAIN)
-    for name in ([level] if isinstance(level, str) else level)
-}
-EXCEPTION = ("sim/run.py", "view")
-"""``Run.to_rerun`` loads the view when called: the one arrow that points back."""
+LEVELS = (
+    ("gear",),
+    ("maps",),
+    ("fe", "joint", "identify"),
+    ("drives",),
+    ("sim",),
+    ("view", "control"),
+    ("envs",),
+    ("explore", "bench", "validation"),
+    ("cli",),
+)
+"""A part imports parts of earlier levels only, not those beside it."""
+RANK = {name: rank for rank, level in enumerate(LEVELS) for name in level}
 
 
 def modules() -> list[Path]:
@@ -69,26 +75,57 @@ def test_every_part_has_its_place():
 
 
 def test_arrows():
-    """A part imports only itself, the parts to its left and the base modules."""
-    wrong, backwards = [], []
+    """A part imports only itself, the parts to its left and the base modules.
+
+    Imports inside functions count; those that only types need do not.
+    """
+    wrong = []
     for path in modules():
         here = part_of(path)
-        inside = path.relative_to(PACKAGE).as_posix()
-        for name, at_import in imports(path):
+        for name, _ in imports(path):
             words = name.split(".")
             if words[0] != "swgjoint" or len(words) < 2 or words[1] not in RANK:
                 continue
             there = words[1]
-            if here is None:
-                # base modules know no part; the entry point starts the command line
-                if inside != "__main__.py":
-                    wrong.append(f"{inside} imports {name}")
-            elif there != here and RANK[there] >= RANK[here]:
-                if (inside, there) == EXCEPTION and not at_import:
-                    backwards.append(name)
-                else:
-                    wrong.append(f"{inside} imports {name}")
+            # base modules know no part; the entry point starts the command line
+            backwards = here is None and path.name != "__main__.py"
+            if here is not None and there != here:
+                backwards = RANK[there] >= RANK[here]
+            if backwards:
+                wrong.append(f"{path.relative_to(PACKAGE).as_posix()} imports {name}")
     assert wrong == []
+
+
+def test_no_circles():
+    """No module imports itself by way of others, not even inside functions."""
+    names = {module_of(path): path for path in modules()}
+    graph: dict[str, set[str]] = {}
+    for module, path in names.items():
+        found = set()
+        for name, _ in imports(path):
+            while name and name not in names:
+                name = name.rpartition(".")[0]
+            found.add(name)
+        # a package is no more than the docstring of its folder
+        graph[module] = {n for n in found if names.get(n, path).name != "__init__.py"}
+    order = TopologicalSorter({m: graph[m] - {m} for m in graph})
+    try:
+        order.prepare()
+    except CycleError as error:
+        pytest.fail(" -> ".join(error.args[1]))
+
+
+def module_of(path: Path) -> str:
+    """Dotted name of a file."""
+    words = ("swgjoint", *path.relative_to(PACKAGE).with_suffix("").parts)
+    return ".".join(words).removesuffix(".__init__")
+
+
+@pytest.mark.parametrize("limit", [25])
+def test_folders_are_small(limit):
+    """No folder has more files directly in it than one can see at once."""
+    sizes = Counter(path.parent for path in modules())
+    assert [folder for folder, size in sizes.items() if size > limit] == []
 
 
 def test_scikit_fem_lives_in_fe_only():

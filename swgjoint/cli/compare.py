@@ -73,10 +73,11 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         every limit), ``files``.
     """
     folder = output_folder(args.out) if args.out else None
-    from swgjoint.explore.compare.compare import LOWER, SLOW, SORTABLE, compare
+    from swgjoint.explore.compare.compare import SLOW, SORTABLE, compare
     from swgjoint.explore.compare.scene import joints_named, resolved, scene_or_arm
     from swgjoint.models_path import near_names
     from swgjoint.sim.arm.scene import is_arm
+    from swgjoint.sim.figures.keys import LOWER
     from swgjoint.view.plots.compare import columns, left_out_notes
 
     if args.sort is not None and args.sort not in SORTABLE:

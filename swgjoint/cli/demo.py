@@ -38,8 +38,8 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     folder = output_folder(args.out)
     from swgjoint.drives.references import load_drive
     from swgjoint.sim.figures.metrics import against_rigid
-    from swgjoint.sim.run import run_scene
     from swgjoint.sim.scene.scene import Scene
+    from swgjoint.view.run import run_scene
 
     maps = {name: load_drive(name, progress=args.progress) for name in DRIVES.values()}
     scene = Scene.load_file(SCENE)

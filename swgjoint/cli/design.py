@@ -344,7 +344,7 @@ def _export(design: Design, folder: Path) -> dict[str, Any]:
         tooth_curve,
         wave_generator_curves,
     )
-    from swgjoint.gear.teeth.profile import tooth_profile
+    from swgjoint.gear.teeth.tooth_profile import tooth_profile
     from swgjoint.gear.wave_generators.wave_generator import wave_generator
 
     curves = {

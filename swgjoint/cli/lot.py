@@ -60,7 +60,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
             raise InputError(f"--{name} {value}; accepted: 1 to {most}")
     folder = output_folder(args.out) if args.out else None
     from swgjoint.explore.compare.compare import read_spec
-    from swgjoint.explore.lot import FIGURES, run_lot
+    from swgjoint.explore.lot import FIGURES, LOWER, run_lot
     from swgjoint.gear.design.design import Design
     from swgjoint.view.plots.lot import lot_picture
 
@@ -78,7 +78,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     if folder is not None:
         outputs = Outputs(folder)
         outputs.write("lot.csv", lambda: _csv(result["rows"]))
-        outputs.write("lot.png", lambda: lot_picture(result))
+        outputs.write("lot.png", lambda: lot_picture(result, lower=LOWER))
         outputs.write_json("lot.json", result)
     return result
 

@@ -32,7 +32,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     """
     folder = output_folder(args.out) if args.out else None
     from swgjoint.gear.design.design import Design
-    from swgjoint.gear.teeth.profile import tooth_profile
+    from swgjoint.gear.teeth.tooth_profile import tooth_profile
 
     design = Design.load(args.design)
     profiles = {member: tooth_profile(design, member) for member in MEMBERS}

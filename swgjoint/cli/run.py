@@ -92,7 +92,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
         loopback_port(args.live)
     folder = output_folder(args.out) if args.out else None
-    from swgjoint.sim.run import run_scene
+    from swgjoint.view.run import run_scene
 
     scene, choice = scene_of(args, args.overrides)
     of_arm = choice is not None

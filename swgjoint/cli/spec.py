@@ -12,7 +12,7 @@ from swgjoint.files import Outputs, output_folder
 from swgjoint.view.words import words
 
 if TYPE_CHECKING:
-    from swgjoint.identify.overlay import Overlay
+    from swgjoint.maps.fit.overlay import Overlay
     from swgjoint.maps.sheet.spec_sheet import SpecSheet
 
 FEW_ANGLES = 3
@@ -67,7 +67,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         unseen solves (null with ``validation_reason``) and ``validation_notes``;
         ``ratcheting`` with the path to the largest torque, or to where it ended;
         ``running`` with what rubs in a design that turns without load; ``measured``
-        with --measured, see :meth:`swgjoint.identify.overlay.Overlay.as_dict`.
+        with --measured, see :meth:`swgjoint.maps.fit.overlay.Overlay.as_dict`.
     """
     start = time.perf_counter()
     folder = output_folder(args.out) if args.out else None
@@ -77,7 +77,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     keys = check_keys(only)
     loop = None
     if args.measured is not None:
-        from swgjoint.identify.measurement import read_loop
+        from swgjoint.maps.fit.measurement import read_loop
 
         loop = read_loop(args.measured)
     drive, ratings, name = _drive(args, keys, always=loop is not None)
@@ -106,8 +106,8 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
         result |= validation_of_sheet(None, keys)
     laid = None
     if loop is not None:
-        from swgjoint.identify.loop_units import check_units
-        from swgjoint.identify.overlay import overlay
+        from swgjoint.maps.fit.loop_units import check_units
+        from swgjoint.maps.fit.overlay import overlay
 
         doubts = check_units(args.measured, loop, drive.ratings.rated_torque)
         laid = overlay(drive, loop)

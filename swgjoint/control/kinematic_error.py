@@ -19,8 +19,8 @@ from swgjoint.control.flexible import flexible_plan
 from swgjoint.control.motor_side import MotorPlan, Planner
 from swgjoint.errors import InputError
 from swgjoint.gear.kinematics import angle_coefficients
-from swgjoint.identify.error_fit import ORDERS
 from swgjoint.maps.drive_map import DriveMap
+from swgjoint.maps.fit.error_fit import ORDERS
 from swgjoint.maps.fit.error_spectrum import peak_to_peak, with_error
 from swgjoint.sim.controller import Controller, Measured, Task
 from swgjoint.units import deg

@@ -1,6 +1,6 @@
 """The rigid arm in Pinocchio: what a controller's feed-forward takes the arm for.
 
-Given to :func:`swgjoint.sim.run.run_scene` as ``known_arm`` it makes the torque of the
+Given to :func:`swgjoint.run_scene` as ``known_arm`` it makes the torque of the
 links, weight and inertia, that every plan starts from, in place of the engine's inverse
 dynamics. From a compiled MuJoCo model the tree is built number by number, since MuJoCo
 writes MJCF with six digits; an arm that is known to Pinocchio by a URDF, or from an

@@ -10,6 +10,7 @@ import mujoco
 
 from swgjoint.drives.references import drive_of
 from swgjoint.drives.rotors import catalogue_rotor_inertia
+from swgjoint.drives.sections import JointSection
 from swgjoint.errors import InputError
 from swgjoint.faults import validated
 from swgjoint.gear.design.design import Design
@@ -19,7 +20,6 @@ from swgjoint.joint.fitting import Fitting, check_spec
 from swgjoint.joint.patterns import chosen_hinges
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.fit.error_spectrum import with_assumed_error
-from swgjoint.sim.scene.sections import JointSection
 from swgjoint.units import arcmin
 
 DriveSource = DriveMap | Design | str | Path

@@ -8,6 +8,7 @@ from dataclasses import replace
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
+from swgjoint.drives.sections import JointSection, LinearDrive
 from swgjoint.errors import InputError
 from swgjoint.gear.catalogue_stated import LOSS_KEYS
 from swgjoint.gear.design.family import family_member
@@ -21,7 +22,6 @@ from swgjoint.maps.from_catalogue import (
 )
 from swgjoint.models_path import bundled_names, is_file, named_kind, near_names
 from swgjoint.progress import Progress, silent
-from swgjoint.sim.scene.sections import JointSection, LinearDrive
 from swgjoint.units import arcmin
 
 if TYPE_CHECKING:

@@ -32,11 +32,11 @@ from swgjoint.gear.catalogue import ratings_of
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.tolerances import has_errors
 from swgjoint.maps.cache import entry_of, known, recalled
+from swgjoint.maps.sheet.sampled_accuracy import REST, peaks
 from swgjoint.pool import run_all
 from swgjoint.progress import Progress, silent
 from swgjoint.store import json_file, keep
 from swgjoint.units import arcmin
-from swgjoint.validation.catalogue.accuracy import REST, peaks
 
 Array = NDArray[np.float64]
 
@@ -269,7 +269,7 @@ def _yields(rows: Sequence[Drawn], spec: Mapping[str, float]) -> dict[str, Any]:
 @lru_cache
 def _own_version() -> str:
     """Hash of the code of this part that decides the figures of a drive."""
-    return code_hash("explore/lot.py", "validation/catalogue/accuracy.py")
+    return code_hash("explore/lot.py", "maps/sheet/sampled_accuracy.py")
 
 
 def _solved(task: _Task) -> _Part:

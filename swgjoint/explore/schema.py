@@ -19,6 +19,7 @@ from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
 from swgjoint.faults import unit_of
+from swgjoint.sim.figures import keys
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 KINDS = ("design", "scene", "sweep", "optimise", "spec", "lot")
@@ -114,8 +115,8 @@ def _limits(kind: str) -> dict[str, Any]:
 
     command = "compare" if kind == "spec" else "lot"
     of: type = compare.Compared if kind == "spec" else lot.Drawn
-    upper: tuple[str, ...] = compare.UPPER if kind == "spec" else lot.UPPER
-    lower: tuple[str, ...] = compare.LOWER if kind == "spec" else lot.LOWER
+    upper: tuple[str, ...] = keys.UPPER if kind == "spec" else lot.UPPER
+    lower: tuple[str, ...] = keys.LOWER if kind == "spec" else lot.LOWER
     meaning = meanings(of)
     figures = {}
     for key in (*upper, *lower):

@@ -9,7 +9,7 @@ from math import log
 
 from swgjoint.errors import InputError
 from swgjoint.gear.design.design import Design
-from swgjoint.maps.drive_map import Ratings
+from swgjoint.gear.ratings import Ratings
 from swgjoint.models_path import models_path
 from swgjoint.units import mm
 

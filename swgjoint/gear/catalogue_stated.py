@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from statistics import median
 from typing import Any
 
 from swgjoint.errors import InputError
 from swgjoint.gear.catalogue import CatalogueRow, catalogue_rows, named_rows, table
-from swgjoint.maps.fit.friction_fit import StatedLosses
 
 SIMILAR = 1.6
 """Torsion at T1 varies by less than this factor about the median of its ratio class:
@@ -20,6 +20,22 @@ _STATED = (
     "lost_motion_arcmin",
     "repeatability_arcmin",
 )
+
+
+@dataclass(frozen=True, kw_only=True)
+class StatedLosses:
+    """Losses of one drive as a catalogue states them [N·m], [-]."""
+
+    rated_torque: float
+    """At the output."""
+    efficiency: float
+    """At rated torque and 2000 rpm."""
+    no_load_running: float
+    """At the input, 2000 rpm."""
+    starting: float
+    """At the input."""
+    back_driving: float
+    """At the output."""
 
 
 LOSS_KEYS = (

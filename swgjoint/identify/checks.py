@@ -13,8 +13,8 @@ from swgjoint.errors import InputError
 from swgjoint.gear.kinematics import LAYOUTS
 from swgjoint.gear.kinematics import ratio as signed_ratio
 from swgjoint.identify.log import BenchLog
-from swgjoint.identify.loop_units import TORSION_AT_RATED
 from swgjoint.maps.drive_map import DriveMap
+from swgjoint.maps.fit.loop_units import TORSION_AT_RATED
 from swgjoint.units import arcmin
 
 if TYPE_CHECKING:

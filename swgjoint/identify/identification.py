@@ -48,11 +48,12 @@ from numpy.typing import NDArray
 
 from swgjoint.errors import ComputationError, InputError
 from swgjoint.gear.kinematics import LAYOUTS
+from swgjoint.gear.ratings import Ratings
 from swgjoint.identify.checks import SURE, check_ratio, doubts_of, remarks, without_skew
 from swgjoint.identify.identified_map import map_of
 from swgjoint.identify.log import FEWEST, Averaged, BenchLog
 from swgjoint.identify.model import Model
-from swgjoint.maps.drive_map import DriveMap, Ratings
+from swgjoint.maps.drive_map import DriveMap
 
 Array = NDArray[np.float64]
 

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from swgjoint.errors import InputError
 from swgjoint.gear.kinematics import angle_coefficients
 from swgjoint.gear.kinematics import ratio as signed_ratio
+from swgjoint.gear.ratings import Ratings
 from swgjoint.identify.log import Averaged, BenchLog, mean_acceleration, mean_rate
-from swgjoint.maps.drive_map import Ratings
 from swgjoint.maps.fit.friction_fit import PRESLIDING
 from swgjoint.maps.friction import play_bristle
 from swgjoint.maps.from_catalogue import three_lines

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from swgjoint.maps.drive_map import DriveMap
+from swgjoint.maps.potential import Potential
 
 JUMP = 1e-6
 """Largest jump of a coefficient or its slope at a knot, of its largest value."""
 
 
-def check_map(drive: DriveMap) -> None:
+def check_map(drive: Potential) -> None:
     """Refuse a map that no drive can have.
 
     Teeth and ratings must make sense, the mean torque must not fall with the torsion,

@@ -1,142 +1,24 @@
-r"""The reduced drive: a potential of torsion and of the two gear angles.
-
-.. math::
-    V(\Delta, \alpha, \beta) = \sum_k \left[ A_k(\Delta) \cos\varphi_k
-        + B_k(\Delta) \sin\varphi_k \right],
-    \quad \varphi_k = p_k \alpha + q_k \beta,
-
-with :math:`\Delta = \theta/i + e_0(\alpha, \beta) - \psi`. The coefficients are
-piecewise polynomials of degree four, so torque is piecewise cubic. Outside the
-sampled torsion every coefficient continues as a parabola, the torque linearly.
-
-Beside the potential a map may have hysteresis, Jenkin elements along the torsion (see
-:mod:`swgjoint.maps.hysteresis`), and friction of the wave generator at speed (see
-:mod:`swgjoint.maps.friction`). Everything below but these two is conservative.
-"""
+"""The map of a drive: where it comes from, its file and its spec sheet."""
 
 from __future__ import annotations
 
-from bisect import bisect_right
-from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Collection
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
-from swgjoint.arrays import frozen_array
-from swgjoint.errors import InputError
-from swgjoint.gear.kinematics import LAYOUTS, angle_coefficients, ratio
-from swgjoint.maps.fields import DriveFields
-from swgjoint.maps.friction import Friction
-from swgjoint.maps.hysteresis import MAX_ELEMENTS, Jenkin
-from swgjoint.units import arcmin
-
-Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Ratings:
-    """Torques at the output that a catalogue states [N·m]."""
-
-    rated_torque: float
-    repeated_peak: float
-    momentary_peak: float
-    T1: float
-    T2: float
-    source: str = "given"
-    ratcheting_torque: float | None = None
-    """At which teeth skip; None where it is not known."""
+from swgjoint.gear.ratings import Ratings
+from swgjoint.maps.potential import Potential
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Law:
-    """Torsion and generalised forces of the potential at some angles, one shape."""
+class DriveMap(Potential):
+    """The reduced drive: torque over torsion and angles, with its sources and files.
 
-    torsion: Array
-    """[rad]."""
-    by_theta: Array
-    """Derivative of the torsion by the input angle [-]."""
-    by_psi: Array
-    """The same by the output angle [-]."""
-    input_force: Array
-    """-dV/dtheta [N·m]."""
-    output_force: Array
-    """-dV/dpsi, the torque on the output [N·m]."""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class DriveMap:
-    """Potential, hysteresis and friction of one drive; immutable."""
-
-    name: str
-    level: str
-    """Source: ``ring``, ``2d``, ``3d``, ``catalogue``, ``measurement``, ``linear``."""
-    layout: str
-    teeth_flexspline: int
-    teeth_circular_spline: int
-    torsion_knots: Array
-    """Increasing breakpoints of the torsion [rad]. Shape (n_knots,)."""
-    orders: NDArray[np.int64]
-    """(p, q) of every harmonic, the mean (0, 0) first. Shape (n_harmonics, 2)."""
-    potential: Array
-    """Coefficients of A and B in ascending powers of (torsion - knot) [J/rad^k].
-
-    Shape (n_harmonics, 2, n_knots - 1, 5).
+    The data and the equations are those of :class:`Potential`.
     """
-    end_stiffness: Array
-    """Slope of the torque of A and B below and above the knots [N·m/rad].
-
-    Shape (n_harmonics, 2, 2).
-    """
-    kinematic_error: Array
-    """Cosine and sine amplitude of e0 for every harmonic [rad]. (n_harmonics, 2)."""
-    ratings: Ratings
-    damping_ratio: float = 0.02
-    hysteresis: tuple[Jenkin, ...] = ()
-    """Parallel elements that add to the torque along the torsion; none by default."""
-    friction: Friction | None = None
-    """Of the wave generator against the flexspline; None by default."""
-    fields: DriveFields | None = None
-    """Shape and stress of the flexspline, to be shown; none without finite elements."""
-    info: Mapping[str, Any] = field(default_factory=dict)
-    """Provenance and residuals, JSON values only."""
-
-    def __post_init__(self) -> None:
-        if self.layout not in LAYOUTS:
-            raise ValueError(f"layout {self.layout!r}; accepted: {', '.join(LAYOUTS)}")
-        knots = frozen_array(self.torsion_knots, "torsion knots [rad]", ndim=1)
-        if knots.size < 2 or (np.diff(knots) <= 0).any():
-            raise ValueError("torsion knots [rad] must be at least two and increasing")
-        orders = np.array(self.orders, dtype=np.int64)
-        if orders.ndim != 2 or orders.shape[1] != 2 or tuple(orders[0]) != (0, 0):
-            raise ValueError("orders need shape (n, 2), the mean (0, 0) first")
-        orders.setflags(write=False)
-        n, m = len(orders), knots.size - 1
-        object.__setattr__(self, "torsion_knots", knots)
-        object.__setattr__(self, "orders", orders)
-        for key, unit, shape in (
-            ("potential", "J", (n, 2, m, 5)),
-            ("end_stiffness", "N·m/rad", (n, 2, 2)),
-            ("kinematic_error", "rad", (n, 2)),
-        ):
-            array = frozen_array(getattr(self, key), f"{key} [{unit}]", shape=shape)
-            object.__setattr__(self, key, array)
-        elements = tuple(self.hysteresis)
-        if len(elements) > MAX_ELEMENTS or not all(
-            isinstance(element, Jenkin) for element in elements
-        ):
-            raise InputError(
-                f"hysteresis of {self.name!r}; accepted: up to {MAX_ELEMENTS} Jenkin"
-                " elements"
-            )
-        object.__setattr__(self, "hysteresis", elements)
-        if not isinstance(self.friction, Friction | None):
-            raise InputError(
-                f"friction of {self.name!r}: {self.friction!s:.40}; accepted: Friction"
-                " or None"
-            )
 
     # -- constructors ---------------------------------------------------------
 
@@ -229,12 +111,12 @@ class DriveMap:
             kinematic_error: CSV file of one output turn without load: ``output_deg``
                 and ``error_arcmin``, output minus ideal output (also ``_rad``).
             **options: ``layout``, ``orders``, ``intervals``, ``damping_ratio``,
-                ``name``; see :mod:`swgjoint.identify.measurement`.
+                ``name``; see :mod:`swgjoint.maps.fit.measurement`.
 
         Raises:
             InputError: If a file or a value cannot be used.
         """
-        from swgjoint.identify.measurement import map_from_measurement
+        from swgjoint.maps.fit.measurement import map_from_measurement
 
         return map_from_measurement(
             path,
@@ -271,211 +153,3 @@ class DriveMap:
         from swgjoint.maps.sheet.spec_sheet import spec_sheet
 
         return spec_sheet(self, only)
-
-    # -- kinematics -----------------------------------------------------------
-
-    @property
-    def ratio(self) -> float:
-        """Signed ratio i, output = input / i."""
-        return ratio(self.layout, self.teeth_flexspline, self.teeth_circular_spline)
-
-    @property
-    def angle_orders(self) -> NDArray[np.int64]:
-        """(d phi/d theta, d phi/d psi) of every harmonic. Shape (n_harmonics, 2)."""
-        alpha, beta = angle_coefficients(self.layout)
-        return np.asarray(self.orders @ np.array([alpha, beta], dtype=np.int64))
-
-    @property
-    def friction_direction(self) -> tuple[int, int]:
-        """(d beta/d theta, d beta/d psi), the rotation against which friction acts."""
-        return angle_coefficients(self.layout)[1]
-
-    def phases(self, theta: ArrayLike, psi: ArrayLike) -> Array:
-        """Phases of the harmonics [rad], appended as the last axis."""
-        angles = np.stack(
-            np.broadcast_arrays(np.asarray(theta, float), np.asarray(psi, float)), -1
-        )
-        return np.asarray(angles @ self.angle_orders.T.astype(float))
-
-    def error_at(self, phases: Array) -> tuple[Array, Array, Array]:
-        """e0 and its derivatives by theta and psi, [rad] and [-]."""
-        cos, sin = np.cos(phases), np.sin(phases)
-        a, b = self.kinematic_error.T
-        slope = b * cos - a * sin
-        n_theta, n_psi = self.angle_orders.T
-        return (
-            np.sum(a * cos + b * sin, axis=-1),
-            np.sum(slope * n_theta, axis=-1),
-            np.sum(slope * n_psi, axis=-1),
-        )
-
-    def torsion(self, theta: ArrayLike, psi: ArrayLike) -> Array:
-        """Torsion theta/i + e0 - psi [rad]."""
-        e0, _, _ = self.error_at(self.phases(theta, psi))
-        ideal = np.asarray(theta, float) / self.ratio
-        return np.asarray(ideal + e0 - np.asarray(psi, float))
-
-    # -- potential ------------------------------------------------------------
-
-    def coefficients(self, torsion: ArrayLike, derivative: int = 0) -> Array:
-        """A and B, or their first or second derivative, at the given torsion.
-
-        Returns:
-            Shape torsion.shape + (n_harmonics, 2).
-        """
-        x = np.asarray(torsion, float)
-        knots = self.torsion_knots
-        inside = np.clip(x, knots[0], knots[-1])
-        j = np.clip(np.searchsorted(knots, inside, side="right") - 1, 0, knots.size - 2)
-        d = (inside - knots[j])[..., None, None]
-        c = np.moveaxis(self.potential, 2, 0)[j]  # (..., n_harmonics, 2, 5)
-        out = (x - inside)[..., None, None]
-        beyond = bool(out.any())
-        low, high = self.end_stiffness[..., 0], self.end_stiffness[..., 1]
-        k_end = np.where(out < 0, low, high) if beyond else high
-        if derivative == 2:
-            v2 = 2 * c[..., 2] + d * (6 * c[..., 3] + d * 12 * c[..., 4])
-            return np.asarray(np.where(out == 0, v2, k_end))
-        if derivative == 1 or beyond:
-            v1 = 2 * c[..., 2] + d * (3 * c[..., 3] + d * 4 * c[..., 4])
-            v1 = c[..., 1] + d * v1
-            if derivative == 1:
-                return np.asarray(v1 + out * k_end if beyond else v1)
-        v0 = c[..., 1] + d * (c[..., 2] + d * (c[..., 3] + d * c[..., 4]))
-        v0 = c[..., 0] + d * v0
-        return np.asarray(v0 + out * (v1 + 0.5 * out * k_end) if beyond else v0)
-
-    def _sum(self, torsion: ArrayLike, phases: Array, derivative: int) -> Array:
-        ab = self.coefficients(torsion, derivative)
-        return np.asarray(
-            np.sum(ab[..., 0] * np.cos(phases) + ab[..., 1] * np.sin(phases), axis=-1)
-        )
-
-    def energy(self, torsion: ArrayLike, theta: ArrayLike, psi: ArrayLike) -> Array:
-        """V [J]."""
-        return self._sum(torsion, self.phases(theta, psi), 0)
-
-    def torque(self, torsion: ArrayLike, theta: ArrayLike, psi: ArrayLike) -> Array:
-        """dV/d(torsion) at fixed angles [N·m]."""
-        return self._sum(torsion, self.phases(theta, psi), 1)
-
-    def stiffness(self, torsion: ArrayLike, theta: ArrayLike, psi: ArrayLike) -> Array:
-        """Second derivative of V by the torsion at fixed angles [N·m/rad]."""
-        return self._sum(torsion, self.phases(theta, psi), 2)
-
-    def forces(self, theta: ArrayLike, psi: ArrayLike) -> tuple[Array, Array]:
-        """Generalised forces -dV/dtheta and -dV/dpsi of the drive [N·m].
-
-        The second is the torque T that the drive exerts on the output; minus the
-        first is the external torque that holds the input in slow motion.
-        """
-        law = self.law(theta, psi)
-        return law.input_force, law.output_force
-
-    def law(self, theta: ArrayLike, psi: ArrayLike) -> Law:
-        """All that the potential says at given angles; shapes of the angles."""
-        phases = self.phases(theta, psi)
-        cos, sin = np.cos(phases), np.sin(phases)
-        a, b = self.kinematic_error.T
-        n_theta, n_psi = self.angle_orders.T
-        x = np.asarray(theta, float) / self.ratio - np.asarray(psi, float)
-        x = x + np.sum(a * cos + b * sin, axis=-1)
-        slope = b * cos - a * sin
-        g_theta = 1.0 / self.ratio + np.sum(slope * n_theta, axis=-1)
-        g_psi = -1.0 + np.sum(slope * n_psi, axis=-1)
-        by_torsion = self.coefficients(x, 1)
-        torque = np.sum(by_torsion[..., 0] * cos + by_torsion[..., 1] * sin, axis=-1)
-        ab = self.coefficients(x)
-        by_phase = ab[..., 1] * cos - ab[..., 0] * sin
-        return Law(
-            torsion=x,
-            by_theta=g_theta,
-            by_psi=g_psi,
-            input_force=-torque * g_theta - np.sum(by_phase * n_theta, axis=-1),
-            output_force=-torque * g_psi - np.sum(by_phase * n_psi, axis=-1),
-        )
-
-    # -- figures that a joint needs -------------------------------------------
-
-    @property
-    def mean_stiffness(self) -> float:
-        """Stiffness of the mean curve between -rated and +rated torque [N·m/rad]."""
-        low, high = (
-            self.mean_torsion(sign * self.ratings.rated_torque) for sign in (-1, 1)
-        )
-        return 2.0 * self.ratings.rated_torque / (high - low)
-
-    @property
-    def max_stiffness(self) -> float:
-        """Bound of the stiffness over torsion and angles, continuation included."""
-        x = np.concatenate(
-            [
-                np.linspace(a, b, 9)
-                for a, b in zip(
-                    self.torsion_knots, self.torsion_knots[1:], strict=False
-                )
-            ]
-        )
-        inside = self.coefficients(x, 2)
-        ends = np.moveaxis(self.end_stiffness, 2, 0)
-        values = np.concatenate([inside, ends])
-        swing = np.hypot(values[:, 1:, 0], values[:, 1:, 1]).sum(axis=1)
-        return float(np.max(values[:, 0, 0] + swing))
-
-    @property
-    def torque_range(self) -> tuple[float, float]:
-        """Sampled range of the mean torque [N·m]; beyond it the map continues."""
-        ends = self.coefficients(self.torsion_knots[[0, -1]], 1)[:, 0, 0]
-        return float(ends[0]), float(ends[1])
-
-    def mean_torsion(self, torque: float) -> float:
-        """Torsion of the mean curve at an output torque [rad]."""
-        from scipy.optimize import brentq
-
-        # a search asks one after the other: plain numbers make it five times as fast
-        knots, pieces = self.torsion_knots.tolist(), self.potential[0, 0].tolist()
-        before, after = self.end_stiffness[0, 0].tolist()
-
-        def residual(x: float) -> float:
-            inside = min(max(x, knots[0]), knots[-1])
-            j = min(bisect_right(knots, inside), len(pieces)) - 1
-            d, out = inside - knots[j], x - inside
-            _, c1, c2, c3, c4 = pieces[j]
-            mean = c1 + d * (2 * c2 + d * (3 * c3 + d * 4 * c4))
-            return float(mean + out * (before if out < 0.0 else after) - torque)
-
-        span = knots[-1] - knots[0]
-        low, high = knots[0], knots[-1]
-        for _ in range(60):
-            if residual(low) <= 0.0 <= residual(high):
-                return float(brentq(residual, low, high, xtol=1e-18, rtol=1e-14))
-            low, high, span = low - span, high + span, 2.0 * span
-        raise ValueError(f"torque {torque} N·m is not reached by this map")
-
-    def with_harmonics(self, keep: ArrayLike) -> Self:
-        """A copy with the harmonics for which ``keep`` is true; the mean stays."""
-        mask = np.array(keep, dtype=bool)
-        mask[0] = True
-        return replace(
-            self,
-            orders=self.orders[mask],
-            potential=self.potential[mask],
-            end_stiffness=self.end_stiffness[mask],
-            kinematic_error=self.kinematic_error[mask],
-        )
-
-    def pruned(self, tolerance_arcmin: float) -> Self:
-        """A copy without the harmonics that a tolerance does not need.
-
-        ``info["pruned"]`` lists what was dropped and bounds its effect on output angle,
-        kinematic error and torque; see :mod:`swgjoint.maps.fit.pruning`.
-
-        Args:
-            tolerance_arcmin: Of the output angle at a given torque and input angle.
-
-        Raises:
-            InputError: If it is not positive, or no bound follows from the map.
-        """
-        from swgjoint.maps.fit.pruning import pruned_map
-
-        return pruned_map(self, tolerance_arcmin * arcmin)

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swgjoint.errors import ComputationError
-from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.hysteresis import Sliders
+from swgjoint.maps.potential import Potential
 
 Array = NDArray[np.float64]
 
@@ -18,7 +18,7 @@ _BISECTIONS = 400
 
 
 def output_angle(
-    drive: DriveMap,
+    drive: Potential,
     theta: ArrayLike,
     torque: ArrayLike,
     sliders: Sliders | None = None,
@@ -57,7 +57,7 @@ def output_angle(
 
 
 def _solve(
-    drive: DriveMap,
+    drive: Potential,
     curve: tuple[Array, Array],
     theta: Array,
     torque: Array,
@@ -91,7 +91,7 @@ def _solve(
 
 
 def _torque(
-    drive: DriveMap, theta: Array, psi: Array, sliders: Sliders | None
+    drive: Potential, theta: Array, psi: Array, sliders: Sliders | None
 ) -> tuple[Array, Array]:
     """T on the output, -dV/dpsi, and the stiffness at fixed angles."""
     phases = drive.phases(theta, psi)
@@ -113,7 +113,7 @@ def _torque(
 
 
 def _bisect(
-    drive: DriveMap,
+    drive: Potential,
     theta: Array,
     torque: Array,
     start: Array,

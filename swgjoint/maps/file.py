@@ -29,13 +29,14 @@ from swgjoint import __version__
 from swgjoint.errors import InputError, MapFileError
 from swgjoint.faults import Section, validated
 from swgjoint.files import write_whole
+from swgjoint.gear.ratings import Ratings
 from swgjoint.json_text import json_text
 from swgjoint.maps.checks import check_map
-from swgjoint.maps.drive_map import DriveMap, Ratings
 from swgjoint.maps.fields import DriveFields
 from swgjoint.maps.friction import Friction
 from swgjoint.maps.hysteresis import Jenkin
 from swgjoint.maps.info import check_texts, sound_info
+from swgjoint.maps.potential import Potential
 
 SCHEMA_VERSION = 4
 """2 added ``hysteresis``, 3 ``friction`` and the ratcheting torque, 4 fields to be
@@ -77,7 +78,7 @@ _NPY = re.compile(
 )
 _END = struct.Struct("<4s4H2LH")  # end of the central directory, PKZIP APPNOTE 4.3.16
 
-Map = TypeVar("Map", bound=DriveMap)
+Map = TypeVar("Map", bound=Potential)
 
 
 class RatingsHeader(Section):
@@ -147,7 +148,7 @@ class Header(Section):
     info: dict[str, Any]
 
 
-def map_bytes(drive: DriveMap) -> bytes:
+def map_bytes(drive: Potential) -> bytes:
     """The content of a ``.swg`` file; the same map gives the same bytes."""
     header = {
         "format": "swgjoint drive map",
@@ -208,7 +209,7 @@ def _plain(value: object) -> object:
     return float(value) if isinstance(value, Real) else value
 
 
-def write_map(drive: DriveMap, path: str | Path) -> None:
+def write_map(drive: Potential, path: str | Path) -> None:
     """Write a ``.swg`` file, whole or not at all.
 
     Raises:

@@ -27,10 +27,11 @@ from swgjoint.gear.catalogue_stated import (
     stated_losses,
     stiffness_of,
 )
-from swgjoint.maps.drive_map import DriveMap, Ratings
+from swgjoint.gear.ratings import Ratings
 from swgjoint.maps.fit.error_spectrum import with_assumed_error
 from swgjoint.maps.fit.friction_fit import friction_of_losses
 from swgjoint.maps.hysteresis import Jenkin
+from swgjoint.maps.potential import Potential
 from swgjoint.maps.sheet.loop import largest_torque, torque_loop
 from swgjoint.maps.torsion_law import potential_of_stiffness
 from swgjoint.units import arcmin
@@ -53,7 +54,7 @@ _NO_ERROR = (
     " kinematic error"
 )
 
-Map = TypeVar("Map", bound=DriveMap)
+Map = TypeVar("Map", bound=Potential)
 
 
 def catalogue_names() -> list[str]:

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.equilibrium import output_angle
+from swgjoint.maps.potential import Potential
 
 Array = NDArray[np.float64]
 
@@ -30,7 +30,7 @@ _BEND = 1e-3
 class IdealMotion:
     """Polynomials of the torsion at given input angles, n of them."""
 
-    drive: DriveMap
+    drive: Potential
     theta: Array
     """Input angles [rad]. Shape (n,)."""
     error: Array
@@ -41,7 +41,7 @@ class IdealMotion:
     """Their V'' below and above the knots. Shape (2, n, 2)."""
 
     @classmethod
-    def of(cls, drive: DriveMap, theta: Array) -> IdealMotion:
+    def of(cls, drive: Potential, theta: Array) -> IdealMotion:
         """Sum the harmonics at psi = theta/i."""
         phases = drive.phases(theta, theta / drive.ratio)
         cos, sin = np.cos(phases), np.sin(phases)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.arrays import frozen_array
-from swgjoint.maps.drive_map import Ratings
+from swgjoint.gear.ratings import Ratings
 from swgjoint.maps.fields import DriveFields
 
 Array = NDArray[np.float64]

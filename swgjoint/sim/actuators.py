@@ -10,12 +10,12 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from swgjoint.drives.sections import MotorLimits
 from swgjoint.sim.figures.transmission import Transmission
 from swgjoint.sim.scene.feature_sections import (
     Disturbance,
     JointPulse,
     JointSine,
-    MotorLimits,
     ToolForce,
 )
 from swgjoint.units import rpm

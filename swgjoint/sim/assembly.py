@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.drives.references import check_joint_names, drive_of
+from swgjoint.drives.sections import JointSection
 from swgjoint.errors import InputError
 from swgjoint.joint.attach import attach_all
 from swgjoint.joint.fitting import Fitting
@@ -28,7 +29,6 @@ from swgjoint.sim.motion.trajectory import Trajectory
 from swgjoint.sim.run_memory import require_run_memory
 from swgjoint.sim.scene.feature_sections import Disturbance, ToolForce
 from swgjoint.sim.scene.scene import Scene
-from swgjoint.sim.scene.sections import JointSection
 
 Array = NDArray[np.float64]
 

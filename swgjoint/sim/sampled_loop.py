@@ -1,7 +1,7 @@
 """Controllers that run once a control period on what sensors read, in Python.
 
 For scenes that ask for it (computed torque, a control period, sensors, link feedback)
-and for controllers that are given to :func:`swgjoint.sim.run.run_scene`. Limits of the
+and for controllers that are given to :func:`swgjoint.run_scene`. Limits of the
 motors stay with the engine's actuators.
 """
 

@@ -20,10 +20,10 @@ from scipy.interpolate import CubicSpline
 from swgjoint.errors import InputError
 from swgjoint.fe.plane.plain_ring import PlainRing, PulledRing, pull_ring
 from swgjoint.files import Outputs
+from swgjoint.gear.pulled_ring import elastica, small_deflection
 from swgjoint.json_text import json_text
 from swgjoint.units import mm
 from swgjoint.validation.rows import Row, StudyOptions, StudyResult
-from swgjoint.validation.thin_ring import elastica, small_deflection
 from swgjoint.view.plots.plain_ring import ring_picture
 
 Array = NDArray[np.float64]

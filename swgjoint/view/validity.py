@@ -15,9 +15,9 @@ import numpy as np
 from swgjoint.errors import SwgError
 from swgjoint.maps.sheet.map_validity import map_validation, validation_summary
 from swgjoint.maps.sheet.validity_marks import joint_doubt
-from swgjoint.sim.run import run_scene
 from swgjoint.sim.scene.scene import Scene
 from swgjoint.units import arcmin, deg
+from swgjoint.view.run import run_scene
 
 if TYPE_CHECKING:
     from swgjoint.maps.drive_map import DriveMap

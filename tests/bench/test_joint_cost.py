@@ -14,7 +14,16 @@ from messages import names
 
 from swgjoint.bench.joint import cost as joint_cost
 from swgjoint.bench.joint.modes import numerical_damping
-from swgjoint.bench.joint.runs import (
+from swgjoint.bench.joint.scenes import exact
+from swgjoint.bench.joint.splits import SPLITS, split
+from swgjoint.bench.stability.joint import Start, hardening_drive, make_joint
+from swgjoint.bench.stability.reference import reference
+from swgjoint.cli.main import main
+from swgjoint.cli.shared import bench_joint
+from swgjoint.joint.step_damping import restore_damping
+from swgjoint.maps.drive_map import DriveMap
+from swgjoint.provenance import provenance
+from swgjoint.sim.accuracy import (
     Setting,
     Stepper,
     assemble_setting,
@@ -25,15 +34,6 @@ from swgjoint.bench.joint.runs import (
     relative_cost,
     rigid_arm,
 )
-from swgjoint.bench.joint.scenes import exact
-from swgjoint.bench.joint.splits import SPLITS, split
-from swgjoint.bench.stability.joint import Start, hardening_drive, make_joint
-from swgjoint.bench.stability.reference import reference
-from swgjoint.cli.main import main
-from swgjoint.cli.shared import bench_joint
-from swgjoint.joint.step_damping import restore_damping
-from swgjoint.maps.drive_map import DriveMap
-from swgjoint.provenance import provenance
 
 
 @pytest.fixture(scope="module")

@@ -16,11 +16,11 @@ import sys
 
 import mujoco
 
-from swgjoint.bench.joint.runs import Setting, attempt, errors
 from swgjoint.explore.advise.advise import advise
 from swgjoint.explore.advise.bound import parse_bound
 from swgjoint.explore.advise.search import ALIKE
 from swgjoint.pool import LocalPool, Lost
+from swgjoint.sim.accuracy import Setting, attempt, errors
 from swgjoint.sim.arm.scene import is_arm, scene_of_arm
 from swgjoint.sim.scene.scene import Scene
 

@@ -22,8 +22,9 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch
 
+from swgjoint.gear.ratings import Ratings
 from swgjoint.joint.attach import LEVELS, attach
-from swgjoint.maps.drive_map import DriveMap, Ratings
+from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.friction import Friction
 from swgjoint.maps.from_catalogue import three_lines
 from swgjoint.maps.hysteresis import Jenkin

@@ -18,8 +18,8 @@ from pathlib import Path
 import numpy as np
 
 from swgjoint.drives.references import load_drive
-from swgjoint.sim.run import run_scene
 from swgjoint.sim.scene.scene import Scene
+from swgjoint.view.run import run_scene
 
 DEFAULT = ("ur5e-sweep", "ur5e-catalogue", "ur5e-circle", "ur5e-payload-step")
 

@@ -14,14 +14,14 @@ from validation_record import validated_map
 
 from swgjoint.cli.main import main
 from swgjoint.errors import InputError
-from swgjoint.explore.compare.compare import LOWER, UPPER
 from swgjoint.explore.compare.scene import joints_named, resolved, with_drive
 from swgjoint.gear.design.design import Design
 from swgjoint.models_path import models_path
 from swgjoint.sim.arm.rigid_arm import RigidArm
 from swgjoint.sim.arm.scene import scene_of_arm
-from swgjoint.sim.run import run_scene
+from swgjoint.sim.figures.keys import LOWER, UPPER
 from swgjoint.sim.scene.scene import Scene
+from swgjoint.view.run import run_scene
 
 SHORT = ["--set", "simulation.duration_s=1.5", "--set", "trajectory.settle_s=0.3"]
 STIFF, SOFT = "CSG-32-100", "CSG-14-100"

@@ -10,7 +10,7 @@ from messages import names
 
 from swgjoint.cli.main import main
 from swgjoint.gear.design.design import Design
-from swgjoint.gear.teeth.profile import tooth_profile
+from swgjoint.gear.teeth.tooth_profile import tooth_profile
 from swgjoint.gear.wave_generators.wave_generator import wave_generator
 from swgjoint.models_path import bundled_names
 

@@ -11,12 +11,12 @@ from swgjoint.cli.main import main
 from swgjoint.cli.schema import KINDS
 from swgjoint.errors import DesignError
 from swgjoint.explore import schema as source
-from swgjoint.explore.compare.compare import LOWER, UPPER
 from swgjoint.explore.lot import FIGURES
 from swgjoint.explore.sweep.keys import known_keys
 from swgjoint.faults import unit_of
 from swgjoint.gear.design.design import Design
 from swgjoint.models_path import models_path
+from swgjoint.sim.figures.keys import LOWER, UPPER
 
 FILES = {
     "design": "drives",

@@ -6,8 +6,9 @@ import pytest
 
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.controller import Controller
-from swgjoint.sim.run import Run, run_scene
+from swgjoint.sim.run import Run
 from swgjoint.sim.scene.scene import Scene
+from swgjoint.view.run import run_scene
 
 
 @pytest.fixture(scope="session")

@@ -13,9 +13,9 @@ from swgjoint.control.motor_side import MotorPID, rigid_plan
 from swgjoint.errors import ComputationError
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.controller import KnownJoints, Task
-from swgjoint.sim.run import run_scene
 from swgjoint.sim.scene.scene import Scene
 from swgjoint.units import arcmin
+from swgjoint.view.run import run_scene
 
 K, C, JM, JL, LOAD = 2e4, 8.0, 1e-4, 1.0, 20.0
 LINEAR = DriveMap.linear(K, teeth_flexspline=120, teeth_circular_spline=122)

@@ -9,13 +9,13 @@ import pytest
 
 from swgjoint.control.flexible import flexible_plan
 from swgjoint.control.motor_side import MotorPID, rigid_plan
+from swgjoint.drives.sections import LEVELS
 from swgjoint.joint.prescribed import error_of_motor
 from swgjoint.sim.assembly import assemble
-from swgjoint.sim.run import run_scene
 from swgjoint.sim.scene.scene import Scene
-from swgjoint.sim.scene.sections import LEVELS
 from swgjoint.sim.scene.task import task_of
 from swgjoint.units import arcmin
+from swgjoint.view.run import run_scene
 
 SCENE = {
     "name": "known",

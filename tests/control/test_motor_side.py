@@ -14,8 +14,8 @@ from swgjoint.errors import ComputationError, InputError
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.friction import Friction
 from swgjoint.sim.controller import ReadingAge
-from swgjoint.sim.run import run_scene
 from swgjoint.sim.scene.scene import Scene
+from swgjoint.view.run import run_scene
 
 LINEAR = DriveMap.linear(2e4, teeth_flexspline=120, teeth_circular_spline=122)
 SWEEP = {"kind": "sweep", "hold_s": 0.1, "ramp_s": 0.15, "end_deg": {"joint": 4.0}}

@@ -20,9 +20,9 @@ from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.hysteresis import Jenkin
 from swgjoint.sim.arm.rigid_arm import RigidArm
 from swgjoint.sim.controller import KnownJoints, Measured, Task
-from swgjoint.sim.run import run_scene
 from swgjoint.sim.scene.scene import Scene
 from swgjoint.units import arcmin
+from swgjoint.view.run import run_scene
 
 SHOULDER = TwoMass(
     ratio=-100.0,

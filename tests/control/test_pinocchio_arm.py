@@ -16,8 +16,8 @@ from swgjoint.errors import InputError, MissingExtraError
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.models_path import bundled_names
 from swgjoint.sim.arm.rigid_arm import RigidArm
-from swgjoint.sim.run import run_scene
 from swgjoint.sim.scene.scene import Scene
+from swgjoint.view.run import run_scene
 
 SCENE = {
     "name": "known",

@@ -12,15 +12,15 @@ from swgjoint.cli.main import main
 from swgjoint.cli.run import left_out_lines
 from swgjoint.drives import references as module
 from swgjoint.drives.references import drive_of, load_drive
+from swgjoint.drives.sections import JointSection
 from swgjoint.errors import InputError
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.fit.error_spectrum import peak_to_peak, with_assumed_error
 from swgjoint.sim.assembly import assemble
 from swgjoint.sim.figures.contains import contents
-from swgjoint.sim.run import run_scene
 from swgjoint.sim.scene.scene import Scene
-from swgjoint.sim.scene.sections import JointSection
 from swgjoint.units import arcmin
+from swgjoint.view.run import run_scene
 
 SCENE = {
     "name": "two",

@@ -10,9 +10,9 @@ from swgjoint.envs import arm_tracking
 from swgjoint.envs.arm_tracking import ArmTrackingEnv
 from swgjoint.errors import InputError
 from swgjoint.models_path import models_path
-from swgjoint.sim.run import run_scene
 from swgjoint.sim.scene.scene import Scene
 from swgjoint.units import arcmin
+from swgjoint.view.run import run_scene
 
 
 def run(env, action):

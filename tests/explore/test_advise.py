@@ -8,27 +8,17 @@ from types import SimpleNamespace
 import pytest
 from messages import names, naming
 
-from swgjoint.bench.joint.runs import (
-    SCENE_INTEGRATORS,
-    Outcome,
-    Setting,
-    attempt,
-    errors,
-)
 from swgjoint.bench.joint.scenes import exact
 from swgjoint.cli.main import main
 from swgjoint.errors import ComputationError, InputError
-from swgjoint.explore.advise import (
-    reference as advise_reference,
-)
-from swgjoint.explore.advise import (
-    search as advise_search,
-)
+from swgjoint.explore.advise import reference as advise_reference
+from swgjoint.explore.advise import search as advise_search
 from swgjoint.explore.advise.advise import STEPS, advise
 from swgjoint.explore.advise.bound import parse_bound
 from swgjoint.explore.advise.reference import settle
 from swgjoint.explore.advise.search import ALIKE, advised
 from swgjoint.joint.attach import LEVELS
+from swgjoint.sim.accuracy import SCENE_INTEGRATORS, Outcome, Setting, attempt, errors
 
 
 @pytest.fixture(scope="module")

@@ -423,8 +423,8 @@ values = [0.5]
 
 def test_run_figures_are_those_of_the_scene():
     """The worst joint of a short run with a catalogue drive."""
-    from swgjoint.sim.run import run_scene
     from swgjoint.sim.scene.scene import Scene
+    from swgjoint.view.run import run_scene
 
     text = """
     scene = "bench"

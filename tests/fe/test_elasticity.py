@@ -19,7 +19,7 @@ from swgjoint.fe.plane.elasticity import (
 )
 from swgjoint.fe.plane.sector_mesh import sector_mesh
 from swgjoint.gear.design.design import Design
-from swgjoint.gear.teeth.profile import tooth_profile
+from swgjoint.gear.teeth.tooth_profile import tooth_profile
 
 E, NU, WIDTH = 210e9, 0.29, 0.01
 

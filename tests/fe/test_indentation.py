@@ -33,7 +33,7 @@ from swgjoint.fe.plane.drive2d import ring_model, sector
 from swgjoint.fe.plane.sector_mesh import sector_mesh
 from swgjoint.fe.plane.tooth_contact import Contacts
 from swgjoint.gear.design.design import Design
-from swgjoint.gear.teeth.profile import tooth_profile
+from swgjoint.gear.teeth.tooth_profile import tooth_profile
 from swgjoint.units import mm
 
 LAW = Indentation(softness=6e-10, patch=1.4e-4, radius=1.2e-3)

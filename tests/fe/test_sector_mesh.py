@@ -8,7 +8,7 @@ import pytest
 from swgjoint.fe.plane.sector_mesh import sector_mesh
 from swgjoint.fe.solid.strip.mesh import flexspline_strip
 from swgjoint.gear.design.design import Design
-from swgjoint.gear.teeth.profile import tooth_profile
+from swgjoint.gear.teeth.tooth_profile import tooth_profile
 
 
 def test_mesh_of_the_thesis():

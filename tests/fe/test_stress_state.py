@@ -18,7 +18,7 @@ from swgjoint.fe.plane.drive2d import ring_model, sector
 from swgjoint.fe.plane.stress import circular_spline_stress, flexspline_stress
 from swgjoint.fe.rings.sections import rim_section
 from swgjoint.gear.design.design import Design
-from swgjoint.gear.teeth.profile import tooth_profile
+from swgjoint.gear.teeth.tooth_profile import tooth_profile
 
 KINDS = ("plane_stress", "auto", "plane_strain")
 

@@ -13,8 +13,8 @@ from messages import naming
 
 from swgjoint.errors import DesignError
 from swgjoint.gear.design.design import Design
-from swgjoint.gear.teeth.profile import tooth_profile
 from swgjoint.gear.teeth.tooth_motion import tooth_motions
+from swgjoint.gear.teeth.tooth_profile import tooth_profile
 
 MEMBERS = ("flexspline", "circular_spline")
 PROFILES = {

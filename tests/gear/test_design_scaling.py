@@ -14,8 +14,8 @@ from swgjoint.gear.design.defaults import defaults_taken
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.feasibility import design_checks, engagement_checks
 from swgjoint.gear.design.scaling import scaled_design
-from swgjoint.gear.teeth.profile import tooth_profile
 from swgjoint.gear.teeth.tooth_path import tooth_path
+from swgjoint.gear.teeth.tooth_profile import tooth_profile
 from swgjoint.gear.wave_generators.wave_generator import wave_generator
 from swgjoint.units import mm
 

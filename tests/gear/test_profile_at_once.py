@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from swgjoint.gear.design.design import Design
-from swgjoint.gear.teeth.profile import tooth_profile
+from swgjoint.gear.teeth.tooth_profile import tooth_profile
 
 DESIGNS = ("reference-2d", "reference-2d-dca", "size-25-100")
 

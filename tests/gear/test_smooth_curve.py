@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from swgjoint.gear.design.design import Design
-from swgjoint.gear.teeth.profile import tooth_profile
 from swgjoint.gear.teeth.smooth_curve import SmoothCurve
+from swgjoint.gear.teeth.tooth_profile import tooth_profile
 
 
 def curves():

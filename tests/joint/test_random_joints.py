@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
 
+from swgjoint.gear.ratings import Ratings
 from swgjoint.joint.region import check_region
-from swgjoint.maps.drive_map import DriveMap, Ratings
+from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.friction import Friction
 from swgjoint.maps.hysteresis import Jenkin
 from swgjoint.units import arcmin

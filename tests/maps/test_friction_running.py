@@ -9,7 +9,7 @@ import pytest
 from messages import naming
 
 from swgjoint.gear.catalogue import table
-from swgjoint.gear.catalogue_stated import LOSS_KEYS
+from swgjoint.gear.catalogue_stated import LOSS_KEYS, StatedLosses
 from swgjoint.gear.design.design import Design
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.fit.friction_bending import (
@@ -17,7 +17,7 @@ from swgjoint.maps.fit.friction_bending import (
     bending_torque,
     rim_bending_energy,
 )
-from swgjoint.maps.fit.friction_fit import StatedLosses, friction_of_losses
+from swgjoint.maps.fit.friction_fit import friction_of_losses
 from swgjoint.maps.friction import Friction
 from swgjoint.maps.sheet.friction_running import (
     RUNNING_SPEED,

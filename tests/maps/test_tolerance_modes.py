@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from swgjoint.gear.kinematics import LAYOUTS, angle_coefficients, periodicity, ratio
-from swgjoint.maps.drive_map import Ratings
+from swgjoint.gear.ratings import Ratings
 from swgjoint.maps.fit.fit import _end_at_largest_torque, fit_map
 from swgjoint.maps.fit.tolerance_modes import orders_of
 from swgjoint.maps.samples import MapSamples, ToleranceSamples

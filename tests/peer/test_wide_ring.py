@@ -15,7 +15,7 @@ from wide_ring import (
 
 from swgjoint.fe.plane.drive2d import sector
 from swgjoint.gear.design.design import Design
-from swgjoint.gear.teeth.profile import tooth_profile
+from swgjoint.gear.teeth.tooth_profile import tooth_profile
 
 STIFFNESS = 0.01
 """The plate theory misses solids by up to 0.8 %, our mesh by 0.3 %."""

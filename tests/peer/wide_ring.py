@@ -18,7 +18,7 @@ from scipy.sparse.linalg import spsolve
 from swgjoint.fe.plane.corotation import rotate
 from swgjoint.fe.plane.superelement import Superelement
 from swgjoint.gear.design.design import Design
-from swgjoint.gear.teeth.profile import tooth_profile
+from swgjoint.gear.teeth.tooth_profile import tooth_profile
 from swgjoint.units import mm
 
 Array = NDArray[np.float64]

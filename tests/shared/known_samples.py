@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from swgjoint.maps.drive_map import Ratings
+from swgjoint.gear.ratings import Ratings
 from swgjoint.maps.samples import MapSamples
 
 RATINGS = Ratings(rated_torque=20, repeated_peak=50, momentary_peak=90, T1=5, T2=15)

@@ -16,9 +16,9 @@ from swgjoint.errors import InputError
 from swgjoint.sim.arm.gentle_sweep import MARGIN, SWEEP, gentle_sweep
 from swgjoint.sim.arm.rigid_arm import RigidArm
 from swgjoint.sim.arm.scene import is_arm, scene_of_arm
-from swgjoint.sim.run import run_scene
 from swgjoint.sim.scene.scene import Scene
 from swgjoint.units import deg
+from swgjoint.view.run import run_scene
 
 LINK = """
   <link name="{name}"><inertial><origin xyz="0.2 0 0"/><mass value="{mass}"/>

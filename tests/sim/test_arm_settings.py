@@ -13,7 +13,7 @@ import pytest
 
 from swgjoint.sim.arm.rigid_arm import RigidArm
 from swgjoint.sim.arm.scene import scene_of_arm
-from swgjoint.sim.run import run_scene
+from swgjoint.view.run import run_scene
 
 FILE = """
 <mujoco>

@@ -6,8 +6,8 @@ from messages import naming
 
 from swgjoint.errors import InputError
 from swgjoint.sim.arm.rigid_arm import RigidArm
-from swgjoint.sim.run import run_scene
 from swgjoint.sim.scene.scene import Scene
+from swgjoint.view.run import run_scene
 
 UR5E = RigidArm("ur5e")
 

@@ -8,8 +8,9 @@ from swgjoint.fe.common.sampling import sample_map
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.fit.fit import fit_map
 from swgjoint.maps.sheet.spec_sheet import measure_spec
-from swgjoint.sim.run import Run, run_scene
+from swgjoint.sim.run import Run
 from swgjoint.units import arcmin
+from swgjoint.view.run import run_scene
 
 CATALOGUE = {"defaults.drive": "CSG-25-100"}
 QUICKER = {"trajectory.speed_deg_s.joint": 12.0, "simulation.duration_s": 4.25}

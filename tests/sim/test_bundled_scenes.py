@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from swgjoint.models_path import bundled_names
-from swgjoint.sim.run import run_scene
 from swgjoint.sim.scene.scene import Scene
+from swgjoint.view.run import run_scene
 
 
 def test_there_are_enough_and_each_says_what_it_is():

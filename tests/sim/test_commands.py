@@ -130,7 +130,7 @@ def test_run_goes_to_a_viewer_on_this_machine_only(capsys, monkeypatch):
     assert sent == {"runs": [""], "url": None, "pace": 1.0}
     assert json.loads(capsys.readouterr().out)["live"].startswith("rerun+http://127.")
     # before anything is simulated
-    monkeypatch.setattr("swgjoint.sim.run.run_scene", None)
+    monkeypatch.setattr("swgjoint.view.run.run_scene", None)
     elsewhere = "rerun+http://192.0.2.1:9876/proxy"
     assert main(["run", "bench", *SHORT, "--live", elsewhere]) == 2
     assert names(capsys.readouterr().err, f"'{elsewhere}'", "127.0.0.1")

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from swgjoint.maps.drive_map import DriveMap
-from swgjoint.sim.run import run_scene
 from swgjoint.sim.scene.scene import Scene
+from swgjoint.view.run import run_scene
 
 LINEAR = DriveMap.linear(2e4, teeth_flexspline=120, teeth_circular_spline=122)
 AT_REST = {"kind": "step", "at_s": 0.1, "step_deg": {"joint": 1.0}}

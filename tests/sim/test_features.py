@@ -17,9 +17,9 @@ from swgjoint.sim.arm.rigid_arm import RigidArm
 from swgjoint.sim.assembly import assemble
 from swgjoint.sim.equilibrium import set_start
 from swgjoint.sim.figures.contains import contents
-from swgjoint.sim.run import run_scene
 from swgjoint.sim.scene.feature_sections import Payload
 from swgjoint.sim.scene.scene import Scene
+from swgjoint.view.run import run_scene
 
 LINEAR = DriveMap.linear(2e4, teeth_flexspline=120, teeth_circular_spline=122)
 INERTIA = 1e-4 + 1.0 / 60.0**2  # rotor and load of the bench at the motor

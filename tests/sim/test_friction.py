@@ -10,11 +10,11 @@ from messages import names
 
 from swgjoint.cli.run import left_out_lines
 from swgjoint.drives.references import drive_of
+from swgjoint.drives.sections import JointSection
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.friction import Friction
 from swgjoint.maps.hysteresis import Jenkin
 from swgjoint.sim.figures.metrics import first_ratcheting
-from swgjoint.sim.scene.sections import JointSection
 
 LINEAR = DriveMap.linear(2e4, teeth_flexspline=120, teeth_circular_spline=122)
 LAW = Friction(stiffness=50.0, coulomb=0.05, static=0.05, load=0.1, damping=0.05)

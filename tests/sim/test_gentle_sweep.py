@@ -288,7 +288,7 @@ def test_a_link_without_inertia_is_named(tmp_path):
 
 def test_a_start_in_contact_names_the_bodies(tmp_path):
     """Not the torque that no drive could hold."""
-    from swgjoint.sim.run import run_scene
+    from swgjoint.view.run import run_scene
 
     path = written(tmp_path, keys=KEYS)
     with warnings.catch_warnings():

@@ -14,8 +14,8 @@ from swgjoint.sim.motion.joint_motions import (
     trapezoid,
 )
 from swgjoint.sim.motion.trajectory import time_grid
-from swgjoint.sim.run import run_scene
 from swgjoint.sim.scene.scene import Scene
+from swgjoint.view.run import run_scene
 
 START, END = np.array([0.3, -1.0, 0.5]), np.array([1.3, -1.4, 0.5])
 

@@ -13,8 +13,8 @@ from swgjoint.sim.figures.metrics import (
     spread,
     torque_ripple,
 )
-from swgjoint.sim.run import run_scene
 from swgjoint.units import arcmin
+from swgjoint.view.run import run_scene
 
 LINEAR = DriveMap.linear(2e4, teeth_flexspline=120, teeth_circular_spline=122)
 

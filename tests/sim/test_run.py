@@ -10,8 +10,8 @@ from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.actuators import control_inputs
 from swgjoint.sim.assembly import assemble
 from swgjoint.sim.equilibrium import set_start
-from swgjoint.sim.run import run_scene
 from swgjoint.sim.scene.scene import Scene
+from swgjoint.view.run import run_scene
 
 LINEAR = DriveMap.linear(2e4, teeth_flexspline=120, teeth_circular_spline=122)
 

@@ -9,10 +9,10 @@ from messages import names
 
 from swgjoint import memory
 from swgjoint.cli.main import main
-from swgjoint.sim.run import run_scene
 from swgjoint.sim.run_memory import VIEWER, required_memory
 from swgjoint.sim.scene.scene import Scene
 from swgjoint.view.recording import recording
+from swgjoint.view.run import run_scene
 
 DRIVE = {"defaults.drive": "CSG-25-100", "trajectory.settle_s": 0.2}
 

@@ -3,9 +3,9 @@
 import pytest
 from messages import names, naming
 
+from swgjoint.drives.sections import JointSection
 from swgjoint.errors import InputError
 from swgjoint.sim.scene.scene import Scene, parse_override
-from swgjoint.sim.scene.sections import JointSection
 
 GOOD = """
 name = "good"

@@ -5,8 +5,8 @@ import pytest
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.arm.rigid_arm import RigidArm
 from swgjoint.sim.arm.scene import scene_of_arm
-from swgjoint.sim.run import run_scene
 from swgjoint.sim.step_choice import STEPS, needed_order, resolving_step
+from swgjoint.view.run import run_scene
 
 
 def test_the_needed_order_leaves_little_above_it(synthetic_map: DriveMap):

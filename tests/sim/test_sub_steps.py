@@ -15,8 +15,8 @@ from swgjoint.joint.step_damping import compensation
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.assembly import assemble
 from swgjoint.sim.motion.trajectory import sweep
-from swgjoint.sim.run import run_scene
 from swgjoint.sim.scene.scene import Scene
+from swgjoint.view.run import run_scene
 
 STIFF = DriveMap.linear(1e7, teeth_flexspline=120, teeth_circular_spline=122)
 

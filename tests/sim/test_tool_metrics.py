@@ -16,8 +16,9 @@ from swgjoint.sim.figures.tool_metrics import (
     settling_time,
     tool_metrics,
 )
-from swgjoint.sim.run import Run, run_scene
+from swgjoint.sim.run import Run
 from swgjoint.sim.scene.scene import Scene
+from swgjoint.view.run import run_scene
 
 STIFF = DriveMap.linear(2e4, teeth_flexspline=120, teeth_circular_spline=122)
 START = {

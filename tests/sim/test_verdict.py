@@ -13,8 +13,8 @@ from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.sheet.map_validity import NOT_VALIDATED
 from swgjoint.sim.figures.ripple_validity import integration_noise
 from swgjoint.sim.figures.verdict import energy_reasons
-from swgjoint.sim.run import run_scene
 from swgjoint.sim.scene.scene import Scene
+from swgjoint.view.run import run_scene
 from swgjoint.view.validity import warnings_of
 
 LINEAR = "defaults.linear={stiffness_Nm_rad=2e4,rated_torque_Nm=50.0}"

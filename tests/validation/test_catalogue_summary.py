@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from swgjoint.gear.design.design import Design
+from swgjoint.maps.sheet.sampled_accuracy import ORDERS, accuracy_bracket, peaks
 from swgjoint.units import arcmin
 from swgjoint.validation.catalogue import catalogue as study
-from swgjoint.validation.catalogue.accuracy import ORDERS, accuracy_bracket, peaks
 from swgjoint.validation.catalogue.file import CatalogueFile
 from swgjoint.validation.catalogue.printed import catalogue_row
 from swgjoint.validation.catalogue.rows import ratcheting_rows

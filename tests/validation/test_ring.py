@@ -13,9 +13,9 @@ from messages import naming
 from swgjoint.cli.main import main
 from swgjoint.errors import ComputationError
 from swgjoint.fe.plane.plain_ring import PlainRing, pull_ring
+from swgjoint.gear.pulled_ring import elastica, small_deflection
 from swgjoint.units import mm
 from swgjoint.validation import ring as study
-from swgjoint.validation.thin_ring import elastica, small_deflection
 
 ANGLES = np.array([0.0, pi / 4, pi / 2])
 

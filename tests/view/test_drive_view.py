@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
-from swgjoint.sim.run import Run, run_scene
+from swgjoint.sim.run import Run
 from swgjoint.view.recording.drive_view import (
     FRAMES,
     angles,
@@ -17,6 +17,7 @@ from swgjoint.view.recording.drive_view import (
     stress_color,
 )
 from swgjoint.view.recording.entities import pose_rows
+from swgjoint.view.run import run_scene
 
 SHORT = {"simulation.duration_s": 1.0, "trajectory.settle_s": 0.2}
 

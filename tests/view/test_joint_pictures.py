@@ -8,7 +8,7 @@ from rerun.chunk import RrdReader
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.models_path import models_path
 from swgjoint.sim.figures.metrics import torque_ripple
-from swgjoint.sim.run import Run, run_scene
+from swgjoint.sim.run import Run
 from swgjoint.units import arcmin
 from swgjoint.view.recording.drive_markers import (
     RADIUS,
@@ -24,6 +24,7 @@ from swgjoint.view.recording.joint_pictures import (
     phase_scales,
     ripple_bars,
 )
+from swgjoint.view.run import run_scene
 
 SHORT = {"simulation.duration_s": 2.0, "trajectory.settle_s": 0.5}
 

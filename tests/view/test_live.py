@@ -11,10 +11,11 @@ from rerun.chunk import RrdReader
 
 from swgjoint.errors import ComputationError, InputError
 from swgjoint.maps.drive_map import DriveMap
-from swgjoint.sim.run import Run, run_scene
+from swgjoint.sim.run import Run
 from swgjoint.view.recording.entities import signals_of
 from swgjoint.view.recording.live import loopback_port, stream_runs
 from swgjoint.view.recording.viewer import STARTED, free_port, start_viewer, wait_for
+from swgjoint.view.run import run_scene
 
 
 @pytest.fixture

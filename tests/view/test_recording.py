@@ -12,7 +12,7 @@ from rerun.chunk import RrdReader
 from swgjoint.cli.main import main
 from swgjoint.errors import ComputationError, InputError, OutputWarning
 from swgjoint.maps.drive_map import DriveMap
-from swgjoint.sim.run import Run, run_scene
+from swgjoint.sim.run import Run
 from swgjoint.units import mm
 from swgjoint.view.plots.runs import comparison_png
 from swgjoint.view.recording import recording
@@ -20,6 +20,7 @@ from swgjoint.view.recording.blueprint import joints_shown
 from swgjoint.view.recording.entities import pose_rows, signals_of
 from swgjoint.view.recording.recording import write_recording
 from swgjoint.view.recording.viewer import STARTED
+from swgjoint.view.run import run_scene
 
 SHORT = {"simulation.duration_s": 1.0, "trajectory.settle_s": 0.2}
 
@@ -252,7 +253,7 @@ def test_a_run_that_fails_leaves_no_recording(synthetic_map, tmp_path, monkeypat
         assert [path.name.startswith(".run.rrd.") for path in tmp_path.iterdir()]
         raise ComputationError("diverged")
 
-    monkeypatch.setattr("swgjoint.sim.run._recorded", fail)
+    monkeypatch.setattr("swgjoint.sim.simulation._recorded", fail)
     with pytest.raises(ComputationError, match="diverged"):
         run_scene(
             "bench",

@@ -13,7 +13,7 @@ import csv
 import io
 import os
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import (
     ProcessPoolExecutor,
     ThreadPoolExecutor,
@@ -25,7 +25,7 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
-from swgjoint.bench.fe.rows import cheapest, rows_of
+from swgjoint.bench.fe.rows import BOUNDS, QUANTITIES, cheapest, rows_of, seconds
 from swgjoint.bench.fe.setting import POSITIONS, Found, Setting
 from swgjoint.bench.fe.solve import Task, solved_in
 from swgjoint.bench.fe.stored import FILE, LONG, stored_of, to_store, told
@@ -136,11 +136,15 @@ def run_fe_cost(
         outputs = Outputs(folder)
         outputs.write("bench-fe.json", lambda: json_text(result) + "\n")
         outputs.write("bench-fe.csv", lambda: _table(rows))
-        outputs.write("bench-fe.png", lambda: cost_picture(result))
+        outputs.write("bench-fe.png", lambda: _picture(result))
         if recompute:
             outputs.write(FILE, lambda: json_file(to_store(design, found)))
         files = outputs.files
     return result | {"files": files, "wall_s": time.perf_counter() - begin}
+
+
+def _picture(result: Mapping[str, Any]) -> bytes:
+    return cost_picture(result, quantities=QUANTITIES, bounds=BOUNDS, seconds=seconds)
 
 
 def _solve_all(

@@ -18,7 +18,16 @@ from typing import Any
 import mujoco
 
 from swgjoint.bench.joint.modes import numerical_damping
-from swgjoint.bench.joint.runs import (
+from swgjoint.bench.joint.scenes import SCENES, BenchScene, bench_scene, exact
+from swgjoint.bench.joint.splits import SPLITS, split
+from swgjoint.errors import ComputationError, InputError
+from swgjoint.files import Outputs
+from swgjoint.joint.attach import LEVELS
+from swgjoint.json_text import json_text
+from swgjoint.pool import run_all
+from swgjoint.progress import Progress, silent
+from swgjoint.provenance import provenance
+from swgjoint.sim.accuracy import (
     QUANTITIES,
     Outcome,
     Setting,
@@ -30,15 +39,6 @@ from swgjoint.bench.joint.runs import (
     relative_speed,
     rigid_arm,
 )
-from swgjoint.bench.joint.scenes import SCENES, BenchScene, bench_scene, exact
-from swgjoint.bench.joint.splits import SPLITS, split
-from swgjoint.errors import ComputationError, InputError
-from swgjoint.files import Outputs
-from swgjoint.joint.attach import LEVELS
-from swgjoint.json_text import json_text
-from swgjoint.pool import run_all
-from swgjoint.progress import Progress, silent
-from swgjoint.provenance import provenance
 from swgjoint.sim.run import Run
 
 STEPS = (1e-5, 5e-5, 1e-4, 2.5e-4, 5e-4, 1e-3, 2e-3, 5e-3)

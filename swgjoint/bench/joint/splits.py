@@ -20,9 +20,9 @@ from dataclasses import replace
 import mujoco
 import numpy as np
 
-from swgjoint.bench.joint.runs import Setting, assemble_setting
 from swgjoint.joint.step_damping import restore_damping
 from swgjoint.maps.drive_map import DriveMap
+from swgjoint.sim.accuracy import Setting, assemble_setting
 from swgjoint.sim.assembly import Assembly
 from swgjoint.sim.scene.scene import Scene
 

@@ -22,9 +22,9 @@ from swgjoint.joint.drive import JointDrive
 from swgjoint.joint.region import MAX_SUB_STEPS, check_region
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.arm.rigid_arm import RigidArm, compile_spec
-from swgjoint.sim.run import run_scene
 from swgjoint.sim.scene.scene import Scene
 from swgjoint.units import arcmin
+from swgjoint.view.run import run_scene
 
 Array = NDArray[np.float64]
 

@@ -18,11 +18,12 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from swgjoint.gear.ratings import Ratings
 from swgjoint.joint.attach import attach
 from swgjoint.joint.drive import JointDrive
 from swgjoint.joint.native import native_map
 from swgjoint.joint.region import Region, check_region
-from swgjoint.maps.drive_map import DriveMap, Ratings
+from swgjoint.maps.drive_map import DriveMap
 from swgjoint.units import arcmin
 
 Array = NDArray[np.float64]

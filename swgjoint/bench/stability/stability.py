@@ -143,7 +143,9 @@ def write_files(rows: Sequence[StabilityRow], folder: Path) -> list[str]:
     writer.writerows(table)
     outputs = Outputs(folder)
     outputs.write("stability.csv", text.getvalue)
-    outputs.write("stability.png", lambda: stability_picture(rows))
+    outputs.write(
+        "stability.png", lambda: stability_picture(rows, scheme=DEFAULT, free=FREE)
+    )
     return outputs.files
 
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from swgjoint.bench.joint.runs import QUANTITIES
 from swgjoint.errors import InputError
+from swgjoint.sim.accuracy import QUANTITIES
 from swgjoint.units import arcmin, arcsec, deg, mm, um
 
 UNITS = {

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from swgjoint.bench.joint.runs import Setting, attempt, common_samples, errors
 from swgjoint.errors import ComputationError
 from swgjoint.explore.advise.bound import Bound
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.progress import Progress, silent
+from swgjoint.sim.accuracy import Setting, attempt, common_samples, errors
 from swgjoint.sim.run import Run
 from swgjoint.sim.scene.scene import Scene
 

@@ -9,7 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from swgjoint.bench.joint.runs import (
+from swgjoint.errors import ComputationError, InputError
+from swgjoint.explore.advise.bound import Bound
+from swgjoint.explore.advise.reference import Reference
+from swgjoint.joint.attach import LEVELS
+from swgjoint.maps.drive_map import DriveMap
+from swgjoint.progress import Progress
+from swgjoint.sim.accuracy import (
     SCENE_INTEGRATORS,
     Setting,
     Stepper,
@@ -19,12 +25,6 @@ from swgjoint.bench.joint.runs import (
     relative_cost,
     rigid_arm,
 )
-from swgjoint.errors import ComputationError, InputError
-from swgjoint.explore.advise.bound import Bound
-from swgjoint.explore.advise.reference import Reference
-from swgjoint.joint.attach import LEVELS
-from swgjoint.maps.drive_map import DriveMap
-from swgjoint.progress import Progress
 from swgjoint.sim.assembly import Assembly
 from swgjoint.sim.scene.scene import Scene
 

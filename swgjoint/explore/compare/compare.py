@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from swgjoint.drives.references import find_drive, given_drives, load_drive
+from swgjoint.drives.sections import LEVELS
 from swgjoint.errors import ComputationError, InputError
 from swgjoint.explore.compare.scene import drives_of, with_drive, with_level
 from swgjoint.faults import read_toml
@@ -25,36 +26,14 @@ from swgjoint.maps.sheet.validity_marks import joints_judged
 from swgjoint.models_path import near_names
 from swgjoint.progress import Progress, silent
 from swgjoint.sim.arm.scene import rigid_arm_of
+from swgjoint.sim.figures.keys import LOWER, RIPPLE, UPPER
 from swgjoint.sim.figures.metrics import drive_order, strongest_left_out
-from swgjoint.sim.run import Run, run_scene
+from swgjoint.sim.run import Run
 from swgjoint.sim.scene.scene import Scene
-from swgjoint.sim.scene.sections import LEVELS
+from swgjoint.view.run import run_scene
 
 STRESS_POSITIONS = 6
 """Over one pitch of the fixed member, after which the pattern repeats."""
-UPPER = (
-    "ripple_rms_percent",
-    "ripple_pp_percent",
-    "transmission_error_arcmin",
-    "transmission_error_ripple_arcmin",
-    "torsion_arcmin",
-    "tool_path_rms_mm",
-    "tool_ap_mm",
-    "tool_rp_mm",
-    "von_mises_MPa",
-    "peak_torque_of_rating",
-    "cubed_mean_torque_of_rating",
-    "wall_s",
-)
-"""Figures that a spec limits from above."""
-LOWER = ("K1_Nm_rad", "fatigue_safety_factor", "real_time_factor")
-"""Figures that a spec limits from below."""
-RIPPLE = (
-    "ripple_rms_percent",
-    "ripple_pp_percent",
-    "transmission_error_ripple_arcmin",
-)
-"""Figures that a drive without harmonics does not have."""
 SORTABLE = (*UPPER, *LOWER)
 SLOW = "fatigue_safety_factor"
 """Computed only where a spec or the order asks for it: minutes in space."""

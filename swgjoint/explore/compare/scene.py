@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from fnmatch import fnmatchcase
 
+from swgjoint.drives.sections import LEVELS, JointSection
 from swgjoint.errors import InputError
 from swgjoint.models_path import near_names
 from swgjoint.sim.arm.scene import is_arm, rigid_arm_of, scene_of_arm
 from swgjoint.sim.scene.scene import Scene
-from swgjoint.sim.scene.sections import LEVELS, JointSection
 from swgjoint.sim.step_choice import resolving_step
 
 _END = "_joint"

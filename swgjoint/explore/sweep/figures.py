@@ -283,9 +283,10 @@ def _run(
     scene: Scene, design: Design | None, task: RunTask
 ) -> tuple[dict[str, float | None], dict[str, str]]:
     """Figures of the worst joint of a run, and why some of them are not valid."""
-    from swgjoint.explore.compare.compare import RIPPLE, row_of
+    from swgjoint.explore.compare.compare import row_of
     from swgjoint.maps.sheet.validity_marks import joint_doubt
-    from swgjoint.sim.run import run_scene
+    from swgjoint.sim.figures.keys import RIPPLE
+    from swgjoint.view.run import run_scene
 
     drive = None
     if design is None:

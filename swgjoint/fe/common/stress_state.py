@@ -11,7 +11,8 @@ from swgjoint.fe.plane.sector_mesh import SectorMesh, sector_mesh
 from swgjoint.fe.plane.superelement import condense
 from swgjoint.fe.rings.sections import rim_section
 from swgjoint.gear.design.design import Design, MemberName
-from swgjoint.gear.teeth.profile import ToothProfile, tooth_profile
+from swgjoint.gear.teeth.profile import ToothProfile
+from swgjoint.gear.teeth.tooth_profile import tooth_profile
 from swgjoint.gear.wide_ring import RimAcross, edge_confinement, rim_confinement
 from swgjoint.units import mm
 

@@ -28,7 +28,8 @@ from swgjoint.gear.design.tolerances import (
     tooth_errors,
     wave_generator_offset,
 )
-from swgjoint.gear.teeth.profile import ToothProfile, tooth_profile
+from swgjoint.gear.teeth.profile import ToothProfile
+from swgjoint.gear.teeth.tooth_profile import tooth_profile
 from swgjoint.gear.wave_generators.wave_generator import lobe_height, wave_generator
 from swgjoint.units import mm
 

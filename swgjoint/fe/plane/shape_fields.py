@@ -22,7 +22,7 @@ from swgjoint.fe.plane.sector_mesh import SectorMesh
 from swgjoint.fe.plane.state import State
 from swgjoint.fe.plane.stress import flexspline_stress
 from swgjoint.gear.design.design import Design
-from swgjoint.gear.teeth.profile import tooth_profile
+from swgjoint.gear.teeth.tooth_profile import tooth_profile
 from swgjoint.gear.wave_generators.wave_generator import wave_generator
 from swgjoint.maps.fields import DriveFields
 

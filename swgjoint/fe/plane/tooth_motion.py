@@ -25,6 +25,7 @@ from swgjoint.gear.teeth.conjugate import conjugate_profile
 from swgjoint.gear.teeth.neutral_line import Pose
 from swgjoint.gear.teeth.profile import ToothProfile
 from swgjoint.gear.teeth.tooth_motion import tooth_motions
+from swgjoint.gear.teeth.tooth_profile import tooth_profile
 from swgjoint.units import mm
 
 Array = NDArray[np.float64]
@@ -123,4 +124,6 @@ def conjugate_by_fe(design: Design, member: MemberName) -> ToothProfile:
         ComputationError: If the deflection fails.
     """
     motions = tooth_motions(design, line=deflected_rim(design))
-    return conjugate_profile(design, member, motions=motions)
+    other = "circular_spline" if member == "flexspline" else "flexspline"
+    given = tooth_profile(design, other)
+    return conjugate_profile(design, member, given, motions=motions)

@@ -25,7 +25,7 @@ from swgjoint.gear.bearing.checks import bearing_checks
 from swgjoint.gear.design.check import raise_faults
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.tolerances import tooth_errors
-from swgjoint.gear.teeth.profile import tooth_profile
+from swgjoint.gear.teeth.tooth_profile import tooth_profile
 from swgjoint.units import mm
 
 Array = NDArray[np.float64]

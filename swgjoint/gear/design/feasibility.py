@@ -12,7 +12,8 @@ from swgjoint.errors import DesignError
 from swgjoint.gear.bearing.checks import bearing_checks
 from swgjoint.gear.design.check import Check
 from swgjoint.gear.design.design import Design
-from swgjoint.gear.teeth.profile import TANGENCY_RAD, ToothProfile, tooth_profile
+from swgjoint.gear.teeth.profile import TANGENCY_RAD, ToothProfile
+from swgjoint.gear.teeth.tooth_profile import tooth_profile
 from swgjoint.gear.wave_generators.wave_generator import lobe_height, with_checks
 from swgjoint.units import deg, mm, um
 

@@ -23,7 +23,7 @@ from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.sections import Conjugate
 from swgjoint.gear.teeth.blank import Blank, blank
 from swgjoint.gear.teeth.envelope import Envelope, Run
-from swgjoint.gear.teeth.profile import TANGENCY_RAD, ToothProfile, tooth_profile
+from swgjoint.gear.teeth.profile import TANGENCY_RAD, ToothProfile
 from swgjoint.gear.teeth.segments import Piece, Point, arc, line
 from swgjoint.gear.teeth.smooth_curve import smooth_curve
 from swgjoint.gear.teeth.tooth_motion import Receiver, ToothMotion, tooth_motions
@@ -51,7 +51,11 @@ NODES, EDGE_NODES, DENSE, SAMPLES = 41, 121, 161, 33
 
 
 def conjugate_profile(
-    design: Design, member: str, *, motions: tuple[ToothMotion, ...] | None = None
+    design: Design,
+    member: str,
+    given: ToothProfile,
+    *,
+    motions: tuple[ToothMotion, ...] | None = None,
 ) -> ToothProfile:
     """Profile of ``member`` conjugate to the other one under the wave generator.
 
@@ -61,6 +65,7 @@ def conjugate_profile(
     Args:
         design: The drive; the profile key of ``member`` counts for its root only.
         member: ``flexspline`` or ``circular_spline``.
+        given: Profile of the other member.
         motions: Of the teeth; by default those of the neutral line.
 
     Raises:
@@ -68,8 +73,6 @@ def conjugate_profile(
     """
     start = blank(design, member)
     receiver: Receiver = "circular_spline" if start.internal else "flexspline"
-    other = "flexspline" if start.internal else "circular_spline"
-    given = tooth_profile(design, other)
     envelope = Envelope(
         given=given,
         receiver=receiver,

@@ -15,7 +15,6 @@ from math import pi
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from swgjoint.gear.design.design import Design
 from swgjoint.gear.teeth.segments import Piece, Segment
 
 Array = NDArray[np.float64]
@@ -199,30 +198,3 @@ class ToothProfile:
                 travel = [self.side * np.array([n[1], -n[0]]) for n in (before, after)]
                 found.append((vertex, travel[0], travel[1]))
         return tuple(found)
-
-
-def tooth_profile(design: Design, member: str, *, bounds: bool = True) -> ToothProfile:
-    """Tooth profile of ``flexspline`` or ``circular_spline``.
-
-    Args:
-        design: The drive.
-        member: Which of both.
-        bounds: Whether a refusal says which values would be accepted, which takes as
-            long as a thousand profiles of arcs.
-
-    Raises:
-        DesignError: If the tooth cannot be built; one line that names the key.
-    """
-    # builders are imported here, they import this module
-    spec = design.flexspline if member == "flexspline" else design.circular_spline
-    if spec.profile.kind == "involute":
-        from swgjoint.gear.teeth.involute import involute_profile
-
-        return involute_profile(design, member)
-    if spec.profile.kind == "conjugate":
-        from swgjoint.gear.teeth.conjugate import conjugate_profile
-
-        return conjugate_profile(design, member)
-    from swgjoint.gear.teeth.arc_profiles import arc_profile
-
-    return arc_profile(design, member, bounds=bounds)

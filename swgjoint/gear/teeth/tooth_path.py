@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 
 from swgjoint.arrays import frozen_array
 from swgjoint.gear.design.design import Design
-from swgjoint.gear.teeth.profile import ToothProfile, tooth_profile
+from swgjoint.gear.teeth.profile import ToothProfile
 from swgjoint.gear.teeth.tooth_motion import ToothMotion, tooth_motions
+from swgjoint.gear.teeth.tooth_profile import tooth_profile
 
 Array = NDArray[np.float64]
 Where = Literal["flank", "flexspline_tip", "circular_spline_tip"]

@@ -31,9 +31,9 @@ from swgjoint.gear.kinematics import angle_coefficients
 from swgjoint.units import arcmin
 
 if TYPE_CHECKING:
-    from swgjoint.maps.drive_map import DriveMap
+    from swgjoint.maps.potential import Potential
 
-    Map = TypeVar("Map", bound=DriveMap)
+    Map = TypeVar("Map", bound=Potential)
 
 Array = NDArray[np.float64]
 
@@ -59,7 +59,7 @@ LARGEST = 60.0
 _SAMPLES = 2**16  # of a period; the peak to peak then errs by less than 1e-8 of it
 
 
-def peak_to_peak(drive: DriveMap) -> float:
+def peak_to_peak(drive: Potential) -> float:
     """Of e0 over one turn of the output [rad]."""
     psi = np.linspace(0.0, 2.0 * np.pi, 40 * round(abs(drive.ratio)) + 1)
     phases = drive.phases(drive.ratio * psi, psi)

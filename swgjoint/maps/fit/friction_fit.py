@@ -16,8 +16,7 @@ rest and 2000 rpm: no Stribeck part, and a straight line.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from swgjoint.gear.catalogue_stated import StatedLosses
 from swgjoint.maps.friction import Friction
 from swgjoint.maps.sheet.friction_running import RUNNING_SPEED
 
@@ -26,22 +25,6 @@ PRESLIDING = 1e-3
 centimetres. Assumed."""
 RELAXATION = 1e-3
 """sigma_1/sigma, the time in which the bristle comes to rest [s]. Assumed."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class StatedLosses:
-    """Losses of one drive as a catalogue states them [N·m], [-]."""
-
-    rated_torque: float
-    """At the output."""
-    efficiency: float
-    """At rated torque and 2000 rpm."""
-    no_load_running: float
-    """At the input, 2000 rpm."""
-    starting: float
-    """At the input."""
-    back_driving: float
-    """At the output."""
 
 
 def friction_of_losses(losses: StatedLosses, ratio: float, *, source: str) -> Friction:

@@ -9,8 +9,8 @@ import numpy as np
 from scipy.optimize import brentq
 
 from swgjoint.errors import InputError
-from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.hysteresis import Jenkin
+from swgjoint.maps.potential import Potential
 from swgjoint.maps.sheet.loop import TorqueLoop, largest_torque, torque_loop
 from swgjoint.units import arcmin
 
@@ -24,7 +24,7 @@ _GROWTH = 1.5
 
 
 def hysteresis_from(
-    drive: DriveMap,
+    drive: Potential,
     *,
     loss: float,
     stiffness: float | None = None,

@@ -22,19 +22,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
 from swgjoint.arrays import frozen_array
-from swgjoint.identify.torsion_fit import FAINT
-from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.equilibrium import output_angle
+from swgjoint.maps.fit.torsion_fit import FAINT
 from swgjoint.maps.hysteresis import Jenkin, Sliders, stretches
+from swgjoint.maps.potential import Potential
 from swgjoint.units import arcmin
 
+Map = TypeVar("Map", bound=Potential)
 Array = NDArray[np.float64]
 
 REACHES = 2.0 ** -np.arange(0.0, 10.5, 0.5)
@@ -165,7 +166,7 @@ def fit_elements(loops: Sequence[FrictionLoop]) -> tuple[Jenkin, ...]:
     )
 
 
-def with_hysteresis(drive: DriveMap, loops: Sequence[FrictionLoop]) -> DriveMap:
+def with_hysteresis(drive: Map, loops: Sequence[FrictionLoop]) -> Map:
     """The map with elements fitted to the loops, compared with them in its info.
 
     Args:
@@ -217,7 +218,7 @@ def with_hysteresis(drive: DriveMap, loops: Sequence[FrictionLoop]) -> DriveMap:
     return replace(found, info=info)
 
 
-def played_loop(drive: DriveMap, loop: FrictionLoop) -> FrictionLoop:
+def played_loop(drive: Potential, loop: FrictionLoop) -> FrictionLoop:
     """What the map does along the torques of a loop."""
     theta = loop.input_angle
     free = float(output_angle(drive, theta, 0.0))

@@ -27,9 +27,9 @@ from swgjoint.errors import InputError
 from swgjoint.units import arcmin
 
 if TYPE_CHECKING:
-    from swgjoint.maps.drive_map import DriveMap
+    from swgjoint.maps.potential import Potential
 
-    Map = TypeVar("Map", bound=DriveMap)
+    Map = TypeVar("Map", bound=Potential)
 
 Array = NDArray[np.float64]
 
@@ -82,13 +82,13 @@ def pruned_map(drive: Map, tolerance: float) -> Map:
     return replace(drive.with_harmonics(keep), info={**drive.info, "pruned": note})
 
 
-def torque_amplitudes(drive: DriveMap) -> Array:
+def torque_amplitudes(drive: Potential) -> Array:
     """Largest torque of every harmonic inside the knots [N·m]. (n_harmonics,)."""
     points = _enclosing(drive, 1)
     return np.asarray(np.hypot(points[:, 0], points[:, 1]).max(axis=(1, 2)))
 
 
-def stiffness_range(drive: DriveMap) -> tuple[float, float]:
+def stiffness_range(drive: Potential) -> tuple[float, float]:
     """Bounds of the stiffness inside the knots at any phases [N·m/rad]."""
     points = _enclosing(drive, 2)
     swing = np.hypot(points[1:, 0], points[1:, 1]).max(axis=-1).sum(axis=0)
@@ -98,7 +98,7 @@ def stiffness_range(drive: DriveMap) -> tuple[float, float]:
     )
 
 
-def _enclosing(drive: DriveMap, derivative: int) -> Array:
+def _enclosing(drive: Potential, derivative: int) -> Array:
     """Bernstein coefficients of a derivative of A and B by the torsion.
 
     Returns:

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.equilibrium import output_angle
+from swgjoint.maps.potential import Potential
 from swgjoint.maps.samples import FullSolves, MapSamples
 from swgjoint.maps.sheet.map_validity import QUANTITIES, STIFFNESS, UNITS
 
@@ -27,7 +27,7 @@ off. Of 22 records of six designs 14 are then within 0.7 to 1.5 times the larges
 difference at other equilibria; with the largest difference of the record itself 12."""
 
 
-def validation(drive: DriveMap, samples: MapSamples) -> dict[str, Any] | None:
+def validation(drive: Potential, samples: MapSamples) -> dict[str, Any] | None:
     """Record of the differences between a map and its unseen equilibria.
 
     Differences of input torque and output error are parts of the peak to peak of the
@@ -111,13 +111,13 @@ def validation(drive: DriveMap, samples: MapSamples) -> dict[str, Any] | None:
     return record
 
 
-def _predicted(drive: DriveMap, solved: FullSolves) -> Array:
+def _predicted(drive: Potential, solved: FullSolves) -> Array:
     """Output error of the map at the torques and angles of the equilibria [rad]."""
     psi = output_angle(drive, solved.input_angle, solved.torque)
     return psi - solved.input_angle / drive.ratio
 
 
-def _input_torque(drive: DriveMap, solved: FullSolves) -> Array:
+def _input_torque(drive: Potential, solved: FullSolves) -> Array:
     """Input torque of the map at its own equilibria [N·m]."""
     psi = output_angle(drive, solved.input_angle, solved.torque)
     on_input, on_output = drive.forces(solved.input_angle, psi)
@@ -132,7 +132,7 @@ def _over(samples: MapSamples, key: str, torque: float) -> Array:
     return np.array([np.interp(torque, samples.torque, row) for row in table.T])
 
 
-def _over_cycle(drive: DriveMap, samples: MapSamples, torque: float) -> list[Array]:
+def _over_cycle(drive: Potential, samples: MapSamples, torque: float) -> list[Array]:
     """Output error and input torque of the map over the cycle of the teeth."""
     assert samples.tolerances is not None
     step = samples.input_angle[1] - samples.input_angle[0]
@@ -147,7 +147,7 @@ def _over_cycle(drive: DriveMap, samples: MapSamples, torque: float) -> list[Arr
 
 
 def _stiffness(
-    drive: DriveMap, solved: FullSolves, offset: float, wrong: Array
+    drive: Potential, solved: FullSolves, offset: float, wrong: Array
 ) -> dict[str, float] | None:
     """Largest relative difference of the torque over the torsion from rest."""
     worst: dict[str, float] | None = None

@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swgjoint.errors import ComputationError
-from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.equilibrium import output_angle
+from swgjoint.maps.potential import Potential
 from swgjoint.maps.sheet.turn import period_of
 from swgjoint.units import rpm
 
@@ -33,7 +33,7 @@ _BALANCES = 30
 _SETTLED = 1e-9
 
 
-def _period(drive: DriveMap, at_most: int | None = None) -> Array:
+def _period(drive: Potential, at_most: int | None = None) -> Array:
     """Input angles over one period of the pattern [rad]."""
     period, samples = period_of(drive)
     samples = min(samples, at_most or samples)
@@ -41,7 +41,7 @@ def _period(drive: DriveMap, at_most: int | None = None) -> Array:
 
 
 def running_torque(
-    drive: DriveMap, theta: Array, torque: ArrayLike, speed: float
+    drive: Potential, theta: Array, torque: ArrayLike, speed: float
 ) -> Array:
     """Torque on the input that keeps it turning forward [N·m]. Shape (n,).
 
@@ -66,12 +66,12 @@ def running_torque(
     return np.asarray(by_theta * rubs - drive.forces(theta, psi)[0])
 
 
-def no_load_running_torque(drive: DriveMap, speed: float = RUNNING_SPEED) -> float:
+def no_load_running_torque(drive: Potential, speed: float = RUNNING_SPEED) -> float:
     """Mean torque on the input at constant speed, output free [N·m]."""
     return float(running_torque(drive, _period(drive), 0.0, speed).mean())
 
 
-def starting_torque(drive: DriveMap) -> float:
+def starting_torque(drive: Potential) -> float:
     """Torque on the input from which it keeps turning, output free [N·m].
 
     A torque that rises slowly turns the input along its positions of balance; it stands
@@ -80,7 +80,7 @@ def starting_torque(drive: DriveMap) -> float:
     return float(running_torque(drive, _period(drive), 0.0, 0.0).max())
 
 
-def back_driving_torque(drive: DriveMap) -> float | None:
+def back_driving_torque(drive: Potential) -> float | None:
     """Torque on the output from which it turns the free input [N·m].
 
     At every position of a period the load at which the input needs no torque; the worst
@@ -112,7 +112,7 @@ def back_driving_torque(drive: DriveMap) -> float | None:
 
 
 def efficiency(
-    drive: DriveMap,
+    drive: Potential,
     torque: float,
     speed: float = RUNNING_SPEED,
     *,

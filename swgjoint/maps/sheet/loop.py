@@ -14,9 +14,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from swgjoint.arrays import frozen_array
 from swgjoint.gear.catalogue import CatalogueRow
-from swgjoint.maps.drive_map import DriveMap, Ratings
+from swgjoint.gear.ratings import Ratings
 from swgjoint.maps.equilibrium import output_angle
 from swgjoint.maps.hysteresis import Sliders
+from swgjoint.maps.potential import Potential
 
 Array = NDArray[np.float64]
 
@@ -135,7 +136,7 @@ def largest_torque(ratings: Ratings | CatalogueRow) -> float:
     return max(ratings.repeated_peak, 1.5 * ratings.T2)
 
 
-def torque_loop(drive: DriveMap, *, theta: float = 0.0) -> TorqueLoop:
+def torque_loop(drive: Potential, *, theta: float = 0.0) -> TorqueLoop:
     """The standard loop 0 -> Tmax -> 0 -> -Tmax -> 0 with the input locked.
 
     T1, T2 and the torques of the lost motion are among the points. Torsion is counted

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
-    from swgjoint.maps.drive_map import DriveMap
+    from swgjoint.maps.potential import Potential
 
 WARNING = 0.1
 """Difference over the peak to peak from which a figure is marked as uncertain."""
@@ -169,7 +169,7 @@ def percent(share: float) -> str:
     return f"{value:.0f} %" if value >= 99.5 else f"{value:.2g} %"
 
 
-def map_validation(drive: DriveMap) -> tuple[MapValidation | None, str | None]:
+def map_validation(drive: Potential) -> tuple[MapValidation | None, str | None]:
     """The record of a map, or why there is none to be used.
 
     Returns:
@@ -185,7 +185,7 @@ def map_validation(drive: DriveMap) -> tuple[MapValidation | None, str | None]:
         return None, f"{NOT_VALIDATED}: {why}"
 
 
-def validation_json(drive: DriveMap) -> dict[str, Any]:
+def validation_json(drive: Potential) -> dict[str, Any]:
     """``validation``: the record, None where it is not to be used; and the reason."""
     found, reason = map_validation(drive)
     record = None if found is None else drive.info["validation"]
@@ -244,7 +244,7 @@ def _torques(found: MapValidation, limit: float) -> str:
     return f"{shown}{', ...' if len(torques) > 6 else ''} N·m"
 
 
-def _no_record(drive: DriveMap) -> str:
+def _no_record(drive: Potential) -> str:
     """Why a map has no record."""
     if "kinematic_error" in drive.info:
         return "its kinematic error is assumed"

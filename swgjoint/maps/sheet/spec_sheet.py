@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from swgjoint.errors import InputError
 from swgjoint.gear.catalogue_stated import LOSS_KEYS
-from swgjoint.maps.drive_map import DriveMap, Ratings
+from swgjoint.gear.ratings import Ratings
+from swgjoint.maps.potential import Potential
 from swgjoint.maps.sheet.friction_running import (
     RUNNING_SPEED,
     back_driving_torque,
@@ -139,7 +140,7 @@ def needs_turn(only: Collection[str]) -> bool:
 
 
 def measure_spec(
-    drive: DriveMap | None = None,
+    drive: Potential | None = None,
     *,
     ratings: Ratings | None = None,
     only: Collection[str] = (),
@@ -217,7 +218,7 @@ def measure_spec(
 
 
 def _loop_figures(
-    drive: DriveMap,
+    drive: Potential,
     loop: TorqueLoop,
     r: Ratings,
     values: dict[str, Any],
@@ -241,7 +242,7 @@ def _loop_figures(
     values["lost_motion_arcmin"] = loop.lost_motion(r.rated_torque) / arcmin
 
 
-def _turns(drive: DriveMap, keys: Collection[str]) -> dict[str, Turn]:
+def _turns(drive: Potential, keys: Collection[str]) -> dict[str, Turn]:
     if len(drive.orders) == 1:
         return {}
     rated = drive.ratings.rated_torque
@@ -259,7 +260,7 @@ def _turns(drive: DriveMap, keys: Collection[str]) -> dict[str, Turn]:
 
 
 def _turn_figures(
-    drive: DriveMap,
+    drive: Potential,
     turns: dict[str, Turn],
     values: dict[str, Any],
     missing: dict[str, str],
@@ -297,7 +298,7 @@ def _turn_figures(
 
 
 def _loss_figures(
-    drive: DriveMap,
+    drive: Potential,
     keys: Collection[str],
     values: dict[str, Any],
     missing: dict[str, str],
@@ -316,7 +317,7 @@ def _loss_figures(
         values["efficiency_percent"] = 100.0 * efficiency(drive, rated)
 
 
-def _loss_curve(drive: DriveMap) -> LossCurve:
+def _loss_curve(drive: Potential) -> LossCurve:
     load = np.linspace(0.0, drive.ratings.repeated_peak, 25)
     return LossCurve(
         load=load[1:],
@@ -329,7 +330,7 @@ def _loss_curve(drive: DriveMap) -> LossCurve:
     )
 
 
-def spec_sheet(drive: DriveMap, only: Collection[str] = ()) -> dict[str, Any]:
+def spec_sheet(drive: Potential, only: Collection[str] = ()) -> dict[str, Any]:
     """Figures, ``missing``, ``uncertain``, ``validity``, ``validation``, ``wall_s``.
 
     Args:
@@ -347,7 +348,7 @@ def spec_sheet(drive: DriveMap, only: Collection[str] = ()) -> dict[str, Any]:
     }
 
 
-def validity(drive: DriveMap) -> dict[str, Any]:
+def validity(drive: Potential) -> dict[str, Any]:
     """Level of the source, its range of torque, whether the loop leaves it.
 
     ``kinematic_error``, ``hysteresis`` and ``friction`` tell where they come from; one

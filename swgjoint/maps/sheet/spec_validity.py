@@ -14,14 +14,14 @@ from swgjoint.maps.sheet.map_validity import (
 )
 
 if TYPE_CHECKING:
-    from swgjoint.maps.drive_map import DriveMap
+    from swgjoint.maps.potential import Potential
 
 RIPPLE_KEYS = ("ripple_rms_percent", "ripple_pp_percent")
 STIFFNESS_KEYS = ("K1_Nm_rad", "K2_Nm_rad", "K3_Nm_rad")
 
 
 def judge_figures(
-    drive: DriveMap, values: dict[str, Any], missing: dict[str, str]
+    drive: Potential, values: dict[str, Any], missing: dict[str, str]
 ) -> dict[str, Difference]:
     """Judge figures by the validation of the map at the torque where they are read.
 

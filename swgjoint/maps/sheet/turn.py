@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from swgjoint.arrays import frozen_array
 from swgjoint.errors import ComputationError
-from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.ideal_motion import IdealMotion
+from swgjoint.maps.potential import Potential
 
 Array = NDArray[np.float64]
 
@@ -90,7 +90,7 @@ def _peak(values: Array) -> float:
     return b if bend >= 0.0 else b - (a - c) ** 2 / (8.0 * bend)
 
 
-def period_of(drive: DriveMap) -> tuple[Fraction, int]:
+def period_of(drive: Potential) -> tuple[Fraction, int]:
     """Period of a map's pattern [input turns] and samples that carry its orders."""
     n_theta, n_psi = drive.angle_orders.T
     # an exact ratio: input turns for whole output turns
@@ -115,7 +115,7 @@ def period_of(drive: DriveMap) -> tuple[Fraction, int]:
     return period, samples
 
 
-def _strengths(drive: DriveMap) -> Array:
+def _strengths(drive: Potential) -> Array:
     """Error of each harmonic, and of its torque as torsion [rad]. (n_harmonics,)."""
     size = np.hypot(*drive.kinematic_error.T)
     torsions = [drive.mean_torsion(s * drive.ratings.rated_torque) for s in (-1, 0, 1)]
@@ -126,12 +126,12 @@ def _strengths(drive: DriveMap) -> Array:
     return np.asarray(size + torque.max(axis=0) / drive.mean_stiffness)
 
 
-def _input_angles(drive: DriveMap) -> tuple[Fraction, Array]:
+def _input_angles(drive: Potential) -> tuple[Fraction, Array]:
     period, samples = period_of(drive)
     return period, 2.0 * pi * float(period) * np.arange(samples) / samples
 
 
-def error_turn(drive: DriveMap, torque: float = 0.0) -> Turn:
+def error_turn(drive: Potential, torque: float = 0.0) -> Turn:
     """Transmission error psi - theta/i [rad] at constant output torque [N·m].
 
     Slow motion in one direction; at no load it is the kinematic error, with the shift
@@ -143,7 +143,7 @@ def error_turn(drive: DriveMap, torque: float = 0.0) -> Turn:
     return Turn(period_turns=period, turns=abs(drive.ratio), signal=error)
 
 
-def ripple_turn(drive: DriveMap, torque: float) -> Turn:
+def ripple_turn(drive: Potential, torque: float) -> Turn:
     """Output torque with the output held on its ideal motion [N·m].
 
     psi = theta/i less the mean torsion at the given torque: the output follows the
@@ -157,7 +157,7 @@ def ripple_turn(drive: DriveMap, torque: float) -> Turn:
     return Turn(period_turns=period, turns=abs(drive.ratio), signal=signal)
 
 
-def _along(drive: DriveMap, theta: Array, of: Callable[[IdealMotion], Array]) -> Array:
+def _along(drive: Potential, theta: Array, of: Callable[[IdealMotion], Array]) -> Array:
     """A quantity at many input angles, some at a time."""
     parts = [
         of(IdealMotion.of(drive, theta[k : k + CHUNK]))

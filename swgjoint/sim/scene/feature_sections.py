@@ -15,42 +15,6 @@ Positive = Annotated[float, Field(gt=0)]
 Seconds = Annotated[float, Field(ge=0, le=10_000)]
 
 
-class MotorLimits(Section):
-    """What a motor can do, all at the motor shaft; each limit is optional."""
-
-    torque_limit_Nm: Positive | None = None
-    stall_torque_Nm: Positive | None = None
-    """Torque-speed line: at most this at rest, nothing at the no-load speed."""
-    no_load_speed_rpm: Positive | None = None
-    torque_constant_Nm_A: Positive | None = None
-    """With it the metrics state the current."""
-    current_limit_A: Positive | None = None
-
-    @model_validator(mode="after")
-    def _pairs(self) -> Self:
-        faults = []
-        if (self.stall_torque_Nm is None) != (self.no_load_speed_rpm is None):
-            faults.append(
-                (
-                    "stall_torque_Nm",
-                    "accepted: stall_torque_Nm and no_load_speed_rpm together",
-                )
-            )
-        if self.current_limit_A is not None and self.torque_constant_Nm_A is None:
-            faults.append(("current_limit_A", "needed with it: torque_constant_Nm_A"))
-        if faults:
-            raise Fault(*faults)
-        return self
-
-    @property
-    def torque(self) -> float | None:
-        """Largest torque at any speed, of torque and current [N·m]; None: any."""
-        bounds = [] if self.torque_limit_Nm is None else [self.torque_limit_Nm]
-        if self.current_limit_A is not None and self.torque_constant_Nm_A is not None:
-            bounds.append(self.current_limit_A * self.torque_constant_Nm_A)
-        return min(bounds, default=None)
-
-
 class Sensor(Section):
     """An angle sensor as the controller reads it."""
 

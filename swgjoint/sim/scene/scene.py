@@ -8,6 +8,7 @@ from typing import Annotated, Any, Self
 
 from pydantic import Field, PrivateAttr, model_validator
 
+from swgjoint.drives.sections import JointSection, Level
 from swgjoint.errors import InputError
 from swgjoint.faults import (
     MAX_DEPTH,
@@ -30,8 +31,6 @@ from swgjoint.sim.scene.feature_sections import (
 )
 from swgjoint.sim.scene.sections import (
     Controller,
-    JointSection,
-    Level,
     Load,
     Metrics,
     Recording,

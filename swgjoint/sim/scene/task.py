@@ -6,12 +6,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from swgjoint.drives.sections import MotorLimits
 from swgjoint.errors import InputError
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.assembly import Assembly
 from swgjoint.sim.controller import KnownArm, KnownJoints, ReadingAge, Task
 from swgjoint.sim.sampled_loop import control_period
-from swgjoint.sim.scene.feature_sections import MotorLimits
 
 
 def task_of(

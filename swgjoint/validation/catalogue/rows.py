@@ -13,8 +13,8 @@ from swgjoint.gear.catalogue import CatalogueRow
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.mounting import series_compliance
 from swgjoint.maps.sheet.loop import LOST_MOTION_TORQUE
+from swgjoint.maps.sheet.sampled_accuracy import accuracy_bracket
 from swgjoint.units import arcmin
-from swgjoint.validation.catalogue.accuracy import accuracy_bracket
 from swgjoint.validation.catalogue.file import CatalogueFile, variant_design
 from swgjoint.validation.catalogue.printed import (
     STIFFNESS,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 
-from swgjoint.validation.catalogue.accuracy import accuracy_bracket
+from swgjoint.maps.sheet.sampled_accuracy import accuracy_bracket
 from swgjoint.validation.catalogue.file import CatalogueFile, variant_design
 from swgjoint.validation.catalogue.printed import STIFFNESS, catalogue_row
 from swgjoint.validation.catalogue.runs import Found

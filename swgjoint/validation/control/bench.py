@@ -17,10 +17,11 @@ from swgjoint.control.kinematic_error import JointRecord, KinematicErrorTable, R
 from swgjoint.control.motor_side import MotorPID, rigid_plan
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.controller import Controller
-from swgjoint.sim.run import Run, run_scene
+from swgjoint.sim.run import Run
 from swgjoint.sim.scene.scene import Scene
 from swgjoint.units import arcmin
 from swgjoint.validation.control.specimens import nominal, specimen
+from swgjoint.view.run import run_scene
 
 Array = NDArray[np.float64]
 

@@ -13,7 +13,7 @@ controllers know it: they hold a reading against the plan of the instant it was 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -140,6 +140,16 @@ class Ladder:
     """By rung and figure, one value a seed."""
     shown: dict[str, dict[str, Array]]
     """Of the first seed, by rung: signals for the picture."""
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """Units of the figures."""
+        return UNITS
+
+    @property
+    def made_for(self) -> dict[str, str | None]:
+        """Every rung and the figure that it shall improve."""
+        return {rung.name: rung.made_for for rung in RUNGS}
 
     def improvement(self, rung: Rung) -> tuple[float, int]:
         """Figure of a rung over that of the one below, mean; seeds that got better."""

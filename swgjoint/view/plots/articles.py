@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import io
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from swgjoint.pictures import save_png
-from swgjoint.validation.articles.runs import Found
+
+if TYPE_CHECKING:
+    from swgjoint.validation.articles.runs import Found
 
 
 def articles_picture(parts: Sequence[str], found: Mapping[str, Found]) -> bytes | None:

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
-from swgjoint.bench.fe.rows import BOUNDS, QUANTITIES, seconds
 from swgjoint.pictures import save_png
 
 STYLES = {
@@ -21,10 +20,22 @@ LEAST = 1e-3
 """Errors below are drawn here [%]."""
 
 
-def cost_picture(result: Mapping[str, Any]) -> bytes:
+def cost_picture(
+    result: Mapping[str, Any],
+    *,
+    quantities: Collection[str],
+    bounds: Collection[float],
+    seconds: Callable[[Mapping[str, Any]], float],
+) -> bytes:
     """PNG: size of the error over the time of one core, one panel a quantity.
 
     The line is the Pareto front: nothing cheaper comes nearer to the reference.
+
+    Args:
+        result: Of :func:`swgjoint.bench.fe.cost.run_fe_cost`.
+        quantities: One panel each.
+        bounds: Errors that are marked [%].
+        seconds: Cost of a row.
     """
     from matplotlib.figure import Figure
 
@@ -32,7 +43,7 @@ def cost_picture(result: Mapping[str, Any]) -> bytes:
     rows = [row for row in result["rows"] if row["error_percent"] is not None]
     reference = rows[0]["reference"]
     panels = figure.subplots(2, 2)
-    for ax, quantity in zip(panels.flat, QUANTITIES, strict=True):
+    for ax, quantity in zip(panels.flat, quantities, strict=True):
         here = [row for row in rows if row["quantity"] == quantity]
         shown = [r for r in here if f"{r['model']}, {r['setting']}" != r["reference"]]
         for kind, (colour, marker, name) in STYLES.items():
@@ -58,7 +69,7 @@ def cost_picture(result: Mapping[str, Any]) -> bytes:
         for row in here:
             if f"{row['model']}, {row['setting']}" == row["reference"]:
                 ax.axvline(seconds(row), color="0.6", ls=":", label="reference")
-        for bound in BOUNDS:
+        for bound in bounds:
             ax.axhline(bound, color="0.9", zorder=0)
         ax.set(xscale="log", yscale="log", title=quantity)
         ax.set(xlabel="seconds of one core", ylabel="error [%]")

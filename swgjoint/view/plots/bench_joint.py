@@ -6,8 +6,8 @@ import io
 from collections.abc import Sequence
 from typing import Any
 
-from swgjoint.bench.joint.runs import QUANTITIES
 from swgjoint.pictures import save_png
+from swgjoint.sim.accuracy import QUANTITIES
 
 _COLOURS = {
     "rigid": "0.5",

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import io
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from swgjoint.pictures import save_png
-from swgjoint.validation.rows import Row
+
+if TYPE_CHECKING:
+    from swgjoint.validation.rows import Row
 
 PANELS = ("K1", "K2", "K3", "ratcheting torque")
 _COLOURS = ("tab:blue", "tab:orange", "tab:green", "tab:red", "tab:purple")

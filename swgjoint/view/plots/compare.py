@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import io
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from swgjoint.explore.compare.compare import LOWER, RIPPLE, Compared
 from swgjoint.maps.sheet.map_validity import QUANTITIES
 from swgjoint.maps.sheet.validity_marks import error_mark, joint_mark, mark_legend
 from swgjoint.pictures import save_png
+from swgjoint.sim.figures.keys import LOWER, RIPPLE
 from swgjoint.view.recording.entities import COLORS
 from swgjoint.view.report.report import Cell, Table
 from swgjoint.view.words import shown
+
+if TYPE_CHECKING:
+    from swgjoint.explore.compare.compare import Compared
 
 HEADER = {
     "ripple_rms_percent": ("ripple rms", "% of rated"),

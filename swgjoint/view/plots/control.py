@@ -3,25 +3,26 @@
 from __future__ import annotations
 
 import io
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from swgjoint.pictures import save_png
-from swgjoint.validation.control.bench import UNITS
-from swgjoint.validation.control.ladder import RUNGS, Ladder
+
+if TYPE_CHECKING:
+    from swgjoint.validation.control.ladder import Ladder
 
 COLORS = ("0.6", "C1", "C0", "C2", "C3", "C5", "C4")
 
 
 def ladder_table(found: Ladder) -> list[str]:
     """Lines of a table, one a rung, mean ± standard deviation."""
-    made_for = {rung.name: rung.made_for for rung in RUNGS}
-    header = ["", *UNITS]
-    rows = [["", *UNITS.values()]]
+    header = ["", *found.units]
+    rows = [["", *found.units.values()]]
     for rung, figures in found.figures.items():
         cells = [
             f"{values.mean():.3g} ± {values.std(ddof=min(1, values.size - 1)):.2g}"
-            + ("*" if made_for[rung] == key else " ")
+            + ("*" if found.made_for[rung] == key else " ")
             for key, values in figures.items()
         ]
         rows.append([rung, *cells])
@@ -50,7 +51,7 @@ def ladder_picture(name: str, found: Ladder) -> bytes:
         ),
         (axes[0, 2], "even_time", "ripple", "time [s]", "output torque - mean [N·m]"),
     )
-    rungs = dict(zip((rung.name for rung in RUNGS), COLORS, strict=True))
+    rungs = dict(zip(found.made_for, COLORS, strict=True))
     for ax, x, y, along, label in signals:
         for rung, shown in found.shown.items():
             off = shown[y].mean() if y == "positioning" else 0.0
@@ -68,7 +69,7 @@ def ladder_picture(name: str, found: Ladder) -> bytes:
             ax.plot(np.full(row.size, k), row, "k.", ms=2)
         ax.set_yscale("log")
         ax.set_xticks(place, names, rotation=30, ha="right", fontsize="small")
-        ax.set(title=f"{key} [{UNITS[key]}]")
+        ax.set(title=f"{key} [{found.units[key]}]")
         ax.grid(alpha=0.3, axis="y")
     count = next(iter(found.figures.values()))[bars[0]].size
     figure.suptitle(f"{name}: above one specimen, below {count} (dots) and their mean")

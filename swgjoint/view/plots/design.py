@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.gear.teeth.neutral_line import neutral_line
-from swgjoint.gear.teeth.profile import tooth_profile
+from swgjoint.gear.teeth.tooth_profile import tooth_profile
 from swgjoint.gear.wave_generators.wave_generator import lobe_height, wave_generator
 from swgjoint.pictures import save_png
 from swgjoint.units import mm

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
 
-from swgjoint.explore.lot import LOWER
 from swgjoint.pictures import save_png
 
 _LABELS = {
@@ -17,11 +17,12 @@ _LABELS = {
 }
 
 
-def lot_picture(result: dict[str, Any]) -> bytes | None:
+def lot_picture(result: dict[str, Any], *, lower: Collection[str]) -> bytes | None:
     """PNG of a lot; None where no drive was solved.
 
     Args:
         result: Of :func:`swgjoint.explore.lot.run_lot`.
+        lower: Figures that a spec limits from below.
     """
     from matplotlib.figure import Figure
     from matplotlib.ticker import PercentFormatter
@@ -37,7 +38,7 @@ def lot_picture(result: dict[str, Any]) -> bytes | None:
         above.hist(values, bins="auto", color="tab:blue", alpha=0.6)
         # drives that cannot be solved meet no limit
         part = np.arange(1, values.size + 1) / len(rows)
-        if key in LOWER:
+        if key in lower:
             part = part[::-1]
         below.step(values, part, where="post", color="tab:blue")
         below.yaxis.set_major_formatter(PercentFormatter(1.0))

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from swgjoint.explore.optimise.front import Candidate
-from swgjoint.explore.sweep.plan import Parameter
 from swgjoint.pictures import save_png
 from swgjoint.view.plots.sweep import label_of
 
 if TYPE_CHECKING:
+    from swgjoint.explore.optimise.front import Candidate
     from swgjoint.explore.optimise.optimise import Optimum
+    from swgjoint.explore.sweep.plan import Parameter
 
 Axes = Any  # of matplotlib, which is imported when a picture is made
 

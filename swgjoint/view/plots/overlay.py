@@ -11,7 +11,7 @@ from swgjoint.pictures import save_png
 from swgjoint.units import arcmin
 
 if TYPE_CHECKING:
-    from swgjoint.identify.overlay import Overlay
+    from swgjoint.maps.fit.overlay import Overlay
 
 
 def overlay_picture(name: str, laid: Overlay) -> bytes:

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from swgjoint.gear.pulled_ring import small_deflection
 from swgjoint.pictures import save_png
 from swgjoint.units import deg, mm, um
-from swgjoint.validation.thin_ring import small_deflection
 
 if TYPE_CHECKING:
     from swgjoint.validation.ring import RingCase

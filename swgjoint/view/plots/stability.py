@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import io
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from swgjoint.bench.stability.rows import DEFAULT, FREE, OUTCOMES, StabilityRow
 from swgjoint.pictures import save_png
+
+if TYPE_CHECKING:
+    from swgjoint.bench.stability.rows import StabilityRow
 
 _COLOURS = {
     "ok": "tab:green",
@@ -17,15 +19,21 @@ _COLOURS = {
     "energy_gain": "tab:orange",
 }
 _SCHEMES = {
-    DEFAULT: "tab:blue",
+    "discrete": "tab:blue",
     "discrete, never cut": "tab:purple",
     "native tendon": "tab:olive",
     "RK4": "tab:red",
 }
 
 
-def stability_picture(rows: Sequence[StabilityRow]) -> bytes:
-    """PNG: outcomes by situation, sub-steps, numerical damping, error, free running."""
+def stability_picture(rows: Sequence[StabilityRow], *, scheme: str, free: str) -> bytes:
+    """PNG: outcomes by situation, sub-steps, numerical damping, error, free running.
+
+    Args:
+        rows: Of the study.
+        scheme: That of the joint; the others are there for comparison.
+        free: Group of the long free runs.
+    """
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(14, 8.5), layout="constrained")
@@ -33,10 +41,10 @@ def stability_picture(rows: Sequence[StabilityRow]) -> bytes:
         [["outcomes", "outcomes", "parts"], ["damping", "error", "free"]]
     )
     _outcomes(axes["outcomes"], rows)
-    _parts(axes["parts"], rows)
+    _parts(axes["parts"], [row for row in rows if row.scheme == scheme])
     _damping(axes["damping"], rows)
     _error(axes["error"], rows)
-    _free(axes["free"], rows)
+    _free(axes["free"], [row for row in rows if row.group == free])
     out = io.BytesIO()
     save_png(figure, out, dpi=100)
     return out.getvalue()
@@ -47,7 +55,7 @@ def _outcomes(axis: Any, rows: Sequence[StabilityRow]) -> None:
     names = list(dict.fromkeys((row.scheme, row.group) for row in rows))
     names.sort(key=lambda name: list(_SCHEMES).index(name[0]))
     left = [0.0] * len(names)
-    for outcome in OUTCOMES:
+    for outcome in _COLOURS:
         share = []
         for name in names:
             own = [r.outcome for r in rows if (r.scheme, r.group) == name]
@@ -70,11 +78,7 @@ def _outcomes(axis: Any, rows: Sequence[StabilityRow]) -> None:
 def _parts(axis: Any, rows: Sequence[StabilityRow]) -> None:
     """How many sub-steps the grid takes."""
     for step in sorted({row.step_s for row in rows}):
-        parts = sorted(
-            row.sub_steps or 100
-            for row in rows
-            if row.scheme == DEFAULT and row.step_s == step
-        )
+        parts = sorted(row.sub_steps or 100 for row in rows if row.step_s == step)
         share = [100.0 * (k + 1) / len(parts) for k in range(len(parts))]
         axis.step(parts, share, where="post", label=f"{1e3 * step:g} ms")
     axis.axvline(64, color="0.6", lw=1)
@@ -137,12 +141,12 @@ def _error(axis: Any, rows: Sequence[StabilityRow]) -> None:
 
 def _free(axis: Any, rows: Sequence[StabilityRow]) -> None:
     """Energy left after ten seconds."""
-    own = [row for row in rows if row.group == FREE and row.energy_balance is not None]
+    own = [row for row in rows if row.energy_balance is not None]
     axis.plot(
         [row.phase_step for row in own],
         [100.0 * (row.energy_balance or 0.0) for row in own],
         ".",
-        color=_SCHEMES[DEFAULT],
+        color=_SCHEMES["discrete"],
     )
     for limit in (-5.0, 5.0):
         axis.axhline(limit, color="0.6", lw=1)

@@ -6,8 +6,8 @@ import io
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+from swgjoint.fe.plane.stress import KINDS
 from swgjoint.pictures import save_png
-from swgjoint.validation.thesis.cases import KINDS
 
 if TYPE_CHECKING:
     from swgjoint.validation.thesis.rows import CaseRecords

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import io
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from swgjoint.explore.tune.result import Candidate, Tuned
 from swgjoint.files import Outputs
 from swgjoint.json_text import json_text
 from swgjoint.pictures import save_png
 from swgjoint.units import arcmin
 from swgjoint.view.report.report import Cell, Table, write_tables
 from swgjoint.view.words import shown
+
+if TYPE_CHECKING:
+    from swgjoint.explore.tune.result import Candidate, Tuned
 
 COLORS = ("0.45", "C1", "C2", "C0")
 """Of the candidates; the tuned controller has the last."""

@@ -16,7 +16,7 @@ from swgjoint.fe.rings.model import thin_ring
 from swgjoint.fe.rings.sections import rim_section
 from swgjoint.fe.rings.state import at_rest
 from swgjoint.gear.design.design import Design
-from swgjoint.gear.teeth.profile import tooth_profile
+from swgjoint.gear.teeth.tooth_profile import tooth_profile
 
 
 def plain(design):

@@ -19,7 +19,7 @@ from swgjoint.fe.solid.strip.segment import condense_segment
 from swgjoint.fe.solid.strip.strip import flexspline
 from swgjoint.gear.cup import cup_torsional_stiffness
 from swgjoint.gear.design.design import Design
-from swgjoint.gear.teeth.profile import tooth_profile
+from swgjoint.gear.teeth.tooth_profile import tooth_profile
 
 
 @cache

@@ -11,7 +11,7 @@ from swgjoint.fe.solid.strip.masters import Orders, SegmentMasters, strip_master
 from swgjoint.fe.solid.strip.mesh import circular_spline_strip, flexspline_strip
 from swgjoint.fe.solid.strip.segment import condense_segment
 from swgjoint.gear.design.design import Design
-from swgjoint.gear.teeth.profile import tooth_profile
+from swgjoint.gear.teeth.tooth_profile import tooth_profile
 
 
 def strip_of(name="reference-3d", **changes):

@@ -40,7 +40,8 @@ from swgjoint.fe.solid.strip.mesh import StripMesh, flexspline_strip
 from swgjoint.fe.solid.strip.segment import Segment, condense_segment
 from swgjoint.fe.solid.strip.smooth_strip import smooth_strip
 from swgjoint.gear.design.design import Design
-from swgjoint.gear.teeth.profile import ToothProfile, tooth_profile
+from swgjoint.gear.teeth.profile import ToothProfile
+from swgjoint.gear.teeth.tooth_profile import tooth_profile
 from swgjoint.units import mm
 
 Array = NDArray[np.float64]

@@ -16,8 +16,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from swgjoint.identify.torsion_fit import SOFTEST, TorsionFit
-from swgjoint.maps.drive_map import DriveMap
+from swgjoint.maps.fit.torsion_fit import SOFTEST, TorsionFit
+from swgjoint.maps.potential import Potential
 from swgjoint.maps.sheet.loop import LOST_MOTION_TORQUE, TorqueLoop, torque_loop
 
 Array = NDArray[np.float64]
@@ -90,7 +90,7 @@ def _read(torque: Array, torsion: Array, at: float, near: float) -> float:
     return float(np.polyval(np.polyfit(torque[chosen] - at, torsion[chosen], 1), 0.0))
 
 
-def _shown(drive: DriveMap, rated_torque: float) -> Readings:
+def _shown(drive: Potential, rated_torque: float) -> Readings:
     """Readings of the standard loop of a map, as a sheet has them; no noise."""
     loop = torque_loop(drive)
     return Readings(
@@ -101,7 +101,7 @@ def _shown(drive: DriveMap, rated_torque: float) -> Readings:
 
 def matched(
     fit: TorsionFit,
-    play: Callable[[TorsionFit], DriveMap],
+    play: Callable[[TorsionFit], Potential],
     rated_torque: float,
 ) -> TorsionFit:
     """The fit whose standard loop shows the readings of the measured one.

@@ -19,8 +19,9 @@ from swgjoint.sim.actuators import control_inputs
 from swgjoint.sim.assembly import Assembly, assemble
 from swgjoint.sim.equilibrium import set_start
 from swgjoint.sim.figures.metrics import torque_ripple
-from swgjoint.sim.run import Run, simulate
+from swgjoint.sim.run import Run
 from swgjoint.sim.scene.scene import Scene
+from swgjoint.sim.simulation import simulate
 from swgjoint.units import arcmin, mm
 
 Array = NDArray[np.float64]

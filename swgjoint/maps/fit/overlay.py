@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from swgjoint.identify.loop_match import readings
-from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.equilibrium import output_angle
+from swgjoint.maps.fit.loop_match import readings
 from swgjoint.maps.hysteresis import Sliders
+from swgjoint.maps.potential import Potential
 from swgjoint.maps.sheet.loop import NO_WIDTH, REST, TorqueLoop
 from swgjoint.units import arcmin
 
@@ -164,7 +164,7 @@ class Overlay:
         }
 
 
-def overlay(drive: DriveMap, measured: TorqueLoop, *, theta: float = 0.0) -> Overlay:
+def overlay(drive: Potential, measured: TorqueLoop, *, theta: float = 0.0) -> Overlay:
     """Lay a measured loop over the prediction of a map.
 
     With hysteresis the prediction starts at rest, or has been along the path once
@@ -199,7 +199,9 @@ def overlay(drive: DriveMap, measured: TorqueLoop, *, theta: float = 0.0) -> Ove
     return min(found, key=lambda one: float(np.sum(one.residual**2)))
 
 
-def _played(drive: DriveMap, measured: TorqueLoop, theta: float) -> tuple[Array, Array]:
+def _played(
+    drive: Potential, measured: TorqueLoop, theta: float
+) -> tuple[Array, Array]:
     """Torsion of the map along a path of the torque, from rest and once more [rad].
 
     Between two turns of the path the direction is one, also where samples jitter.
@@ -252,7 +254,7 @@ def _shift(measured: TorqueLoop, predicted: TorqueLoop, top: float) -> float:
     return float(np.mean(apart[np.isfinite(apart)]))
 
 
-def _beyond(drive: DriveMap, measured: TorqueLoop) -> bool:
+def _beyond(drive: Potential, measured: TorqueLoop) -> bool:
     low, high = drive.torque_range
     slipping = sum(element.yield_torque for element in drive.hysteresis)
     reach = 1.0 + 1e-6

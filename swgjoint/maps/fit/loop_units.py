@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from swgjoint.errors import InputError
-from swgjoint.identify.torsion_fit import fit_torsion
+from swgjoint.maps.fit.torsion_fit import fit_torsion
 from swgjoint.maps.sheet.loop import TorqueLoop
 from swgjoint.units import arcmin
 

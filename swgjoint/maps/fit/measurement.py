@@ -12,13 +12,14 @@ import numpy as np
 from swgjoint.csv_columns import read_columns
 from swgjoint.errors import InputError
 from swgjoint.gear.kinematics import LAYOUTS
-from swgjoint.identify.error_fit import ORDERS, fit_error
-from swgjoint.identify.loop_match import matched
-from swgjoint.identify.loop_units import check_direction, check_units
-from swgjoint.identify.overlay import COMPARED, overlay
-from swgjoint.identify.torsion_fit import INTERVALS, TorsionFit, fit_torsion
+from swgjoint.gear.ratings import Ratings
 from swgjoint.maps.checks import check_map
-from swgjoint.maps.drive_map import DriveMap, Ratings
+from swgjoint.maps.fit.error_fit import ORDERS, fit_error
+from swgjoint.maps.fit.loop_match import matched
+from swgjoint.maps.fit.loop_units import check_direction, check_units
+from swgjoint.maps.fit.overlay import COMPARED, overlay
+from swgjoint.maps.fit.torsion_fit import INTERVALS, TorsionFit, fit_torsion
+from swgjoint.maps.potential import Potential
 from swgjoint.maps.sheet.loop import TorqueLoop, torque_loop
 from swgjoint.maps.torsion_law import potential_of_stiffness
 from swgjoint.units import arcmin, deg
@@ -31,7 +32,7 @@ TORSION = {"torsion_arcmin": arcmin, "torsion_rad": 1.0}
 OUTPUT = {"output_deg": deg, "output_rad": 1.0}
 ERROR = {"error_arcmin": arcmin, "error_rad": 1.0}
 
-Map = TypeVar("Map", bound=DriveMap)
+Map = TypeVar("Map", bound=Potential)
 
 
 def read_loop(path: str | Path) -> TorqueLoop:
@@ -93,10 +94,10 @@ def map_from_measurement(
     rated = _ratings(ratings, float(np.abs(loop.torque).max()))
     doubts = check_units(path, loop, rated.rated_torque)
 
-    def play(tried: TorsionFit) -> DriveMap:
+    def play(tried: TorsionFit) -> Potential:
         """The map of a spring and elements alone."""
         potential, ends = potential_of_stiffness(tried.knots, tried.stiffness)
-        return DriveMap(
+        return Potential(
             name=name or Path(path).stem,
             level="measurement",
             layout=layout,

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.kinematics import angle_coefficients
 from swgjoint.units import arcmin
-from swgjoint.validation.catalogue.runs import Found
 
 Array = NDArray[np.float64]
 
@@ -52,7 +54,7 @@ def peaks(theta: Array, error: Array, design: Design) -> tuple[float, float]:
     return low, float(np.sqrt(rest @ rest / (rest.size - weights.size)))
 
 
-def accuracy_bracket(found: Found, design: Design) -> tuple[float, float]:
+def accuracy_bracket(found: Mapping[str, Any], design: Design) -> tuple[float, float]:
     """Peak to peak that is sure, and with all that the rest may add [arcmin].
 
     Sure is that of the low orders, or what the samples themselves show.

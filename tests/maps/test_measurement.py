@@ -9,7 +9,8 @@ import pytest
 from messages import names, naming
 
 from swgjoint.errors import InputError
-from swgjoint.maps.drive_map import DriveMap, Ratings
+from swgjoint.gear.ratings import Ratings
+from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.equilibrium import output_angle
 from swgjoint.maps.file import map_bytes
 from swgjoint.maps.hysteresis import Jenkin

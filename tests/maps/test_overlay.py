@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from messages import names
 
-from swgjoint.identify.overlay import overlay
 from swgjoint.maps.drive_map import DriveMap
+from swgjoint.maps.fit.overlay import overlay
 from swgjoint.maps.hysteresis import Jenkin
 from swgjoint.maps.sheet.loop import TorqueLoop, torque_loop
 from swgjoint.units import arcmin

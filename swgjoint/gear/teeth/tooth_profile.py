@@ -1,0 +1,31 @@
+"""The tooth profile of a member, of whatever kind the design asks for."""
+
+from __future__ import annotations
+
+from swgjoint.gear.design.design import Design
+from swgjoint.gear.teeth.arc_profiles import arc_profile
+from swgjoint.gear.teeth.conjugate import conjugate_profile
+from swgjoint.gear.teeth.involute import involute_profile
+from swgjoint.gear.teeth.profile import ToothProfile
+
+
+def tooth_profile(design: Design, member: str, *, bounds: bool = True) -> ToothProfile:
+    """Tooth profile of ``flexspline`` or ``circular_spline``.
+
+    Args:
+        design: The drive.
+        member: Which of both.
+        bounds: Whether a refusal says which values would be accepted, which takes as
+            long as a thousand profiles of arcs.
+
+    Raises:
+        DesignError: If the tooth cannot be built; one line that names the key.
+    """
+    spec = design.flexspline if member == "flexspline" else design.circular_spline
+    if spec.profile.kind == "involute":
+        return involute_profile(design, member)
+    if spec.profile.kind == "conjugate":
+        other = "circular_spline" if member == "flexspline" else "flexspline"
+        given = tooth_profile(design, other)
+        return conjugate_profile(design, member, given)
+    return arc_profile(design, member, bounds=bounds)

@@ -1,0 +1,27 @@
+"""Figures by which runs are compared, and which way is better."""
+
+from __future__ import annotations
+
+UPPER = (
+    "ripple_rms_percent",
+    "ripple_pp_percent",
+    "transmission_error_arcmin",
+    "transmission_error_ripple_arcmin",
+    "torsion_arcmin",
+    "tool_path_rms_mm",
+    "tool_ap_mm",
+    "tool_rp_mm",
+    "von_mises_MPa",
+    "peak_torque_of_rating",
+    "cubed_mean_torque_of_rating",
+    "wall_s",
+)
+"""Figures that a spec limits from above."""
+LOWER = ("K1_Nm_rad", "fatigue_safety_factor", "real_time_factor")
+"""Figures that a spec limits from below."""
+RIPPLE = (
+    "ripple_rms_percent",
+    "ripple_pp_percent",
+    "transmission_error_ripple_arcmin",
+)
+"""Figures that a drive without harmonics does not have."""

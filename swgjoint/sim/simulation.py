@@ -1,0 +1,319 @@
+"""The simulation of a scene: the arm under its controller, recorded at every step."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+from mujoco.rollout import Rollout
+from numpy.typing import NDArray
+
+from swgjoint.errors import ComputationError, InputError
+from swgjoint.maps.drive_map import DriveMap
+from swgjoint.progress import Progress, silent
+from swgjoint.sim.actuators import control_inputs, limited, wanted_torque
+from swgjoint.sim.assembly import Assembly, assemble
+from swgjoint.sim.controller import Controller, KnownArm
+from swgjoint.sim.equilibrium import set_start
+from swgjoint.sim.run import Run
+from swgjoint.sim.sampled_loop import GivenLoop, Loop, SampledLoop, run_sampled
+from swgjoint.sim.scene.scene import Scene
+from swgjoint.sim.scene.task import task_of
+
+Array = NDArray[np.float64]
+
+_CHUNK = 1000  # steps of the engine between two signs of life
+_STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
+
+
+def simulate_scene(
+    scene: Scene | str | Path,
+    *,
+    overrides: Mapping[str, Any] | Iterable[str] | None = None,
+    drives: Mapping[str, DriveMap] | None = None,
+    controller: Controller | None = None,
+    known_drives: Mapping[str, DriveMap] | None = None,
+    known_arm: KnownArm | None = None,
+    name: str | None = None,
+    progress: Progress = silent,
+) -> Run:
+    """Simulate a scene from an equilibrium to its end.
+
+    The arguments are those of :func:`swgjoint.run_scene`, which also records the run
+    for the viewer.
+    """
+    assembly, loop = prepare_scene(
+        scene,
+        overrides=overrides,
+        drives=drives,
+        controller=controller,
+        known_drives=known_drives,
+        known_arm=known_arm,
+        progress=progress,
+    )
+    return simulate(
+        assembly, name=name or assembly.scene.name, loop=loop, progress=progress
+    )
+
+
+def prepare_scene(
+    scene: Scene | str | Path,
+    *,
+    overrides: Mapping[str, Any] | Iterable[str] | None = None,
+    drives: Mapping[str, DriveMap] | None = None,
+    controller: Controller | None = None,
+    known_drives: Mapping[str, DriveMap] | None = None,
+    known_arm: KnownArm | None = None,
+    progress: Progress = silent,
+) -> tuple[Assembly, Loop | None]:
+    """The compiled scene and the law of a controller from outside, if there is one.
+
+    The arguments are those of :func:`swgjoint.run_scene`.
+    """
+    if not isinstance(scene, Scene):
+        scene = Scene.load_file(scene, overrides)
+    elif overrides:
+        scene = scene.with_changes(overrides)
+    assembly = assemble(
+        scene,
+        drives=drives,
+        controlled_by=None if controller is None else type(controller).__name__,
+        progress=progress,
+    )
+    loop: Loop | None = None
+    if controller is not None:
+        loop = GivenLoop(
+            assembly, controller, task_of(assembly, known_drives, known_arm)
+        )
+    elif known_drives or known_arm is not None:
+        what = "known_drives" if known_drives else "known_arm"
+        raise InputError(f"{what} without controller; accepted: both or none")
+    return assembly, loop
+
+
+@contextmanager
+def _without_log_file() -> Iterator[None]:
+    """Let the engine put its warnings on the console alone, not in the working folder.
+
+    A run tells what they mean; the engine's ``MUJOCO_LOG.TXT`` would stay for ever.
+    """
+    config = mujoco.MjLogConfig.get()
+    before, config.logto_file = config.logto_file, False
+    config.set()
+    try:
+        yield
+    finally:
+        config.logto_file = before
+        config.set()
+
+
+@_without_log_file()
+def simulate(
+    assembly: Assembly,
+    *,
+    name: str,
+    loop: Loop | None = None,
+    progress: Progress = silent,
+) -> Run:
+    """Run an assembled scene; see :func:`swgjoint.run_scene`.
+
+    Args:
+        assembly: The scene.
+        name: Of the run.
+        loop: Law of a controller from outside.
+        progress: Called with the steps done.
+    """
+    model, path = assembly.model, assembly.trajectory
+    inputs = control_inputs(assembly)
+    data = mujoco.MjData(model)
+    set_start(assembly, data)
+    state = np.empty(mujoco.mj_stateSize(model, _STATE))
+    mujoco.mj_getState(model, data, state, _STATE)
+
+    if assembly.loops.sampled:
+        begin = time.perf_counter()
+        states, rates, wanted = run_sampled(
+            assembly,
+            loop or SampledLoop(assembly),
+            data,
+            inputs,
+            check=lambda new: _check_finite(assembly, data, new),
+            progress=lambda done: progress(f"run {name}", done, len(inputs)),
+        )
+        wall = time.perf_counter() - begin
+        return _recorded(assembly, name, states, rates, wall, wanted=wanted)
+
+    # the engine's own rollout: no Python between two steps, every state recorded
+    steps, parts = len(inputs), assembly.sub_steps
+    states = np.empty((steps // parts + 1, state.size))
+    states[0] = state
+    speeds = 1 + model.nq + assembly.link_velocity
+    rates = np.empty((path.time.size, speeds.size))
+    rates[0] = state[speeds]
+    chunk = parts * max(1, _CHUNK // parts)
+    begin = time.perf_counter()
+    with Rollout(nthread=0) as rollout:
+        for first in range(0, steps, chunk):
+            last = min(first + chunk, steps)
+            got, _ = rollout.rollout(
+                model,
+                data,
+                states[first // parts][None],
+                inputs[None, first:last],
+                initial_warmstart=data.qacc_warmstart[None],
+            )
+            states[first // parts + 1 : last // parts + 1] = got[0, parts - 1 :: parts]
+            rates[first + 1 : last + 1] = got[0][:, speeds]
+            _check_finite(assembly, data, got[0])
+            progress(f"run {name}", last, steps)
+    return _recorded(assembly, name, states, rates, time.perf_counter() - begin)
+
+
+def _check_finite(assembly: Assembly, data: mujoco.MjData, states: Array) -> None:
+    """Stop a run that diverged; the engine would go on with a reset state."""
+    nq, nv = assembly.model.nq, assembly.model.nv
+    if data.warning[mujoco.mjtWarning.mjWARN_BADCTRL].number:
+        raise ComputationError(
+            f"scene {assembly.scene.name!r}: before t = {states[-1, 0]:.3f} s a motor"
+            " or a disturbance was asked for more than 1e10, which the engine does not"
+            " apply; use lower gains of the controller"
+        )
+    if data.warning[mujoco.mjtWarning.mjWARN_INERTIA].number:
+        raise ComputationError(
+            f"scene {assembly.scene.name!r}: before t = {states[-1, 0]:.3f} s the"
+            " engine could not solve for the accelerations: the masses of the arm are"
+            " too far apart, or its inertia is close to singular; see mjWARN_INERTIA"
+            " in MuJoCo's manual"
+        )
+    bad = any(
+        data.warning[kind].number
+        for kind in (
+            mujoco.mjtWarning.mjWARN_BADQPOS,
+            mujoco.mjtWarning.mjWARN_BADQVEL,
+            mujoco.mjtWarning.mjWARN_BADQACC,
+        )
+    )
+    speed = np.abs(states[:, 1 + nq : 1 + nq + nv])
+    if bad or not np.isfinite(states).all() or speed.max() > 1e6:
+        step = assembly.step
+        raise ComputationError(
+            f"scene {assembly.scene.name!r}: the motion diverged before"
+            f" t = {states[-1, 0]:.3f} s with a step of {step:g} s and integrator"
+            f" {assembly.scene.simulation.integrator}; use a smaller simulation.step_s"
+            " or integrator discrete"
+        )
+
+
+def _recorded(
+    whole: Assembly,
+    name: str,
+    states: Array,
+    rates: Array,
+    wall: float,
+    *,
+    wanted: Array | None = None,
+) -> Run:
+    """Signals of all joints from the recorded states.
+
+    Args:
+        whole: The scene as it was run.
+        name: Of the run.
+        states: One per step of the scene. Shape (n, n_state).
+        rates: Link speeds at every step of the engine [rad/s].
+        wall: Time that the steps took [s].
+        wanted: Motor torque that a sampled loop asked for at every step of the engine
+            [N·m]; None for the engine's own loops.
+    """
+    assembly, ratio = whole.recorded(), whole.ratio
+    model, path = assembly.model, assembly.trajectory
+    q = states[:, 1 : 1 + model.nq]
+    v = states[:, 1 + model.nq : 1 + model.nq + model.nv]
+    position, velocity = q[:, assembly.link_position], v[:, assembly.link_velocity]
+    flexible = assembly.motor_position >= 0
+    theta = ratio * (position - assembly.prescribed)
+    theta_rate = ratio * (velocity - assembly.prescribed_rate)
+    theta[:, flexible] = q[:, assembly.motor_position[flexible]]
+    theta_rate[:, flexible] = v[:, assembly.motor_velocity[flexible]]
+
+    if wanted is None:
+        integral = _integrals(assembly, states)
+        asked = wanted_torque(whole, theta, theta_rate, integral)
+    else:
+        asked = np.stack(2 * [wanted[:: whole.sub_steps]])
+    speed = theta_rate
+    if assembly.scene.simulation.integrator != "discrete":
+        speed = np.diff(theta, axis=0) / np.diff(path.time)[:, None]
+        speed = np.vstack([speed[:1], speed])
+    motor = np.stack(
+        [
+            limited(asked[:, :, j], speed[:, j], limits)
+            for j, limits in enumerate(assembly.loops.limits)
+        ],
+        axis=-1,
+    ).mean(axis=0)
+    wanted = asked.mean(axis=0)
+    # no rotor: what the motor gives less what its rotor takes; the integrator's own
+    # acceleration is the velocity difference of the step that led to the state
+    ideal = ratio * (rates - whole.prescribed_rate)
+    slowing = np.diff(ideal, axis=0, prepend=ideal[:1])[:: whole.sub_steps] / whole.step
+    output = ratio * (motor - assembly.rotor_inertia * slowing)
+    torsion, slipping, friction = np.zeros((3, *position.shape))
+    error = assembly.prescribed.copy()
+    # the discrete integrator's positions are half a step ahead of its velocities
+    ahead = 0.0
+    if assembly.scene.simulation.integrator == "discrete":
+        ahead = 0.5 * whole.step
+    for j in np.flatnonzero(flexible):
+        got = assembly.transmissions[j].signals(
+            theta[:, j] - ahead * theta_rate[:, j],
+            position[:, j] - ahead * velocity[:, j],
+            theta_rate[:, j],
+            velocity[:, j],
+        )
+        torsion[:, j], error[:, j] = got.torsion, got.transmission_error
+        output[:, j] = got.torque
+        slipping[:, j], friction[:, j] = got.slipping, got.friction
+    return Run(
+        name=name,
+        assembly=assembly,
+        joints=assembly.joints,
+        time=path.time,
+        position=position,
+        velocity=velocity,
+        motor_position=theta,
+        motor_velocity=theta_rate,
+        reference=path.position,
+        torsion=torsion,
+        transmission_error=error,
+        output_torque=output,
+        motor_torque=motor,
+        wanted_torque=wanted,
+        slipping_torque=slipping,
+        friction_torque=friction,
+        tool_position=assembly.arm.tool_positions(position),
+        tool_reference=assembly.arm.tool_positions(path.position),
+        wall=wall,
+    )
+
+
+def _integrals(assembly: Assembly, states: Array) -> Array:
+    """Integral of the error in the engine's loops [rad·s]. Shape (n, n_joints).
+
+    Under ``discrete`` as it acted on the way to the state: the engine integrates after
+    the forces.
+    """
+    model = assembly.model
+    integral = np.zeros((len(states), len(assembly.joints)))
+    first = 1 + model.nq + model.nv
+    for j in np.flatnonzero(assembly.loops.integral):
+        address = model.actuator_actadr[j]
+        if address >= 0:
+            integral[:, j] = states[:, first + address]
+    if assembly.scene.simulation.integrator == "discrete":
+        integral[1:] = integral[:-1].copy()
+    return integral
