@@ -34,7 +34,7 @@ import numpy as np
 
 import swgjoint
 from swgjoint.bench.scaling.joint import chain_model
-from swgjoint.fe.build_map import build_map
+from swgjoint.drives.build_map import build_map
 from swgjoint.fe.solid.continuation import SolidContinuation
 from swgjoint.fe.solid.drive3d import solid_ring
 from swgjoint.fe.solid.stress import SolidMaxima

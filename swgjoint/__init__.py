@@ -11,10 +11,11 @@ _PUBLIC = {
     "DriveMap": "swgjoint.maps.drive_map",
     "SwgError": "swgjoint.errors",
     "attach": "swgjoint.drives.attach",
-    "build_map": "swgjoint.fe.build_map",
+    "build_map": "swgjoint.drives.build_map",
     "load_plugin": "swgjoint.joint.plugin",
     "run_scene": "swgjoint.view.run",
     "simulate_meshing": "swgjoint.fe.meshing",
+    "spec_sheet": "swgjoint.drives.spec_sheet",
 }
 __all__ = ["__version__", *sorted(_PUBLIC)]
 

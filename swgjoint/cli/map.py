@@ -7,10 +7,11 @@ import time
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from swgjoint.cli.shared.map_validity_text import validation_of_map, validation_table
+from swgjoint.cli.shared.map_validity_text import validation_table
 from swgjoint.cli.shared.text import table
 from swgjoint.errors import InputError
 from swgjoint.files import Outputs, check_output_file
+from swgjoint.maps.sheet.validation_notes import validation_of_map
 
 if TYPE_CHECKING:
     from swgjoint.maps.drive_map import DriveMap
@@ -118,7 +119,7 @@ def _built(args: argparse.Namespace) -> DriveMap:
 
     design = Design.load(args.design)
     # the finite elements take half a second to import: not before the design is sound
-    from swgjoint.fe.build_map import build_map
+    from swgjoint.drives.build_map import build_map
 
     return build_map(design, model=args.model, progress=args.progress)
 

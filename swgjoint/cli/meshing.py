@@ -81,7 +81,9 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     from swgjoint.gear.catalogue import ratings_of
 
     torque = ratings_of(design).rated_torque if args.torque is None else args.torque
-    model = args.model or ("3d" if design.cup is not None else "2d")
+    from swgjoint.drives.fidelity import default_model
+
+    model = args.model or default_model(design)
     if args.resume and (folder is None or model != "3d"):
         raise InputError("--resume needs a 3d model and --out DIR of the run")
     meshing = simulate_meshing(

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import argparse
-import time
 from typing import TYPE_CHECKING, Any
 
-from swgjoint.cli.shared.map_validity_text import doubts, marked, validation_of_sheet
+from swgjoint.cli.shared.map_validity_text import doubts, marked
 from swgjoint.cli.shared.text import table
 from swgjoint.files import Outputs, output_folder
 from swgjoint.view.words import words
@@ -14,10 +13,6 @@ from swgjoint.view.words import words
 if TYPE_CHECKING:
     from swgjoint.maps.fit.overlay import Overlay
     from swgjoint.maps.sheet.spec_sheet import SpecSheet
-
-FEW_ANGLES = 3
-"""Wave-generator positions of a design's map where every wanted figure is read with the
-input locked at the first one, without manufacturing errors."""
 
 _SHOWN_ORDERS = 6
 
@@ -59,191 +54,23 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     """Find or build the map and measure it.
 
     Returns:
-        Every key of :data:`swgjoint.maps.sheet.spec_sheet.KEYS` (or those of
-        ``--only``), None where the source cannot tell, with the reason in ``missing``;
-        ``design``, ``validity``, ``files``, ``wall_s``; ``radial_stiffness`` and
-        ``fatigue`` with what stands behind these two figures, where they were computed;
-        ``uncertain`` by key what the map misses, ``validation`` of the map against
-        unseen solves (null with ``validation_reason``) and ``validation_notes``;
-        ``ratcheting`` with the path to the largest torque, or to where it ended;
-        ``running`` with what rubs in a design that turns without load; ``measured``
-        with --measured, see :meth:`swgjoint.maps.fit.overlay.Overlay.as_dict`.
+        What :func:`swgjoint.drives.spec_sheet.spec_sheet` says, and ``files``.
     """
-    start = time.perf_counter()
     folder = output_folder(args.out) if args.out else None
-    from swgjoint.maps.sheet.spec_sheet import check_keys, measure_spec, validity
+    from swgjoint.drives.spec_sheet import measure_drive
 
-    only = [] if args.only is None else [k.strip() for k in args.only.split(",")]
-    keys = check_keys(only)
-    loop = None
-    if args.measured is not None:
-        from swgjoint.maps.fit.measurement import read_loop
-
-        loop = read_loop(args.measured)
-    drive, ratings, name = _drive(args, keys, always=loop is not None)
-    values, reasons, details = _solid(args, keys, ratings)
-    if only:
-        _ratcheting(args, keys, values, reasons, details)
-    _running(args, keys, reasons, details)
-    sheet = measure_spec(
-        drive, ratings=ratings, only=keys, known=values, unknown=reasons
-    )
-    result: dict[str, Any] = {"design": name, **sheet.as_dict(), **details}
-    if drive is not None:
-        result["validity"] = validity(drive)
-        result |= validation_of_sheet(drive, keys)
-        if "manufacturing_errors" in drive.info:
-            result["validity"]["manufacturing_errors"] = drive.info[
-                "manufacturing_errors"
-            ]
-        label = drive.info.get("label")
-        if isinstance(label, dict) and label.get("stress_state"):
-            result["validity"]["stress_state"] = label["stress_state"]
-        stated = drive.info.get("stated")
-        result["stated"] = stated if isinstance(stated, dict) else None
-    else:
-        result["validity"] = {"level": "design", "ratings": ratings.source}
-        result |= validation_of_sheet(None, keys)
-    laid = None
-    if loop is not None:
-        from swgjoint.maps.fit.loop_units import check_units
-        from swgjoint.maps.fit.overlay import overlay
-
-        doubts = check_units(args.measured, loop, drive.ratings.rated_torque)
-        laid = overlay(drive, loop)
-        found = laid.as_dict()
-        found["warnings"] = [*doubts, *found["warnings"]]
-        result["measured"] = {"file": args.measured, **found}
-    result |= {"files": [], "wall_s": time.perf_counter() - start}
-    if folder is not None:
-        _write(folder, result, sheet, laid)
-    return result
-
-
-def _drive(
-    args: argparse.Namespace, keys: tuple[str, ...], *, always: bool
-) -> tuple[Any, Any, str]:
-    """Map (None where ratings suffice, unless always), ratings and name."""
-    from swgjoint.drives.references import find_drive, load_drive
-    from swgjoint.gear.catalogue import ratings_of
-    from swgjoint.maps.drive_map import DriveMap
-    from swgjoint.maps.sheet.spec_sheet import needs_map, needs_turn
-
-    if not needs_map(keys) and not always:
-        source = find_drive(args.drive)
-        if not isinstance(source, DriveMap):
-            return None, ratings_of(source), source.drive.name
-        if args.model is None:
-            return source, source.ratings, source.name
-    turn = needs_turn(keys)
-    drive = load_drive(
+    found = measure_drive(
         args.drive,
         model=args.model,
-        angles=None if turn else FEW_ANGLES,
-        errors=turn,
+        only=[] if args.only is None else [k.strip() for k in args.only.split(",")],
+        measured=args.measured,
         progress=args.progress,
     )
-    return drive, drive.ratings, drive.name
-
-
-def _solid(
-    args: argparse.Namespace, keys: tuple[str, ...], ratings: Any
-) -> tuple[dict[str, float], dict[str, str], dict[str, Any]]:
-    """Figures of the solid model of a design, reasons of those it has not, details."""
-    from swgjoint.drives.references import find_drive
-    from swgjoint.gear.design.design import Design
-    from swgjoint.maps.sheet.spec_sheet import SOLID_KEYS
-
-    wanted = [key for key in SOLID_KEYS if key in keys]
-    source = find_drive(args.drive) if wanted else None
-    if not isinstance(source, Design):
-        return {}, {}, {}
-    if args.model not in (None, "3d"):
-        reason = f"needs the 3d model, not --model {args.model}"
-        return {}, dict.fromkeys(wanted, reason), {}
-    from swgjoint.fe.solid.figures.spec_figures import solid_figures
-
-    found = solid_figures(source, wanted, ratings.rated_torque, progress=args.progress)
-    return found.values, found.missing, found.details
-
-
-def _ratcheting(
-    args: argparse.Namespace,
-    keys: tuple[str, ...],
-    values: dict[str, float],
-    reasons: dict[str, str],
-    details: dict[str, Any],
-) -> None:
-    """Add the ratcheting torque of a design, or the reason why there is none."""
-    from swgjoint.drives.references import find_drive
-    from swgjoint.gear.design.design import Design
-    from swgjoint.maps.cache import recalled
-    from swgjoint.maps.sheet.spec_sheet import RATCHETING_KEY
-
-    source = find_drive(args.drive) if RATCHETING_KEY in keys else None
-    if not isinstance(source, Design):
-        return
-    from swgjoint.fe.plane.ratcheting import ratcheting_path
-
-    path = recalled(
-        "figures",
-        {"figure": RATCHETING_KEY, "design": source.content_hash()},
-        dict[str, Any],
-        lambda: ratcheting_path(source, progress=args.progress).as_dict(),
-    )
-    details["ratcheting"] = path
-    if path["passed"]:
-        values[RATCHETING_KEY] = path["limit_Nm"]
-    else:
-        rim = source.circular_spline.outer_rim
-        reasons[RATCHETING_KEY] = (
-            f"more than {path['limit_Nm']:.4g} N·m (a lower bound, where the search"
-            f" ended: {path['outcome']}): the plane has a rigid wave generator, and"
-            f" the outside of the circular spline is {rim}"
-        )
-
-
-def _running(
-    args: argparse.Namespace,
-    keys: tuple[str, ...],
-    reasons: dict[str, str],
-    details: dict[str, Any],
-) -> None:
-    """Add what friction of teeth and race takes of the unloaded input of a design.
-
-    A lower bound, a small part of what a drive takes: no figure, but the reason why
-    there is none.
-    """
-    from swgjoint.drives.references import find_drive
-    from swgjoint.errors import ComputationError, DesignError
-    from swgjoint.gear.design.design import Design
-    from swgjoint.maps.fit.friction_bending import without_friction
-    from swgjoint.maps.sheet.spec_sheet import SLOW_KEYS
-
-    wanted = [key for key in SLOW_KEYS if key in keys]
-    source = find_drive(args.drive) if wanted else None
-    if not isinstance(source, Design):
-        return
-    from swgjoint.fe.rings.running import LEFT_OUT, running_friction
-
-    mu = source.friction.tooth_coefficient
-    found, why = None, "nothing rubs with friction.tooth_coefficient = 0"
-    if mu:
-        try:
-            found = running_friction(source)
-        except (ComputationError, DesignError) as error:
-            why = "; ".join(str(error).splitlines())
-    if found is None:
-        reasons |= dict.fromkeys(wanted, f"{why}; {without_friction(source)}")
-        return
-    details["running"] = found.as_dict(mu)
-    figures = (found.running_torque(mu), found.starting_torque(mu))
-    for key, figure in zip(SLOW_KEYS, figures, strict=True):
-        if key in wanted:
-            reasons[key] = (
-                f"more than {figure:.3g} N·m (friction of teeth and race, a lower"
-                f" bound); not modelled: {LEFT_OUT}"
-            )
+    wall = found.result.pop("wall_s")
+    result = {**found.result, "files": [], "wall_s": wall}
+    if folder is not None:
+        _write(folder, result, found.sheet, found.overlay)
+    return result
 
 
 def _write(

@@ -8,7 +8,7 @@ from typing import Any, TypedDict, Unpack, overload
 
 import mujoco
 
-from swgjoint.drives.references import drive_of
+from swgjoint.drives.references import drive_of, load_drive
 from swgjoint.drives.rotors import catalogue_rotor_inertia
 from swgjoint.drives.sections import JointSection
 from swgjoint.errors import InputError
@@ -178,11 +178,9 @@ def _map(
 ) -> DriveMap:
     """The map of one joint; ``known`` keeps what several joints share."""
     if isinstance(source, Design):
-        from swgjoint.fe.build_map import build_map
-
         key = f"{id(source)}"
         if key not in known:
-            known[key] = build_map(source, model=model)
+            known[key] = load_drive(source, model=model)
         source = known[key]
     if isinstance(source, DriveMap):
         if not error:

@@ -6,15 +6,14 @@ import re
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import lru_cache
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from swgjoint.drives.sections import JointSection, LinearDrive
 from swgjoint.errors import InputError
-from swgjoint.gear.catalogue_stated import LOSS_KEYS
 from swgjoint.gear.design.family import family_member
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.fit.error_spectrum import with_assumed_error
-from swgjoint.maps.fit.friction_bending import without_friction
 from swgjoint.maps.from_catalogue import (
     catalogue_names,
     is_catalogue_name,
@@ -139,7 +138,7 @@ def linear_map(section: LinearDrive) -> DriveMap:
 
 
 def load_drive(
-    reference: str,
+    reference: str | Path | Design | DriveMap,
     *,
     model: str | None = None,
     angles: int | None = None,
@@ -165,14 +164,15 @@ def load_drive(
             no design, or a kinematic error for what has its own.
     """
     wanted = kinematic_error_arcmin
-    if wanted is not None and names_catalogue(reference) and model is None:
-        return DriveMap.from_catalogue(reference, kinematic_error_arcmin=wanted)
+    named = isinstance(reference, str) and names_catalogue(reference)
+    if wanted is not None and named and model is None:
+        return DriveMap.from_catalogue(str(reference), kinematic_error_arcmin=wanted)
     drive = _from_source(reference, model, angles, errors, progress)
     return with_assumed_error(drive, wanted * arcmin) if wanted else drive
 
 
 def _from_source(
-    reference: str,
+    reference: str | Path | Design | DriveMap,
     model: str | None,
     angles: int | None,
     errors: bool,
@@ -183,40 +183,45 @@ def _from_source(
     if isinstance(source, DriveMap):
         if model is not None:
             raise InputError(
-                f"model {model!r} for {reference!r}, a map of level {source.level!r};"
-                " accepted: a design"
+                f"model {model!r} for {_named(reference)!r}, a map of level"
+                f" {source.level!r}; accepted: a design"
             )
         return source
-    from swgjoint.fe.build_map import build_map
+    from swgjoint.drives.build_map import build_map
     from swgjoint.gear.design.tolerances import has_errors, without_errors
 
     flawless = not errors and has_errors(source)
     if flawless:
         source = without_errors(source)
-    if angles is None:
-        drive = build_map(source, model=model, progress=progress)
-    else:
-        drive = build_map(source, model=model, angles=angles, progress=progress)
-    missing = dict.fromkeys(LOSS_KEYS, without_friction(source))
-    info = {**drive.info, "missing": missing}
-    if flawless:
-        info["manufacturing_errors"] = "left out"
-    return replace(drive, info=info)
+    drive = build_map(source, model=model, angles=angles, progress=progress)
+    if not flawless:
+        return drive
+    return replace(drive, info={**drive.info, "manufacturing_errors": "left out"})
 
 
-def find_drive(reference: str) -> DriveMap | Design:
+def _named(reference: str | Path | Design | DriveMap) -> str:
+    return reference.name if isinstance(reference, DriveMap) else str(reference)
+
+
+def find_drive(reference: str | Path | Design | DriveMap) -> DriveMap | Design:
     """What a drive reference names; nothing is built.
 
     A name ending ``.swg`` is a map; an existing file or a bundled name is a design; a
-    name that begins with a catalogue series (``CSG-25-100``) is a catalogue drive.
+    name that begins with a catalogue series (``CSG-25-100``) is a catalogue drive. A
+    design or a map that is given as an object is returned as it is.
 
     Raises:
         InputError: If it is none of these.
     """
-    if reference.endswith(".swg"):
-        return DriveMap.load(reference)
+    if isinstance(reference, DriveMap):
+        return reference
     from swgjoint.gear.design.design import Design
 
+    if isinstance(reference, Design):
+        return reference
+    reference = str(reference)
+    if reference.endswith(".swg"):
+        return DriveMap.load(reference)
     if names_catalogue(reference):
         return DriveMap.from_catalogue(reference)
     try:

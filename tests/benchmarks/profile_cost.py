@@ -38,7 +38,7 @@ def timed(name, work):
 """
 TASKS = {
     "2d map": """
-from swgjoint.fe.build_map import build_map
+from swgjoint.drives.build_map import build_map
 design = Design.load("reference-2d")
 timed("map", lambda: build_map(design, model="2d", angles=4, cache=False))
 """,

@@ -11,7 +11,7 @@ from messages import names
 from validation_record import made_record
 
 from swgjoint.cli.main import main
-from swgjoint.fe import build_map as builder
+from swgjoint.drives import build_map as builder
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.file import map_bytes
 from swgjoint.maps.sheet.map_validity import NOT_VALIDATED

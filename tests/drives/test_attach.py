@@ -59,7 +59,7 @@ def test_files_and_designs_are_drives(spec, tmp_path, monkeypatch, synthetic_map
         asked.append((design.drive.name, model))
         return synthetic_map
 
-    monkeypatch.setattr("swgjoint.fe.build_map.build_map", build)
+    monkeypatch.setattr("swgjoint.drives.build_map.build_map", build)
     synthetic_map.save(tmp_path / "drive.swg")
     (tmp_path / "drive.toml").write_text(design.to_toml())
     spec.option.timestep = 5e-4

@@ -10,7 +10,7 @@ import pytest
 from messages import naming
 from solved import kept
 
-import swgjoint.fe.build_map as building
+import swgjoint.drives.build_map as building
 from swgjoint.errors import ComputationError
 from swgjoint.fe.common.sampling import sample_map
 from swgjoint.fe.plane import friction_loop

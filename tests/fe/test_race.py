@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from messages import naming
 
+from swgjoint.drives.build_map import build_map
 from swgjoint.errors import DesignError
-from swgjoint.fe.build_map import build_map
 from swgjoint.fe.common.sampling import on_bearing
 from swgjoint.fe.meshing import simulate_meshing
 from swgjoint.fe.plane.continuation import Continuation

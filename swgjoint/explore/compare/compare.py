@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from swgjoint.drives.fidelity import default_model
 from swgjoint.drives.references import find_drive, given_drives, load_drive
 from swgjoint.drives.sections import LEVELS
 from swgjoint.errors import ComputationError, InputError
@@ -350,7 +351,7 @@ def _stress(
 
     if model == "ring":  # has no notches
         model = "2d"
-    model = model or ("3d" if source.cup is not None else "2d")
+    model = model or default_model(source)
     try:
         run = simulate_meshing(
             source,

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from swgjoint.drives.fidelity import default_model
 from swgjoint.errors import InputError, MissingExtraError, SwgError
 from swgjoint.gear.design.design import Design
 from swgjoint.maps.cache import code_version
@@ -114,7 +115,7 @@ def _load(first: Asked) -> None:
         from swgjoint.fe import meshing  # noqa: F401
     mapped = first.spec is not None and needs_map(first.spec.figures)
     if mapped or (first.run is not None and first.design is not None):
-        from swgjoint.fe import build_map  # noqa: F401
+        from swgjoint.drives import build_map  # noqa: F401
     if first.run is not None:
         from swgjoint.explore.compare import compare  # noqa: F401
 
@@ -208,7 +209,7 @@ def _meshing(design: Design, task: MeshingTask) -> dict[str, float | None]:
 
 
 def _model(design: Design, task: MeshingTask) -> str:
-    return task.model or ("3d" if design.cup is not None else "2d")
+    return task.model or default_model(design)
 
 
 def _simulated(
@@ -236,7 +237,7 @@ def _range(values: Sequence[float]) -> float:
 def _map(
     design: Design, task: SpecTask | RunTask, *, turn: bool
 ) -> tuple[DriveMap, Design]:
-    from swgjoint.fe.build_map import build_map
+    from swgjoint.drives.build_map import build_map
     from swgjoint.gear.design.tolerances import has_errors, without_errors
 
     if not turn and has_errors(design):  # read with the input locked

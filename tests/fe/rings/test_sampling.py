@@ -11,8 +11,8 @@ from messages import naming
 from solved import kept, ring_path
 
 from swgjoint.cli.main import main
+from swgjoint.drives.build_map import build_map
 from swgjoint.errors import DesignError
-from swgjoint.fe.build_map import build_map
 from swgjoint.fe.rings import sampling
 from swgjoint.fe.rings.loading import loaded, unloaded
 from swgjoint.fe.rings.model import thin_ring

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from swgjoint.drives.build_map import build_map
 from swgjoint.errors import DesignError
-from swgjoint.fe.build_map import build_map
 from swgjoint.gear.design.design import Design
 from swgjoint.maps.fit.fit import fit_map
 

@@ -197,7 +197,7 @@ def _no_finite_elements() -> Iterator[None]:
         mock.patch(f"{lot}.perfect_positions", lambda *_: ()),
         mock.patch(f"{lot}.superposition_error", lambda *_: 0.01),
         mock.patch(f"{lot}.sample_lot", _drawn_lot),
-        mock.patch("swgjoint.fe.build_map.build_map", _known_map),
+        mock.patch("swgjoint.drives.build_map.build_map", _known_map),
     ):
         yield
 

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from swgjoint.drives.fidelity import default_model
 from swgjoint.errors import ComputationError
 from swgjoint.fe.common.sampling import sample_map
 from swgjoint.fe.plane import drive2d
 from swgjoint.fe.plane.friction_loop import friction_loops
 from swgjoint.fe.rings import sampling as thin_ring
 from swgjoint.fe.solid import drive3d
+from swgjoint.gear.catalogue_stated import LOSS_KEYS
 from swgjoint.gear.design.design import Design
 from swgjoint.maps.cache import cached
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.fit.fit import fit_map
+from swgjoint.maps.fit.friction_bending import without_friction
 from swgjoint.maps.fit.hysteresis_loops import with_hysteresis
 from swgjoint.maps.unfinished import Unfinished
 from swgjoint.progress import Progress, silent
@@ -50,7 +53,7 @@ def build_map(
         DesignError: If the design cannot be built or holds what is not modelled.
         ComputationError: If no torque at all can be solved.
     """
-    model = model or ("3d" if design.cup is not None else "2d")
+    model = model or default_model(design)
     if model == "3d":
         drive3d.check_modelled(design)
     elif model == "ring":
@@ -66,7 +69,7 @@ def build_map(
             progress(f"map of {design.drive.name} in 3D, {hint}", 0, 1)
         if model == "ring":
             given = thin_ring.sample_rings(design, angles=angles, progress=progress)
-            return fit_map(given)
+            return _without_losses(design, fit_map(given))
         keep = Unfinished.of(parts) if cache else None
         samples = sample_map(
             design, model=model, angles=angles, progress=progress, keep=keep
@@ -76,7 +79,7 @@ def build_map(
             drive = _with_friction(design, drive, progress, keep)
         if keep is not None:
             keep.clear()
-        return drive
+        return _without_losses(design, drive)
 
     return cached(parts, build, name=design.drive.name) if cache else build()
 
@@ -93,3 +96,10 @@ def _with_friction(
         missing = {**drive.info.get("missing", {}), "hysteresis_loss_arcmin": reason}
         return replace(drive, info={**drive.info, "missing": missing})
     return with_hysteresis(drive, loops)
+
+
+def _without_losses(design: Design, drive: DriveMap) -> DriveMap:
+    """The map with the reason why it has no losses at speed."""
+    missing = dict.fromkeys(LOSS_KEYS, without_friction(design))
+    missing |= drive.info.get("missing", {})
+    return replace(drive, info={**drive.info, "missing": missing})

@@ -1,0 +1,12 @@
+"""The fidelity of finite elements that a design gets where nobody names one."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from swgjoint.gear.design.design import Design
+
+
+def default_model(design: Design) -> Literal["2d", "3d"]:
+    """``3d`` for a design with a cup, else ``2d``."""
+    return "2d" if design.cup is None else "3d"
