@@ -25,9 +25,11 @@ from swgjoint.sim.scene.scene import Scene
 def design(monkeypatch, tmp_path):
     """A bundled design whose finite elements give known samples."""
     monkeypatch.setenv("SWGJOINT_CACHE", str(tmp_path / "cache"))
-    samples = replace(samples_of(), name="reference-2d")
+    design = Design.load("reference-2d")
+    info = {"design_hash": design.content_hash()}
+    samples = replace(samples_of(), name="reference-2d", info=info)
     monkeypatch.setattr(building, "sample_map", lambda *_, **__: samples)
-    return Design.load("reference-2d")
+    return design
 
 
 def test_one_map(design, tmp_path):
@@ -37,7 +39,8 @@ def test_one_map(design, tmp_path):
     scene = Scene.load_file("bench", {"simulation.duration_s": 0.6})
     in_scene = assemble(scene).transmissions[0].drive
     spec = mujoco.MjSpec.from_string(
-        "<mujoco><worldbody><body><joint name='j' range='-1 1'/>"
+        "<mujoco><option timestep='1e-4'/><worldbody><body>"
+        "<joint name='j' range='-1 1'/>"
         "<geom size='.1'/></body></worldbody></mujoco>"
     )
     attached = swgjoint.attach(spec, joint="j", drive=design, rotor_inertia=1e-4)
@@ -70,5 +73,6 @@ def test_one_sheet(design, capsys, tmp_path, source):
 
 def test_a_fidelity_needs_a_design():
     """A map has its own."""
-    with pytest.raises(InputError, match=naming("2d", "CSG-25-100", "catalogue", "a design")):
+    said = naming("2d", "CSG-25-100", "catalogue", "a design")
+    with pytest.raises(InputError, match=said):
         swgjoint.spec_sheet("CSG-25-100", model="2d")
