@@ -39,7 +39,8 @@ CASES: dict[str, dict[str, list[str]]] = tomllib.loads(
     (FOLDER / "cases.toml").read_text(encoding="utf-8")
 )
 VOLATILE = ("wall_s", "cpu_s", "_per_s", "seconds", "version", "machine", "commit")
-VOLATILE += ("speed_up", "real_time", "memory", "date", "folder", "path", "created")
+VOLATILE += ("work_s", "speed_up", "real_time", "memory", "date", "folder", "path")
+VOLATILE += ("created",)
 """Parts of keys whose values are those of one machine or one run."""
 
 LONG_TABLE = 60
@@ -68,10 +69,11 @@ def run(name: str, argv: list[str], folder: Path) -> dict[str, Any]:
 def stable(value: Any, folder: str) -> Any:
     """A result without times, versions, places and sentences."""
     if isinstance(value, dict):
+        timed = {"cost", "efficiency"} if {"cost", "work_s"} & set(value) else set()
         return {
             key: stable(item, folder)
             for key, item in value.items()
-            if not any(part in key for part in VOLATILE)
+            if key not in timed and not any(part in key for part in VOLATILE)
         }
     if isinstance(value, list):
         items = [stable(item, folder) for item in value]
@@ -143,9 +145,9 @@ def differences(frozen: Any, found: Any, where: str = "") -> Iterator[str]:
     elif isinstance(frozen, float) and isinstance(found, float | int):
         # 1e-6: what solvers leave of a figure; 1e-9: residuals and other noise
         if not math.isclose(frozen, found, rel_tol=1e-6, abs_tol=1e-9):
-            yield f"{where}: {frozen!r}, now {found!r}"
+            yield f"{where}: {frozen!r:.60}, now {found!r:.60}"
     elif frozen != found:
-        yield f"{where}: {frozen!r}, now {found!r}"
+        yield f"{where}: {frozen!r:.60}, now {found!r:.60}"
 
 
 def text(content: Any) -> str:
