@@ -17,6 +17,7 @@ from swgjoint.fe.pattern import with_mirrored_torques
 from swgjoint.fe.sampling import sample_map
 from swgjoint.fe.tolerance_sampling import sample_tolerances
 from swgjoint.gear.design import Design
+from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.file import map_bytes
 from swgjoint.maps.fit import fit_map
 from swgjoint.maps.unfinished import Unfinished
@@ -126,22 +127,30 @@ def stopping(after: int):
 @pytest.mark.fe
 @pytest.mark.parametrize("spoil", [False, True], ids=["sound", "damaged"])
 def test_an_interrupted_map_goes_on_bit_for_bit(monkeypatch, tmp_path, spoil):
-    """Solved positions are taken up, damaged ones solved again; then they are gone."""
+    """Every finished equilibrium is read, a damaged one alone solved again."""
     monkeypatch.setenv("SWGJOINT_CACHE", str(tmp_path))
     monkeypatch.setattr(sampling, "LEVELS", (0.35, 1.0))
     design = few_teeth()
     whole = sampling.sample_map(design, angles=4)
-    # two positions of three solves, and some of the third
+    # two positions of three solves, and one of the third
     with pytest.raises(Stop):
-        build_map(design, angles=4, progress=stopping(7))
+        build_map(design, angles=4, progress=stopping(6))
     parts = sorted(tmp_path.rglob("*.npz"))
-    assert [part.stem for part in parts] == ["solves-0000", "solves-0001"]
+    assert [part.stem for part in parts] == [f"solve-{k:04d}" for k in range(7)]
     if spoil:
         parts[1].write_bytes(parts[1].read_bytes()[:-200])
-    seen = []
-    drive = build_map(design, angles=4, progress=lambda *call: seen.append(call[1]))
-    # the parts that are whole count at once, the others solve by solve
-    assert seen[:3] == ([3, 4, 5] if spoil else [3, 6, 7])
+    written = []
+    write = Unfinished.write
+
+    def noted(keep, name, arrays):
+        written.append(name)
+        write(keep, name, arrays)
+
+    monkeypatch.setattr(Unfinished, "write", noted)
+    drive = build_map(design, angles=4)
+    assert written[:2] == (["solve-0001"] if spoil else []) + [
+        f"solve-{k:04d}" for k in range(7, 8 if spoil else 9)
+    ]
     assert list(tmp_path.rglob("*.npz")) == []
     # all but the time that it took
     wanted = fit_map(whole)
@@ -149,6 +158,23 @@ def test_an_interrupted_map_goes_on_bit_for_bit(monkeypatch, tmp_path, spoil):
     assert map_bytes(replace(drive, info=drive.info | took)) == map_bytes(
         replace(wanted, info=wanted.info | took)
     )
+
+
+@pytest.mark.fe
+def test_a_map_is_kept_before_its_equilibria_are_removed(monkeypatch, tmp_path):
+    """A kill between the last solve and the entry of the cache costs no equilibrium."""
+    monkeypatch.setenv("SWGJOINT_CACHE", str(tmp_path))
+    monkeypatch.setattr(sampling, "LEVELS", (0.35, 1.0))
+
+    def stopped(*_: object) -> None:
+        raise Stop
+
+    with monkeypatch.context() as patch:
+        patch.setattr(DriveMap, "save", stopped)
+        with pytest.raises(Stop):
+            build_map(few_teeth(), angles=2)
+    monkeypatch.setattr(Unfinished, "write", stopped)
+    build_map(few_teeth(), angles=2)
 
 
 @pytest.mark.fe
