@@ -138,8 +138,9 @@ def generations(folder: Path) -> dict[str, float]:
 PART = "swgjoint.maps.unfinished:Unfinished.read"
 PARTS = stored(f"{CACHE}/unfinished/*/*.npz")
 FEW_SOLVES = (
-    "from swgjoint.fe import sampling; sampling.SOLID_SOLVES = 56;"
-    " sampling.SOLID_ANGLES = sampling.SOLID_MOST_ANGLES = 4"
+    "from swgjoint.fe import sampling; sampling.SOLID_SOLVES = 24;"
+    " sampling.SOLID_ANGLES = sampling.SOLID_MOST_ANGLES = 2;"
+    " sampling.SOLID_UNSEEN = (2, 1)"
 )
 FEW_ELEMENTS = "from swgjoint.fe.thin_ring import model; model.ELEMENTS = 100"
 CASES = (

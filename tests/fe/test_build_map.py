@@ -13,6 +13,7 @@ from swgjoint.errors import ComputationError
 from swgjoint.fe import build_map as building
 from swgjoint.fe import sampling, tolerance_sampling
 from swgjoint.fe.build_map import build_map
+from swgjoint.fe.continuation import Continuation
 from swgjoint.fe.pattern import with_mirrored_torques
 from swgjoint.fe.sampling import sample_map
 from swgjoint.fe.tolerance_sampling import sample_tolerances
@@ -213,6 +214,10 @@ def test_the_superposition_of_errors_is_counted_and_goes_on(monkeypatch, tmp_pat
     assert sorted(superposed) == [1, 1, 62]
     for key in ("torque", "table", "perfect"):
         assert np.array_equal(getattr(found, key), getattr(whole, key))
+    # nor are the full solves that were finished
+    monkeypatch.setattr(Continuation, "with_errors", None)
+    again = sample_tolerances(design, **options, keep=keep)
+    assert np.array_equal(again.solved.output_error, whole.solved.output_error)
 
 
 def test_a_map_in_3d_says_at_once_that_it_takes_long(monkeypatch):

@@ -87,7 +87,8 @@ def started(case: Case, folder: Path) -> subprocess.Popen[str]:
         "from swgjoint.cli.main import main; sys.exit(main())"
     )
     note = {begun.UNIT: case.begins, begun.FILE: str(note_of(folder))}
-    note["PYTHONPATH"] = str(Path(begun.__file__).parent)
+    path = [str(Path(begun.__file__).parent), os.environ.get("PYTHONPATH", "")]
+    note["PYTHONPATH"] = os.pathsep.join(filter(None, path))
     note_of(folder).write_text("")
     with log_of(folder).open("w") as log:
         return subprocess.Popen(
