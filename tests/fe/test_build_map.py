@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from messages import names
 from solved import coarse, few_teeth
 
-from swgjoint.errors import ComputationError
+from swgjoint.errors import ComputationError, Outcome
 from swgjoint.fe import build_map as building
 from swgjoint.fe import sampling, tolerance_sampling
 from swgjoint.fe.build_map import build_map
@@ -17,6 +18,7 @@ from swgjoint.fe.continuation import Continuation
 from swgjoint.fe.pattern import with_mirrored_torques
 from swgjoint.fe.sampling import sample_map
 from swgjoint.fe.tolerance_sampling import sample_tolerances
+from swgjoint.fe.torque_columns import ColumnGrid
 from swgjoint.gear.design import Design
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.file import map_bytes
@@ -159,6 +161,27 @@ def test_an_interrupted_map_goes_on_bit_for_bit(monkeypatch, tmp_path, spoil):
     assert map_bytes(replace(drive, info=drive.info | took)) == map_bytes(
         replace(wanted, info=wanted.info | took)
     )
+
+
+def test_a_failed_solve_is_not_tried_again(tmp_path, caplog):
+    """An interrupted run keeps failures, too, each for its own angle and torque."""
+    tried = []
+
+    def grid():
+        keep, nothing = Unfinished(folder=tmp_path), dict.fromkeys(("follow", "tick"))
+        numbers = {"period": 1.0, "finest": 4, "levels": [], "small": 0.1}
+        return ColumnGrid(**nothing, **numbers, keep=keep)
+
+    def failing():
+        tried.append(True)
+        return SimpleNamespace(outcome=Outcome.DIVERGED)
+
+    for _ in range(2):
+        assert grid().solved(0.0, 1.0, failing) is None
+    assert len(tried) == 1
+    assert grid().solved(0.25, 1.0, failing) is None
+    assert len(tried) == 2
+    assert names(caplog.text, "another angle", "computed again")
 
 
 @pytest.mark.fe
