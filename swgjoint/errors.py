@@ -33,6 +33,11 @@ class OutputWarning(UserWarning):
     """A file that belongs to a result could not be written; the result stands."""
 
 
+def out_of_memory(error: Exception) -> bool:
+    """Whether memory ran out; MuJoCo reports that by errors of its own."""
+    return isinstance(error, MemoryError) or "could not allocate" in str(error).lower()
+
+
 class Outcome(Enum):
     """Outcome of a solve; the value is the advice that a user sees."""
 

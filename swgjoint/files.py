@@ -14,7 +14,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from swgjoint.errors import InputError, OutputWarning, SwgError
+from swgjoint.errors import InputError, OutputWarning, SwgError, out_of_memory
 from swgjoint.json_text import json_text
 
 DEEPEST = 100
@@ -98,7 +98,10 @@ def attempting(
         if unless():
             raise
         kind = "" if isinstance(failure, SwgError) else f"{type(failure).__name__}: "
-        text = f"{path} is not written: {kind}{' '.join(str(failure).split())}"
+        why = f"{kind}{' '.join(str(failure).split())}"
+        if out_of_memory(failure):
+            why = "out of memory"
+        text = f"{path} is not written: {why}"
         warnings.warn(OutputWarning(text), stacklevel=3)
 
 

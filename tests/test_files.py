@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 
+import mujoco
 import pytest
 
 from swgjoint.errors import InputError, OutputWarning
@@ -42,6 +43,16 @@ def test_a_folder_that_cannot_be_made_is_told_per_file(tmp_path):
     with pytest.warns(OutputWarning, match=r"a\.txt is not written"):
         outputs.write("a.txt", lambda: "text")
     assert outputs.files == []
+
+
+def test_an_engine_without_memory_is_no_defect(tmp_path):
+    """What MuJoCo raises when it cannot allocate is reported as want of memory."""
+
+    def too_large():
+        mujoco.MjModel.from_xml_string('<mujoco><size memory="1000000G"/></mujoco>')
+
+    with pytest.warns(OutputWarning, match=r"a\.png is not written: out of memory$"):
+        Outputs(tmp_path).write("a.png", too_large)
 
 
 def test_a_failure_of_the_content_is_raised(tmp_path):

@@ -24,7 +24,7 @@ from types import ModuleType
 from typing import Any, NoReturn
 
 from swgjoint import __version__
-from swgjoint.errors import InputError, OutputWarning, SwgError
+from swgjoint.errors import InputError, OutputWarning, SwgError, out_of_memory
 from swgjoint.progress import StderrProgress, silent
 
 COMMANDS = {
@@ -170,9 +170,10 @@ def _command(name: str, arguments: list[str]) -> int:
     except OSError as exc:  # disk full, no permission: nothing that we can repair
         what = f"{exc.filename}: " if exc.filename else ""
         return _refuse(name, f"{what}{exc.strerror or exc}", FAILED)
-    except MemoryError:
-        return _refuse(name, "out of memory: use a smaller refinement", FAILED)
-    except Exception as exc:  # a defect of ours: one line, and how to report it
+    except Exception as exc:
+        if out_of_memory(exc):
+            return _refuse(name, "out of memory: use a smaller refinement", FAILED)
+        # a defect of ours: one line, and how to report it
         if args.traceback:
             traceback.print_exc()
         return _refuse(name, _internal(exc, shown=args.traceback), FAILED)

@@ -46,8 +46,7 @@ def build_map(
             :func:`swgjoint.fe.rings.sampling.sample_rings` if None.
         progress: Called with the stage, the solves done and their number.
         cache: Whether to look in the cache of maps, and to store there. With it a map
-            in the plane or in space that was interrupted goes on where it was, and is
-            the same bit for bit.
+            that was interrupted goes on where it was, and is the same bit for bit.
 
     Raises:
         DesignError: If the design cannot be built or holds what is not modelled.
@@ -63,25 +62,31 @@ def build_map(
 
     parts = {"design": design.content_hash(), "model": model, "angles": angles}
 
+    keep = Unfinished.of(parts) if cache else None
+
     def build() -> DriveMap:
         if model == "3d":
             hint = "takes some 20 min; 2d and ring are quicker"
             progress(f"map of {design.drive.name} in 3D, {hint}", 0, 1)
         if model == "ring":
-            given = thin_ring.sample_rings(design, angles=angles, progress=progress)
-            return _without_losses(design, fit_map(given))
-        keep = Unfinished.of(parts) if cache else None
+            samples = thin_ring.sample_rings(
+                design, angles=angles, progress=progress, keep=keep
+            )
+            return _without_losses(design, fit_map(samples))
         samples = sample_map(
             design, model=model, angles=angles, progress=progress, keep=keep
         )
         drive = fit_map(samples)
         if design.friction.tooth_coefficient:
             drive = _with_friction(design, drive, progress, keep)
-        if keep is not None:
-            keep.clear()
         return _without_losses(design, drive)
 
-    return cached(parts, build, name=design.drive.name) if cache else build()
+    if not cache:
+        return build()
+    drive = cached(parts, build, name=design.drive.name)
+    if keep is not None:
+        keep.clear()  # not before the map itself is in the cache
+    return drive
 
 
 def _with_friction(

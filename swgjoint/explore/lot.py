@@ -48,7 +48,8 @@ FIGURES = UPPER + LOWER
 SIZES = ("limit", "uniform")
 
 CHUNK = 10
-"""Drives of one task: some seconds."""
+"""Drives of one task, some seconds: it takes the positions without errors with it,
+which are tens of megabytes. Each drive is solved alone and kept as soon as it is."""
 _SIZE_STREAM = 100
 """Of the random numbers of a drive; those of its errors have lower numbers."""
 
@@ -83,13 +84,6 @@ class Drawn:
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Part:
-    """Drives of one task, as they are kept."""
-
-    rows: list[Drawn]
-
-
-@dataclass(frozen=True, kw_only=True)
 class _Judged:
     """:func:`superposition_error` of the first drive, as it is kept."""
 
@@ -100,7 +94,7 @@ class _Judged:
 class _Task:
     rests: Sequence[Rest]
     drives: tuple[Design, ...]
-    path: Path | None
+    paths: tuple[Path | None, ...]
     """Where they are kept."""
 
 
@@ -189,30 +183,29 @@ def run_lot(
         return _Judged(error=error)
 
     off = recalled("lots", {**parts, "full solves": seed}, _Judged, judged).error
-    found: dict[tuple[int, ...], _Part] = {}
-    tasks = {}
-    for first in range(seed, seed + count, CHUNK):
-        seeds = tuple(range(first, min(first + CHUNK, seed + count)))
-        path = entry_of("lots", {**parts, "seeds": seeds})
-        there = known(path, _Part)
-        if there is None:
-            drives = tuple(draw(design, one, sizes) for one in seeds)
-            tasks[seeds] = _Task(rests=rests(), drives=drives, path=path)
-        else:
-            found[seeds] = there
+    paths = {
+        one: entry_of("lots", {**parts, "seed": one})
+        for one in range(seed, seed + count)
+    }
+    found = {one: row for one, path in paths.items() if (row := known(path, Drawn))}
+    left = [one for one in paths if one not in found]
+    tasks = [
+        _Task(
+            rests=rests(),
+            drives=tuple(draw(design, one, sizes) for one in seeds),
+            paths=tuple(paths[one] for one in seeds),
+        )
+        for seeds in (left[k : k + CHUNK] for k in range(0, len(left), CHUNK))
+    ]
 
     def report(stage: str, done: int, total: int) -> None:
-        progress(stage, len(found) + done, len(found) + total)
+        progress(stage, len(found) + min(CHUNK * done, len(left)), count)
 
     solved_now = run_all(
-        _solved,
-        list(tasks.values()),
-        jobs=jobs,
-        stage=f"{name}: tens of drives",
-        progress=report,
+        _solved, tasks, jobs=jobs, stage=f"{name}: drives", progress=report
     )
-    found |= dict(zip(tasks, solved_now, strict=True))
-    rows = [row for _, part in sorted(found.items()) for row in part.rows]
+    rows = [*found.values(), *(row for part in solved_now for row in part)]
+    rows.sort(key=lambda row: row.seed)
     solved = [row for row in rows if not row.failed]
     return {
         "design": design.drive.name,
@@ -272,12 +265,16 @@ def _own_version() -> str:
     return code_hash("explore/lot.py", "maps/sheet/sampled_accuracy.py")
 
 
-def _solved(task: _Task) -> _Part:
-    lot = sample_lot(task.drives, task.rests)
-    rows = [_figures(lot, n, drive) for n, drive in enumerate(task.drives)]
-    found = _Part(rows=rows)
-    if task.path is not None:
-        keep(task.path, json_file(found))
+def _solved(task: _Task) -> list[Drawn]:
+    pairs = zip(task.drives, task.paths, strict=True)
+    return [_one(task.rests, drive, path) for drive, path in pairs]
+
+
+def _one(rests: Sequence[Rest], drive: Design, path: Path | None) -> Drawn:
+    """One drive; beside others it would differ from itself by round-off."""
+    found = _figures(sample_lot([drive], rests), 0, drive)
+    if path is not None:
+        keep(path, json_file(found))
     return found
 
 

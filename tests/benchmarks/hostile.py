@@ -25,6 +25,9 @@ from pathlib import Path
 from typing import Any
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+# the memory allocator of recordings reserves address space that it does not use, 1 GB
+# at a time, which the limit of an input would count [KiB]
+os.environ.setdefault("MIMALLOC_ARENA_RESERVE", "65536")
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "shared"))
 
 from hostile import KINDS, draw

@@ -5,14 +5,16 @@
 For every command one run that nothing stops, then runs that SIGKILL ends after a random
 part of its time, each followed by the same command. Prints a table: how many second
 runs had the same result, how many units of work were kept at the kill (least, median,
-most), how many units had to be done again, what was left behind. Inputs are coarse, so
-that a run takes seconds. Linux.
+most), how many of these were done again, how many that were begun before the kill were
+begun once more (median, most: those in flight, one a process, or with ``sweep`` and
+``optimise`` a task of 2 s of designs), what was left behind. Work before the first unit
+and after the last one is repeated, too. Inputs are coarse, so that a run takes seconds.
+Linux.
 """
 
 from __future__ import annotations
 
 import argparse
-import re
 import statistics
 import sys
 import tempfile
@@ -34,6 +36,7 @@ from interrupted import (
     interrupted,
     prepared,
     stored,
+    units,
 )
 
 from swgjoint.cli.shared.text import table
@@ -111,13 +114,11 @@ def map_arrays(folder: Path, _: dict[str, Any]) -> Any:
     return {**arrays, "info": drive.info}
 
 
-def states(folder: Path) -> dict[str, None]:
-    """Equilibria of a map that are kept."""
+def drives(folder: Path) -> dict[str, int]:
+    """Drives of a lot that are kept, and when; the check of one of them is not."""
+    found = stored(f"{CACHE}/lots/*.json")(folder)
     return {
-        f"{path.name} {key}": None
-        for path in folder.glob(f"{CACHE}/unfinished/*/[!.]*.npz")
-        for key, value in arrays_content(path.read_bytes()).items()
-        if key.endswith(".kind") and str(value) == "State"
+        name: t for name, t in found.items() if '"seed"' in (folder / name).read_text()
     }
 
 
@@ -134,12 +135,21 @@ def generations(folder: Path) -> dict[str, float]:
     }
 
 
+PART = "swgjoint.maps.unfinished:Unfinished.read"
+PARTS = stored(f"{CACHE}/unfinished/*/*.npz")
+FEW_SOLVES = (
+    "from swgjoint.fe import sampling; sampling.SOLID_SOLVES = 24;"
+    " sampling.SOLID_ANGLES = sampling.SOLID_MOST_ANGLES = 2;"
+    " sampling.SOLID_UNSEEN = (2, 1)"
+)
+FEW_ELEMENTS = "from swgjoint.fe.thin_ring import model; model.ELEMENTS = 100"
 CASES = (
     Case(
         name="sweep",
         arguments=("sweep", "sweep.toml", "--out", "out", "--jobs", "2"),
         inputs={"few.toml": toml("reference-2d"), "sweep.toml": SWEEP},
         unit="designs",
+        begins="swgjoint.study.sweep_figures:compute",
         kept=stored("out/results/*/*.json"),
     ),
     Case(
@@ -147,21 +157,52 @@ CASES = (
         arguments=("optimise", "optimise.toml", "--out", "out", "--jobs", "2"),
         inputs={"few.toml": toml("reference-2d"), "optimise.toml": OPTIMISE},
         unit="designs",
+        begins="swgjoint.study.sweep_figures:compute",
         kept=stored("out/results/*/*.json"),
     ),
     Case(
         name="lot",
         arguments=("lot", "few.toml", "--drives", "80", "--jobs", "2", "--out", "out"),
         inputs={"few.toml": toml("reference-2d-tolerances")},
-        unit="tens of drives",
-        kept=stored(f"{CACHE}/lots/*.json"),
+        unit="drives",
+        begins="swgjoint.study.lot:_one",
+        kept=drives,
     ),
     Case(
         name="map",
-        arguments=("map", "few.toml", "-o", "few.swg", "--verbose"),
+        arguments=("map", "few.toml", "-o", "few.swg"),
         inputs={"few.toml": toml("reference-2d")},
         unit="equilibria",
-        kept=states,
+        begins=PART,
+        kept=PARTS,
+        result=map_arrays,
+    ),
+    Case(
+        name="map-3d",
+        arguments=("map", "cup.toml", "-o", "few.swg", "--model", "3d"),
+        inputs={"cup.toml": toml("reference-3d-modified", CUP)},
+        settings=FEW_SOLVES,
+        unit="equilibria",
+        begins=PART,
+        kept=PARTS,
+        result=map_arrays,
+    ),
+    Case(
+        name="map-ring",
+        arguments=("map", "size-25-100", "-o", "few.swg", "--model", "ring"),
+        settings=FEW_ELEMENTS,
+        unit="positions of the balls",
+        begins=PART,
+        kept=PARTS,
+        result=map_arrays,
+    ),
+    Case(
+        name="map-tolerances",
+        arguments=("map", "few.toml", "-o", "few.swg"),
+        inputs={"few.toml": toml("reference-2d-tolerances")},
+        unit="equilibria, phases of a pitch",
+        begins=PART,
+        kept=PARTS,
         result=map_arrays,
     ),
     Case(
@@ -172,6 +213,7 @@ CASES = (
         ),
         inputs={"cup.toml": toml("reference-3d-modified", CUP)},
         unit="equilibria",
+        begins="swgjoint.fe.solid.checkpoint:Checkpoint.read",
         kept=stored("out/states/*.npz"),
     ),
     Case(
@@ -181,6 +223,7 @@ CASES = (
             *("--set", "drive=CSG-20-100", "--out", "out"),
         ),
         unit="generations",
+        begins="swgjoint.study.tune:_costs",
         kept=generations,
     ),
     Case(
@@ -190,6 +233,7 @@ CASES = (
             *("--set", "simulation.duration_s=60"),
         ),
         unit="runs",
+        begins="swgjoint.sim.run:set_start",
         inputs={"out/run.rrd": OLDER},
         kept=stored("out/[!r]*.rrd"),
         sound=whole_recording,
@@ -209,8 +253,9 @@ def main() -> None:
         for case in CASES:
             if case.name in args.only.split(","):
                 rows.append(row(case, Path(top) / case.name, args.kills, rng))
-    header = ("", "kills", "same result", "kept at the kill", "kept and done again")
-    header += ("solved and not kept", "litter", "processes left", "whole run [s]")
+    header = ("", "kills", "same result", "units", "kept at the kill")
+    header += ("kept and done again", "begun twice", "litter", "processes left")
+    header += ("whole run [s]",)
     print(table(rows, header=header))
 
 
@@ -231,19 +276,20 @@ def row(case: Case, top: Path, kills: int, rng: np.random.Generator) -> tuple[An
         found.append(outcome)
         print(
             f"{case.name} {len(found)}/{kills}: kept {outcome.kept}, again"
-            f" {outcome.again}, told {told(outcome.log)}, same {outcome.same}, sound"
-            f" {outcome.sound}, litter"
-            f" {outcome.litter}, processes {outcome.left}",
+            f" {outcome.again}, begun {outcome.begun}, twice {outcome.twice}, same"
+            f" {outcome.same}, sound {outcome.sound}, litter {outcome.litter},"
+            f" processes {outcome.left}",
             file=sys.stderr,
         )
-    kept = [one.kept for one in found]
+    kept, twice = [one.kept for one in found], [one.twice for one in found]
     return (
         case.name,
         len(found),
         sum(one.same and one.sound for one in found),
-        f"{min(kept)}, {statistics.median(kept):g}, {max(kept)} {case.unit}",
+        f"{units(folder)} {case.unit}",
+        f"{min(kept)}, {statistics.median(kept):g}, {max(kept)}",
         sum(one.again for one in found),
-        max(told(one.log) - one.kept for one in found) if case.name == "map" else None,
+        f"{statistics.median(twice):g}, {max(twice)}",
         sum(bool(one.litter) for one in found),
         sum(bool(one.left) for one in found),
         wall,
@@ -252,12 +298,6 @@ def row(case: Case, top: Path, kills: int, rng: np.random.Generator) -> tuple[An
 
 def past(end: float) -> bool:
     return time.monotonic() > end
-
-
-def told(log: str) -> int:
-    """Equilibria that a map had solved when it was killed."""
-    counts = re.findall(r"equilibria: (\d+)/", log)
-    return int(counts[-1]) if counts else 0
 
 
 if __name__ == "__main__":

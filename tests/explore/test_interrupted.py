@@ -28,7 +28,7 @@ KEPT = stored("out/results/*/*.json")
 @pytest.mark.fe
 @pytest.mark.skipif(not Path("/proc").is_dir(), reason="looks for processes in /proc")
 def test_a_killed_sweep_goes_on(tmp_path):
-    """Same rows, no kept design is computed again, no file and no process is left.
+    """Same rows, only designs in flight are computed again, nothing is left behind.
 
     ``tests/benchmarks/interruptions.py`` kills other commands at random times.
     """
@@ -37,6 +37,7 @@ def test_a_killed_sweep_goes_on(tmp_path):
         arguments=("sweep", "sweep.toml", "--out", "out", "--jobs", "2"),
         inputs={"few.toml": few_teeth().to_toml(), "sweep.toml": SWEEP},
         unit="designs",
+        begins="swgjoint.study.sweep_figures:compute",
         kept=KEPT,
     )
     whole = prepared(case, tmp_path / "whole")
@@ -45,4 +46,6 @@ def test_a_killed_sweep_goes_on(tmp_path):
     found = interrupted(case, folder, lambda: len(KEPT(folder)) > 1, (whole, printed))
     assert found is not None and 2 <= found.kept < 5
     assert found.same and found.again == 0
+    # one in each of two processes
+    assert found.begun >= found.kept and 0 <= found.twice <= 2
     assert found.litter == found.left == ()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,13 +12,16 @@ from solved import coarse, few_teeth
 
 from swgjoint.drives import build_map as building
 from swgjoint.drives.build_map import build_map
-from swgjoint.errors import ComputationError
+from swgjoint.errors import ComputationError, Outcome
 from swgjoint.fe.common import sampling
 from swgjoint.fe.common.pattern import with_mirrored_torques
 from swgjoint.fe.common.sampling import sample_map
+from swgjoint.fe.common.torque_columns import ColumnGrid
+from swgjoint.fe.plane.continuation import Continuation
 from swgjoint.fe.tolerances import sampling as tolerance_sampling
 from swgjoint.fe.tolerances.sampling import sample_tolerances
 from swgjoint.gear.design.design import Design
+from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.file import map_bytes
 from swgjoint.maps.fit.fit import fit_map
 from swgjoint.maps.unfinished import Unfinished
@@ -127,22 +131,30 @@ def stopping(after: int):
 @pytest.mark.fe
 @pytest.mark.parametrize("spoil", [False, True], ids=["sound", "damaged"])
 def test_an_interrupted_map_goes_on_bit_for_bit(monkeypatch, tmp_path, spoil):
-    """Solved positions are taken up, damaged ones solved again; then they are gone."""
+    """Every finished equilibrium is read, a damaged one alone solved again."""
     monkeypatch.setenv("SWGJOINT_CACHE", str(tmp_path))
     monkeypatch.setattr(sampling, "LEVELS", (0.35, 1.0))
     design = few_teeth()
     whole = sampling.sample_map(design, angles=4)
-    # two positions of three solves, and some of the third
+    # two positions of three solves, and one of the third
     with pytest.raises(Stop):
-        build_map(design, angles=4, progress=stopping(7))
+        build_map(design, angles=4, progress=stopping(6))
     parts = sorted(tmp_path.rglob("*.npz"))
-    assert [part.stem for part in parts] == ["solves-0000", "solves-0001"]
+    assert [part.stem for part in parts] == [f"solve-{k:04d}" for k in range(7)]
     if spoil:
         parts[1].write_bytes(parts[1].read_bytes()[:-200])
-    seen = []
-    drive = build_map(design, angles=4, progress=lambda *call: seen.append(call[1]))
-    # the parts that are whole count at once, the others solve by solve
-    assert seen[:3] == ([3, 4, 5] if spoil else [3, 6, 7])
+    written = []
+    write = Unfinished.write
+
+    def noted(keep, name, arrays):
+        written.append(name)
+        write(keep, name, arrays)
+
+    monkeypatch.setattr(Unfinished, "write", noted)
+    drive = build_map(design, angles=4)
+    assert written[:2] == (["solve-0001"] if spoil else []) + [
+        f"solve-{k:04d}" for k in range(7, 8 if spoil else 9)
+    ]
     assert list(tmp_path.rglob("*.npz")) == []
     wanted = fit_map(whole)
     # all but the time that it took, and the reasons that build_map adds
@@ -150,6 +162,44 @@ def test_an_interrupted_map_goes_on_bit_for_bit(monkeypatch, tmp_path, spoil):
     assert map_bytes(replace(drive, info=drive.info | other)) == map_bytes(
         replace(wanted, info=wanted.info | other)
     )
+
+
+def test_a_failed_solve_is_not_tried_again(tmp_path, caplog):
+    """An interrupted run keeps failures, too, each for its own angle and torque."""
+    tried = []
+
+    def grid():
+        keep, nothing = Unfinished(folder=tmp_path), dict.fromkeys(("follow", "tick"))
+        numbers = {"period": 1.0, "finest": 4, "levels": [], "small": 0.1}
+        return ColumnGrid(**nothing, **numbers, keep=keep)
+
+    def failing():
+        tried.append(True)
+        return SimpleNamespace(outcome=Outcome.DIVERGED)
+
+    for _ in range(2):
+        assert grid().solved(0.0, 1.0, failing) is None
+    assert len(tried) == 1
+    assert grid().solved(0.25, 1.0, failing) is None
+    assert len(tried) == 2
+    assert names(caplog.text, "another angle", "computed again")
+
+
+@pytest.mark.fe
+def test_a_map_is_kept_before_its_equilibria_are_removed(monkeypatch, tmp_path):
+    """A kill between the last solve and the entry of the cache costs no equilibrium."""
+    monkeypatch.setenv("SWGJOINT_CACHE", str(tmp_path))
+    monkeypatch.setattr(sampling, "LEVELS", (0.35, 1.0))
+
+    def stopped(*_: object) -> None:
+        raise Stop
+
+    with monkeypatch.context() as patch:
+        patch.setattr(DriveMap, "save", stopped)
+        with pytest.raises(Stop):
+            build_map(few_teeth(), angles=2)
+    monkeypatch.setattr(Unfinished, "write", stopped)
+    build_map(few_teeth(), angles=2)
 
 
 @pytest.mark.fe
@@ -188,6 +238,10 @@ def test_the_superposition_of_errors_is_counted_and_goes_on(monkeypatch, tmp_pat
     assert sorted(superposed) == [1, 1, 62]
     for key in ("torque", "table", "perfect"):
         assert np.array_equal(getattr(found, key), getattr(whole, key))
+    # nor are the full solves that were finished
+    monkeypatch.setattr(Continuation, "with_errors", None)
+    again = sample_tolerances(design, **options, keep=keep)
+    assert np.array_equal(again.solved.output_error, whole.solved.output_error)
 
 
 def test_a_map_in_3d_says_at_once_that_it_takes_long(monkeypatch):

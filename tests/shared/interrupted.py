@@ -16,6 +16,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import begun
+
 CACHE = "cache"
 """Folder of the cache inside that of a case."""
 COSTS = {
@@ -34,11 +36,15 @@ class Case:
     name: str
     arguments: tuple[str, ...]
     unit: str
-    """What is kept as soon as it is done."""
+    """What one process computes at a time."""
+    begins: str
+    """The function that begins a unit, see :data:`begun.UNIT`."""
+    settings: str = ""
+    """Statements before the command, for what it has no option for."""
     inputs: Mapping[str, str] = field(default_factory=dict)
     """Files of the folder by name."""
     kept: Callable[[Path], Mapping[str, Any]]
-    """Units in the folder by name, each with what changes if it is done again."""
+    """What is in the folder by name, each with what changes if it is done again."""
     result: Callable[[Path, dict[str, Any]], Any] = lambda folder, printed: printed
     """What has to be the same, of the folder and the JSON that the command prints."""
     sound: Callable[[Path], bool] = lambda folder: True
@@ -50,11 +56,13 @@ class Outcome:
     """What came of one interruption."""
 
     kept: int
-    """Units when the command was killed."""
+    """Units in the folder when the command was killed."""
     again: int
     """Of these, those that the second run did once more."""
-    log: str
-    """Progress of the run that was killed."""
+    begun: int
+    """Units that were begun when the command was killed."""
+    twice: int
+    """Of these, those that the second run began once more."""
     sound: bool
     same: bool
     litter: tuple[str, ...]
@@ -74,12 +82,19 @@ def prepared(case: Case, folder: Path) -> Path:
 
 def started(case: Case, folder: Path) -> subprocess.Popen[str]:
     """The command, its progress in a file."""
-    code = "import sys; from swgjoint.cli.main import main; sys.exit(main())"
+    code = (
+        f"import sys, begun; begun.watch(); {case.settings}\n"
+        "from swgjoint.cli.main import main; sys.exit(main())"
+    )
+    note = {begun.UNIT: case.begins, begun.FILE: str(note_of(folder))}
+    path = [str(Path(begun.__file__).parent), os.environ.get("PYTHONPATH", "")]
+    note["PYTHONPATH"] = os.pathsep.join(filter(None, path))
+    note_of(folder).write_text("")
     with log_of(folder).open("w") as log:
         return subprocess.Popen(
             [sys.executable, "-P", "-c", code, *case.arguments, "--json"],
             cwd=folder,
-            env={**os.environ, "SWGJOINT_CACHE": str(folder / CACHE)},
+            env={**os.environ, "SWGJOINT_CACHE": str(folder / CACHE), **note},
             stdout=subprocess.PIPE,
             stderr=log,
             text=True,
@@ -93,6 +108,16 @@ def finished(case: Case, folder: Path) -> dict[str, Any]:
     assert process.returncode == 0, log_of(folder).read_text()
     found: dict[str, Any] = json.loads(printed)
     return found
+
+
+def note_of(folder: Path) -> Path:
+    """Where the units are noted that the command of a folder begins."""
+    return folder.parent / f"{folder.name}.begun"
+
+
+def units(folder: Path) -> int:
+    """Units that the last command of a folder has begun."""
+    return len(note_of(folder).read_text().splitlines())
 
 
 def log_of(folder: Path) -> Path:
@@ -129,15 +154,16 @@ def interrupted(
     end = time.monotonic() + PATIENCE_S
     while (left := tuple(filter(running, processes))) and time.monotonic() < end:
         time.sleep(0.05)
-    kept = case.kept(folder)
-    sound, log = case.sound(folder), log_of(folder).read_text()
+    kept, first = case.kept(folder), units(folder)
+    sound = case.sound(folder)
     printed = finished(case, folder)
     after = case.kept(folder)
     unlike = files(folder) ^ files(whole[0])
     return Outcome(
         kept=len(kept),
         again=sum(after.get(name, token) != token for name, token in kept.items()),
-        log=log,
+        begun=first,
+        twice=first + units(folder) - units(whole[0]),
         sound=sound,
         same=plain(case, folder, printed) == plain(case, *whole),
         litter=tuple(sorted(unlike)),

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Generic
 
 import numpy as np
@@ -12,8 +13,7 @@ from numpy.typing import NDArray
 from swgjoint.errors import ComputationError
 from swgjoint.fe.common.following import AnyState, Follower
 from swgjoint.fe.common.torque_choice import unseen_places
-from swgjoint.fe.common.torque_columns import STATE, ColumnGrid, check_like
-from swgjoint.fe.plane.state_arrays import packed, settled, unpacked
+from swgjoint.fe.common.torque_columns import ColumnGrid
 from swgjoint.maps.samples import FullSolves
 from swgjoint.maps.unfinished import Unfinished
 
@@ -92,7 +92,6 @@ def solve_pattern(
     symmetric: bool,
     tick: Callable[[], None],
     keep: Unfinished | None = None,
-    restored: Callable[[int], None] = lambda solves: None,
 ) -> Pattern[AnyState]:
     """Solve as many angles and torques as the drive asks for.
 
@@ -112,8 +111,7 @@ def solve_pattern(
         rated: Next to it the claims are checked [N·m].
         symmetric: Whether the negative torques are the mirror image.
         tick: Called after every solve.
-        keep: Where solved positions are kept, and taken up again; None keeps none.
-        restored: Called with the number of solves that an interrupted run had done.
+        keep: Where equilibria are kept, and taken up again; None keeps none.
 
     Raises:
         ComputationError: If the unloaded drive or all torques cannot be solved.
@@ -126,7 +124,6 @@ def solve_pattern(
         small=small,
         tick=tick,
         keep=keep,
-        restored=restored,
     )
     count = effort.angles
     grid.solve_columns(count)
@@ -228,17 +225,12 @@ def _second_pitch(
     follow, theta = grid.follow, grid.angles(count)
     columns = [column for _, column in grid.chosen(count)]
     state, again = columns[-1].states[torque], []
-    for k, angle in enumerate(theta[::EVERY]):
-        name = f"second-pitch-{k:04d}"
-        there = None if grid.keep is None else _read(grid.keep, name, like=state)
-        if there is None:
-            there = settled(follow.to_angle(state, grid.period + float(angle)))
-            if grid.keep is not None:
-                grid.keep.write(name, packed(there, STATE))
-        state = there
-        ok = state.outcome.ok
-        again.append(follow.output_angle(state) if ok else np.nan)
-        grid._count()
+    for angle in grid.period + theta[::EVERY]:
+        solve = partial(follow.to_angle, state, float(angle))
+        found = grid.solved(float(angle), torque, solve)
+        again.append(np.nan if found is None else follow.output_angle(found))
+        state = state if found is None else found
+        grid.count()
     first = np.array([grid.figures(c.states[torque], c.theta)[0] for c in columns])
     apart = np.array(again) - (grid.period + theta[::EVERY]) / follow.ratio
     return {
@@ -252,25 +244,13 @@ def _mirror(grid: ColumnGrid[AnyState], torque: float, count: int) -> dict[str, 
     """How well the drive is its own mirror image, at the second angle."""
     step = grid.finest // count
     one, image = grid.columns[step], grid.columns[grid.finest - step]
-    solved = grid.follow.to_torque(one.rest.state, -torque)
-    error = grid.figures(solved, one.theta)[0]
-    wanted = -grid.figures(image.states[torque], image.theta)[0]
-    ok = solved.outcome.ok
-    return {
-        "torque_Nm": -torque,
-        "difference_rad": float(error - wanted) if ok else None,
-    }
-
-
-def _read(keep: Unfinished, name: str, *, like: AnyState) -> AnyState | None:
-    """A state of an interrupted run; None if it did not get there."""
-
-    def taken(arrays: Mapping[str, Any]) -> AnyState:
-        state: AnyState = unpacked(arrays, STATE)
-        check_like(state, like)
-        return state
-
-    return keep.read(name, taken)
+    solve = partial(grid.follow.to_torque, one.rest.state, -torque)
+    found = grid.solved(one.theta, -torque, solve)
+    difference = None
+    if found is not None:
+        wanted = -grid.figures(image.states[torque], image.theta)[0]
+        difference = float(grid.figures(found, one.theta)[0] - wanted)
+    return {"torque_Nm": -torque, "difference_rad": difference}
 
 
 def with_mirrored_torques(tables: dict[float, Array]) -> dict[float, Array]:

@@ -94,7 +94,7 @@ def sample_map(
             :data:`FIXED_SOLVES` equilibria each; by default as many as the drive asks
             for, from :data:`ANGLES`, in space :data:`SOLID_ANGLES`.
         progress: Called with the stage, the solves done and their number.
-        keep: Where solved positions are kept and taken up again after an interruption;
+        keep: Where every equilibrium is kept and taken up again after an interruption;
             the samples are the same, bit for bit. None keeps none.
 
     Raises:
@@ -114,9 +114,9 @@ def sample_map(
     stages = len(STAGES) if has_errors(design) else 1
     stage = f"{drive.name}: equilibria" + (f", part 1 of {stages}" * (stages > 1))
 
-    def tick(solves: int = 1) -> None:
+    def tick() -> None:
         nonlocal done
-        done += solves
+        done += 1
         progress(stage, min(done, total), total)
 
     settings: dict[str, Any] = {
@@ -125,7 +125,6 @@ def sample_map(
         "symmetric": symmetric,
         "tick": tick,
         "keep": keep,
-        "restored": tick,
     }
     try:
         # two calls: states in the plane and in space differ

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Generic
+from functools import partial
+from typing import Any, Generic, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,7 @@ from swgjoint.maps.samples import FullSolves
 from swgjoint.maps.unfinished import Unfinished
 
 Array = NDArray[np.float64]
+T = TypeVar("T")
 
 POTENTIAL_WAVES = 1.0
 """Waves in a pitch of the estimated error of the complementary potential, whose
@@ -37,9 +39,7 @@ BEYOND = (0.02, 0.15)
 AHEAD = 0.4
 """Reach of a prediction of contact changes, in parts of the largest torque: above the
 distance of any two common torques."""
-_SOLVES, _REST, _TORQUES = "solves-{:04d}", "rest", "torques"
-STATE = "state"
-"""Name of a state in the arrays of an interrupted run."""
+_SOLVE, _STATE = "solve-{:04d}", "state"
 
 
 @dataclass(kw_only=True, eq=False)
@@ -90,15 +90,16 @@ class ColumnGrid(Generic[AnyState]):
     small: float
     tick: Callable[[], None]
     keep: Unfinished | None
-    restored: Callable[[int], None]
     columns: dict[float, AngleColumn[AnyState]] = field(default_factory=dict)
     failed: list[float] = field(default_factory=list)
     """Torques between the levels that were tried in vain."""
     beyond: list[float] = field(default_factory=list)
     """Torques of every column beyond the levels, at most one of each sign."""
     solves: int = 0
-    parts: int = 0
-    """Kept so far."""
+    tried: int = 0
+    """Solves and those that failed."""
+    like: AnyState | None = None
+    """The first state; an interrupted run holds none of another shape."""
 
     @property
     def free(self) -> bool:
@@ -145,13 +146,10 @@ class ColumnGrid(Generic[AnyState]):
         """Rest and the common torques, from the column before, if there is one."""
         theta = self.period * place / self.finest
         before = max((p for p in self.columns if p < place), default=None)
-        column = self._read(theta, self.levels)
-        if column is None:
-            if before is None:
-                column = self._first()
-            else:
-                column = self._beside(self.columns[before], theta)
-            self._write(column, list(column.states), rest=True)
+        if before is None:
+            column = self._first()
+        else:
+            column = self._beside(self.columns[before], theta)
         lost = [t for t in self.levels if t not in column.states]
         for sign in (1.0, -1.0):
             first = min((abs(t) for t in lost if t * sign > 0.0), default=np.inf)
@@ -160,46 +158,63 @@ class ColumnGrid(Generic[AnyState]):
 
     def _first(self) -> AngleColumn[AnyState]:
         """Load the first position from zero torque outwards until a solve fails."""
-        state = self.follow.meshed(self.follow.deflected())
-        if not state.outcome.ok:
-            raise _no_rest(0.0, state)
-        column = self._rest(self.follow.unloaded(state, self.small), 0.0)
+
+        def unloaded() -> Unloaded[AnyState]:
+            state = self.follow.meshed(self.follow.deflected())
+            if not state.outcome.ok:
+                raise _no_rest(0.0, state)
+            return self.follow.unloaded(state, self.small)
+
+        column = self._rest(0.0, unloaded)
         for sign in (1.0, -1.0):
             state = column.towards(sign)
             for torque in sorted((t for t in self.levels if t * sign > 0.0), key=abs):
-                state = self.follow.to_torque(state, torque)
-                if not state.outcome.ok:
+                found = self.solved(
+                    0.0, torque, partial(self.follow.to_torque, state, torque)
+                )
+                if found is None:
                     break
-                state = settled(state)
-                column.states[torque] = state
-                self._count()
+                column.states[torque] = state = found
+                self.count()
         return column
 
     def _beside(
         self, before: AngleColumn[AnyState], theta: float
     ) -> AngleColumn[AnyState]:
         """The same torques a step on; none beyond one that fails."""
-        column = self._rest(self.follow.unloaded_to(before.rest, theta), theta)
+        column = self._rest(theta, partial(self.follow.unloaded_to, before.rest, theta))
+
+        def beside(torque: float) -> AnyState:
+            state = self.follow.to_angle(before.states[torque], theta)
+            if state.outcome.ok:
+                return state
+            return self.follow.to_torque(column.nearest(torque), torque)
+
         lost = set()
         for torque in sorted(self.levels, key=abs):
-            if (torque > 0.0) not in lost:
-                state = self.follow.to_angle(before.states[torque], theta)
-                if not state.outcome.ok:
-                    state = self.follow.to_torque(column.nearest(torque), torque)
-                if state.outcome.ok:
-                    column.states[torque] = settled(state)
-                    self._count()
-                    continue
-            lost.add(torque > 0.0)
+            if (torque > 0.0) in lost:
+                continue
+            state = self.solved(theta, torque, partial(beside, torque))
+            if state is None:
+                lost.add(torque > 0.0)
+            else:
+                column.states[torque] = state
+                self.count()
         return column
 
     def _rest(
-        self, unloaded: Unloaded[AnyState], theta: float
+        self, theta: float, solve: Callable[[], Unloaded[AnyState]]
     ) -> AngleColumn[AnyState]:
-        if not unloaded.state.outcome.ok:
-            raise _no_rest(theta, unloaded.state)
-        self._count()
-        return AngleColumn(theta=theta, rest=settled(unloaded))
+        def sound() -> Unloaded[AnyState]:
+            unloaded = solve()
+            if not unloaded.state.outcome.ok:
+                raise _no_rest(theta, unloaded.state)
+            return unloaded
+
+        rest = self._recalled(theta, 0.0, sound)
+        self.like = rest.state if self.like is None else self.like
+        self.count()
+        return AngleColumn(theta=theta, rest=rest)
 
     def _more(
         self,
@@ -212,91 +227,69 @@ class ColumnGrid(Generic[AnyState]):
         That is one at the same torque in a column beside, from which it takes half the
         iterations, or else one at the same angle.
         """
-        if self._read(column.theta, torques, column) is None:
-            found = []
-            for torque in sorted(torques, key=lambda t: (t < 0.0, abs(t))):
-                there = [one.states[torque] for one in beside if torque in one.states]
-                if there:
-                    state = self.follow.to_angle(there[0], column.theta)
-                else:
-                    state = self.follow.to_torque(column.nearest(torque), torque)
-                if state.outcome.ok:
-                    column.states[torque] = settled(state)
-                    found.append(torque)
-                self._count()
-            self._write(column, found, rest=False)
-        column.failed |= {t for t in torques if t not in column.states}
+        for torque in sorted(torques, key=lambda t: (t < 0.0, abs(t))):
+            there = [one.states[torque] for one in beside if torque in one.states]
+            if there:
+                solve = partial(self.follow.to_angle, there[0], column.theta)
+            else:
+                near = column.nearest(torque)
+                solve = partial(self.follow.to_torque, near, torque)
+            state = self.solved(column.theta, torque, solve)
+            if state is None:
+                column.failed.add(torque)
+            else:
+                column.states[torque] = state
+            self.count()
 
-    def _count(self) -> None:
+    def count(self) -> None:
+        """One more solve is done."""
         self.solves += 1
         self.tick()
 
     # -- interruptions -----------------------------------------------------------------
 
-    def _write(
-        self, column: AngleColumn[AnyState], torques: list[float], *, rest: bool
-    ) -> None:
-        if self.keep is not None:
-            arrays = packed(column.rest, _REST) if rest else {}
-            arrays |= {_TORQUES: np.array(torques), "theta": np.array(column.theta)}
-            for j, t in enumerate(torques):
-                arrays |= packed(column.states[t], f"{STATE}-{j}")
-            self.keep.write(_SOLVES.format(self.parts), arrays)
-        self.parts += 1
+    def solved(
+        self, theta: float, torque: float, solve: Callable[[], AnyState]
+    ) -> AnyState | None:
+        """An equilibrium, solved now or before an interruption; None if that fails."""
 
-    def _read(
-        self,
-        theta: float,
-        torques: list[float],
-        column: AngleColumn[AnyState] | None = None,
-    ) -> AngleColumn[AnyState] | None:
-        """The next part of an interrupted run, added to a column if one is given."""
-        if self.keep is None:
-            return None
-        there = self.keep.read(
-            _SOLVES.format(self.parts),
-            lambda arrays: self._taken(arrays, theta, torques, column),
-        )
-        if there is None:
-            return None
-        found, solves = there
-        self.parts += 1
-        self.solves += solves
-        self.restored(solves)
+        def sound() -> AnyState | None:
+            state = solve()
+            return state if state.outcome.ok else None
+
+        return self._recalled(theta, torque, sound)
+
+    def _recalled(self, theta: float, torque: float, solve: Callable[[], T]) -> T:
+        """What is solved, or was by an interrupted run; a failure is kept, too."""
+        name, self.tried = _SOLVE.format(self.tried), self.tried + 1
+        if self.keep is not None:
+            there = self.keep.read(name, partial(self._taken, theta, torque))
+            if there is not None:
+                return cast(T, there[0])
+        found = settled(solve())
+        if self.keep is not None:
+            at = {"theta": theta, "torque": torque}
+            self.keep.write(name, at | packed(found, _STATE))
         return found
 
     def _taken(
-        self,
-        arrays: Mapping[str, Any],
-        theta: float,
-        torques: list[float],
-        column: AngleColumn[AnyState] | None,
-    ) -> tuple[AngleColumn[AnyState], int]:
-        """A column from the arrays of a part, and the number of its solves.
+        self, theta: float, torque: float, arrays: Mapping[str, Any]
+    ) -> tuple[Unloaded[AnyState] | AnyState | None]:
+        """An equilibrium from its arrays.
 
         Raises:
-            ValueError: If it does not follow the parts before.
+            ValueError: If it does not follow those before.
         """
-        if float(arrays["theta"]) != theta:
-            raise ValueError("a position at another angle")
-        solved: list[float] = np.asarray(arrays[_TORQUES]).tolist()
-        if not {*solved} <= {*torques}:
-            raise ValueError(f"other torques: {solved}")
-        found: dict[float, Any] = {
-            t: unpacked(arrays, f"{STATE}-{j}") for j, t in enumerate(solved)
-        }
-        if column is not None:
-            for state in found.values():
-                check_like(state, column.rest.state)
-            column.states |= found
-            return column, len(torques)
-        rest: Any = unpacked(arrays, _REST)
-        if not isinstance(rest, Unloaded):
-            raise ValueError("no position without torque")
-        like = self.columns[0].rest.state if self.columns else rest.state
-        for state in (rest.state, *(rest.sides or ()), *found.values()):
-            check_like(state, like)
-        return AngleColumn(theta=theta, rest=rest, states=found), 1 + len(found)
+        if (float(arrays["theta"]), float(arrays["torque"])) != (theta, torque):
+            raise ValueError("an equilibrium at another angle or torque")
+        found: Any = unpacked(arrays, _STATE)
+        if isinstance(found, Unloaded) != (torque == 0.0):
+            raise ValueError("no equilibrium of this torque")
+        states = [found] if torque else [found.state, *(found.sides or ())]
+        for state in states:
+            if state is not None:
+                _check_like(state, self.like)
+        return (found,)
 
     # -- figures -----------------------------------------------------------------------
 
@@ -592,9 +585,11 @@ class ColumnGrid(Generic[AnyState]):
         return found, {0.0, *self.levels, *self.beyond}
 
 
-def check_like(state: Any, like: Any) -> None:
+def _check_like(state: Any, like: Any) -> None:
     """Refuse a state that is not an equilibrium of the same model."""
-    if type(state) is not type(like) or state.faces.shape != like.faces.shape:
+    if like is not None and (
+        type(state) is not type(like) or state.faces.shape != like.faces.shape
+    ):
         raise ValueError("a state of another model")
     if not np.isfinite(state.faces).all():
         raise ValueError("positions that are not finite")

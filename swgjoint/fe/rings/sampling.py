@@ -8,8 +8,11 @@ passage of teeth, a tenth as large in the kinematic error under load, is left ou
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from math import pi
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +32,7 @@ from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.tolerances import has_errors
 from swgjoint.gear.mounting import series_compliance, springs_of
 from swgjoint.maps.samples import FullSolves, MapSamples
+from swgjoint.maps.unfinished import Unfinished
 from swgjoint.progress import Progress, silent
 
 Array = NDArray[np.float64]
@@ -87,7 +91,11 @@ def ball_passage(design: Design, model: ThinRing) -> BallPassage:
 
 
 def sample_rings(
-    design: Design, *, angles: int | None = None, progress: Progress = silent
+    design: Design,
+    *,
+    angles: int | None = None,
+    progress: Progress = silent,
+    keep: Unfinished | None = None,
 ) -> MapSamples:
     """Equilibria over the passage of a ball and both signs of torque.
 
@@ -98,6 +106,8 @@ def sample_rings(
         design: The drive.
         angles: Positions over one passage; :data:`PHASES` by default.
         progress: Called with the stage, the solves done and their number.
+        keep: Where every position of the balls is kept and taken up again after an
+            interruption; the samples are the same, bit for bit. None keeps none.
 
     Raises:
         DesignError: If the design holds what is not modelled.
@@ -111,12 +121,23 @@ def sample_rings(
     torques = [part * ratings.repeated_peak for part in LEVELS]
     small = SMALL * ratings.rated_torque
     theta = 2.0 * pi / passage.carried_as * np.arange(count) / count
+
+    def position(
+        name: str, phase: float, torques: list[float]
+    ) -> tuple[dict[float, list[float]], bool]:
+        found = None if keep is None else keep.read(name, partial(_taken, phase))
+        if found is None:
+            found = _position(model, phase, passage, torques, small)
+            if keep is not None:
+                keep.write(name, _arrays(phase, *found))
+        return found
+
     rows: list[dict[float, list[float]]] = []
     free = False
     for k in range(count):
         # the cage lags behind the wave generator
         phase = -2.0 * pi / passage.per_cage_turn * k / count
-        row, alone = _position(model, phase, passage, torques, small)
+        row, alone = position(f"position-{k:04d}", phase, torques)
         if not row:
             raise ComputationError(
                 f"{drive.name}: no equilibrium of the rings under {small:g} N·m with"
@@ -132,7 +153,7 @@ def sample_rings(
         place = count * (j + 0.381966) / UNSEEN_PHASES
         phase = -2.0 * pi / passage.per_cage_turn * place / count
         levels = [part * ratings.repeated_peak for part in UNSEEN]
-        row, _ = _position(model, phase, passage, levels, small)
+        row, _ = position(f"unseen-{j:04d}", phase, levels)
         at = 2.0 * pi / passage.carried_as * place / count
         others += [
             (at, t, v[0] - t * series, v[3])
@@ -254,3 +275,31 @@ def _position(
             break
         rows[torque] = row(state, torque)
     return rows, free
+
+
+def _arrays(
+    phase: float, rows: dict[float, list[float]], free: bool
+) -> dict[str, float | bool | Array]:
+    """What :func:`_position` found, for a file."""
+    return {
+        "phase": phase,
+        "free": free,
+        "torque": np.array(list(rows)),
+        "rows": np.array(list(rows.values())),
+    }
+
+
+def _taken(
+    phase: float, arrays: Mapping[str, Any]
+) -> tuple[dict[float, list[float]], bool]:
+    """What :func:`_position` found in an interrupted run.
+
+    Raises:
+        ValueError: If it is another position.
+    """
+    torque, rows = np.asarray(arrays["torque"]), np.asarray(arrays["rows"])
+    if float(arrays["phase"]) != phase or not np.isfinite(rows).all():
+        raise ValueError("another position of the balls")
+    rows = rows.reshape(torque.size, 4)
+    found = dict(zip(torque.tolist(), rows.tolist(), strict=True))
+    return found, bool(arrays["free"])

@@ -9,6 +9,7 @@ a few positions within one pitch, and the errors of all pitches are superposed t
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -50,7 +51,7 @@ FREE = 100.0
 CHUNK = 128
 """Sets of errors that are superposed between two calls of the progress: of drives with
 many teeth a torque takes minutes."""
-_PHASE = "superposition-{:04d}"
+_PHASE, _CHECK = "superposition-{:04d}", "full-solves-{:04d}"
 
 
 def sample_tolerances(
@@ -133,7 +134,7 @@ def sample_tolerances(
     chosen = np.arange(checks) * (count // checks) + np.arange(checks) % phases
     torques = (0.0, rated_torque)
     tick = _stage(progress, design, 3, checks)
-    solved = full_solves(design, follow, linear, chosen % count, torques, tick)
+    solved = full_solves(design, follow, linear, chosen % count, torques, tick, keep)
     if has_play:
         levels = np.append(FAINT * small, levels)
     return ToleranceSamples(
@@ -154,6 +155,7 @@ def full_solves(
     positions: Index,
     torques: Sequence[float],
     tick: Callable[[], None] = lambda: None,
+    keep: Unfinished | None = None,
 ) -> FullSolves:
     """Equilibria with errors at some positions of the cycle, without linearisation.
 
@@ -164,11 +166,14 @@ def full_solves(
         positions: Numbers of positions in the cycle, ``len(rests)`` a pitch.
         torques: T at each of them [N·m].
         tick: Called after every position.
+        keep: Where solved positions are kept and taken up again; None keeps none.
     """
-    rows = []
+    tables = []
     step = pitch_of(design) / len(rests)
     pitch, phase = np.divmod(positions, len(rests))
-    for k, errors in enumerate(zip(*gap_errors(design, pitch), strict=True)):
+
+    def solved(k: int, errors: tuple[Array, ...]) -> Array:
+        rows = []
         flawed, rest = follow.with_errors(*errors), rests[phase[k]]
         state = rest.state
         for torque in torques:
@@ -184,8 +189,19 @@ def full_solves(
             error = angle - step * phase[k] / follow.ratio
             moment = np.mean([flawed.input_torque(s) for s in found])
             rows.append((step * positions[k], torque, error, moment))
+        return np.array(rows)
+
+    for k, errors in enumerate(zip(*gap_errors(design, pitch), strict=True)):
+        at = np.array([(step * positions[k], torque) for torque in torques])
+        name = _CHECK.format(k)
+        table = None if keep is None else keep.read(name, partial(_checked, at))
+        if table is None:
+            table = solved(k, errors)
+            if keep is not None:
+                keep.write(name, {"table": table})
+        tables.append(table)
         tick()
-    table = np.array(rows).T
+    table = np.concatenate(tables).T
     table = table[:, np.isfinite(table[2])]
     return FullSolves(
         input_angle=table[0],
@@ -282,6 +298,14 @@ def _kept(
         return table, int(arrays["free"])
 
     return None if keep is None else keep.read(_PHASE.format(phase), taken)
+
+
+def _checked(at: Array, arrays: Mapping[str, Any]) -> Array:
+    """Rows of a position of an interrupted run, see :func:`full_solves`."""
+    table = np.asarray(arrays["table"], float)
+    if table.shape != (len(at), 4) or not np.array_equal(table[:, :2], at):
+        raise ValueError("another position of the cycle")
+    return table
 
 
 def _with_onsets(table: Array, small: float) -> Array:

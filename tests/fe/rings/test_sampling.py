@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 from messages import naming
-from solved import kept, ring_path
+from solved import hundred_elements, kept, ring_path
 
 from swgjoint.cli.main import main
 from swgjoint.drives.build_map import build_map
@@ -18,7 +19,9 @@ from swgjoint.fe.rings.loading import loaded, unloaded
 from swgjoint.fe.rings.model import thin_ring
 from swgjoint.fe.rings.sampling import ball_passage, sample_rings
 from swgjoint.gear.design.design import Design
+from swgjoint.maps.file import map_bytes
 from swgjoint.maps.fit.fit import fit_map
+from swgjoint.maps.unfinished import Unfinished
 from swgjoint.units import arcsec
 
 LEVELS = (0.1, 0.35, 1.01)
@@ -46,6 +49,43 @@ def test_energy_of_the_samples_is_torque_over_torsion():
     assert given.free
     mean = given.input_torque.mean(axis=1)
     assert mean == pytest.approx(given.torque / drive.ratio, rel=0.01, abs=2e-4)
+
+
+class Stop(Exception):
+    """An interruption."""
+
+
+def test_an_interrupted_ring_map_goes_on_bit_for_bit(monkeypatch, tmp_path):
+    """Positions of the balls that were finished are read; only the others are asked."""
+    monkeypatch.setattr(sampling, "LEVELS", (0.1, 1.01))
+    monkeypatch.setattr(sampling, "UNSEEN", (0.5,))
+    design, solve = Design.load("size-25-100"), sampling._position
+    solved, asked = {}, []
+
+    def once(model, phase, *others):
+        asked.append(phase)
+        if phase not in solved:
+            solved[phase] = solve(model, phase, *others)
+        return solved[phase]
+
+    def stop(stage: str, done: int, total: int) -> None:
+        if "unseen" in stage:
+            raise Stop
+
+    monkeypatch.setattr(sampling, "_position", once)
+    keep = Unfinished(folder=tmp_path)
+    with hundred_elements():
+        with pytest.raises(Stop):
+            sample_rings(design, angles=2, keep=keep, progress=stop)
+        before = len(asked)
+        found = sample_rings(design, angles=2, keep=keep)
+        again = asked[before:]
+        whole = sample_rings(design, angles=2)
+    assert (before, len(again)) == (3, 2) and not set(asked[:before]) & set(again)
+    took = {"sampling_wall_s": 0.0}
+    assert map_bytes(replace(fit_map(found), info=took)) == map_bytes(
+        replace(fit_map(whole), info=took)
+    )
 
 
 @pytest.mark.slow
