@@ -138,18 +138,18 @@ def generations(folder: Path) -> dict[str, float]:
 PART = "swgjoint.maps.unfinished:Unfinished.read"
 PARTS = stored(f"{CACHE}/unfinished/*/*.npz")
 FEW_SOLVES = (
-    "from swgjoint.fe import sampling; sampling.SOLID_SOLVES = 24;"
+    "from swgjoint.fe.common import sampling; sampling.SOLID_SOLVES = 24;"
     " sampling.SOLID_ANGLES = sampling.SOLID_MOST_ANGLES = 2;"
     " sampling.SOLID_UNSEEN = (2, 1)"
 )
-FEW_ELEMENTS = "from swgjoint.fe.thin_ring import model; model.ELEMENTS = 100"
+FEW_ELEMENTS = "from swgjoint.fe.rings import model; model.ELEMENTS = 100"
 CASES = (
     Case(
         name="sweep",
         arguments=("sweep", "sweep.toml", "--out", "out", "--jobs", "2"),
         inputs={"few.toml": toml("reference-2d"), "sweep.toml": SWEEP},
         unit="designs",
-        begins="swgjoint.study.sweep_figures:compute",
+        begins="swgjoint.explore.sweep.figures:compute",
         kept=stored("out/results/*/*.json"),
     ),
     Case(
@@ -157,7 +157,7 @@ CASES = (
         arguments=("optimise", "optimise.toml", "--out", "out", "--jobs", "2"),
         inputs={"few.toml": toml("reference-2d"), "optimise.toml": OPTIMISE},
         unit="designs",
-        begins="swgjoint.study.sweep_figures:compute",
+        begins="swgjoint.explore.sweep.figures:compute",
         kept=stored("out/results/*/*.json"),
     ),
     Case(
@@ -165,7 +165,7 @@ CASES = (
         arguments=("lot", "few.toml", "--drives", "80", "--jobs", "2", "--out", "out"),
         inputs={"few.toml": toml("reference-2d-tolerances")},
         unit="drives",
-        begins="swgjoint.study.lot:_one",
+        begins="swgjoint.explore.lot:_one",
         kept=drives,
     ),
     Case(
@@ -223,7 +223,7 @@ CASES = (
             *("--set", "drive=CSG-20-100", "--out", "out"),
         ),
         unit="generations",
-        begins="swgjoint.study.tune:_costs",
+        begins="swgjoint.explore.tune.tune:_costs",
         kept=generations,
     ),
     Case(

@@ -37,7 +37,7 @@ def test_a_killed_sweep_goes_on(tmp_path):
         arguments=("sweep", "sweep.toml", "--out", "out", "--jobs", "2"),
         inputs={"few.toml": few_teeth().to_toml(), "sweep.toml": SWEEP},
         unit="designs",
-        begins="swgjoint.study.sweep_figures:compute",
+        begins="swgjoint.explore.sweep.figures:compute",
         kept=KEPT,
     )
     whole = prepared(case, tmp_path / "whole")

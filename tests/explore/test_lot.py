@@ -9,7 +9,15 @@ from solved import few_teeth, kept
 
 from swgjoint.errors import DesignError
 from swgjoint.explore import lot
-from swgjoint.explore.lot import FIGURES, _figures, distribution, draw, run_lot, wilson
+from swgjoint.explore.lot import (
+    FIGURES,
+    LOWER,
+    _figures,
+    distribution,
+    draw,
+    run_lot,
+    wilson,
+)
 from swgjoint.fe.tolerances.cycle import gap_errors, pitch_of, pitches_of
 from swgjoint.fe.tolerances.lot import outline_change, perfect_positions, sample_lot
 from swgjoint.gear.design.design import Design
@@ -145,10 +153,12 @@ def test_picture_shows_a_lot_with_a_failed_drive():
     lost = {"seed": 2} | dict.fromkeys(FIGURES)
     result = {"design": "d", "sizes": "limit", "spec": None, "yield": None}
     figures = {key: distribution([1.0]) for key in FIGURES}
-    shown = lot_picture({**result, "rows": [row, lost], "figures": figures})
+    shown = lot_picture(
+        {**result, "rows": [row, lost], "figures": figures}, lower=LOWER
+    )
     assert shown is not None and shown.startswith(b"\x89PNG")
     nothing = {**result, "rows": [lost], "figures": dict.fromkeys(FIGURES)}
-    assert lot_picture(nothing) is None
+    assert lot_picture(nothing, lower=LOWER) is None
 
 
 def test_a_design_without_tolerances_has_no_lot():

@@ -51,12 +51,18 @@ def run(name: str, argv: list[str], folder: Path) -> dict[str, Any]:
     """Exit status, result and maps of one command that runs in a folder."""
     shutil.copytree(FOLDER / "inputs", folder, dirs_exist_ok=True)
     out, here = io.StringIO(), Path.cwd()
+    cache = os.environ.get("SWGJOINT_CACHE")
+    os.environ["SWGJOINT_CACHE"] = str(folder / "cache")
     os.chdir(folder)
     try:
         with contextlib.redirect_stdout(out):
             status = main([*argv, "--json"])
     finally:
         os.chdir(here)
+        if cache is None:
+            del os.environ["SWGJOINT_CACHE"]
+        else:
+            os.environ["SWGJOINT_CACHE"] = cache
     result = json.loads(out.getvalue()) if out.getvalue() else None
     frozen = {"command": argv, "status": status, "result": stable(result, str(folder))}
     for path in sorted(folder.glob("*.swg")):
@@ -77,6 +83,8 @@ def stable(value: Any, folder: str) -> Any:
         }
     if isinstance(value, list):
         items = [stable(item, folder) for item in value]
+        if any(isinstance(item, dict) and "cost" in item for item in value):
+            items.sort(key=json.dumps)  # they are in the order of their cost
         return summed(items) if len(items) > LONG_TABLE else items
     if isinstance(value, str):
         # sentences may improve; what they must name is tested where they arise
