@@ -7,11 +7,21 @@ __version__ = "0.1.0"
 
 # name -> module; imported on first use, so that importing the package stays cheap
 _PUBLIC = {
+    "ComputationError": "swgjoint.errors",
     "Design": "swgjoint.gear.design.design",
+    "DesignError": "swgjoint.errors",
     "DriveMap": "swgjoint.maps.drive_map",
+    "InputError": "swgjoint.errors",
+    "JointDrive": "swgjoint.joint.drive",
+    "MeshingRun": "swgjoint.fe.meshing_run",
+    "Ratings": "swgjoint.gear.ratings",
+    "Scene": "swgjoint.sim.scene.scene",
+    "SceneRun": "swgjoint.view.run",
+    "SolidRun": "swgjoint.fe.solid.meshing",
     "SwgError": "swgjoint.errors",
     "attach": "swgjoint.drives.attach",
     "build_map": "swgjoint.drives.build_map",
+    "load_drive": "swgjoint.drives.references",
     "load_plugin": "swgjoint.joint.plugin",
     "run_scene": "swgjoint.view.run",
     "simulate_meshing": "swgjoint.fe.meshing",
@@ -19,13 +29,35 @@ _PUBLIC = {
 }
 __all__ = ["__version__", *sorted(_PUBLIC)]
 
+if _typing.TYPE_CHECKING:
+    # for type checkers of users, who do not run __getattr__
+    from swgjoint.drives.attach import attach as attach
+    from swgjoint.drives.build_map import build_map as build_map
+    from swgjoint.drives.references import load_drive as load_drive
+    from swgjoint.drives.spec_sheet import spec_sheet as spec_sheet
+    from swgjoint.errors import ComputationError as ComputationError
+    from swgjoint.errors import DesignError as DesignError
+    from swgjoint.errors import InputError as InputError
+    from swgjoint.errors import SwgError as SwgError
+    from swgjoint.fe.meshing import simulate_meshing as simulate_meshing
+    from swgjoint.fe.meshing_run import MeshingRun as MeshingRun
+    from swgjoint.fe.solid.meshing import SolidRun as SolidRun
+    from swgjoint.gear.design.design import Design as Design
+    from swgjoint.gear.ratings import Ratings as Ratings
+    from swgjoint.joint.drive import JointDrive as JointDrive
+    from swgjoint.joint.plugin import load_plugin as load_plugin
+    from swgjoint.maps.drive_map import DriveMap as DriveMap
+    from swgjoint.sim.scene.scene import Scene as Scene
+    from swgjoint.view.run import SceneRun as SceneRun
+    from swgjoint.view.run import run_scene as run_scene
+else:
 
-def __getattr__(name: str) -> _typing.Any:
-    if name in _PUBLIC:
-        from importlib import import_module
+    def __getattr__(name: str) -> _typing.Any:
+        if name in _PUBLIC:
+            from importlib import import_module
 
-        return getattr(import_module(_PUBLIC[name]), name)
-    raise AttributeError(f"module 'swgjoint' has no attribute {name!r}")
+            return getattr(import_module(_PUBLIC[name]), name)
+        raise AttributeError(f"module 'swgjoint' has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:
