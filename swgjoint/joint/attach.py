@@ -241,7 +241,10 @@ def _configs(drives: Iterable[JointDrive]) -> dict[str, dict[str, str]]:
         key = id(drive.drive)
         if key not in texts:
             texts[key] = plugin.config(drive.drive, damping=drive.damping)
-        found[drive.joint] = texts[key] | {"damping": repr(float(drive.damping))}
+        found[drive.joint] = texts[key] | {
+            "damping": repr(float(drive.damping)),
+            "contact_damping": repr(float(drive.contact_damping)),
+        }
     return found
 
 

@@ -17,6 +17,16 @@ from swgjoint.maps.hysteresis import Jenkin, Sliders
 
 Array = NDArray[np.float64]
 
+LEAST_DAMPING_RATIO = 0.001
+"""Damping ratio from which a drive needs no help in a contact [-]."""
+CONTACT_DAMPING_RATIO = 0.05
+"""Damping ratio of a drive with less, and without friction, while a contact or a limit
+acts [-].
+
+The engine pushes a link out of a contact along a prescribed path, whatever torque that
+takes, and so feeds the torsion of a chain that bounces, at any step and also under RK4.
+A bouncing chain touches the floor for a twentieth of the time, so this takes about as
+much as :data:`LEAST_DAMPING_RATIO` does all the time."""
 ACCELERATIONS = 2
 """Numbers in the plugin's state before those of the hysteresis."""
 
@@ -66,6 +76,10 @@ class JointDrive:
     """Mean stiffness of the map [N·m/rad]."""
     damping: float
     """Torque per torsion rate, output side [N·m·s/rad]."""
+    contact_damping: float = 0.0
+    """Least damping while a contact or a limit acts anywhere in the model, by
+    :data:`CONTACT_DAMPING_RATIO` [N·m·s/rad]; 0 for drives with losses of their own and
+    at levels other than ``full``."""
     drive: DriveMap
     """The map as simulated: without the unresolved harmonics."""
     unresolved: tuple[UnresolvedOrder, ...]
@@ -81,9 +95,6 @@ class JointDrive:
     [N·m·s/rad]; see :mod:`swgjoint.joint.step_damping`."""
     compensated_at: float | None = None
     """Step at which that holds [s]; None where nothing is taken out."""
-    coupling: float = 0.0
-    """Share of the inertia about the joint at qpos0 that gives way where the other
-    joints are free [-]."""
     motors: tuple[str, ...] = ()
     """Actuators that the model had on the joint; with a rotor they turn that."""
     variable: bool = False

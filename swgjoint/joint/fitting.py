@@ -8,7 +8,13 @@ import mujoco
 import numpy as np
 
 from swgjoint.errors import InputError
-from swgjoint.joint.drive import JointDrive, UnresolvedOrder, prune
+from swgjoint.joint.drive import (
+    CONTACT_DAMPING_RATIO,
+    LEAST_DAMPING_RATIO,
+    JointDrive,
+    UnresolvedOrder,
+    prune,
+)
 from swgjoint.joint.native import NativeSpring, fit_native
 from swgjoint.joint.place import Place
 from swgjoint.joint.prescribed import kinematic_part, ratio_variation
@@ -92,7 +98,8 @@ def fitted(
         damping_ratio = drive.damping_ratio
     reflected = ratio**2 * fitting.rotor_inertia
     reduced = reflected * place.inertia / (reflected + place.inertia)
-    damping = 2.0 * damping_ratio * float(np.sqrt(stiffness * reduced))
+    critical = 2.0 * float(np.sqrt(stiffness * reduced))
+    lossless = drive.friction is None and damping_ratio < LEAST_DAMPING_RATIO
     if level == "kinematic":
         drive = kinematic_part(drive)
     unresolved: tuple[UnresolvedOrder, ...] = ()
@@ -122,9 +129,11 @@ def fitted(
         ratio=ratio,
         rotor_inertia=float(fitting.rotor_inertia),
         link_inertia=place.inertia,
-        coupling=place.coupling,
         stiffness=stiffness,
-        damping=damping if own else 0.0,
+        damping=damping_ratio * critical if own else 0.0,
+        contact_damping=(
+            CONTACT_DAMPING_RATIO * critical if level == "full" and lossless else 0.0
+        ),
         drive=drive,
         unresolved=unresolved,
         native=spring,

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from swgjoint.errors import InputError
 from swgjoint.joint.obstacles import Surroundings
-from swgjoint.joint.response import responses
 
 Array = NDArray[np.float64]
 
@@ -45,9 +44,6 @@ class Place:
     """Of the joint and of the actuators on it [kg·m²]."""
     inertia: float
     """At qpos0, the other joints held, without armature [kg·m²]."""
-    coupling: float
-    """Share of the joint's inertia, armature included, that gives way where the other
-    joints are free [-]; 0 for a joint by itself."""
     has_damping_ratio: bool
     """Whether an actuator on the joint states its damping as a ratio."""
 
@@ -84,8 +80,6 @@ class Compiled:
         armature = float(model.dof_armature[dof]) + float(
             model.actuator_armature[k] @ model.actuator_gear[k, 0] ** 2
         )
-        data = self.data
-        response = responses(model, data.qLD, data.qLDiagInv, [dof])
         offset = np.zeros(3)
         mujoco.mju_rotVecQuat(offset, model.jnt_pos[j], model.body_quat[b])
         return Place(
@@ -101,7 +95,6 @@ class Compiled:
             ref=float(model.qpos0[model.jnt_qposadr[j]]),
             armature=armature,
             inertia=float(self.mass[dof, dof]) - armature,
-            coupling=1.0 - 1.0 / float(self.mass[dof, dof] * response[0]),
             has_damping_ratio=any(
                 actuators[i].biasprm[2] > 0.0 > model.actuator_biasprm[i, 2] for i in k
             ),

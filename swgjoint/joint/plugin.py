@@ -87,6 +87,7 @@ def config(
     drive: DriveMap,
     *,
     damping: float,
+    contact_damping: float = 0.0,
     numerical_damping: float = NUMERICAL_DAMPING,
     passes: int = PASSES,
 ) -> dict[str, str]:
@@ -95,6 +96,8 @@ def config(
     Args:
         drive: Map to evaluate.
         damping: Torque per torsion rate [N·m·s/rad].
+        contact_damping: Its least value while a contact or a limit acts
+            [N·m·s/rad].
         numerical_damping: See :data:`NUMERICAL_DAMPING` [-].
         passes: See :data:`PASSES`.
     """
@@ -107,6 +110,7 @@ def config(
             "end_stiffness": _text(drive.end_stiffness),
             "kinematic_error": _text(drive.kinematic_error),
             "damping": repr(float(damping)),
+            "contact_damping": repr(float(contact_damping)),
             "numerical_damping": repr(float(numerical_damping)),
             "passes": str(int(passes)),
         }

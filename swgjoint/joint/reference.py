@@ -142,7 +142,8 @@ def scheme_force(
         drive: Map.
         motion: Pair at the beginning of the step.
         timestep: Step h [s].
-        damping: Torque per torsion rate, C [N·m·s/rad].
+        damping: Torque per torsion rate, C [N·m·s/rad]; while a contact or a limit
+            acts, not below ``contact_damping`` of the drive.
         numerical_damping: nu1 of the scheme [-].
         passes: Evaluations of the map.
     """

@@ -136,6 +136,9 @@ class WarpDrives:
                 self.maps,
                 self.weight,
                 d.time,
+                d.nefc,
+                d.ne,
+                d.nf,
                 d.qpos,
                 d.qvel,
                 d.ten_velocity,
@@ -202,6 +205,7 @@ def _place(model: mujoco.MjModel, drive: JointDrive) -> Any:
     one.entry_rotor = row + columns.index(one.v_rotor)
     one.entry_link = row + columns.index(one.v_link)
     one.ratio, one.damping = drive.ratio, drive.damping
+    one.contact_damping = drive.contact_damping
     one.friction = -1
     if drive.friction is not None:
         one.friction = int(model.tendon(f"{drive.joint}_friction").id)

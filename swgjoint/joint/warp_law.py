@@ -43,6 +43,7 @@ class Drive:
     elements: int
     ratio: real
     damping: real
+    contact_damping: real
     friction: int
     """Its tendon, -1 without."""
     b_theta: real
@@ -416,6 +417,9 @@ def law(
     maps: Maps,
     weight: wp.array2d(dtype=float),
     time: wp.array(dtype=float),
+    rows: wp.array(dtype=int),
+    equalities: wp.array(dtype=int),
+    losses: wp.array(dtype=int),
     qpos: wp.array2d(dtype=float),
     qvel: wp.array2d(dtype=float),
     ten_velocity: wp.array2d(dtype=float),
@@ -477,6 +481,9 @@ def law(
     theta = real(qpos[world, drive.q_rotor]) - HALF * h * vm
     psi = real(qpos[world, drive.q_link]) - HALF * h * vl
     c = damped * drive.damping
+    if rows[world] > equalities[world] + losses[world]:
+        # a contact or a limit acts
+        c = wp.max(c, drive.contact_damping)
     dm, dl = real(0.0), real(0.0)
     force, p = real(0.0), real(0.0)
     s = Secant()

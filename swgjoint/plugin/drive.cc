@@ -17,7 +17,7 @@ constexpr char kName[] = "swgjoint.drive";
 constexpr const char* kAttributes[] = {
     "ratio",           "orders",  "knots",             "potential", "end_stiffness",
     "kinematic_error", "damping", "numerical_damping", "passes", "hysteresis",
-    "friction"};
+    "friction",        "contact_damping"};
 constexpr int kAccelerations = 2;  // states before those of the hysteresis
 constexpr int kBristle = 2;        // where it is relaxed, whether that is known
 constexpr size_t kMaxElements = 64;
@@ -157,6 +157,11 @@ std::unique_ptr<Drive> Drive::Create(const mjModel* m, int instance) {
   }
   if (!Scalar(m, instance, "numerical_damping", 0, 1, &drive->numerical_damping_)) {
     return Refuse(m, instance, "attribute 'numerical_damping' is not in 0..1");
+  }
+  const char* contact = text("contact_damping");
+  if (contact && *contact &&
+      !Scalar(m, instance, "contact_damping", 0, mjMAXVAL, &drive->contact_damping_)) {
+    return Refuse(m, instance, "attribute 'contact_damping' is not one number >= 0");
   }
   mjtNum passes;
   if (!Scalar(m, instance, "passes", 1, 20, &passes) || passes != std::rint(passes)) {
@@ -377,6 +382,16 @@ void Drive::AddGradient(const mjModel* m, mjData* d, int instance) {
   step_.gradient = true;
 }
 
+// Torque per torsion rate in a step of the scheme. The engine pushes a link out of a
+// contact or a limit along a prescribed path, whatever torque that takes, and so feeds
+// the torsion of a drive that has no losses: contact_damping takes that.
+mjtNum Drive::Damping(const mjModel* m, const mjData* d) const {
+  const mjtNum own = m->opt.disableflags & mjDSBL_DAMPER ? 0 : damping_;
+  // the rows of the step are made before the passive stage
+  const bool touches = d->nefc > d->ne + d->nf;
+  return touches ? std::max(own, contact_damping_) : own;
+}
+
 // Predicts the step of the pair, takes the discrete gradient over it and hands the
 // rest, linear in the velocity step, to the engine: its metric M + h^2 p g g' is
 // built after this stage from ten_J (the direction g) and from the tangent of the
@@ -386,7 +401,7 @@ void Drive::AddScheme(const mjModel* m, mjData* d, int instance) {
   const mjtNum vm = d->qvel[v_rotor_], vl = d->qvel[v_link_];
   const mjtNum wm = Response(m, d, v_rotor_), wl = Response(m, d, v_link_);
   const mjtNum* state = d->plugin_state + m->plugin_stateadr[instance];
-  const mjtNum damping = m->opt.disableflags & mjDSBL_DAMPER ? 0 : damping_;
+  const mjtNum damping = Damping(m, d);
 
   // the scheme is a midpoint rule in positions half a step back
   map_.Begin(d->qpos[q_rotor_] - 0.5 * h * vm, d->qpos[q_link_] - 0.5 * h * vl);

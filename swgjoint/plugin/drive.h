@@ -56,6 +56,7 @@ class Drive {
   void Watch(const mjModel* m, const mjData* d, int instance, int scheme);
   void AddGradient(const mjModel* m, mjData* d, int instance);
   void AddScheme(const mjModel* m, mjData* d, int instance);
+  mjtNum Damping(const mjModel* m, const mjData* d) const;
   mjtNum Response(const mjModel* m, const mjData* d, int dof);
   void AdvanceState(const mjModel* m, const mjData* d, mjtNum* state);
   bool Diverges(mjData* d, std::initializer_list<mjtNum> numbers) const;
@@ -66,7 +67,7 @@ class Drive {
   void Vary(const mjModel* m);
 
   DriveMap map_;
-  mjtNum damping_ = 0, numerical_damping_ = 0;
+  mjtNum damping_ = 0, contact_damping_ = 0, numerical_damping_ = 0;
   int passes_ = 0;
   int tendon_ = -1, entry_rotor_ = -1, entry_link_ = -1;  // tendon, entries of ten_J
   int q_rotor_ = -1, q_link_ = -1, v_rotor_ = -1, v_link_ = -1;  // addresses

@@ -32,6 +32,7 @@ TWO_MASS = """
       <inertial pos="0 0 0" mass="3" diaginertia="{link} {link} {link}"/>
     </body>
   </worldbody>
+  {equality}
 </mujoco>
 """
 
@@ -151,9 +152,12 @@ def make_bench(
     integrator: str = "discrete",
     link: float = 0.4,
     joint: str = "",
+    equality: str = "",
     **keys: object,
 ) -> Bench:
-    text = TWO_MASS.format(step=step, integrator=integrator, link=link, joint=joint)
+    text = TWO_MASS.format(
+        step=step, integrator=integrator, link=link, joint=joint, equality=equality
+    )
     spec = mujoco.MjSpec.from_string(text)
     keys = {"rotor_inertia": 4e-5, "damping_ratio": 0.0, "friction": True, **keys}
     got = attach(spec, joint="j", drive=drive, **keys)  # type: ignore[arg-type]

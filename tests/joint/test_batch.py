@@ -49,6 +49,22 @@ def test_batch_equals_loop(bench, synthetic_map, integrator, persistent):
         assert np.abs(batch.plugin_state).min() > 0.0
 
 
+def test_batch_equals_loop_at_a_limit(bench, synthetic_map):
+    """Simulations that press against a limit and free ones do not mix their damping."""
+    half = np.rad2deg(np.median(np.abs(starts(bench(synthetic_map))[0][:, 1])))
+    b = bench(synthetic_map, joint=f'limited="true" range="{-half} {half}"')
+    q, v = starts(b)
+    batch = Batch(b.model, COUNT, nthread=2, persistent=False)
+    batch.qpos[:, b.q], batch.qvel[:, b.v] = q, v
+    for _ in range(STEPS):
+        batch.step()
+    assert b.drive.contact_damping > 0.0
+    for k in range(COUNT):
+        got = np.concatenate([batch.qpos[k], batch.qvel[k], batch.plugin_state[k]])
+        want = loop(b, b.model, q[k], v[k], np.zeros(2))
+        np.testing.assert_array_equal(got, want)
+
+
 def test_expanded_fields_equal_models_of_their_own(bench, synthetic_map):
     """Inertia, carrier stiffness and step per simulation act as in separate models."""
     b = bench(synthetic_map, damping_ratio=0.02)

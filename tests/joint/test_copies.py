@@ -197,6 +197,7 @@ def run_on_spec(spec, joint):
         ("kinematic_error", "0 0 0", ("3", "2")),
         ("damping", "-1", ("one", ">= 0")),
         ("damping", "1,5", ("one", ">= 0")),
+        ("contact_damping", "-1", ("one", ">= 0")),
         ("numerical_damping", "2", ("0..1",)),
         ("passes", "1.5", ("integer", "1..20")),
     ],

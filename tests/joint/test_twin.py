@@ -80,6 +80,48 @@ def test_scheme_force_equals_twin(bench, any_layout, speed):
         )
 
 
+LIMIT = {"joint": 'limited="true" range="-10 10"'}
+WELD = {"equality": '<equality><weld body1="link"/></equality>'}
+
+
+@pytest.mark.parametrize(
+    ("keys", "psi", "acts"),
+    [
+        (LIMIT, 0.2, True),
+        (LIMIT, 0.1, False),
+        ({"joint": 'frictionloss=".1"'}, 0.2, False),
+        (WELD, 0.2, False),
+        (LIMIT | {"damping_ratio": 0.001}, 0.2, False),
+    ],
+    ids=["pressed", "free", "friction loss", "equality", "damped"],
+)
+def test_a_drive_without_losses_is_damped_while_a_limit_acts(
+    bench, synthetic_map, keys, psi, acts
+):
+    """The torque and the metric equal the twin's, with contact_damping then only.
+
+    Rows of friction loss and equalities are neither contacts nor limits, and a drive
+    with losses keeps its own damping.
+    """
+    b = bench(synthetic_map, **keys)
+    b.place(synthetic_map.ratio * psi, psi, 3.0, 0.2)
+    b.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_DAMPER * acts
+    mujoco.mj_forward(b.model, b.data)
+    assert (b.data.nefc > 0) == (psi == 0.2)
+    h = b.model.opt.timestep
+    floor = 0.05 * 2.0 * np.sqrt(b.drive.stiffness / b.drive.mobility)
+    damping = floor if acts else b.drive.damping
+    want = scheme_force(synthetic_map, b.motion(), timestep=h, damping=damping)
+    tendon = b.model.tendon(b.drive.tendon).id
+    metric = 1e-9 + 3.0 * b.data.ten_length[tendon] ** 2
+    assert metric == pytest.approx(want.metric, rel=1e-8)
+    shift = h * want.metric * b.data.ten_velocity[tendon]
+    g = np.array([want.g_theta, want.g_psi])
+    np.testing.assert_allclose(
+        b.data.qfrc_passive[b.v], [want.theta, want.psi] + shift * g, rtol=1e-8
+    )
+
+
 @pytest.mark.parametrize("torque", [0.0, 40.0])
 def test_trajectory_equals_twin(bench, any_layout, torque):
     """300 loaded steps, plugin state included, equal the scheme solved in numpy."""

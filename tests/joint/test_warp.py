@@ -181,6 +181,39 @@ def test_force_direction_and_stiffness_equal_reference(drive):
     assert 5 < slips < 64 or not drive.friction
 
 
+def test_contact_damping_acts_in_the_worlds_that_touch(synthetic_map):
+    """Of two worlds without losses only the one beyond its joint limit is damped."""
+    limited = 'axis="0 0 1" limited="true" range="-10 10"/>'
+    xml = PAIR.replace('axis="0 0 1"/>', limited)
+    both = Both(xml, synthetic_map, worlds=2, damping_ratio=0.0)
+    [one], ratio = both.drives, synthetic_map.ratio
+    pair = both.pair(one)
+    order = np.argsort(pair)
+    psi = np.array([0.2, 0.1])
+    both.put(np.stack([ratio * psi, psi], -1)[:, order], np.array([3.0, 0.2])[order])
+    mjw.forward(both.m, both.d)
+    h = float(both.m.opt.timestep.numpy()[0])
+    tendon = both.plain.tendon(one.tendon).id
+    for world, damping in enumerate((one.contact_damping, 0.0)):
+        theta, psi = both.d.qpos.numpy()[world][pair].astype(float)
+        rates = both.d.qvel.numpy()[world][pair].astype(float)
+        want = scheme_force(
+            synthetic_map,
+            Motion(
+                theta=theta,
+                psi=psi,
+                theta_rate=rates[0],
+                psi_rate=rates[1],
+                rotor_weight=1 / 4e-5,
+                link_weight=1 / 0.4,
+            ),
+            timestep=h,
+            damping=damping,
+        )
+        length = float(both.d.ten_length.numpy()[world, tendon])
+        assert 1e-9 + 3 * length**2 == pytest.approx(want.metric, rel=1e-6)
+
+
 def test_pair_moves_as_with_the_plugin(drive):
     """250 loaded steps of a pair equal MuJoCo with the plugin.
 

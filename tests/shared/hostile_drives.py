@@ -27,6 +27,7 @@ WILD = (np.nan, np.inf, -np.inf, 1e15, -1e15, 1e-300, -0.0, 5e-324, 1e308, 1e9)
 WORDS = ("x", "1,5", "0x10", "1e", "+1", "--1", "1e999", "nan", "inf", "-nan(1)", "٣")
 KEYS = ("ratio", "orders", "knots", "potential", "end_stiffness", "kinematic_error")
 KEYS += ("damping", "numerical_damping", "passes", "hysteresis", "friction")
+KEYS += ("contact_damping",)
 BODIES = """
   <body><plugin instance="d{k}"/><inertial pos="0 0 0" mass="1e-9"
     diaginertia="{rotor} {rotor} {rotor}"/><joint name="m{k}" axis="0 0 1"/></body>
@@ -78,6 +79,8 @@ def sound_attributes(rng: Rng) -> dict[str, str]:
         law = 10.0 ** rng.uniform(-12, 12, 7)
         law[3] += law[2]
         found["friction"] = _text([1.0, rng.choice([1.0, -1.0]), *law])
+    if rng.random() < 0.5:
+        found["contact_damping"] = repr(float(rng.choice([0.0, 3.0, 1e10])))
     return found
 
 

@@ -6,12 +6,20 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
+from swgjoint.errors import Outcome
+
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 
 class ActiveSetError(ArithmeticError):
     """No active set was found, or the system of the active set is singular."""
+
+    def __init__(
+        self, message: str, outcome: Outcome = Outcome.ACTIVE_SET_CYCLES
+    ) -> None:
+        super().__init__(message)
+        self.outcome = outcome
 
 
 def solve_mixed(
@@ -71,7 +79,7 @@ def _solve_active(matrix: Array, offset: Array, active: Mask) -> Array:
         try:
             z[index] = np.linalg.solve(matrix[np.ix_(index, index)], -offset[index])
         except np.linalg.LinAlgError as error:
-            raise ActiveSetError("singular contact matrix") from error
+            raise ActiveSetError("singular contact matrix", Outcome.SINGULAR) from error
     return z
 
 

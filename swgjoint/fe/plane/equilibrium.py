@@ -142,9 +142,7 @@ class NewtonSolver:
                     outcome = Outcome.SINGULAR if free else Outcome.CONVERGED
                     return _finished(model, state, outcome, history, self.ring_range)
         except ActiveSetError as error:
-            singular = "singular" in str(error)
-            outcome = Outcome.SINGULAR if singular else Outcome.ACTIVE_SET_CYCLES
-            return replace(start, outcome=outcome, history=tuple(history))
+            return replace(start, outcome=error.outcome, history=tuple(history))
         except SingularRingError:
             return replace(start, outcome=Outcome.SINGULAR, history=tuple(history))
         outcome = Outcome.MAX_ITERATIONS if settled else Outcome.ACTIVE_SET_CYCLES

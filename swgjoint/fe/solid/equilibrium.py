@@ -107,9 +107,7 @@ class SolidSolver:
                     outcome = Outcome.SINGULAR if free else Outcome.CONVERGED
                     return _finished(ring, state, outcome, history)
         except ActiveSetError as error:
-            singular = "singular" in str(error)
-            outcome = Outcome.SINGULAR if singular else Outcome.ACTIVE_SET_CYCLES
-            return replace(start, outcome=outcome, history=tuple(history))
+            return replace(start, outcome=error.outcome, history=tuple(history))
         except SingularRingError:
             return replace(start, outcome=Outcome.SINGULAR, history=tuple(history))
         outcome = Outcome.MAX_ITERATIONS if settled else Outcome.ACTIVE_SET_CYCLES
