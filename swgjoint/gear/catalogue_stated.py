@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from statistics import median
-from typing import Any
 
 from swgjoint.errors import InputError
-from swgjoint.gear.catalogue import CatalogueRow, catalogue_rows, named_rows, table
+from swgjoint.gear.catalogue import CatalogueRow, table
 
 SIMILAR = 1.6
 """Torsion at T1 varies by less than this factor about the median of its ratio class:
@@ -126,41 +125,6 @@ def stated_figures(row: CatalogueRow) -> dict[str, float | None]:
         "buckling_torque_Nm": _number(ratings, "buckling_Nm"),
         "input_inertia_kgm2": 1e-4 * inertia if isinstance(inertia, float) else None,
     }
-
-
-def catalogue_faults() -> list[str]:
-    """Contradictions in the shipped tables, one line each; none in a sound release.
-
-    K1 < K2 < K3 and T1 < T2; torsion T1/K1 similar over the sizes of a ratio class;
-    rated <= repeated peak <= momentary peak, T2 below the repeated peak.
-    """
-    faults = [fault for row in table("stiffness") for fault in _faults(row)]
-    for row in catalogue_rows():
-        if not row.rated_torque <= row.repeated_peak <= row.momentary_peak:
-            faults.append(f"{row.name}: torques of ratings.csv do not increase")
-        if row.T2 >= row.repeated_peak:
-            faults.append(f"{row.name}: T2 {row.T2:g} N·m is above the repeated peak")
-    return faults
-
-
-def catalogue_gaps() -> list[dict[str, Any]]:
-    """Rows with values that the tables do not hold: ``row`` and ``missing``."""
-    gaps = []
-    for row in named_rows():
-        absent = [key for key, value in stated_figures(row).items() if value is None]
-        if absent:
-            gaps.append({"row": row.name, "missing": absent})
-    rated = {row.size for row in catalogue_rows()}
-    smallest = min(row.ratio for row in catalogue_rows())
-    for line in table("stiffness"):
-        size, ratio = int(_number(line, "size")), int(_number(line, "ratio_class"))
-        if size not in rated or ratio < smallest:
-            gaps.append({"row": f"stiffness {size}-{ratio}", "missing": ["ratings"]})
-    for line in table("accuracy"):
-        if line["series"] != "CSG":
-            name = f"{line['series']}-{line['size']:g}-{line['ratio_class']:g}"
-            gaps.append({"row": f"accuracy {name}", "missing": ["ratings"]})
-    return gaps
 
 
 def _faults(row: dict[str, float | str | None]) -> list[str]:

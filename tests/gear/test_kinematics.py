@@ -1,4 +1,4 @@
-"""Layouts: signed ratios, the two gear angles, the rotation that takes up backlash."""
+"""Layouts: signed ratios, the two gear angles."""
 
 from __future__ import annotations
 
@@ -17,7 +17,6 @@ from swgjoint.gear.kinematics import (
     periodicity,
     ratio,
 )
-from swgjoint.gear.teeth.backlash import circumferential_backlash, initial_rotation
 
 ANGLE = st.floats(-10.0, 10.0)
 
@@ -96,40 +95,3 @@ def test_unknown_layout_says_what_is_accepted():
         ),
     ):
         ratio("ring_fixed", 120, 122)
-
-
-# -- backlash ------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("c_p", "backlash"),
-    [(1.0, 0.0), (0.95, 0.07854), (0.9, 0.15708), (0.85, 0.23562), (0.8, 0.31416)],
-)
-def test_backlash_of_table_6_1(c_p, backlash):
-    """Circumferential backlash over c_P of the ring gear, thesis Table 6.1."""
-    design = Design.load("reference-2d").with_changes(
-        {"circular_spline.thickness_coefficient": c_p}
-    )
-    assert circumferential_backlash(design) == pytest.approx(backlash * 1e-3, abs=5e-9)
-
-
-@pytest.mark.parametrize("member", ["flexspline", "circular_spline"])
-def test_initial_rotation(member):
-    """Eq. (6.4): pi (1 - c_P)/(2 N_fs) with the lower c_P, wherever it is."""
-    design = Design.load("reference-2d")
-    assert initial_rotation(design) == 0.0
-    changed = design.with_changes({f"{member}.thickness_coefficient": 0.9})
-    assert initial_rotation(changed) == pytest.approx(pi * 0.1 / 240, rel=1e-12)
-
-
-def test_initial_rotation_takes_up_the_backlash_at_the_pitch_circle():
-    """On the pitch circle of the flexspline gamma is half the backlash B."""
-    design = Design.load("reference-3d")  # c_P = 0.95 in the circular spline
-    moved = initial_rotation(design) * 60e-3
-    assert moved == pytest.approx(circumferential_backlash(design) / 2, rel=1e-12)
-
-
-def test_initial_rotation_of_involutes():
-    """Difference of the angular tooth thicknesses, pi/120 - pi/122."""
-    design = Design.load("reference-2d-involute")
-    assert initial_rotation(design) == pytest.approx(pi / 120 - pi / 122, rel=1e-12)

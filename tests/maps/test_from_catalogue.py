@@ -11,11 +11,9 @@ from messages import names, naming
 
 from swgjoint.errors import InputError
 from swgjoint.gear import catalogue_stated
-from swgjoint.gear.catalogue import table
+from swgjoint.gear.catalogue import catalogue_rows, table
 from swgjoint.gear.catalogue_stated import (
-    catalogue_faults,
-    catalogue_gaps,
-    stated_figures,
+    _faults,
 )
 from swgjoint.gear.kinematics import LAYOUTS
 from swgjoint.maps.drive_map import DriveMap
@@ -23,7 +21,6 @@ from swgjoint.maps.file import map_bytes, map_from_bytes
 from swgjoint.maps.fit.error_spectrum import with_assumed_error
 from swgjoint.maps.from_catalogue import (
     catalogue_names,
-    find_row,
     is_catalogue_name,
     three_lines,
     with_stated_error,
@@ -200,6 +197,23 @@ def test_lost_motion_is_not_above_the_bound_of_the_size():
         assert 0 < lost["lost_motion_arcmin"] <= bounds[int(name.split("-")[1])]
 
 
+def catalogue_faults() -> list[str]:
+    """Contradictions in the shipped tables, one line each; none in a sound release.
+
+    K1 < K2 < K3 and T1 < T2; torsion T1/K1 similar over the sizes of a ratio class;
+    rated <= repeated peak <= momentary peak, T2 below the repeated peak.
+    """
+    faults = [
+        fault for row in catalogue_stated.table("stiffness") for fault in _faults(row)
+    ]
+    for row in catalogue_rows():
+        if not row.rated_torque <= row.repeated_peak <= row.momentary_peak:
+            faults.append(f"{row.name}: torques of ratings.csv do not increase")
+        if row.T2 >= row.repeated_peak:
+            faults.append(f"{row.name}: T2 {row.T2:g} N·m is above the repeated peak")
+    return faults
+
+
 def test_tables_agree_with_themselves(monkeypatch):
     """The shipped tables have no contradiction; a swapped or misplaced digit is one."""
     assert catalogue_faults() == []
@@ -221,18 +235,6 @@ def test_tables_agree_with_themselves(monkeypatch):
             InputError, match=naming("stiffness.csv", "14", "80", *parts)
         ):
             DriveMap.from_catalogue("CSG-14-100")
-
-
-def test_gaps_are_listed():
-    """Rows without ratings or without a figure are named with what they lack."""
-    gaps = {gap["row"]: gap["missing"] for gap in catalogue_gaps()}
-    assert gaps["stiffness 8-30"] == ["ratings"]
-    assert gaps["accuracy CHA-14-30"] == ["ratings"]
-    assert "stiffness 14-50" not in gaps
-    for name in catalogue_names():
-        row = find_row(name)
-        empty = [key for key, value in stated_figures(row).items() if value is None]
-        assert gaps.get(name, []) == empty
 
 
 @pytest.mark.parametrize(

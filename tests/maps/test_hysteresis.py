@@ -12,10 +12,8 @@ from messages import naming
 
 from swgjoint.errors import InputError
 from swgjoint.maps.drive_map import DriveMap
-from swgjoint.maps.fit.hysteresis_fit import hysteresis_from
 from swgjoint.maps.hysteresis import Jenkin, Sliders, play_hysteresis
 from swgjoint.maps.sheet.loop import torque_loop
-from swgjoint.units import arcmin
 
 ELEMENTS = (
     Jenkin(stiffness=4e3, yield_torque=2.0),
@@ -137,51 +135,3 @@ def test_area_of_the_loop_is_the_slip_work(synthetic_map):
     want = sum(4 * e.yield_torque * (X - e.yield_torsion) for e in ELEMENTS)
     # chords of the legs between 80 torques cut the corners where elements slip
     assert area == pytest.approx(want, rel=5e-3)
-
-
-@pytest.mark.parametrize("stiffness", [None, 2e5])
-def test_wanted_loss_is_measured(synthetic_map, stiffness):
-    """The spec procedure returns the hysteresis loss that was wanted."""
-    catalogue = DriveMap.from_catalogue("CSG-20-80")
-    for drive in (catalogue,) if stiffness else (synthetic_map, catalogue):
-        [element] = hysteresis_from(drive, loss=0.8 * arcmin, stiffness=stiffness)
-        drive = replace(drive, hysteresis=(element,))
-        sheet = drive.spec_sheet(["hysteresis_loss_arcmin"])
-        assert sheet["hysteresis_loss_arcmin"] == pytest.approx(0.8, rel=1e-4)
-        assert "hysteresis_loss_arcmin" not in sheet["missing"]
-        assert sheet["validity"]["hysteresis"] == "given"
-        if stiffness:
-            assert element.stiffness == stiffness
-
-
-def test_lost_motion_takes_a_second_element():
-    """Loss and lost motion at once; a lost motion that cannot be had is refused."""
-    drive = DriveMap.linear(1e4, rated_torque=50.0)
-    lost = 0.99 * 4.0 / 1e4  # the line alone has 8 % of rated over K
-    elements = hysteresis_from(drive, loss=1e-4, lost_motion=lost)
-    assert len(elements) == 2
-    drive = replace(drive, hysteresis=elements)
-    sheet = drive.spec_sheet(["hysteresis_loss_arcmin", "lost_motion_arcmin"])
-    assert sheet["hysteresis_loss_arcmin"] == pytest.approx(1e-4 / arcmin, rel=1e-3)
-    assert sheet["lost_motion_arcmin"] == pytest.approx(lost / arcmin, rel=1e-3)
-    with pytest.raises(
-        InputError,
-        match=naming(
-            "lost motion", "1.513 arcmin", "1.349", "1.375 arcmin", "'linear'"
-        ),
-    ):
-        hysteresis_from(drive, loss=1e-4, lost_motion=1.1 * 4.0 / 1e4)
-
-
-def test_loss_that_no_element_gives():
-    """Wider than sticking allows, narrower than clearance, no number: refused."""
-    drive = DriveMap.linear(1e4)
-    with pytest.raises(
-        InputError, match=naming("hysteresis loss", "103.1 arcmin", "3.438e-08 arcmin")
-    ):
-        hysteresis_from(drive, loss=0.03)
-    for loss in (0.0, -1.0, np.nan):
-        with pytest.raises(
-            InputError, match=naming("hysteresis loss", f"{loss} rad", "> 0 rad")
-        ):
-            hysteresis_from(drive, loss=loss)
