@@ -11,7 +11,7 @@ from swgjoint.errors import ComputationError
 from swgjoint.fe.meshing_phases import default_steps, overload
 from swgjoint.fe.meshing_run import MeshingRun, MeshingStep, SetupState
 from swgjoint.fe.plane.continuation import Continuation
-from swgjoint.fe.plane.drive2d import check_modelled, ring_model
+from swgjoint.fe.plane.drive2d import Half, can_halve, check_modelled, ring_model
 from swgjoint.fe.plane.ring import RingModel
 from swgjoint.fe.plane.state import State
 from swgjoint.fe.plane.stress import MemberMaxima
@@ -33,7 +33,7 @@ def simulate_meshing(
     steps: int | None = None,
     turn: float = 0.5,
     nonlinear: bool = True,
-    half: bool = False,
+    half: Half = False,
     elastic_circular_spline: bool = True,
     throw: bool = True,
     progress: Progress = silent,
@@ -52,7 +52,8 @@ def simulate_meshing(
             the ``warnings`` of the result say so.
         turn: Turns of the input.
         nonlinear: Large rotations of the sectors; False is the cheap linear level.
-        half: Half model; needs even tooth counts.
+        half: Half model, which needs even tooth counts and a symmetric wave generator
+            without errors; ``auto``: where it applies.
         elastic_circular_spline: Whether the circular spline deforms; False makes it
             rigid.
         throw: Whether a position that cannot be solved is an error; else it is kept
@@ -69,6 +70,8 @@ def simulate_meshing(
     """
     if steps is None:
         steps = default_steps(design, turn)
+    if half == "auto":
+        half = can_halve(design, bearing=model == "2d")
     if model == "3d":
         from swgjoint.fe.solid.meshing import simulate_solid_meshing
 

@@ -347,7 +347,6 @@ def _stress(
     if isinstance(source, DriveMap):
         return None
     from swgjoint.fe.meshing import simulate_meshing
-    from swgjoint.fe.plane.drive2d import can_halve
 
     if model == "ring":  # has no notches
         model = "2d"
@@ -359,7 +358,7 @@ def _stress(
             torque=drive.ratings.rated_torque,
             steps=STRESS_POSITIONS,
             turn=1.0 / source.periodicity,
-            half=can_halve(source, bearing=model == "2d"),
+            half="auto",
         )
     except ComputationError:
         return None

@@ -217,7 +217,6 @@ def _simulated(
 ) -> MeshingRun | SolidRun:
     """A simulation of meshing with every position solved."""
     from swgjoint.fe.meshing import simulate_meshing
-    from swgjoint.fe.plane.drive2d import can_halve
 
     turn, model = 1.0 / design.periodicity, _model(design, task)
     return simulate_meshing(
@@ -226,7 +225,7 @@ def _simulated(
         torque=torque,
         steps=task.positions,
         turn=turn if task.turn_deg is None else task.turn_deg / 360.0,
-        half=can_halve(design, bearing=model == "2d"),
+        half="auto",
     )
 
 

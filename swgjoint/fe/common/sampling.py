@@ -15,7 +15,7 @@ from swgjoint.errors import ComputationError
 from swgjoint.fe.common.pattern import Effort, Pattern, solve_pattern
 from swgjoint.fe.common.stress_state import stress_state_label
 from swgjoint.fe.plane.continuation import Continuation
-from swgjoint.fe.plane.drive2d import can_halve, carries_bearing, left_out, ring_model
+from swgjoint.fe.plane.drive2d import carries_bearing, left_out, ring_model
 from swgjoint.fe.plane.equilibrium import NewtonSolver
 from swgjoint.fe.plane.shape_fields import drive_fields, plane_fields, plane_surface
 from swgjoint.fe.solid.continuation import SolidContinuation
@@ -267,7 +267,7 @@ def follower_in_plane(design: Design) -> Continuation:
     return Continuation(
         model=ring_model(
             perfect,
-            half=can_halve(perfect, bearing=bearing),
+            half="auto",
             friction=False,
             bearing=bearing,
             cage_held=True,
@@ -281,7 +281,7 @@ def follower_in_plane(design: Design) -> Continuation:
 def _in_space(design: Design) -> SolidContinuation:
     perfect = without_errors(design)
     return SolidContinuation(
-        ring=solid_ring(perfect, half=can_halve(perfect, bearing=False)),
+        ring=solid_ring(perfect, half="auto"),
         ratio=design.ratio,
         layout=design.drive.layout,
     )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +38,10 @@ Array = NDArray[np.float64]
 
 NARROW = ("parabolic", "asymmetric_parabolic", "four_roller")
 """Wave generators whose contact with the bore is narrower than its nodes are apart."""
+
+
+Half = bool | Literal["auto"]
+"""Whether a model is half of the drive; ``auto``: where its symmetry allows it."""
 
 
 def can_halve(design: Design, *, bearing: bool = True) -> bool:
@@ -116,7 +121,7 @@ def left_out(design: Design, model: str = "2d", *, bearing: bool = True) -> str 
 def ring_model(
     design: Design,
     *,
-    half: bool = False,
+    half: Half = False,
     nonlinear: bool = True,
     elastic_circular_spline: bool = True,
     friction: bool = True,
@@ -128,7 +133,7 @@ def ring_model(
 
     Args:
         design: The drive.
-        half: Half of the drive, closed by its symmetry.
+        half: Half of the drive, closed by its symmetry; ``auto``: where it applies.
         nonlinear: Large rotations of the sectors.
         elastic_circular_spline: Whether the circular spline deforms; its outer
             diameter is fixed or free as the design says.
@@ -142,7 +147,9 @@ def ring_model(
     Raises:
         DesignError: If the design cannot be built or the half model does not apply.
     """
-    if half and not can_halve(design, bearing=bearing):
+    if half == "auto":
+        half = can_halve(design, bearing=bearing)
+    elif half and not can_halve(design, bearing=bearing):
         drive, own = design.drive, design.wave_generator.bearing
         balls = ""
         if bearing and carries_bearing(design) and own is not None and own.balls % 2:

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from swgjoint.arrays import frozen_array
 from swgjoint.errors import ComputationError, Outcome
 from swgjoint.fe.plane.continuation import Continuation
-from swgjoint.fe.plane.drive2d import can_halve, ring_model
+from swgjoint.fe.plane.drive2d import ring_model
 from swgjoint.fe.plane.equilibrium import NewtonSolver
 from swgjoint.fe.plane.state import State
 from swgjoint.gear.design.design import Design
@@ -170,7 +170,6 @@ def ratcheting_path(
 def path_follower(design: Design) -> Continuation:
     """The drive in the plane, perfect and smooth, far from its map's torques."""
     perfect = without_errors(design)
-    half = can_halve(perfect, bearing=False)
     small = TOLERANCE * lobe_height(design)
     solver = NewtonSolver(
         max_iterations=ITERATIONS,
@@ -179,7 +178,7 @@ def path_follower(design: Design) -> Continuation:
         ring_range=RING_RANGE,
     )
     return Continuation(
-        model=ring_model(perfect, half=half, friction=False, bearing=False),
+        model=ring_model(perfect, half="auto", friction=False, bearing=False),
         ratio=design.ratio,
         layout=design.drive.layout,
         solver=solver,

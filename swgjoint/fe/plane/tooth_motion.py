@@ -19,7 +19,7 @@ from scipy.interpolate import CubicSpline
 from swgjoint.errors import ComputationError
 from swgjoint.fe.plane.continuation import Continuation
 from swgjoint.fe.plane.corotation import rotate, turned
-from swgjoint.fe.plane.drive2d import can_halve, ring_model
+from swgjoint.fe.plane.drive2d import ring_model
 from swgjoint.gear.design.design import Design, MemberName
 from swgjoint.gear.teeth.conjugate import conjugate_profile
 from swgjoint.gear.teeth.neutral_line import Pose
@@ -79,7 +79,7 @@ def deflected_rim(design: Design) -> DeflectedRim:
     """
     model = ring_model(
         design,
-        half=can_halve(design, bearing=False),
+        half="auto",
         elastic_circular_spline=False,
         friction=False,
         bearing=False,

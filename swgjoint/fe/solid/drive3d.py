@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from swgjoint.errors import DesignError
 from swgjoint.fe.common.contact_patch import averaged_spline
 from swgjoint.fe.plane.circular_spline import CircularSpline
-from swgjoint.fe.plane.drive2d import can_halve
+from swgjoint.fe.plane.drive2d import Half, can_halve
 from swgjoint.fe.solid.memory import require_solid_memory, required_memory
 from swgjoint.fe.solid.ring import SolidRing
 from swgjoint.fe.solid.ring_gear import ring_gear
@@ -37,7 +37,7 @@ Bearing = Literal["free", "held"]
 def solid_ring(
     design: Design,
     *,
-    half: bool = False,
+    half: Half = False,
     nonlinear: bool = True,
     elastic_circular_spline: bool = True,
     orders: Orders | None = None,
@@ -47,7 +47,7 @@ def solid_ring(
 
     Args:
         design: The drive; it needs a ``[cup]``.
-        half: Half of the drive, closed by its symmetry.
+        half: Half of the drive, closed by its symmetry; ``auto``: where it applies.
         nonlinear: Large rotations of the segments.
         elastic_circular_spline: Whether the circular spline deforms.
         orders: Degrees of the displacements of faces and sections.
@@ -61,6 +61,10 @@ def solid_ring(
     """
     name = design.drive.name
     check_modelled(design)
+    if half == "auto":
+        own = design.wave_generator.bearing
+        even = bearing is None or own is None or own.balls % 2 == 0
+        half = can_halve(design, bearing=False) and even
     if bearing is not None:
         check_bearing(design, half=half)
     if half and not can_halve(design, bearing=False):

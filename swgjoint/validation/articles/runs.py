@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from swgjoint.errors import ComputationError, DesignError
-from swgjoint.fe.plane.drive2d import can_halve
 from swgjoint.fe.solid.continuation import SolidContinuation
 from swgjoint.fe.solid.drive3d import solid_ring
 from swgjoint.fe.solid.figures.fatigue import Limits, assess, fatigue
@@ -114,8 +113,7 @@ def _fatigue(task: Task) -> Found:
 
 def _deflected(task: Task) -> Found:
     """On the wave generator, no tooth contact: displacement [mm], stress [MPa]."""
-    half = can_halve(task.design, bearing=False)
-    ring = solid_ring(task.design, half=half, elastic_circular_spline=False)
+    ring = solid_ring(task.design, half="auto", elastic_circular_spline=False)
     state = SolidContinuation(ring=ring, ratio=task.design.ratio).deflected()
     if not state.outcome.ok:
         raise ComputationError(f"{task.name}: {state.outcome.value}")

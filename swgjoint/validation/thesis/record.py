@@ -103,7 +103,6 @@ def recorded(spec: RunSpec) -> RunRecord:
 def compute(spec: RunSpec) -> RunRecord:
     """Simulate meshing; what fails is part of the record, not an error."""
     from swgjoint.fe.meshing import simulate_meshing
-    from swgjoint.fe.plane.drive2d import can_halve
 
     begin = time.perf_counter()
     try:
@@ -113,7 +112,7 @@ def compute(spec: RunSpec) -> RunRecord:
             torque=spec.torque,
             steps=spec.positions,
             turn=spec.turn,
-            half=can_halve(spec.design, bearing=spec.model == "2d"),
+            half="auto",
             throw=False,
         )
     except (ComputationError, DesignError) as error:

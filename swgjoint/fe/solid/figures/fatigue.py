@@ -21,7 +21,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.errors import ComputationError, DesignError
-from swgjoint.fe.plane.drive2d import can_halve
 from swgjoint.fe.solid.continuation import SolidContinuation
 from swgjoint.fe.solid.drive3d import solid_ring
 from swgjoint.fe.solid.state import SolidState
@@ -159,7 +158,7 @@ def fatigue(
         ComputationError: If a solve fails or memory will not do.
     """
     limits, shell = Limits.of(design), ShellDimensions.of(design)
-    ring = solid_ring(design, half=can_halve(design, bearing=False))
+    ring = solid_ring(design, half="auto")
     follow = SolidContinuation(
         ring=ring, ratio=design.ratio, layout=design.drive.layout
     )

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.errors import ComputationError
-from swgjoint.fe.plane.drive2d import can_halve
 from swgjoint.fe.solid.continuation import SolidContinuation
 from swgjoint.fe.solid.drive3d import Bearing, solid_ring
 from swgjoint.fe.solid.ring import SolidRing
@@ -74,10 +73,7 @@ def solid_torsion(
         DesignError: If the design cannot be built or holds what is not modelled.
         ComputationError: If a solve fails.
     """
-    half = can_halve(design, bearing=False)
-    if bearing is not None and design.wave_generator.bearing is not None:
-        half = half and design.wave_generator.bearing.balls % 2 == 0
-    ring = solid_ring(design, half=half, bearing=bearing)
+    ring = solid_ring(design, half="auto", bearing=bearing)
     follow = SolidContinuation(
         ring=ring, ratio=design.ratio, layout=design.drive.layout
     )
