@@ -162,6 +162,8 @@ def step_mode(
     )
     s = -np.log(np.linalg.eigvals(matrix).astype(complex)) / h
     size = float(np.sqrt(np.abs(s[0] * s[1])))
+    if not 0.0 < size < np.inf:  # too soft to vibrate in numbers
+        return None
     return StepMode(
         damping_ratio=float(np.real(s[0] + s[1])) / (2.0 * size),
         frequency=size,

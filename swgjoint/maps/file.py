@@ -213,10 +213,12 @@ def write_map(drive: Potential, path: str | Path) -> None:
     """Write a ``.swg`` file, whole or not at all.
 
     Raises:
-        InputError: If the file cannot be written.
-        ValueError: If the map would be refused by the reader.
+        InputError: If the file cannot be written, or the reader would refuse the map.
     """
-    check_map(drive)
+    try:
+        check_map(drive)
+    except ValueError as exc:
+        raise MapFileError(f"map {drive.name!r} is no drive: {exc}") from None
     write_whole(path, map_bytes(drive))
 
 

@@ -166,6 +166,14 @@ def test_linear_spring_is_damped_as_asked(catalogue):
         assert plain == pytest.approx(0.02 + 0.5 * h_w, rel=0.1)
 
 
+def test_a_spring_too_soft_to_vibrate_has_no_mode():
+    """Where the frequency vanishes in numbers there is no damping ratio."""
+    soft = DriveMap.linear(1e-30)
+    _, _, got = built(PAIR.format(step=1e-3, link=0.4), soft, "full")
+    damped = replace(got["j"], damping=3.0)
+    assert step_mode(damped, timestep=1e-3) is None
+
+
 @pytest.mark.parametrize("level", ["linear", "native"])
 @pytest.mark.parametrize("link", [0.4, 1e-3, 1e-5])
 def test_free_joint_never_gains_energy(catalogue, level, link):

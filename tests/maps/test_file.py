@@ -602,3 +602,11 @@ def test_a_header_that_cannot_be_written_is_refused(
             archive.writestr(name, content)
     with pytest.raises(MapFileError, match=naming("map.swg", *says)):
         DriveMap.load(file)
+
+
+def test_a_map_that_cannot_be_read_is_not_written(synthetic_map, tmp_path):
+    """The writer refuses in one line what the reader would."""
+    drive = replace(synthetic_map, kinematic_error=synthetic_map.kinematic_error + 4.0)
+    with pytest.raises(InputError, match=naming("'synthetic'", "half a turn")):
+        drive.save(tmp_path / "a.swg")
+    assert list(tmp_path.iterdir()) == []

@@ -253,3 +253,11 @@ def test_a_trapezoid_must_fit_into_the_run():
             "[trajectory]\nkind='trapezoid'\nend_deg={joint=20.0}\n"
             "max_speed_deg_s=10.0\nmax_acceleration_deg_s2=20.0"
         )
+
+
+def test_a_motion_beyond_numbers_is_refused():
+    """A ramp of 1e-300 s divides zero by zero: the line names the key and its value."""
+    scene = Scene.load_file("bench-chirp", {"trajectory.ramp_s": 1e-300})
+    arm = RigidArm(scene.arm)
+    with pytest.raises(InputError, match=naming("ramp_s", "1e-300", "not finite")):
+        trajectory_of(scene, arm)

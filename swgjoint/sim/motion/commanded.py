@@ -40,7 +40,19 @@ def trajectory_of(scene: Scene, arm: RigidArm, *, sub_steps: int = 1) -> Traject
         InputError: If the arm cannot make the motion, or no sample of the run is left
             for the metrics.
     """
-    path = _motion_of(scene, arm, sub_steps)
+    with np.errstate(all="ignore"):  # what is not finite is refused below
+        path = _motion_of(scene, arm, sub_steps)
+    samples = (path.position, path.velocity, path.acceleration)
+    if not all(np.isfinite(part).all() for part in samples):
+        values = [
+            f"{key} = {value:g}"
+            for key, value in scene.trajectory.model_dump().items()
+            if isinstance(value, float) and not 1e-12 < abs(value) < 1e12 and value
+        ]
+        raise InputError(
+            f"{scene.where}: trajectory.{', '.join(values) or 'kind'}: the motion is"
+            " not finite; accepted: times, speeds and distances of a real motion"
+        )
     if path.steady.stop <= path.steady.start:
         raise InputError(
             f"{scene.where}: simulation.step_s: {scene.simulation.step_s:g} s leaves no"
