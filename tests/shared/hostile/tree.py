@@ -30,7 +30,7 @@ def hostile_value(rng: np.random.Generator, like: Any = None) -> Any:
     """A value instead of ``like``: near it, of another type, or absurd."""
     what = int(rng.integers(16)) - 6
     if what < 3 and isinstance(like, int | float) and not isinstance(like, bool):
-        scaled = like * factor(rng)
+        scaled = max(-1e300, min(1e300, like)) * factor(rng)
         return int(scaled) if isinstance(like, int) else scaled
     if what < 4 and isinstance(like, list):
         return list_of(rng, like)
