@@ -11,7 +11,7 @@ from swgjoint.json_text import json_text
 
 if TYPE_CHECKING:
     from swgjoint.explore.optimise.optimise import Optimum
-    from swgjoint.explore.sweep.results import Place
+    from swgjoint.explore.sweep.results import ResultStore
 
 
 def configure(parser: argparse.ArgumentParser) -> None:
@@ -54,7 +54,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     return result
 
 
-def _write(place: Place, found: Optimum, result: dict[str, Any]) -> list[str]:
+def _write(place: ResultStore, found: Optimum, result: dict[str, Any]) -> list[str]:
     """Designs of the front, all that were tried, the picture, the whole as JSON."""
     from swgjoint.explore.sweep.results import csv_text, write_to
     from swgjoint.view.plots.optimise import optimum_picture

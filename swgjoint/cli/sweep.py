@@ -10,7 +10,7 @@ from swgjoint.cli.shared.text import short_headers, table
 from swgjoint.json_text import json_text
 
 if TYPE_CHECKING:
-    from swgjoint.explore.sweep.results import Place
+    from swgjoint.explore.sweep.results import ResultStore
     from swgjoint.explore.sweep.sweep import SweepResult
 
 SHOWN = 40
@@ -64,7 +64,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     return result
 
 
-def _write(place: Place, found: SweepResult, result: dict[str, Any]) -> list[str]:
+def _write(place: ResultStore, found: SweepResult, result: dict[str, Any]) -> list[str]:
     """One row a design as tables, the picture, and the whole as JSON."""
     from swgjoint.explore.sweep.results import csv_text, parquet_bytes, write_to
     from swgjoint.view.plots.sweep import sweep_picture

@@ -166,7 +166,7 @@ def compensated(
     return planned
 
 
-class Recorder:
+class TurnRecorder:
     """Keeps what another controller reads; needs a link encoder."""
 
     def __init__(self, inner: Controller) -> None:

@@ -51,7 +51,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from swgjoint.control.flexible import flexible_plan
 from swgjoint.control.motor_side import Planner
-from swgjoint.control.mpc_design import DRIFT, Design, TwoMass, design
+from swgjoint.control.mpc_design import DRIFT, PredictionMatrices, TwoMassModel, design
 from swgjoint.control.mpc_solver import solve
 from swgjoint.errors import InputError
 from swgjoint.maps.drive_map import DriveMap
@@ -126,8 +126,8 @@ class PredictiveController:
             level[..., j] = np.searchsorted(between, stiffness)
             self._grids.append(grid)
         self._level = level.reshape(self._count, -1)
-        self._design: Design | None = None
-        self._parts: Design | None = None
+        self._design: PredictionMatrices | None = None
+        self._parts: PredictionMatrices | None = None
         self._state: Array = np.empty((0, 6))
         limit = np.broadcast_to(joints.torque_limit, shape).reshape(-1)
         rated = np.array([d.ratings.rated_torque for d in joints.drives])[self._joint]
@@ -209,7 +209,7 @@ class PredictiveController:
         self._state[:, 0] = readings[:, 0]
         reads_link = measured.link_angle is not None
         self._state[:, 1] = readings[:, 1 if reads_link else 0]
-        self._design = Design.stacked(
+        self._design = PredictionMatrices.stacked(
             [
                 [
                     design(
@@ -269,12 +269,14 @@ def _stiffness(drive: DriveMap, theta: Array, psi: Array) -> Array:
     return np.maximum(found, 1e-3 * drive.mean_stiffness)  # clearance has none
 
 
-def _model(joints: KnownJoints, j: int, stiffness: float, period: float) -> TwoMass:
+def _model(
+    joints: KnownJoints, j: int, stiffness: float, period: float
+) -> TwoMassModel:
     def known(values: Array) -> float:
         return float(np.reshape(values, (-1, len(joints.names)))[0, j])
 
     drive = joints.drives[j]
-    return TwoMass(
+    return TwoMassModel(
         ratio=drive.ratio,
         rotor_inertia=known(joints.rotor_inertia),
         link_inertia=known(joints.link_inertia),

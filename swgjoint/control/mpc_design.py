@@ -38,7 +38,7 @@ input that is larger than real gives the feedback back the margins that a filter
 
 
 @dataclass(frozen=True, kw_only=True)
-class TwoMass:
+class TwoMassModel:
     """A joint about its plan, motor on the output side."""
 
     ratio: float
@@ -70,7 +70,7 @@ class TwoMass:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Design:
+class PredictionMatrices:
     """What the controller multiplies with; stacked, axes in front are designs."""
 
     transition: Array
@@ -98,7 +98,7 @@ class Design:
     weight: Array
 
     @classmethod
-    def stacked(cls, designs: list[list[Design]]) -> Design:
+    def stacked(cls, designs: list[list[PredictionMatrices]]) -> PredictionMatrices:
         """Designs of all joints and stiffnesses, axes in front."""
         return cls(
             **{
@@ -107,13 +107,15 @@ class Design:
             }
         )
 
-    def at(self, index: tuple[NDArray[Any], ...]) -> Design:
+    def at(self, index: tuple[NDArray[Any], ...]) -> PredictionMatrices:
         """Those of joints and stiffnesses."""
-        return Design(**{f.name: getattr(self, f.name)[index] for f in fields(self)})
+        return PredictionMatrices(
+            **{f.name: getattr(self, f.name)[index] for f in fields(self)}
+        )
 
 
 def design(
-    joint: TwoMass,
+    joint: TwoMassModel,
     *,
     horizon: int,
     frequency: float,
@@ -121,7 +123,7 @@ def design(
     unit: float,
     reads_link: bool,
     reads_torque: bool,
-) -> Design:
+) -> PredictionMatrices:
     """Feedback, filter and programme.
 
     Args:
@@ -168,7 +170,7 @@ def design(
     inverse, weight = prepare(hessian, rows)
     reads, gain = _filter(joint, whole, push, drift, reads_link, reads_torque)
     k, i = joint.stiffness, joint.ratio
-    return Design(
+    return PredictionMatrices(
         transition=whole,
         by_torque=push,
         reads=reads,
@@ -185,7 +187,7 @@ def design(
 
 
 def _filter(
-    joint: TwoMass,
+    joint: TwoMassModel,
     whole: Array,
     push: Array,
     drift: float,

@@ -25,7 +25,7 @@ from swgjoint.units import arcmin
 DriveSource = DriveMap | Design | str | Path
 
 
-class Options(TypedDict, total=False):
+class AttachOptions(TypedDict, total=False):
     """Options of :func:`attach`, which says what they mean."""
 
     level: str
@@ -46,7 +46,7 @@ class Options(TypedDict, total=False):
 def attach(
     spec: mujoco.MjSpec,
     drives: Mapping[str, DriveSource],
-    **options: Unpack[Options],
+    **options: Unpack[AttachOptions],
 ) -> dict[str, JointDrive]: ...
 
 
@@ -56,7 +56,7 @@ def attach(
     *,
     joint: str,
     drive: DriveSource,
-    **options: Unpack[Options],
+    **options: Unpack[AttachOptions],
 ) -> JointDrive: ...
 
 

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from swgjoint.drives.references import names_catalogue
 from swgjoint.envs.api import BatchEnv, SingleEnv
 from swgjoint.envs.arguments import check_flag, check_number, shown
-from swgjoint.envs.core import Core, Entry, Limits, ceiling, error_bounds
+from swgjoint.envs.core import Core, Entry, EpisodeLimits, ceiling, error_bounds
 from swgjoint.envs.loop import MotorLoop
 from swgjoint.envs.plant import Plant, specimen
 from swgjoint.envs.sensors import Sensors
-from swgjoint.envs.specimen import Tolerances, load_drive_once, tolerances_of
+from swgjoint.envs.specimen import SpecimenTolerances, load_drive_once, tolerances_of
 from swgjoint.errors import InputError
 from swgjoint.joint.region import check_region
 from swgjoint.maps.drive_map import DriveMap
@@ -54,7 +54,7 @@ class ArmSettings:
     shift_arcmin: float = 10.0
     episode_s: float = 2.0
     sensors: Mapping[str, float] | Sensors | None = None
-    randomise: bool | Mapping[str, float] | Tolerances = False
+    randomise: bool | Mapping[str, float] | SpecimenTolerances = False
     error_scale_mm: float = 1.0
     effort_weight: float = 0.1
 
@@ -151,7 +151,7 @@ class ArmCore(Core):
                 damping=assembly.loops.damping,
                 ratio=task.joints.ratio,
             ),
-            limits=Limits(
+            limits=EpisodeLimits(
                 angle=0.5 * np.ptp(path, axis=0) + ANGLE_MARGIN,
                 centre=0.5 * (path.max(axis=0) + path.min(axis=0)),
                 motor_speed=top,

@@ -11,11 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.envs.arguments import check_flag, check_number, shown
-from swgjoint.envs.core import Core, Entry, Limits, ceiling, error_bounds
+from swgjoint.envs.core import Core, Entry, EpisodeLimits, ceiling, error_bounds
 from swgjoint.envs.loop import MotorLoop
 from swgjoint.envs.plant import Plant, specimen
 from swgjoint.envs.sensors import Sensors
-from swgjoint.envs.specimen import Tolerances, drive_of_environment, tolerances_of
+from swgjoint.envs.specimen import (
+    SpecimenTolerances,
+    drive_of_environment,
+    tolerances_of,
+)
 from swgjoint.errors import InputError
 from swgjoint.joint.attach import attach
 from swgjoint.joint.drive import JointDrive
@@ -55,7 +59,7 @@ class BenchSettings:
     episode_s: float = 2.0
     load_of_rated: float = 0.5
     sensors: Mapping[str, float] | Sensors | None = None
-    randomise: bool | Mapping[str, float] | Tolerances = False
+    randomise: bool | Mapping[str, float] | SpecimenTolerances = False
 
     def __post_init__(self) -> None:
         for key, unit in (
@@ -191,7 +195,7 @@ class BenchCore(Core):
             plant,
             joints=joints,
             loop=loop,
-            limits=Limits(
+            limits=EpisodeLimits(
                 angle=(2.0 * s.max_angle_rad + 1.0) * one,
                 centre=np.zeros(1),
                 motor_speed=top_speed * one,

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from swgjoint.envs.loop import MotorLoop
 from swgjoint.envs.plant import Plant
 from swgjoint.envs.sensors import Readout, Sensors
-from swgjoint.envs.specimen import Tolerances
+from swgjoint.envs.specimen import SpecimenTolerances
 from swgjoint.errors import InputError
 from swgjoint.joint.variation import Variation
 from swgjoint.maps.drive_map import DriveMap
@@ -101,7 +101,7 @@ def ceiling(value: float) -> float:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Limits:
+class EpisodeLimits:
     """What ends an episode; arrays of shape (n_joints,)."""
 
     angle: Array
@@ -127,9 +127,9 @@ class Core(ABC):
         *,
         joints: KnownJoints,
         loop: MotorLoop,
-        limits: Limits,
+        limits: EpisodeLimits,
         sensors: Sensors,
-        tolerances: Tolerances | None,
+        tolerances: SpecimenTolerances | None,
         period: float,
         steps: int,
         shared: bool = False,

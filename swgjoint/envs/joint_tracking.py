@@ -216,7 +216,8 @@ class JointTrackingEnv(SingleEnv):
         load_of_rated: Largest load torque, as part of the rated torque; 0.5.
         sensors: Mapping with fields of :class:`~swgjoint.envs.sensors.Sensors`.
         randomise: True, or a mapping with fields of
-            :class:`~swgjoint.envs.specimen.Tolerances`: every episode has a drive and
+            :class:`~swgjoint.envs.specimen.SpecimenTolerances`: every episode has a drive
+            and
             a load of its own. ``task`` keeps the nominal ones. At ``linear`` True draws
             the load's inertia alone, and tolerances of the drive are refused. False.
         reference: One or several of ``sinusoid``, ``multisine``, ``point_to_point``.

@@ -54,7 +54,7 @@ def _load_once(
 
 
 @dataclass(frozen=True, kw_only=True)
-class Tolerances:
+class SpecimenTolerances:
     """Within what a drive and its load may differ from the nominal ones; ± shares.
 
     At ``linear`` a drive is one constant spring, and ``load_inertia`` is all there is:
@@ -102,8 +102,8 @@ class Tolerances:
 
 
 def tolerances_of(
-    argument: bool | Mapping[str, float] | Tolerances, level: str
-) -> Tolerances | None:
+    argument: bool | Mapping[str, float] | SpecimenTolerances, level: str
+) -> SpecimenTolerances | None:
     """What the argument ``randomise`` of an environment means; None: off.
 
     Args:
@@ -113,24 +113,28 @@ def tolerances_of(
     Raises:
         InputError: If it is of another kind, or says what the level cannot carry.
     """
-    known = {field.name for field in fields(Tolerances)}
+    known = {field.name for field in fields(SpecimenTolerances)}
     if argument is False:
         return None
     if isinstance(argument, Mapping):
         unknown = [shown(key) for key in argument if key not in known]
     else:
         unknown = [shown(argument)]
-    if unknown and argument is not True and not isinstance(argument, Tolerances):
+    if (
+        unknown
+        and argument is not True
+        and not isinstance(argument, SpecimenTolerances)
+    ):
         raise InputError(
             f"randomise {unknown[0]}; accepted: True, False or a mapping with"
             f" {', '.join(sorted(known))}"
         )
     absent = dict.fromkeys(known - {"load_inertia"}, 0) if level == "linear" else {}
-    if isinstance(argument, Tolerances):
+    if isinstance(argument, SpecimenTolerances):
         got = argument
     else:
         given = argument if isinstance(argument, Mapping) else {}
-        got = Tolerances(**{**absent, **given})  # type: ignore[arg-type]
+        got = SpecimenTolerances(**{**absent, **given})  # type: ignore[arg-type]
     for key in sorted(absent):
         if value := getattr(got, key):
             raise InputError(

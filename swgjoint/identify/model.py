@@ -36,7 +36,7 @@ _SOFTEST = 1e-3  # of the mean stiffness: slopes stay positive on the way to the
 
 
 @dataclass(frozen=True, kw_only=True)
-class Parameter:
+class ModelParameter:
     """One unknown."""
 
     name: str
@@ -246,7 +246,7 @@ class Model:
         return float(np.abs(n @ np.diff(angles)).max(initial=0.0))
 
     @cached_property
-    def unknowns(self) -> tuple[Parameter, ...]:
+    def unknowns(self) -> tuple[ModelParameter, ...]:
         """Parameters in the order of all arrays of values."""
         return tuple(_unknowns(self))
 
@@ -275,36 +275,38 @@ def lines_of(model: Model, p: Mapping[str, float]) -> tuple[Array, Array]:
     return three_lines(r.T1, r.T2, K1, K2, K3, largest=top)
 
 
-def _unknowns(model: Model) -> list[Parameter]:
+def _unknowns(model: Model) -> list[ModelParameter]:
     """The unknowns in their order: the straight line to start with, little else."""
     K, i = model.mean_stiffness, abs(model.ratio)
     x = 0.5 * float(np.ptp(model.torsion))
     T = K * x
     rate = _spread(mean_rate(model.torsion, model.step))
 
-    def slope(name: str) -> Parameter:
-        return Parameter(name=name, unit="N·m/rad", start=K, scale=K)
+    def slope(name: str) -> ModelParameter:
+        return ModelParameter(name=name, unit="N·m/rad", start=K, scale=K)
 
     found = [slope(name) for name in SPRINGS[model.spring]]
     if model.spring == "cubic":
-        cubic = Parameter(name="hardening", unit="N·m/rad³", start=0.0, scale=K / x**2)
+        cubic = ModelParameter(
+            name="hardening", unit="N·m/rad³", start=0.0, scale=K / x**2
+        )
         found[1] = cubic
     zero = -float(np.mean(model.torsion))
     found += [
-        Parameter(name="zero", unit="rad", start=zero, scale=x),
-        Parameter(name="damping", unit="N·m·s/rad", start=0.0, scale=T / rate),
+        ModelParameter(name="zero", unit="rad", start=zero, scale=x),
+        ModelParameter(name="damping", unit="N·m·s/rad", start=0.0, scale=T / rate),
     ]
     if model.hysteresis:
         # an element is f/k wide: -k and -f would do as well as k and f
         found += [
-            Parameter(
+            ModelParameter(
                 name="hysteresis_stiffness",
                 unit="N·m/rad",
                 start=0.5 * K,
                 scale=K,
                 least=_LEAST * K,
             ),
-            Parameter(
+            ModelParameter(
                 name="hysteresis_yield_torque",
                 unit="N·m",
                 start=0.02 * T,
@@ -313,12 +315,12 @@ def _unknowns(model: Model) -> list[Parameter]:
             ),
         ]
     found += [
-        Parameter(name=f"error_{p}_{q}_{part}", unit="rad", start=0.0, scale=x)
+        ModelParameter(name=f"error_{p}_{q}_{part}", unit="rad", start=0.0, scale=x)
         for p, q in model.orders
         for part in ("cos", "sin")
     ]
     if model.skew:
-        skew = Parameter(
+        skew = ModelParameter(
             name="link_skew",
             unit="s",
             start=model.first_skew,
@@ -328,18 +330,18 @@ def _unknowns(model: Model) -> list[Parameter]:
         return [*found, skew] if model.skew else found
     at_motor, speed = T / i, _spread(model.relative_rate)
     found += [
-        Parameter(
+        ModelParameter(
             name="friction_coulomb", unit="N·m", start=0.01 * at_motor, scale=at_motor
         ),
-        Parameter(name="friction_load", unit="-", start=0.0, scale=1.0),
-        Parameter(
+        ModelParameter(name="friction_load", unit="-", start=0.0, scale=1.0),
+        ModelParameter(
             name="friction_viscous", unit="N·m·s/rad", start=0.0, scale=at_motor / speed
         ),
     ]
     if model.rotor_inertia is None:
         inertia = at_motor / _spread(model.motor_acceleration)
         found.append(
-            Parameter(name="rotor_inertia", unit="kg·m²", start=0.0, scale=inertia)
+            ModelParameter(name="rotor_inertia", unit="kg·m²", start=0.0, scale=inertia)
         )
     return [*found, skew] if model.skew else found
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from swgjoint.joint.drive import JointDrive
 from swgjoint.joint.native import NativeSpring
-from swgjoint.joint.place import ROTOR_MASS, Place, Rotor
+from swgjoint.joint.place import ROTOR_MASS, DrivePlace, Rotor
 from swgjoint.units import deg
 
 SOLREF = (0.02, 1.0)
@@ -19,7 +19,7 @@ SOLIMP = (0.9, 0.95, 0.001, 0.5, 2.0)
 
 
 def add_rotor(
-    spec: mujoco.MjSpec, place: Place, name: str, rotor: Rotor
+    spec: mujoco.MjSpec, place: DrivePlace, name: str, rotor: Rotor
 ) -> tuple[Any, Any]:
     """Rotor body and hinge at the joint's place, nothing inherited from defaults.
 

@@ -16,7 +16,7 @@ from swgjoint.joint.drive import (
     prune,
 )
 from swgjoint.joint.native import NativeSpring, fit_native
-from swgjoint.joint.place import Place
+from swgjoint.joint.place import DrivePlace
 from swgjoint.joint.prescribed import kinematic_part, ratio_variation
 from swgjoint.maps.drive_map import DriveMap
 
@@ -76,7 +76,7 @@ class Fitting:
 
 
 def fitted(
-    joint: str, fitting: Fitting, place: Place, *, timestep: float
+    joint: str, fitting: Fitting, place: DrivePlace, *, timestep: float
 ) -> JointDrive:
     """The drive that a joint will have.
 

@@ -8,17 +8,17 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from swgjoint.joint.place import Place
+from swgjoint.joint.place import DrivePlace
 
 
-def clear_armature(place: Place) -> None:
+def clear_armature(place: DrivePlace) -> None:
     """Let the rotor of the drive be the only one; actuators may bring theirs."""
     for actuator in place.actuators.values():
         actuator.armature = 0.0
 
 
 def move_to_rotor(
-    place: Place,
+    place: DrivePlace,
     rotor: Any,
     *,
     ratio: float,
@@ -84,7 +84,7 @@ def move_to_rotor(
             sensor.objname = rotor.name
 
 
-def torque_is_actuators(place: Place, measured: set[str]) -> bool:
+def torque_is_actuators(place: DrivePlace, measured: set[str]) -> bool:
     """Whether sensors of the joint's actuator torque can read an actuator instead.
 
     That is so for a single actuator of gear 1, whose force is the torque; a limit of
@@ -103,7 +103,7 @@ def torque_is_actuators(place: Place, measured: set[str]) -> bool:
     return actuator.name not in measured and bool(low < high)
 
 
-def _common_range(place: Place, k: int) -> Any:
+def _common_range(place: DrivePlace, k: int) -> Any:
     """Range of an actuator's force within that of the joint's [N·m]."""
     model = place.model
     joint = model.jnt_actfrcrange[place.index]
@@ -113,7 +113,9 @@ def _common_range(place: Place, k: int) -> Any:
     return np.array([max(low, joint[0]), min(high, joint[1])])
 
 
-def misread_sensors(places: Mapping[str, Place], measured: set[str]) -> dict[str, str]:
+def misread_sensors(
+    places: Mapping[str, DrivePlace], measured: set[str]
+) -> dict[str, str]:
     """Sensors of joint torque that will read the motor's side, with their joint."""
     return {
         sensor.name or f"of joint {name}": name

@@ -32,7 +32,7 @@ _DIVERGES = (
 
 
 @dataclass(frozen=True, kw_only=True)
-class Options:
+class EngineOptions:
     """What a model with drives will have."""
 
     integrator: mujoco.mjtIntegrator
@@ -55,7 +55,7 @@ class Options:
         spec.option.tolerance = self.tolerance
 
 
-def options_for(spec: mujoco.MjSpec, wanted: str, *, rotors: bool) -> Options:
+def options_for(spec: mujoco.MjSpec, wanted: str, *, rotors: bool) -> EngineOptions:
     """Options under which drives hold in a model.
 
     Args:
@@ -101,7 +101,7 @@ def options_for(spec: mujoco.MjSpec, wanted: str, *, rotors: bool) -> Options:
             )
             if wanted == "discrete":
                 solver = enough
-    return Options(
+    return EngineOptions(
         integrator=integrator,
         iterations=solver[0],
         ls_iterations=solver[1],

@@ -23,7 +23,7 @@ LUMPED_INERTIA = 1e-12
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Place:
+class DrivePlace:
     """Where a joint stands in the compiled model."""
 
     joint: Any
@@ -70,7 +70,7 @@ class Compiled:
         mujoco.mj_fullM(self.model, self.data, mass)
         return mass
 
-    def place(self, joint: Any) -> Place:
+    def place(self, joint: Any) -> DrivePlace:
         """Where a hinge that can take a drive stands."""
         model, name = self.model, joint.name
         j = int(model.joint(name).id)
@@ -82,7 +82,7 @@ class Compiled:
         )
         offset = np.zeros(3)
         mujoco.mju_rotVecQuat(offset, model.jnt_pos[j], model.body_quat[b])
-        return Place(
+        return DrivePlace(
             joint=joint,
             parent=joint.parent.parent,
             model=model,
@@ -124,7 +124,7 @@ class Rotor:
 
 
 def free_inertias(
-    compiled: Compiled, places: Mapping[str, Place], rotors: Mapping[str, Rotor]
+    compiled: Compiled, places: Mapping[str, DrivePlace], rotors: Mapping[str, Rotor]
 ) -> dict[str, tuple[float, float]]:
     """Inertia about joints with the others free, before any drive and with the rest.
 
@@ -164,7 +164,7 @@ def free_inertias(
 
 def find_places(
     spec: mujoco.MjSpec, rotors: Mapping[str, float]
-) -> tuple[Compiled, dict[str, Place]]:
+) -> tuple[Compiled, dict[str, DrivePlace]]:
     """Find hinges that can take a drive, in the order of the model.
 
     Args:

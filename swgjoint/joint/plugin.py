@@ -172,7 +172,7 @@ def metric_error() -> float:
     the engine through ``ten_J`` and ``ten_length``, which no document promises; this
     asks the installed engine.
     """
-    from swgjoint.joint.reference import Motion, metric_of, scheme_force
+    from swgjoint.joint.reference import TwinMotion, metric_of, scheme_force
 
     load()
     drive = DriveMap.linear(2e4)
@@ -196,7 +196,7 @@ def metric_error() -> float:
     inertia = np.array([4e-5, 0.5])
     force = scheme_force(
         drive,
-        Motion(
+        TwinMotion(
             theta=0.3,
             psi=float(data.qpos[1]),
             theta_rate=v[0],

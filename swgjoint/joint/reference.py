@@ -53,7 +53,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Motion:
+class TwinMotion:
     """State of one rotor-link pair before a step."""
 
     theta: float
@@ -105,7 +105,7 @@ class _Secant:
 
 
 def gradient_force(
-    drive: DriveMap, motion: Motion, *, damping: float
+    drive: DriveMap, motion: TwinMotion, *, damping: float
 ) -> tuple[float, float]:
     """Forces on rotor and link, minus the gradient of V and the damping [N·m]."""
     theta, psi = drive.forces(motion.theta, motion.psi)
@@ -129,7 +129,7 @@ def gradient_force(
 
 def scheme_force(
     drive: DriveMap,
-    motion: Motion,
+    motion: TwinMotion,
     *,
     timestep: float,
     damping: float,
@@ -224,7 +224,7 @@ def metric_of(drive: DriveMap, force: SchemeForce, *, timestep: float) -> Array:
 
 def other_acceleration(
     drive: DriveMap,
-    motion: Motion,
+    motion: TwinMotion,
     force: SchemeForce,
     *,
     timestep: float,
@@ -250,7 +250,7 @@ def other_acceleration(
 
 
 def rest_after(
-    drive: DriveMap, motion: Motion, *, timestep: float
+    drive: DriveMap, motion: TwinMotion, *, timestep: float
 ) -> tuple[float, ...]:
     """Plugin state after a step of the scheme: where each element is relaxed [rad].
 
@@ -269,7 +269,7 @@ def rest_after(
 
 def relaxed_after(
     drive: DriveMap,
-    motion: Motion,
+    motion: TwinMotion,
     force: SchemeForce,
     *,
     timestep: float,

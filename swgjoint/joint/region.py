@@ -71,7 +71,7 @@ MARGIN = 1.4
 
 
 @dataclass(frozen=True, kw_only=True)
-class Bound:
+class RegionBound:
     """One inequality, value <= limit."""
 
     what: str
@@ -92,7 +92,7 @@ class Region:
 
     joint: str
     timestep: float
-    bounds: tuple[Bound, ...]
+    bounds: tuple[RegionBound, ...]
 
     @property
     def ok(self) -> bool:
@@ -194,7 +194,7 @@ def check_region(
     """
     native = drive.level in ("linear", "native")
     if drive.rotor is None or (native and integrator == "discrete"):
-        bounds: tuple[Bound, ...] = ()
+        bounds: tuple[RegionBound, ...] = ()
     elif integrator == "discrete":
         torque = max(max_torque or 0.0, drive.drive.ratings.repeated_peak)
         bounds = _discrete_bounds(drive, timestep, abs(max_input_speed))
@@ -208,7 +208,9 @@ def check_region(
     return Region(joint=drive.joint, timestep=timestep, bounds=bounds)
 
 
-def _discrete_bounds(drive: JointDrive, h: float, speed: float) -> tuple[Bound, ...]:
+def _discrete_bounds(
+    drive: JointDrive, h: float, speed: float
+) -> tuple[RegionBound, ...]:
     m, i, rotor = drive.drive, abs(drive.ratio), drive.rotor_inertia
     sticking = sum(element.stiffness for element in m.hysteresis)
     n = input_orders(m)[1:]
@@ -222,32 +224,32 @@ def _discrete_bounds(drive: JointDrive, h: float, speed: float) -> tuple[Bound, 
     held = drive.stiffness / i**2
     surplus = 2.0 * curvature - held  # what J/h² has to carry
     return (
-        Bound(what="step h [s]", value=h, limit=5e-3, timestep=5e-3),
-        Bound(
+        RegionBound(what="step h [s]", value=h, limit=5e-3, timestep=5e-3),
+        RegionBound(
             what="phase step h n |theta rate| [rad]",
             value=h * order * speed,
             limit=MAX_PHASE_STEP,
             timestep=MAX_PHASE_STEP / (order * speed) if order * speed else inf,
         ),
-        Bound(
+        RegionBound(
             what="h² C/(J + J_link/i²)",
             value=h**2 * curvature / inertia,
             limit=0.5,
             timestep=sqrt(0.5 * inertia / curvature) if curvature else inf,
         ),
-        Bound(
+        RegionBound(
             what="C/(K/i² + J/h²)",
             value=curvature / (held + rotor / h**2),
             limit=0.5,
             timestep=sqrt(rotor / surplus) if surplus > 0.0 else inf,
         ),
-        Bound(
+        RegionBound(
             what="slope of the kinematic error at the rotor, i sum n e",
             value=i * float(np.sum(n * e)),
             limit=0.56,
             timestep=None,
         ),
-        Bound(
+        RegionBound(
             what="largest over mean stiffness",
             value=(m.max_stiffness + sticking) / drive.stiffness,
             limit=30.0,
@@ -256,9 +258,9 @@ def _discrete_bounds(drive: JointDrive, h: float, speed: float) -> tuple[Bound, 
     )
 
 
-def _acceleration_bound(drive: JointDrive, torque: float) -> Bound:
+def _acceleration_bound(drive: JointDrive, torque: float) -> RegionBound:
     rotor = abs(drive.ratio) * drive.rotor_inertia
-    return Bound(
+    return RegionBound(
         what="acceleration of rotor or link by the largest torque [rad/s²]",
         value=torque / min(rotor, drive.link_inertia),
         limit=1e10,  # mjMAXVAL: the engine takes more for a divergence
@@ -266,9 +268,9 @@ def _acceleration_bound(drive: JointDrive, torque: float) -> Bound:
     )
 
 
-def _contact_bound(drive: JointDrive, h: float) -> Bound:
+def _contact_bound(drive: JointDrive, h: float) -> RegionBound:
     frequency = sqrt(drive.stiffness / drive.link_inertia)
-    return Bound(
+    return RegionBound(
         what="h times the frequency of the link on its held rotor, with contacts",
         value=h * frequency,
         limit=2.5,
@@ -276,12 +278,12 @@ def _contact_bound(drive: JointDrive, h: float) -> Bound:
     )
 
 
-def _lossless_bound(drive: JointDrive, h: float, speed: float) -> Bound:
+def _lossless_bound(drive: JointDrive, h: float, speed: float) -> RegionBound:
     frequency = drive.natural_frequency
     order = float(input_orders(drive.drive).max(initial=0.0))
     # a kept order meets the torsion, or comes near, at or below this speed
     resonant = order * speed >= 0.5 * frequency
-    return Bound(
+    return RegionBound(
         what="h times the torsion frequency, without losses at resonance",
         value=h * frequency if resonant else 0.0,
         limit=0.25,
@@ -289,7 +291,9 @@ def _lossless_bound(drive: JointDrive, h: float, speed: float) -> Bound:
     )
 
 
-def _explicit_bounds(drive: JointDrive, h: float, integrator: str) -> tuple[Bound, ...]:
+def _explicit_bounds(
+    drive: JointDrive, h: float, integrator: str
+) -> tuple[RegionBound, ...]:
     stiffness = drive.stiffness
     if drive.level == "full":
         stiffness = drive.drive.max_stiffness
@@ -303,7 +307,7 @@ def _explicit_bounds(drive: JointDrive, h: float, integrator: str) -> tuple[Boun
     # stability ends at 2.8 for RK4 and 2 for a semi-implicit step, in free oscillation
     rk4 = integrator.upper() == "RK4"
     limit, what = 2.0 if rk4 else 1.0, "the fastest torsion frequency"
-    damped: tuple[Bound, ...] = ()
+    damped: tuple[RegionBound, ...] = ()
     law = drive.friction
     if law is not None:
         # a bristle that sticks: beyond it creeps below its yield torque, or diverges
@@ -313,7 +317,7 @@ def _explicit_bounds(drive: JointDrive, h: float, integrator: str) -> tuple[Boun
         what = "the fastest frequency of torsion and friction bristle"
         rate, most = (law.damping + law.viscous) * mobility, 2.5 if rk4 else 1.0
         damped = (
-            Bound(
+            RegionBound(
                 what=f"h times the decay rate of friction under {integrator}",
                 value=h * rate,
                 limit=most,
@@ -321,7 +325,7 @@ def _explicit_bounds(drive: JointDrive, h: float, integrator: str) -> tuple[Boun
             ),
         )
     return (
-        Bound(
+        RegionBound(
             what=f"h times {what} under {integrator}",
             value=h * frequency,
             limit=limit,

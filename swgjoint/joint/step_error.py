@@ -41,7 +41,7 @@ SAME = 1e-6
 
 
 @dataclass(frozen=True, kw_only=True)
-class MotorLoop:
+class LinearMotorLoop:
     """Gains of a motor's loop on angle and speed of the rotor."""
 
     stiffness: float = 0.0
@@ -60,7 +60,7 @@ def step_error(
     torque: float,
     timestep: float,
     link_inertia: float | None = None,
-    loop: MotorLoop | None = None,
+    loop: LinearMotorLoop | None = None,
 ) -> float | None:
     """Relative error of the amplitude of a line of the output torque.
 
@@ -91,7 +91,7 @@ def step_error(
     if not chosen.any() or timestep * frequency >= np.pi:
         return None
     link = drive.link_inertia if link_inertia is None else link_inertia
-    motor = loop or MotorLoop()
+    motor = loop or LinearMotorLoop()
     ends = [
         abs(_line(drive, chosen, speed, torque, step, link, motor))
         for step in (0.0, timestep)
@@ -106,7 +106,7 @@ def _line(
     torque: float,
     h: float,
     link: float,
-    loop: MotorLoop,
+    loop: LinearMotorLoop,
 ) -> complex:
     """Complex amplitude of the output torque at the chosen harmonics [N·m]."""
     law, ratio, rotor = drive.drive, drive.ratio, drive.rotor_inertia

@@ -38,9 +38,9 @@ try:
     import warp as wp
 
     from swgjoint.joint.warp_law import (
-        Drive,
         Maps,
-        Step,
+        WarpDrive,
+        WarpStep,
         articulated,
         law,
         real,
@@ -97,12 +97,12 @@ class WarpDrives:
                 kind = vec5 if key == "row" else real
                 array = wp.array(np.concatenate(part), dtype=kind)
                 setattr(self.maps, key, array)
-            self.drives = wp.array(rows, dtype=Drive)
+            self.drives = wp.array(rows, dtype=WarpDrive)
             elements = sum(len(part) for part in parts["element"])
             self.rest = wp.zeros((worlds, max(elements, 1)), dtype=real)
-            unknown = Step()
+            unknown = WarpStep()
             unknown.time = float("inf")  # taken as a reset
-            self.steps = wp.full((worlds, len(rows)), unknown, dtype=Step)
+            self.steps = wp.full((worlds, len(rows)), unknown, dtype=WarpStep)
             self.factor = wp.zeros((worlds, model.nC), dtype=float)
             self.column = wp.zeros((worlds, model.nv), dtype=float)
             self.weight = wp.zeros((worlds, model.nv), dtype=float)
@@ -196,7 +196,7 @@ def _place(model: mujoco.MjModel, drive: JointDrive) -> Any:
             " the model, which MuJoCo Warp does not read; accepted: variable=False,"
             " with the map of Variation.of for another specimen"
         )
-    one = Drive()
+    one = WarpDrive()
     one.tendon = tendon
     one.q_rotor, one.q_link = int(rotor.qposadr[0]), int(link.qposadr[0])
     one.v_rotor, one.v_link = int(rotor.dofadr[0]), int(link.dofadr[0])

@@ -20,7 +20,7 @@ ZERO, HALF, ONE = (wp.constant(real(x)) for x in (0.0, 0.5, 1.0))
 
 
 @wp.struct
-class Drive:
+class WarpDrive:
     """One drive: where it is in the model, and its rows in the arrays of the maps."""
 
     tendon: int
@@ -72,7 +72,7 @@ class Rub:
 
 
 @wp.struct
-class Step:
+class WarpStep:
     """What the last evaluation left to the next, in one world."""
 
     time: float
@@ -177,7 +177,7 @@ def divided_slope(w: vec5, a: real, b: real):
 
 
 @wp.func
-def segment_at(drive: Drive, maps: Maps, torsion: real):
+def segment_at(drive: WarpDrive, maps: Maps, torsion: real):
     """Segment of a drive in which a torsion lies."""
     found = int(0)  # noqa: RUF046, UP018  # a literal is a constant to Warp
     for j in range(1, drive.segments):
@@ -187,7 +187,7 @@ def segment_at(drive: Drive, maps: Maps, torsion: real):
 
 
 @wp.func
-def torsion_at(drive: Drive, maps: Maps, theta: real, psi: real):
+def torsion_at(drive: WarpDrive, maps: Maps, theta: real, psi: real):
     """theta/i + e0 - psi."""
     x = theta / drive.ratio - psi
     for k in range(drive.harmonic, drive.harmonic + drive.harmonics):
@@ -198,7 +198,7 @@ def torsion_at(drive: Drive, maps: Maps, theta: real, psi: real):
 
 @wp.func
 def weigh(
-    drive: Drive,
+    drive: WarpDrive,
     maps: Maps,
     segment: int,
     theta: real,
@@ -236,7 +236,7 @@ def weigh(
 
 @wp.func
 def secant_over(
-    drive: Drive, maps: Maps, theta: real, psi: real, dtheta: real, dpsi: real
+    drive: WarpDrive, maps: Maps, theta: real, psi: real, dtheta: real, dpsi: real
 ):
     """Discrete gradient of V over a step of the angles, as in ``drive_map.cc``."""
     out = Secant()
@@ -299,7 +299,7 @@ def slip(s: Secant, stiffness: real, reach: real, rest: real):
 
 @wp.func
 def rub_over(
-    drive: Drive,
+    drive: WarpDrive,
     stretch: real,
     yield_torque: real,
     speed: real,
@@ -344,7 +344,7 @@ def rub_over(
 
 
 @wp.func
-def stretch_after(drive: Drive, rub: Rub, dx: real):
+def stretch_after(drive: WarpDrive, rub: Rub, dx: real):
     """Stretch of the bristle after the rotation that the step came to."""
     end = wp.clamp(rub.stretch + dx, -rub.reach, rub.reach)
     work = (rub.offset + rub.rate * dx) * dx
@@ -413,7 +413,7 @@ def respond(
 def law(
     timestep: wp.array(dtype=float),
     damped: real,
-    drives: wp.array(dtype=Drive),
+    drives: wp.array(dtype=WarpDrive),
     maps: Maps,
     weight: wp.array2d(dtype=float),
     time: wp.array(dtype=float),
@@ -423,7 +423,7 @@ def law(
     qpos: wp.array2d(dtype=float),
     qvel: wp.array2d(dtype=float),
     ten_velocity: wp.array2d(dtype=float),
-    steps: wp.array2d(dtype=Step),
+    steps: wp.array2d(dtype=WarpStep),
     rest: wp.array2d(dtype=real),
     ten_J: wp.array2d(dtype=float),
     ten_length: wp.array2d(dtype=float),

@@ -55,7 +55,7 @@ class Setting:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Outcome:
+class SettingOutcome:
     """What became of a setting."""
 
     run: Run | None
@@ -92,7 +92,7 @@ def attempt(
     drives: Mapping[str, DriveMap] | None = None,
     *,
     midway: bool = False,
-) -> Outcome:
+) -> SettingOutcome:
     """Run a setting; what is refused or diverges is part of the result.
 
     Args:
@@ -104,19 +104,23 @@ def attempt(
     try:
         whole = assemble_setting(scene, setting, drives)
     except SwgError as exc:
-        return Outcome(run=None, assembly=None, outcome="refused", reason=str(exc))
+        return SettingOutcome(
+            run=None, assembly=None, outcome="refused", reason=str(exc)
+        )
     return attempt_assembled(whole, midway=midway)
 
 
-def attempt_assembled(whole: Assembly, *, midway: bool = False) -> Outcome:
+def attempt_assembled(whole: Assembly, *, midway: bool = False) -> SettingOutcome:
     """Run what was assembled."""
     kept = thinned(held_midway(whole) if midway else whole)
     try:
         run = simulate(kept, name=whole.scene.name)
     except ComputationError as exc:
-        return Outcome(run=None, assembly=whole, outcome="diverged", reason=str(exc))
+        return SettingOutcome(
+            run=None, assembly=whole, outcome="diverged", reason=str(exc)
+        )
     cut = whole.sub_steps > 1
-    return Outcome(
+    return SettingOutcome(
         run=run,
         assembly=whole,
         outcome="sub_stepped" if cut else "ok",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from swgjoint.sim.scene.sections import Controller, FeedForward
+from swgjoint.sim.scene.sections import ControllerSection, FeedForward
 
 Array = NDArray[np.float64]
 
@@ -16,7 +16,7 @@ INTEGRAL_TIME = 4.0
 """Of a PID loop times its natural frequency; stable above 1/(2 zeta)."""
 
 
-def control_gains(section: Controller, inertia: Array) -> tuple[Array, Array]:
+def control_gains(section: ControllerSection, inertia: Array) -> tuple[Array, Array]:
     """Motor-side gains on angle [N·m/rad] and speed [N·m·s/rad]. Shapes (n_joints,).
 
     Args:
@@ -31,7 +31,9 @@ def control_gains(section: Controller, inertia: Array) -> tuple[Array, Array]:
     return inertia * omega**2, 2.0 * zeta * omega * inertia
 
 
-def integral_gain(section: Controller, stiffness: Array, inertia: Array) -> Array:
+def integral_gain(
+    section: ControllerSection, stiffness: Array, inertia: Array
+) -> Array:
     """Gain on the integral of the motor angle's error [N·m/(rad·s)]. (n_joints,).
 
     Args:
@@ -46,7 +48,7 @@ def integral_gain(section: Controller, stiffness: Array, inertia: Array) -> Arra
     return np.asarray(stiffness * np.sqrt(stiffness / inertia) / INTEGRAL_TIME)
 
 
-def answer_speed(section: Controller, jump: Array) -> Array:
+def answer_speed(section: ControllerSection, jump: Array) -> Array:
     r"""Largest speed of the answer to a step, of a rigid drive without limits [rad/s].
 
     Of the oscillator with the loop's :math:`\omega, \zeta`, whose velocity loop sees no

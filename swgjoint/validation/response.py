@@ -57,7 +57,7 @@ class Predicted:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Measured:
+class MeasuredResponse:
     """One response with what it should be and how it changes with the step."""
 
     case: str
@@ -193,7 +193,9 @@ def _closed_summary(
     ]
 
 
-def _measured(drive: DriveMap, masses: TwoMass, progress: Any) -> list[Measured]:
+def _measured(
+    drive: DriveMap, masses: TwoMass, progress: Any
+) -> list[MeasuredResponse]:
     """The linear level at two steps, then ``full`` at every amplitude."""
 
     def expected(stiffness: float) -> tuple[float, float]:
@@ -222,7 +224,7 @@ def _measured(drive: DriveMap, masses: TwoMass, progress: Any) -> list[Measured]
 
     least = AMPLITUDES[0]
     found = [
-        Measured(
+        MeasuredResponse(
             case="linear",
             response=measure("linear", least, STEP),
             half_step=measure("linear", least, 0.5 * STEP),
@@ -235,7 +237,7 @@ def _measured(drive: DriveMap, masses: TwoMass, progress: Any) -> list[Measured]
         response = measure("full", amplitude, STEP)
         small = amplitude == least and not drive.hysteresis
         found.append(
-            Measured(
+            MeasuredResponse(
                 case=f"full, {100 * amplitude:g} % of rated torque",
                 response=response,
                 half_step=None,
@@ -248,7 +250,7 @@ def _measured(drive: DriveMap, masses: TwoMass, progress: Any) -> list[Measured]
     return found
 
 
-def _rows(name: str, measured: Measured) -> list[Row]:
+def _rows(name: str, measured: MeasuredResponse) -> list[Row]:
     rows = []
     for k, quantity in enumerate(("antiresonance", "resonance")):
         finer, closed = measured.half_step, measured.expected
@@ -267,7 +269,7 @@ def _rows(name: str, measured: Measured) -> list[Row]:
     return rows
 
 
-def _summary(name: str, found: list[Measured]) -> list[str]:
+def _summary(name: str, found: list[MeasuredResponse]) -> list[str]:
     linear, weak, strong = found[0], found[1], found[-1]
     assert linear.expected is not None
     off = max(
@@ -283,7 +285,7 @@ def _summary(name: str, found: list[Measured]) -> list[str]:
     ]
 
 
-def response_picture(name: str, found: list[Measured]) -> bytes:
+def response_picture(name: str, found: list[MeasuredResponse]) -> bytes:
     """PNG: magnitude of rotor and link speed per torque over frequency."""
     from matplotlib.figure import Figure
 

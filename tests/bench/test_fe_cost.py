@@ -17,8 +17,8 @@ from swgjoint.bench.fe import cost as fe_cost
 from swgjoint.bench.fe import solve as fe_cost_solve
 from swgjoint.bench.fe.cost import run_fe_cost
 from swgjoint.bench.fe.rows import cheapest
-from swgjoint.bench.fe.setting import POSITIONS, RIM, Found, Setting, rim_shape
-from swgjoint.bench.fe.solve import Task, solved, solved_in
+from swgjoint.bench.fe.setting import POSITIONS, RIM, FeSetting, Found, rim_shape
+from swgjoint.bench.fe.solve import SettingTask, solved, solved_in
 from swgjoint.bench.fe.stored import FILE, LONG, WITNESS, stored_of, to_store
 from swgjoint.cli.shared import bench_fe
 from swgjoint.errors import ComputationError, DesignError
@@ -62,11 +62,11 @@ def solve(monkeypatch):
 def test_rows_compare_with_three_references(solve, tmp_path):
     """The best, the finest of the kind, the next level up; one may fail."""
     settings = [
-        Setting(model="2d", refinement=1),
-        Setting(model="2d", refinement=2),
-        Setting(model="3d", refinement=0.7),
-        Setting(model="3d", refinement=0.5),
-        Setting(model="3d", refinement=1.0),
+        FeSetting(model="2d", refinement=1),
+        FeSetting(model="2d", refinement=2),
+        FeSetting(model="3d", refinement=0.7),
+        FeSetting(model="3d", refinement=0.5),
+        FeSetting(model="3d", refinement=1.0),
     ]
     parts = (0.2, 0.15, None, 0.1, 0.0)
     table = {
@@ -108,7 +108,7 @@ def test_rows_compare_with_three_references(solve, tmp_path):
 
 def test_the_front_has_what_nothing_cheaper_beats(solve):
     """A dearer setting with a larger or the same error is not on it."""
-    settings = [Setting(model="3d", refinement=n) for n in (0.5, 0.6, 0.7, 0.8, 1.0)]
+    settings = [FeSetting(model="3d", refinement=n) for n in (0.5, 0.6, 0.7, 0.8, 1.0)]
     parts = ((0.1, 1), (0.1 - 1e-9, 1.5), (0.2, 2), (0.05, 3), (0.0, 4))
     table = zip(settings, parts, strict=True)
     solve({s.key: found(*values) for s, values in table})
@@ -119,7 +119,7 @@ def test_the_front_has_what_nothing_cheaper_beats(solve):
 
 def test_a_bound_that_is_met_by_chance_does_not_count(solve):
     """The finer mesh of the same kind must meet it, too."""
-    settings = [Setting(model="3d", refinement=n) for n in (0.5, 0.7, 0.8, 1.0)]
+    settings = [FeSetting(model="3d", refinement=n) for n in (0.5, 0.7, 0.8, 1.0)]
     table = zip(settings, ((0.02, 1), (0.08, 2), (0.03, 3), (0.0, 4)), strict=True)
     solve({s.key: found(*values) for s, values in table})
     picks = cheapest(run_fe_cost(design=CUP, settings=settings)["rows"])
@@ -129,8 +129,8 @@ def test_a_bound_that_is_met_by_chance_does_not_count(solve):
 
 def test_the_plane_alone_goes_by_its_own_finest_mesh(solve):
     """Far from the model in space, near to the finest plane mesh."""
-    settings = [Setting(model="2d", refinement=n) for n in (1, 2, 4)]
-    settings.append(Setting(model="3d", refinement=1.0))
+    settings = [FeSetting(model="2d", refinement=n) for n in (1, 2, 4)]
+    settings.append(FeSetting(model="3d", refinement=1.0))
     table = zip(settings, ((0.33, 1), (0.31, 2), (0.3, 3), (0.0, 4)), strict=True)
     solve({s.key: found(*values) for s, values in table})
     result = run_fe_cost(design=CUP, settings=settings)
@@ -145,7 +145,7 @@ def test_a_reference_that_fails_is_an_error(solve):
     with pytest.raises(
         ComputationError, match=naming("reference", "refinement 1", "diverged")
     ):
-        run_fe_cost(design=CUP, settings=[Setting(model="3d", refinement=1.0)])
+        run_fe_cost(design=CUP, settings=[FeSetting(model="3d", refinement=1.0)])
 
 
 def test_a_design_without_cup_is_refused():
@@ -170,8 +170,8 @@ def test_stored_settings_are_of_their_design_and_tell_drift(tmp_path, monkeypatc
     assert np.array_equal(again.kinematic_error, table[WITNESS].kinematic_error)
     assert stored_of(CUP.with_changes({"flexspline.rim_mm": 1.1}), path) == {}
 
-    linear = Setting(model="3d", refinement=1, nonlinear=False)
-    settings = [linear, *(Setting(model="3d", refinement=n) for n in (0.5, 1.4))]
+    linear = FeSetting(model="3d", refinement=1, nonlinear=False)
+    settings = [linear, *(FeSetting(model="3d", refinement=n) for n in (0.5, 1.4))]
     del kept["settings"][linear.key]
 
     def now(design, wanted, **keys):
@@ -193,10 +193,10 @@ def test_stored_settings_are_of_their_design_and_tell_drift(tmp_path, monkeypatc
 def test_what_is_long_and_not_stored_is_left_out(solve):
     """Of a design without a file an hour is not spent unasked; the rows say so."""
     long = [
-        Setting(model="3d", refinement=1, nonlinear=False),
-        Setting(model="3d", refinement=1.4),
+        FeSetting(model="3d", refinement=1, nonlinear=False),
+        FeSetting(model="3d", refinement=1.4),
     ]
-    short = [Setting(model="3d", refinement=n) for n in (0.5, 1.0)]
+    short = [FeSetting(model="3d", refinement=n) for n in (0.5, 1.0)]
     assert [setting.key for setting in long] == list(LONG)
     # of the long ones nothing is known: to solve one would be a KeyError
     solve({s.key: found(part) for s, part in zip(short, (0.1, 0.0), strict=True)})
@@ -215,8 +215,8 @@ def test_what_is_long_and_not_stored_is_left_out(solve):
 def test_the_only_mesh_of_a_kind_is_not_its_own_reference(solve):
     """No error of its kind instead of none."""
     settings = [
-        Setting(model="3d", refinement=0.5, nonlinear=False),
-        *(Setting(model="3d", refinement=n) for n in (0.5, 1.0)),
+        FeSetting(model="3d", refinement=0.5, nonlinear=False),
+        *(FeSetting(model="3d", refinement=n) for n in (0.5, 1.0)),
     ]
     table = zip(settings, (0.4, 0.1, 0.0), strict=True)
     solve({s.key: found(part) for s, part in table})
@@ -228,7 +228,7 @@ def test_the_only_mesh_of_a_kind_is_not_its_own_reference(solve):
     assert {row["reference_of_kind"] for row in rows[4:]} == {"3d, refinement 1"}
 
 
-PLANE = Setting(model="2d", refinement=0.5)
+PLANE = FeSetting(model="2d", refinement=0.5)
 
 FATED = """
 import os
@@ -250,7 +250,7 @@ def test_a_process_that_dies_is_a_row(tmp_path, monkeypatch):
     (tmp_path / "fates.py").write_text(FATED)
     monkeypatch.syspath_prepend(tmp_path)
     monkeypatch.setattr(fe_cost, "solved_in", import_module("fates").fated)
-    settings = [Setting(model="2d", refinement=n) for n in (1.0, 2.0, 3.0)]
+    settings = [FeSetting(model="2d", refinement=n) for n in (1.0, 2.0, 3.0)]
     got = fe_cost._solve_all(
         CUP, settings, jobs=2, stage="settings", progress=lambda *_: None
     )
@@ -286,7 +286,7 @@ def test_a_process_has_one_thread(tmp_path, monkeypatch):
 
 def test_the_kinematic_error_says_at_how_many_positions(solve):
     """In JSON and table: four of a pitch, which see its first harmonic alone."""
-    setting = Setting(model="3d", refinement=1.0)
+    setting = FeSetting(model="3d", refinement=1.0)
     solve({setting.key: found(0.0)})
     result = run_fe_cost(design=CUP, settings=[setting])
     assert result["kinematic_error_positions"] == POSITIONS == 4
@@ -322,7 +322,7 @@ def test_rim_shape_folds_half_turns():
 @pytest.fixture(scope="module")
 def half():
     """The coarsest plane model, of half the teeth."""
-    return solved_in(Task(design=SMALL, setting=PLANE))
+    return solved_in(SettingTask(design=SMALL, setting=PLANE))
 
 
 def test_half_and_all_teeth_agree(half):
@@ -345,10 +345,10 @@ def test_plane_model_has_the_cup_in_series(half, monkeypatch):
 @pytest.mark.slow
 def test_closed_form_and_rings_tell_the_lobe():
     """Rings on a stiff bearing keep the deflection at the lobes and the cup behind."""
-    closed = solved(CUP, Setting(model="ring", refinement=0))
+    closed = solved(CUP, FeSetting(model="ring", refinement=0))
     assert closed.rim_shape[0] == pytest.approx(1e-3)
     assert closed.stiffness == cup_torsional_stiffness(CUP)
-    rings = solved(CUP, Setting(model="ring", refinement=0.5))
+    rings = solved(CUP, FeSetting(model="ring", refinement=0.5))
     assert rings.stiffness < closed.stiffness
     assert rings.rim_shape[0] == pytest.approx(1e-3, rel=0.02)
     assert rings.tensile == pytest.approx(closed.tensile, rel=0.3)

@@ -8,7 +8,7 @@ import pytest
 
 from swgjoint.bench.scaling import fe as scaling_fe
 from swgjoint.bench.scaling import joint as scaling_joint
-from swgjoint.bench.scaling.scaling import Sweep, fitted, run_scaling
+from swgjoint.bench.scaling.scaling import SizeSweep, fitted, run_scaling
 
 
 def sweep(**changes):
@@ -20,7 +20,7 @@ def sweep(**changes):
         "sizes": (1, 10, 100, 1000),
         "measure": lambda n: {"seconds": 500.0 + 2.0 * n**3},
     }
-    return Sweep(**(given | changes))
+    return SizeSweep(**(given | changes))
 
 
 def test_a_power_is_found_where_it_rules():

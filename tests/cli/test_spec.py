@@ -19,7 +19,7 @@ from swgjoint.fe.plane.ratcheting import RatchetingPath
 from swgjoint.fe.rings import running as ring_running
 from swgjoint.fe.rings.running import RunningFriction
 from swgjoint.fe.solid.figures import spec_figures
-from swgjoint.fe.solid.figures.fatigue import Fatigue, Limits, SectionFatigue
+from swgjoint.fe.solid.figures.fatigue import Fatigue, FatigueLimits, SectionFatigue
 from swgjoint.fe.solid.figures.radial_stiffness import RadialStiffness
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.tolerances import has_errors
@@ -130,7 +130,7 @@ def solid(monkeypatch):
 
     def safety(design, torques, progress):
         calls.append(("fatigue", *torques))
-        limits, shell = Limits.of(design), ShellDimensions.of(design)
+        limits, shell = FatigueLimits.of(design), ShellDimensions.of(design)
         sections = tuple(
             SectionFatigue(
                 z=z,

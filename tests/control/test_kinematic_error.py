@@ -10,7 +10,7 @@ from swgjoint.control.flexible import flexible_plan
 from swgjoint.control.kinematic_error import (
     JointRecord,
     KinematicErrorTable,
-    Recorder,
+    TurnRecorder,
     compensated,
     identify_kinematic_error,
 )
@@ -93,7 +93,7 @@ def test_records_that_do_not_tell_are_refused():
 def test_a_table_from_another_load_compensates_the_link(turn):
     """Recorded with noise at 40 N·m, used at 20 N·m: a twentieth is left."""
     known, plant = linear(), TABLE.on(linear())
-    record = Recorder(MotorPID())
+    record = TurnRecorder(MotorPID())
     turn(plant, known, record, speed=12.0, duration=30.5, load=40.0, step=2e-3,
          sensors__link__noise_arcsec=2.0)  # fmt: skip
     table = identify_kinematic_error(record.record(skip=100), known)
@@ -112,5 +112,5 @@ def test_a_record_needs_a_link_encoder(turn):
     with pytest.raises(
         InputError, match=naming("link encoder", "controller.feedback", "'link'")
     ):
-        turn(linear(), linear(), Recorder(MotorPID()), speed=1.0, duration=0.1,
+        turn(linear(), linear(), TurnRecorder(MotorPID()), speed=1.0, duration=0.1,
              controller__feedback="motor")  # fmt: skip

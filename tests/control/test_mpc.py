@@ -13,7 +13,7 @@ from messages import naming
 from swgjoint.control.flexible import flexible_plan
 from swgjoint.control.motor_side import MotorPID, rigid_plan
 from swgjoint.control.mpc import PredictiveController, free_inertia
-from swgjoint.control.mpc_design import TwoMass, design
+from swgjoint.control.mpc_design import TwoMassModel, design
 from swgjoint.control.mpc_solver import prepare, solve
 from swgjoint.errors import InputError
 from swgjoint.maps.drive_map import DriveMap
@@ -24,7 +24,7 @@ from swgjoint.sim.scene.scene import Scene
 from swgjoint.units import arcmin
 from swgjoint.view.run import run_scene
 
-SHOULDER = TwoMass(
+SHOULDER = TwoMassModel(
     ratio=-100.0,
     rotor_inertia=4e-5,
     link_inertia=1.0,

@@ -22,7 +22,7 @@ from swgjoint.control.symbolic import (
 )
 from swgjoint.errors import MissingExtraError
 from swgjoint.joint.attach import attach
-from swgjoint.joint.reference import Motion, gradient_force
+from swgjoint.joint.reference import TwinMotion, gradient_force
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.hysteresis import Jenkin
 
@@ -99,7 +99,7 @@ def assert_forces_agree(drive: DriveMap, states: int) -> None:
     for _ in range(states):
         q, v, history = random_state(drive, rng)
         rests = tuple(history[: len(drive.hysteresis)])
-        motion = Motion(
+        motion = TwinMotion(
             theta=q[0],
             psi=q[1],
             theta_rate=v[0],

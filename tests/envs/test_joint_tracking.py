@@ -17,7 +17,7 @@ from swgjoint.envs.core import LIMITS
 from swgjoint.envs.joint_tracking import JointTrackingEnv, JointTrackingVectorEnv
 from swgjoint.envs.references import KINDS
 from swgjoint.envs.sensors import Sensors
-from swgjoint.envs.specimen import Tolerances, load_drive_once
+from swgjoint.envs.specimen import SpecimenTolerances, load_drive_once
 from swgjoint.errors import InputError
 from swgjoint.joint.variation import Variation
 from swgjoint.maps.drive_map import DriveMap
@@ -25,7 +25,7 @@ from swgjoint.units import arcmin
 
 NAME = "swgjoint.envs:swgjoint/JointTracking-v0"
 SENSORS = tuple(Sensors.__dataclass_fields__)
-TOLERANCES = tuple(Tolerances.__dataclass_fields__)
+TOLERANCES = tuple(SpecimenTolerances.__dataclass_fields__)
 ALL = {"link_encoder": True, "torque_sensor": True}
 EXACT = {
     "motor_counts": 0,
@@ -303,7 +303,7 @@ def test_whole_numbers_of_any_type_are_integers():
 def test_linear_drives_have_no_tolerances(key):
     """What one constant spring cannot carry is refused, in whatever form it comes."""
     value = True if key == "phase" else 0.1
-    for said in ({key: value}, Tolerances(**{key: value})):
+    for said in ({key: value}, SpecimenTolerances(**{key: value})):
         with pytest.raises(
             InputError, match=naming("tolerance", "linear", "load_inertia", "full")
         ):

@@ -18,7 +18,13 @@ from swgjoint.explore.advise.bound import parse_bound
 from swgjoint.explore.advise.reference import settle
 from swgjoint.explore.advise.search import ALIKE, advised
 from swgjoint.joint.attach import LEVELS
-from swgjoint.sim.accuracy import SCENE_INTEGRATORS, Outcome, Setting, attempt, errors
+from swgjoint.sim.accuracy import (
+    SCENE_INTEGRATORS,
+    Setting,
+    SettingOutcome,
+    attempt,
+    errors,
+)
 
 
 @pytest.fixture(scope="module")
@@ -178,7 +184,7 @@ def test_a_run_that_fails_ends_what_was_settled_before(bench, monkeypatch):
     def attempted(*_):
         outcome = next(outcomes)
         run = object() if outcome == "ok" else None
-        return Outcome(run=run, assembly=None, outcome=outcome, reason=outcome)
+        return SettingOutcome(run=run, assembly=None, outcome=outcome, reason=outcome)
 
     monkeypatch.setattr(advise_reference, "attempt", attempted)
     monkeypatch.setattr(advise_reference, "_extrapolated", lambda fine, coarse: fine)

@@ -12,7 +12,7 @@ from messages import naming
 
 from swgjoint.errors import InputError
 from swgjoint.explore.tune.result import TuneSettings
-from swgjoint.explore.tune.search import JOURNAL, Search, run_search, write_journal
+from swgjoint.explore.tune.search import JOURNAL, GainSearch, run_search, write_journal
 from swgjoint.explore.tune.tune import tune
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.store import arrays_content
@@ -35,7 +35,7 @@ def settings(**changes):
 @pytest.fixture
 def search():
     """One of two parameters and two generations, by differential evolution."""
-    made = Search()
+    made = GainSearch()
     go_on(made)
     return made
 
@@ -94,7 +94,7 @@ def test_a_journal_of_other_places_is_refused(optimiser):
     """Every optimiser lets the line through, also one that catches value errors."""
     if optimiser != "de":
         pytest.importorskip(optimiser)
-    search = Search()
+    search = GainSearch()
     go_on(search, optimiser=optimiser)
     search.places[1][0, 0] += 1e-9
     with pytest.raises(
@@ -114,9 +114,9 @@ def test_errors_of_costs_and_journals_are_kept():
         raise TypeError("of the environment")
 
     with pytest.raises(InputError, match="No space left"):
-        go_on(Search(), after=full)
+        go_on(GainSearch(), after=full)
     with pytest.raises(TypeError, match="of the environment"):
-        go_on(Search(), costs=broken)
+        go_on(GainSearch(), costs=broken)
 
 
 def test_a_changed_drive_is_another_run(tmp_path):

@@ -12,7 +12,7 @@ import pytest
 from swgjoint.joint.attach import attach
 from swgjoint.joint.drive import JointDrive
 from swgjoint.joint.reference import (
-    Motion,
+    TwinMotion,
     metric_of,
     other_acceleration,
     relaxed_after,
@@ -83,13 +83,13 @@ class Bench:
             potential += 0.5 * drive.friction.stiffness * stretch**2
         return float(0.5 * np.sum(inertia * v**2) + potential)
 
-    def motion(self, **history: object) -> Motion:
+    def motion(self, **history: object) -> TwinMotion:
         """What the twin sees where the engine stands, after mj_forward."""
         d = self.data
         (theta, psi), rates = d.qpos[self.q], d.qvel[self.v]
         weight = responses(self.model, d.qLD, d.qLDiagInv, self.v)
         other = d.plugin_state[:2]
-        return Motion(
+        return TwinMotion(
             theta=theta,
             psi=psi,
             theta_rate=rates[0],
@@ -109,7 +109,7 @@ class Bench:
         state, rest, relaxed = (0.0, 0.0), (0.0,) * len(drive.hysteresis), None
         rubs = []
         for _ in range(steps):
-            motion = Motion(
+            motion = TwinMotion(
                 theta=q[0],
                 psi=q[1],
                 theta_rate=v[0],

@@ -17,7 +17,7 @@ from swgjoint.errors import InputError
 from swgjoint.joint import plugin
 from swgjoint.joint.attach import attach
 from swgjoint.joint.friction_step import friction_step, stretch_after
-from swgjoint.joint.reference import Motion, gradient_force, scheme_force
+from swgjoint.joint.reference import TwinMotion, gradient_force, scheme_force
 from swgjoint.joint.region import check_region
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.friction import Friction
@@ -33,7 +33,7 @@ def rubbing(any_layout: DriveMap, friction_law) -> DriveMap:
     return replace(any_layout, friction=friction_law, hysteresis=(element,))
 
 
-def random_motion(b, rng) -> Motion:
+def random_motion(b, rng) -> TwinMotion:
     """A state that sticks, slips, or slips before the step is through."""
     drive = b.drive.drive
     theta = rng.uniform(-8, 8)

@@ -16,7 +16,7 @@ from messages import naming
 import swgjoint
 from swgjoint.errors import InputError
 from swgjoint.joint.attach import attach
-from swgjoint.joint.reference import Motion, scheme_force
+from swgjoint.joint.reference import TwinMotion, scheme_force
 from swgjoint.joint.step_damping import damp_as_asked
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.hysteresis import Jenkin
@@ -140,7 +140,7 @@ def test_force_direction_and_stiffness_equal_reference(drive):
         )
         want = scheme_force(
             drive,
-            Motion(
+            TwinMotion(
                 theta=theta,
                 psi=psi,
                 theta_rate=dtheta,
@@ -199,7 +199,7 @@ def test_contact_damping_acts_in_the_worlds_that_touch(synthetic_map):
         rates = both.d.qvel.numpy()[world][pair].astype(float)
         want = scheme_force(
             synthetic_map,
-            Motion(
+            TwinMotion(
                 theta=theta,
                 psi=psi,
                 theta_rate=rates[0],

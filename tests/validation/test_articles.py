@@ -14,7 +14,7 @@ from swgjoint.gear.design.design import Design
 from swgjoint.models_path import models_path
 from swgjoint.validation.articles import articles as study
 from swgjoint.validation.articles.file import ArticlesFile
-from swgjoint.validation.articles.runs import Task, run_task
+from swgjoint.validation.articles.runs import ArticleTask, run_task
 
 BROKEN = ("deflection", "force", "force, lobes", "fatigue", "four, fine")
 KEYS = {"case", "quantity", "unit", "source_value", "ours", "converged", "reason"}
@@ -207,7 +207,7 @@ def test_file_of_the_study(tmp_path):
 def test_a_design_that_cannot_be_meshed_is_a_fault():
     """Part of the result, not an error."""
     design = Design.load("xb1-100-80").with_changes({"cup.fillet_mm": 0.1})
-    found = run_task(Task(name="thin", kind="pinched", design=design))
+    found = run_task(ArticleTask(name="thin", kind="pinched", design=design))
     assert "fillet_mm = 0.1" in found["fault"]
 
 
@@ -215,7 +215,7 @@ def test_a_design_that_cannot_be_meshed_is_a_fault():
 def test_open_edge_of_the_80_to_1_drive():
     """Coning moves the open edge by more than w_0 = 0.5 mm, as the article finds."""
     design = Design.load("dca-80-to-1").with_changes({"mesh.refinement": 0.6})
-    found = run_task(Task(name="dca", kind="deflected", design=design))
+    found = run_task(ArticleTask(name="dca", kind="deflected", design=design))
     assert found["at_mid_face_mm"] == pytest.approx(0.53, abs=0.02)
     assert 0.55 < found["largest_radial_mm"] < 0.7
     assert found["radial_z_mm"] == pytest.approx(-8.0)
@@ -227,7 +227,7 @@ def test_open_edge_of_the_80_to_1_drive():
 @pytest.mark.slow
 def test_four_forces_on_the_cup_of_the_article():
     """Nominal stress without torque within a tenth of the shell theory's 164 MPa."""
-    task = Task(name="four", kind="four", design=Design.load("stress-cup"))
+    task = ArticleTask(name="four", kind="four", design=Design.load("stress-cup"))
     (at_rest,) = run_task(task)["by_torque"]
     assert at_rest["mid_face"]["normal_amplitude_MPa"] == pytest.approx(164.4, rel=0.12)
     assert at_rest["largest_radial_mm"] == pytest.approx(0.372)

@@ -27,7 +27,7 @@ from swgjoint.validation.catalogue.printed import (
     torques_of,
 )
 from swgjoint.validation.catalogue.rows import rubbed, stiffnesses
-from swgjoint.validation.catalogue.runs import Task, oval, run_task
+from swgjoint.validation.catalogue.runs import CatalogueTask, oval, run_task
 from swgjoint.validation.rows import StudyOptions
 
 BROKEN = "path 20 80 28"
@@ -105,7 +105,8 @@ def test_stiffness_is_read_by_the_definition():
     torques = torques_of(row)
     assert torques[-1] == max(row.repeated_peak, 1.5 * row.T2)
     path = rubbed(
-        curve(Task(name="x 28", kind="path", design=design, torques=torques)), design
+        curve(CatalogueTask(name="x 28", kind="path", design=design, torques=torques)),
+        design,
     )
     compliance = 1e-5 + series_compliance(design, cup=True)
     play = 0.05 * arcmin
@@ -243,8 +244,8 @@ def test_results_are_kept(monkeypatch, tmp_path):
 
     monkeypatch.setitem(runs.KINDS, "path", compute)
     design = Design.preset("size-25-50")
-    good = Task(name="good", kind="path", design=design, torques=(1.0,))
-    bad = Task(name="bad", kind="path", design=design, torques=(2.0,))
+    good = CatalogueTask(name="good", kind="path", design=design, torques=(1.0,))
+    bad = CatalogueTask(name="bad", kind="path", design=design, torques=(2.0,))
     for _ in range(2):
         assert run_task(good)["value"] == 1.0
         assert run_task(bad)["fault"] == "no equilibrium"
@@ -282,7 +283,7 @@ def test_one_case_runs_whole(monkeypatch, tmp_path):
     monkeypatch.setenv("SWGJOINT_CACHE", str(tmp_path))
     row = catalogue_row(25, 50)
     design = variant_design(25, 50, CatalogueFile.load().variants[0])
-    task = Task(name="p", kind="path", design=design, torques=torques_of(row))
+    task = CatalogueTask(name="p", kind="path", design=design, torques=torques_of(row))
     found = run_task(task)
     K = stiffnesses(rubbed(found, design), row)
     assert K[0] < K[1] < K[2]

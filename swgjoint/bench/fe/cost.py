@@ -26,8 +26,8 @@ from pathlib import Path
 from typing import Any
 
 from swgjoint.bench.fe.rows import BOUNDS, QUANTITIES, cheapest, rows_of, seconds
-from swgjoint.bench.fe.setting import POSITIONS, Found, Setting
-from swgjoint.bench.fe.solve import Task, solved_in
+from swgjoint.bench.fe.setting import POSITIONS, FeSetting, Found
+from swgjoint.bench.fe.solve import SettingTask, solved_in
 from swgjoint.bench.fe.stored import FILE, LONG, stored_of, to_store, told
 from swgjoint.errors import ComputationError, DesignError
 from swgjoint.fe.solid.drive3d import check_modelled
@@ -40,24 +40,24 @@ from swgjoint.store import json_file
 from swgjoint.view.plots.bench_fe import cost_picture
 
 SETTINGS = (
-    Setting(model="ring", refinement=0),
-    Setting(model="ring", refinement=0.5),
-    Setting(model="ring", refinement=1),
-    Setting(model="2d", refinement=0.5, nonlinear=False),
-    Setting(model="2d", refinement=1.0, nonlinear=False),
-    Setting(model="2d", refinement=2.0, nonlinear=False),
-    Setting(model="2d", refinement=0.5),
-    Setting(model="2d", refinement=1.0),
-    Setting(model="2d", refinement=1.0, full=True),
-    Setting(model="2d", refinement=2.0),
-    Setting(model="2d", refinement=4.0),
-    Setting(model="3d", refinement=0.5, nonlinear=False),
-    Setting(model="3d", refinement=1.0, nonlinear=False),
-    Setting(model="3d", refinement=0.5),
-    Setting(model="3d", refinement=0.5, full=True),
-    Setting(model="3d", refinement=0.7),
-    Setting(model="3d", refinement=1.0),
-    Setting(model="3d", refinement=1.4),
+    FeSetting(model="ring", refinement=0),
+    FeSetting(model="ring", refinement=0.5),
+    FeSetting(model="ring", refinement=1),
+    FeSetting(model="2d", refinement=0.5, nonlinear=False),
+    FeSetting(model="2d", refinement=1.0, nonlinear=False),
+    FeSetting(model="2d", refinement=2.0, nonlinear=False),
+    FeSetting(model="2d", refinement=0.5),
+    FeSetting(model="2d", refinement=1.0),
+    FeSetting(model="2d", refinement=1.0, full=True),
+    FeSetting(model="2d", refinement=2.0),
+    FeSetting(model="2d", refinement=4.0),
+    FeSetting(model="3d", refinement=0.5, nonlinear=False),
+    FeSetting(model="3d", refinement=1.0, nonlinear=False),
+    FeSetting(model="3d", refinement=0.5),
+    FeSetting(model="3d", refinement=0.5, full=True),
+    FeSetting(model="3d", refinement=0.7),
+    FeSetting(model="3d", refinement=1.0),
+    FeSetting(model="3d", refinement=1.4),
 )
 """The finest of every kind comes last; the last one of all is the reference."""
 
@@ -68,7 +68,7 @@ LOST = "its process died: out of memory, or killed"
 def run_fe_cost(
     *,
     design: Design,
-    settings: Sequence[Setting] = SETTINGS,
+    settings: Sequence[FeSetting] = SETTINGS,
     folder: Path | None = None,
     progress: Progress = silent,
     jobs: int = 2,
@@ -149,7 +149,7 @@ def _picture(result: Mapping[str, Any]) -> bytes:
 
 def _solve_all(
     design: Design,
-    settings: Sequence[Setting],
+    settings: Sequence[FeSetting],
     *,
     jobs: int,
     stage: str,
@@ -164,7 +164,7 @@ def _solve_all(
     with _one_thread():
         try:
             tasks = {
-                threads.submit(_solved_apart, Task(design=design, setting=s)): s
+                threads.submit(_solved_apart, SettingTask(design=design, setting=s)): s
                 for s in order
             }
             for future in as_completed(tasks):
@@ -175,7 +175,7 @@ def _solve_all(
     return found
 
 
-def _solved_apart(task: Task) -> Found | str:
+def _solved_apart(task: SettingTask) -> Found | str:
     """A setting in a process of its own; what becomes of that is part of the result."""
     context = get_context("spawn")
     with ProcessPoolExecutor(max_workers=1, mp_context=context) as process:
@@ -207,7 +207,7 @@ def _one_thread() -> Iterator[None]:
                 os.environ[name] = value
 
 
-def _work(setting: Setting) -> float:
+def _work(setting: FeSetting) -> float:
     """Rough seconds."""
     base = {"ring": 6.0, "2d": 5.0, "3d": 150.0}[setting.model]
     active_sets = 3.0 if setting.kind == "3d linear" else 1.0

@@ -12,8 +12,8 @@ from swgjoint.bench.fe.setting import (
     POSITIONS,
     RIM,
     Array,
+    FeSetting,
     Found,
-    Setting,
     checked,
     mean_of,
     positions,
@@ -32,7 +32,7 @@ from swgjoint.gear.wave_generators.wave_generator import lobe_height
 from swgjoint.units import mm
 
 
-def solved_by_rings(design: Design, setting: Setting, begin: float) -> Found:
+def solved_by_rings(design: Design, setting: FeSetting, begin: float) -> Found:
     """What rings or closed forms say of a design; ``begin``: of the setting [s]."""
     if not setting.refinement:
         return _closed_form(design, begin)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from swgjoint.bench.fe.setting import Found, Setting
+from swgjoint.bench.fe.setting import FeSetting, Found
 from swgjoint.units import arcsec, mm
 
 QUANTITIES = {
@@ -27,10 +27,10 @@ BOUNDS = (1.0, 5.0, 15.0)
 
 
 def rows_of(
-    settings: Sequence[Setting],
+    settings: Sequence[FeSetting],
     found: Mapping[str, Found | str],
     *,
-    best: Setting,
+    best: FeSetting,
     stored: set[str],
 ) -> list[dict[str, Any]]:
     """One row a setting and quantity, one row for a setting without solution.
@@ -124,7 +124,7 @@ _ORDER = (
 )
 
 
-def _failed(same: dict[str, Any], best: Setting, outcome: str) -> dict[str, Any]:
+def _failed(same: dict[str, Any], best: FeSetting, outcome: str) -> dict[str, Any]:
     nothing = {key: None for key in _ORDER if key not in same}
     return (
         same

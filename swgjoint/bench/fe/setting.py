@@ -31,7 +31,7 @@ RIM = 90
 
 
 @dataclass(frozen=True, kw_only=True)
-class Setting:
+class FeSetting:
     """One model and its effort."""
 
     model: str

@@ -14,8 +14,8 @@ from swgjoint.bench.fe.rings import solved_by_rings
 from swgjoint.bench.fe.setting import (
     RIM,
     Array,
+    FeSetting,
     Found,
-    Setting,
     checked,
     mean_of,
     positions,
@@ -40,14 +40,14 @@ from swgjoint.gear.mounting import series_compliance
 
 
 @dataclass(frozen=True, kw_only=True)
-class Task:
+class SettingTask:
     """A setting of a design; a process of its own solves it."""
 
     design: Design
-    setting: Setting
+    setting: FeSetting
 
 
-def solved_in(task: Task) -> Found | str:
+def solved_in(task: SettingTask) -> Found | str:
     """A setting in a process that has done nothing else, or why it has no solution."""
     cpu = time.process_time()
     try:
@@ -63,7 +63,7 @@ def peak_memory() -> float:
     return float(peak if sys.platform == "darwin" else 1024 * peak)
 
 
-def solved(design: Design, setting: Setting) -> Found:
+def solved(design: Design, setting: FeSetting) -> Found:
     """What a setting says of a design.
 
     Raises:

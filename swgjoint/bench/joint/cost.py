@@ -29,8 +29,8 @@ from swgjoint.progress import Progress, silent
 from swgjoint.provenance import provenance
 from swgjoint.sim.accuracy import (
     QUANTITIES,
-    Outcome,
     Setting,
+    SettingOutcome,
     Stepper,
     attempt,
     attempt_assembled,
@@ -203,7 +203,7 @@ def reference(bench: BenchScene, level: str) -> tuple[Run, str, dict[str, Any]]:
 
 
 def _rows(
-    base: dict[str, Any], got: Outcome, full: Run, level: Run
+    base: dict[str, Any], got: SettingOutcome, full: Run, level: Run
 ) -> list[dict[str, Any]]:
     """A row a quantity.
 
@@ -247,7 +247,7 @@ def _rows(
     return rows
 
 
-def _costs(got: Outcome, rigid: Stepper | None) -> dict[str, Any]:
+def _costs(got: SettingOutcome, rigid: Stepper | None) -> dict[str, Any]:
     """Sub-steps, harmonics left out, time; against a rigid arm where there is one."""
     keys = ("sub_steps", "unresolved", "wall_s", "steps_ratio", "cost")
     found: dict[str, Any] = dict.fromkeys(keys)

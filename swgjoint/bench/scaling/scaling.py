@@ -30,7 +30,7 @@ from swgjoint.view.plots.scaling import scaling_picture
 
 
 @dataclass(frozen=True, kw_only=True)
-class Sweep:
+class SizeSweep:
     """One parameter, and what takes time with it."""
 
     name: str
@@ -46,7 +46,7 @@ class Sweep:
 
 
 SWEEPS = (
-    Sweep(
+    SizeSweep(
         name="joints",
         label="driven joints of a chain",
         per="step",
@@ -54,14 +54,14 @@ SWEEPS = (
         measure=scaling_joint.chain,
         from_size=8,
     ),
-    Sweep(
+    SizeSweep(
         name="batch",
         label="arms of a batch",
         per="batch step",
         sizes=(1, 4, 16, 64, 256, 1024),
         measure=scaling_joint.batch,
     ),
-    Sweep(
+    SizeSweep(
         name="harmonics",
         label="harmonics of the map",
         per="joint step",
@@ -69,7 +69,7 @@ SWEEPS = (
         measure=scaling_joint.step_with_harmonics,
         from_size=16,
     ),
-    Sweep(
+    SizeSweep(
         name="map evaluation",
         label="harmonics of the map",
         per="evaluation of 1,000",
@@ -77,7 +77,7 @@ SWEEPS = (
         measure=scaling_joint.evaluation,
         from_size=16,
     ),
-    Sweep(
+    SizeSweep(
         name="teeth",
         label="teeth of the flexspline",
         per="position",
@@ -85,21 +85,21 @@ SWEEPS = (
         measure=scaling_fe.teeth,
         from_size=120,
     ),
-    Sweep(
+    SizeSweep(
         name="nodes",
         label="nodes of the half model",
         per="position",
         sizes=(0.5, 1, 2, 3),
         measure=scaling_fe.mesh,
     ),
-    Sweep(
+    SizeSweep(
         name="torque",
         label="torque over the rated one",
         per="position",
         sizes=(0.25, 1, 4),
         measure=scaling_fe.torque,
     ),
-    Sweep(
+    SizeSweep(
         name="angles",
         label="positions of a turn",
         per="turn",
@@ -112,7 +112,7 @@ SWEEPS = (
 def run_scaling(
     *,
     folder: Path | None = None,
-    sweeps: Sequence[Sweep] = SWEEPS,
+    sweeps: Sequence[SizeSweep] = SWEEPS,
     progress: Progress = silent,
 ) -> dict[str, Any]:
     """Measure all sweeps.
@@ -165,7 +165,7 @@ def run_scaling(
     return result | {"files": files, "wall_s": time.perf_counter() - begin}
 
 
-def fitted(sweep: Sweep, rows: Sequence[dict[str, Any]]) -> dict[str, Any] | None:
+def fitted(sweep: SizeSweep, rows: Sequence[dict[str, Any]]) -> dict[str, Any] | None:
     """Least squares of the logarithms; None with fewer than two sizes."""
     used = [r for r in rows if r["sweep"] == sweep.name and r["seconds"]]
     used = [r for r in used if r["size"] >= sweep.from_size]

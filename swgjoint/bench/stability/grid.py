@@ -19,7 +19,7 @@ from swgjoint.bench.stability.joint import (
     hardening_drive,
     make_joint,
 )
-from swgjoint.bench.stability.reference import Reference, reference
+from swgjoint.bench.stability.reference import TwoMassReference, reference
 from swgjoint.bench.stability.rows import DEFAULT, StabilityRow, outcome_of
 from swgjoint.joint.region import MAX_SUB_STEPS, Region
 from swgjoint.maps.drive_map import DriveMap
@@ -134,7 +134,7 @@ def _default(
     task: GridJoint,
     drive: DriveMap,
     step: float,
-    references: dict[str, Reference],
+    references: dict[str, TwoMassReference],
 ) -> Iterator[StabilityRow]:
     """The default scheme, cut into sub-steps or refused as its region asks for."""
     joint = make_joint(drive, rotor=task.rotor, link=task.link, step=step)
@@ -200,7 +200,7 @@ def _others(
     task: GridJoint,
     drive: DriveMap,
     step: float,
-    references: dict[str, Reference],
+    references: dict[str, TwoMassReference],
 ) -> Iterator[StabilityRow]:
     """What the other schemes make of the same joint."""
     for scheme, (level, integrator) in OTHERS.items():

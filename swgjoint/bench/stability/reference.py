@@ -38,7 +38,7 @@ PHASE = 100.0
 
 
 @dataclass(frozen=True, kw_only=True)
-class Reference:
+class TwoMassReference:
     """Solution of one joint from one start."""
 
     window: float
@@ -66,7 +66,7 @@ class Reference:
 
 def reference(
     stiffness: float, *, rotor: float, link: float, start: Start
-) -> Reference:
+) -> TwoMassReference:
     """Solve the two-mass equations.
 
     Args:
@@ -112,4 +112,4 @@ def reference(
     )
     if not found.success:
         raise ComputationError(f"reference of the stability study: {found.message}")
-    return Reference(window=window, link=lambda t: np.asarray(found.sol(t)[1]))
+    return TwoMassReference(window=window, link=lambda t: np.asarray(found.sol(t)[1]))

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from swgjoint.errors import InputError
 
 if TYPE_CHECKING:
-    from swgjoint.explore.sweep.results import Place
+    from swgjoint.explore.sweep.results import ResultStore
     from swgjoint.explore.sweep.tasks import AskedFile
     from swgjoint.pool import Executor
 
@@ -42,7 +42,7 @@ def configure_places(parser: argparse.ArgumentParser, *, out: str) -> None:
 
 def places_of(
     args: argparse.Namespace,
-) -> tuple[Place | None, Callable[[AskedFile], AbstractContextManager[Executor]]]:
+) -> tuple[ResultStore | None, Callable[[AskedFile], AbstractContextManager[Executor]]]:
     """Where records are kept, and what computes the designs of a file.
 
     Raises:

@@ -15,9 +15,9 @@ import mujoco
 
 from swgjoint.drives.references import drive_of
 from swgjoint.errors import ComputationError, InputError
-from swgjoint.explore.advise.bound import Bound
+from swgjoint.explore.advise.bound import ErrorBound
 from swgjoint.explore.advise.reference import settle
-from swgjoint.explore.advise.search import Search, advised
+from swgjoint.explore.advise.search import SettingSearch, advised
 from swgjoint.joint.attach import LEVELS
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.progress import Progress, silent
@@ -30,7 +30,7 @@ STEPS = (1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3)
 
 def advise(
     scene: Scene,
-    bound: Bound,
+    bound: ErrorBound,
     *,
     drives: Mapping[str, DriveMap] | None = None,
     levels: Sequence[str] = LEVELS,
@@ -68,7 +68,9 @@ def advise(
     mujoco.set_mju_user_warning(lambda message: None)
     try:
         reference = settle(scene, bound, known, progress)
-        search = Search(scene=scene, bound=bound, drives=known, reference=reference)
+        search = SettingSearch(
+            scene=scene, bound=bound, drives=known, reference=reference
+        )
         rows = search.run(levels, steps, progress)
     finally:
         mujoco.set_mju_user_warning(None)

@@ -23,7 +23,7 @@ UNITS = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class Bound:
+class ErrorBound:
     """An error that is accepted: of the link angle or of the tool, rms."""
 
     text: str
@@ -37,7 +37,7 @@ class Bound:
         return QUANTITIES[self.quantity]
 
 
-def parse_bound(text: str) -> Bound:
+def parse_bound(text: str) -> ErrorBound:
     """A number with its unit, such as ``0.1arcmin``, ``2e-5rad`` or ``0.05mm``.
 
     Raises:
@@ -55,4 +55,4 @@ def parse_bound(text: str) -> Bound:
         value = 0.0
     if not (np.isfinite(value) and value > 0.0):
         raise InputError(f"--error {text!r}; {accepted}")
-    return Bound(text=text.strip(), quantity=quantity, value=value)
+    return ErrorBound(text=text.strip(), quantity=quantity, value=value)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from swgjoint.errors import ComputationError
-from swgjoint.explore.advise.bound import Bound
+from swgjoint.explore.advise.bound import ErrorBound
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.progress import Progress, silent
 from swgjoint.sim.accuracy import Setting, attempt, common_samples, errors
@@ -23,7 +23,7 @@ taken, and above which the scene has none."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Reference:
+class FullReference:
     """Level ``full`` without an error of its steps."""
 
     run: Run
@@ -35,10 +35,10 @@ class Reference:
 
 def settle(
     scene: Scene,
-    bound: Bound,
+    bound: ErrorBound,
     drives: Mapping[str, DriveMap],
     progress: Progress = silent,
-) -> Reference:
+) -> FullReference:
     """The reference, its step halved until two extrapolations agree.
 
     The scheme is of the first order in the link angle, for positions of the engine lead
@@ -80,7 +80,7 @@ def settle(
             f" steps down to {1e3 * step:g} ms it still moves by {apart:.3g}"
             f" {bound.unit}; use a larger --error"
         )
-    return Reference(run=best, step=step, error=float(apart))
+    return FullReference(run=best, step=step, error=float(apart))
 
 
 def _extrapolated(fine: Run, coarse: Run) -> Run:

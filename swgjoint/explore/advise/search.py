@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from swgjoint.errors import ComputationError, InputError
-from swgjoint.explore.advise.bound import Bound
-from swgjoint.explore.advise.reference import Reference
+from swgjoint.explore.advise.bound import ErrorBound
+from swgjoint.explore.advise.reference import FullReference
 from swgjoint.joint.attach import LEVELS
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.progress import Progress
@@ -53,13 +53,13 @@ def advised(rows: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Search:
+class SettingSearch:
     """Settings of one scene from the cheapest on."""
 
     scene: Scene
-    bound: Bound
+    bound: ErrorBound
     drives: Mapping[str, DriveMap]
-    reference: Reference
+    reference: FullReference
 
     def run(
         self, levels: Sequence[str], steps: Sequence[float], progress: Progress

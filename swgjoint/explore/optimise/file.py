@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 
 from swgjoint.explore.sweep.file import SweepFile, anchored, lying_in
 from swgjoint.explore.sweep.keys import BASE
-from swgjoint.explore.sweep.plan import List, Parameter, Search, plan_faults
+from swgjoint.explore.sweep.plan import List, Parameter, SearchPlan, plan_faults
 from swgjoint.explore.sweep.tasks import (
     AskedFile,
     MeshingTask,
@@ -81,7 +81,7 @@ class OptimisationFile(AskedFile):
 
     objectives: Annotated[tuple[Objective, ...], Field(strict=False, min_length=1)]
     limits: Annotated[tuple[Limit, ...], Field(strict=False)] = ()
-    plan: Search
+    plan: SearchPlan
     confirm: Confirmation | None = None
     beside: Annotated[tuple[Reference, ...], Field(strict=False)] = ()
     """Designs to hold against the front; the search does not see them."""

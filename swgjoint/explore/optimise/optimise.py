@@ -25,7 +25,7 @@ from swgjoint.explore.optimise.search import search
 from swgjoint.explore.sweep.figures import LOST
 from swgjoint.explore.sweep.keys import BASE
 from swgjoint.explore.sweep.points import Values
-from swgjoint.explore.sweep.results import Place, flat
+from swgjoint.explore.sweep.results import ResultStore, flat
 from swgjoint.explore.sweep.sweep import SweepResult, run_sweep
 from swgjoint.explore.sweep.validity import validity_of
 from swgjoint.gear.design.design import Design
@@ -127,7 +127,7 @@ def optimise(
     file: OptimisationFile,
     *,
     executor: Executor,
-    place: Place | None = None,
+    place: ResultStore | None = None,
     progress: Progress = silent,
 ) -> Optimum:
     """Search, then compute some of the front again with more care.

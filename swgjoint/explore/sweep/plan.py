@@ -110,7 +110,7 @@ class List(Section):
 Plan = Annotated[Grid | LatinHypercube | List, Field(discriminator="kind")]
 
 
-class Search(Section):
+class SearchPlan(Section):
     """Values that a genetic search chooses, generation by generation (NSGA-II).
 
     Source:
@@ -129,7 +129,7 @@ class Search(Section):
     parameters: Parameters
 
 
-AnyPlan = Grid | LatinHypercube | List | Search
+AnyPlan = Grid | LatinHypercube | List | SearchPlan
 
 
 def plan_faults(plan: AnyPlan, kinds: tuple[str, ...]) -> list[tuple[str, str]]:
@@ -153,7 +153,10 @@ def plan_faults(plan: AnyPlan, kinds: tuple[str, ...]) -> list[tuple[str, str]]:
             faults.append((f"{where}.values", "missing; accepted: a list"))
         if isinstance(plan, Grid) and ranged and parameter.count is None:
             faults.append((f"{where}.count", "missing; accepted: a whole number >= 2"))
-        if isinstance(plan, LatinHypercube | Search) and parameter.count is not None:
+        if (
+            isinstance(plan, LatinHypercube | SearchPlan)
+            and parameter.count is not None
+        ):
             faults.append((f"{where}.count", "read by nobody; see plan.designs"))
         if ranged and BASE in parameter.keys:
             faults.append((f"{where}.values", "missing; accepted: names of designs"))

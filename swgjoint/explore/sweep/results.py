@@ -16,7 +16,7 @@ from swgjoint.json_text import json_text
 from swgjoint.store import DamagedError, ignored, json_content, json_file
 
 
-class Place(Protocol):
+class ResultStore(Protocol):
     """A folder."""
 
     def at(self, name: str) -> str:
@@ -39,11 +39,11 @@ class Folder:
         self.path = output_folder(path)
 
     def at(self, name: str) -> str:
-        """See :class:`Place`."""
+        """See :class:`ResultStore`."""
         return str(self.path / name)
 
     def read(self, name: str) -> bytes | None:
-        """See :class:`Place`."""
+        """See :class:`ResultStore`."""
         try:
             return read_regular(self.path / name)
         except FileNotFoundError:
@@ -53,7 +53,7 @@ class Folder:
             raise InputError(f"cannot read {self.at(name)}: {why}") from None
 
     def write(self, name: str, data: bytes) -> str:
-        """See :class:`Place`."""
+        """See :class:`ResultStore`."""
         target = self.path / name
         try:
             target.parent.mkdir(parents=True, exist_ok=True)
@@ -62,7 +62,7 @@ class Folder:
         return str(write_whole(target, data))
 
     def remove(self, name: str) -> None:
-        """See :class:`Place`."""
+        """See :class:`ResultStore`."""
         target = self.path / name
         try:
             target.unlink()
@@ -87,11 +87,11 @@ class Remote:
         self._scheme = address.partition("://")[0]
 
     def at(self, name: str) -> str:
-        """See :class:`Place`."""
+        """See :class:`ResultStore`."""
         return f"{self._scheme}://{f'{self._root}/{name}'.lstrip('/')}"
 
     def read(self, name: str) -> bytes | None:
-        """See :class:`Place`."""
+        """See :class:`ResultStore`."""
         try:
             data: bytes = self._files.cat_file(f"{self._root}/{name}")
         except FileNotFoundError:
@@ -99,7 +99,7 @@ class Remote:
         return data
 
     def write(self, name: str, data: bytes) -> str:
-        """See :class:`Place`; beside and moved, for not every system writes whole."""
+        """See :class:`ResultStore`; moved into place, as not every system writes whole."""
         target = f"{self._root}/{name}"
         folder, _, last = target.rpartition("/")
         beside = f"{folder}/.{last}.{secrets.token_hex(4)}"
@@ -109,16 +109,16 @@ class Remote:
         return self.at(name)
 
     def remove(self, name: str) -> None:
-        """See :class:`Place`."""
+        """See :class:`ResultStore`."""
         self._files.rm_file(f"{self._root}/{name}")
 
 
-def place_of(where: str | Path) -> Place:
+def place_of(where: str | Path) -> ResultStore:
     """The folder of a path or of an address with ``://``."""
     return Remote(where) if isinstance(where, str) and "://" in where else Folder(where)
 
 
-def read_record(place: Place, key: str) -> Record | None:
+def read_record(place: ResultStore, key: str) -> Record | None:
     """What is kept under a key; a damaged one is none."""
     data = place.read(_name(key))
     if data is None:
@@ -131,7 +131,7 @@ def read_record(place: Place, key: str) -> Record | None:
 
 
 def write_record(
-    place: Place, key: str, record: Record, values: Mapping[str, Any]
+    place: ResultStore, key: str, record: Record, values: Mapping[str, Any]
 ) -> None:
     """Keep a record, with the values for whoever looks into the folder."""
     place.write(_name(key), json_file({**asdict(record), "values": dict(values)}))
@@ -142,7 +142,7 @@ def _name(key: str) -> str:
 
 
 def write_to(
-    place: Place, outputs: Mapping[str, Callable[[], bytes | None]]
+    place: ResultStore, outputs: Mapping[str, Callable[[], bytes | None]]
 ) -> list[str]:
     """Write the outputs of a result by name; one that fails costs no other.
 

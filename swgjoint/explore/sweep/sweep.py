@@ -11,7 +11,7 @@ from swgjoint.errors import ComputationError
 from swgjoint.explore.sweep.figures import LOST, Record, compute_all
 from swgjoint.explore.sweep.file import SweepFile
 from swgjoint.explore.sweep.points import Point, points_of
-from swgjoint.explore.sweep.results import Place, flat, read_record, write_record
+from swgjoint.explore.sweep.results import ResultStore, flat, read_record, write_record
 from swgjoint.explore.sweep.validity import validity_of
 from swgjoint.maps.cache import code_version
 from swgjoint.pool import Executor, Lost
@@ -88,7 +88,7 @@ def run_sweep(
     file: SweepFile,
     *,
     executor: Executor,
-    place: Place | None = None,
+    place: ResultStore | None = None,
     retry_failed: bool = False,
     progress: Progress = silent,
 ) -> SweepResult:

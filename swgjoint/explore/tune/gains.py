@@ -39,7 +39,7 @@ BANDWIDTH, DAMPING = 1.0 / 3.0, 0.7
 
 
 @dataclass(frozen=True, kw_only=True)
-class Parameter:
+class GainParameter:
     """One number that is tuned, on a logarithmic scale between two bounds."""
 
     key: str
@@ -130,26 +130,26 @@ def anti_resonance(joints: KnownJoints) -> float:
     return float(np.sqrt(stiffness / joints.link_inertia[0]) / (2.0 * np.pi))
 
 
-def parameters_of(tunable: Tunable, joints: KnownJoints) -> tuple[Parameter, ...]:
+def parameters_of(tunable: Tunable, joints: KnownJoints) -> tuple[GainParameter, ...]:
     """What is tuned of a controller, with bounds for a joint."""
     high = anti_resonance(joints)
     known = (
         # a tenth to twice the anti-resonance: softer is useless, stiffer rings
-        Parameter(
+        GainParameter(
             key="frequency_Hz",
             low=0.1 * high,
             high=2.0 * high,
             neutral=BANDWIDTH * high,
         ),
-        Parameter(key="damping_ratio", low=0.2, high=3.0, neutral=DAMPING),
-        Parameter(key="integral_time_s", low=0.01, high=10.0, neutral=np.inf),
-        Parameter(key="torque_share", low=0.5, high=2.0, neutral=1.0),
-        Parameter(key="friction_share", low=0.3, high=3.0, neutral=1.0),
-        Parameter(key="torsion_share", low=0.5, high=2.0, neutral=1.0),
+        GainParameter(key="damping_ratio", low=0.2, high=3.0, neutral=DAMPING),
+        GainParameter(key="integral_time_s", low=0.01, high=10.0, neutral=np.inf),
+        GainParameter(key="torque_share", low=0.5, high=2.0, neutral=1.0),
+        GainParameter(key="friction_share", low=0.3, high=3.0, neutral=1.0),
+        GainParameter(key="torsion_share", low=0.5, high=2.0, neutral=1.0),
         # of the nominal drive's kinematic error, whose phase specimens do not share
-        Parameter(key="error_share", low=0.02, high=2.0, neutral=1.0),
+        GainParameter(key="error_share", low=0.02, high=2.0, neutral=1.0),
         # a reading of t - age is held against the plan of then
-        Parameter(key="reading_age_s", low=1e-4, high=4e-3, neutral=0.0),
+        GainParameter(key="reading_age_s", low=1e-4, high=4e-3, neutral=0.0),
     )
     return tuple(p for key in tunable.keys for p in known if p.key == key)
 

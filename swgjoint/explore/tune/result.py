@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from swgjoint.errors import InputError
 from swgjoint.explore.tune.cost import Trace
-from swgjoint.explore.tune.gains import Parameter
-from swgjoint.explore.tune.search import OPTIMISERS, Search
+from swgjoint.explore.tune.gains import GainParameter
+from swgjoint.explore.tune.search import OPTIMISERS, GainSearch
 from swgjoint.units import arcmin
 
 Array = NDArray[np.float64]
@@ -71,7 +71,7 @@ class TuneSettings:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Candidate:
+class GainCandidate:
     """A controller with its values and what it costs."""
 
     name: str
@@ -111,10 +111,10 @@ class Tuned:
 
     settings: TuneSettings
     environment: str
-    candidates: tuple[Candidate, ...]
+    candidates: tuple[GainCandidate, ...]
     """First the textbook's PD, last the tuned controller."""
-    searches: dict[str, Search]
-    parameters: tuple[Parameter, ...]
+    searches: dict[str, GainSearch]
+    parameters: tuple[GainParameter, ...]
     """Of the named controller."""
     anti_resonance: float
     """Of the nominal plant [Hz]."""
@@ -126,16 +126,16 @@ class Tuned:
     """With what was spent before an interruption [s]."""
 
     @property
-    def baseline(self) -> Candidate:
+    def baseline(self) -> GainCandidate:
         """PD by the textbook rule."""
         return self.candidates[0]
 
     @property
-    def best(self) -> Candidate:
+    def best(self) -> GainCandidate:
         """The tuned controller."""
         return self.candidates[-1]
 
-    def improvement(self, candidate: Candidate) -> float:
+    def improvement(self, candidate: GainCandidate) -> float:
         """Share of the baseline's held-out cost that a candidate saves."""
         return float(1.0 - candidate.held_out.mean() / self.baseline.held_out.mean())
 

@@ -45,7 +45,7 @@ class _Failed(Exception):
 
 
 @dataclass(kw_only=True, eq=False)
-class Search:
+class GainSearch:
     """Generations of one search."""
 
     places: list[Array] = field(default_factory=list)
@@ -73,7 +73,7 @@ class Search:
 
 def run_search(
     optimiser: str,
-    search: Search,
+    search: GainSearch,
     *,
     costs: Callable[[Array], Array],
     more: Callable[[], bool],
@@ -220,7 +220,7 @@ OPTIMISERS: dict[str, Callable[[Evaluate, Array, int, int], None]] = {
 
 
 def write_journal(
-    folder: Path, header: Mapping[str, Any], searches: Mapping[str, Search]
+    folder: Path, header: Mapping[str, Any], searches: Mapping[str, GainSearch]
 ) -> Path:
     """Write all searches, whole or not at all."""
     arrays: dict[str, Any] = {"header": json.dumps(header, sort_keys=True)}
@@ -234,7 +234,7 @@ def write_journal(
 
 def read_journal(
     folder: Path, header: Mapping[str, Any], names: tuple[str, ...]
-) -> dict[str, Search]:
+) -> dict[str, GainSearch]:
     """Searches of a run that is taken up again.
 
     Raises:
@@ -265,15 +265,15 @@ def read_journal(
     return found
 
 
-def _search(arrays: Mapping[str, Array], name: str) -> Search:
+def _search(arrays: Mapping[str, Array], name: str) -> GainSearch:
     if f"{name}.places" not in arrays:
-        return Search()
+        return GainSearch()
     places, costs, seconds = (
         arrays[f"{name}.{key}"] for key in ("places", "costs_rad", "seconds")
     )
     whole = places.shape[:2] == costs.shape[:2] and seconds.shape == places.shape[:1]
     if not (whole and places.ndim == costs.ndim == 3 and np.isfinite(costs).all()):
         raise ValueError(f"{name}: generations and costs do not match")
-    return Search(
+    return GainSearch(
         places=list(places), costs=list(costs), seconds=[float(s) for s in seconds]
     )

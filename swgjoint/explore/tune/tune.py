@@ -23,7 +23,7 @@ from swgjoint.errors import InputError
 from swgjoint.explore.tune.cost import Trace, Trials, environment_named
 from swgjoint.explore.tune.gains import (
     CONTROLLERS,
-    Parameter,
+    GainParameter,
     Tunable,
     anti_resonance,
     controller_named,
@@ -32,14 +32,14 @@ from swgjoint.explore.tune.gains import (
 )
 from swgjoint.explore.tune.result import (
     MINUTES,
-    Candidate,
+    GainCandidate,
     Tuned,
     TuneSettings,
     arguments_of,
 )
 from swgjoint.explore.tune.search import (
     JOURNAL,
-    Search,
+    GainSearch,
     read_journal,
     run_search,
     write_journal,
@@ -84,7 +84,7 @@ def tune(
     tunables = {_PD: CONTROLLERS["pd"]}
     if named.name != "pd":
         tunables[_NAMED] = named
-    searches = {name: Search() for name in tunables}
+    searches = {name: GainSearch() for name in tunables}
     if folder is None and resume:
         raise InputError("resume without a folder; accepted: --out of the run")
     training, held_out = settings.seeds
@@ -129,7 +129,7 @@ def tune(
     trials.close()
     last = Trials(environment, arguments, seeds=training + held_out, candidates=1)
     joints = last.joints
-    candidates: list[Candidate] = []
+    candidates: list[GainCandidate] = []
     for name, tunable in tunables.items():
         parameters = parameters_of(tunable, joints)
         neutral = {p.key: np.array([p.neutral]) for p in parameters}
@@ -169,8 +169,8 @@ class _Budget:
     """When a search has to end: after so many candidates, or in time."""
 
     settings: TuneSettings
-    searches: Mapping[str, Search]
-    search: Search
+    searches: Mapping[str, GainSearch]
+    search: GainSearch
     share: float
     elapsed: Any
 
@@ -234,14 +234,14 @@ def _header(
     return text
 
 
-def _values(parameters: tuple[Parameter, ...], places: Array) -> dict[str, Array]:
+def _values(parameters: tuple[GainParameter, ...], places: Array) -> dict[str, Array]:
     return {p.key: p.value(places[:, k]) for k, p in enumerate(parameters)}
 
 
 def _costs(
     trials: Trials,
     tunable: Tunable,
-    parameters: tuple[Parameter, ...],
+    parameters: tuple[GainParameter, ...],
     places: Array,
 ) -> Array:
     return trials.costs(tunable, _values(parameters, places))
@@ -255,9 +255,9 @@ def _candidate(
     trace: Trace,
     trials: Trials,
     settings: TuneSettings,
-) -> Candidate:
+) -> GainCandidate:
     first = settings.training
-    return Candidate(
+    return GainCandidate(
         name=f"{tunable.name} {label}",
         controller=tunable.name,
         values={key: float(x[0]) for key, x in values.items()},

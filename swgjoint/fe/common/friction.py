@@ -32,7 +32,7 @@ far below its sliding of micrometres, and the spring is no stiffer than the toot
 
 
 @dataclass(frozen=True, kw_only=True)
-class Friction:
+class CoulombFriction:
     """Law of the flanks."""
 
     coefficient: float
@@ -133,7 +133,7 @@ class Sliding:
     @classmethod
     def of(
         cls,
-        friction: Friction,
+        friction: CoulombFriction,
         contacts: Contacts,
         history: SlipHistory | None,
         last: SlipHistory | None,
@@ -220,7 +220,7 @@ class Sliding:
 
 
 def dissipated(
-    friction: Friction, history: SlipHistory | None, now: SlipHistory
+    friction: CoulombFriction, history: SlipHistory | None, now: SlipHistory
 ) -> float:
     """Work of friction over a step [J]; never negative.
 
@@ -243,7 +243,7 @@ def dissipated(
     return work + float(np.sum(old[parted] ** 2)) / (2.0 * k)
 
 
-def spring_energy(friction: Friction, now: SlipHistory) -> float:
+def spring_energy(friction: CoulombFriction, now: SlipHistory) -> float:
     """Energy of the stick springs [J]."""
     force = (now.pairs.share > 0.0) @ now.force
     return 0.5 * float(np.sum(force**2)) / friction.stiffness

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from swgjoint.errors import DesignError
 from swgjoint.fe.common.contact_patch import half_length
-from swgjoint.fe.common.friction import STICK_STIFFNESS, Friction
+from swgjoint.fe.common.friction import STICK_STIFFNESS, CoulombFriction
 from swgjoint.fe.common.indentation import Indentation, softness_of
 from swgjoint.fe.common.stress_state import confinement
 from swgjoint.fe.plane.bore_contact import NARROW_POINTS, POINTS
@@ -180,7 +180,7 @@ def ring_model(
             )
         modulus = design.material_of("flexspline").youngs_modulus
         width = design.drive.face_width_mm * mm
-        law = Friction(
+        law = CoulombFriction(
             coefficient=coefficient, stiffness=STICK_STIFFNESS * modulus * width
         )
     shifts: dict[str, Array] = {}

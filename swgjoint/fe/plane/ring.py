@@ -12,7 +12,7 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
-from swgjoint.fe.common.friction import Friction
+from swgjoint.fe.common.friction import CoulombFriction
 from swgjoint.fe.common.indentation import Indentation
 from swgjoint.fe.plane.bore_contact import POINTS, BoreStations
 from swgjoint.fe.plane.circular_spline import CircularSpline
@@ -43,7 +43,7 @@ class RingModel:
     half: bool = False
     """Half of the ring, closed by a rotation of 180 deg."""
     nonlinear: bool = True
-    friction: Friction | None = None
+    friction: CoulombFriction | None = None
     """Between the flanks; None without."""
     indentation: Indentation | None = None
     """Of the flanks; None gives them the patch of a contact alone."""

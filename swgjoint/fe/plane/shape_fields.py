@@ -52,7 +52,7 @@ class SectorFields:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Surface:
+class ShapeSurface:
     """What is shown of a sector."""
 
     nodes: Index
@@ -70,7 +70,7 @@ class Surface:
         return np.asarray(apart.argmin(axis=0), dtype=np.int64)
 
 
-def surface_of(points: Array, rows: Sequence[Index]) -> Surface:
+def surface_of(points: Array, rows: Sequence[Index]) -> ShapeSurface:
     """A surface through rows of nodes.
 
     Args:
@@ -79,7 +79,7 @@ def surface_of(points: Array, rows: Sequence[Index]) -> Surface:
     """
     triangles = np.concatenate([_between(a, b) for a, b in pairwise(rows)])
     nodes, number = np.unique(triangles, return_inverse=True)
-    return Surface(
+    return ShapeSurface(
         nodes=nodes,
         points=points[nodes],
         triangles=np.asarray(number.reshape(triangles.shape), dtype=np.int64),
@@ -106,7 +106,7 @@ def outline_rows(plane: SectorMesh) -> tuple[Index, Index]:
     return plane.bore[::EVERY], np.concatenate([right[half], left])
 
 
-def plane_surface(model: RingModel) -> Surface:
+def plane_surface(model: RingModel) -> ShapeSurface:
     """The section of the flexspline's tooth."""
     mesh = model.element.mesh
     flat = np.asarray(mesh.mesh.p).T
@@ -114,7 +114,7 @@ def plane_surface(model: RingModel) -> Surface:
     return surface_of(points, outline_rows(mesh))
 
 
-def plane_fields(model: RingModel, state: State, surface: Surface) -> SectorFields:
+def plane_fields(model: RingModel, state: State, surface: ShapeSurface) -> SectorFields:
     """An equilibrium in the plane."""
     element, frames = model.element, model.frames(state)
     size = len(element.displacement_from_skeleton)
@@ -148,7 +148,7 @@ def drive_fields(
     design: Design,
     states: Mapping[float, Sequence[AnyState]],
     fields: Callable[[AnyState], SectorFields],
-    surface: Surface,
+    surface: ShapeSurface,
     *,
     symmetric: bool,
 ) -> DriveFields:
@@ -208,7 +208,7 @@ def _by_place(phases: list[Array]) -> Array:
     return table
 
 
-def _mirrored(fields: SectorFields, surface: Surface) -> SectorFields:
+def _mirrored(fields: SectorFields, surface: ShapeSurface) -> SectorFields:
     """The same under the opposite torque, seen in a mirror."""
     flip = np.array([-1.0, 1.0, 1.0])
 

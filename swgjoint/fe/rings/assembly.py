@@ -10,7 +10,7 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 
-class Assembly:
+class BandedAssembly:
     """Energy, gradient and Hessian of many small parts."""
 
     def __init__(self, size: int) -> None:

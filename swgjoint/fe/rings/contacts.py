@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.fe.plane.corotation import rotate, turned
-from swgjoint.fe.rings.assembly import Assembly
+from swgjoint.fe.rings.assembly import BandedAssembly
 from swgjoint.fe.rings.facing import Facing, facing
 from swgjoint.fe.rings.model import ThinRing
 from swgjoint.fe.rings.race_on_balls import PressedBalls, pressed_form
@@ -23,7 +23,7 @@ PARTS = ("rim", "race", "balls", "bore", "teeth")
 
 def linearised(
     model: ThinRing, state: RingState, *, teeth: bool
-) -> tuple[RingState, Assembly, int]:
+) -> tuple[RingState, BandedAssembly, int]:
     """Forces and tangent at the positions of a state, and the coordinate that is held.
 
     Args:
@@ -31,7 +31,7 @@ def linearised(
         state: Their positions and where contacts were; forces are written anew.
         teeth: Whether the teeth touch.
     """
-    total = Assembly(model.size)
+    total = BandedAssembly(model.size)
     first = model.rim.size
     rim, race = state.q[:first], state.q[first:]
     both = (("rim", model.rim, rim, 0), ("race", model.race, race, first))
@@ -59,7 +59,7 @@ def race_on_balls(model: ThinRing, state: RingState, race: Array) -> PressedBall
 
 
 def _balls(
-    model: ThinRing, state: RingState, race: Array, total: Assembly
+    model: ThinRing, state: RingState, race: Array, total: BandedAssembly
 ) -> RingState:
     pressed = race_on_balls(model, state, race)
     on = np.flatnonzero(pressed.overlap > 0.0)
@@ -78,7 +78,7 @@ def _balls(
 
 
 def _bore(
-    model: ThinRing, state: RingState, rim: Array, race: Array, total: Assembly
+    model: ThinRing, state: RingState, rim: Array, race: Array, total: BandedAssembly
 ) -> RingState:
     """Unilateral contact of the rim's bore with the race."""
     points = model.bore.points(rim)[0]
@@ -98,7 +98,9 @@ def _bore(
     return replace(state, bore_feet=seen.place)
 
 
-def _teeth(model: ThinRing, state: RingState, rim: Array, total: Assembly) -> RingState:
+def _teeth(
+    model: ThinRing, state: RingState, rim: Array, total: BandedAssembly
+) -> RingState:
     """Contact of the flanks."""
     nodes = rim.reshape(-1, 2, 2)[:: model.nodes_per_tooth]
     foot, slope = nodes[:, 0], nodes[:, 1]
@@ -122,7 +124,7 @@ def _teeth(model: ThinRing, state: RingState, rim: Array, total: Assembly) -> Ri
 
 
 def _press(
-    total: Assembly,
+    total: BandedAssembly,
     name: str,
     seen: Facing,
     rows: Array,

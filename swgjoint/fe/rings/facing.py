@@ -111,7 +111,7 @@ def facing(
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Surface:
+class FacingSurface:
     """Points beside a ring at fixed places, carried along by its sections."""
 
     ring: HermiteRing
@@ -153,6 +153,8 @@ class Surface:
         bend = -self.offset * np.einsum("ni,ni->n", seen.normal, outward)
         return self.ring.dofs[element], rows, bend
 
-    def chosen(self, index: Index) -> Surface:
+    def chosen(self, index: Index) -> FacingSurface:
         """The points with the given indices."""
-        return Surface(ring=self.ring, place=self.place[index], offset=self.offset)
+        return FacingSurface(
+            ring=self.ring, place=self.place[index], offset=self.offset
+        )

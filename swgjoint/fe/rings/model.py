@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 from swgjoint.errors import DesignError
 from swgjoint.fe.plane.drive2d import sector
-from swgjoint.fe.rings.facing import Surface
+from swgjoint.fe.rings.facing import FacingSurface
 from swgjoint.fe.rings.hermite_ring import GAUSS, HermiteRing
 from swgjoint.fe.rings.race_on_balls import RaceOnBalls
 from swgjoint.fe.rings.sections import rim_section, tooth_pair_stiffness
-from swgjoint.fe.rings.teeth import Teeth
+from swgjoint.fe.rings.teeth import RingTeeth
 from swgjoint.gear.bearing.ball_bearing import BallBearing
 from swgjoint.gear.bearing.checks import bearing_checks
 from swgjoint.gear.design.check import raise_faults
@@ -43,16 +43,16 @@ class ThinRing(RaceOnBalls):
 
     rim: HermiteRing
     nodes_per_tooth: int
-    teeth: Teeth
+    teeth: RingTeeth
     press: float
     """Stiffness of bore against race per length [N/m^2]."""
 
     @cached_property
-    def bore(self) -> Surface:
+    def bore(self) -> FacingSurface:
         """Points of the rim's bore that face the race."""
         place = np.arange(self.rim.elements)[:, None] + PER_ELEMENT
         offset = self.bearing.bore_radius - self.rim.radius
-        return Surface(ring=self.rim, place=place.ravel(), offset=offset)
+        return FacingSurface(ring=self.rim, place=place.ravel(), offset=offset)
 
     @property
     def press_per_point(self) -> float:
@@ -147,7 +147,7 @@ def thin_ring(design: Design) -> ThinRing:
         **vars(RaceOnBalls.of(design, rim.elements)),
         rim=rim,
         nodes_per_tooth=per_tooth,
-        teeth=Teeth(
+        teeth=RingTeeth(
             flexspline=flexspline,
             circular_spline=circular_spline,
             foot_radius=section.neutral_radius,

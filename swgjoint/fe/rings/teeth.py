@@ -49,7 +49,7 @@ class RigidFlanks:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Teeth:
+class RingTeeth:
     """Both members' teeth; those of the flexspline stand on a line of given radius."""
 
     flexspline: ToothProfile

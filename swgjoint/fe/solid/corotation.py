@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from swgjoint.fe.solid.strip.segment import Segment
+from swgjoint.fe.solid.strip.segment import StripSegment
 
 Array = NDArray[np.float64]
 
@@ -44,7 +44,7 @@ def about_z(angle: Array) -> Array:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Frames:
+class SolidFrames:
     """Kinematics of one segment in all sectors; m masters."""
 
     turn: Array
@@ -66,8 +66,8 @@ class Frames:
 
 
 def segment_frames(
-    segment: Segment, x: Array, place: Array, *, fitted: bool = True
-) -> Frames:
+    segment: StripSegment, x: Array, place: Array, *, fitted: bool = True
+) -> SolidFrames:
     """Best-fit frames.
 
     Args:
@@ -91,7 +91,7 @@ def segment_frames(
         inertia = arm[:, None, None] * np.eye(3)
         inertia -= np.einsum("sai,aj->sij", y, reference)
         gradient += np.linalg.solve(inertia, np.broadcast_to(crossed, gradient.shape))
-    return Frames(
+    return SolidFrames(
         turn=turn,
         position=y,
         centre=np.einsum("sji,sj->si", turn, mean) - segment.position.mean(axis=0),
@@ -100,20 +100,20 @@ def segment_frames(
     )
 
 
-def energies(segment: Segment, frames: Frames) -> Array:
+def energies(segment: StripSegment, frames: SolidFrames) -> Array:
     """Strain energy of the masters' part in each sector (N,) [J]."""
     d = frames.deformation
     return np.asarray(0.5 * np.einsum("si,ij,sj->s", d, segment.stiffness, d))
 
 
-def projected(frames: Frames, force: Array) -> Array:
+def projected(frames: SolidFrames, force: Array) -> Array:
     """P^T f: gradient by the masters seen in the frame (N, 3 m) [N]."""
     n, m = frames.position.shape[:2]
     moment = np.cross(frames.position, force.reshape(n, m, 3)).sum(axis=1)
     return np.asarray(force - np.einsum("sw,swi->si", moment, frames.gradient))
 
 
-def tangent(segment: Segment, frames: Frames, force: Array) -> Array:
+def tangent(segment: StripSegment, frames: SolidFrames, force: Array) -> Array:
     r"""Second derivative by the masters seen in the frames, to first order in d.
 
     .. math:: T = P^T \hat K P + H G + (H G)^T - G^T \mathrm{sym}(H^T S) G, \quad
@@ -142,14 +142,14 @@ def tangent(segment: Segment, frames: Frames, force: Array) -> Array:
     return np.asarray(segment.stiffness + outer + outer.transpose(0, 2, 1))
 
 
-def in_global(frames: Frames, rows: Array) -> Array:
+def in_global(frames: SolidFrames, rows: Array) -> Array:
     """Vectors per master from the frames to the global frame (N, 3 m)."""
     n, m = frames.position.shape[:2]
     turned = np.einsum("sij,saj->sai", frames.turn, rows.reshape(n, m, 3))
     return np.asarray(turned.reshape(n, 3 * m))
 
 
-def matrices_in_global(frames: Frames, matrix: Array) -> Array:
+def matrices_in_global(frames: SolidFrames, matrix: Array) -> Array:
     """Matrices over masters from the frames to the global frame (N, 3 m, 3 m)."""
     n, m = frames.position.shape[:2]
     half = frames.turn[:, None] @ matrix.reshape(n, m, 3, 3 * m)

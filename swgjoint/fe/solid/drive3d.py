@@ -17,7 +17,7 @@ from swgjoint.fe.solid.ring_gear import ring_gear
 from swgjoint.fe.solid.strip.masters import Orders
 from swgjoint.fe.solid.strip.mesh import circular_spline_strip, flexspline_strip
 from swgjoint.fe.solid.strip.strip import flexspline
-from swgjoint.fe.solid.teeth import FlankCrowning, Teeth
+from swgjoint.fe.solid.teeth import FlankCrowning, SolidTeeth
 from swgjoint.fe.solid.wave_generator.race import SolidRace
 from swgjoint.fe.solid.wave_generator.surface import WaveGeneratorSurface
 from swgjoint.gear.bearing.checks import bearing_checks
@@ -94,7 +94,7 @@ def solid_ring(
     return SolidRing(
         strip=strip,
         wave_generator=WaveGeneratorSurface.of(design),
-        teeth=Teeth(
+        teeth=SolidTeeth(
             strip=strip,
             circular_spline=surface,
             ring_gear=gear,

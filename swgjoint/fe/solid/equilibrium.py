@@ -16,7 +16,7 @@ from swgjoint.errors import Outcome
 from swgjoint.fe.common.complementarity import ActiveSetError, solve_mixed
 from swgjoint.fe.common.cyclic import SingularRingError
 from swgjoint.fe.solid.corotation import about_z, energies
-from swgjoint.fe.solid.linearise import Linearised, linearise
+from swgjoint.fe.solid.linearise import SolidLinearised, linearise
 from swgjoint.fe.solid.ring import SolidRing
 from swgjoint.fe.solid.ring_factor import RingFactor
 from swgjoint.fe.solid.state import SolidState
@@ -159,7 +159,7 @@ class _Step:
 def _solve_linear(
     ring: SolidRing,
     state: SolidState,
-    linear: Linearised,
+    linear: SolidLinearised,
     load: SolidLoad,
     reach: float,
     thorough: bool,
@@ -250,7 +250,7 @@ class Condensed:
 def condense(
     ring: SolidRing,
     state: SolidState,
-    linear: Linearised,
+    linear: SolidLinearised,
     found: ToothRows | None,
     rotation: float | None = None,
 ) -> Condensed:
@@ -357,7 +357,7 @@ def _solve_ring(ring: SolidRing, matrix: Array, columns: Array) -> Array:
 def _advance(
     ring: SolidRing,
     state: SolidState,
-    linear: Linearised,
+    linear: SolidLinearised,
     step: _Step,
     damping: float,
     *,

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from swgjoint.fe.plane.race import RaceForces
 from swgjoint.fe.solid.across import FLAT, WIDE, crown_bend, vertices
 from swgjoint.fe.solid.corotation import (
-    Frames,
+    SolidFrames,
     in_global,
     matrices_in_global,
     projected,
@@ -81,10 +81,10 @@ class BoreContact:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Linearised:
+class SolidLinearised:
     """Ring at one state; n = 3 masters, and the coordinates of a race."""
 
-    frames: tuple[Frames, ...]
+    frames: tuple[SolidFrames, ...]
     gradient: Array
     """Derivative of the strain energy (N, n) [N]."""
     hessian: Array
@@ -98,7 +98,7 @@ class Linearised:
 
 def linearise(
     ring: SolidRing, state: SolidState, *, kept: Mask | None = None
-) -> Linearised:
+) -> SolidLinearised:
     """Linearise a ring.
 
     Args:
@@ -136,7 +136,7 @@ def linearise(
         )
         gradient[:, dofs] += race.gradient
         hessian[:, dofs[:, None], dofs] += race.hessian
-    return Linearised(
+    return SolidLinearised(
         frames=frames,
         gradient=gradient,
         hessian=hessian,
@@ -147,7 +147,7 @@ def linearise(
 
 
 def bore_contact(
-    ring: SolidRing, state: SolidState, frame: Frames, *, kept: Mask | None = None
+    ring: SolidRing, state: SolidState, frame: SolidFrames, *, kept: Mask | None = None
 ) -> BoreContact:
     """Contact points of all sectors; see :func:`linearise`."""
     teeth, first = ring.strip.teeth, ring.strip.flank_dofs

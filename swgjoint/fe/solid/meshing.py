@@ -23,7 +23,7 @@ from swgjoint.fe.solid.drive3d import check_modelled, solid_ring
 from swgjoint.fe.solid.figures.axial_section import coning
 from swgjoint.fe.solid.ring import SolidRing
 from swgjoint.fe.solid.state import SolidState
-from swgjoint.fe.solid.stress import Place, SolidMaxima
+from swgjoint.fe.solid.stress import SolidMaxima, StressPlace
 from swgjoint.fe.solid.strip.masters import Orders
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.tolerances import has_errors
@@ -289,7 +289,7 @@ def _nodes(ring: SolidRing) -> int:
     return int((ring.strip.mesh.nodes - face + sum(rows)) * ring.sectors)
 
 
-def _place(place: Place) -> dict[str, Any]:
+def _place(place: StressPlace) -> dict[str, Any]:
     return {
         "part": place.part,
         "sector": place.sector,

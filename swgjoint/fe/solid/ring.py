@@ -9,10 +9,10 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
-from swgjoint.fe.solid.corotation import Frames, about_z, segment_frames
+from swgjoint.fe.solid.corotation import SolidFrames, about_z, segment_frames
 from swgjoint.fe.solid.state import SolidState
 from swgjoint.fe.solid.strip.strip import Strip
-from swgjoint.fe.solid.teeth import Teeth
+from swgjoint.fe.solid.teeth import SolidTeeth
 from swgjoint.fe.solid.wave_generator.race import NODE, SIGN, SolidRace
 from swgjoint.fe.solid.wave_generator.surface import WaveGeneratorSurface
 
@@ -26,7 +26,7 @@ class SolidRing:
 
     strip: Strip
     wave_generator: WaveGeneratorSurface
-    teeth: Teeth
+    teeth: SolidTeeth
     lobe_height: float
     """Radial deflection at the lobes [m]."""
     half: bool = False
@@ -117,7 +117,7 @@ class SolidRing:
         """Forces at the loaded degrees of freedom of the teeth (N, n_b) [N]."""
         return np.concatenate([state.flank_force, state.bore_force], axis=1)
 
-    def frames(self, state: SolidState) -> tuple[Frames, ...]:
+    def frames(self, state: SolidState) -> tuple[SolidFrames, ...]:
         """Frames of all segments."""
         x, place = self.masters(state), self.place
         if not self.nonlinear:
@@ -127,7 +127,7 @@ class SolidRing:
             for segment in self.strip.segments
         )
 
-    def bore_positions(self, frames: Frames, state: SolidState) -> Array:
+    def bore_positions(self, frames: SolidFrames, state: SolidState) -> Array:
         """Bore nodes in the frames of the teeth (N, n_bore, 3) [m]."""
         teeth, first = self.strip.teeth, self.strip.flank_dofs
         moved = frames.displacement @ teeth.loaded_from_masters[first:].T

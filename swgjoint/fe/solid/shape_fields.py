@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from swgjoint.fe.plane.shape_fields import (
     EVERY,
     SectorFields,
-    Surface,
+    ShapeSurface,
     outline_rows,
     surface_of,
 )
@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 
-def solid_surface(ring: SolidRing) -> Surface:
+def solid_surface(ring: SolidRing) -> ShapeSurface:
     """Outside of a sector, nodes of its segments numbered one after the other."""
     strip = ring.strip.mesh
     bore, outline = outline_rows(strip.teeth.plane)
@@ -41,7 +41,9 @@ def solid_surface(ring: SolidRing) -> Surface:
     return surface_of(points, rows)
 
 
-def solid_fields(ring: SolidRing, state: SolidState, surface: Surface) -> SectorFields:
+def solid_fields(
+    ring: SolidRing, state: SolidState, surface: ShapeSurface
+) -> SectorFields:
     """An equilibrium in space."""
     loads, frames = ring.loads(state), ring.frames(state)
     # from where the teeth stood, undeformed and turned with the flexspline

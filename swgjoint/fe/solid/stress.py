@@ -109,7 +109,7 @@ def turned_stress(stress: Array, turn: Array) -> Array:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Place:
+class StressPlace:
     """Where the largest von Mises stress of the flexspline lies, in its sector."""
 
     part: str
@@ -127,7 +127,7 @@ class SolidMaxima:
     circular_spline: StressMaxima | None
     by_part: dict[str, StressMaxima]
     """Of the flexspline by segment."""
-    place: Place
+    place: StressPlace
 
     @classmethod
     def at(cls, ring: SolidRing, state: SolidState) -> SolidMaxima:
@@ -167,7 +167,7 @@ def _largest(maxima: tuple[Array, Array, Array]) -> StressMaxima:
     return StressMaxima(tensile=tensile, compressive=compressive, von_mises=von_mises)
 
 
-def _place(ring: SolidRing, part: str, sector: int, node: int) -> Place:
+def _place(ring: SolidRing, part: str, sector: int, node: int) -> StressPlace:
     """Name the place of a node."""
     strip = ring.strip
     number = [segment.name for segment in strip.segments].index(part)
@@ -184,4 +184,4 @@ def _place(ring: SolidRing, part: str, sector: int, node: int) -> Place:
             name = "bore"
         else:
             name = "tooth" if radius > root + 0.3 * (root - bore) else "root"
-    return Place(part=name, sector=sector, position=(x, y, z))
+    return StressPlace(part=name, sector=sector, position=(x, y, z))

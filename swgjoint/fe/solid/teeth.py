@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from swgjoint.fe.plane.circular_spline import CircularSpline
 from swgjoint.fe.plane.corotation import rotate
 from swgjoint.fe.plane.tooth_contact import Contacts, ToothContact
-from swgjoint.fe.solid.corotation import Frames, spin
+from swgjoint.fe.solid.corotation import SolidFrames, spin
 from swgjoint.fe.solid.ring_gear import RingGear
 from swgjoint.fe.solid.strip.strip import Strip
 from swgjoint.fe.solid.wave_generator.surface import crown
@@ -77,7 +77,7 @@ class ToothRows:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Teeth:
+class SolidTeeth:
     """Both members' flanks."""
 
     strip: Strip
@@ -103,7 +103,7 @@ class Teeth:
 
     def find(
         self,
-        frame: Frames,
+        frame: SolidFrames,
         force: Array,
         ring_force: Array,
         reach: float,
@@ -186,7 +186,7 @@ class Teeth:
         self,
         contacts: Contacts,
         plane: Index,
-        frame: Frames,
+        frame: SolidFrames,
         nodes: Array,
         angle: Array,
     ) -> ToothRows:

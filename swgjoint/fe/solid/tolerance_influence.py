@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from swgjoint.fe.common.influence import Gaps, Influence, pivoted
 from swgjoint.fe.plane.corotation import rotate
 from swgjoint.fe.solid.equilibrium import condense
-from swgjoint.fe.solid.linearise import Linearised, linearise
+from swgjoint.fe.solid.linearise import SolidLinearised, linearise
 from swgjoint.fe.solid.ring import SolidRing
 from swgjoint.fe.solid.state import SolidState
 from swgjoint.fe.solid.teeth import ToothRows
@@ -76,7 +76,7 @@ def _gaps(ring: SolidRing, state: SolidState, found: ToothRows, carries: Mask) -
 
 
 def _tooth_contacts(
-    ring: SolidRing, linear: Linearised, state: SolidState
+    ring: SolidRing, linear: SolidLinearised, state: SolidState
 ) -> tuple[ToothRows, Mask]:
     """Points that may touch, and which of them carry force at the state."""
     held = state.held

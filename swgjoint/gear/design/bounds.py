@@ -15,7 +15,7 @@ DIGITS = 4
 
 
 @dataclass(frozen=True, kw_only=True)
-class Bound:
+class AcceptedBound:
     """How far a value must go until it is accepted."""
 
     rejected: float
@@ -39,7 +39,7 @@ def nearest_bound(
     *,
     low: float = 0.0,
     high: float = float("inf"),
-) -> Bound | None:
+) -> AcceptedBound | None:
     """Nearest accepted value on either side of a rejected positive one.
 
     Values are tried in steps of 5 % up to a factor of 20, the smallest change first;
@@ -62,7 +62,9 @@ def nearest_bound(
         for factor in (STEP, 1.0 / STEP):
             tried, before = value * factor**k, value * factor ** (k - 1)
             if low < tried <= high and accepts(tried):
-                return Bound(rejected=value, accepted=_bisected(before, tried, accepts))
+                return AcceptedBound(
+                    rejected=value, accepted=_bisected(before, tried, accepts)
+                )
     return None
 
 

@@ -21,16 +21,16 @@ from swgjoint.gear.design.sections import (
     CircularSplineMember,
     Coupling,
     Cup,
-    Drive,
-    Friction,
+    DriveSection,
+    FrictionSection,
     Housing,
-    JointSection,
+    JointDampingSection,
     MaterialSection,
     Member,
     MeshSection,
     MicroGeometry,
     RatingsSection,
-    Tolerances,
+    TolerancesSection,
 )
 from swgjoint.gear.wave_generators.sections import WaveGenerator
 from swgjoint.models_path import bundled_names, find
@@ -47,7 +47,7 @@ class Design(Section):
     this class are in SI. Immutable; :meth:`with_changes` gives a changed copy.
     """
 
-    drive: Drive
+    drive: DriveSection
     material: MaterialSection = MaterialSection()
     flexspline: Member
     circular_spline: CircularSplineMember
@@ -57,10 +57,10 @@ class Design(Section):
     housing: Housing | None = None
     coupling: Coupling | None = None
     micro_geometry: MicroGeometry = MicroGeometry()
-    tolerances: Tolerances = Tolerances()
-    friction: Friction = Friction()
+    tolerances: TolerancesSection = TolerancesSection()
+    friction: FrictionSection = FrictionSection()
     ratings: RatingsSection = RatingsSection()
-    joint: JointSection = JointSection()
+    joint: JointDampingSection = JointDampingSection()
     mesh: MeshSection = MeshSection()
 
     @model_validator(mode="after")

@@ -16,7 +16,7 @@ from typing import Any
 
 from swgjoint.errors import DesignError
 from swgjoint.faults import unit_of, validated
-from swgjoint.gear.design.bounds import Bound, nearest_bound
+from swgjoint.gear.design.bounds import AcceptedBound, nearest_bound
 from swgjoint.gear.design.check import Check
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.feasibility import (
@@ -25,7 +25,7 @@ from swgjoint.gear.design.feasibility import (
     engagement_checks,
     part_checks,
 )
-from swgjoint.gear.design.sections import Drive
+from swgjoint.gear.design.sections import DriveSection
 from swgjoint.gear.teeth.tooth_bounds import MEMBER_KEYS
 from swgjoint.gear.teeth.tooth_path import tooth_path
 from swgjoint.gear.wave_generators.wave_generator import lobe_height
@@ -54,13 +54,13 @@ _LARGEST = {
 
 
 @dataclass(frozen=True, kw_only=True)
-class Moved:
+class MovedValue:
     """A value with which the scaled design could not be built."""
 
     key: str
     value: float
     """What it is now."""
-    bound: Bound
+    bound: AcceptedBound
     """What it was, and the nearest accepted value."""
     fault: str
 
@@ -81,7 +81,7 @@ class Scaled:
     design: Design
     factors: dict[str, float]
     """By what was multiplied: ``module``, ``pitch_diameter``, ``deflection``."""
-    moved: tuple[Moved, ...]
+    moved: tuple[MovedValue, ...]
 
 
 def scaled_design(
@@ -115,7 +115,9 @@ def scaled_design(
     if module is not None:
         own["module_mm"] = module
     asked = {**old.model_dump(), **own}
-    new = validated(Drive, asked, where=f"design {name!r}: drive", error=DesignError)
+    new = validated(
+        DriveSection, asked, where=f"design {name!r}: drive", error=DesignError
+    )
     by_module = new.module_mm / old.module_mm
     difference = new.teeth_circular_spline - new.teeth_flexspline
     factors = {
@@ -191,9 +193,9 @@ def _outline_to_scale(old: Design, new: Design) -> dict[str, Any]:
 
 def _made_feasible(
     design: Design, fixed: frozenset[str]
-) -> tuple[Design, tuple[Moved, ...]]:
+) -> tuple[Design, tuple[MovedValue, ...]]:
     """The design with as few values moved as make every check pass."""
-    moved: list[Moved] = []
+    moved: list[MovedValue] = []
     while (failed := _first_failed(design)) is not None and len(moved) < ROUNDS:
         part, faults = failed
         settled = fixed | {one.key for one in moved}
@@ -208,7 +210,7 @@ def _made_feasible(
         else:
             design, value = design.with_changes({key: bound.accepted}), bound.accepted
         cause = faults[0].partition(": ")[2].partition("; accepted")[0]
-        moved.append(Moved(key=key, value=value, bound=bound, fault=cause))
+        moved.append(MovedValue(key=key, value=value, bound=bound, fault=cause))
     if failed is not None:
         raise DesignError("\n".join(failed[1]))
     return design, tuple(moved)
@@ -247,9 +249,9 @@ def _with(design: Design, key: str, value: float) -> Design | None:
 
 def _nearest(
     design: Design, part: str, fixed: frozenset[str]
-) -> tuple[str, Bound] | None:
+) -> tuple[str, AcceptedBound] | None:
     """The key whose smallest change alone makes a part feasible."""
-    best: tuple[str, Bound] | None = None
+    best: tuple[str, AcceptedBound] | None = None
     for key, value in _candidates(design, part):
         if key in fixed:
             continue

@@ -26,7 +26,7 @@ SMALLEST_MODULE = 0.005
 """[mm]; micro strain wave gears with pitch diameters of 6 mm have 0.03 mm."""
 
 
-class Drive(Section):
+class DriveSection(Section):
     """Identity, layout, teeth and module."""
 
     name: Annotated[str, Field(min_length=1, max_length=100)]
@@ -45,7 +45,7 @@ class Drive(Section):
     """Width of the teeth along the axis."""
 
     @model_validator(mode="after")
-    def _module_in_millimetres(self) -> Drive:
+    def _module_in_millimetres(self) -> DriveSection:
         if self.module_mm < SMALLEST_MODULE:
             raise Fault(
                 (
@@ -58,7 +58,7 @@ class Drive(Section):
         return self
 
     @model_validator(mode="after")
-    def _tooth_difference(self) -> Drive:
+    def _tooth_difference(self) -> DriveSection:
         difference = self.teeth_circular_spline - self.teeth_flexspline
         if difference <= 0:
             raise Fault(
@@ -284,7 +284,7 @@ class MicroGeometry(Section):
     """Shape of both crownings along the face."""
 
 
-class Tolerances(Section):
+class TolerancesSection(Section):
     """Manufacturing errors; all zero by default."""
 
     flexspline_cumulative_pitch_um: Micrometre = 0.0
@@ -307,7 +307,7 @@ class Tolerances(Section):
     """Of all random parts."""
 
 
-class Friction(Section):
+class FrictionSection(Section):
     """Coulomb friction of the teeth."""
 
     tooth_coefficient: Annotated[float, Field(ge=0, le=1)] = 0.0
@@ -346,7 +346,7 @@ class RatingsSection(Section):
         return self
 
 
-class JointSection(Section):
+class JointDampingSection(Section):
     """Damping of the drive in a robot joint."""
 
     damping_ratio: Annotated[float, Field(ge=0, le=2)] = 0.02

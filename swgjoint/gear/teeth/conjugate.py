@@ -22,7 +22,7 @@ from swgjoint.errors import DesignError
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.sections import Conjugate
 from swgjoint.gear.teeth.blank import Blank, blank
-from swgjoint.gear.teeth.envelope import Envelope, Run
+from swgjoint.gear.teeth.envelope import Envelope, EnvelopeRun
 from swgjoint.gear.teeth.profile import TANGENCY_RAD, ToothProfile
 from swgjoint.gear.teeth.segments import Piece, Point, arc, line
 from swgjoint.gear.teeth.smooth_curve import smooth_curve
@@ -181,7 +181,7 @@ class _Builder:
 
     # -- the flank ----------------------------------------------------------------
 
-    def _with_edge(self, runs: list[Run]) -> list[Run]:
+    def _with_edge(self, runs: list[EnvelopeRun]) -> list[EnvelopeRun]:
         """The runs, closed by the path of the edge where the flank begins at one."""
         low, last = self.envelope.given.contact_range[0], runs[-1]
         close = last.station[-1] - low < 0.05 * (runs[0].station[0] - low)
@@ -189,10 +189,10 @@ class _Builder:
             return runs
         station, guess = np.array([low]), last.theta[-1:]
         theta = self.envelope.contact(last.motion, station, guess)
-        edge = Run(motion=last.motion, station=station, theta=theta, edge=True)
+        edge = EnvelopeRun(motion=last.motion, station=station, theta=theta, edge=True)
         return [*runs, edge]
 
-    def _trace(self, run: Run) -> Callable[[Array], tuple[Array, Array]]:
+    def _trace(self, run: EnvelopeRun) -> Callable[[Array], tuple[Array, Array]]:
         """Points and normals of the thinned tooth, at stations or edge positions."""
 
         def trace(t: Array) -> tuple[Array, Array]:
@@ -209,7 +209,7 @@ class _Builder:
         return float(np.hypot(points[0, 0], points[0, 1]))
 
     def _flank(
-        self, runs: list[Run], departure: float
+        self, runs: list[EnvelopeRun], departure: float
     ) -> tuple[list[Piece], tuple[Point, Array]] | None:
         """Pieces from the tip circle to the departure, and where that is.
 
@@ -294,7 +294,7 @@ class _Builder:
         sharp = np.abs(np.diff(turn)) * SHARPEST * self.start.module > walked
         return float(t[np.argmax(sharp)]) if sharp.any() else last
 
-    def _summit(self, run: Run, first: float) -> float:
+    def _summit(self, run: EnvelopeRun, first: float) -> float:
         """Position at which the path of the edge is farthest into the receiver."""
         from scipy.optimize import minimize_scalar
 
@@ -308,7 +308,7 @@ class _Builder:
         )
         return float(found.x)
 
-    def _runs_on(self, run: Run, following: Run, low: float) -> bool:
+    def _runs_on(self, run: EnvelopeRun, following: EnvelopeRun, low: float) -> bool:
         """Whether a branch goes over into the path of the edge at its own end."""
         near = abs(run.station[-1] - low) < 0.05 * abs(run.station[0] - low)
         step = abs(following.theta[0] - run.theta[-1])
@@ -320,7 +320,7 @@ class _Builder:
             and bool(step < 0.03 * run.motion.half_range)
         )
 
-    def _meet(self, one: Run, two: Run) -> tuple[float, float]:
+    def _meet(self, one: EnvelopeRun, two: EnvelopeRun) -> tuple[float, float]:
         """Parameters (stations, positions of an edge) at which two branches cross."""
         from scipy.optimize import root
 
@@ -350,7 +350,7 @@ class _Builder:
 
     def _curves(
         self,
-        run: Run,
+        run: EnvelopeRun,
         trace: Callable[[Array], tuple[Array, Array]],
         first: float,
         last: float,

@@ -29,7 +29,7 @@ ITERATIONS = 100
 
 
 @dataclass(frozen=True, kw_only=True)
-class Run:
+class EnvelopeRun:
     """Part of the boundary that one branch of the envelope, or one edge, makes."""
 
     motion: ToothMotion
@@ -123,7 +123,7 @@ class Envelope:
                 break
         return np.asarray(theta)
 
-    def trace(self, run: Run, s: Array) -> tuple[Array, Array, Array]:
+    def trace(self, run: EnvelopeRun, s: Array) -> tuple[Array, Array, Array]:
         """Points and outward normals of the receiver, and theta, at flank points s."""
         order = np.argsort(run.station)
         guess = np.interp(s, run.station[order], run.theta[order])
@@ -132,7 +132,7 @@ class Envelope:
         moved = run.motion.to(self.receiver, theta)
         return moved.points(points), -moved.vectors(normals), theta
 
-    def trace_edge(self, run: Run, theta: Array) -> tuple[Array, Array]:
+    def trace_edge(self, run: EnvelopeRun, theta: Array) -> tuple[Array, Array]:
         """Path of the edge of the given flank, with the receiver's outward normals."""
         low = np.full(theta.shape, self.given.contact_range[0])
         points, normals, _ = self.given.evaluate(low)
@@ -184,7 +184,7 @@ class Envelope:
         """Radius that the given root comes to; the receiving tip keeps off [m]."""
         return self._deepest(self._table[0][..., -1])
 
-    def runs(self) -> list[Run]:
+    def runs(self) -> list[EnvelopeRun]:
         """Branches of the boundary from the receiver's tip towards its root.
 
         Empty where the given flank does not reach the tip circle.
@@ -226,7 +226,7 @@ class Envelope:
         )
         parts = np.split(np.arange(count), np.flatnonzero(jump))
         return [
-            Run(
+            EnvelopeRun(
                 motion=self.motions[int(where[0, part[0]])],
                 station=station[part],
                 theta=theta[where[1, part]],

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 from swgjoint.errors import DesignError
 from swgjoint.faults import unit_of
-from swgjoint.gear.design.bounds import Bound, nearest_bound
+from swgjoint.gear.design.bounds import AcceptedBound, nearest_bound
 from swgjoint.gear.teeth.blank import Blank, ToothFault
 from swgjoint.gear.teeth.profile import ToothProfile
 
@@ -46,7 +46,7 @@ def with_bounds(
         for name, value in start.spec.profile.model_dump().items()
         if name.endswith("_mm") and value
     ]
-    found: dict[str, Bound] = {}
+    found: dict[str, AcceptedBound] = {}
     for key in (*lengths, *MEMBER_KEYS):
         bound = nearest_bound(
             start.value(key),
@@ -70,7 +70,7 @@ def with_bounds(
 
 def _common(
     start: Blank, lengths: list[str], builds: Callable[[Blank], bool]
-) -> Bound | None:
+) -> AcceptedBound | None:
     """Bound of a factor of all lengths, one that alone changes nothing rejected."""
 
     def builds_with(factor: float) -> bool:
@@ -82,7 +82,7 @@ def _common(
     return nearest_bound(1.0, builds_with)
 
 
-def _told(key: str, bound: Bound) -> str:
+def _told(key: str, bound: AcceptedBound) -> str:
     return f"{bound.sign} {bound.accepted:.6g}{_unit(key)}"
 
 

@@ -26,7 +26,7 @@ _MIRROR = np.array([-1.0, 1.0])
 
 
 @dataclass(frozen=True, kw_only=True)
-class Moved:
+class MovedFlank:
     """Rigid motions of vectors, one per parameter: q = turn (p) + shift."""
 
     turn: Array
@@ -97,7 +97,7 @@ class ToothMotion:
         """Half the angle between two lobes [rad]."""
         return np.pi / self.line.lobes
 
-    def in_space(self, theta: Array) -> Moved:
+    def in_space(self, theta: Array) -> MovedFlank:
         """From the flexspline tooth frame to the frame of the tooth space.
 
         The space of the circular spline is centred on +y, the gear axis is the origin.
@@ -119,16 +119,16 @@ class ToothMotion:
             - _apply(d_turn, _like(foot, turn))
         )
         if not self.mirrored:
-            return Moved(turn=turn, shift=shift, d_turn=d_turn, d_shift=d_shift)
+            return MovedFlank(turn=turn, shift=shift, d_turn=d_turn, d_shift=d_shift)
         both = _MIRROR[:, None] * _MIRROR
-        return Moved(
+        return MovedFlank(
             turn=turn * both,
             shift=shift * _MIRROR,
             d_turn=-d_turn * both,
             d_shift=-d_shift * _MIRROR,
         )
 
-    def to_circular_spline(self, theta: Array) -> Moved:
+    def to_circular_spline(self, theta: Array) -> MovedFlank:
         """From a right flexspline flank to the right flank of the tooth it faces.
 
         The tooth of the circular spline half a pitch clockwise, mirrored so that its
@@ -136,26 +136,26 @@ class ToothMotion:
         """
         space = self.in_space(theta)
         matrix = _facing(self.teeth_circular_spline)
-        return Moved(
+        return MovedFlank(
             turn=matrix @ space.turn,
             shift=space.shift @ matrix.T,
             d_turn=matrix @ space.d_turn,
             d_shift=space.d_shift @ matrix.T,
         )
 
-    def to_flexspline(self, theta: Array) -> Moved:
+    def to_flexspline(self, theta: Array) -> MovedFlank:
         """The inverse: from a right flank of the circular spline to the flexspline."""
         there = self.to_circular_spline(theta)
         turn = np.swapaxes(there.turn, -1, -2)
         d_turn = np.swapaxes(there.d_turn, -1, -2)
-        return Moved(
+        return MovedFlank(
             turn=turn,
             shift=-_apply(turn, there.shift),
             d_turn=d_turn,
             d_shift=-_apply(d_turn, there.shift) - _apply(turn, there.d_shift),
         )
 
-    def to(self, receiver: Receiver, theta: Array) -> Moved:
+    def to(self, receiver: Receiver, theta: Array) -> MovedFlank:
         """From the other member's right flank to that of the receiver."""
         if receiver == "flexspline":
             return self.to_flexspline(theta)

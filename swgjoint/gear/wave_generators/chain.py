@@ -9,14 +9,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from swgjoint.gear.wave_generators.curve import Array, ClosedCurve
-from swgjoint.gear.wave_generators.pieces import Piece
+from swgjoint.gear.wave_generators.pieces import OutlinePiece
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Chain(ClosedCurve):
     """Closed convex chain of pieces, the first one starting on the +y axis."""
 
-    pieces: tuple[Piece, ...]
+    pieces: tuple[OutlinePiece, ...]
     major: float = field(init=False)
     """Largest radius [m]."""
 

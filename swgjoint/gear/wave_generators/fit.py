@@ -11,7 +11,7 @@ from swgjoint.gear.design.check import Check
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.wave_generators.chain import Chain
 from swgjoint.gear.wave_generators.curve import ClosedCurve
-from swgjoint.gear.wave_generators.radial import Radial, Table
+from swgjoint.gear.wave_generators.radial import Radial, TableOutline
 from swgjoint.gear.wave_generators.rollers import FourRoller
 from swgjoint.units import mm
 
@@ -78,7 +78,7 @@ def wave_generator_checks(
         checks.append(_rollers_clear(design, outline))
     if isinstance(outline, Radial):
         checks.append(_convex(design, outline))
-    if isinstance(outline, Table):
+    if isinstance(outline, TableOutline):
         checks.append(_lobes_reach(design, outline))
     return checks
 
@@ -162,7 +162,7 @@ def _convex(design: Design, outline: Radial) -> Check:
     )
 
 
-def _lobes_reach(design: Design, outline: Table) -> Check:
+def _lobes_reach(design: Design, outline: TableOutline) -> Check:
     """Every lobe of a table deflects the bore."""
     lobes = 2.0 * pi * np.arange(design.lobes) / design.lobes
     least = float(outline.radius(lobes).min()) / mm

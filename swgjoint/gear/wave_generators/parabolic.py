@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from math import atan, atan2, cos, hypot, pi, sin, sqrt
 
 from swgjoint.gear.wave_generators.chain import Chain
-from swgjoint.gear.wave_generators.pieces import Arc, Parabola, Piece, Point
+from swgjoint.gear.wave_generators.pieces import Arc, OutlinePiece, Parabola, Point
 from swgjoint.units import deg, mm
 
 
@@ -94,7 +94,7 @@ def parabolic(
                 f" by {-aperture / deg:.4g} deg to meet the minor axis; accepted: a"
                 " smaller one",
             )
-    half: list[Piece] = [
+    half: list[OutlinePiece] = [
         wing_l,
         Arc(centre=centre_l, radius=left.connector_radius, start=end_l, end=first),
         Arc(centre=centre, radius=radius, start=first, end=last),
@@ -169,7 +169,7 @@ def _lateral(
     return centre, radius
 
 
-def _turned(piece: Piece) -> Piece:
+def _turned(piece: OutlinePiece) -> OutlinePiece:
     """The piece turned by half a turn about the axis."""
     if isinstance(piece, Arc):
         x, y = piece.centre

@@ -18,7 +18,7 @@ from swgjoint.gear.wave_generators.curve import Array
 Point = tuple[float, float]
 
 
-class Piece(Protocol):
+class OutlinePiece(Protocol):
     """One smooth part of an outline."""
 
     @property
@@ -57,14 +57,14 @@ class Arc:
         return self.radius * (self.end - self.start)
 
     def at(self, s: Array) -> tuple[Array, Array, Array]:
-        """See :class:`Piece`."""
+        """See :class:`OutlinePiece`."""
         angle = self.start + s / self.radius
         normals = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
         points = np.asarray(self.centre) + self.radius * normals
         return points, normals, np.full(np.shape(s), 1.0 / self.radius)
 
     def foot(self, points: Array) -> Array:
-        """See :class:`Piece`."""
+        """See :class:`OutlinePiece`."""
         middle, half = 0.5 * (self.start + self.end), 0.5 * (self.end - self.start)
         rel = points - np.asarray(self.centre)
         c, d = cos(middle), sin(middle)  # angle from the middle: no branch cut near
@@ -72,7 +72,7 @@ class Arc:
         return np.asarray(self.radius * (np.clip(angle, -half, half) + half))
 
     def largest_radius(self) -> float:
-        """See :class:`Piece`."""
+        """See :class:`OutlinePiece`."""
         ends, normals, _ = self.at(np.array([0.0, self.length]))
         # the far point from the axis lies beyond the centre, if the arc reaches there
         ox, oy = self.centre
@@ -99,7 +99,7 @@ class Line:
         return np.subtract(self.end, self.start) / self.length
 
     def at(self, s: Array) -> tuple[Array, Array, Array]:
-        """See :class:`Piece`."""
+        """See :class:`OutlinePiece`."""
         s = np.asarray(s, dtype=float)
         direction = self._direction
         points = np.asarray(self.start) + s[:, None] * direction
@@ -107,12 +107,12 @@ class Line:
         return points, normals, np.zeros(s.shape)
 
     def foot(self, points: Array) -> Array:
-        """See :class:`Piece`."""
+        """See :class:`OutlinePiece`."""
         along = (points - np.asarray(self.start)) @ self._direction
         return np.asarray(np.clip(along, 0.0, self.length))
 
     def largest_radius(self) -> float:
-        """See :class:`Piece`."""
+        """See :class:`OutlinePiece`."""
         return max(hypot(*self.start), hypot(*self.end))
 
 
@@ -148,7 +148,7 @@ class Parabola:
         return np.array([[c, d], [-d, c]])
 
     def at(self, s: Array) -> tuple[Array, Array, Array]:
-        """See :class:`Piece`; the arc length is inverted by Newton's method."""
+        """See :class:`OutlinePiece`; the arc length is inverted by Newton's method."""
         a = self.coefficient
         wanted = self._from_apex(self.start) - np.asarray(s, dtype=float)
         u = 2.0 * a * wanted
@@ -166,7 +166,7 @@ class Parabola:
         return points, normals @ self._rotation, 2.0 * a / size**3
 
     def foot(self, points: Array) -> Array:
-        """See :class:`Piece`.
+        """See :class:`OutlinePiece`.
 
         The perpendicular through (p, q) meets the parabola at the largest root of
         x^3 + c x = h with c = (1 + 2 a q)/(2 a^2), h = |p|/(2 a^2). Newton's method
@@ -189,7 +189,7 @@ class Parabola:
         return np.asarray(self._from_apex(self.start) - along)
 
     def largest_radius(self) -> float:
-        """See :class:`Piece`."""
+        """See :class:`OutlinePiece`."""
         a = self.coefficient
         ox, oy = -self._rotation @ np.asarray(self.apex)
         roots = np.roots([2.0 * a * a, 0.0, 1.0 + 2.0 * a * oy, -ox])

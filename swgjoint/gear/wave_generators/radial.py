@@ -134,7 +134,7 @@ class Cosine(Radial):
         return np.asarray(-n * n * swing * np.cos(angle))
 
 
-class Table(Radial):
+class TableOutline(Radial):
     """Periodic cubic spline, twice continuously differentiable, through a table."""
 
     def __init__(self, angle: Sequence[float], radius: Sequence[float]) -> None:

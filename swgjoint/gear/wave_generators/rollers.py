@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from swgjoint.gear.wave_generators.chain import Chain
 from swgjoint.gear.wave_generators.curve import Array, ClosedCurve
-from swgjoint.gear.wave_generators.pieces import Arc, Line, Piece
+from swgjoint.gear.wave_generators.pieces import Arc, Line, OutlinePiece
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,7 +38,7 @@ class FourRoller(ClosedCurve):
         """Taut band around the four rollers."""
         (x, y), r = self.centre, self.roller_radius
         # from the +y axis: half a top line, roller, side line, roller, half a line
-        half: list[Piece] = [
+        half: list[OutlinePiece] = [
             Line(start=(0.0, y + r), end=(-x, y + r)),
             Arc(centre=(-x, y), radius=r, start=0.5 * pi, end=pi),
             Line(start=(-x - r, y), end=(-x - r, -y)),

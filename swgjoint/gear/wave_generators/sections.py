@@ -47,7 +47,7 @@ class WaveGeneratorBase(Section):
     """Ball bearing below the flexspline; without one the cam slides."""
 
 
-class Elliptical(WaveGeneratorBase):
+class EllipticalSection(WaveGeneratorBase):
     """Ellipse, thesis 3.2.2."""
 
     kind: Literal["elliptical"] = "elliptical"
@@ -55,7 +55,7 @@ class Elliptical(WaveGeneratorBase):
     """C: half minor axis over bore radius less deflection."""
 
 
-class Simplified(WaveGeneratorBase):
+class SimplifiedSection(WaveGeneratorBase):
     """Two semicircles joined by straight lines, thesis 3.2.1."""
 
     kind: Literal["simplified"] = "simplified"
@@ -128,7 +128,7 @@ class AsymmetricParabolic(WaveGeneratorBase):
         return self
 
 
-class FourRoller(WaveGeneratorBase):
+class FourRollerSection(WaveGeneratorBase):
     """Four rollers, thesis 3.2.4."""
 
     kind: Literal["four_roller"] = "four_roller"
@@ -138,7 +138,7 @@ class FourRoller(WaveGeneratorBase):
     """Radius of the rollers."""
 
 
-class Cosine(WaveGeneratorBase):
+class CosineSection(WaveGeneratorBase):
     """Cosine of the lobes about the neutral circle."""
 
     kind: Literal["cosine"] = "cosine"
@@ -146,7 +146,7 @@ class Cosine(WaveGeneratorBase):
     """C: half minor axis over bore radius less deflection."""
 
 
-class Table(WaveGeneratorBase):
+class TableSection(WaveGeneratorBase):
     """Radius over the angle from the major axis, one turn."""
 
     kind: Literal["table"] = "table"
@@ -156,7 +156,7 @@ class Table(WaveGeneratorBase):
     """Radius at every angle."""
 
     @model_validator(mode="after")
-    def _same_length(self) -> Table:
+    def _same_length(self) -> TableSection:
         if len(self.angle_deg) < 8:
             raise Fault(
                 ("angle_deg", f"{len(self.angle_deg)} values; accepted: 8 or more")
@@ -178,12 +178,12 @@ class Table(WaveGeneratorBase):
 
 
 WaveGenerator = Annotated[
-    Elliptical
-    | Simplified
+    EllipticalSection
+    | SimplifiedSection
     | Parabolic
     | AsymmetricParabolic
-    | FourRoller
-    | Cosine
-    | Table,
+    | FourRollerSection
+    | CosineSection
+    | TableSection,
     Field(discriminator="kind"),
 ]

@@ -15,7 +15,7 @@ from swgjoint.gear.wave_generators.curve import ClosedCurve
 from swgjoint.gear.wave_generators.ellipse import Elliptical
 from swgjoint.gear.wave_generators.fit import wave_generator_checks
 from swgjoint.gear.wave_generators.parabolic import OutlineFault, Side, parabolic
-from swgjoint.gear.wave_generators.radial import Cosine, Table
+from swgjoint.gear.wave_generators.radial import Cosine, TableOutline
 from swgjoint.gear.wave_generators.rollers import FourRoller
 from swgjoint.gear.wave_generators.sections import (
     AsymmetricParabolic,
@@ -86,7 +86,7 @@ def _outline(design: Design, r: float, w0: float) -> ClosedCurve:
         )
     if spec.kind == "table":
         angles = np.asarray(spec.angle_deg) * deg
-        return Table(angles.tolist(), [radius * mm for radius in spec.radius_mm])
+        return TableOutline(angles.tolist(), [radius * mm for radius in spec.radius_mm])
     minor = spec.minor_axis_coefficient * (r - w0)  # (3.2), (3.4)
     if spec.kind == "elliptical":
         return Elliptical(major=major, minor=minor)

@@ -38,7 +38,7 @@ of the lost motion."""
 
 
 @dataclass(frozen=True, kw_only=True)
-class Readings:
+class LoopReadings:
     """What a sheet reads about zero torque."""
 
     hysteresis_loss: float
@@ -47,7 +47,7 @@ class Readings:
     """[rad], NaN where it does not pass zero in both."""
 
 
-def readings(loop: TorqueLoop, rated_torque: float) -> Readings:
+def readings(loop: TorqueLoop, rated_torque: float) -> LoopReadings:
     """Hysteresis loss and lost motion, noise averaged where there are samples.
 
     Args:
@@ -58,7 +58,7 @@ def readings(loop: TorqueLoop, rated_torque: float) -> Readings:
     wanted = np.array([-at, 0.0, at])
     falling, rising = (_branch(loop, wanted, rising=r) for r in (False, True))
     mid = 0.5 * (falling + rising)
-    return Readings(
+    return LoopReadings(
         hysteresis_loss=float(falling[1] - rising[1]),
         lost_motion=float(mid[2] - mid[0]),
     )
@@ -90,10 +90,10 @@ def _read(torque: Array, torsion: Array, at: float, near: float) -> float:
     return float(np.polyval(np.polyfit(torque[chosen] - at, torsion[chosen], 1), 0.0))
 
 
-def _shown(drive: Potential, rated_torque: float) -> Readings:
+def _shown(drive: Potential, rated_torque: float) -> LoopReadings:
     """Readings of the standard loop of a map, as a sheet has them; no noise."""
     loop = torque_loop(drive)
-    return Readings(
+    return LoopReadings(
         hysteresis_loss=loop.hysteresis_loss(),
         lost_motion=loop.lost_motion(rated_torque),
     )

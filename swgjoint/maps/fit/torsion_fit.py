@@ -29,7 +29,7 @@ _SIGNIFICANT = 20.0  # of an F test: far beyond what noise does
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Record:
+class LoopRecord:
     """What of a loop the least squares see."""
 
     loop: TorqueLoop
@@ -55,7 +55,7 @@ class TorsionFit:
     """At the knots, positive [N·m/rad]."""
     hysteresis: tuple[Jenkin, ...]
     report: dict[str, Any]
-    record: Record
+    record: LoopRecord
     yields: Array
     """Yield torques of the elements that were tried [N·m]."""
 
@@ -104,7 +104,7 @@ def fit_torsion(loop: TorqueLoop, *, intervals: int = INTERVALS) -> TorsionFit:
         known[:] = True
     torque, x = loop.torque[known], loop.torsion[known]
     count = max(1, min(intervals, np.unique(torque).size // 3))
-    record = Record(
+    record = LoopRecord(
         loop=loop,
         torque=torque,
         torsion=x,
@@ -131,7 +131,7 @@ def fit_torsion(loop: TorqueLoop, *, intervals: int = INTERVALS) -> TorsionFit:
 
 
 def _fit_of(
-    record: Record, found: _Solution, yields: Array, report: dict[str, Any]
+    record: LoopRecord, found: _Solution, yields: Array, report: dict[str, Any]
 ) -> TorsionFit:
     """Spring and elements of a solution, and how well they follow the loop."""
     loop, knots, x = record.loop, record.knots, record.torsion

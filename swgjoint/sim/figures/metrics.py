@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from swgjoint.joint.step_error import MotorLoop, step_error
+from swgjoint.joint.step_error import LinearMotorLoop, step_error
 from swgjoint.sim.figures.energy import joint_energy, run_energy
 from swgjoint.sim.figures.orders import OrderLine, resample, strongest_lines
 from swgjoint.sim.figures.ripple_validity import (
@@ -241,7 +241,7 @@ def line_error(run: Run, j: int, order: float) -> float | None:
         torque=float(run.output_torque[run.steady, j].mean()),
         timestep=run.assembly.step,
         link_inertia=float(run.assembly.link_inertia[j]),
-        loop=MotorLoop(
+        loop=LinearMotorLoop(
             stiffness=float(loops.stiffness[j]),
             damping=float(loops.damping[j]),
             sampled=loops.sampled,

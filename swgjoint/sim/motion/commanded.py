@@ -15,14 +15,14 @@ from swgjoint.sim.motion.inverse_kinematics import ToolKinematics
 from swgjoint.sim.motion.trajectory import Trajectory, constant_speed, sweep, time_grid
 from swgjoint.sim.scene.scene import Scene
 from swgjoint.sim.scene.trajectory_sections import (
-    Chirp,
+    ChirpSection,
     Circle,
     ConstantSpeed,
     FromFile,
     Iso9283,
-    Line,
-    Step,
-    Sweep,
+    LineSection,
+    StepSection,
+    SweepSection,
     Trapezoid,
 )
 from swgjoint.units import deg, mm
@@ -72,7 +72,7 @@ def _motion_of(scene: Scene, arm: RigidArm, sub_steps: int) -> Trajectory:
         "step": timing.step_s,
         "sub_steps": sub_steps,
     }
-    if isinstance(section, Sweep):
+    if isinstance(section, SweepSection):
         end = {**section.start_deg, **section.end_deg}
         return sweep(
             start=start,
@@ -90,7 +90,7 @@ def _motion_of(scene: Scene, arm: RigidArm, sub_steps: int) -> Trajectory:
             **grid,
         )
     time, where = time_grid(**grid), f"{scene.where}: trajectory"
-    if isinstance(section, Step):
+    if isinstance(section, StepSection):
         jump = _angles(section.step_deg, joints)
         return joint_motions.step(
             time,
@@ -109,7 +109,7 @@ def _motion_of(scene: Scene, arm: RigidArm, sub_steps: int) -> Trajectory:
             max_acceleration=section.max_acceleration_deg_s2 * deg,
             where=where,
         )
-    if isinstance(section, Chirp):
+    if isinstance(section, ChirpSection):
         return joint_motions.chirp(
             time,
             start=start,
@@ -133,12 +133,12 @@ def _motion_of(scene: Scene, arm: RigidArm, sub_steps: int) -> Trajectory:
 
 
 def _tool_motion(
-    section: Line | Circle | Iso9283,
+    section: LineSection | Circle | Iso9283,
     time: Array,
     kinematics: ToolKinematics,
     start: Array,
 ) -> Trajectory:
-    if isinstance(section, Line):
+    if isinstance(section, LineSection):
         return tool_motions.line(
             time,
             kinematics,

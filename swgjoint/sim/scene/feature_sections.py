@@ -39,7 +39,7 @@ class TorqueSensor(Section):
     """Standard deviation of every reading, normal."""
 
 
-class Sensors(Section):
+class SensorsSection(Section):
     """Sensors of every joint; without one an angle reads exactly and at once."""
 
     motor: Sensor | None = None

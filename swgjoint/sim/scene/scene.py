@@ -25,19 +25,23 @@ from swgjoint.sim.arm.reading import ArmReading
 from swgjoint.sim.scene.feature_sections import (
     Disturbance,
     Payload,
-    Sensors,
+    SensorsSection,
     misfits,
     too_fast,
 )
 from swgjoint.sim.scene.sections import (
-    Controller,
-    Load,
+    ControllerSection,
+    LoadSection,
     Metrics,
     Recording,
     Several,
     Simulation,
 )
-from swgjoint.sim.scene.trajectory_sections import MOTIONS, Chirp, TrajectorySection
+from swgjoint.sim.scene.trajectory_sections import (
+    MOTIONS,
+    ChirpSection,
+    TrajectorySection,
+)
 from swgjoint.units import deg
 
 MAX_STEPS = 2_000_000
@@ -65,10 +69,10 @@ class Scene(Section):
     """Drive of every hinge joint that does not say otherwise."""
     joints: dict[str, JointSection] = Field(default_factory=dict)
     trajectory: TrajectorySection
-    controller: Controller = Controller()
-    load: dict[str, Load] = Field(default_factory=dict)
+    controller: ControllerSection = ControllerSection()
+    load: dict[str, LoadSection] = Field(default_factory=dict)
     """Constant torque that the load exerts against a joint."""
-    sensors: Sensors | None = None
+    sensors: SensorsSection | None = None
     """What the controller reads; None reads every angle exactly and at once."""
     payload: Payload | None = None
     disturbance: list[Disturbance] = Field(default_factory=list)
@@ -141,7 +145,7 @@ class Scene(Section):
                 or abs(value / step - round(value / step)) > 1e-6
             )
         ]
-        if isinstance(self.trajectory, Chirp):
+        if isinstance(self.trajectory, ChirpSection):
             faults += [
                 (f"trajectory.{key}", fault)
                 for key in ("from_Hz", "to_Hz")
@@ -203,7 +207,7 @@ class Scene(Section):
         merged = _merged(data, overrides, where)
         lines: list[str] = []
         # tables keyed by joint are checked one by one, so that messages know their keys
-        for table, model in (("joints", JointSection), ("load", Load)):
+        for table, model in (("joints", JointSection), ("load", LoadSection)):
             entries = merged.get(table)
             if not isinstance(entries, dict):
                 continue

@@ -28,7 +28,7 @@ Positive = Annotated[float, Field(gt=0)]
 Several = Field(strict=False)
 
 
-class Controller(Section):
+class ControllerSection(Section):
     r"""Position control of every motor on its own encoder.
 
     ``pd`` and, with the integral of the error, ``pid``:
@@ -98,7 +98,7 @@ class Controller(Section):
         return self
 
 
-class Load(Section):
+class LoadSection(Section):
     """Constant torque of the load against a joint; the drive exerts the same."""
 
     torque_Nm: Annotated[float, Field(ge=-1e6, le=1e6)] | None = None

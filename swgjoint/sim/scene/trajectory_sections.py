@@ -16,7 +16,7 @@ Cycles = Annotated[int, Field(ge=1, le=1_000)]
 Plane = Literal["+x", "-x", "+y", "-y"]
 
 
-class Motion(Section):
+class MotionSection(Section):
     """What all motions share."""
 
     start_deg: dict[str, Degrees] = Field(default_factory=dict)
@@ -33,7 +33,7 @@ class Motion(Section):
         return {"start_deg": set(self.start_deg)}
 
 
-class Sweep(Motion):
+class SweepSection(MotionSection):
     """All joints together from start to end: rest, ramp, constant speed, ramp, rest."""
 
     kind: Literal["sweep"] = "sweep"
@@ -55,7 +55,7 @@ class Sweep(Motion):
         return {"start_deg": set(self.start_deg), "end_deg": set(self.end_deg)}
 
 
-class ConstantSpeed(Motion):
+class ConstantSpeed(MotionSection):
     """Constant joint speeds from the first instant."""
 
     kind: Literal["constant_speed"] = "constant_speed"
@@ -77,7 +77,7 @@ class ConstantSpeed(Motion):
         }
 
 
-class Step(Motion):
+class StepSection(MotionSection):
     """Joint angles jump once; what follows is the controller's answer."""
 
     kind: Literal["step"] = "step"
@@ -96,7 +96,7 @@ class Step(Motion):
         return {"start_deg": set(self.start_deg), "step_deg": set(self.step_deg)}
 
 
-class Trapezoid(Motion):
+class Trapezoid(MotionSection):
     """Point to point at constant acceleration, speed and deceleration, then rest.
 
     All joints start and stop together, and the one that needs longest runs at a limit.
@@ -132,7 +132,7 @@ class Trapezoid(Motion):
         return {"start_deg": set(self.start_deg), "end_deg": set(self.end_deg)}
 
 
-class Chirp(Motion):
+class ChirpSection(MotionSection):
     """One joint swings about its start, faster and faster (or slower and slower)."""
 
     kind: Literal["chirp"] = "chirp"
@@ -156,7 +156,7 @@ class Chirp(Motion):
         return {"start_deg": set(self.start_deg), "joint": {self.joint}}
 
 
-class FromFile(Motion):
+class FromFile(MotionSection):
     """Joint angles from a CSV file, smoothly through all of its points."""
 
     kind: Literal["csv"] = "csv"
@@ -171,14 +171,14 @@ class FromFile(Motion):
         return self.hold_s
 
 
-class ToolMotion(Motion):
+class ToolMotion(MotionSection):
     """A motion that the tool site makes; joints follow by inverse kinematics."""
 
     orientation: Literal["hold", "free"] | None = None
     """Whether the tool keeps its orientation; None: from six joints on."""
 
 
-class Line(ToolMotion):
+class LineSection(ToolMotion):
     """The tool goes straight forth and back, resting at either end."""
 
     kind: Literal["line"] = "line"
@@ -254,27 +254,27 @@ class Iso9283(ToolMotion):
 
 
 TrajectorySection = Annotated[
-    Sweep
+    SweepSection
     | ConstantSpeed
-    | Step
+    | StepSection
     | Trapezoid
-    | Chirp
+    | ChirpSection
     | FromFile
-    | Line
+    | LineSection
     | Circle
     | Iso9283,
     Field(discriminator="kind"),
 ]
-MOTIONS: dict[str, type[Motion]] = {
+MOTIONS: dict[str, type[MotionSection]] = {
     str(model.model_fields["kind"].default): model
     for model in (
-        Sweep,
+        SweepSection,
         ConstantSpeed,
-        Step,
+        StepSection,
         Trapezoid,
-        Chirp,
+        ChirpSection,
         FromFile,
-        Line,
+        LineSection,
         Circle,
         Iso9283,
     )

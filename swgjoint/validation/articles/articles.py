@@ -24,7 +24,7 @@ from swgjoint.validation.articles.rows import (
     force_rows,
     stress_rows,
 )
-from swgjoint.validation.articles.runs import Found, Task, run_task
+from swgjoint.validation.articles.runs import ArticleTask, Found, run_task
 from swgjoint.validation.rows import Row, StudyOptions, StudyResult
 
 PARTS = ("deflection", "force", "stress", "fatigue")
@@ -66,7 +66,7 @@ def run_articles(options: StudyOptions) -> StudyResult:
     )
 
 
-def tasks_of(study: ArticlesFile, part: str) -> list[Task]:
+def tasks_of(study: ArticlesFile, part: str) -> list[ArticleTask]:
     """What a part computes."""
     if part == "deflection":
         own = changed(study.deflection.base)
@@ -78,11 +78,13 @@ def tasks_of(study: ArticlesFile, part: str) -> list[Task]:
         force = study.force
         design = changed(force.base)
         tasks = [
-            Task(name="force", kind="pinched", design=design),
-            Task(name="force, smooth", kind="pinched", design=design, toothless=True),
-            Task(name="force, large", kind="rotated", design=design, size=2),
-            Task(name="force, lobes", kind="lobes", design=design, size=4),
-            Task(
+            ArticleTask(name="force", kind="pinched", design=design),
+            ArticleTask(
+                name="force, smooth", kind="pinched", design=design, toothless=True
+            ),
+            ArticleTask(name="force, large", kind="rotated", design=design, size=2),
+            ArticleTask(name="force, lobes", kind="lobes", design=design, size=4),
+            ArticleTask(
                 name="force, fine",
                 kind="pinched",
                 design=design.with_changes(FINE),
@@ -90,7 +92,7 @@ def tasks_of(study: ArticlesFile, part: str) -> list[Task]:
             ),
         ]
         return tasks + [
-            Task(
+            ArticleTask(
                 name=f"force, {v.name}",
                 kind="pinched",
                 design=changed(force.base, v.changes),
@@ -101,8 +103,8 @@ def tasks_of(study: ArticlesFile, part: str) -> list[Task]:
     design, torques = changed(stress.base), stress.torques_Nm
     crowned = design.with_changes(stress.crowned)
     tasks = [
-        Task(name="four", kind="four", design=design, torques=torques, size=2),
-        Task(
+        ArticleTask(name="four", kind="four", design=design, torques=torques, size=2),
+        ArticleTask(
             name="four, fine",
             kind="four",
             design=design.with_changes(FINE),
@@ -119,16 +121,20 @@ def tasks_of(study: ArticlesFile, part: str) -> list[Task]:
         ("fatigue, fine", design, 20),
     ):
         few = torques[FINE_TORQUES] if name == "fatigue, fine" else torques
-        tasks.append(Task(name=name, kind="fatigue", design=on, torques=few, size=size))
+        tasks.append(
+            ArticleTask(name=name, kind="fatigue", design=on, torques=few, size=size)
+        )
     return tasks
 
 
-def _deflected(name: str, design: Design, *, fine: bool = False) -> list[Task]:
+def _deflected(name: str, design: Design, *, fine: bool = False) -> list[ArticleTask]:
     """On the wave generator, on one mesh or two."""
     coarse = design.with_changes(COARSE)
-    tasks = [Task(name=name, kind="deflected", design=coarse, size=2)]
+    tasks = [ArticleTask(name=name, kind="deflected", design=coarse, size=2)]
     if fine:
-        more = Task(name=f"{name}, fine", kind="deflected", design=design, size=8)
+        more = ArticleTask(
+            name=f"{name}, fine", kind="deflected", design=design, size=8
+        )
         tasks.append(more)
     return tasks
 

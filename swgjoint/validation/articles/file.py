@@ -17,7 +17,7 @@ Text = Annotated[str, Field(min_length=1, max_length=200)]
 Series = Annotated[tuple[Positive, ...], Field(strict=False, min_length=1)]
 
 
-class Variation(Section):
+class ArticleVariation(Section):
     """Something that a source leaves open, chosen otherwise."""
 
     name: Text
@@ -33,7 +33,7 @@ class Deflection(Section):
     table_mm: Positive
     theory_mm: Positive
     largest_radial_mm: Positive
-    variations: Annotated[tuple[Variation, ...], Field(strict=False)] = ()
+    variations: Annotated[tuple[ArticleVariation, ...], Field(strict=False)] = ()
 
 
 class Springs(Section):
@@ -54,7 +54,7 @@ class Force(Section):
     radius_mm: Positive
     series_sum: Positive
     slope_N_mm: Positive
-    variations: Annotated[tuple[Variation, ...], Field(strict=False)] = ()
+    variations: Annotated[tuple[ArticleVariation, ...], Field(strict=False)] = ()
     springs: Annotated[tuple[Springs, ...], Field(strict=False)] = ()
 
 

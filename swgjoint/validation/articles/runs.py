@@ -11,7 +11,7 @@ import numpy as np
 from swgjoint.errors import ComputationError, DesignError
 from swgjoint.fe.solid.continuation import SolidContinuation
 from swgjoint.fe.solid.drive3d import solid_ring
-from swgjoint.fe.solid.figures.fatigue import Limits, assess, fatigue
+from swgjoint.fe.solid.figures.fatigue import FatigueLimits, assess, fatigue
 from swgjoint.fe.solid.figures.four_forces import four_forces
 from swgjoint.fe.solid.figures.pinched_cup import pinched_cup
 from swgjoint.fe.solid.stress import SolidMaxima, flexspline_stresses
@@ -25,7 +25,7 @@ Found = dict[str, Any]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Task:
+class ArticleTask:
     """One computation; ``fault`` is the one key of what it returns where it failed."""
 
     name: str
@@ -39,7 +39,7 @@ class Task:
     """Rough work, to start long ones first."""
 
 
-def run_task(task: Task) -> Found:
+def run_task(task: ArticleTask) -> Found:
     """Compute; what fails is part of the result, not an error."""
     try:
         return KINDS[task.kind](task)
@@ -47,7 +47,7 @@ def run_task(task: Task) -> Found:
         return {"fault": str(error)}
 
 
-def _pinched(task: Task) -> Found:
+def _pinched(task: ArticleTask) -> Found:
     """Radial stiffness by place [N/mm]."""
     cup = pinched_cup(task.design, toothless=task.toothless)
     return {
@@ -56,7 +56,7 @@ def _pinched(task: Task) -> Found:
     }
 
 
-def _rotated(task: Task) -> Found:
+def _rotated(task: ArticleTask) -> Found:
     """The same at mid-face with large rotations, at about the lobe height."""
     cup = pinched_cup(task.design)
     deflection = 0.5 * task.design.drive.module_mm * task.design.tooth_difference * mm
@@ -67,7 +67,7 @@ def _rotated(task: Task) -> Found:
     }
 
 
-def _lobes(task: Task) -> Found:
+def _lobes(task: ArticleTask) -> Found:
     """Force [N] and play [mrad] over the deflection of a lobe [mm]."""
     found = lobe_characteristic(task.design)
     return {
@@ -80,12 +80,12 @@ def _lobes(task: Task) -> Found:
     }
 
 
-def _four(task: Task) -> Found:
+def _four(task: ArticleTask) -> Found:
     """Load case of the article by torque; radial displacement [mm], stress [MPa]."""
     cup = pinched_cup(task.design)
     shell = ShellDimensions.of(task.design)
     loaded = four_forces(cup, shell.deflection)
-    limits = Limits.of(task.design)
+    limits = FatigueLimits.of(task.design)
     rows = []
     for torque in (0.0, *task.torques):
         stresses = loaded.stresses(torque)
@@ -106,12 +106,12 @@ def _four(task: Task) -> Found:
     return {"by_torque": rows}
 
 
-def _fatigue(task: Task) -> Found:
+def _fatigue(task: ArticleTask) -> Found:
     """Safety factors on the wave generator of the design."""
     return {"by_torque": [a.to_json() for a in fatigue(task.design, task.torques)]}
 
 
-def _deflected(task: Task) -> Found:
+def _deflected(task: ArticleTask) -> Found:
     """On the wave generator, no tooth contact: displacement [mm], stress [MPa]."""
     ring = solid_ring(task.design, half="auto", elastic_circular_spline=False)
     state = SolidContinuation(ring=ring, ratio=task.design.ratio).deflected()
@@ -147,7 +147,7 @@ def _deflected(task: Task) -> Found:
     }
 
 
-KINDS: dict[str, Callable[[Task], Found]] = {
+KINDS: dict[str, Callable[[ArticleTask], Found]] = {
     "pinched": _pinched,
     "rotated": _rotated,
     "lobes": _lobes,

@@ -37,7 +37,7 @@ from swgjoint.validation.catalogue.rows import (
     ratcheting_rows,
     stiffness_rows,
 )
-from swgjoint.validation.catalogue.runs import Found, Task, oval, run_task
+from swgjoint.validation.catalogue.runs import CatalogueTask, Found, oval, run_task
 from swgjoint.validation.catalogue.shares import (
     friction,
     individual_summary,
@@ -112,7 +112,7 @@ def run_catalogue(options: StudyOptions) -> StudyResult:
     return StudyResult(rows=tuple(rows), summary=tuple(lines), more=more, files=files)
 
 
-def tasks_of(study: CatalogueFile, part: str) -> list[Task]:
+def tasks_of(study: CatalogueFile, part: str) -> list[CatalogueTask]:
     """What a part computes."""
     if part == "losses":
         return loss_tasks(study)
@@ -136,7 +136,7 @@ def tasks_of(study: CatalogueFile, part: str) -> list[Task]:
         own = study.individuals
         torques = edges(catalogue_row(own.size, own.ratio))[1:]
         return [
-            Task(
+            CatalogueTask(
                 name=f"individual {seed}",
                 kind="individual",
                 design=study.individual(seed),
@@ -149,7 +149,7 @@ def tasks_of(study: CatalogueFile, part: str) -> list[Task]:
     if part == "accuracy":
         changes = {**study.individuals.changes, "tolerances.seed": 1}
         return [
-            Task(
+            CatalogueTask(
                 name=f"accuracy {size} {ratio}",
                 kind="accuracy",
                 design=variant_design(size, ratio, study.variants[0]).with_changes(
@@ -172,8 +172,10 @@ def tasks_of(study: CatalogueFile, part: str) -> list[Task]:
     return tasks
 
 
-def _path(size: int, ratio: int, design: Design, flank: float, end: str = "") -> Task:
-    return Task(
+def _path(
+    size: int, ratio: int, design: Design, flank: float, end: str = ""
+) -> CatalogueTask:
+    return CatalogueTask(
         name=f"path {size} {ratio} {flank:g}{end}",
         kind="path",
         design=design,
@@ -182,8 +184,8 @@ def _path(size: int, ratio: int, design: Design, flank: float, end: str = "") ->
     )
 
 
-def _teeth(name: str, design: Design, work: float) -> Task:
-    return Task(name=name, kind="ratcheting", design=design, work=work)
+def _teeth(name: str, design: Design, work: float) -> CatalogueTask:
+    return CatalogueTask(name=name, kind="ratcheting", design=design, work=work)
 
 
 def rows_of(study: CatalogueFile, part: str, found: Mapping[str, Found]) -> list[Row]:

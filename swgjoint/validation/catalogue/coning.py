@@ -21,7 +21,7 @@ from swgjoint.validation.catalogue.printed import (
     catalogue_stiffness,
     edges,
 )
-from swgjoint.validation.catalogue.runs import Found, Task
+from swgjoint.validation.catalogue.runs import CatalogueTask, Found
 
 CASES = (
     ("rings", "coning ring", False),
@@ -34,11 +34,11 @@ CASES = (
 """Name, kind, and whether nothing is relieved along the face width."""
 
 
-def coning_tasks(study: CatalogueFile) -> list[Task]:
+def coning_tasks(study: CatalogueFile) -> list[CatalogueTask]:
     """All cases at all ratios."""
     size = study.coning.size
     return [
-        Task(
+        CatalogueTask(
             name=f"coning {ratio} {name}",
             kind=kind,
             design=study.coned(ratio, straight=straight),

@@ -58,7 +58,7 @@ class Individuals(Section):
     source: Text
 
 
-class Coning(Section):
+class ConingSection(Section):
     """The wave generator in space, rigid and on its bearing, at one size."""
 
     size: Whole
@@ -81,7 +81,7 @@ class CatalogueFile(Section):
     stated: Mapping[str, Mapping[str, Any]]
     variants: Annotated[tuple[Variant, ...], Field(strict=False, min_length=1)]
     individuals: Individuals
-    coning: Coning
+    coning: ConingSection
 
     @classmethod
     def load(cls, reference: str = "catalogue") -> CatalogueFile:

@@ -18,7 +18,7 @@ from swgjoint.maps.fit.friction_bending import bending_torque
 from swgjoint.validation.catalogue.file import CatalogueFile, variant_design
 from swgjoint.validation.catalogue.printed import catalogue_row
 from swgjoint.validation.catalogue.rows import bracket_row
-from swgjoint.validation.catalogue.runs import Found, Task
+from swgjoint.validation.catalogue.runs import CatalogueTask, Found
 from swgjoint.validation.rows import Row
 
 RUNNING = "no-load running torque"
@@ -26,11 +26,11 @@ STARTING = "starting torque"
 _MILLI = 1e-3
 
 
-def loss_tasks(study: CatalogueFile) -> list[Task]:
+def loss_tasks(study: CatalogueFile) -> list[CatalogueTask]:
     """Every drive whose losses are stated, with either flank; the cup takes nothing."""
     flanks = {v.flank_deg: v for v in reversed(study.variants)}
     return [
-        Task(
+        CatalogueTask(
             name=_name(size, ratio, flank),
             kind="running",
             design=variant_design(size, ratio, variant),

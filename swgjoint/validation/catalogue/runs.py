@@ -34,7 +34,7 @@ INDIVIDUAL_ANGLES = 8
 
 
 @dataclass(frozen=True, kw_only=True)
-class Task:
+class CatalogueTask:
     """One computation."""
 
     name: str
@@ -47,7 +47,7 @@ class Task:
     """Rough, to start long ones first."""
 
 
-def run_task(task: Task) -> Found:
+def run_task(task: CatalogueTask) -> Found:
     """The result of a task, kept or computed; ``fault`` where it failed."""
     parts = {
         "study": _own_version(),
@@ -58,7 +58,7 @@ def run_task(task: Task) -> Found:
     return recalled("studies", parts, Found, lambda: _computed(task))
 
 
-def _computed(task: Task) -> Found:
+def _computed(task: CatalogueTask) -> Found:
     begin = time.perf_counter()
     try:
         found = KINDS[task.kind](task)
@@ -73,7 +73,7 @@ def _own_version() -> str:
     return code_hash("validation/catalogue/runs.py")
 
 
-def _whole_path(task: Task, angles: Array | None = None) -> RubbedPath:
+def _whole_path(task: CatalogueTask, angles: Array | None = None) -> RubbedPath:
     """The path of the rings to the last torque of a task."""
     from swgjoint.fe.rings.friction import rubbed_path
 
@@ -87,7 +87,7 @@ def _whole_path(task: Task, angles: Array | None = None) -> RubbedPath:
     return path
 
 
-def _path(task: Task) -> Found:
+def _path(task: CatalogueTask) -> Found:
     """Torsion behind the cup [rad] and sliding work per mu [J] over the torque."""
     path = _whole_path(task)
     work = path.teeth_work + path.race_work
@@ -106,14 +106,14 @@ def _path(task: Task) -> Found:
     }
 
 
-def _ratcheting(task: Task) -> Found:
+def _ratcheting(task: CatalogueTask) -> Found:
     """Largest torque in the plane, with what the design's circular spline sits in."""
     from swgjoint.fe.plane.ratcheting import ratcheting_path
 
     return ratcheting_path(task.design).as_dict()
 
 
-def _individual(task: Task) -> Found:
+def _individual(task: CatalogueTask) -> Found:
     """Torsion behind the cup [rad] over the torque, at angles over an output turn."""
     from swgjoint.fe.rings.accuracy import over_output_turn
 
@@ -128,7 +128,7 @@ def _individual(task: Task) -> Found:
     }
 
 
-def _accuracy(task: Task) -> Found:
+def _accuracy(task: CatalogueTask) -> Found:
     """Error of the rings over one output turn, hardly loaded."""
     from swgjoint.fe.rings.accuracy import over_output_turn, transmission_error
 
@@ -137,7 +137,7 @@ def _accuracy(task: Task) -> Found:
     return {"input_angles_rad": angles.tolist(), "error_rad": error.tolist()}
 
 
-def _running(task: Task) -> Found:
+def _running(task: CatalogueTask) -> Found:
     """Input torque of slow turning without load, and what rubs takes per mu."""
     from swgjoint.fe.rings.running import running_friction
 
@@ -151,7 +151,7 @@ def _running(task: Task) -> Found:
     }
 
 
-def _coning(task: Task) -> Found:
+def _coning(task: CatalogueTask) -> Found:
     """Torsion in space over the torque; the kind ends with that of the bearing."""
     from swgjoint.fe.solid.figures.torsion import solid_torsion
 
@@ -169,7 +169,7 @@ def _coning(task: Task) -> Found:
     }
 
 
-def _coning_ring(task: Task) -> Found:
+def _coning_ring(task: CatalogueTask) -> Found:
     """The same by the thin rings, the closed-form cup in series."""
     path = _whole_path(task, np.zeros(1))
     at = np.searchsorted(path.torque, task.torques)
@@ -182,7 +182,7 @@ def _coning_ring(task: Task) -> Found:
     }
 
 
-KINDS: dict[str, Callable[[Task], Found]] = {
+KINDS: dict[str, Callable[[CatalogueTask], Found]] = {
     "path": _path,
     "individual": _individual,
     "ratcheting": _ratcheting,

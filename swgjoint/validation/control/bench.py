@@ -13,7 +13,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from swgjoint.control.kinematic_error import JointRecord, KinematicErrorTable, Recorder
+from swgjoint.control.kinematic_error import (
+    JointRecord,
+    KinematicErrorTable,
+    TurnRecorder,
+)
 from swgjoint.control.motor_side import MotorPID, rigid_plan
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.controller import Controller
@@ -78,7 +82,7 @@ MOTIONS = {"move": MOVE, "slow": SLOW, "even": EVEN}
 
 def record_turn(drive: DriveMap, seed: int) -> JointRecord:
     """A noisy slow turn at another load, of a drive with another random part."""
-    recorder = Recorder(MotorPID(rigid_plan, frequency=FREQUENCY))
+    recorder = TurnRecorder(MotorPID(rigid_plan, frequency=FREQUENCY))
     plant = specimen(drive, seed, random_seed=1)
     run_motion(drive, plant, recorder, "slow", seed + 1000, load=RECORD_LOAD)
     return recorder.record(skip=500)

@@ -16,7 +16,7 @@ from swgjoint.view.report.report import Cell, Table, write_tables
 from swgjoint.view.words import shown
 
 if TYPE_CHECKING:
-    from swgjoint.explore.tune.result import Candidate, Tuned
+    from swgjoint.explore.tune.result import GainCandidate, Tuned
 
 COLORS = ("0.45", "C1", "C2", "C0")
 """Of the candidates; the tuned controller has the last."""
@@ -171,7 +171,7 @@ def _plain_ticks(ax: Any) -> None:
     ax.grid(axis="y", color="0.92")
 
 
-def _colored(found: Tuned) -> list[tuple[Candidate, str]]:
+def _colored(found: Tuned) -> list[tuple[GainCandidate, str]]:
     colors = COLORS if len(found.candidates) > 2 else (COLORS[0], COLORS[3])
     return list(zip(found.candidates, colors, strict=True))
 
@@ -272,11 +272,11 @@ def _best_place(found: Tuned) -> list[float]:
     ]
 
 
-def _cost(one: Candidate) -> str:
+def _cost(one: GainCandidate) -> str:
     mean, spread = one.held_out.mean() / arcmin, one.held_out.std(ddof=1) / arcmin
     return f"{mean:.3g} ± {spread:.2g} arcmin"
 
 
-def _less(found: Tuned, one: Candidate) -> str:
+def _less(found: Tuned, one: GainCandidate) -> str:
     saved = 100.0 * found.improvement(one)
     return f"{abs(saved):.1f} % {'less' if saved >= 0 else 'more'}"

@@ -8,7 +8,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.linalg import spsolve
 
 from swgjoint.fe.plane.plain_ring import PlainRing, pull_ring
-from swgjoint.fe.rings.facing import Surface, facing
+from swgjoint.fe.rings.facing import FacingSurface, facing
 from swgjoint.fe.rings.hermite_ring import HermiteRing
 from swgjoint.gear.shell_theory import ring_stiffness
 
@@ -117,7 +117,7 @@ def test_large_pull_against_plane_elements():
     q, force = squeezed(ring, travel)
     # a line knows no pinch under the rollers
     assert force == pytest.approx(peer.force[-1], rel=5e-3)
-    outside = Surface(ring=ring, place=np.linspace(0, 64, 400), offset=0.2e-3)
+    outside = FacingSurface(ring=ring, place=np.linspace(0, 64, 400), offset=0.2e-3)
     points = outside.points(q)[0]
     around = np.arctan2(np.abs(points[:, 0]), points[:, 1])
     order = np.argsort(around)
@@ -134,7 +134,7 @@ def test_distance_from_a_ring_and_its_derivatives(inside):
     q = disturbed(RING)
     place = np.array([0.3, 5.9, 17.2])
     other = disturbed(RING, seed=3)
-    beside = Surface(ring=RING, place=place, offset=-2e-3 if inside else 2e-3)
+    beside = FacingSurface(ring=RING, place=place, offset=-2e-3 if inside else 2e-3)
 
     def seen(q, other):
         return facing(RING, q, beside.points(other)[0], place, inside=inside)

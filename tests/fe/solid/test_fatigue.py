@@ -12,7 +12,7 @@ from messages import naming
 from swgjoint.errors import DesignError
 from swgjoint.fe.solid.figures import fatigue as module
 from swgjoint.fe.solid.figures.fatigue import (
-    Limits,
+    FatigueLimits,
     assess,
     fatigue,
     half_range,
@@ -24,7 +24,7 @@ from swgjoint.fe.solid.strip.masters import Orders
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.shell_theory import ShellDimensions, safety_factor
 
-LIMITS = Limits(bending=800e6, torsion=320e6)
+LIMITS = FatigueLimits(bending=800e6, torsion=320e6)
 PHI = 2.0 * pi * np.arange(40) / 40
 
 

@@ -40,14 +40,14 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Limits:
+class FatigueLimits:
     """Endurance limits of the material [Pa]."""
 
     bending: float
     torsion: float
 
     @classmethod
-    def of(cls, design: Design) -> Limits:
+    def of(cls, design: Design) -> FatigueLimits:
         """Those of the flexspline.
 
         Raises:
@@ -111,7 +111,7 @@ class Fatigue:
     width."""
     shell: SafetyFactor
     """From closed forms alone."""
-    limits: Limits
+    limits: FatigueLimits
 
     @property
     def worst(self) -> SectionFatigue:
@@ -157,7 +157,7 @@ def fatigue(
         DesignError: If the design cannot be built or lacks endurance limits.
         ComputationError: If a solve fails or memory will not do.
     """
-    limits, shell = Limits.of(design), ShellDimensions.of(design)
+    limits, shell = FatigueLimits.of(design), ShellDimensions.of(design)
     ring = solid_ring(design, half="auto")
     follow = SolidContinuation(
         ring=ring, ratio=design.ratio, layout=design.drive.layout
@@ -186,7 +186,7 @@ def assess(
     strip: StripMesh,
     stresses: Mapping[str, Array],
     torque: float,
-    limits: Limits,
+    limits: FatigueLimits,
     shell: ShellDimensions,
 ) -> Fatigue:
     """Safety factors from the stresses of all sectors.

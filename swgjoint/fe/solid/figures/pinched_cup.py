@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from swgjoint.errors import ComputationError, DesignError, Outcome
 from swgjoint.fe.solid.corotation import (
-    Frames,
+    SolidFrames,
     about_z,
     energies,
     in_global,
@@ -37,7 +37,7 @@ from swgjoint.fe.solid.ring_factor import RingFactor
 from swgjoint.fe.solid.stress import average_faces
 from swgjoint.fe.solid.strip.masters import Masters, Orders, strip_masters
 from swgjoint.fe.solid.strip.mesh import StripMesh, flexspline_strip
-from swgjoint.fe.solid.strip.segment import Segment, condense_segment
+from swgjoint.fe.solid.strip.segment import StripSegment, condense_segment
 from swgjoint.fe.solid.strip.smooth_strip import smooth_strip
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.teeth.profile import ToothProfile
@@ -92,7 +92,7 @@ class PinchedCup:
     """In the half."""
     strip: StripMesh
     masters: Masters
-    segments: tuple[Segment, ...]
+    segments: tuple[StripSegment, ...]
     root: float
     """Radius of the outside of the wall [m]."""
     bore: int
@@ -171,7 +171,7 @@ class PinchedCup:
             f"{self.name}: two loads of {force:g} N: {Outcome.MAX_ITERATIONS.value}"
         )
 
-    def frames(self, x: Array, *, nonlinear: bool) -> tuple[Frames, ...]:
+    def frames(self, x: Array, *, nonlinear: bool) -> tuple[SolidFrames, ...]:
         """Frames of all segments with the masters at x (N, n, 3) [m]."""
         return tuple(
             segment_frames(
@@ -180,7 +180,7 @@ class PinchedCup:
             for segment in self.segments
         )
 
-    def _points(self, frame: Frames, load: Array) -> Array:
+    def _points(self, frame: SolidFrames, load: Array) -> Array:
         """Loaded points of the first sector in its frame (p, 3) [m]."""
         teeth = self.segments[0]
         rest = np.asarray(teeth.mesh.mesh.p).T[teeth.loaded[::3] // 3]
@@ -188,7 +188,9 @@ class PinchedCup:
         moved += teeth.compliance @ load
         return np.asarray(rest + moved.reshape(-1, 3))
 
-    def _row(self, frame: Frames, weight: Array, force: float) -> tuple[Array, Array]:
+    def _row(
+        self, frame: SolidFrames, weight: Array, force: float
+    ) -> tuple[Array, Array]:
         """Derivative of the loaded points' outward motion, and the forces on them.
 
         Returns:
@@ -206,7 +208,9 @@ class PinchedCup:
         row = carried + turning @ frame.gradient[0]
         return (row.reshape(-1, 3) @ frame.turn[0].T).ravel(), load
 
-    def _step(self, frames: tuple[Frames, ...], loads: Array, pushed: Array) -> Array:
+    def _step(
+        self, frames: tuple[SolidFrames, ...], loads: Array, pushed: Array
+    ) -> Array:
         """Newton increment of the masters (N, 3 n) [m].
 
         Args:

@@ -8,7 +8,7 @@ from math import inf, nan
 import numpy as np
 from numpy.typing import NDArray
 
-from swgjoint.fe.solid.corotation import Frames, about_z
+from swgjoint.fe.solid.corotation import SolidFrames, about_z
 from swgjoint.fe.solid.ring import SolidRing
 
 Array = NDArray[np.float64]
@@ -23,7 +23,7 @@ TOUCHES = 1e-10
 """Rotation that counts as none [rad]."""
 
 
-def play(ring: SolidRing, frame: Frames, load: Array, ratio: float) -> float:
+def play(ring: SolidRing, frame: SolidFrames, load: Array, ratio: float) -> float:
     r"""Rotation of the output between the contacts of its two directions [rad].
 
     The deflected flexspline turns as a whole until a tooth touches. That turns the

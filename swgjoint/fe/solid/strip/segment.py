@@ -18,7 +18,7 @@ Index = NDArray[np.int64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Segment:
+class StripSegment:
     r"""One condensed segment in the frame of its tooth.
 
     With d the displacements of its masters, F forces on the loaded surfaces:
@@ -88,7 +88,7 @@ def condense_segment(
     loaded: Index | None = None,
     spread: sparse.csr_matrix | None = None,
     held: Index | None = None,
-) -> Segment:
+) -> StripSegment:
     """Condense a segment, in real arithmetic, once per member.
 
     Args:
@@ -98,7 +98,7 @@ def condense_segment(
         youngs_modulus: [Pa].
         poisson_ratio: [-].
         loaded: Degrees of freedom at which forces may act (n_b,).
-        spread: S of :class:`Segment`; by default forces act where they are.
+        spread: S of :class:`StripSegment`; by default forces act where they are.
         held: Nodes that do not move, beside the boundary.
     """
     body = solid(mesh.mesh, youngs_modulus, poisson_ratio)
@@ -113,7 +113,7 @@ def _condensed(
     loaded: Index | None,
     spread: sparse.csr_matrix | None,
     held: Index | None,
-) -> Segment:
+) -> StripSegment:
     def dofs(nodes: Index) -> Index:
         return np.asarray((3 * nodes[:, None] + np.arange(3)).ravel(), dtype=np.int64)
 
@@ -152,7 +152,7 @@ def _condensed(
         carried = np.tile(np.eye(3), (size // 3, 1)) / np.sqrt(count)
         nodal += (carried - nodal @ move) @ move.T
     compliance = spread.T @ nodal_from_force[force_dofs]
-    return Segment(
+    return StripSegment(
         name=mesh.name,
         mesh=mesh,
         masters=masters.masters,

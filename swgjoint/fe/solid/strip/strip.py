@@ -14,7 +14,7 @@ from swgjoint.fe.common.contact_patch import averaged_spline
 from swgjoint.fe.solid.across import spread_over
 from swgjoint.fe.solid.strip.masters import Masters, Orders, strip_masters
 from swgjoint.fe.solid.strip.mesh import StripMesh
-from swgjoint.fe.solid.strip.segment import Segment, condense_segment
+from swgjoint.fe.solid.strip.segment import StripSegment, condense_segment
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.teeth.profile import ToothProfile
 
@@ -33,11 +33,11 @@ class Strip:
     sectors: int
     mesh: StripMesh
     masters: Masters
-    segments: tuple[Segment, ...]
+    segments: tuple[StripSegment, ...]
     profile: ToothProfile
 
     @property
-    def teeth(self) -> Segment:
+    def teeth(self) -> StripSegment:
         """The toothed segment."""
         return self.segments[0]
 
