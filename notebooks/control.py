@@ -29,7 +29,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from swgjoint.control.flexible import flexible_plan
-from swgjoint.control.kinematic_error import compensated, identify_kinematic_error
+from swgjoint.control.kinematic_error import compensate, identify_kinematic_error
 from swgjoint.control.learning import LearningCompensation
 from swgjoint.control.motor_side import MotorPID, ideal_plan, rigid_plan
 from swgjoint.maps.drive_map import DriveMap
@@ -107,7 +107,7 @@ for pq, pair in zip(table.orders, table.amplitudes, strict=True):
 
 slow = {
     "flexible": MotorPID(flexible_plan, frequency=FREQUENCY),
-    "with the table": MotorPID(compensated([table]), frequency=FREQUENCY),
+    "with the table": MotorPID(compensate([table]), frequency=FREQUENCY),
 }
 turns = {
     name: run_motion(drive, plant, controller, "slow", SEED)

@@ -27,11 +27,11 @@ from itertools import pairwise
 import matplotlib.pyplot as plt
 import numpy as np
 
-from swgjoint.explore.compare.compare import compare, missed
+from swgjoint.explore.compare.compare import compare, missed_limits
 from swgjoint.sim.scene.scene import Scene
 from swgjoint.units import mm
 from swgjoint.view.run import run_scene
-from swgjoint.view.words import short, shown
+from swgjoint.view.words import format_figure, short
 
 LOAD = {"payload.mass_kg": 5.0, "payload.centre_mm": [0.0, 0.0, 60.0]}
 scene = Scene.load_file("ur5e-catalogue").with_changes(LOAD)
@@ -81,7 +81,9 @@ for axis, (key, limit), title in zip(axes, spec.items(), titles, strict=True):
     axis.axvline(limit, color="black", ls="--", lw=1)
     axis.set_title(title, fontsize="medium")
     for k, value in enumerate(values):
-        axis.text(value, k, f" {shown(float(value))}", va="center", fontsize="small")
+        axis.text(
+            value, k, f" {format_figure(float(value))}", va="center", fontsize="small"
+        )
     axis.set_xlim(0.0, 1.25 * max(values))
 axes[0].invert_yaxis()
 
@@ -144,7 +146,7 @@ for joint, figures in row.run.metrics()["joints"].items():
         f" of {use['repeated_peak_Nm']:5.0f} N·m, cubed mean"
         f" {use['cubed_mean_Nm']:5.1f} of {use['rated_Nm']:4.1f} N·m"
     )
-assert missed(row, spec) == ()
+assert missed_limits(row, spec) == ()
 assert row.tool_path_rms_mm < rows[sizes.index("CSG-25-100")].tool_path_rms_mm
 
 # %% [markdown]

@@ -224,7 +224,7 @@ def parse_value(text: str, *, where: str) -> Any:
     return value
 
 
-def shortened(text: str, most: int = 60) -> str:
+def shorten(text: str, most: int = 60) -> str:
     """A foreign text as a message repeats it: cut, without control characters."""
     text = _CONTROL.sub("?", text)
     return text if len(text) <= most else f"{text[: most - 3]}..."
@@ -240,25 +240,25 @@ def _first_fault(data: dict[str, Any]) -> str | None:
     while todo:
         path, value, depth = todo.pop()
         if depth > MAX_DEPTH:
-            return f"{shortened(path)}: {_too_deep()}"
+            return f"{shorten(path)}: {_too_deep()}"
         if isinstance(value, dict):
             for key, item in value.items():
                 if len(key) > MAX_KEY or _CONTROL.search(key):
                     return (
-                        f"{shortened(key)}: not a key; accepted: up to {MAX_KEY}"
+                        f"{shorten(key)}: not a key; accepted: up to {MAX_KEY}"
                         " characters, no control characters"
                     )
                 todo.append((f"{path}.{key}" if path else key, item, depth + 1))
         elif isinstance(value, list):
             todo += [(f"{path}[{k}]", item, depth + 1) for k, item in enumerate(value)]
         elif isinstance(value, int) and value not in _INTEGERS:
-            return f"{shortened(path)}: an integer of more than 64 bits"
+            return f"{shorten(path)}: an integer of more than 64 bits"
         elif isinstance(value, str) and _CONTROL.search(value):
-            return f"{shortened(path)} = {shortened(value)!r}: a control character"
+            return f"{shorten(path)} = {shorten(value)!r}: a control character"
     return None
 
 
-def validated(
+def validate(
     model: type[Model],
     data: Mapping[str, Any],
     *,
@@ -340,7 +340,7 @@ def _walk(
         if isinstance(part, int):
             path += f"[{part}]"
             continue
-        name = shortened(str(part))
+        name = shorten(str(part))
         path += f".{name}" if path else name
         if named or here is None:
             named = False
@@ -439,4 +439,4 @@ def _shown(value: Any, key: str) -> str:
         else (f"{value:g}" if isinstance(value, float) else repr(value))
     )
     unit = unit_of(key)
-    return f"{shortened(text)} {unit}" if unit else shortened(text)
+    return f"{shorten(text)} {unit}" if unit else shorten(text)

@@ -80,7 +80,7 @@ def write_whole(path: str | Path, data: bytes | str) -> Path:
 
 
 @contextmanager
-def attempting(
+def attempt_output(
     path: str | Path, *, unless: Callable[[], bool] = lambda: False
 ) -> Iterator[None]:
     """Turn whatever keeps a file from being written into an ``OutputWarning``.
@@ -120,7 +120,7 @@ class Outputs:
     def write(self, name: str, make: Callable[[], bytes | str | None]) -> None:
         """Write what ``make`` returns, whole; nothing where it returns None."""
         path = self._folder / name
-        with attempting(path):
+        with attempt_output(path):
             content = make()
             if content is not None:
                 self._folder.mkdir(parents=True, exist_ok=True)
@@ -143,7 +143,7 @@ class Outputs:
     def hand_over(self, name: str, write: Callable[[Path], object]) -> None:
         """Let ``write`` write the file."""
         path = self._folder / name
-        with attempting(path):
+        with attempt_output(path):
             self._folder.mkdir(parents=True, exist_ok=True)
             write(path)
             self.files.append(str(path))

@@ -24,7 +24,7 @@ def save_png(figure: Any, out: IO[bytes], *, dpi: float) -> None:
     from matplotlib.ticker import FixedFormatter, FuncFormatter
 
     for text in figure.findobj(Text):
-        text.set_text(drawn(text.get_text()))
+        text.set_text(plain_text(text.get_text()))
     # the texts of ticks are set when they are drawn; those of a logarithmic scale are
     # mathematics of matplotlib's own
     given = (FixedFormatter, FuncFormatter)
@@ -37,7 +37,7 @@ def save_png(figure: Any, out: IO[bytes], *, dpi: float) -> None:
     figure.savefig(out, format="png", dpi=dpi)
 
 
-def drawn(text: str) -> str:
+def plain_text(text: str) -> str:
     """A text for a picture: no mathematics, no unseen characters, no endless word."""
     text = "".join(
         "?" if unicodedata.category(c) in _UNSEEN and c != "\n" else c for c in text

@@ -145,16 +145,16 @@ def read_kept(path: Path, take: Callable[[bytes], T]) -> T | None:
     except FileNotFoundError:
         return None
     except Exception as error:
-        ignored(path, error)
+        warn_ignored(path, error)
         return None
 
 
-def ignored(where: Path | str, why: Exception) -> None:
+def warn_ignored(where: Path | str, why: Exception) -> None:
     """Warn of something kept that cannot be used."""
-    _log.warning("%s ignored and computed again: %s", where, told(why))
+    _log.warning("%s ignored and computed again: %s", where, one_line(why))
 
 
-def told(error: Exception) -> str:
+def one_line(error: Exception) -> str:
     """One line about an error."""
     lines = str(error).splitlines() or [type(error).__name__]
     return lines[0]
@@ -166,4 +166,4 @@ def keep(path: Path, data: bytes) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
         write_whole(path, data)
     except (OSError, InputError) as error:
-        _log.warning("not kept: %s", told(error))
+        _log.warning("not kept: %s", one_line(error))

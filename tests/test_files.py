@@ -8,7 +8,7 @@ import mujoco
 import pytest
 
 from swgjoint.errors import InputError, OutputWarning
-from swgjoint.files import Outputs, attempting
+from swgjoint.files import Outputs, attempt_output
 
 
 def broken():
@@ -57,7 +57,7 @@ def test_an_engine_without_memory_is_no_defect(tmp_path):
 
 def test_a_failure_of_the_content_is_raised(tmp_path):
     """Only what concerns the file alone becomes a warning."""
-    with pytest.raises(InputError), attempting(tmp_path / "a", unless=lambda: True):
+    with pytest.raises(InputError), attempt_output(tmp_path / "a", unless=lambda: True):
         raise InputError("the drive is unknown")
-    with pytest.raises(KeyboardInterrupt), attempting(tmp_path / "a"):
+    with pytest.raises(KeyboardInterrupt), attempt_output(tmp_path / "a"):
         raise KeyboardInterrupt

@@ -7,7 +7,7 @@ import time
 import pytest
 
 from swgjoint.errors import InputError
-from swgjoint.faults import MAX_DEPTH, parse_toml, parse_value, shortened
+from swgjoint.faults import MAX_DEPTH, parse_toml, parse_value, shorten
 from swgjoint.sim.scene.scene import parse_override
 
 DEEP = 5000
@@ -83,5 +83,5 @@ def test_honest_values_pass():
 
 def test_a_shortened_text_is_printable():
     """Of a foreign text 60 characters at most, none of which moves the cursor."""
-    assert shortened("a\x1b[2Jb\x00") == "a?[2Jb?"
-    assert len(shortened("y" * 500)) == 60
+    assert shorten("a\x1b[2Jb\x00") == "a?[2Jb?"
+    assert len(shorten("y" * 500)) == 60

@@ -9,7 +9,7 @@ import pytest
 
 from swgjoint.files import check_output_file, file_name, output_folder
 from swgjoint.maps.sheet.spec_sheet import measure_spec
-from swgjoint.pictures import drawn, save_png
+from swgjoint.pictures import plain_text, save_png
 from swgjoint.view.plots.spec import spec_picture
 
 HOSTILE = ("$\\frac{$", "$x^$", "$$", "\\$", "a\x1b[31m", "half \udc80", "n" * 5000)
@@ -39,10 +39,10 @@ def test_names_of_ticks_are_drawn_as_they_are():
 
 def test_drawn_texts():
     """What is plain stays, a second pass changes nothing, length is bounded."""
-    assert drawn("torque [N·m]\nof CSG-25-100") == "torque [N·m]\nof CSG-25-100"
+    assert plain_text("torque [N·m]\nof CSG-25-100") == "torque [N·m]\nof CSG-25-100"
     for name in HOSTILE:
-        assert drawn(drawn(name)) == drawn(name)
-        assert len(drawn(name)) <= 81 + name.count("$")
+        assert plain_text(plain_text(name)) == plain_text(name)
+        assert len(plain_text(name)) <= 81 + name.count("$")
 
 
 @pytest.mark.parametrize(

@@ -74,7 +74,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     """
     folder = output_folder(args.out) if args.out else None
     from swgjoint.explore.compare.compare import SLOW, SORTABLE, compare
-    from swgjoint.explore.compare.scene import joints_named, resolved, scene_or_arm
+    from swgjoint.explore.compare.scene import joints_named, resolve_step, scene_or_arm
     from swgjoint.models_path import near_names
     from swgjoint.sim.arm.scene import is_arm
     from swgjoint.sim.figures.keys import LOWER
@@ -91,7 +91,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     joints = joints_named(scene, args.joints)
     stepped = any(text.startswith("simulation.step_s") for text in args.overrides)
     if is_arm(args.scene) and not stepped:
-        scene = resolved(scene, args.arguments, joints)
+        scene = resolve_step(scene, args.arguments, joints)
     rows = compare(
         args.arguments,
         scene,

@@ -9,7 +9,7 @@ from typing import Any
 
 from swgjoint.cli.shared.text import table
 from swgjoint.errors import InputError, Outcome
-from swgjoint.files import Outputs, attempting, output_folder
+from swgjoint.files import Outputs, attempt_output, output_folder
 from swgjoint.json_text import plain
 
 
@@ -107,7 +107,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
         outputs = Outputs(folder)
         outputs.write("meshing.png", lambda: meshing_picture(result))
-        with attempting(folder / "pictures of the fields"):
+        with attempt_output(folder / "pictures of the fields"):
             if isinstance(meshing, MeshingRun):
                 from swgjoint.view.plots.fields import field_pictures
 

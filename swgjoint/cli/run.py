@@ -238,10 +238,10 @@ def joint_row(item: tuple[str, dict[str, Any]]) -> tuple[str, ...]:
     return (
         name,
         joint["level"],
-        fixed(torsion["mean"]),
-        fixed(torsion["pp"]),
-        fixed(error["mean"]),
-        _signed(error_mark(joint, error["pp"]), fixed(error["pp"])),
+        format_fixed(torsion["mean"]),
+        format_fixed(torsion["pp"]),
+        format_fixed(error["mean"]),
+        _signed(error_mark(joint, error["pp"]), format_fixed(error["pp"])),
         ripple_cell(joint, "ripple_pp_percent"),
         ripple_cell(joint, "ripple_rms_percent"),
         _signed(
@@ -267,14 +267,14 @@ def ripple_cell(joint: dict[str, Any], key: str) -> str:
     if joint["ripple_missing"]:
         return "-"
     bound = "> " if joint["ripple_is_lower_bound"] else ""
-    return _signed(joint_mark(joint), f"{bound}{fixed(joint[key])}")
+    return _signed(joint_mark(joint), f"{bound}{format_fixed(joint[key])}")
 
 
 def _signed(sign: str, text: str) -> str:
     return text if not sign or text == "-" else f"{sign} {text}"
 
 
-def fixed(value: float, digits: int = 3) -> str:
+def format_fixed(value: float, digits: int = 3) -> str:
     """A number with fixed digits, without a sign on zero."""
     return f"{round(value, digits) + 0.0:.{digits}f}"
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from swgjoint.cli.shared.map_validity_text import doubts, marked
+from swgjoint.cli.shared.map_validity_text import doubts, mark_figure
 from swgjoint.cli.shared.text import table
 from swgjoint.files import Outputs, output_folder
 from swgjoint.view.words import words
@@ -102,7 +102,7 @@ def report(result: dict[str, Any]) -> str:
     for key in keys:
         name, unit = words(key)
         more = [stated.get(key)] if stated else []
-        rows.append((name, marked(result, key), *more, unit))
+        rows.append((name, mark_figure(result, key), *more, unit))
     lines = [f"spec sheet of {result['design']} ({_source(result)})"]
     if rows:
         lines.append(table(rows, header=header))

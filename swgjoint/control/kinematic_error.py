@@ -148,7 +148,7 @@ def _fit(basis: Array, error: Array, count: int) -> tuple[Array, float]:
     return pairs, spread * float(np.sqrt(2.0 / error.size))
 
 
-def compensated(
+def compensate(
     tables: Sequence[KinematicErrorTable], plan: Planner = flexible_plan
 ) -> Planner:
     """A plan whose drives have the kinematic error of tables.

@@ -12,7 +12,7 @@ from swgjoint.drives.references import drive_of, load_drive
 from swgjoint.drives.rotors import catalogue_rotor_inertia
 from swgjoint.drives.sections import JointSection
 from swgjoint.errors import InputError
-from swgjoint.faults import validated
+from swgjoint.faults import validate
 from swgjoint.gear.design.design import Design
 from swgjoint.joint.attach import attach_all
 from swgjoint.joint.drive import JointDrive
@@ -193,7 +193,7 @@ def _map(
             "kinematic_error_arcmin": None if error is None else float(error),
             "seed": seed,
         }
-        section = validated(JointSection, keys, where=f"joint {joint!r}")
+        section = validate(JointSection, keys, where=f"joint {joint!r}")
         return drive_of(section, known=known, joint=joint)
     raise InputError(
         f"drive of {joint!r}: {type(source).__name__} {str(source)[:60]!r}; accepted: a"

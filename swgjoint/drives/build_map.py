@@ -13,7 +13,7 @@ from swgjoint.fe.rings import sampling as thin_ring
 from swgjoint.fe.solid import drive3d
 from swgjoint.gear.catalogue_stated import LOSS_KEYS
 from swgjoint.gear.design.design import Design
-from swgjoint.maps.cache import cached
+from swgjoint.maps.cache import cache_map
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.fit.fit import fit_map
 from swgjoint.maps.fit.friction_bending import without_friction
@@ -83,7 +83,7 @@ def build_map(
 
     if not cache:
         return build()
-    drive = cached(parts, build, name=design.drive.name)
+    drive = cache_map(parts, build, name=design.drive.name)
     if keep is not None:
         keep.clear()  # not before the map itself is in the cache
     return drive

@@ -18,7 +18,7 @@ from swgjoint.errors import ComputationError, DesignError
 from swgjoint.gear.catalogue import ratings_of
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.ratings import Ratings
-from swgjoint.maps.cache import recalled
+from swgjoint.maps.cache import recall
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.fit.friction_bending import without_friction
 from swgjoint.maps.sheet.spec_sheet import (
@@ -231,7 +231,7 @@ class _Figures:
             return
         from swgjoint.fe.plane.ratcheting import ratcheting_path
 
-        path = recalled(
+        path = recall(
             "figures",
             {"figure": RATCHETING_KEY, "design": design.content_hash()},
             dict[str, Any],

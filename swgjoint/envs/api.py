@@ -12,7 +12,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from swgjoint.envs.arguments import shown
+from swgjoint.envs.arguments import format_value
 from swgjoint.envs.bench import settings_of
 from swgjoint.envs.core import Core, Entry, bounds
 from swgjoint.envs.picture import Picture
@@ -32,7 +32,7 @@ def _check_options(options: dict[str, Any], known: tuple[str, ...]) -> None:
     """Refuse options of ``reset`` that are not known."""
     if unknown := [key for key in options if key not in known]:
         raise InputError(
-            f"option {shown(unknown[0])} of reset; accepted:"
+            f"option {format_value(unknown[0])} of reset; accepted:"
             f" {', '.join(known) or 'no options'}"
         )
 
@@ -218,7 +218,7 @@ class BatchEnv(VectorEnv[Array, Array, Array]):
         good = isinstance(mask, np.ndarray) and mask.dtype == np.bool_
         if not (good and mask.shape == (n,) and mask.any()):
             raise InputError(
-                f"reset_mask {shown(mask)}; accepted: an array of {n} truth values, at"
+                f"reset_mask {format_value(mask)}; accepted: an array of {n} truth values, at"
                 " least one of them True"
             )
         if not self._rngs:

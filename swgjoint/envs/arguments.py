@@ -26,7 +26,7 @@ def is_flag(value: Any) -> bool:
     return isinstance(value, bool | np.bool_) or (is_number(value) and value in (0, 1))
 
 
-def shown(value: Any) -> str:
+def format_value(value: Any) -> str:
     """A value in a message: numbers plain, the rest as Python writes it, cut short."""
     plain = isinstance(value, np.generic)
     text = str(value) if plain else repr(value)
@@ -36,7 +36,7 @@ def shown(value: Any) -> str:
 def check_number(key: str, value: Any, unit: str, *, zero: bool) -> None:
     """Refuse what is no positive number; ``zero`` is accepted where it says so."""
     if not (is_number(value) and (value > 0 or (zero and value == 0))):
-        got = f"{key} {shown(value)} {unit}".rstrip()
+        got = f"{key} {format_value(value)} {unit}".rstrip()
         raise InputError(f"{got}; accepted: a number {'>=' if zero else '>'} 0")
 
 
@@ -44,10 +44,12 @@ def check_count(key: str, value: Any, least: int) -> None:
     """Refuse what is no integer of at least ``least``."""
     integer = isinstance(value, int | np.integer) and not isinstance(value, bool)
     if not (integer and value >= least):
-        raise InputError(f"{key} {shown(value)}; accepted: an integer >= {least}")
+        raise InputError(
+            f"{key} {format_value(value)}; accepted: an integer >= {least}"
+        )
 
 
 def check_flag(key: str, value: Any) -> None:
     """Refuse what is no truth value."""
     if not is_flag(value):
-        raise InputError(f"{key} {shown(value)}; accepted: True, False")
+        raise InputError(f"{key} {format_value(value)}; accepted: True, False")

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from swgjoint.drives.references import names_catalogue
 from swgjoint.envs.api import BatchEnv, SingleEnv
-from swgjoint.envs.arguments import check_flag, check_number, shown
+from swgjoint.envs.arguments import check_flag, check_number, format_value
 from swgjoint.envs.core import Core, Entry, EpisodeLimits, ceiling, error_bounds
 from swgjoint.envs.loop import MotorLoop
 from swgjoint.envs.plant import Plant, specimen
@@ -73,7 +73,7 @@ class ArmSettings:
         check_flag("friction", self.friction)
         if not isinstance(self.scene, str | Path):
             raise InputError(
-                f"scene {shown(self.scene)}; accepted: name or path of a scene, or an"
+                f"scene {format_value(self.scene)}; accepted: name or path of a scene, or an"
                 " arm"
             )
         if self.action not in ACTIONS:

@@ -10,7 +10,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from swgjoint.envs.arguments import check_flag, check_number, shown
+from swgjoint.envs.arguments import check_flag, check_number, format_value
 from swgjoint.envs.core import Core, Entry, EpisodeLimits, ceiling, error_bounds
 from swgjoint.envs.loop import MotorLoop
 from swgjoint.envs.plant import Plant, specimen
@@ -80,7 +80,7 @@ class BenchSettings:
         check_flag("friction", self.friction)
         if not isinstance(self.drive, str | DriveMap):
             raise InputError(
-                f"drive {shown(self.drive)}; accepted: a catalogue name, a map or"
+                f"drive {format_value(self.drive)}; accepted: a catalogue name, a map or"
                 " design file, or a DriveMap"
             )
         if self.level not in LEVELS:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.envs.api import BatchEnv, SingleEnv
-from swgjoint.envs.arguments import shown
+from swgjoint.envs.arguments import format_value
 from swgjoint.envs.bench import BenchCore, BenchSettings
 from swgjoint.envs.core import Entry, ceiling
 from swgjoint.envs.references import KINDS, draw_motion, smooth_step
@@ -43,7 +43,7 @@ class TrackingSettings(BenchSettings):
         for one in given:
             if not (isinstance(one, str) and one in KINDS):
                 raise InputError(
-                    f"reference {shown(one)}; accepted: one or several of"
+                    f"reference {format_value(one)}; accepted: one or several of"
                     f" {', '.join(KINDS)}"
                 )
 
@@ -216,9 +216,8 @@ class JointTrackingEnv(SingleEnv):
         load_of_rated: Largest load torque, as part of the rated torque; 0.5.
         sensors: Mapping with fields of :class:`~swgjoint.envs.sensors.Sensors`.
         randomise: True, or a mapping with fields of
-            :class:`~swgjoint.envs.specimen.SpecimenTolerances`: every episode has a drive
-            and
-            a load of its own. ``task`` keeps the nominal ones. At ``linear`` True draws
+            :class:`~swgjoint.envs.specimen.SpecimenTolerances`: every episode has a
+            drive and a load of its own. ``task`` keeps the nominal ones. At ``linear`` True draws
             the load's inertia alone, and tolerances of the drive are refused. False.
         reference: One or several of ``sinusoid``, ``multisine``, ``point_to_point``.
         error_scale_arcmin: Of the reward; 3.

@@ -8,7 +8,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from numpy.typing import NDArray
 
-from swgjoint.envs.arguments import is_flag, is_number, is_whole, shown
+from swgjoint.envs.arguments import format_value, is_flag, is_number, is_whole
 from swgjoint.errors import InputError
 from swgjoint.units import arcsec
 
@@ -47,7 +47,7 @@ class Sensors:
             }[kind]
             if not (fits(value) and value >= 0):
                 raise InputError(
-                    f"sensor {field.name} {shown(value)}; accepted: {accepted}"
+                    f"sensor {field.name} {format_value(value)}; accepted: {accepted}"
                 )
             if kind == "int":  # what a file or a division may have as 2.0
                 object.__setattr__(self, field.name, int(value))
@@ -60,12 +60,12 @@ class Sensors:
         known = {field.name for field in fields(cls)}
         if not isinstance(argument, Mapping):
             raise InputError(
-                f"sensors {shown(argument)}; accepted: None or a mapping with"
+                f"sensors {format_value(argument)}; accepted: None or a mapping with"
                 f" {', '.join(sorted(known))}"
             )
         if unknown := [key for key in argument if key not in known]:
             raise InputError(
-                f"sensor {shown(unknown[0])}; accepted: {', '.join(sorted(known))}"
+                f"sensor {format_value(unknown[0])}; accepted: {', '.join(sorted(known))}"
             )
         return cls(**argument)  # type: ignore[arg-type]
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from swgjoint.drives.references import load_drive
-from swgjoint.envs.arguments import is_flag, is_number, shown
+from swgjoint.envs.arguments import format_value, is_flag, is_number
 from swgjoint.errors import InputError
 from swgjoint.joint.variation import Variation
 from swgjoint.maps.drive_map import DriveMap
@@ -77,7 +77,7 @@ class SpecimenTolerances:
             if not good:
                 accepted = "True, False" if flag else "0 to 1, 1 excluded"
                 raise InputError(
-                    f"tolerance {field.name} {shown(value)}; accepted: {accepted}"
+                    f"tolerance {field.name} {format_value(value)}; accepted: {accepted}"
                 )
 
     def draw(self, rng: np.random.Generator) -> tuple[Variation, float]:
@@ -117,9 +117,9 @@ def tolerances_of(
     if argument is False:
         return None
     if isinstance(argument, Mapping):
-        unknown = [shown(key) for key in argument if key not in known]
+        unknown = [format_value(key) for key in argument if key not in known]
     else:
-        unknown = [shown(argument)]
+        unknown = [format_value(argument)]
     if (
         unknown
         and argument is not True

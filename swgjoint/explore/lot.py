@@ -20,7 +20,7 @@ from scipy.stats import binomtest
 
 from swgjoint.code_hash import code_hash
 from swgjoint.errors import DesignError
-from swgjoint.fe.plane.drive2d import left_out
+from swgjoint.fe.plane.drive2d import unmodelled_parts
 from swgjoint.fe.tolerances.lot import (
     Lot,
     perfect_positions,
@@ -31,7 +31,7 @@ from swgjoint.fe.tolerances.rest import Rest
 from swgjoint.gear.catalogue import ratings_of
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.tolerances import has_errors
-from swgjoint.maps.cache import entry_of, known, recalled
+from swgjoint.maps.cache import entry_of, recall, recall_kept
 from swgjoint.maps.sheet.sampled_accuracy import REST, peaks
 from swgjoint.pool import run_all
 from swgjoint.progress import Progress, silent
@@ -182,12 +182,14 @@ def run_lot(
         progress(f"{name}: full solves", 1, 1)
         return _Judged(error=error)
 
-    off = recalled("lots", {**parts, "full solves": seed}, _Judged, judged).error
+    off = recall("lots", {**parts, "full solves": seed}, _Judged, judged).error
     paths = {
         one: entry_of("lots", {**parts, "seed": one})
         for one in range(seed, seed + count)
     }
-    found = {one: row for one, path in paths.items() if (row := known(path, Drawn))}
+    found = {
+        one: row for one, path in paths.items() if (row := recall_kept(path, Drawn))
+    }
     left = [one for one in paths if one not in found]
     tasks = [
         _Task(
@@ -221,7 +223,7 @@ def run_lot(
         "validity": {
             "level": "2d, errors superposed",
             "torque_Nm": ratings_of(design).rated_torque,
-            "left_out": left_out(design, bearing=False),
+            "left_out": unmodelled_parts(design, bearing=False),
             "friction": "none",
             "cup": None if design.cup is None else "closed-form torsion in series",
             "superposition_error": off,

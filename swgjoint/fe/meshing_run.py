@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from swgjoint.errors import Outcome
 from swgjoint.fe.common.stress_state import stress_state_label
 from swgjoint.fe.meshing_phases import alike, overload, unspread
-from swgjoint.fe.plane.drive2d import left_out
+from swgjoint.fe.plane.drive2d import unmodelled_parts
 from swgjoint.fe.plane.fields import root_stress, tooth_forces, wave_generator_contact
 from swgjoint.fe.plane.ring import RingModel
 from swgjoint.fe.plane.state import State
@@ -201,7 +201,7 @@ class MeshingRun(Positions):
                 "springs_Nm_rad": springs_of(self.design),
                 "tooth_friction": self.design.friction.tooth_coefficient or None,
                 "tolerances": has_errors(self.design) or None,
-                "left_out": left_out(self.design),
+                "left_out": unmodelled_parts(self.design),
                 "positions": self.unspread,
             },
             "torque_Nm": self.torque,

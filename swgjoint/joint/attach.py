@@ -14,7 +14,7 @@ from swgjoint.joint.drive import JointDrive
 from swgjoint.joint.elements import add_native, add_rotor, add_tendon, extend_keys
 from swgjoint.joint.fitting import LEVELS as LEVELS
 from swgjoint.joint.fitting import ROTORS as ROTORS
-from swgjoint.joint.fitting import Fitting, check_spec, fitted
+from swgjoint.joint.fitting import Fitting, check_spec, fit_drive
 from swgjoint.joint.motors import clear_armature, misread_sensors, move_to_rotor
 from swgjoint.joint.options import options_for
 from swgjoint.joint.place import Rotor, find_places, free_inertias
@@ -170,7 +170,7 @@ def attach_all(
     )
     timestep = float(spec.option.timestep)
     drives = {
-        name: fitted(name, fittings[name], place, timestep=timestep)
+        name: fit_drive(name, fittings[name], place, timestep=timestep)
         for name, place in places.items()
     }
     if any(drive.plugin for drive in drives.values()):

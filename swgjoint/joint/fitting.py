@@ -75,7 +75,7 @@ class Fitting:
         _positive("max_phase_step", self.max_phase_step, "rad")
 
 
-def fitted(
+def fit_drive(
     joint: str, fitting: Fitting, place: DrivePlace, *, timestep: float
 ) -> JointDrive:
     """The drive that a joint will have.

@@ -267,7 +267,7 @@ def rest_after(
     return tuple(np.clip(rest, torsion - reach, torsion + reach).tolist())
 
 
-def relaxed_after(
+def relax_state(
     drive: DriveMap,
     motion: TwinMotion,
     force: SchemeForce,

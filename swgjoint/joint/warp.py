@@ -41,7 +41,7 @@ try:
         Maps,
         WarpDrive,
         WarpStep,
-        articulated,
+        factor_mass_matrix,
         law,
         real,
         respond,
@@ -115,7 +115,7 @@ class WarpDrives:
         damped = not m.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_DAMPER
         rows = [m.M_rownnz, m.M_rowadr, m.M_colind]
         wp.launch(
-            articulated,
+            factor_mass_matrix,
             dim=d.nworld,
             inputs=[*rows, d.M, m.nv],
             outputs=[self.factor],

@@ -159,7 +159,7 @@ def curvature(w: vec5, d: real):
 
 
 @wp.func
-def divided(w: vec5, a: real, b: real):
+def divided_difference(w: vec5, a: real, b: real):
     """(w(b) - w(a))/(b - a) without a difference."""
     both = a + b
     squares = a * a + b * b
@@ -252,7 +252,7 @@ def secant_over(
     d1 = x1 - maps.segment[drive.segment + j1, 2]
     last = weigh(drive, maps, j1, theta, psi, dtheta, dpsi)
     if j0 == j1:
-        out.torque = divided(sums.mean, d0, d1)
+        out.torque = divided_difference(sums.mean, d0, d1)
         out.slope = divided_slope(sums.mean, d0, d1)
     else:
         # piece by piece across the knots, no difference of two large energies
@@ -267,7 +267,9 @@ def secant_over(
                 to = maps.segment[drive.segment + j, 1]
             if j > j1:
                 to = maps.segment[drive.segment + j, 0]
-            work += divided(piece.mean, begin - base, to - base) * (to - begin)
+            work += divided_difference(piece.mean, begin - base, to - base) * (
+                to - begin
+            )
             begin = to
             j += wp.where(j1 > j0, 1, -1)
         out.torque = work / out.change
@@ -354,7 +356,7 @@ def stretch_after(drive: WarpDrive, rub: Rub, dx: real):
 
 
 @wp.kernel
-def articulated(
+def factor_mass_matrix(
     M_rownnz: wp.array(dtype=int),
     M_rowadr: wp.array(dtype=int),
     M_colind: wp.array(dtype=int),

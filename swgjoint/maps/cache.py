@@ -55,7 +55,7 @@ def key_of(parts: Mapping[str, Any]) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-def cached(
+def cache_map(
     parts: Mapping[str, Any],
     build: Callable[[], DriveMap],
     *,
@@ -84,7 +84,7 @@ def cached(
     return drive if name in (None, drive.name) else replace(drive, name=name)
 
 
-def recalled(
+def recall(
     store: str,
     parts: Mapping[str, Any],
     kind: type[Found],
@@ -103,7 +103,7 @@ def recalled(
         compute: Called when there is no sound entry.
     """
     path = entry_of(store, parts)
-    found = known(path, kind)
+    found = recall_kept(path, kind)
     if found is None:
         found = compute()
         if path is not None:
@@ -112,12 +112,12 @@ def recalled(
 
 
 def entry_of(store: str, parts: Mapping[str, Any]) -> Path | None:
-    """File of a result in the cache, see :func:`recalled`; None if that is off."""
+    """File of a result in the cache, see :func:`recall`; None if that is off."""
     folder = cache_folder()
     return None if folder is None else folder / store / f"{key_of(parts)}.json"
 
 
-def known(path: Path | None, kind: type[Found]) -> Found | None:
+def recall_kept(path: Path | None, kind: type[Found]) -> Found | None:
     """What an entry holds; None if there is none or it is damaged."""
     if path is None:
         return None

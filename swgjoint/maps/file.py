@@ -27,7 +27,7 @@ from pydantic import Field
 
 from swgjoint import __version__
 from swgjoint.errors import InputError, MapFileError
-from swgjoint.faults import Section, validated
+from swgjoint.faults import Section, validate
 from swgjoint.files import write_whole
 from swgjoint.gear.ratings import Ratings
 from swgjoint.json_text import json_text
@@ -377,7 +377,7 @@ def _header(data: bytes) -> Header:
             f" {', '.join(map(str, _READABLE))}; build the map again with 'swgjoint"
             " map'"
         )
-    return validated(Header, content, where="header", error=MapFileError)
+    return validate(Header, content, where="header", error=MapFileError)
 
 
 def _refuse(constant: str) -> None:

@@ -55,7 +55,7 @@ def quartic_chain(knots: Array, values: Array) -> tuple[Array, Array]:
     return breaks, pieces.reshape(5, -1).T
 
 
-def evaluated(breaks: Array, pieces: Array, at: Array) -> Array:
+def evaluate(breaks: Array, pieces: Array, at: Array) -> Array:
     """Value and two derivatives of a chain at places inside it.
 
     Args:

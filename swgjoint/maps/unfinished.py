@@ -36,7 +36,7 @@ class Unfinished:
 
         Args:
             parts: Everything that decides the map, as for
-                :func:`swgjoint.maps.cache.cached`.
+                :func:`swgjoint.maps.cache.cache_map`.
         """
         cache = cache_folder()
         if cache is None:

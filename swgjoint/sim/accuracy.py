@@ -99,7 +99,7 @@ def attempt(
         scene: The scene.
         setting: How.
         drives: Maps that stand for the scene's drive references of these names.
-        midway: See :func:`held_midway`.
+        midway: See :func:`hold_midway`.
     """
     try:
         whole = assemble_setting(scene, setting, drives)
@@ -112,7 +112,7 @@ def attempt(
 
 def attempt_assembled(whole: Assembly, *, midway: bool = False) -> SettingOutcome:
     """Run what was assembled."""
-    kept = thinned(held_midway(whole) if midway else whole)
+    kept = thin_samples(hold_midway(whole) if midway else whole)
     try:
         run = simulate(kept, name=whole.scene.name)
     except ComputationError as exc:
@@ -128,7 +128,7 @@ def attempt_assembled(whole: Assembly, *, midway: bool = False) -> SettingOutcom
     )
 
 
-def thinned(whole: Assembly) -> Assembly:
+def thin_samples(whole: Assembly) -> Assembly:
     """The same, of which a run keeps samples at :data:`RECORD` instead of every step.
 
     A loop of its own counts the steps of the scene, and is left as it is.
@@ -142,7 +142,7 @@ def thinned(whole: Assembly) -> Assembly:
     return replace(whole, sub_steps=n * whole.sub_steps)
 
 
-def held_midway(whole: Assembly) -> Assembly:
+def hold_midway(whole: Assembly) -> Assembly:
     """The same with inputs of the middle of each step, for a reference.
 
     Explicit integrators hold the inputs of the start of a step through it, half a step

@@ -194,7 +194,7 @@ def disturbance_at(disturbance: Disturbance, time: Array) -> Array:
     return acts
 
 
-def limited(command: Array, speed: Array, limits: MotorLimits | None) -> Array:
+def limit_torque(command: Array, speed: Array, limits: MotorLimits | None) -> Array:
     """What a motor gives of a wanted torque at a speed [N·m]. Shape (n,).
 
     Args:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from swgjoint.errors import ComputationError, InputError
 from swgjoint.joint.response import responses
 from swgjoint.sim.figures.transmission import Transmission
-from swgjoint.sim.motion.start_check import touching_at
+from swgjoint.sim.motion.start_check import touching_bodies
 
 if TYPE_CHECKING:
     from swgjoint.sim.assembly import Assembly
@@ -46,7 +46,7 @@ def start_state(assembly: Assembly) -> tuple[Array, Array]:
     try:
         theta, psi = _balance(assembly, 0.0)
     except ComputationError as exc:
-        touching = touching_at(assembly.arm, path.position[0])
+        touching = touching_bodies(assembly.arm, path.position[0])
         if not touching:
             raise
         raise InputError(

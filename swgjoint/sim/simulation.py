@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from swgjoint.errors import ComputationError, InputError
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.progress import Progress, silent
-from swgjoint.sim.actuators import control_inputs, limited, wanted_torque
+from swgjoint.sim.actuators import control_inputs, limit_torque, wanted_torque
 from swgjoint.sim.assembly import Assembly, assemble
 from swgjoint.sim.controller import Controller, KnownArm
 from swgjoint.sim.equilibrium import set_start
@@ -251,7 +251,7 @@ def _recorded(
         speed = np.vstack([speed[:1], speed])
     motor = np.stack(
         [
-            limited(asked[:, :, j], speed[:, j], limits)
+            limit_torque(asked[:, :, j], speed[:, j], limits)
             for j, limits in enumerate(assembly.loops.limits)
         ],
         axis=-1,

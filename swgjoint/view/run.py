@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
-from swgjoint.files import attempting
+from swgjoint.files import attempt_output
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.progress import Progress, silent
 from swgjoint.sim.controller import Controller, KnownArm
@@ -84,7 +84,7 @@ def run_scene(
     from swgjoint.view.recording.recording import Recorder
 
     run: Run | None = None
-    with attempting(recording, unless=lambda: run is None):
+    with attempt_output(recording, unless=lambda: run is None):
         with Recorder(assembly, recording) as recorder:
 
             def going(label: str, done: int, total: int) -> None:

@@ -181,7 +181,7 @@ def warnings_of(joints: Mapping[str, Any]) -> list[str]:
     return lines
 
 
-def left_out_of(run: Run) -> list[str]:
+def omissions_of(run: Run) -> list[str]:
     """What the model leaves out and why, joints of the same together."""
     joints: dict[tuple[str, str], list[str]] = {}
     for item in run.contains["left_out"]:

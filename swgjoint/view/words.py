@@ -22,7 +22,7 @@ def words(key: str) -> tuple[str, str]:
     return key.replace("_", " "), ""
 
 
-def shown(value: object) -> str:
+def format_figure(value: object) -> str:
     """A figure with four digits, - for None, yes and no."""
     if value is None:
         return "-"

@@ -11,15 +11,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from messages import naming
-from solved import small_cup
+from solve_setting import small_cup
 
 from swgjoint.bench.fe import cost as fe_cost
 from swgjoint.bench.fe import solve as fe_cost_solve
 from swgjoint.bench.fe.cost import run_fe_cost
 from swgjoint.bench.fe.rows import cheapest
 from swgjoint.bench.fe.setting import POSITIONS, RIM, FeSetting, Found, rim_shape
-from swgjoint.bench.fe.solve import SettingTask, solved, solved_in
-from swgjoint.bench.fe.stored import FILE, LONG, WITNESS, stored_of, to_store
+from swgjoint.bench.fe.solve import SettingTask, solve_in_process, solve_setting
+from swgjoint.bench.fe.stored import FILE, LONG, WITNESS, load_stored, to_store
 from swgjoint.cli.shared import bench_fe
 from swgjoint.errors import ComputationError, DesignError
 from swgjoint.gear.cup import cup_torsional_stiffness
@@ -164,11 +164,11 @@ def test_stored_settings_are_of_their_design_and_tell_drift(tmp_path, monkeypatc
     table = {key: found(0.0) for key in (*LONG, WITNESS)}
     path = tmp_path / FILE
     path.write_bytes(json_file(to_store(CUP, table)))
-    kept = stored_of(CUP, path)
+    kept = load_stored(CUP, path)
     assert set(kept["settings"]) == set(table)
     again = kept["settings"][WITNESS]
     assert np.array_equal(again.kinematic_error, table[WITNESS].kinematic_error)
-    assert stored_of(CUP.with_changes({"flexspline.rim_mm": 1.1}), path) == {}
+    assert load_stored(CUP.with_changes({"flexspline.rim_mm": 1.1}), path) == {}
 
     linear = FeSetting(model="3d", refinement=1, nonlinear=False)
     settings = [linear, *(FeSetting(model="3d", refinement=n) for n in (0.5, 1.4))]
@@ -297,7 +297,7 @@ def test_the_kinematic_error_says_at_how_many_positions(solve):
 
 def test_the_bundled_file_is_of_the_default_design():
     """The default run needs no reference of its own, and can check the file."""
-    kept = stored_of(Design.load("reference-3d-modified"))
+    kept = load_stored(Design.load("reference-3d-modified"))
     reference = fe_cost.SETTINGS[-1].key
     assert {reference, WITNESS} <= set(kept["settings"])
     assert kept["positions"] == POSITIONS
@@ -322,12 +322,12 @@ def test_rim_shape_folds_half_turns():
 @pytest.fixture(scope="module")
 def half():
     """The coarsest plane model, of half the teeth."""
-    return solved_in(SettingTask(design=SMALL, setting=PLANE))
+    return solve_in_process(SettingTask(design=SMALL, setting=PLANE))
 
 
 def test_half_and_all_teeth_agree(half):
     """The same drive; and the process tells its memory and time."""
-    whole = solved(SMALL, replace(PLANE, full=True))
+    whole = solve_setting(SMALL, replace(PLANE, full=True))
     assert whole.stiffness == pytest.approx(half.stiffness, rel=1e-7)
     assert np.abs(whole.rim_shape - half.rim_shape).max() < 1e-10
     assert np.abs(whole.kinematic_error - half.kinematic_error).max() < 1e-11
@@ -337,7 +337,7 @@ def test_half_and_all_teeth_agree(half):
 def test_plane_model_has_the_cup_in_series(half, monkeypatch):
     """Stiffness at rated torque behind that of the cup."""
     monkeypatch.setattr(fe_cost_solve, "series_compliance", lambda design, cup: 0.0)
-    ring = solved(SMALL, PLANE).stiffness
+    ring = solve_setting(SMALL, PLANE).stiffness
     cup = cup_torsional_stiffness(SMALL)
     assert 1.0 / half.stiffness == pytest.approx(1.0 / ring + 1.0 / cup, rel=1e-6)
 
@@ -345,10 +345,10 @@ def test_plane_model_has_the_cup_in_series(half, monkeypatch):
 @pytest.mark.slow
 def test_closed_form_and_rings_tell_the_lobe():
     """Rings on a stiff bearing keep the deflection at the lobes and the cup behind."""
-    closed = solved(CUP, FeSetting(model="ring", refinement=0))
+    closed = solve_setting(CUP, FeSetting(model="ring", refinement=0))
     assert closed.rim_shape[0] == pytest.approx(1e-3)
     assert closed.stiffness == cup_torsional_stiffness(CUP)
-    rings = solved(CUP, FeSetting(model="ring", refinement=0.5))
+    rings = solve_setting(CUP, FeSetting(model="ring", refinement=0.5))
     assert rings.stiffness < closed.stiffness
     assert rings.rim_shape[0] == pytest.approx(1e-3, rel=0.02)
     assert rings.tensile == pytest.approx(closed.tensile, rel=0.3)

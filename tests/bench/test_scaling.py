@@ -8,7 +8,7 @@ import pytest
 
 from swgjoint.bench.scaling import fe as scaling_fe
 from swgjoint.bench.scaling import joint as scaling_joint
-from swgjoint.bench.scaling.scaling import SizeSweep, fitted, run_scaling
+from swgjoint.bench.scaling.scaling import SizeSweep, fit_exponent, run_scaling
 
 
 def sweep(**changes):
@@ -26,10 +26,10 @@ def sweep(**changes):
 def test_a_power_is_found_where_it_rules():
     """Exponent 3 beyond the constant part; less over all sizes."""
     rows = run_scaling(sweeps=[sweep()])["rows"]
-    assert fitted(sweep(from_size=100), rows)["exponent"] == pytest.approx(
+    assert fit_exponent(sweep(from_size=100), rows)["exponent"] == pytest.approx(
         3.0, abs=1e-3
     )
-    whole = fitted(sweep(), rows)
+    whole = fit_exponent(sweep(), rows)
     assert whole["exponent"] < 2.5 and whole["spread"] > 1.5
 
 

@@ -19,7 +19,7 @@ import tempfile
 from swgjoint.explore.sweep.file import SweepFile
 from swgjoint.explore.sweep.results import place_of
 from swgjoint.explore.sweep.sweep import run_sweep
-from swgjoint.faults import parse_toml, validated
+from swgjoint.faults import parse_toml, validate
 from swgjoint.pool import LocalPool
 from swgjoint.progress import StderrProgress
 
@@ -59,7 +59,7 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=2)
     args = parser.parse_args()
     text = FILE.format(designs=args.designs)
-    file = validated(SweepFile, parse_toml(text, where="benchmark"), where="benchmark")
+    file = validate(SweepFile, parse_toml(text, where="benchmark"), where="benchmark")
     with tempfile.TemporaryDirectory() as folder:
         place = place_of(folder)
         found = run_sweep(

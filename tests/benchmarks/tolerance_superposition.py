@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from swgjoint.fe.tolerances.cycle import MEMBERS, pitches_of, shifted
+from swgjoint.fe.tolerances.cycle import MEMBERS, pitches_of, shift_errors
 from swgjoint.fe.tolerances.rest import influences
 from swgjoint.fe.tolerances.sampling import full_solves
 from swgjoint.files import write_whole
@@ -46,7 +46,9 @@ def one_seed(design: Design, count: int, parts: list[float]) -> list[dict[str, A
 
     def gaps(pitches: np.ndarray) -> np.ndarray:
         layout = design.drive.layout
-        shifts = [shifted(tooth_errors(design, m), pitches, layout) for m in MEMBERS]
+        shifts = [
+            shift_errors(tooth_errors(design, m), pitches, layout) for m in MEMBERS
+        ]
         return at.gap_change(*shifts)
 
     rows = []

@@ -14,7 +14,7 @@ from validation_record import validated_map
 
 from swgjoint.cli.main import main
 from swgjoint.errors import InputError
-from swgjoint.explore.compare.scene import joints_named, resolved, with_drive
+from swgjoint.explore.compare.scene import joints_named, resolve_step, with_drive
 from swgjoint.gear.design.design import Design
 from swgjoint.models_path import models_path
 from swgjoint.sim.arm.rigid_arm import RigidArm
@@ -116,8 +116,8 @@ def test_the_step_of_an_arm_carries_every_drive_that_is_compared():
     arm = str(models_path() / "arms" / "two-link.xml")
     scene = scene_of_arm(arm)
     before = scene.simulation.step_s
-    assert resolved(scene, ["rigid", scene.joints["elbow"].drive]) == scene
-    finer = resolved(scene, ["reference-2d", STIFF])
+    assert resolve_step(scene, ["rigid", scene.joints["elbow"].drive]) == scene
+    finer = resolve_step(scene, ["reference-2d", STIFF])
     assert finer.simulation.step_s < 0.5 * before
     design, speed = Design.preset("reference-2d"), 20.0 / 2.5 * np.pi / 180.0
     rate = design.periodicity * abs(design.ratio) * speed

@@ -11,7 +11,7 @@ from swgjoint.control.kinematic_error import (
     JointRecord,
     KinematicErrorTable,
     TurnRecorder,
-    compensated,
+    compensate,
     identify_kinematic_error,
 )
 from swgjoint.control.motor_side import MotorPID
@@ -98,7 +98,7 @@ def test_a_table_from_another_load_compensates_the_link(turn):
          sensors__link__noise_arcsec=2.0)  # fmt: skip
     table = identify_kinematic_error(record.record(skip=100), known)
     left = []
-    for plan in (flexible_plan, compensated([table])):
+    for plan in (flexible_plan, compensate([table])):
         pid = MotorPID(plan)
         run = turn(plant, known, pid, speed=12.0, duration=8.0, step=2e-3)
         error = (run.position - run.reference)[500:, 0]

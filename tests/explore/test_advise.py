@@ -16,7 +16,7 @@ from swgjoint.explore.advise import search as advise_search
 from swgjoint.explore.advise.advise import STEPS, advise
 from swgjoint.explore.advise.bound import parse_bound
 from swgjoint.explore.advise.reference import settle
-from swgjoint.explore.advise.search import ALIKE, advised
+from swgjoint.explore.advise.search import ALIKE, choose_row
 from swgjoint.joint.attach import LEVELS
 from swgjoint.sim.accuracy import (
     SCENE_INTEGRATORS,
@@ -150,8 +150,8 @@ def test_costs_that_timing_cannot_tell_apart_are_equal():
             row("rigid", 1.09 * noise, 0.1),
             row("rigid", 0.50, 9.0, within=False),
         ]
-        assert advised(rows) is advised(rows[::-1]) is rows[2]
-    assert advised(rows[4:]) is None
+        assert choose_row(rows) is choose_row(rows[::-1]) is rows[2]
+    assert choose_row(rows[4:]) is None
 
 
 def test_levels_that_cannot_do_it_are_left_early(bench):

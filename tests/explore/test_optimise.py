@@ -16,13 +16,13 @@ from swgjoint.explore.optimise.front import (
     front_of,
     not_worse,
     objectives_of,
-    spread,
+    pick_spread,
 )
 from swgjoint.explore.optimise.optimise import optimise
 from swgjoint.explore.optimise.search import search
 from swgjoint.explore.sweep.figures import Record
 from swgjoint.explore.sweep.results import place_of
-from swgjoint.faults import parse_toml, validated
+from swgjoint.faults import parse_toml, validate
 from swgjoint.gear.design.design import Design
 from swgjoint.models_path import bundled_names
 from swgjoint.pool import LocalPool
@@ -58,7 +58,7 @@ high = 25.0
 
 
 def read(text: str) -> OptimisationFile:
-    return validated(OptimisationFile, parse_toml(text, where="x"), where="x")
+    return validate(OptimisationFile, parse_toml(text, where="x"), where="x")
 
 
 def sizes(designs: int = 40, *, seed: int = 0, more: str = "") -> OptimisationFile:
@@ -173,10 +173,10 @@ def test_no_design_of_the_front_is_beaten_and_every_other_is():
 def test_spread_takes_the_ends_first_and_then_the_gaps():
     """Best of every column; then the design farthest from both."""
     values = np.array([[0.0, 10.0], [0.1, 9.0], [0.5, 5.0], [0.9, 0.5], [1.0, 0.0]])
-    assert spread(values, 2) == [0, 4]
-    assert spread(values, 3) == [0, 4, 2]
-    assert sorted(spread(values, 9)) == [0, 1, 2, 3, 4]
-    assert spread(np.array([[1.0], [0.5]]), 1) == [1]
+    assert pick_spread(values, 2) == [0, 4]
+    assert pick_spread(values, 3) == [0, 4, 2]
+    assert sorted(pick_spread(values, 9)) == [0, 1, 2, 3, 4]
+    assert pick_spread(np.array([[1.0], [0.5]]), 1) == [1]
 
 
 def test_sizes_by_hand():

@@ -22,7 +22,7 @@ from swgjoint.explore.sweep.points import _engine_version, points_of
 from swgjoint.explore.sweep.results import csv_text, parquet_bytes, place_of
 from swgjoint.explore.sweep.sweep import run_sweep
 from swgjoint.explore.sweep.tasks import RunTask
-from swgjoint.faults import parse_toml, validated
+from swgjoint.faults import parse_toml, validate
 from swgjoint.pool import LocalPool, Lost
 from swgjoint.sim.scene.scene import Scene
 from swgjoint.store import json_content, json_file
@@ -43,7 +43,7 @@ values = {}
 
 def sheet(values) -> SweepFile:
     text = SHEET.format(list(values))
-    return validated(SweepFile, parse_toml(text, where="x"), where="x")
+    return validate(SweepFile, parse_toml(text, where="x"), where="x")
 
 
 @dataclass
@@ -347,7 +347,7 @@ def test_meshing_figures_are_those_of_the_simulation():
     keys = ["mesh.refinement"]
     values = [0.5]
     """
-    file = validated(SweepFile, parse_toml(text, where="x"), where="x")
+    file = validate(SweepFile, parse_toml(text, where="x"), where="x")
     (point,) = points_of(file)
     record = compute(point.asked)
     settings = {"torque": 20.0, "steps": 2, "turn": 2.0 / 360.0, "half": True}
@@ -389,7 +389,7 @@ kind = "list"
 keys = ["mesh.refinement"]
 values = [0.5]
 """
-    file = validated(SweepFile, parse_toml(text, where="x"), where="x")
+    file = validate(SweepFile, parse_toml(text, where="x"), where="x")
     (point,) = points_of(file)
     told = compute(point.asked).figures["torsional_stiffness_Nm_rad"]
 
@@ -418,7 +418,7 @@ values = [0.5]
         InputError,
         match=naming("meshing.torque_Nm", "0 N·m", "torsional_stiffness_Nm_rad"),
     ):
-        validated(SweepFile, parse_toml(text, where="x"), where="x")
+        validate(SweepFile, parse_toml(text, where="x"), where="x")
 
 
 def test_run_figures_are_those_of_the_scene():
@@ -439,7 +439,7 @@ def test_run_figures_are_those_of_the_scene():
     keys = ["simulation.duration_s"]
     values = [1.0]
     """
-    file = validated(SweepFile, parse_toml(text, where="x"), where="x")
+    file = validate(SweepFile, parse_toml(text, where="x"), where="x")
     (point,) = points_of(file)
     record = compute(point.asked)
     assert record.outcome == "ok", record.reason

@@ -18,7 +18,7 @@ from swgjoint.explore.sweep.executor import DaskPool, dask_pool, slurm_cluster
 from swgjoint.explore.sweep.file import SweepFile
 from swgjoint.explore.sweep.sweep import run_sweep
 from swgjoint.explore.sweep.tasks import SlurmCluster
-from swgjoint.faults import parse_toml, validated
+from swgjoint.faults import parse_toml, validate
 from swgjoint.pool import LocalPool, Lost
 
 pytest.importorskip("distributed", reason="needs swgjoint[cluster]")
@@ -44,7 +44,7 @@ LONG = 300.0
 
 @pytest.fixture(scope="module")
 def file() -> SweepFile:
-    return validated(SweepFile, parse_toml(MESHING, where="x"), where="x")
+    return validate(SweepFile, parse_toml(MESHING, where="x"), where="x")
 
 
 def figures(found) -> list[dict]:

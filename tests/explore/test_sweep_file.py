@@ -13,7 +13,7 @@ from swgjoint.explore.sweep.file import SweepFile
 from swgjoint.explore.sweep.keys import kind_of, known_keys
 from swgjoint.explore.sweep.points import points_of, values_of
 from swgjoint.explore.sweep.validity import validity_of
-from swgjoint.faults import parse_toml, validated
+from swgjoint.faults import parse_toml, validate
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.feasibility import design_checks
 from swgjoint.models_path import bundled_names, models_path
@@ -27,7 +27,7 @@ figures = ["rated_torque_Nm"]
 
 
 def sweep(text: str, head: str = HEAD) -> SweepFile:
-    return validated(SweepFile, parse_toml(head + text, where="x"), where="x")
+    return validate(SweepFile, parse_toml(head + text, where="x"), where="x")
 
 
 def parameter(keys: str, rest: str) -> str:

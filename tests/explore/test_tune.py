@@ -21,7 +21,7 @@ from swgjoint.explore.tune.gains import (
     parameters_of,
     parts_of,
     textbook,
-    weighted,
+    weight_plan,
 )
 from swgjoint.explore.tune.result import TuneSettings
 from swgjoint.explore.tune.search import JOURNAL
@@ -159,7 +159,7 @@ def test_old_readings_are_held_against_the_plan_of_then(trials):
     trials.env.reset(seed=[4, 9] * 3)
     task = trials.env.task
     plan = FLEXIBLE.plan(task)
-    got = weighted(
+    got = weight_plan(
         parts_of(FLEXIBLE, task), task, {"reading_age_s": np.full((6, 1), task.period)}
     )
     # second order: a share of a period over the time that the motion takes to change
@@ -212,7 +212,7 @@ def test_the_error_has_a_share_of_its_own(trials):
     trials.env.reset(seed=[4, 9] * 3)
     task = trials.env.task
     even, uneven = parts_of(FLEXIBLE, task)
-    got = weighted((even, uneven), task, {"error_share": np.zeros((6, 1))})
+    got = weight_plan((even, uneven), task, {"error_share": np.zeros((6, 1))})
     np.testing.assert_allclose(got.angle, even.angle, rtol=0, atol=1e-12)
     assert np.abs(uneven.angle).max() > 1e-3
     assert not parts_of(PD, task)[1].angle.any()

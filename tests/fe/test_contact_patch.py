@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from swgjoint.fe.common.contact_patch import PATCH_PARTS, averaged_spline
+from swgjoint.fe.common.contact_patch import PATCH_PARTS, average_spline
 from swgjoint.fe.plane.continuation import Continuation
 from swgjoint.fe.plane.drive2d import ring_model
 from swgjoint.gear.design.design import Design
@@ -14,7 +14,7 @@ STATIONS = np.linspace(0.3e-3, 2.2e-3, 21)
 def test_linear_fields_are_reproduced_to_the_ends():
     """Rigid motion of a straight flank closes the gap by exactly that motion."""
     s = np.linspace(STATIONS[0], STATIONS[-1], 301)
-    found = averaged_spline(STATIONS)(s) @ (2.0 + 3.0e3 * STATIONS)
+    found = average_spline(STATIONS)(s) @ (2.0 + 3.0e3 * STATIONS)
     assert found == pytest.approx(2.0 + 3.0e3 * s, rel=1e-12)
 
 
@@ -24,7 +24,7 @@ def test_average_of_a_wave_has_the_transform_of_the_patch():
     half = (STATIONS[-1] - STATIONS[0]) / PATCH_PARTS
     wave_number = 2.0 / half
     s = np.linspace(0.8e-3, 1.7e-3, 50)
-    found = averaged_spline(fine)(s) @ np.sin(wave_number * fine)
+    found = average_spline(fine)(s) @ np.sin(wave_number * fine)
     x = np.linspace(-1.0, 1.0, 20_001)
     kernel = (1.0 - x**2) ** 3
     factor = float(np.sum(kernel * np.cos(2.0 * x)) / np.sum(kernel))

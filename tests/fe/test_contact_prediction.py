@@ -18,7 +18,7 @@ from swgjoint.fe.plane.condensed_ring import (
     distinct,
 )
 from swgjoint.fe.plane.continuation import Continuation
-from swgjoint.fe.plane.corotation import turned
+from swgjoint.fe.plane.corotation import rotate_right_angle
 from swgjoint.fe.plane.linearise import linearise
 from swgjoint.fe.plane.state import State
 from swgjoint.fe.plane.tooth_contact import Contacts
@@ -113,7 +113,7 @@ def test_forces_of_the_teeth_balance_the_torque_where_many_contacts_change():
     )
     none = np.zeros((len(ring.gap), ring.gap.shape[1] // ring.stations.per_interval))
     linear = drive.influence(Supports.of(ring, state, none.astype(bool)))
-    arm = np.einsum("ki,ki->k", turned(contacts.point), contacts.normal)
+    arm = np.einsum("ki,ki->k", rotate_right_angle(contacts.point), contacts.normal)
     moments, opened = [], []
     torques = state.torque * np.linspace(1.0, 0.4, 13)
     for torque in torques:

@@ -8,7 +8,7 @@ import pytest
 from swgjoint.fe.plane.corotation import (
     elastic_energy,
     elastic_force,
-    projected,
+    project_to_frames,
     rotate,
     sector_frames,
     tangent,
@@ -39,7 +39,7 @@ def energy(element, place, x):
 
 def gradient(element, place, x):
     frames = sector_frames(element, x, place)
-    force = projected(frames, elastic_force(element, frames))
+    force = project_to_frames(frames, elastic_force(element, frames))
     return rotate(force.reshape(x.shape), frames.angle[:, None]).reshape(3, -1)
 
 

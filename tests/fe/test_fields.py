@@ -10,7 +10,7 @@ import pytest
 from solved import kept
 
 from swgjoint.fe.meshing import simulate_meshing
-from swgjoint.fe.plane.corotation import rotate, turned
+from swgjoint.fe.plane.corotation import rotate, rotate_right_angle
 from swgjoint.fe.plane.elasticity import stress_maxima
 from swgjoint.fe.plane.fields import (
     circular_spline_field,
@@ -76,7 +76,7 @@ def test_global_stress_is_that_of_the_bent_rim():
     tooth = int(np.argmin(np.abs(tooth_angles(model, state()) - pi / 2)))
     node = model.element.mesh.bore[len(model.element.mesh.bore) // 2]
     xx, yy, xy, _ = found.stress[tooth, node]
-    unit = turned(found.points[tooth, node])
+    unit = rotate_right_angle(found.points[tooth, node])
     unit = unit / np.hypot(*unit)
     along = unit[0] ** 2 * xx + unit[1] ** 2 * yy + 2 * unit[0] * unit[1] * xy
     assert along == pytest.approx(found.maxima[0][tooth, node], rel=1e-3)
@@ -112,7 +112,7 @@ def test_tooth_forces_carry_the_load():
     assert force.shape == (120, 2)
     assert np.array_equal(force[:60], force[60:])
     contacts = state().contacts
-    arm = np.einsum("ki,ki->k", turned(contacts.point), contacts.normal)
+    arm = np.einsum("ki,ki->k", rotate_right_angle(contacts.point), contacts.normal)
     # both flanks have their lever arm, of opposite sign
     arms = [arm[contacts.side == side].mean() for side in (0, 1)]
     moment = force[:, 0].sum() * arms[0] + force[:, 1].sum() * arms[1]

@@ -18,7 +18,7 @@ from swgjoint.fe.common.indentation import Strips
 from swgjoint.fe.meshing import simulate_meshing
 from swgjoint.fe.plane.continuation import Continuation
 from swgjoint.fe.plane.corotation import elastic_energy
-from swgjoint.fe.plane.drive2d import left_out, ring_model
+from swgjoint.fe.plane.drive2d import ring_model, unmodelled_parts
 from swgjoint.fe.plane.linearise import linearise
 from swgjoint.fe.plane.stress import circular_spline_stress, flexspline_stress
 from swgjoint.gear.cup import cup_torsional_stiffness
@@ -341,8 +341,8 @@ def test_backlash_is_taken_up_by_torque():
 
 def test_label_names_what_a_plane_model_cannot_see():
     """Micro-geometry of a design is left out, and the label says so."""
-    assert left_out(Design.load("reference-2d")) is None
-    assert left_out(Design.load("size-25-100")) == "micro_geometry"
+    assert unmodelled_parts(Design.load("reference-2d")) is None
+    assert unmodelled_parts(Design.load("size-25-100")) == "micro_geometry"
     assert one_pitch().to_json()["label"]["left_out"] is None
 
 

@@ -12,15 +12,20 @@ from messages import naming
 
 from swgjoint.drives.build_map import build_map
 from swgjoint.errors import DesignError
-from swgjoint.fe.common.sampling import on_bearing
+from swgjoint.fe.common.sampling import maps_bearing
 from swgjoint.fe.meshing import simulate_meshing
 from swgjoint.fe.plane.continuation import Continuation
-from swgjoint.fe.plane.corotation import turned
-from swgjoint.fe.plane.drive2d import can_halve, carries_bearing, left_out, ring_model
+from swgjoint.fe.plane.corotation import rotate_right_angle
+from swgjoint.fe.plane.drive2d import (
+    can_halve,
+    carries_bearing,
+    ring_model,
+    unmodelled_parts,
+)
 from swgjoint.fe.plane.equilibrium import Load
 from swgjoint.fe.plane.linearise import linearise
 from swgjoint.fe.plane.race import PlaneRace
-from swgjoint.fe.rings.loading import loaded, unloaded
+from swgjoint.fe.rings.loading import solve_loaded, solve_unloaded
 from swgjoint.fe.rings.model import thin_ring
 from swgjoint.gear.bearing.ball_bearing import BallBearing
 from swgjoint.gear.design.design import Design
@@ -196,7 +201,10 @@ def test_moments_balance():
         alpha = state.wave_generator_angle
         nodes = model.skeleton(state)[:, model.bore_nodes]
         found = race.forces(state.race, alpha, nodes, state.touching)
-        pushed = turned(race.on_balls.balls(alpha, race.phase)[0]) * found.balls.push
+        pushed = (
+            rotate_right_angle(race.on_balls.balls(alpha, race.phase)[0])
+            * found.balls.push
+        )
         off.append(abs(float(pushed.sum()) + state.tooth_moment - TORQUE))
         # bore on race: nothing pulls, what does not press is apart
         assert state.pressure.min() == 0.0
@@ -330,9 +338,12 @@ def test_thin_rings_tell_the_same():
         model = replace(ring_model(design), indentation=None)
         follow = Continuation(model=model, ratio=design.ratio)
         state, rings = follow.meshed(follow.deflected()), thin_ring(design)
-        twin, found, theirs = unloaded(rings, 0.0), [], []
+        twin, found, theirs = solve_unloaded(rings, 0.0), [], []
         for torque in (5.0, 14.0, 48.0, 100.0):
-            state, twin = follow.to_torque(state, torque), loaded(rings, twin, torque)
+            state, twin = (
+                follow.to_torque(state, torque),
+                solve_loaded(rings, twin, torque),
+            )
             assert state.outcome.ok and twin.outcome.ok
             # 3 % where one pair of teeth more or less comes in, else below 1.5 %
             assert state.rotation == pytest.approx(twin.rotation, rel=0.035)
@@ -360,11 +371,14 @@ def test_no_bearing_is_no_change():
 
 def test_labels_say_where_the_bearing_is():
     """In the plane under an outline without corners, the circular spline fixed."""
-    assert left_out(small()) is None and left_out(small(), "ring") is not None
-    assert left_out(small(), "3d").startswith("wave_generator.bearing and ")
-    assert left_out(small(), bearing=False) == "wave_generator.bearing"
+    assert (
+        unmodelled_parts(small()) is None
+        and unmodelled_parts(small(), "ring") is not None
+    )
+    assert unmodelled_parts(small(), "3d").startswith("wave_generator.bearing and ")
+    assert unmodelled_parts(small(), bearing=False) == "wave_generator.bearing"
     held = small(**{"drive.layout": "flexspline_fixed"})
-    assert left_out(held) == "wave_generator.bearing"
+    assert unmodelled_parts(held) == "wave_generator.bearing"
     assert ring_model(held, half=True).race is None
     run = simulate_meshing(small(), torque=TORQUE, steps=2, turn=0.01, half=True)
     assert run.to_json()["label"]["bearing"] == "balls roll"
@@ -392,7 +406,7 @@ def test_map_carries_the_bearing():
 
 def test_errors_put_the_drive_on_a_rigid_wave_generator():
     """The bearing of a design with errors of the teeth is left out of its maps."""
-    assert on_bearing(small()) and not on_bearing(small(**FLAWED))
+    assert maps_bearing(small()) and not maps_bearing(small(**FLAWED))
 
 
 @pytest.mark.slow

@@ -11,7 +11,7 @@ from solved import hundred_elements
 
 from swgjoint.errors import ComputationError, Outcome
 from swgjoint.fe.rings import accuracy as ring_accuracy
-from swgjoint.fe.rings.accuracy import over_output_turn, transmission_error
+from swgjoint.fe.rings.accuracy import output_turn_angles, transmission_error
 from swgjoint.gear.design.design import Design
 from swgjoint.units import arcmin
 
@@ -62,7 +62,7 @@ def test_half_an_output_turn_is_no_jump():
 
 def test_angles_are_strewn_over_the_output_turn():
     """One in each of the equal parts, no two of one spacing."""
-    angles = over_output_turn(PERFECT, 16)
+    angles = output_turn_angles(PERFECT, 16)
     assert (np.floor(angles / (TURN / 16)) == np.arange(16)).all()
     assert np.ptp(np.diff(angles)) > 1.0
 

@@ -8,8 +8,8 @@ from messages import naming
 from solved import hundred_elements
 
 from swgjoint.errors import InputError, Outcome
-from swgjoint.fe.rings.friction import RubbedPath, rubbed_path
-from swgjoint.fe.rings.loading import loaded, unloaded
+from swgjoint.fe.rings.friction import RubbedPath, friction_path
+from swgjoint.fe.rings.loading import solve_loaded, solve_unloaded
 from swgjoint.fe.rings.model import thin_ring
 from swgjoint.fe.rings.sliding import weighted_median
 from swgjoint.gear.design.design import Design
@@ -34,20 +34,20 @@ def design():
 @pytest.fixture(scope="module")
 def path(design):
     """Along three torques at one wave-generator angle."""
-    return rubbed_path(design, TORQUES, angles=ANGLES)
+    return friction_path(design, TORQUES, angles=ANGLES)
 
 
 def test_torsion_is_from_the_middle_of_the_play(design, path):
     """A torque and its opposite turn the rings by as much, whatever the play."""
     assert path.outcome is Outcome.CONVERGED
     model = thin_ring(design)
-    rest = unloaded(model, ANGLES[0])
+    rest = solve_unloaded(model, ANGLES[0])
     ends, small = [], path.torque[0]
     for sign in (1.0, -1.0):
-        state = loaded(model, rest, sign * small)
+        state = solve_loaded(model, rest, sign * small)
         ends.append([state.rotation])
         for torque in path.torque[1:]:
-            state = loaded(model, state, sign * torque)
+            state = solve_loaded(model, state, sign * torque)
             ends[-1].append(state.rotation)
     up, down = np.array(ends)
     rings = path.torsion - path.series * path.torque
@@ -61,7 +61,7 @@ def test_work_adds_up_along_the_path(design, path):
 
     With mu = 1 it would still be less than what the torque puts in.
     """
-    finer = rubbed_path(design, [20.0, 30.0, 40.0, 60.0, 80.0], angles=ANGLES)
+    finer = friction_path(design, [20.0, 30.0, 40.0, 60.0, 80.0], angles=ANGLES)
     for key in ("teeth_work", "race_work"):
         coarse, fine = getattr(path, key), getattr(finer, key)
         assert (coarse > 0.0).all()
@@ -77,7 +77,7 @@ def test_similar_drives_rub_in_proportion(design, path):
     large = Design.preset("size-50-50").with_changes(
         {"wave_generator.bearing.clearance_um": 2.0 * bearing.clearance_um}
     )
-    found = rubbed_path(large, [8.0 * t for t in TORQUES], angles=ANGLES)
+    found = friction_path(large, [8.0 * t for t in TORQUES], angles=ANGLES)
     # 1e-4: profiles of the family are rounded to a nanometre
     assert found.torsion[1:] == pytest.approx(path.torsion[1:], rel=1e-4)
     assert found.race_work[1:] == pytest.approx(8.0 * path.race_work[1:], rel=1e-3)

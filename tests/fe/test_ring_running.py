@@ -8,13 +8,13 @@ from messages import naming
 from solved import hundred_elements
 
 from swgjoint.errors import DesignError
-from swgjoint.fe.plane.corotation import rotate, turned
+from swgjoint.fe.plane.corotation import rotate, rotate_right_angle
 from swgjoint.fe.rings import model as rings
 from swgjoint.fe.rings import running as ring_running
-from swgjoint.fe.rings.contacts import linearised, race_on_balls
+from swgjoint.fe.rings.contacts import linearise, race_on_balls
 from swgjoint.fe.rings.equilibrium import RingSolver, rim_rotation
-from swgjoint.fe.rings.facing import facing
-from swgjoint.fe.rings.loading import loaded, positions, without_torque
+from swgjoint.fe.rings.facing import distances_to_ring
+from swgjoint.fe.rings.loading import positions, solve_loaded, without_torque
 from swgjoint.fe.rings.model import thin_ring
 from swgjoint.fe.rings.running import STEP, RunningFriction, running_friction
 from swgjoint.fe.rings.sliding import weighted_median
@@ -46,7 +46,7 @@ def design():
 def standing(model, theta, torque):
     """Equilibrium at an input angle."""
     state = without_torque(model, theta)
-    return loaded(model, state, torque) if torque else state
+    return solve_loaded(model, state, torque) if torque else state
 
 
 def race_forces(model, state, way):
@@ -60,7 +60,7 @@ def race_forces(model, state, way):
     rim, race = np.split(state.q, [model.rim.size])
     half = 0.5 * model.bearing.race_thickness
     points = model.bore.points(rim)[0]
-    seen = facing(model.race, race, points, state.bore_feet, inside=False)
+    seen = distances_to_ring(model.race, race, points, state.bore_feet, inside=False)
     normal = model.press_per_point * np.maximum(half - seen.distance, 0.0)
     dofs, rows, _ = model.bore.rows(rim, seen)
     # the outside of the race lags where its section turns
@@ -68,7 +68,7 @@ def race_forces(model, state, way):
     slip = np.einsum("ni,ni->n", rows[:, 1], way[dofs])
     slip += np.einsum("ni,ni->n", by_race, way[seen.dofs + model.rim.size])
     # creep at which the moments balance; the last point takes what is left over
-    arm = np.einsum("ni,ni->n", turned(points), seen.tangent)
+    arm = np.einsum("ni,ni->n", rotate_right_angle(points), seen.tangent)
     order = np.argsort(slip / arm)
     moment = (normal * arm)[order]
     below = np.concatenate([[0.0], np.cumsum(moment)])
@@ -92,9 +92,10 @@ def tooth_forces(model, state, way):
     angle = np.arctan2(-slope[:, 1], -slope[:, 0])
     along = rotate(state.contacts.tangent, angle)
     arm = rotate(state.contacts.point, angle) - foot
-    turn = turned(slope) / np.einsum("ni,ni->n", slope, slope)[:, None]
+    turn = rotate_right_angle(slope) / np.einsum("ni,ni->n", slope, slope)[:, None]
     row = np.concatenate(
-        [along, np.einsum("ni,ni->n", along, turned(arm))[:, None] * turn], axis=1
+        [along, np.einsum("ni,ni->n", along, rotate_right_angle(arm))[:, None] * turn],
+        axis=1,
     )
     dofs = 4 * model.nodes_per_tooth * j[:, None] + np.arange(4)
     slip = np.einsum("ni,ni->n", row, way[dofs])
@@ -115,7 +116,7 @@ def torque_under_friction(design, torque, direction):
     ]
     way = (ends[1].q - ends[0].q) / STEP
     state = standing(model, ANGLE, torque)
-    state, total, held = linearised(model, state, teeth=bool(state.loaded_teeth))
+    state, total, held = linearise(model, state, teeth=bool(state.loaded_teeth))
     _, turn = rim_rotation(model, state.q, state.rotation)
     found = []
     for forces in (tooth_forces, race_forces):
@@ -172,7 +173,7 @@ def test_rings_that_bend_without_stretching(design):
     rim, race = np.split(state.q, [model.rim.size])
     points = model.bore.points(rim)[0]
     half = 0.5 * model.bearing.race_thickness
-    seen = facing(model.race, race, points, state.bore_feet, inside=False)
+    seen = distances_to_ring(model.race, race, points, state.bore_feet, inside=False)
     normal = model.press_per_point * np.maximum(half - seen.distance, 0.0)
     depth = model.rim.radius - model.bearing.bore_radius
     lever = depth / model.rim.radius + half / model.race.radius

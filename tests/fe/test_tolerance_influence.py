@@ -11,7 +11,7 @@ from solved import coarse
 
 from swgjoint.fe.plane.continuation import Continuation
 from swgjoint.fe.plane.drive2d import ring_model
-from swgjoint.fe.tolerances.cycle import MEMBERS, pitch_of, pitches_of, shifted
+from swgjoint.fe.tolerances.cycle import MEMBERS, pitch_of, pitches_of, shift_errors
 from swgjoint.fe.tolerances.rest import Rest, influences
 from swgjoint.fe.tolerances.sampling import full_solves
 from swgjoint.gear.design.design import Design
@@ -36,7 +36,7 @@ def flawed(name="reference-2d", **values) -> Design:
 def gaps_at(design, at, pitches):
     """Gap changes of all contacts at whole pitches (n, n_contacts)."""
     layout = design.drive.layout
-    shifts = [shifted(tooth_errors(design, m), pitches, layout) for m in MEMBERS]
+    shifts = [shift_errors(tooth_errors(design, m), pitches, layout) for m in MEMBERS]
     return at.gap_change(*shifts)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from solved import coarse
 
-from swgjoint.fe.tolerances.cycle import MEMBERS, pitches_of, shifted
+from swgjoint.fe.tolerances.cycle import MEMBERS, pitches_of, shift_errors
 from swgjoint.fe.tolerances.rest import influences
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.tolerances import ToothErrors, tooth_errors
@@ -49,7 +49,7 @@ def orders_of(at, design):
     """The same over the cycle of a design's teeth."""
     pitches = np.arange(pitches_of(design))
     layout = design.drive.layout
-    shifts = [shifted(tooth_errors(design, m), pitches, layout) for m in MEMBERS]
+    shifts = [shift_errors(tooth_errors(design, m), pitches, layout) for m in MEMBERS]
     return orders(at, shifts)
 
 
@@ -74,7 +74,7 @@ def test_odd_harmonics_of_the_pitch_cancel(perfect):
     for low, high in ((1, 3), (2, 4)):
         wave = 2e-6 * (np.cos(low * angle) + np.cos(high * angle + 1.0))
         errors = ToothErrors(tangential=wave, radial=np.zeros(122))
-        shifts = shifted(errors, pitches, "circular_spline_fixed")
+        shifts = shift_errors(errors, pitches, "circular_spline_fixed")
         seen = orders(perfect[False], (none, shifts))
         found[low] = max(seen(order) for order in range(1, 13))
     # a shift of all teeth turns the output by itself over the pitch radius

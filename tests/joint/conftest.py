@@ -15,7 +15,7 @@ from swgjoint.joint.reference import (
     TwinMotion,
     metric_of,
     other_acceleration,
-    relaxed_after,
+    relax_state,
     rest_after,
     scheme_force,
 )
@@ -130,7 +130,7 @@ class Bench:
             state = other_acceleration(drive, motion, f, **rates)
             rest = rest_after(drive, motion, timestep=h)
             if drive.friction is not None:
-                relaxed = relaxed_after(drive, motion, f, **rates)
+                relaxed = relax_state(drive, motion, f, **rates)
                 rubs.append(f.friction)
         return Twin(q=q, v=v, rest=rest, relaxed=relaxed, rubs=rubs)
 

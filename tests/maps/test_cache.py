@@ -9,7 +9,7 @@ from dataclasses import replace
 import pytest
 
 from swgjoint.maps import cache
-from swgjoint.maps.cache import cached
+from swgjoint.maps.cache import cache_map
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.file import map_bytes
 from swgjoint.store import cache_folder
@@ -36,8 +36,8 @@ def folder(tmp_path, monkeypatch):
 def test_built_once(folder):
     """The second request of the same parts is answered from the folder, bitwise."""
     build = Builder()
-    first = cached({"design": "a", "level": "2d"}, build)
-    second = cached({"level": "2d", "design": "a"}, build)
+    first = cache_map({"design": "a", "level": "2d"}, build)
+    second = cache_map({"level": "2d", "design": "a"}, build)
     assert build.count == 1
     assert map_bytes(first) == map_bytes(second)
 
@@ -45,17 +45,17 @@ def test_built_once(folder):
 def test_other_parts_other_entry(folder):
     """Any other part gives another entry."""
     build = Builder()
-    cached({"design": "a", "level": "2d"}, build)
-    cached({"design": "a", "level": "3d"}, build)
+    cache_map({"design": "a", "level": "2d"}, build)
+    cache_map({"design": "a", "level": "3d"}, build)
     assert build.count == 2
 
 
 def test_other_code_other_entry(folder, monkeypatch):
     """A map that other code computed is not used."""
     build = Builder()
-    cached({"design": "a"}, build)
+    cache_map({"design": "a"}, build)
     monkeypatch.setattr(cache, "code_version", lambda: "other")
-    cached({"design": "a"}, build)
+    cache_map({"design": "a"}, build)
     assert build.count == 2
 
 
@@ -63,13 +63,13 @@ def test_other_code_other_entry(folder, monkeypatch):
 def test_other_packages_other_entry(folder, monkeypatch, package):
     """A map that another version of a package computed is not used."""
     build, asked = Builder(), cache.version
-    cached({"design": "a"}, build)
+    cache_map({"design": "a"}, build)
     monkeypatch.setattr(
         cache, "version", lambda name: "0" if name == package else asked(name)
     )
     cache.code_version.cache_clear()
     try:
-        cached({"design": "a"}, build)
+        cache_map({"design": "a"}, build)
     finally:
         cache.code_version.cache_clear()
     assert build.count == 2
@@ -78,11 +78,11 @@ def test_other_packages_other_entry(folder, monkeypatch, package):
 def test_a_map_of_another_design_is_not_taken(folder, caplog):
     """However sound it is: whoever put it there, the design asked for is built."""
     build = Builder()
-    cached({"design": "a"}, build)
+    cache_map({"design": "a"}, build)
     (entry,) = folder.rglob("*.swg")
     for info in ({}, {"design_hash": "b"}):
         replace(DriveMap.linear(5e3), info=info).save(entry)
-        assert cached({"design": "a"}, build).mean_stiffness == pytest.approx(1e4)
+        assert cache_map({"design": "a"}, build).mean_stiffness == pytest.approx(1e4)
         assert "another design" in caplog.text
         caplog.clear()
     assert build.count == 3
@@ -91,13 +91,13 @@ def test_a_map_of_another_design_is_not_taken(folder, caplog):
 def test_damaged_entry_is_built_again(folder, caplog):
     """A damaged entry is reported, ignored and replaced."""
     build = Builder()
-    cached({"design": "a"}, build)
+    cache_map({"design": "a"}, build)
     (entry,) = folder.rglob("*.swg")
     entry.write_bytes(entry.read_bytes()[:-30])
-    cached({"design": "a"}, build)
+    cache_map({"design": "a"}, build)
     assert build.count == 2
     assert "ignored" in caplog.text
-    cached({"design": "a"}, build)
+    cache_map({"design": "a"}, build)
     assert build.count == 2
 
 
@@ -105,8 +105,8 @@ def test_empty_variable_switches_off(monkeypatch):
     """With an empty SWGJOINT_CACHE every request builds."""
     monkeypatch.setenv("SWGJOINT_CACHE", "")
     build = Builder()
-    cached({"design": "a"}, build)
-    cached({"design": "a"}, build)
+    cache_map({"design": "a"}, build)
+    cache_map({"design": "a"}, build)
     assert build.count == 2
     assert cache_folder() is None
 
@@ -116,7 +116,7 @@ def test_unwritable_folder_is_no_obstacle(tmp_path, monkeypatch, caplog):
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("SWGJOINT_CACHE", str(tmp_path / "file"))
     build = Builder()
-    cached({"design": "a"}, build)
+    cache_map({"design": "a"}, build)
     assert build.count == 1
     assert "not kept" in caplog.text
 
@@ -124,8 +124,8 @@ def test_unwritable_folder_is_no_obstacle(tmp_path, monkeypatch, caplog):
 def test_name_is_not_content(folder):
     """Two designs that differ in their name share an entry and keep their names."""
     build = Builder()
-    assert cached({"design": "a"}, build, name="one").name == "one"
-    assert cached({"design": "a"}, build, name="two").name == "two"
+    assert cache_map({"design": "a"}, build, name="one").name == "one"
+    assert cache_map({"design": "a"}, build, name="two").name == "two"
     assert build.count == 1
 
 

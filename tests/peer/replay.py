@@ -12,7 +12,7 @@ from calculix import Fields
 from numpy.typing import NDArray
 from quadratic_ring import Chain, QuadraticRing, quadratic_ring
 
-from swgjoint.fe.plane.corotation import rotate, turned
+from swgjoint.fe.plane.corotation import rotate, rotate_right_angle
 from swgjoint.fe.plane.elasticity import stress_maxima
 from swgjoint.fe.plane.ring import RingModel
 from swgjoint.fe.plane.state import State
@@ -124,7 +124,7 @@ class Replay:
         start, difference = start[there], (theirs * mm - ours)[there]
         unit = start / np.hypot(*start.T)[:, None]
         radial = np.einsum("ni,ni->n", difference, unit)
-        tangential = np.einsum("ni,ni->n", difference, turned(unit))
+        tangential = np.einsum("ni,ni->n", difference, rotate_right_angle(unit))
         if not self.quarter:
             tangential = tangential - tangential.mean()
         return radial, tangential
@@ -174,7 +174,7 @@ class Replay:
     def moment(self) -> float:
         """Moment of all forces about the axis in CalculiX's deformed shape [N m]."""
         place = self.ring.points + self.fields.displacement * mm
-        return float(np.einsum("ni,ni->", turned(place), self.nodal))
+        return float(np.einsum("ni,ni->", rotate_right_angle(place), self.nodal))
 
 
 def root_start(model: RingModel) -> float:

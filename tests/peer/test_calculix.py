@@ -21,7 +21,7 @@ from states import (
     turned_to,
 )
 
-from swgjoint.fe.plane.corotation import rotate, turned
+from swgjoint.fe.plane.corotation import rotate, rotate_right_angle
 from swgjoint.units import mm
 
 OURS = 2, 3
@@ -57,8 +57,8 @@ def test_forces_keep_their_resultants_on_another_mesh():
             flanks.reshape(-1, 2),
         ]
     )
-    moment = np.einsum("ni,ni->", turned(place), every)
-    ours = np.einsum("ni,ni->", turned(ring.points), nodal)
+    moment = np.einsum("ni,ni->", rotate_right_angle(place), every)
+    ours = np.einsum("ni,ni->", rotate_right_angle(ring.points), nodal)
     assert ours == pytest.approx(moment, abs=1e-6 * TORQUE)
     assert abs(moment) > 1e-3 * TORQUE  # they balance in the deformed shape only
 
@@ -67,7 +67,9 @@ def test_forces_balance_in_the_deformed_shape():
     """Wave generator, load and teeth have no moment about the axis together."""
     model, state = model_of("elliptical", 2, True), loaded("elliptical", 2, True)
     nodes = model.skeleton(state)[:, model.bore_nodes]
-    bore = np.einsum("sni,sni->", turned(nodes), Forces.of(model, state).bore)
+    bore = np.einsum(
+        "sni,sni->", rotate_right_angle(nodes), Forces.of(model, state).bore
+    )
     balance = model.copies * bore + state.tooth_moment
     assert abs(balance) < 1e-9 * TORQUE
     assert abs(state.tooth_moment) > 0.9 * TORQUE

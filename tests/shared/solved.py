@@ -21,7 +21,7 @@ import pytest
 from filelock import FileLock
 
 from swgjoint.fe.rings import model as rings
-from swgjoint.fe.rings.friction import RubbedPath, rubbed_path
+from swgjoint.fe.rings.friction import RubbedPath, friction_path
 from swgjoint.gear.design.design import Design
 from swgjoint.maps.cache import code_version
 
@@ -93,4 +93,4 @@ def ring_path() -> RubbedPath:
     """The thin rings of size 25 and ratio 100, loaded at an input angle of 0.1 rad."""
     design = Design.load("size-25-100")
     name = f"ring path {design.content_hash()} {RING_TORQUES}"
-    return kept(name, lambda: rubbed_path(design, RING_TORQUES, angles=[0.1]))
+    return kept(name, lambda: friction_path(design, RING_TORQUES, angles=[0.1]))

@@ -10,7 +10,7 @@ from swgjoint.sim.motion.commanded import trajectory_of
 from swgjoint.sim.motion.joint_motions import (
     chirp,
     read_points,
-    through_points,
+    spline_motion,
     trapezoid,
 )
 from swgjoint.sim.motion.trajectory import time_grid
@@ -36,7 +36,7 @@ def one_chirp(h: float = 1e-3):
 def one_file(h: float = 1e-3):
     t = np.linspace(5.0, 7.0, 21)
     wave = np.sin(0.5 * np.pi * (t - 5.0)) ** 4
-    return through_points(
+    return spline_motion(
         time_grid(3.0, h),
         points_time=t,
         points=START + wave[:, None] * (END - START),

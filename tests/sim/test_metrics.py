@@ -10,7 +10,7 @@ from swgjoint.sim.figures.metrics import (
     against_rigid,
     cubed_mean,
     orders_untold,
-    spread,
+    signal_statistics,
     torque_ripple,
 )
 from swgjoint.units import arcmin
@@ -22,7 +22,7 @@ LINEAR = DriveMap.linear(2e4, teeth_flexspline=120, teeth_circular_spline=122)
 def test_spread_of_a_sine():
     """Mean, root mean square and peak to peak of a sine about a constant."""
     x = 3.0 + 2.0 * np.sin(np.linspace(0.0, 2.0 * np.pi, 4001))
-    got = spread(x)
+    got = signal_statistics(x)
     assert got["mean"] == pytest.approx(3.0, rel=1e-3)
     assert got["rms"] == pytest.approx(np.sqrt(9.0 + 2.0), rel=1e-3)
     assert got["pp"] == pytest.approx(4.0, rel=1e-6)

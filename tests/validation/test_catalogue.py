@@ -11,7 +11,7 @@ from messages import names, naming
 
 from swgjoint.cli.main import main
 from swgjoint.errors import ComputationError, InputError
-from swgjoint.fe.rings.accuracy import over_output_turn
+from swgjoint.fe.rings.accuracy import output_turn_angles
 from swgjoint.gear.catalogue_stated import stated_losses
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.mounting import series_compliance
@@ -26,7 +26,7 @@ from swgjoint.validation.catalogue.printed import (
     printed_accuracy,
     torques_of,
 )
-from swgjoint.validation.catalogue.rows import rubbed, stiffnesses
+from swgjoint.validation.catalogue.rows import friction_of_path, stiffnesses
 from swgjoint.validation.catalogue.runs import CatalogueTask, oval, run_task
 from swgjoint.validation.rows import StudyOptions
 
@@ -79,7 +79,7 @@ def instant(task):
         torque = np.array([0.1, *task.torques])
         return {"torque_Nm": torque.tolist(), "ring_torsion_rad": single(task, torque)}
     if task.kind == "accuracy":
-        theta = over_output_turn(task.design, 96)
+        theta = output_turn_angles(task.design, 96)
         error = 0.25 * arcmin * np.cos(2.0 * theta)
         return {"input_angles_rad": theta.tolist(), "error_rad": error.tolist()}
     if task.kind == "running":
@@ -104,7 +104,7 @@ def test_stiffness_is_read_by_the_definition():
     design = Design.preset("size-25-100")
     torques = torques_of(row)
     assert torques[-1] == max(row.repeated_peak, 1.5 * row.T2)
-    path = rubbed(
+    path = friction_of_path(
         curve(CatalogueTask(name="x 28", kind="path", design=design, torques=torques)),
         design,
     )
@@ -285,7 +285,7 @@ def test_one_case_runs_whole(monkeypatch, tmp_path):
     design = variant_design(25, 50, CatalogueFile.load().variants[0])
     task = CatalogueTask(name="p", kind="path", design=design, torques=torques_of(row))
     found = run_task(task)
-    K = stiffnesses(rubbed(found, design), row)
+    K = stiffnesses(friction_of_path(found, design), row)
     assert K[0] < K[1] < K[2]
     assert run_task(task) == found
 

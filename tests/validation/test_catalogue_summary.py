@@ -17,8 +17,8 @@ from swgjoint.validation.catalogue.printed import catalogue_row
 from swgjoint.validation.catalogue.rows import ratcheting_rows
 from swgjoint.validation.catalogue.shares import scatter, single_stiffnesses
 from swgjoint.validation.catalogue.summary import (
+    compare_scaling,
     ratcheting_orders,
-    scaled_against_computed,
     summary,
 )
 from swgjoint.validation.rows import StudyOptions
@@ -146,10 +146,10 @@ def test_what_is_scaled_stands_over_what_is_computed():
         "accuracy 14 80": error | {"error_rad": (2e-4 * np.cos(2 * theta)).tolist()},
     }
     file = CatalogueFile.load()
-    lines = scaled_against_computed(file, found, 25, (14, 80))
+    lines = compare_scaling(file, found, 25, (14, 80))
     # 1000 x 0.56^3 = 175.616; 1.4 / 0.56 / 2 = 1.25
     assert [line.split(": ")[-1] for line in lines] == ["1.250", "1.250"]
-    assert scaled_against_computed(file, {}, 25, (14, 80)) == []
+    assert compare_scaling(file, {}, 25, (14, 80)) == []
 
 
 @pytest.mark.parametrize("seed", range(2))

@@ -15,7 +15,7 @@ from swgjoint.fe.meshing_run import MeshingStep
 from swgjoint.gear.design.design import Design
 from swgjoint.validation.thesis import record
 from swgjoint.validation.thesis.cases import KINDS
-from swgjoint.validation.thesis.record import RunSpec, compute, recorded
+from swgjoint.validation.thesis.record import RunSpec, compute, record_run
 from swgjoint.validation.thesis.stress_places import StressPlaces
 
 SHORT = RunSpec(
@@ -93,15 +93,15 @@ def test_resumes_from_the_cache(cache_here, monkeypatch):
         return short()
 
     monkeypatch.setattr(record, "compute", counted)
-    first = recorded(SHORT)
-    assert recorded(SHORT) == first == short()
+    first = record_run(SHORT)
+    assert record_run(SHORT) == first == short()
     assert len(calls) == 1
     (entry,) = cache_here.iterdir()
     entry.write_text(entry.read_text()[:100])
-    assert recorded(SHORT) == first
+    assert record_run(SHORT) == first
     assert len(calls) == 2
     monkeypatch.setenv("SWGJOINT_CACHE", "")
-    recorded(SHORT)
+    record_run(SHORT)
     assert len(calls) == 3
 
 

@@ -8,7 +8,7 @@ import pytest
 from messages import names, naming
 
 from swgjoint.errors import InputError
-from swgjoint.faults import validated
+from swgjoint.faults import validate
 from swgjoint.validation.rows import StudyOptions
 from swgjoint.validation.thesis import record
 from swgjoint.validation.thesis.cases import KINDS, StudyFile
@@ -54,7 +54,7 @@ def folders(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def study():
-    return validated(StudyFile, TINY, where="tiny")
+    return validate(StudyFile, TINY, where="tiny")
 
 
 @pytest.fixture(scope="module")
@@ -133,7 +133,7 @@ def test_increase_with_torque(study, folders, monkeypatch):
     monkeypatch.setenv("SWGJOINT_CACHE", str(folders[0]))
     low = {**TINY["group"][0], "cases": [{"value": 1.0}], "lowest": {}}
     high = {**low, "id": "high", "torque_Nm": 200.0, "over": "sweep"}
-    tiny = validated(StudyFile, {**TINY, "group": [low, high]}, where="tiny")
+    tiny = validate(StudyFile, {**TINY, "group": [low, high]}, where="tiny")
     rows = run_cases(tiny, StudyOptions()).rows
     assert [row.more["part"] for row in rows] == ["sweep"] * 3 + ["high"] * 4
     before, after, increase = rows[2], rows[5], rows[6]
@@ -146,7 +146,7 @@ def test_increase_with_torque(study, folders, monkeypatch):
     with pytest.raises(
         InputError, match=naming("group[1].over", "'nothing'", "group of", "keys")
     ):
-        validated(StudyFile, {**TINY, "group": [low, high]}, where="tiny")
+        validate(StudyFile, {**TINY, "group": [low, high]}, where="tiny")
 
 
 def test_files(result, folders):
@@ -187,7 +187,7 @@ def test_finer_meshes(study, monkeypatch):
     group = {**TINY["group"][0], "converge": True, "cases": [{"value": 1.0}]}
     group["lowest"] = {}
     finer = {"refinements": [2], "fine_positions": 1, "group": [group]}
-    tiny = validated(StudyFile, {**TINY, **finer}, where="tiny")
+    tiny = validate(StudyFile, {**TINY, **finer}, where="tiny")
     found = {row.more["kind"]: row for row in run_cases(tiny, StudyOptions()).rows}
     assert set(found) == set(KINDS)
     row = found["tensile"]

@@ -14,7 +14,7 @@ from swgjoint.view.recording.drive_markers import (
     RADIUS,
     housing_radius,
     load_color,
-    turned_to,
+    rotation_to,
 )
 from swgjoint.view.recording.entities import pose_rows
 from swgjoint.view.recording.joint_pictures import (
@@ -128,7 +128,7 @@ def test_collars_stand_out_of_the_housings(arm):
 def test_a_collar_lies_about_the_axis():
     """The turn takes z into the axis of the joint."""
     for axis in np.array([[0, 0, 1], [0, 1, 0], [1, 0, 0], [0.6, 0, -0.8]]):
-        x, y, z, w = turned_to(axis)
+        x, y, z, w = rotation_to(axis)
         turned = np.zeros(3)
         mujoco.mju_rotVecQuat(turned, np.array([0.0, 0, 1]), np.array([w, x, y, z]))
         np.testing.assert_allclose(turned, axis, atol=1e-12)

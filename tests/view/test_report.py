@@ -17,7 +17,7 @@ from swgjoint.view.report.plots import envelope
 from swgjoint.view.report.report import Cell, Table, write_report
 from swgjoint.view.run import run_scene
 from swgjoint.view.validity import STEP_KEYS, _same_orders, step_error
-from swgjoint.view.words import shown, words
+from swgjoint.view.words import format_figure, words
 
 SHORT = {"simulation.duration_s": 1.0, "trajectory.settle_s": 0.2}
 VOID = {"meta", "link", "img", "br", "hr", "input"}
@@ -129,7 +129,7 @@ def test_figures_are_those_of_the_metrics(run, tmp_path):
         figures["ratings"]["peak_Nm"],
         run.assembly.transmissions[0].drive.spec_sheet(("K1_Nm_rad",))["K1_Nm_rad"],
     ):
-        assert shown(value) in page.texts
+        assert format_figure(value) in page.texts
 
 
 def test_every_run_has_its_label_and_error_estimate(written):
@@ -213,7 +213,9 @@ def test_figures_read_as_people_write_them():
     """Units come from the key; thousands are grouped; small ones keep their digits."""
     assert words("K1_Nm_rad") == ("K1", "N·m/rad")
     assert words("radial_stiffness_N_mm") == ("radial stiffness", "N/mm")
-    assert [shown(v) for v in (None, True, 940884.8, 0.0, 3.14159, 2e-6, "x")] == [
+    assert [
+        format_figure(v) for v in (None, True, 940884.8, 0.0, 3.14159, 2e-6, "x")
+    ] == [
         "-",
         "yes",
         "940,900",
@@ -233,8 +235,8 @@ def test_figures_of_a_map_that_misses_unseen_solves_are_marked(synthetic_map, tm
     path = write_report({"": run}, tmp_path / "report.html", check_step=False)
     texts = Page(path.read_text(encoding="utf-8")).texts
     figures = run.metrics()["joints"]["joint"]
-    assert f"! {shown(figures['ripple_rms_percent'])}" in texts
-    assert f"~ {shown(figures['transmission_error_arcmin']['pp'])}" in texts
+    assert f"! {format_figure(figures['ripple_rms_percent'])}" in texts
+    assert f"~ {format_figure(figures['transmission_error_arcmin']['pp'])}" in texts
     assert any(names(text, "NOT VALID", "joint", "50 %", "20 N·m") for text in texts)
     assert any(names(text, "! not valid", "30 %") for text in texts)
     (error,) = [text for text in texts if text.startswith("validated")]

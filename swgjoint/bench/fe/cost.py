@@ -27,8 +27,8 @@ from typing import Any
 
 from swgjoint.bench.fe.rows import BOUNDS, QUANTITIES, cheapest, rows_of, seconds
 from swgjoint.bench.fe.setting import POSITIONS, FeSetting, Found
-from swgjoint.bench.fe.solve import SettingTask, solved_in
-from swgjoint.bench.fe.stored import FILE, LONG, stored_of, to_store, told
+from swgjoint.bench.fe.solve import SettingTask, solve_in_process
+from swgjoint.bench.fe.stored import FILE, LONG, describe_stored, load_stored, to_store
 from swgjoint.errors import ComputationError, DesignError
 from swgjoint.fe.solid.drive3d import check_modelled
 from swgjoint.files import Outputs
@@ -104,7 +104,7 @@ def run_fe_cost(
             " [cup]; accepted: a design with one, such as reference-3d-modified"
         )
     check_modelled(design)
-    kept = {} if recompute else stored_of(design)
+    kept = {} if recompute else load_stored(design)
     stored = kept.get("settings", {})
     found: dict[str, Found | str] = {
         s.key: stored.get(s.key, LEFT_OUT)
@@ -126,7 +126,7 @@ def run_fe_cost(
         "rows": rows,
         "cheapest": cheapest(rows),
         "cheapest_in_the_plane": cheapest(rows, "2d"),
-        "stored": told(kept, found) if kept else None,
+        "stored": describe_stored(kept, found) if kept else None,
         "left_out": left_out,
         "kinematic_error_positions": POSITIONS,
         "provenance": provenance(),
@@ -180,7 +180,7 @@ def _solved_apart(task: SettingTask) -> Found | str:
     context = get_context("spawn")
     with ProcessPoolExecutor(max_workers=1, mp_context=context) as process:
         try:
-            return process.submit(solved_in, task).result()
+            return process.submit(solve_in_process, task).result()
         except BrokenProcessPool:
             return LOST
         except MemoryError:

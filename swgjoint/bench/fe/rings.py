@@ -14,13 +14,13 @@ from swgjoint.bench.fe.setting import (
     Array,
     FeSetting,
     Found,
-    checked,
     mean_of,
     positions,
+    require_equilibrium,
     rim_shape,
 )
 from swgjoint.fe.rings.equilibrium import RingSolver
-from swgjoint.fe.rings.loading import SMALL, loaded, unloaded
+from swgjoint.fe.rings.loading import SMALL, solve_loaded, solve_unloaded
 from swgjoint.fe.rings.model import ThinRing, thin_ring
 from swgjoint.fe.rings.state import RingState
 from swgjoint.gear.catalogue import ratings_of
@@ -32,7 +32,7 @@ from swgjoint.gear.wave_generators.wave_generator import lobe_height
 from swgjoint.units import mm
 
 
-def solved_by_rings(design: Design, setting: FeSetting, begin: float) -> Found:
+def solve_by_rings(design: Design, setting: FeSetting, begin: float) -> Found:
     """What rings or closed forms say of a design; ``begin``: of the setting [s]."""
     if not setting.refinement:
         return _closed_form(design, begin)
@@ -53,13 +53,13 @@ def solved_by_rings(design: Design, setting: FeSetting, begin: float) -> Found:
     series, shape = series_compliance(design, cup=True), np.zeros(RIM)
     error, compliance, tensile = list[float](), list[float](), list[float]()
     for angle in positions(design):
-        rest = unloaded(model, float(angle))
-        sides = [loaded(model, rest, t * SMALL * rated) for t in (1.0, -1.0)]
-        psi = 0.5 * sum(checked(side).rotation for side in sides)
-        middle = checked(solver(model, rest, rotation=psi))
+        rest = solve_unloaded(model, float(angle))
+        sides = [solve_loaded(model, rest, t * SMALL * rated) for t in (1.0, -1.0)]
+        psi = 0.5 * sum(require_equilibrium(side).rotation for side in sides)
+        middle = require_equilibrium(solver(model, rest, rotation=psi))
         if middle.loaded_teeth:
-            middle = checked(solver(model, middle, torque=0.0))
-        state = checked(loaded(model, sides[0], rated))
+            middle = require_equilibrium(solver(model, middle, torque=0.0))
+        state = require_equilibrium(solve_loaded(model, sides[0], rated))
         if not error:
             place: Array = np.arange(4 * count, dtype=np.float64) / 4.0
             points, _, _ = model.rim.at(state.q[: model.rim.size], place)

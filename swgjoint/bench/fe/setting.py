@@ -89,7 +89,7 @@ class Found:
     """Of one sector of the flexspline."""
 
 
-def checked(state: AnyState) -> AnyState:
+def require_equilibrium(state: AnyState) -> AnyState:
     """The state, if it is an equilibrium.
 
     Raises:

@@ -10,15 +10,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from swgjoint.bench.fe.rings import solved_by_rings
+from swgjoint.bench.fe.rings import solve_by_rings
 from swgjoint.bench.fe.setting import (
     RIM,
     Array,
     FeSetting,
     Found,
-    checked,
     mean_of,
     positions,
+    require_equilibrium,
     rim_shape,
 )
 from swgjoint.errors import ComputationError, DesignError
@@ -47,11 +47,11 @@ class SettingTask:
     setting: FeSetting
 
 
-def solved_in(task: SettingTask) -> Found | str:
+def solve_in_process(task: SettingTask) -> Found | str:
     """A setting in a process that has done nothing else, or why it has no solution."""
     cpu = time.process_time()
     try:
-        found = solved(task.design, task.setting)
+        found = solve_setting(task.design, task.setting)
     except (ComputationError, DesignError) as failure:
         return str(failure)
     return replace(found, cpu_s=time.process_time() - cpu, peak_MB=peak_memory() / 1e6)
@@ -63,7 +63,7 @@ def peak_memory() -> float:
     return float(peak if sys.platform == "darwin" else 1024 * peak)
 
 
-def solved(design: Design, setting: FeSetting) -> Found:
+def solve_setting(design: Design, setting: FeSetting) -> Found:
     """What a setting says of a design.
 
     Raises:
@@ -72,7 +72,7 @@ def solved(design: Design, setting: FeSetting) -> Found:
     """
     begin = time.perf_counter()
     if setting.model == "ring":
-        return solved_by_rings(design, setting, begin)
+        return solve_by_rings(design, setting, begin)
     changed = design.with_changes({"mesh.refinement": setting.refinement})
     # on the rigid wave generator that the levels in space have
     half = can_halve(changed, bearing=False) and not setting.full
@@ -124,7 +124,8 @@ def _measured(
     """
     rated, theta = ratings_of(design).rated_torque, positions(design)
     rest = follow.unloaded(
-        checked(follow.meshed(checked(follow.deflected()))), SMALL * rated
+        require_equilibrium(follow.meshed(require_equilibrium(follow.deflected()))),
+        SMALL * rated,
     )
     state = follow.to_torque(rest.state if rest.sides is None else rest.sides[0], rated)
     error, compliance, tensile, shape = [], [], [], np.zeros(RIM)
@@ -132,8 +133,8 @@ def _measured(
         if k:
             rest = follow.unloaded_to(rest, float(angle))
             state = follow.to_angle(state, float(angle))
-        checked(rest.state)
-        checked(state)
+        require_equilibrium(rest.state)
+        require_equilibrium(state)
         if not k:
             shape = rim(state)
         error.append(follow.output_angle(rest.state) - angle / design.ratio)

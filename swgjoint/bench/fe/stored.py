@@ -35,7 +35,7 @@ class _Stored:
     settings: dict[str, dict[str, float | list[float] | None]]
 
 
-def stored_of(design: Design, path: Path | None = None) -> dict[str, Any]:
+def load_stored(design: Design, path: Path | None = None) -> dict[str, Any]:
     """Stored settings of a design, empty if the file is of another one."""
     path = path or models_path() / "studies" / FILE
     kept = read_kept(path, _read)
@@ -73,7 +73,9 @@ def to_store(design: Design, found: dict[str, Found | str]) -> dict[str, Any]:
     }
 
 
-def told(kept: dict[str, Any], found: dict[str, Found | str]) -> dict[str, Any]:
+def describe_stored(
+    kept: dict[str, Any], found: dict[str, Found | str]
+) -> dict[str, Any]:
     """Provenance of the file, how far its witness is from today's, and how much faster.
 
     ``pace`` is CPU time of the witness today over that in the file.

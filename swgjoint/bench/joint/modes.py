@@ -39,7 +39,7 @@ _STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
 _CHANGE = {"q": 1e-6, "v": 1e-4, "act": 1e-6, "plugin": 1e-1}
 
 
-def released(whole: Assembly) -> Assembly:
+def release_motors(whole: Assembly) -> Assembly:
     """The same with the motors' torque at the start in place of their loops.
 
     Loops with an integral or a torque-speed line stay.
@@ -159,7 +159,7 @@ def numerical_damping(whole: Assembly) -> list[tuple[float, float, float]]:
     A mode at the scene's step is the one of the nearest shape. Where steps leave a mode
     no oscillation, they add what is missing to a damping ratio of one.
     """
-    free = released(whole)
+    free = release_motors(whole)
     stepped = modes(free)
     own = own_modes(free)
     alike = np.abs(own.shape.conj().T @ stepped.shape)

@@ -152,7 +152,9 @@ def run_scaling(
             progress("sizes", len(rows), total)
     result: dict[str, Any] = {
         "rows": rows,
-        "fits": [fit for sweep in sweeps if (fit := fitted(sweep, rows)) is not None],
+        "fits": [
+            fit for sweep in sweeps if (fit := fit_exponent(sweep, rows)) is not None
+        ],
         "provenance": provenance(),
     }
     files: list[str] = []
@@ -165,7 +167,9 @@ def run_scaling(
     return result | {"files": files, "wall_s": time.perf_counter() - begin}
 
 
-def fitted(sweep: SizeSweep, rows: Sequence[dict[str, Any]]) -> dict[str, Any] | None:
+def fit_exponent(
+    sweep: SizeSweep, rows: Sequence[dict[str, Any]]
+) -> dict[str, Any] | None:
     """Least squares of the logarithms; None with fewer than two sizes."""
     used = [r for r in rows if r["sweep"] == sweep.name and r["seconds"]]
     used = [r for r in used if r["size"] >= sweep.from_size]

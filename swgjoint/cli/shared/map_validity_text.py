@@ -39,7 +39,7 @@ def validation_table(result: dict[str, Any]) -> list[str]:
     ]
 
 
-def marked(result: dict[str, Any], key: str) -> Any:
+def mark_figure(result: dict[str, Any], key: str) -> Any:
     """A figure of a spec sheet, marked where its map misses unseen solves."""
     from swgjoint.maps.sheet.validity_marks import mark
 

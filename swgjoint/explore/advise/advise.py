@@ -17,7 +17,7 @@ from swgjoint.drives.references import drive_of
 from swgjoint.errors import ComputationError, InputError
 from swgjoint.explore.advise.bound import ErrorBound
 from swgjoint.explore.advise.reference import settle
-from swgjoint.explore.advise.search import SettingSearch, advised
+from swgjoint.explore.advise.search import SettingSearch, choose_row
 from swgjoint.joint.attach import LEVELS
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.progress import Progress, silent
@@ -76,7 +76,7 @@ def advise(
         mujoco.set_mju_user_warning(None)
     tried = [row for row in rows if row["error"] is not None]
     best = min(tried, key=lambda row: float(row["error"]), default=None)
-    found = advised(rows)
+    found = choose_row(rows)
     if found is None:
         what = (
             "no setting runs"

@@ -37,7 +37,7 @@ FEWEST = {"discrete": 0.4, "RK4": 1.5}
 """Cost of a setting at 1 ms at the least, before it was measured: tried in order."""
 
 
-def advised(rows: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
+def choose_row(rows: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
     """Of the rows within the bound the cheapest; None if there is none.
 
     Of those that cost as much (:data:`ALIKE`) the lowest level, then the smallest

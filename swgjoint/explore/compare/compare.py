@@ -210,7 +210,7 @@ def compare(
         row = row_of(name, run, drive, level=level, of=joints)
         row = replace(row, von_mises_MPa=stress, fatigue_safety_factor=safety)
         row = replace(row, wall_s=time.perf_counter() - begin)
-        rows.append(replace(row, missed=missed(row, spec or {})))
+        rows.append(replace(row, missed=missed_limits(row, spec or {})))
         progress("compared", number + 1, len(arguments))
     return rows
 
@@ -219,7 +219,7 @@ def _is_design(reference: str) -> bool:
     return isinstance(find_drive(reference), Design)
 
 
-def missed(row: Compared, spec: Mapping[str, float]) -> tuple[str, ...]:
+def missed_limits(row: Compared, spec: Mapping[str, float]) -> tuple[str, ...]:
     """Limits that a row does not keep: figures not known or not valid among them.
 
     A level without compliance keeps every lower limit of the stiffness.

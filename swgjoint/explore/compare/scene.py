@@ -32,7 +32,7 @@ def scene_or_arm(reference: str, overrides: Iterable[str] = ()) -> Scene:
     return Scene.load_file(reference, overrides)
 
 
-def resolved(
+def resolve_step(
     scene: Scene, arguments: Iterable[str], joints: Sequence[str] = ()
 ) -> Scene:
     """The scene at a step that carries the ripple of every drive that is compared.

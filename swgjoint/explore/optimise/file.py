@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
-from swgjoint.explore.sweep.file import SweepFile, anchored, lying_in
+from swgjoint.explore.sweep.file import SweepFile, anchor_files, path_in_folder
 from swgjoint.explore.sweep.keys import BASE
 from swgjoint.explore.sweep.plan import List, Parameter, SearchPlan, plan_faults
 from swgjoint.explore.sweep.tasks import (
@@ -18,7 +18,7 @@ from swgjoint.explore.sweep.tasks import (
     Text,
     task_faults,
 )
-from swgjoint.faults import Fault, Section, read_toml, unit_of, validated
+from swgjoint.faults import Fault, Section, read_toml, unit_of, validate
 from swgjoint.models_path import find
 
 REFINEMENT = "mesh.refinement"
@@ -127,8 +127,8 @@ class OptimisationFile(AskedFile):
         """
         path = find(reference, "optimisations", ".toml", what="optimisation")
         data = read_toml(path, what="optimisation")
-        file = anchored(validated(cls, data, where=str(path)), path.parent)
-        beside = tuple(lying_in(path.parent, name) for name in file.beside)
+        file = anchor_files(validate(cls, data, where=str(path)), path.parent)
+        beside = tuple(path_in_folder(path.parent, name) for name in file.beside)
         return file.model_copy(update={"beside": beside})
 
     def violations(self, figures: Mapping[str, float | None]) -> dict[str, float]:

@@ -68,7 +68,7 @@ def _beaten(values: Array, k: int) -> bool:
     return bool(np.any(no_worse & np.any(values < values[k], axis=1)))
 
 
-def spread(values: Array, count: int) -> list[int]:
+def pick_spread(values: Array, count: int) -> list[int]:
     """Rows that are the best of every column, then those farthest from the chosen."""
     width = np.ptp(values, axis=0)
     scaled = values / np.where(width > 0.0, width, 1.0)

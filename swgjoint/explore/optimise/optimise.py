@@ -19,7 +19,7 @@ from swgjoint.explore.optimise.front import (
     front_of,
     not_worse,
     objectives_of,
-    spread,
+    pick_spread,
 )
 from swgjoint.explore.optimise.search import search
 from swgjoint.explore.sweep.figures import LOST
@@ -211,7 +211,7 @@ def optimise(
             f" {tried[0].record.reason or 'beyond a limit'}"
         )
     if file.confirm is not None:
-        chosen = spread(objectives_of(file, front), file.confirm.designs)
+        chosen = pick_spread(objectives_of(file, front), file.confirm.designs)
         columns = {
             name: [front[k].values[name] for k in chosen] for name in front[0].values
         }

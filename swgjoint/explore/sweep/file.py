@@ -11,7 +11,7 @@ from pydantic import model_validator
 from swgjoint.explore.sweep.keys import is_path
 from swgjoint.explore.sweep.plan import AnyPlan, Plan, plan_faults
 from swgjoint.explore.sweep.tasks import AskedFile, task_faults
-from swgjoint.faults import Fault, read_toml, validated
+from swgjoint.faults import Fault, read_toml, validate
 from swgjoint.models_path import find
 
 
@@ -38,7 +38,7 @@ class SweepFile(AskedFile):
         """
         path = find(reference, "sweeps", ".toml", what="sweep")
         data = read_toml(path, what="sweep")
-        return anchored(validated(cls, data, where=str(path)), path.parent)
+        return anchor_files(validate(cls, data, where=str(path)), path.parent)
 
 
 class _Planned(Protocol):
@@ -58,20 +58,24 @@ class _Planned(Protocol):
 Planned = TypeVar("Planned", bound=_Planned)
 
 
-def anchored(file: Planned, folder: Path) -> Planned:
+def anchor_files(file: Planned, folder: Path) -> Planned:
     """The file with those that it names relative to a folder."""
     parameters = tuple(
-        p.model_copy(update={"values": tuple(lying_in(folder, v) for v in p.values)})
+        p.model_copy(
+            update={"values": tuple(path_in_folder(folder, v) for v in p.values)}
+        )
         if p.values is not None and any(map(is_path, p.keys))
         else p
         for p in file.plan.parameters
     )
     plan = file.plan.model_copy(update={"parameters": parameters})
-    bases = {key: lying_in(folder, getattr(file, key)) for key in ("design", "scene")}
+    bases = {
+        key: path_in_folder(folder, getattr(file, key)) for key in ("design", "scene")
+    }
     return file.model_copy(update={**bases, "plan": plan})
 
 
-def lying_in(folder: Path, value: Any) -> Any:
+def path_in_folder(folder: Path, value: Any) -> Any:
     """The path of a file in the folder; whatever names none as it is."""
     if isinstance(value, str) and os.path.isfile(folder / value):
         return str((folder / value).resolve())

@@ -11,9 +11,9 @@ from typing import Any, Protocol
 
 from swgjoint.errors import InputError, MissingExtraError
 from swgjoint.explore.sweep.figures import Record
-from swgjoint.files import attempting, output_folder, read_regular, write_whole
+from swgjoint.files import attempt_output, output_folder, read_regular, write_whole
 from swgjoint.json_text import json_text
-from swgjoint.store import DamagedError, ignored, json_content, json_file
+from swgjoint.store import DamagedError, json_content, json_file, warn_ignored
 
 
 class ResultStore(Protocol):
@@ -99,7 +99,7 @@ class Remote:
         return data
 
     def write(self, name: str, data: bytes) -> str:
-        """See :class:`ResultStore`; moved into place, as not every system writes whole."""
+        """See :class:`ResultStore`; moved into place, as not all systems write whole."""
         target = f"{self._root}/{name}"
         folder, _, last = target.rpartition("/")
         beside = f"{folder}/.{last}.{secrets.token_hex(4)}"
@@ -126,7 +126,7 @@ def read_record(place: ResultStore, key: str) -> Record | None:
     try:
         return json_content(data, Record)
     except DamagedError as error:
-        ignored(place.at(_name(key)), error)
+        warn_ignored(place.at(_name(key)), error)
         return None
 
 
@@ -151,7 +151,7 @@ def write_to(
     """
     files: list[str] = []
     for name, make in outputs.items():
-        with attempting(place.at(name)):
+        with attempt_output(place.at(name)):
             data = make()
             if data is not None:
                 files.append(place.write(name, data))

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from swgjoint.control.motor_side import MotorPlan
 from swgjoint.errors import InputError
-from swgjoint.explore.tune.gains import Tunable, build, parts_of, weighted
+from swgjoint.explore.tune.gains import Tunable, build, parts_of, weight_plan
 from swgjoint.sim.controller import KnownJoints, ReadingAge, Task
 from swgjoint.units import arcmin
 
@@ -201,4 +201,6 @@ class Trials:
         )
         if tunable.name not in self._plans:
             self._plans[tunable.name] = parts_of(tunable, few)
-        return weighted(self._plans[tunable.name], few, each, repeats=self.candidates)
+        return weight_plan(
+            self._plans[tunable.name], few, each, repeats=self.candidates
+        )

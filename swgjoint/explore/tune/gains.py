@@ -197,7 +197,7 @@ def parts_of(tunable: Tunable, task: Task) -> tuple[MotorPlan, MotorPlan]:
     )
 
 
-def weighted(
+def weight_plan(
     parts: tuple[MotorPlan, MotorPlan],
     task: Task,
     values: Mapping[str, Array],

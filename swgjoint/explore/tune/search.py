@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from swgjoint.errors import InputError, MissingExtraError
 from swgjoint.files import read_regular, write_whole
-from swgjoint.store import arrays_content, arrays_file, told
+from swgjoint.store import arrays_content, arrays_file, one_line
 
 Array = NDArray[np.float64]
 Evaluate = Callable[[Array], Array]
@@ -253,7 +253,7 @@ def read_journal(
         ) from None
     except Exception as error:  # a file may be anything
         raise InputError(
-            f"{path} is no journal of a tuning run: {told(error)}; accepted: another"
+            f"{path} is no journal of a tuning run: {one_line(error)}; accepted: another"
             " --out"
         ) from None
     for key, value in header.items():

@@ -24,7 +24,7 @@ def respond(offsets: Index, blocks: Array, force: Array) -> Array:
     return result
 
 
-def between(
+def contact_compliance(
     offsets: Index, blocks: Array, tooth: Index, weight: Array, teeth: int
 ) -> Array:
     """Compliance between contact points (n, n) [m/N].

@@ -35,7 +35,7 @@ def half_length(stations: Array) -> float:
     return float(stations[-1] - stations[0]) / PATCH_PARTS
 
 
-def averaged_spline(stations: Array, half: float | None = None) -> CubicSpline:
+def average_spline(stations: Array, half: float | None = None) -> CubicSpline:
     """Weights of the flank nodes in the displacement averaged around an arc length.
 
     Beyond the ends of the flank its displacement goes on by odd reflection, so that

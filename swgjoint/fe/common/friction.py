@@ -219,7 +219,7 @@ class Sliding:
         return result, rows(offset) + kept[:, n:lines] @ self.fixed
 
 
-def dissipated(
+def dissipated_work(
     friction: CoulombFriction, history: SlipHistory | None, now: SlipHistory
 ) -> float:
     """Work of friction over a step [J]; never negative.

@@ -235,7 +235,7 @@ class Gaps:
     """Which carry force (n,)."""
 
 
-def pivoted(
+def pivot_system(
     system: Array,
     offset: Array,
     gaps: Gaps,

@@ -15,7 +15,7 @@ from swgjoint.errors import ComputationError
 from swgjoint.fe.common.pattern import Effort, Pattern, solve_pattern
 from swgjoint.fe.common.stress_state import stress_state_label
 from swgjoint.fe.plane.continuation import Continuation
-from swgjoint.fe.plane.drive2d import carries_bearing, left_out, ring_model
+from swgjoint.fe.plane.drive2d import carries_bearing, ring_model, unmodelled_parts
 from swgjoint.fe.plane.equilibrium import NewtonSolver
 from swgjoint.fe.plane.shape_fields import drive_fields, plane_fields, plane_surface
 from swgjoint.fe.solid.continuation import SolidContinuation
@@ -207,7 +207,7 @@ def sample_map(
                 if model == "2d" and design.cup is not None
                 else None,
                 "bearing": "balls at rest on the cam, their passage left out"
-                if model == "2d" and on_bearing(design)
+                if model == "2d" and maps_bearing(design)
                 else None,
                 "stress_state": stress_state_label(design) if model == "2d" else None,
                 "springs_Nm_rad": springs_of(design),
@@ -215,7 +215,9 @@ def sample_map(
                 if design.friction.tooth_coefficient
                 else None,
                 "tolerances": _named(design),
-                "left_out": left_out(design, model, bearing=on_bearing(design)),
+                "left_out": unmodelled_parts(
+                    design, model, bearing=maps_bearing(design)
+                ),
             },
             "ratings_source": ratings.source,
             "truncated": found.truncated,
@@ -263,7 +265,7 @@ def effort_of(
 
 def follower_in_plane(design: Design) -> Continuation:
     """The drive in the plane as maps sample it, its teeth perfect."""
-    perfect, bearing = without_errors(design), on_bearing(design)
+    perfect, bearing = without_errors(design), maps_bearing(design)
     return Continuation(
         model=ring_model(
             perfect,
@@ -287,7 +289,7 @@ def _in_space(design: Design) -> SolidContinuation:
     )
 
 
-def on_bearing(design: Design) -> bool:
+def maps_bearing(design: Design) -> bool:
     """Whether a map of the plane carries the bearing of the wave generator.
 
     Errors are superposed on a rigid wave generator: a map with them is of that drive.

@@ -17,7 +17,7 @@ from swgjoint.fe.common.contact_changes import ContactChanges
 from swgjoint.fe.common.following import AnyState, Follower, Unloaded
 from swgjoint.fe.common.load_path import LoadPath
 from swgjoint.fe.common.torque_choice import common_torques, periodic, unseen_parts
-from swgjoint.fe.plane.state_arrays import packed, settled, unpacked
+from swgjoint.fe.plane.state_arrays import copy_contiguous, pack, unpack
 from swgjoint.maps.samples import FullSolves
 from swgjoint.maps.unfinished import Unfinished
 
@@ -266,10 +266,10 @@ class ColumnGrid(Generic[AnyState]):
             there = self.keep.read(name, partial(self._taken, theta, torque))
             if there is not None:
                 return cast(T, there[0])
-        found = settled(solve())
+        found = copy_contiguous(solve())
         if self.keep is not None:
             at = {"theta": theta, "torque": torque}
-            self.keep.write(name, at | packed(found, _STATE))
+            self.keep.write(name, at | pack(found, _STATE))
         return found
 
     def _taken(
@@ -282,7 +282,7 @@ class ColumnGrid(Generic[AnyState]):
         """
         if (float(arrays["theta"]), float(arrays["torque"])) != (theta, torque):
             raise ValueError("an equilibrium at another angle or torque")
-        found: Any = unpacked(arrays, _STATE)
+        found: Any = unpack(arrays, _STATE)
         if isinstance(found, Unloaded) != (torque == 0.0):
             raise ValueError("no equilibrium of this torque")
         states = [found] if torque else [found.state, *(found.sides or ())]

@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from swgjoint.fe.common.block_circulant import between, respond
+from swgjoint.fe.common.block_circulant import contact_compliance, respond
 from swgjoint.fe.common.cyclic import CyclicFactor
-from swgjoint.fe.plane.corotation import rotate, turned
+from swgjoint.fe.plane.corotation import rotate, rotate_right_angle
 from swgjoint.fe.plane.superelement import Superelement
 from swgjoint.gear.teeth.profile import ToothProfile
 
@@ -51,7 +51,7 @@ class Compliance:
         """Skeleton displacement in the frames of the teeth (N, 2 n_a) [m]."""
         return respond(self.offsets, self.skeleton, force)
 
-    def between(self, tooth: Index, weight: Array, teeth: int) -> Array:
+    def contact_compliance(self, tooth: Index, weight: Array, teeth: int) -> Array:
         """Compliance between contact points (n, n) [m/N].
 
         Args:
@@ -59,7 +59,7 @@ class Compliance:
             weight: Derivative of its gap by the flank displacement (n, 2 n_b).
             teeth: Teeth in the model.
         """
-        return between(self.offsets, self.flank, tooth, weight, teeth)
+        return contact_compliance(self.offsets, self.flank, tooth, weight, teeth)
 
 
 def ring_compliance(element: Superelement, *, free_rim: bool = False) -> Compliance:
@@ -130,7 +130,9 @@ def _rigid_modes(skeleton: Array, teeth: int) -> Array:
     shifts = [
         np.broadcast_to(rotate(axis, -angle)[:, None], shape) for axis in np.eye(2)
     ]
-    return np.stack([*shifts, np.broadcast_to(turned(skeleton), shape)], axis=-1)
+    return np.stack(
+        [*shifts, np.broadcast_to(rotate_right_angle(skeleton), shape)], axis=-1
+    )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from swgjoint.fe.common.cyclic import CyclicFactor
 from swgjoint.fe.common.indentation import Strips
-from swgjoint.fe.common.influence import Gaps, Influence, pivoted
-from swgjoint.fe.plane.corotation import turned
+from swgjoint.fe.common.influence import Gaps, Influence, pivot_system
+from swgjoint.fe.plane.corotation import rotate_right_angle
 from swgjoint.fe.plane.linearise import Linearised
 from swgjoint.fe.plane.ring import RingModel
 from swgjoint.fe.plane.state import State
@@ -110,7 +110,7 @@ class CondensedRing:
             )
         system[n, n] -= 1.0 / ring.anchor_stiffness
         # the circular spline turns towards the teeth with a lever arm
-        arm = np.einsum("ki,ki->k", turned(contacts.point), contacts.normal)
+        arm = np.einsum("ki,ki->k", rotate_right_angle(contacts.point), contacts.normal)
         system[:n, n + 2] = system[n + 2, :n] = -arm
         # gaps as if the tooth forces of the state were gone
         old = np.einsum("kb,kb->k", local, state.flank_force[contacts.sector])
@@ -163,7 +163,7 @@ class CondensedRing:
         model, state, contacts = self.model, self.state, self.contacts
         system, offset = self._system(supports)
         n, m = len(contacts), len(contacts) + len(supports.intervals.sector)
-        return pivoted(
+        return pivot_system(
             system,
             offset,
             Gaps(

@@ -34,7 +34,7 @@ def rotate(vectors: Array, angle: Array | float) -> Array:
     return np.stack([cos * x - sin * y, sin * x + cos * y], axis=-1)
 
 
-def turned(vectors: Array) -> Array:
+def rotate_right_angle(vectors: Array) -> Array:
     """Rotate plane vectors by a right angle: J v."""
     return np.stack([-vectors[..., 1], vectors[..., 0]], axis=-1)
 
@@ -83,7 +83,7 @@ def sector_frames(
     seen = rotate(positions, -place[:, None])
     n = len(positions)
     if fixed is None:
-        cross = np.einsum("ci,sci->s", turned(x_c), seen[:, faces])
+        cross = np.einsum("ci,sci->s", rotate_right_angle(x_c), seen[:, faces])
         dot = np.einsum("ci,sci->s", x_c, seen[:, faces])
         phi = np.arctan2(cross, dot)
     else:
@@ -94,7 +94,7 @@ def sector_frames(
     gyration = np.einsum("ci,sci->s", x_c, y[:, faces])
     if fixed is None:
         # d phi = sum X_c x dy_c / C = sum (J X_c) . dy_c / C
-        spin[:, faces] = turned(x_c) / gyration[:, None, None]
+        spin[:, faces] = rotate_right_angle(x_c) / gyration[:, None, None]
     deformation = (moved - moved.mean(axis=1, keepdims=True)).reshape(n, -1)
     elongating = np.zeros_like(deformation)
     if fixed is None:
@@ -139,12 +139,14 @@ def elastic_force(element: Superelement, frames: Frames) -> Array:
     return np.asarray(force + hoop[:, None] * frames.elongating)
 
 
-def projected(frames: Frames, force: Array) -> Array:
+def project_to_frames(frames: Frames, force: Array) -> Array:
     r"""Gradient by the positions seen in the sector frame: P^T f.
 
     .. math:: P = I - (J y)\,\Gamma^T
     """
-    j_y = turned(frames.position.reshape(*force.shape[:-1], -1, 2)).reshape(force.shape)
+    j_y = rotate_right_angle(frames.position.reshape(*force.shape[:-1], -1, 2)).reshape(
+        force.shape
+    )
     return np.asarray(force - frames.spin * np.einsum("si,si->s", force, j_y)[:, None])
 
 
@@ -172,14 +174,14 @@ def tangent(element: Superelement, frames: Frames, force: Array) -> Array:
         return np.broadcast_to(element.stiffness, (n_sectors, n, n)).copy()
     stiffness = _elastic_tangent(element, frames)
     y = frames.position
-    j_y = turned(y.reshape(n_sectors, -1, 2)).reshape(n_sectors, n)
-    j_f = turned(force.reshape(n_sectors, -1, 2)).reshape(n_sectors, n)
+    j_y = rotate_right_angle(y.reshape(n_sectors, -1, 2)).reshape(n_sectors, n)
+    j_f = rotate_right_angle(force.reshape(n_sectors, -1, 2)).reshape(n_sectors, n)
     # P^T K P = K - Gamma (K Jy)^T - (K Jy) Gamma^T + (Jy K Jy) Gamma Gamma^T
     k_jy = np.einsum("sij,sj->si", stiffness, j_y)
     quadratic = np.einsum("si,si->s", j_y, k_jy) - np.einsum("si,si->s", force, y)
     moment = np.einsum("si,si->s", force, j_y)
     # Gamma = J X_c / C, hence X_c = -C J Gamma
-    x_c = -turned(gamma.reshape(n_sectors, -1, 2)).reshape(n_sectors, n)
+    x_c = -rotate_right_angle(gamma.reshape(n_sectors, -1, 2)).reshape(n_sectors, n)
     x_c *= frames.gyration[:, None]
     column = j_f - k_jy + (moment / frames.gyration)[:, None] * x_c
     column += 0.5 * quadratic[:, None] * gamma

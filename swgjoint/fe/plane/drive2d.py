@@ -97,7 +97,9 @@ def check_modelled(design: Design, model: str) -> None:
         raise DesignError("\n".join(f"{drive.name}: {fault}" for fault in faults))
 
 
-def left_out(design: Design, model: str = "2d", *, bearing: bool = True) -> str | None:
+def unmodelled_parts(
+    design: Design, model: str = "2d", *, bearing: bool = True
+) -> str | None:
     """Parts of the design that the model cannot see, for the validity label.
 
     Args:

@@ -15,9 +15,14 @@ from numpy.typing import NDArray
 from swgjoint.errors import Outcome
 from swgjoint.fe.common.complementarity import ActiveSetError, solve_mixed
 from swgjoint.fe.common.cyclic import CyclicFactor, SingularRingError
-from swgjoint.fe.common.friction import Sliding, SlipHistory, dissipated, spring_energy
+from swgjoint.fe.common.friction import (
+    Sliding,
+    SlipHistory,
+    dissipated_work,
+    spring_energy,
+)
 from swgjoint.fe.common.indentation import Strips, strain_energy
-from swgjoint.fe.plane.corotation import elastic_energy, turned
+from swgjoint.fe.plane.corotation import elastic_energy, rotate_right_angle
 from swgjoint.fe.plane.linearise import Linearised, linearise
 from swgjoint.fe.plane.race import NODE
 from swgjoint.fe.plane.ring import RingModel
@@ -246,7 +251,7 @@ def _solve_linear(
     matrix[:n, last_two] = matrix[last_two, :n].T
     matrix[n, n] -= 1.0 / ring.anchor_stiffness
     # turning the circular spline towards the teeth closes the gap by the lever arm
-    arm = np.einsum("ki,ki->k", turned(lines.point), lines.normal)
+    arm = np.einsum("ki,ki->k", rotate_right_angle(lines.point), lines.normal)
     matrix[:n, n + 1] = matrix[n + 1, :n] = -arm
     offset[n + 1] = -(load.on_ring or 0.0) / model.copies
     # gaps as if the old tooth forces were gone; the new ones bring their own share
@@ -432,8 +437,10 @@ def _finished(
     if state.contacts is not None:
         c = state.contacts
         moment = float(
-            state.tooth_force @ np.einsum("ki,ki->k", turned(c.point), c.normal)
-            + state.friction_force @ np.einsum("ki,ki->k", turned(c.point), c.tangent)
+            state.tooth_force
+            @ np.einsum("ki,ki->k", rotate_right_angle(c.point), c.normal)
+            + state.friction_force
+            @ np.einsum("ki,ki->k", rotate_right_angle(c.point), c.tangent)
         )
     energy = float(elastic_energy(model.element, frames, state.flank_force).sum())
     moved = model.ring_displacement(state)
@@ -451,14 +458,16 @@ def _finished(
         input_torque, balls = race.balls.input_torque, race.balls.force
     else:
         normal = model.wave_generator_normal(state)
-        arm = np.einsum("sqi,sqi->sq", turned(model.bore_points(state)), normal)
+        arm = np.einsum(
+            "sqi,sqi->sq", rotate_right_angle(model.bore_points(state)), normal
+        )
         input_torque = model.copies * float(np.sum(state.pressure * arm))
         layer = 0.5 * state.pressure**2 / model.stations.stiffness
         energy += model.copies * float(np.sum(layer))
     work, law = 0.0, model.friction
     if law is not None and state.candidates is not None:
         energy += model.copies * spring_energy(law, state.candidates)
-        work = dissipated(law, state.slip, state.candidates)
+        work = dissipated_work(law, state.slip, state.candidates)
         state = replace(state, slip=state.candidates)
     return replace(
         state,

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.errors import ComputationError
-from swgjoint.fe.common.sampling import SYMMETRIC, on_bearing
+from swgjoint.fe.common.sampling import SYMMETRIC, maps_bearing
 from swgjoint.fe.plane.continuation import Continuation
 from swgjoint.fe.plane.drive2d import ring_model
 from swgjoint.fe.plane.state import State
@@ -73,7 +73,7 @@ def friction_loops(
     parts = (np.arange(positions) + 0.5) / positions
     if design.wave_generator.kind in SYMMETRIC:
         parts = parts[: (positions + 1) // 2]
-    bearing = on_bearing(design)
+    bearing = maps_bearing(design)
     model = ring_model(perfect, half="auto", bearing=bearing, cage_held=True)
     rubbing = Continuation(model=model, ratio=design.ratio, layout=drive.layout)
     smooth = replace(rubbing, model=replace(model, friction=None))

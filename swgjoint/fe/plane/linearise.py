@@ -11,10 +11,10 @@ from swgjoint.fe.plane.bore_contact import BoreStations
 from swgjoint.fe.plane.corotation import (
     Frames,
     elastic_force,
-    projected,
+    project_to_frames,
     rotate,
+    rotate_right_angle,
     tangent,
-    turned,
 )
 from swgjoint.fe.plane.ring import RingModel
 from swgjoint.fe.plane.state import State
@@ -97,8 +97,10 @@ class Linearised:
         s, frames = contacts.sector, self.frames
         count, n = len(s), frames.spin.shape[1]
         carried = contacts.weight @ self.element.flank_from_skeleton
-        j_y = turned(frames.position[s].reshape(count, n // 2, 2)).reshape(count, n)
-        arm = np.einsum("ki,ki->k", contacts.normal, turned(contacts.point))
+        j_y = rotate_right_angle(frames.position[s].reshape(count, n // 2, 2)).reshape(
+            count, n
+        )
+        arm = np.einsum("ki,ki->k", contacts.normal, rotate_right_angle(contacts.point))
         lever = arm - np.einsum("kn,kn->k", carried, j_y)
         seen = (carried + frames.spin[s] * lever[:, None]).reshape(count, n // 2, 2)
         rows = np.zeros((count, self.gradient.shape[1]))
@@ -173,7 +175,7 @@ def linearise(model: RingModel, state: State, torque: float | None) -> Linearise
     # elastic forces and tangent in the sector frames, then in the global one
     elastic = elastic_force(element, frames)
     total = elastic - state.flank_force @ element.flank_from_skeleton
-    seen = projected(frames, elastic).reshape(model.sectors, n_a, 2)
+    seen = project_to_frames(frames, elastic).reshape(model.sectors, n_a, 2)
     gradient, hessian = np.zeros(sign.shape), np.zeros((*sign.shape, sign.shape[1]))
     gradient[:, dofs] = rotate(seen, frames.angle[:, None]).reshape(model.sectors, -1)
     hessian[:, dofs[:, None], dofs] = _in_global_frame(
@@ -210,7 +212,7 @@ def linearise(model: RingModel, state: State, torque: float | None) -> Linearise
         gradient += torque / model.copies * rotation_gradient
 
     anchor = np.zeros(sign.shape)
-    anchor[0, dofs[:2]] = turned(x[0, 0]) / np.hypot(*x[0, 0])
+    anchor[0, dofs[:2]] = rotate_right_angle(x[0, 0]) / np.hypot(*x[0, 0])
     centre = frames.position.reshape(model.sectors, n_a, 2).mean(axis=1)
     angle = frames.angle - state.ring_rotation
     ring_elastic = model.ring_displacement(state)
@@ -262,7 +264,7 @@ def _on_surface(model: RingModel, state: State) -> _Bore:
     push = (k * gap[on])[..., None] * normal[on]
     gradient[on] = stations.forces_of(push).reshape(on.size, size)
     hessian[on] = stations.stiffness_of(normal[on], k)
-    hessian[on] += stations.stiffness_of(turned(normal[on]), bend)
+    hessian[on] += stations.stiffness_of(rotate_right_angle(normal[on]), bend)
     return _Bore(gap=gap, normal=normal, gradient=gradient, hessian=hessian)
 
 

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from swgjoint.fe.plane.corotation import rotate
 from swgjoint.fe.plane.superelement import Superelement
-from swgjoint.fe.rings.facing import facing
+from swgjoint.fe.rings.facing import distances_to_ring
 from swgjoint.fe.rings.race_on_balls import PressedBalls, RaceOnBalls, pressed_form
 from swgjoint.gear.design.design import Design
 
@@ -234,7 +234,9 @@ class PlaneRace:
         first = np.minimum(self.places.astype(np.int64), m - 1)
         below = (m * np.arange(n)[:, None] + first).ravel()
         start = (m * np.arange(n)[:, None] + self.places).ravel()
-        seen = facing(ring, q, points.reshape(-1, 2), start, inside=False, own=below)
+        seen = distances_to_ring(
+            ring, q, points.reshape(-1, 2), start, inside=False, own=below
+        )
         gap = seen.distance - 0.5 * own.bearing.race_thickness
         k = np.where(touching, self.press, 0.0).ravel()
         force = -k * gap

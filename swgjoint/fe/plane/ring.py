@@ -16,7 +16,12 @@ from swgjoint.fe.common.friction import CoulombFriction
 from swgjoint.fe.common.indentation import Indentation
 from swgjoint.fe.plane.bore_contact import POINTS, BoreStations
 from swgjoint.fe.plane.circular_spline import CircularSpline
-from swgjoint.fe.plane.corotation import Frames, rotate, sector_frames, turned
+from swgjoint.fe.plane.corotation import (
+    Frames,
+    rotate,
+    rotate_right_angle,
+    sector_frames,
+)
 from swgjoint.fe.plane.race import NODE, PlaneRace
 from swgjoint.fe.plane.state import State
 from swgjoint.fe.plane.superelement import Superelement
@@ -218,7 +223,11 @@ class RingModel:
         radial = w0 * np.cos(2 * phi)
         tangential = -0.5 * w0 * np.sin(2 * phi) + (radius - bore) * turn
         unit = x / radius[..., None]
-        moved = x + radial[..., None] * unit + tangential[..., None] * turned(unit)
+        moved = (
+            x
+            + radial[..., None] * unit
+            + tangential[..., None] * rotate_right_angle(unit)
+        )
         moved = rotate(moved, rotation)
         size, inside = element.face_size, element.bore_size
         race = None
@@ -285,9 +294,9 @@ class RingModel:
     def best_fit_rotation(self, nodes: Array) -> tuple[float, Array]:
         """Best-fit rotation of the bore nodes and its gradient (N, n_bore + 1, 2)."""
         x0 = self.reference[:, self.bore_nodes]
-        sine = float(np.einsum("sni,sni->", turned(x0), nodes))
+        sine = float(np.einsum("sni,sni->", rotate_right_angle(x0), nodes))
         cosine = float(np.einsum("sni,sni->", x0, nodes))
-        gradient = (cosine * turned(x0) - sine * x0) / (sine**2 + cosine**2)
+        gradient = (cosine * rotate_right_angle(x0) - sine * x0) / (sine**2 + cosine**2)
         return float(np.arctan2(sine, cosine)), gradient
 
     def moved(
@@ -310,22 +319,22 @@ class RingModel:
         # displacements in sector frames repeat after half a turn
         still = self.element.skeleton[: size + inside]
         x = rotate(
-            still + travelled(local - still, shift),
+            still + shift_rows(local - still, shift),
             (self.place + rotation)[:, None],
         )
         race = state.race
         if self.race is not None and race is not None:
-            race = travelled(self.race.displaced(race, state.rotation), shift)
+            race = shift_rows(self.race.displaced(race, state.rotation), shift)
             race = self.race.placed(race, rotation)
         return replace(
             state,
             race=race,
             faces=x[:, :size],
             bores=x[:, size:],
-            pressure=travelled(state.pressure, shift),
+            pressure=shift_rows(state.pressure, shift),
             touching=np.roll(state.touching, round(shift), axis=0),
-            flank_force=travelled(state.flank_force, shift),
-            ring_force=travelled(
+            flank_force=shift_rows(state.flank_force, shift),
+            ring_force=shift_rows(
                 state.ring_force,
                 (d_alpha - (ring_rotation - state.ring_rotation)) / ring_pitch,
             ),
@@ -353,7 +362,7 @@ def _pairs(nodes: Index) -> Index:
     return np.asarray((2 * nodes[:, None] + np.arange(2)).ravel())
 
 
-def travelled(values: Array, shift: float) -> Array:
+def shift_rows(values: Array, shift: float) -> Array:
     """Rows moved on by a fraction of the ring, cubic between four neighbours."""
     whole = int(np.floor(shift))
     t = shift - whole

@@ -48,7 +48,7 @@ class SectorMesh:
     """Arc length of the flank nodes on the profile [m]."""
 
 
-def multiplied(elements: int, refinement: float) -> int:
+def refine_count(elements: int, refinement: float) -> int:
     """Elements along an edge that has so many in the mesh of the thesis."""
     return ceil(elements * refinement)
 
@@ -69,15 +69,15 @@ def sector_mesh(
     Args:
         profile: Flank of the member.
         rim: Thickness between root circle and inner (outer) diameter [m].
-        refinement: Multiplies the elements per direction, see :func:`multiplied`.
+        refinement: Multiplies the elements per direction, see :func:`refine_count`.
         lower_rim: Thickness of the lower rim, to which a cup connects; that of the
             thesis for a plane model if None [m].
 
     Returns:
         The sector; both halves are mirror images.
     """
-    n, layers = multiplied(FLANK, refinement), multiplied(LAYERS, refinement)
-    bore, lower = multiplied(BORE, refinement), multiplied(LOWER_RIM, refinement)
+    n, layers = refine_count(FLANK, refinement), refine_count(LAYERS, refinement)
+    bore, lower = refine_count(BORE, refinement), refine_count(LOWER_RIM, refinement)
     side = -1.0 if profile.internal else 1.0
     inner = profile.dedendum_radius - side * rim
     if lower_rim is None:

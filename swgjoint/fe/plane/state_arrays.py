@@ -26,7 +26,7 @@ _NUMBERS = {"float": float, "int": int}
 T = TypeVar("T")
 
 
-def packed(value: Any, name: str) -> dict[str, Any]:
+def pack(value: Any, name: str) -> dict[str, Any]:
     """Arrays of a state, or of what is part of one; its type by name with them.
 
     Args:
@@ -40,18 +40,18 @@ def packed(value: Any, name: str) -> dict[str, Any]:
     if isinstance(value, tuple) and any(is_dataclass(one) for one in value):
         found: dict[str, Any] = {f"{name}.{_KIND}": f"tuple {len(value)}"}
         for k, one in enumerate(value):
-            found |= packed(one, f"{name}.{k}")
+            found |= pack(one, f"{name}.{k}")
         return found
     if is_dataclass(value):
         found = {f"{name}.{_KIND}": type(value).__name__}
         for item in fields(value):
-            found |= packed(getattr(value, item.name), f"{name}.{item.name}")
+            found |= pack(getattr(value, item.name), f"{name}.{item.name}")
         return found
     return {name: value}
 
 
-def unpacked(arrays: Mapping[str, Any], name: str) -> Any:
-    """What :func:`packed` was given; None where nothing of that name is there.
+def unpack(arrays: Mapping[str, Any], name: str) -> Any:
+    """What :func:`pack` was given; None where nothing of that name is there.
 
     Raises:
         KeyError: If the arrays are not those of a state.
@@ -63,11 +63,11 @@ def unpacked(arrays: Mapping[str, Any], name: str) -> Any:
         return arrays.get(name)
     if str(kind).startswith("tuple "):
         count = int(str(kind).removeprefix("tuple "))
-        return tuple(unpacked(arrays, f"{name}.{k}") for k in range(count))
+        return tuple(unpack(arrays, f"{name}.{k}") for k in range(count))
     cls = _KINDS[str(kind)]
     given = {}
     for item in fields(cls):
-        value = unpacked(arrays, f"{name}.{item.name}")
+        value = unpack(arrays, f"{name}.{item.name}")
         if value is None:
             continue
         if item.type in _NUMBERS:
@@ -80,7 +80,7 @@ def unpacked(arrays: Mapping[str, Any], name: str) -> Any:
     return cls(**given)
 
 
-def settled(value: T) -> T:
+def copy_contiguous(value: T) -> T:
     """The same with arrays that lie in memory as those of a file do.
 
     Sums may depend on the order in memory in their last digit; a run that goes on from
@@ -90,8 +90,10 @@ def settled(value: T) -> T:
     if isinstance(value, np.ndarray):
         changed = np.ascontiguousarray(value) if value.ndim else value
     elif isinstance(value, tuple):
-        changed = tuple(settled(one) for one in value)
+        changed = tuple(copy_contiguous(one) for one in value)
     elif is_dataclass(value) and not isinstance(value, type):
         parts: Iterable[str] = (item.name for item in fields(value))
-        changed = replace(value, **{key: settled(getattr(value, key)) for key in parts})
+        changed = replace(
+            value, **{key: copy_contiguous(getattr(value, key)) for key in parts}
+        )
     return changed  # type: ignore[no-any-return]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.sparse.linalg import splu
 
-from swgjoint.fe.common.contact_patch import averaged_spline
+from swgjoint.fe.common.contact_patch import average_spline
 from swgjoint.fe.plane.elasticity import (
     nodal_stress_operator,
     plane_basis,
@@ -189,5 +189,5 @@ def condense(
         axial_stress=confinement * poisson_ratio,
         mesh=mesh,
         profile=profile,
-        spline=averaged_spline(stations),
+        spline=average_spline(stations),
     )

@@ -18,7 +18,7 @@ from scipy.interpolate import CubicSpline
 
 from swgjoint.errors import ComputationError
 from swgjoint.fe.plane.continuation import Continuation
-from swgjoint.fe.plane.corotation import rotate, turned
+from swgjoint.fe.plane.corotation import rotate, rotate_right_angle
 from swgjoint.fe.plane.drive2d import ring_model
 from swgjoint.gear.design.design import Design, MemberName
 from swgjoint.gear.teeth.conjugate import conjugate_profile
@@ -61,7 +61,7 @@ class DeflectedRim:
         # +x of the tooth frame points clockwise
         local = np.stack([-value[:, 0], self.radius + value[:, 1]], axis=-1)
         rate = np.stack([-slope[:, 0], slope[:, 1]], axis=-1)
-        rate += turned(local)
+        rate += rotate_right_angle(local)
         return Pose(
             point=rotate(local, theta),
             angle=theta + value[:, 2],
@@ -99,7 +99,7 @@ def deflected_rim(design: Design) -> DeflectedRim:
     # rigid motion of the flanks of each tooth, seen in its sector frame
     centre, middle = still.mean(axis=0), nodes.mean(axis=1)
     about, seen = still - centre, nodes - middle[:, None]
-    cross = np.einsum("ni,sni->s", turned(about), seen)
+    cross = np.einsum("ni,sni->s", rotate_right_angle(about), seen)
     turn = np.arctan2(cross, np.einsum("ni,sni->s", about, seen))
     radius = design.flexspline_inner_radius + 0.5 * design.flexspline.rim_mm * mm
     foot = middle + rotate(

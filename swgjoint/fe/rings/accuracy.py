@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swgjoint.errors import ComputationError
-from swgjoint.fe.rings.loading import SMALL, loaded, unloaded
+from swgjoint.fe.rings.loading import SMALL, solve_loaded, solve_unloaded
 from swgjoint.fe.rings.model import thin_ring
 from swgjoint.gear.catalogue import ratings_of
 from swgjoint.gear.design.design import Design
@@ -34,7 +34,7 @@ def transmission_error(
     load = SMALL * ratings_of(design).rated_torque if torque is None else torque
     found = []
     for theta in np.asarray(input_angles, dtype=float).ravel().tolist():
-        state = loaded(model, unloaded(model, theta), load)
+        state = solve_loaded(model, solve_unloaded(model, theta), load)
         if not state.outcome.ok:
             raise ComputationError(
                 f"{design.drive.name}: no equilibrium at {load:.4g} N·m and input angle"
@@ -44,7 +44,7 @@ def transmission_error(
     return np.array(found)
 
 
-def over_output_turn(design: Design, count: int, seed: int = 0) -> Array:
+def output_turn_angles(design: Design, count: int, seed: int = 0) -> Array:
     """Input angles strewn over one output turn, one in every equal part (n,) [rad].
 
     Strewn, so that no order of tooth, ball or turn is met in step.

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from swgjoint.fe.plane.corotation import rotate, turned
+from swgjoint.fe.plane.corotation import rotate, rotate_right_angle
 from swgjoint.fe.rings.assembly import BandedAssembly
-from swgjoint.fe.rings.facing import Facing, facing
+from swgjoint.fe.rings.facing import Facing, distances_to_ring
 from swgjoint.fe.rings.model import ThinRing
 from swgjoint.fe.rings.race_on_balls import PressedBalls, pressed_form
 from swgjoint.fe.rings.state import RingState
@@ -21,7 +21,7 @@ PARTS = ("rim", "race", "balls", "bore", "teeth")
 """What stores energy; bore is what the rim presses on the race."""
 
 
-def linearised(
+def linearise(
     model: ThinRing, state: RingState, *, teeth: bool
 ) -> tuple[RingState, BandedAssembly, int]:
     """Forces and tangent at the positions of a state, and the coordinate that is held.
@@ -82,7 +82,7 @@ def _bore(
 ) -> RingState:
     """Unilateral contact of the rim's bore with the race."""
     points = model.bore.points(rim)[0]
-    seen = facing(model.race, race, points, state.bore_feet, inside=False)
+    seen = distances_to_ring(model.race, race, points, state.bore_feet, inside=False)
     overlap = 0.5 * model.bearing.race_thickness - seen.distance
     on = np.flatnonzero(overlap > 0.0)
     near, k = seen.chosen(on), model.press_per_point
@@ -119,7 +119,7 @@ def _teeth(
         state,
         contacts=contacts,
         tooth_force=force,
-        tooth_moment=float(np.sum(turned(point) * push)),
+        tooth_moment=float(np.sum(rotate_right_angle(point) * push)),
     )
 
 

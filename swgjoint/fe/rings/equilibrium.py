@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.errors import Outcome
-from swgjoint.fe.plane.corotation import turned
-from swgjoint.fe.rings.contacts import linearised
+from swgjoint.fe.plane.corotation import rotate_right_angle
+from swgjoint.fe.rings.contacts import linearise
 from swgjoint.fe.rings.model import ThinRing
 from swgjoint.fe.rings.state import RingState
 
@@ -69,7 +69,7 @@ class RingSolver:
         step, part, last = np.zeros(model.size), 0.0, np.inf
         for _ in range(self.max_iterations):
             tried = replace(state, q=state.q + part * step)
-            tried, total, held = linearised(model, tried, teeth=teeth)
+            tried, total, held = linearise(model, tried, teeth=teeth)
             psi, turn = rim_rotation(model, tried.q, start.rotation)
             potential = tried.energy + load * psi
             rises = potential - last > 1e-12 * abs(last)
@@ -114,10 +114,10 @@ def rim_rotation(model: ThinRing, q: Array, near: float) -> tuple[float, Array]:
     """
     x0 = model.rim.reference[:, 0]
     x = q[: model.rim.size].reshape(-1, 2, 2)[:, 0]
-    sine, cosine = float(np.sum(turned(x0) * x)), float(np.sum(x0 * x))
+    sine, cosine = float(np.sum(rotate_right_angle(x0) * x)), float(np.sum(x0 * x))
     gradient = np.zeros(model.size)
     rows = gradient[: model.rim.size].reshape(-1, 2, 2)
-    rows[:, 0] = (cosine * turned(x0) - sine * x0) / (sine**2 + cosine**2)
+    rows[:, 0] = (cosine * rotate_right_angle(x0) - sine * x0) / (sine**2 + cosine**2)
     psi = float(np.arctan2(sine, cosine))
     return psi + 2.0 * np.pi * round((near - psi) / (2.0 * np.pi)), gradient
 
@@ -131,6 +131,6 @@ def _finished(
     teeth: bool,
 ) -> RingState:
     """Forces and energy at the last positions."""
-    state, _, _ = linearised(model, state, teeth=teeth)
+    state, _, _ = linearise(model, state, teeth=teeth)
     psi, _ = rim_rotation(model, state.q, state.rotation)
     return replace(state, rotation=psi, outcome=outcome, history=tuple(history))

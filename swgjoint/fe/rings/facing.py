@@ -61,7 +61,7 @@ class Facing:
         )
 
 
-def facing(
+def distances_to_ring(
     ring: HermiteRing,
     q: Array,
     points: Array,

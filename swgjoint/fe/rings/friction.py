@@ -25,9 +25,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from swgjoint.errors import InputError, Outcome
 from swgjoint.fe.rings.contacts import PARTS
-from swgjoint.fe.rings.loading import SMALL, loaded, positions, unloaded
+from swgjoint.fe.rings.loading import SMALL, positions, solve_loaded, solve_unloaded
 from swgjoint.fe.rings.model import ThinRing, thin_ring
-from swgjoint.fe.rings.sliding import rubbing
+from swgjoint.fe.rings.sliding import sliding_sums
 from swgjoint.gear.catalogue import ratings_of
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.mounting import series_compliance
@@ -113,7 +113,7 @@ class RubbedPath:
         return np.asarray(4.0 * mu * np.concatenate([[0.0], np.cumsum(work)]))
 
 
-def rubbed_path(
+def friction_path(
     design: Design,
     torques: ArrayLike,
     *,
@@ -168,22 +168,22 @@ def _along(
 
     Works since the torque before [J], compliance without what is in series.
     """
-    rest = unloaded(model, alpha)
+    rest = solve_unloaded(model, alpha)
     if not rest.outcome.ok:
         return [], rest.outcome
     # the middle of the play between the smallest torque and its opposite
-    down = loaded(model, rest, -float(torques[0]))
+    down = solve_loaded(model, rest, -float(torques[0]))
     if not down.outcome.ok:
         return [], down.outcome
     rows: list[list[float]] = []
     state, middle = rest, 0.0
     for torque in torques.tolist():
-        found = loaded(model, state, torque)
+        found = solve_loaded(model, state, torque)
         if not found.outcome.ok:
             return rows, found.outcome
         if not rows:
             middle = 0.5 * (found.rotation + down.rotation)
-        work = rubbing(model, state, found) if rows else (0.0, 0.0)
+        work = sliding_sums(model, state, found) if rows else (0.0, 0.0)
         assert found.ball_force is not None
         balls = float((found.ball_force > 0.0).sum())
         c = found.compliance

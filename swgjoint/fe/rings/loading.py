@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from swgjoint.fe.rings.equilibrium import RingSolver
 from swgjoint.fe.rings.model import ThinRing
-from swgjoint.fe.rings.state import RingState, at_rest
+from swgjoint.fe.rings.state import RingState, initial_state
 
 Array = NDArray[np.float64]
 
@@ -28,7 +28,7 @@ def positions(model: ThinRing, count: int) -> Array:
     return np.asarray(passage * (k + 0.5) / count + pitch * np.mod(k * GOLDEN, 1.0))
 
 
-def unloaded(model: ThinRing, alpha: float, phase: float = 0.0) -> RingState:
+def solve_unloaded(model: ThinRing, alpha: float, phase: float = 0.0) -> RingState:
     """The drive without torque: rings on the balls, output at the ideal ratio.
 
     Args:
@@ -36,7 +36,7 @@ def unloaded(model: ThinRing, alpha: float, phase: float = 0.0) -> RingState:
         alpha: Wave-generator angle, of any number of turns [rad].
         phase: Angle of ball 0 from the major axis at alpha = 0 [rad].
     """
-    start = at_rest(model, alpha, phase)
+    start = initial_state(model, alpha, phase)
     solver, psi = RingSolver(), start.rotation
     state = solver(model, start, rotation=psi, teeth=False)
     return solver(model, state, rotation=psi) if state.outcome.ok else state
@@ -49,13 +49,13 @@ def without_torque(model: ThinRing, alpha: float) -> RingState:
         model: The rings.
         alpha: Wave-generator angle, of any number of turns [rad].
     """
-    state = unloaded(model, alpha)
+    state = solve_unloaded(model, alpha)
     if state.outcome.ok and state.loaded_teeth:
         state = RingSolver()(model, state, torque=0.0)
     return state
 
 
-def loaded(model: ThinRing, state: RingState, torque: float) -> RingState:
+def solve_loaded(model: ThinRing, state: RingState, torque: float) -> RingState:
     """Equilibrium under a torque; on failure in halved steps.
 
     Args:

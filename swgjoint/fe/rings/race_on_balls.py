@@ -8,8 +8,8 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
-from swgjoint.fe.plane.corotation import rotate, turned
-from swgjoint.fe.rings.facing import Facing, facing
+from swgjoint.fe.plane.corotation import rotate, rotate_right_angle
+from swgjoint.fe.rings.facing import Facing, distances_to_ring
 from swgjoint.fe.rings.hermite_ring import HermiteRing
 from swgjoint.gear.bearing.ball_bearing import BallBearing
 from swgjoint.gear.design.design import Design
@@ -110,7 +110,7 @@ class RaceOnBalls:
         pose = self.cam.pose(phase + lag * alpha + spacing)
         centre = rotate(pose.point + self.cam_offset, alpha)
         rolled = rotate(pose.d_point, alpha)
-        return centre, turned(centre) + lag * rolled, rolled
+        return centre, rotate_right_angle(centre) + lag * rolled, rolled
 
     def pressed(
         self, race: Array, alpha: float, phase: float, feet: Array
@@ -124,7 +124,7 @@ class RaceOnBalls:
             feet: Places on the race near the balls (balls,).
         """
         centre, d_centre, d_phase = self.balls(alpha, phase)
-        seen = facing(self.race, race, centre, feet, inside=True)
+        seen = distances_to_ring(self.race, race, centre, feet, inside=True)
         reach = 0.5 * (self.bearing.ball_diameter + self.bearing.race_thickness)
         overlap = np.maximum(reach - seen.distance, 0.0)
         force = self.ball_constant * overlap**1.5

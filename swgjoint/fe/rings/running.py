@@ -29,9 +29,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swgjoint.errors import ComputationError
-from swgjoint.fe.rings.loading import loaded, positions, without_torque
+from swgjoint.fe.rings.loading import positions, solve_loaded, without_torque
 from swgjoint.fe.rings.model import ThinRing, thin_ring
-from swgjoint.fe.rings.sliding import rubbing
+from swgjoint.fe.rings.sliding import sliding_sums
 from swgjoint.fe.rings.state import RingState
 from swgjoint.gear.design.design import Design
 
@@ -123,7 +123,7 @@ def running_friction(
             _standing(design, model, angle + part * STEP, torque)
             for part in (-0.5, 0.5)
         )
-        teeth, race = rubbing(model, first, last)
+        teeth, race = sliding_sums(model, first, last)
         rows.append(
             [
                 0.5 * (first.wave_generator_torque + last.wave_generator_torque),
@@ -148,7 +148,7 @@ def _standing(
     """Equilibrium under a torque at an input angle."""
     state = without_torque(model, theta)
     if state.outcome.ok and torque:
-        state = loaded(model, state, torque)
+        state = solve_loaded(model, state, torque)
     if not state.outcome.ok:
         raise ComputationError(
             f"{design.drive.name}: no equilibrium at {torque:.4g} N·m and input angle"

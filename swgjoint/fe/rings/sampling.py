@@ -20,11 +20,11 @@ from numpy.typing import NDArray
 from swgjoint.errors import ComputationError, DesignError
 from swgjoint.fe.common.clearance import across_clearance
 from swgjoint.fe.common.stress_state import stress_state_label
-from swgjoint.fe.plane.drive2d import can_halve, left_out
+from swgjoint.fe.plane.drive2d import can_halve, unmodelled_parts
 from swgjoint.fe.rings import model as thin
 from swgjoint.fe.rings.contacts import race_on_balls
 from swgjoint.fe.rings.equilibrium import RingSolver
-from swgjoint.fe.rings.loading import SMALL, loaded, unloaded
+from swgjoint.fe.rings.loading import SMALL, solve_loaded, solve_unloaded
 from swgjoint.fe.rings.model import ThinRing, thin_ring
 from swgjoint.fe.rings.state import RingState
 from swgjoint.gear.catalogue import ratings_of
@@ -213,7 +213,7 @@ def sample_rings(
                 "springs_Nm_rad": springs_of(design),
                 "friction": None,
                 "tolerances": None,
-                "left_out": left_out(design, "ring"),
+                "left_out": unmodelled_parts(design, "ring"),
             },
             "ball_passage": {
                 "balls": model.bearing.balls,
@@ -252,10 +252,10 @@ def _position(
             torque / model.ratio + ripple,
         ]
 
-    rest = unloaded(model, 0.0, phase)
+    rest = solve_unloaded(model, 0.0, phase)
     if not rest.outcome.ok:
         return {}, False
-    sides = [loaded(model, rest, t) for t in (small, -small)]
+    sides = [solve_loaded(model, rest, t) for t in (small, -small)]
     if not all(side.outcome.ok for side in sides):
         return {}, False
     solver = RingSolver()
@@ -270,7 +270,7 @@ def _position(
     rows |= {t: row(s, t) for t, s in zip((small, -small), sides, strict=True)}
     state = sides[0]
     for torque in torques:
-        state = loaded(model, state, torque)
+        state = solve_loaded(model, state, torque)
         if not state.outcome.ok:
             break
         rows[torque] = row(state, torque)

@@ -6,14 +6,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.fe.plane.corotation import rotate
-from swgjoint.fe.rings.facing import facing
+from swgjoint.fe.rings.facing import distances_to_ring
 from swgjoint.fe.rings.model import ThinRing
 from swgjoint.fe.rings.state import RingState
 
 Array = NDArray[np.float64]
 
 
-def rubbing(model: ThinRing, first: RingState, last: RingState) -> tuple[float, float]:
+def sliding_sums(
+    model: ThinRing, first: RingState, last: RingState
+) -> tuple[float, float]:
     r"""Sums of N |sigma| between two equilibria, of the teeth and of the race [J].
 
     The mean of the forces at both ends; teeth that come in or leave count half.
@@ -61,7 +63,7 @@ def _pressed(model: ThinRing, state: RingState) -> tuple[Array, Array]:
     """Forces of the bore's points on the race [N], and their places on it."""
     rim, race = np.split(state.q, [model.rim.size])
     points = model.bore.points(rim)[0]
-    seen = facing(model.race, race, points, state.bore_feet, inside=False)
+    seen = distances_to_ring(model.race, race, points, state.bore_feet, inside=False)
     overlap = 0.5 * model.bearing.race_thickness - seen.distance
     return model.press_per_point * np.maximum(overlap, 0.0), seen.place
 

@@ -63,7 +63,7 @@ class RingState:
         return 0 if self.tooth_force is None else len(self.tooth_force)
 
 
-def at_rest(model: ThinRing, alpha: float, phase: float = 0.0) -> RingState:
+def initial_state(model: ThinRing, alpha: float, phase: float = 0.0) -> RingState:
     """Start of a search: both rings deflected by the lobes, not stretched.
 
     They have turned with the flexspline, however far: at the ideal ratio.

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from swgjoint.fe.plane.circular_spline import CircularSpline
-from swgjoint.fe.plane.corotation import rotate, turned
+from swgjoint.fe.plane.corotation import rotate, rotate_right_angle
 from swgjoint.fe.plane.tooth_contact import Contacts, ToothContact
 from swgjoint.gear.teeth.profile import ToothProfile
 
@@ -117,14 +117,17 @@ class RingTeeth:
         """
         j = contacts.sector
         normal = rotate(contacts.normal, angle[j])
-        tangent = -turned(normal)
+        tangent = -rotate_right_angle(normal)
         arm = rotate(contacts.point, angle[j]) - foot[j]
         square = np.einsum("ni,ni->n", slope[j], slope[j])
         turn = np.zeros((len(j), 4))
-        turn[:, 2:] = turned(slope[j]) / square[:, None]
+        turn[:, 2:] = rotate_right_angle(slope[j]) / square[:, None]
 
         def moved(direction: Array) -> Array:
-            row = np.einsum("ni,ni->n", direction, turned(arm))[:, None] * turn
+            row = (
+                np.einsum("ni,ni->n", direction, rotate_right_angle(arm))[:, None]
+                * turn
+            )
             row[:, :2] += direction
             return np.asarray(row)
 

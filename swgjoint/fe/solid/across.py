@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.interpolate import CubicSpline
 
-from swgjoint.fe.common.contact_patch import averaged_spline
+from swgjoint.fe.common.contact_patch import average_spline
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -44,7 +44,7 @@ WIDE = 3.0
 """How many times larger it is where planes share the contact: they keep it so long."""
 
 
-def spread_over(z: Array, nodes: int) -> sparse.csr_matrix:
+def spread_forces(z: Array, nodes: int) -> sparse.csr_matrix:
     """Forces in the planes of the mesh by forces there that act on patches.
 
     A point force on a mesh sinks in by an amount that depends on the elements, and on
@@ -57,7 +57,7 @@ def spread_over(z: Array, nodes: int) -> sparse.csr_matrix:
     half = max(PATCH * float(z[-1] - z[0]), ELEMENTS * float(z[1] - z[0]))
     if half > 0.5 * (z[-1] - z[0]):
         return sparse.eye_array(len(z) * nodes, format="csr")
-    mean = averaged_spline(z, half)(z)
+    mean = average_spline(z, half)(z)
     return sparse.kron(mean.T, sparse.eye_array(nodes), format="csr")
 
 

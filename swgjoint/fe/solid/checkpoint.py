@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from swgjoint.errors import InputError
-from swgjoint.fe.plane.state_arrays import packed, unpacked
+from swgjoint.fe.plane.state_arrays import pack, unpack
 from swgjoint.fe.solid.state import SolidState
 from swgjoint.files import read_regular, write_whole
 from swgjoint.json_text import json_text
@@ -17,10 +17,10 @@ from swgjoint.store import (
     DamagedError,
     arrays_content,
     arrays_file,
-    ignored,
     json_content,
     json_file,
-    told,
+    one_line,
+    warn_ignored,
 )
 
 RUN = "run.json"
@@ -62,7 +62,7 @@ class Checkpoint:
             return cls(folder=folder, asked=resume)
         except (OSError, DamagedError) as error:
             raise InputError(
-                f"{file} is of no run that --resume could go on with: {told(error)};"
+                f"{file} is of no run that --resume could go on with: {one_line(error)};"
                 " accepted: another --out"
             ) from None
         if there != settings:
@@ -105,7 +105,7 @@ class Checkpoint:
         """
         path = self.folder / f"{name}.npz"
         try:
-            found = unpacked(arrays_content(read_regular(path)), _STATE)
+            found = unpack(arrays_content(read_regular(path)), _STATE)
             if not isinstance(found, SolidState):
                 raise DamagedError("it holds no state")
         except FileNotFoundError:
@@ -113,13 +113,13 @@ class Checkpoint:
         except Exception as error:  # a file may be anything
             if self.asked:
                 raise InputError(
-                    f"--resume: {path}: {told(error)}; remove it to compute it again"
+                    f"--resume: {path}: {one_line(error)}; remove it to compute it again"
                 ) from None
-            ignored(path, error)
+            warn_ignored(path, error)
             return None
         return found
 
     def write(self, name: str, state: SolidState) -> None:
         """Keep a state, whole or not at all."""
-        data = arrays_file(packed(state, _STATE))
+        data = arrays_file(pack(state, _STATE))
         write_whole(self.folder / f"{name}.npz", data)

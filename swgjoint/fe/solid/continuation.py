@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from swgjoint.fe.common.following import Follower
 from swgjoint.fe.common.influence import Influence
-from swgjoint.fe.plane.ring import travelled
+from swgjoint.fe.plane.ring import shift_rows
 from swgjoint.fe.solid.corotation import about_z
 from swgjoint.fe.solid.equilibrium import SolidLoad, SolidSolver
 from swgjoint.fe.solid.ring import SolidRing
@@ -130,24 +130,24 @@ class SolidContinuation(Follower[SolidState]):
         there = about_z(np.array(state.rotation)) @ ring.place
         local = np.concatenate([state.faces, state.inside], axis=1)
         local = np.einsum("sji,saj->sai", there, local) - still
-        moved = travelled(local, shift) + still
+        moved = shift_rows(local, shift) + still
         now = about_z(np.array(rotation)) @ ring.place
         x = np.einsum("sij,saj->sai", now, moved)
         race = state.race
         if ring.race is not None and race is not None:
-            moved = travelled(ring.race.displaced(race, state.rotation), shift)
+            moved = shift_rows(ring.race.displaced(race, state.rotation), shift)
             race = ring.race.placed(moved, rotation)
         return replace(
             state,
             faces=x[:, :size],
             inside=x[:, size:],
             race=race,
-            pressure=np.clip(travelled(state.pressure, shift), 0.0, None),
+            pressure=np.clip(shift_rows(state.pressure, shift), 0.0, None),
             touching=np.roll(state.touching, round(shift), axis=0),
             shared=np.roll(state.shared, round(shift), axis=0),
-            bore_force=travelled(state.bore_force, shift),
-            flank_force=travelled(state.flank_force, shift),
-            ring_force=travelled(
+            bore_force=shift_rows(state.bore_force, shift),
+            flank_force=shift_rows(state.flank_force, shift),
+            ring_force=shift_rows(
                 state.ring_force,
                 (d_alpha - (ring_rotation - state.ring_rotation)) / (2.0 * pi / teeth),
             ),

@@ -106,7 +106,7 @@ def energies(segment: StripSegment, frames: SolidFrames) -> Array:
     return np.asarray(0.5 * np.einsum("si,ij,sj->s", d, segment.stiffness, d))
 
 
-def projected(frames: SolidFrames, force: Array) -> Array:
+def project_to_frames(frames: SolidFrames, force: Array) -> Array:
     """P^T f: gradient by the masters seen in the frame (N, 3 m) [N]."""
     n, m = frames.position.shape[:2]
     moment = np.cross(frames.position, force.reshape(n, m, 3)).sum(axis=1)
@@ -142,7 +142,7 @@ def tangent(segment: StripSegment, frames: SolidFrames, force: Array) -> Array:
     return np.asarray(segment.stiffness + outer + outer.transpose(0, 2, 1))
 
 
-def in_global(frames: SolidFrames, rows: Array) -> Array:
+def rotate_to_global(frames: SolidFrames, rows: Array) -> Array:
     """Vectors per master from the frames to the global frame (N, 3 m)."""
     n, m = frames.position.shape[:2]
     turned = np.einsum("sij,saj->sai", frames.turn, rows.reshape(n, m, 3))

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.errors import DesignError
-from swgjoint.fe.common.contact_patch import averaged_spline
+from swgjoint.fe.common.contact_patch import average_spline
 from swgjoint.fe.plane.circular_spline import CircularSpline
 from swgjoint.fe.plane.drive2d import Half, can_halve
 from swgjoint.fe.solid.memory import require_solid_memory, required_memory
@@ -81,7 +81,7 @@ def solid_ring(
     if ring is not None:
         gear = ring_gear(design, facing, ring)
         stations = gear.mesh.teeth.plane.flank_stations[:-1]
-        surface = CircularSpline(profile=facing, weights=averaged_spline(stations))
+        surface = CircularSpline(profile=facing, weights=average_spline(stations))
     shape, errors = design.micro_geometry, dict[str, Array]()
     if has_errors(design):
         if gear is None:

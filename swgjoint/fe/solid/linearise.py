@@ -23,9 +23,9 @@ from swgjoint.fe.plane.race import RaceForces
 from swgjoint.fe.solid.across import FLAT, WIDE, crown_bend, vertices
 from swgjoint.fe.solid.corotation import (
     SolidFrames,
-    in_global,
     matrices_in_global,
-    projected,
+    project_to_frames,
+    rotate_to_global,
     spin,
     tangent,
 )
@@ -121,7 +121,7 @@ def linearise(
         total = elastic
         if number == 0:
             total = elastic - loads @ segment.loaded_from_masters
-        gradient[:, dofs] += in_global(frame, projected(frame, elastic))
+        gradient[:, dofs] += rotate_to_global(frame, project_to_frames(frame, elastic))
         local = matrices_in_global(frame, tangent(segment, frame, total))
         hessian[:, dofs[:, None], dofs] += local
         if number == 0:

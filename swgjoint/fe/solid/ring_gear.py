@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
 from swgjoint.errors import DesignError
-from swgjoint.fe.common.block_circulant import between, respond
-from swgjoint.fe.solid.across import spread_over
+from swgjoint.fe.common.block_circulant import contact_compliance, respond
+from swgjoint.fe.solid.across import spread_forces
 from swgjoint.fe.solid.corotation import about_z
 from swgjoint.fe.solid.ring_factor import RingFactor
 from swgjoint.fe.solid.strip.elasticity import Solid, solid
@@ -54,9 +54,9 @@ class RingGear:
         """Displacement of all nodes (N_c, n_nodes, 3) [m]."""
         return respond(self.offsets, self.nodal, force).reshape(len(force), -1, 3)
 
-    def between(self, tooth: Index, weight: Array, teeth: int) -> Array:
+    def contact_compliance(self, tooth: Index, weight: Array, teeth: int) -> Array:
         """Compliance between contact points (n, n) [m/N]; see the plane model."""
-        return between(self.offsets, self.flank, tooth, weight, teeth)
+        return contact_compliance(self.offsets, self.flank, tooth, weight, teeth)
 
 
 def ring_gear(design: Design, profile: ToothProfile, mesh: StripMesh) -> RingGear:
@@ -96,7 +96,7 @@ def ring_gear(design: Design, profile: ToothProfile, mesh: StripMesh) -> RingGea
         options={"SymmetricMode": True},
     )
     units = np.zeros((len(free), len(flank)))
-    spread = spread_over(teeth.z, 2 * teeth.flank.shape[1])
+    spread = spread_forces(teeth.z, 2 * teeth.flank.shape[1])
     units[np.searchsorted(free, flank)] = spread.toarray()
     pull = matrix[free][:, boundary].toarray()
     solved = factor.solve(np.concatenate([-pull, units], axis=1))

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from swgjoint.fe.common.influence import Gaps, Influence, pivoted
+from swgjoint.fe.common.influence import Gaps, Influence, pivot_system
 from swgjoint.fe.plane.corotation import rotate
 from swgjoint.fe.solid.equilibrium import condense
 from swgjoint.fe.solid.linearise import SolidLinearised, linearise
@@ -46,7 +46,7 @@ def influence(ring: SolidRing, state: SolidState, *, ring_is_output: bool) -> In
     used = np.append(np.arange(n), n + 1 if ring_is_output else n)
     offset = condensed.offset[used]
     offset[n] -= state.torque
-    return pivoted(
+    return pivot_system(
         condensed.system[np.ix_(used, used)],
         offset,
         _gaps(ring, state, found, carries),

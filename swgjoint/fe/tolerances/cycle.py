@@ -31,7 +31,7 @@ def pitch_of(design: Design) -> float:
     return 2.0 * pi / design.periodicity
 
 
-def shifted(errors: ToothErrors, pitches: Index, layout: str) -> Array:
+def shift_errors(errors: ToothErrors, pitches: Index, layout: str) -> Array:
     """Shifts of the teeth that stand where those of the first pitch stood.
 
     Args:
@@ -55,13 +55,13 @@ def gap_errors(design: Design, pitches: Index) -> tuple[Array, Array, Array]:
     As the first pitch sees them: (n, N, 2), (n, N_c, 2) [m], (n, 2) [rad].
     """
     own, other = (
-        shifted(tooth_errors(design, member), pitches, design.drive.layout)
+        shift_errors(tooth_errors(design, member), pitches, design.drive.layout)
         for member in MEMBERS
     )
-    return own, other, tilted(design, pitches)
+    return own, other, axis_slope(design, pitches)
 
 
-def tilted(design: Design, pitches: Index) -> Array:
+def axis_slope(design: Design, pitches: Index) -> Array:
     """Slope of the axis, turned back with the wave generator to the first pitch.
 
     Args:

@@ -12,7 +12,7 @@ from typing import Any, Literal, Self
 from pydantic import model_validator
 
 from swgjoint.errors import DesignError, InputError
-from swgjoint.faults import Fault, Section, parse_toml, read_toml, validated
+from swgjoint.faults import Fault, Section, parse_toml, read_toml, validate
 from swgjoint.gear import kinematics
 from swgjoint.gear.design.family import family_design, family_member
 from swgjoint.gear.design.material import Material
@@ -133,7 +133,7 @@ class Design(Section):
                 raise DesignError(f"{exc}; any size-NN-RRR by rule") from None
             return cls.model_validate(family_design(*member))
         data = read_toml(path, what="design", error=DesignError)
-        return validated(cls, data, where=str(path), error=DesignError)
+        return validate(cls, data, where=str(path), error=DesignError)
 
     @classmethod
     def preset(cls, name: str) -> Self:
@@ -153,7 +153,7 @@ class Design(Section):
     def from_toml(cls, text: str, where: str = "design") -> Self:
         """A design from the text of a design file; ``where`` names it in messages."""
         data = parse_toml(text, where=where, error=DesignError)
-        return validated(cls, data, where=where, error=DesignError)
+        return validate(cls, data, where=where, error=DesignError)
 
     def with_changes(
         self, changes: Mapping[str, Any] | None = None, /, **dotted: Any
@@ -186,7 +186,7 @@ class Design(Section):
                 table.pop(last, None)
             else:
                 table[last] = value
-        return validated(type(self), data, where=where, error=DesignError)
+        return validate(type(self), data, where=where, error=DesignError)
 
     # -- text and identity ------------------------------------------------------
 

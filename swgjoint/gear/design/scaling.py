@@ -15,7 +15,7 @@ from math import inf
 from typing import Any
 
 from swgjoint.errors import DesignError
-from swgjoint.faults import unit_of, validated
+from swgjoint.faults import unit_of, validate
 from swgjoint.gear.design.bounds import AcceptedBound, nearest_bound
 from swgjoint.gear.design.check import Check
 from swgjoint.gear.design.design import Design
@@ -115,7 +115,7 @@ def scaled_design(
     if module is not None:
         own["module_mm"] = module
     asked = {**old.model_dump(), **own}
-    new = validated(
+    new = validate(
         DriveSection, asked, where=f"design {name!r}: drive", error=DesignError
     )
     by_module = new.module_mm / old.module_mm

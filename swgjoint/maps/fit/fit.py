@@ -23,8 +23,8 @@ from scipy.interpolate import PchipInterpolator
 
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.equilibrium import output_angle
-from swgjoint.maps.fit.tolerance_modes import combined
-from swgjoint.maps.fit.torsion_table import on_knots
+from swgjoint.maps.fit.tolerance_modes import combine_modes
+from swgjoint.maps.fit.torsion_table import interpolate_on_knots
 from swgjoint.maps.fit.validation import validation
 from swgjoint.maps.quartic import quartic_chain
 from swgjoint.maps.samples import FullSolves, MapSamples, ToleranceSamples
@@ -61,12 +61,14 @@ def fit_map(samples: MapSamples, *, keep: float = KEEP) -> DriveMap:
     knots = _knots(samples, torsion)
     torque = np.broadcast_to(samples.torque[:, None], torsion.shape)
     curve = np.stack([energy, torque, 1.0 / samples.compliance])
-    modes = _modes(on_knots(torsion, curve, knots))  # (n_modes, 2, 3, n_knots)
+    modes = _modes(
+        interpolate_on_knots(torsion, curve, knots)
+    )  # (n_modes, 2, 3, n_knots)
     error_modes = np.concatenate([np.zeros((1, 2)), _modes(e0)[1:]])
     orders = np.arange(len(modes))[:, None] * np.array([samples.order])
     toleranced = None
     if samples.tolerances is not None:
-        toleranced = combined(
+        toleranced = combine_modes(
             samples, knots, modes, error_modes, coarse=_coarse(samples), keep=keep
         )
         orders, modes = toleranced.orders, toleranced.potential
@@ -176,7 +178,7 @@ def _end_at_largest_torque(
     for end, sign in ((0, -1.0), (-1, 1.0)):
         last = knots[[end]].copy()
         for _ in range(END_STEPS):
-            _, reached, slope = on_knots(torsion, curve, last).mean(axis=0)
+            _, reached, slope = interpolate_on_knots(torsion, curve, last).mean(axis=0)
             last += (found.torque[end] - reached) / slope
         side = knots * sign > 0.0
         knots[side] *= last / knots[end]

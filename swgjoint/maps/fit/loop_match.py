@@ -99,7 +99,7 @@ def _shown(drive: Potential, rated_torque: float) -> LoopReadings:
     )
 
 
-def matched(
+def match_loop(
     fit: TorsionFit,
     play: Callable[[TorsionFit], Potential],
     rated_torque: float,

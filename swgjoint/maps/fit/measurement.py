@@ -15,7 +15,7 @@ from swgjoint.gear.kinematics import LAYOUTS
 from swgjoint.gear.ratings import Ratings
 from swgjoint.maps.checks import check_map
 from swgjoint.maps.fit.error_fit import ORDERS, fit_error
-from swgjoint.maps.fit.loop_match import matched
+from swgjoint.maps.fit.loop_match import match_loop
 from swgjoint.maps.fit.loop_units import check_direction, check_units
 from swgjoint.maps.fit.overlay import COMPARED, overlay
 from swgjoint.maps.fit.torsion_fit import INTERVALS, TorsionFit, fit_torsion
@@ -112,7 +112,7 @@ def map_from_measurement(
             hysteresis=tried.hysteresis,
         )
 
-    fit = matched(fit_torsion(loop, intervals=intervals), play, rated.rated_torque)
+    fit = match_loop(fit_torsion(loop, intervals=intervals), play, rated.rated_torque)
     info: dict[str, Any] = {
         "source": f"measurement {Path(path).name}",
         "fit": {"torsion": fit.report},

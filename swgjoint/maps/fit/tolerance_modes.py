@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from swgjoint.maps.fit.torsion_table import on_knots
-from swgjoint.maps.quartic import evaluated, quartic_chain
+from swgjoint.maps.fit.torsion_table import interpolate_on_knots
+from swgjoint.maps.quartic import evaluate, quartic_chain
 from swgjoint.maps.samples import MapSamples
 
 Array = NDArray[np.float64]
@@ -55,7 +55,9 @@ def tolerance_modes(samples: MapSamples, knots: Array) -> ToleranceModes:
         error, energy, compliance = table
         torsion = error[zero] - error
         torque = np.broadcast_to(found.torque[:, None], torsion.shape)
-        curve = on_knots(torsion, np.stack([energy, torque, 1.0 / compliance]), knots)
+        curve = interpolate_on_knots(
+            torsion, np.stack([energy, torque, 1.0 / compliance]), knots
+        )
         # (n_angles, 3, n_knots), the error at rest as one more column
         return np.concatenate(
             [curve.reshape(len(curve), -1), error[zero][:, None]], axis=1
@@ -122,7 +124,7 @@ class Combined:
     record: dict[str, Any]
 
 
-def combined(
+def combine_modes(
     samples: MapSamples,
     knots: Array,
     potential: Array,
@@ -214,6 +216,6 @@ def _refined(potential: Array, knots: Array, coarse: NDArray[np.bool_]) -> Array
         potential.reshape(-1, *potential.shape[2:]),
         strict=True,
     ):
-        one[:] = evaluated(*quartic_chain(knots[coarse], given), knots)
+        one[:] = evaluate(*quartic_chain(knots[coarse], given), knots)
         one[:, coarse] = given
     return found

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
-def on_knots(torsion: Array, curve: Array, knots: Array) -> Array:
+def interpolate_on_knots(torsion: Array, curve: Array, knots: Array) -> Array:
     """Quintic Hermite interpolation of many curves, with a parabola beyond the ends.
 
     V'' is there the mean of all curves: the tangents of single ones jump with the

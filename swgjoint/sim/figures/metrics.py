@@ -105,8 +105,8 @@ def joint_metrics(run: Run, j: int) -> dict[str, Any]:
         ],
         "highest_resolved_order": highest,
         "phase_step_rad": phase_step(run, j),
-        "transmission_error_arcmin": spread(error),
-        "torsion_arcmin": spread(run.torsion[window, j] / arcmin),
+        "transmission_error_arcmin": signal_statistics(error),
+        "torsion_arcmin": signal_statistics(run.torsion[window, j] / arcmin),
         "off_command_deg": _off_command(run, j),
         "input_turns": float(abs(angle[-1] - angle[0]) / (2.0 * np.pi)),
         "ratings": use_of_ratings(run, j),
@@ -271,7 +271,7 @@ AT_REST = 1e-9
 equal points is below it."""
 
 
-def spread(values: Array) -> dict[str, float]:
+def signal_statistics(values: Array) -> dict[str, float]:
     """Mean, root mean square and peak to peak of a signal, in its unit."""
     return {
         "mean": float(np.mean(values)),

@@ -49,7 +49,7 @@ def ripple_label(run: Run, j: int, ripple: Array) -> dict[str, Any]:
         ``ripple_missing``: why there is none to tell, None where there is.
         ``ripple_noise_percent``: rms of the noise of the integration, of the rated
         torque. ``ripple_left_out_percent``: rms of the orders that the step leaves out.
-        ``ripple_is_lower_bound``: whether they matter. ``resolving``: the strongest
+        ``ripple_is_lower_bound``: whether they matter. ``find_resolving_step``: the strongest
         order that is left out with the step, and the speed of the joint at the step of
         the run, that carry it; None where nothing is left out.
     """
@@ -71,7 +71,7 @@ def ripple_label(run: Run, j: int, ripple: Array) -> dict[str, Any]:
         "ripple_noise_percent": 100.0 * noise / rated,
         "ripple_left_out_percent": 100.0 * left / rated,
         "ripple_is_lower_bound": bool(left > 0.0 and whole > (1.0 + SHARE) * rms),
-        "resolving": resolving(run, j),
+        "resolving": find_resolving_step(run, j),
     }
 
 
@@ -150,7 +150,7 @@ def left_out_torque(run: Run, j: int) -> float:
     )
 
 
-def resolving(run: Run, j: int) -> dict[str, float] | None:
+def find_resolving_step(run: Run, j: int) -> dict[str, float] | None:
     """Step and speed that carry the strongest order that is left out."""
     transmission = run.assembly.transmissions[j]
     attached = transmission.attached

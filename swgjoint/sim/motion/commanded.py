@@ -122,7 +122,7 @@ def _motion_of(scene: Scene, arm: RigidArm, sub_steps: int) -> Trajectory:
         )
     if isinstance(section, FromFile):
         points_time, points = joint_motions.read_points(section.file, joints, start)
-        return joint_motions.through_points(
+        return joint_motions.spline_motion(
             time, points_time=points_time, points=points, hold=section.hold_s
         )
     hold = section.orientation or (

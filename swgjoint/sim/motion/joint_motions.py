@@ -169,7 +169,7 @@ def chirp(
     )
 
 
-def through_points(
+def spline_motion(
     time: Array, *, points_time: Array, points: Array, hold: float
 ) -> Trajectory:
     """Rest, a smooth motion through all points, rest; twice differentiable throughout.

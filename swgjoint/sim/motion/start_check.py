@@ -78,7 +78,7 @@ def check_link(attached: JointDrive, arm: RigidArm, *, where: str) -> None:
     )
 
 
-def touching_at(arm: RigidArm, position: Array) -> str:
+def touching_bodies(arm: RigidArm, position: Array) -> str:
     """Bodies that press each other in a pose, as part of a message; empty if none.
 
     Args:

@@ -17,8 +17,8 @@ from swgjoint.faults import (
     parse_toml,
     parse_value,
     read_toml,
-    shortened,
-    validated,
+    shorten,
+    validate,
 )
 from swgjoint.models_path import find, is_file
 from swgjoint.sim.arm.reading import ArmReading
@@ -221,7 +221,7 @@ class Scene(Section):
                 lines += faulty
                 merged[table] = {}
         try:
-            scene = validated(cls, merged, where=where)
+            scene = validate(cls, merged, where=where)
         except InputError as exc:
             lines += str(exc).split("\n")
         if lines:
@@ -272,7 +272,7 @@ class Scene(Section):
 def _faults_of(model: type[Section], entry: dict[str, Any], path: str) -> list[str]:
     """Lines about one table that lies at a dotted path of the file."""
     try:
-        validated(model, entry, where="\0")
+        validate(model, entry, where="\0")
     except InputError as exc:
         return [line.replace("\0: ", f"{path}.", 1) for line in str(exc).split("\n")]
     return []
@@ -333,12 +333,12 @@ def parse_override(text: str) -> tuple[str, Any]:
     key = key.strip()
     if not equals or not all(key.split(".")):
         raise InputError(
-            f"override {shortened(text)!r}: accepted: key=value with a dotted key, for"
+            f"override {shorten(text)!r}: accepted: key=value with a dotted key, for"
             " example simulation.step_s=0.0005"
         )
     if key.count(".") >= MAX_DEPTH:
         raise InputError(
-            f"override {shortened(key)}: accepted: a dotted key of at most {MAX_DEPTH}"
+            f"override {shorten(key)}: accepted: a dotted key of at most {MAX_DEPTH}"
             " parts"
         )
     return key, parse_value(value, where=key)  # a bare word: a name or a path

@@ -16,7 +16,7 @@ from swgjoint.files import Outputs
 from swgjoint.gear.design.design import Design
 from swgjoint.json_text import json_text
 from swgjoint.pool import run_all
-from swgjoint.validation.articles.file import ArticlesFile, changed
+from swgjoint.validation.articles.file import ArticlesFile, changed_design
 from swgjoint.validation.articles.lobes import lobe_rows
 from swgjoint.validation.articles.rows import (
     deflection_rows,
@@ -69,14 +69,14 @@ def run_articles(options: StudyOptions) -> StudyResult:
 def tasks_of(study: ArticlesFile, part: str) -> list[ArticleTask]:
     """What a part computes."""
     if part == "deflection":
-        own = changed(study.deflection.base)
+        own = changed_design(study.deflection.base)
         tasks = _deflected("deflection", own, fine=True)
         for v in study.deflection.variations:
             tasks += _deflected(f"deflection, {v.name}", own.with_changes(v.changes))
         return tasks
     if part == "force":
         force = study.force
-        design = changed(force.base)
+        design = changed_design(force.base)
         tasks = [
             ArticleTask(name="force", kind="pinched", design=design),
             ArticleTask(
@@ -95,12 +95,12 @@ def tasks_of(study: ArticlesFile, part: str) -> list[ArticleTask]:
             ArticleTask(
                 name=f"force, {v.name}",
                 kind="pinched",
-                design=changed(force.base, v.changes),
+                design=changed_design(force.base, v.changes),
             )
             for v in force.variations
         ]
     stress = study.stress
-    design, torques = changed(stress.base), stress.torques_Nm
+    design, torques = changed_design(stress.base), stress.torques_Nm
     crowned = design.with_changes(stress.crowned)
     tasks = [
         ArticleTask(name="four", kind="four", design=design, torques=torques, size=2),

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 from pydantic import Field, model_validator
 
 from swgjoint.errors import InputError
-from swgjoint.faults import Fault, Section, read_toml, validated
+from swgjoint.faults import Fault, Section, read_toml, validate
 from swgjoint.gear.design.design import Design
 from swgjoint.models_path import find
 
@@ -100,10 +100,10 @@ class ArticlesFile(Section):
         """
         path = find(reference, "studies", ".toml", what="study")
         data = read_toml(path, what="study", error=InputError)
-        return validated(cls, data, where=str(path), error=InputError)
+        return validate(cls, data, where=str(path), error=InputError)
 
 
-def changed(base: str, changes: Mapping[str, Any] | None = None) -> Design:
+def changed_design(base: str, changes: Mapping[str, Any] | None = None) -> Design:
     """A bundled design with some keys changed.
 
     Raises:

@@ -21,7 +21,7 @@ from swgjoint.validation.articles.file import (
     Deflection,
     Force,
     StressAndFatigue,
-    changed,
+    changed_design,
 )
 from swgjoint.validation.articles.runs import Found
 from swgjoint.validation.rows import Row
@@ -46,7 +46,7 @@ def _at(found: Found, torque: float) -> Found:
 def deflection_rows(own: Deflection, results: Mapping[str, Found]) -> list[Row]:
     """Deflection of the 80:1 drive and where its largest stress lies."""
     found, fine = results["deflection"], results["deflection, fine"]
-    drive = changed(own.base).drive
+    drive = changed_design(own.base).drive
     lobe = (
         0.5 * drive.module_mm * (drive.teeth_circular_spline - drive.teeth_flexspline)
     )
@@ -188,7 +188,7 @@ def _at_torque(found: Found, k: int, *keys: str) -> float | None:
 
 def force_rows(own: Force, found: Mapping[str, Found]) -> list[Row]:
     """Deformation force of XB1-100-80: formula, finite elements, what is open."""
-    design = changed(own.base)
+    design = changed_design(own.base)
     steel = design.material_of("flexspline")
     assert design.cup is not None
     length = design.cup.length_mm + design.drive.face_width_mm
@@ -306,7 +306,7 @@ def force_rows(own: Force, found: Mapping[str, Found]) -> list[Row]:
 
 def stress_rows(own: StressAndFatigue, found: Mapping[str, Found]) -> list[Row]:
     """Stress without torque: shell theory and finite elements."""
-    shell = ShellDimensions.of(changed(own.base))
+    shell = ShellDimensions.of(changed_design(own.base))
     four, fine = found["four"], found["four, fine"]
 
     row = partial(_row, "stress", own.base)
@@ -407,7 +407,7 @@ def _torque_at(allowable: float, shell: ShellDimensions, steel: Material) -> flo
 
 def fatigue_rows(own: StressAndFatigue, found: Mapping[str, Found]) -> list[Row]:
     """Safety factors over the torque."""
-    design = changed(own.base)
+    design = changed_design(own.base)
     shell, radius = ShellDimensions.of(design), 0.5 * design.pitch_diameter
     steel = design.material_of("flexspline")
     assert steel.fatigue_limit_bending and steel.fatigue_limit_torsion

@@ -39,14 +39,14 @@ from swgjoint.validation.catalogue.rows import (
 )
 from swgjoint.validation.catalogue.runs import CatalogueTask, Found, oval, run_task
 from swgjoint.validation.catalogue.shares import (
+    cube_scaling,
     friction,
     individual_summary,
-    scaling,
     shares,
 )
 from swgjoint.validation.catalogue.summary import (
+    compare_scaling,
     ratcheting_orders,
-    scaled_against_computed,
     summary,
 )
 from swgjoint.validation.rows import Row, StudyOptions, StudyResult
@@ -87,7 +87,7 @@ def run_catalogue(options: StudyOptions) -> StudyResult:
     lines = summary(study, rows) + loss_lines(rows)
     if "ratcheting" in parts:
         lines += ratcheting_orders(study, found, REFERENCE)
-    lines += scaled_against_computed(study, found, REFERENCE, CHECK)
+    lines += compare_scaling(study, found, REFERENCE, CHECK)
     more: dict[str, Any] = {
         "source": study.source,
         "variants": [v.name for v in study.variants],
@@ -95,7 +95,7 @@ def run_catalogue(options: StudyOptions) -> StudyResult:
         "failed": sorted(failed),
     }
     if "stiffness" in parts:
-        more["scaling"] = scaling(study, found, REFERENCE)
+        more["scaling"] = cube_scaling(study, found, REFERENCE)
         more["shares"] = shares(study, found, REFERENCE)
         more["friction"] = friction(study, found, REFERENCE)
         for key in ("scaling", "shares", "friction"):

@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field
 
 from swgjoint.errors import InputError
-from swgjoint.faults import Section, read_toml, validated
+from swgjoint.faults import Section, read_toml, validate
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.family import BEARING_BORE, CLEARANCE
 from swgjoint.models_path import find
@@ -92,7 +92,7 @@ class CatalogueFile(Section):
         """
         path = find(reference, "studies", ".toml", what="study")
         data = read_toml(path, what="study", error=InputError)
-        return validated(cls, data, where=str(path), error=InputError)
+        return validate(cls, data, where=str(path), error=InputError)
 
     @property
     def coefficients(self) -> tuple[float, ...]:

@@ -28,7 +28,7 @@ from swgjoint.validation.rows import Row
 Array = NDArray[np.float64]
 
 
-def rubbed(found: Found, design: Design) -> RubbedPath:
+def friction_of_path(found: Found, design: Design) -> RubbedPath:
     """A path of the rings behind the cup of a design."""
     torque = np.array(found["torque_Nm"])
     series = series_compliance(design, cup=True)
@@ -70,7 +70,7 @@ def stiffness_rows(
         if "fault" in one:
             faults.append(f"{variant.name}: {one['fault']}")
             continue
-        path = rubbed(one, variant_design(row.size, row.ratio, variant))
+        path = friction_of_path(one, variant_design(row.size, row.ratio, variant))
         for key, value in zip(STIFFNESS, stiffnesses(path, row), strict=True):
             values.setdefault(key, []).append(float(value))
         for mu in study.coefficients:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from swgjoint.code_hash import code_hash
 from swgjoint.errors import ComputationError, DesignError
 from swgjoint.gear.design.design import Design
-from swgjoint.maps.cache import recalled
+from swgjoint.maps.cache import recall
 
 if TYPE_CHECKING:
     from swgjoint.fe.rings.friction import RubbedPath
@@ -55,7 +55,7 @@ def run_task(task: CatalogueTask) -> Found:
         "design": task.design.content_hash(),
         "torques": task.torques,
     }
-    return recalled("studies", parts, Found, lambda: _computed(task))
+    return recall("studies", parts, Found, lambda: _computed(task))
 
 
 def _computed(task: CatalogueTask) -> Found:
@@ -75,9 +75,9 @@ def _own_version() -> str:
 
 def _whole_path(task: CatalogueTask, angles: Array | None = None) -> RubbedPath:
     """The path of the rings to the last torque of a task."""
-    from swgjoint.fe.rings.friction import rubbed_path
+    from swgjoint.fe.rings.friction import friction_path
 
-    path = rubbed_path(task.design, task.torques, angles=angles)
+    path = friction_path(task.design, task.torques, angles=angles)
     if not path.outcome.ok:
         reached = path.torque[-1] if path.torque.size else 0.0
         raise ComputationError(
@@ -115,9 +115,9 @@ def _ratcheting(task: CatalogueTask) -> Found:
 
 def _individual(task: CatalogueTask) -> Found:
     """Torsion behind the cup [rad] over the torque, at angles over an output turn."""
-    from swgjoint.fe.rings.accuracy import over_output_turn
+    from swgjoint.fe.rings.accuracy import output_turn_angles
 
-    angles = over_output_turn(task.design, INDIVIDUAL_ANGLES)
+    angles = output_turn_angles(task.design, INDIVIDUAL_ANGLES)
     paths = [_whole_path(task, angles[k : k + 1]) for k in range(angles.size)]
     return {
         "input_angles_rad": angles.tolist(),
@@ -130,9 +130,9 @@ def _individual(task: CatalogueTask) -> Found:
 
 def _accuracy(task: CatalogueTask) -> Found:
     """Error of the rings over one output turn, hardly loaded."""
-    from swgjoint.fe.rings.accuracy import over_output_turn, transmission_error
+    from swgjoint.fe.rings.accuracy import output_turn_angles, transmission_error
 
-    angles = over_output_turn(task.design, ANGLES)
+    angles = output_turn_angles(task.design, ANGLES)
     error = transmission_error(task.design, angles)
     return {"input_angles_rad": angles.tolist(), "error_rad": error.tolist()}
 

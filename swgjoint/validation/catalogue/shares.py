@@ -16,13 +16,13 @@ from swgjoint.gear.mounting import series_compliance
 from swgjoint.units import arcmin
 from swgjoint.validation.catalogue.file import CatalogueFile, variant_design
 from swgjoint.validation.catalogue.printed import STIFFNESS, catalogue_row, edges
-from swgjoint.validation.catalogue.rows import rubbed, stiffnesses
+from swgjoint.validation.catalogue.rows import friction_of_path, stiffnesses
 from swgjoint.validation.catalogue.runs import Found
 
 Array = NDArray[np.float64]
 
 
-def scaling(
+def cube_scaling(
     study: CatalogueFile, found: Mapping[str, Found], size: int
 ) -> dict[str, Any]:
     """How far the cube of the size goes: K of every size over that scaled from one.
@@ -37,13 +37,13 @@ def scaling(
         base = found[f"path {size} {ratio} {first.flank_deg:g}"]
         if "fault" in base:
             continue
-        here = rubbed(base, variant_design(size, ratio, first))
+        here = friction_of_path(base, variant_design(size, ratio, first))
         for other in study.sizes:
             one = found[f"path {other} {ratio} {first.flank_deg:g}"]
             if "fault" in one or other == size:
                 continue
             scale = (other / size) ** 3
-            there = rubbed(one, variant_design(other, ratio, first))
+            there = friction_of_path(one, variant_design(other, ratio, first))
             reach = min(float(there.torque[-1]), scale * float(here.torque[-1]))
             torques = np.minimum(edges(catalogue_row(other, ratio)), reach)
             own = np.diff(_smooth(there, torques))
@@ -88,7 +88,7 @@ def shares(
         if "fault" in found[name]:
             continue
         row, design = catalogue_row(size, ratio), variant_design(size, ratio, first)
-        path = rubbed(found[name], design)
+        path = friction_of_path(found[name], design)
         parts = {f"{first.cup} cup": path.series / path.compliance, **path.shares}
         rows += [
             {
@@ -111,7 +111,10 @@ def shares(
         )
         tight = found[f"{name} tight"]
         if "fault" not in tight:
-            K, free = stiffnesses(path, row), stiffnesses(rubbed(tight, design), row)
+            K, free = (
+                stiffnesses(path, row),
+                stiffnesses(friction_of_path(tight, design), row),
+            )
             less = "/".join(f"{value:.2f}" for value in free / K)
             rising = [f"{k[2] / k[0]:.2f}" for k in (K, free)]
             lines[-1] += (
@@ -194,7 +197,7 @@ def friction(
         one = found[f"path {size} {ratio} {first.flank_deg:g}"]
         if "fault" in one:
             continue
-        path = rubbed(one, variant_design(size, ratio, first))
+        path = friction_of_path(one, variant_design(size, ratio, first))
         torque = path.torque.tolist()
         for mu in (0.0, *study.coefficients):
             rows.append(

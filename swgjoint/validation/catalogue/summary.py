@@ -110,7 +110,7 @@ def ratcheting_orders(
     return lines
 
 
-def scaled_against_computed(
+def compare_scaling(
     study: CatalogueFile,
     found: Mapping[str, Found],
     size: int,

@@ -172,7 +172,7 @@ def two_per_turn(run: Run) -> float:
     return float(np.sqrt(weights @ weights))
 
 
-def shown_of(runs: dict[str, Run]) -> dict[str, Array]:
+def signals_of(runs: dict[str, Run]) -> dict[str, Array]:
     """Signals of the runs for the picture."""
     move, slow, even = (runs[motion] for motion in MOTIONS)
     turn = slice(slow.steady.start, slow.steady.stop, 10)

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from swgjoint.control.flexible import flexible_plan
 from swgjoint.control.kinematic_error import (
     KinematicErrorTable,
-    compensated,
+    compensate,
     identify_kinematic_error,
 )
 from swgjoint.control.learning import LearningCompensation
@@ -45,7 +45,7 @@ from swgjoint.validation.control.bench import (
     figures_of,
     record_turn,
     run_motion,
-    shown_of,
+    signals_of,
 )
 from swgjoint.validation.control.specimens import nominal, specimen
 from swgjoint.validation.rows import Row, StudyOptions, StudyResult
@@ -78,11 +78,11 @@ def _plan(planner: Any) -> Build:
 
 
 def _compensated(table: KinematicErrorTable) -> Controller:
-    return MotorPID(compensated([table]), frequency=FREQUENCY)
+    return MotorPID(compensate([table]), frequency=FREQUENCY)
 
 
 def _predictive(table: KinematicErrorTable) -> Controller:
-    return PredictiveController(compensated([table]))
+    return PredictiveController(compensate([table]))
 
 
 def _learning(inner: Build, table: KinematicErrorTable) -> Controller:
@@ -205,7 +205,7 @@ def _one_seed(
             for motion in MOTIONS
         }
         figures[rung.name] = figures_of(runs)
-        shown[rung.name] = shown_of(runs) if seed == 0 else {}
+        shown[rung.name] = signals_of(runs) if seed == 0 else {}
     return figures, shown
 
 

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from swgjoint.errors import DesignError, InputError
-from swgjoint.faults import Fault, Section, read_toml, validated
+from swgjoint.faults import Fault, Section, read_toml, validate
 from swgjoint.gear.design.design import Design
 from swgjoint.models_path import find
 
@@ -164,7 +164,7 @@ class StudyFile(Section):
             InputError: With one line per fault of the file.
         """
         path = find(reference, "studies", ".toml", what="study")
-        return validated(cls, read_toml(path, what="study"), where=str(path))
+        return validate(cls, read_toml(path, what="study"), where=str(path))
 
     @property
     def by_tenth(self) -> bool:

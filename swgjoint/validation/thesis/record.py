@@ -14,7 +14,7 @@ import numpy as np
 from swgjoint.code_hash import code_hash
 from swgjoint.errors import ComputationError, DesignError
 from swgjoint.gear.design.design import Design
-from swgjoint.maps.cache import key_of, recalled
+from swgjoint.maps.cache import key_of, recall
 from swgjoint.units import MPa
 from swgjoint.validation.thesis.cases import KINDS
 
@@ -95,9 +95,9 @@ class RunRecord:
         return self.outcome == "converged"
 
 
-def recorded(spec: RunSpec) -> RunRecord:
+def record_run(spec: RunSpec) -> RunRecord:
     """The record of a run, from the cache or computed and then kept."""
-    return recalled("studies", spec.parts, RunRecord, lambda: compute(spec))
+    return recall("studies", spec.parts, RunRecord, lambda: compute(spec))
 
 
 def compute(spec: RunSpec) -> RunRecord:

@@ -27,7 +27,7 @@ from swgjoint.validation.thesis.checks import (
     rank_checks,
     trend_checks,
 )
-from swgjoint.validation.thesis.record import RunRecord, RunSpec, recorded
+from swgjoint.validation.thesis.record import RunRecord, RunSpec, record_run
 from swgjoint.validation.thesis.rows import CaseRecords, increase_rows, stress_rows
 
 TENTH = 0.1
@@ -55,7 +55,7 @@ def run_cases(study: StudyFile, options: StudyOptions) -> StudyResult:
     specs = {spec.key: spec for row in plan.values() for spec in row.values()}
     ordered = sorted(specs.values(), key=lambda spec: -spec.size)
     records = run_all(
-        recorded,
+        record_run,
         ordered,
         jobs=options.jobs,
         stage="simulations of meshing",

@@ -12,7 +12,7 @@ from swgjoint.pictures import save_png
 from swgjoint.sim.figures.keys import LOWER, RIPPLE
 from swgjoint.view.recording.entities import COLORS
 from swgjoint.view.report.report import Cell, Table
-from swgjoint.view.words import shown
+from swgjoint.view.words import format_figure
 
 if TYPE_CHECKING:
     from swgjoint.explore.compare.compare import Compared
@@ -63,7 +63,7 @@ def cell(row: Mapping[str, Any], key: str) -> str:
         sign = joint_mark(row, JUDGED_BY[key])
     else:
         sign = error_mark(row, row[key]) if key == _ERROR else ""
-    return f"{sign} {bound}{shown(row[key])}".strip()
+    return f"{sign} {bound}{format_figure(row[key])}".strip()
 
 
 def columns(rows: Sequence[Compared]) -> dict[str, tuple[str, str]]:

@@ -88,11 +88,11 @@ def section_picture(run: SolidRun, state: SolidState) -> bytes:
     from matplotlib.collections import LineCollection, PolyCollection
     from matplotlib.figure import Figure
 
-    from swgjoint.fe.solid.figures.axial_section import axial_sections, on_axes
+    from swgjoint.fe.solid.figures.axial_section import axial_sections, axis_sectors
 
     figure = Figure(figsize=(11.0, 6.0), layout="constrained")
     axes = figure.subplots(1, 2, sharex=True, sharey=True)
-    both = [axial_sections(run.model, state, k) for k in on_axes(run.model, state)]
+    both = [axial_sections(run.model, state, k) for k in axis_sectors(run.model, state)]
     rest, moved = (
         np.concatenate([getattr(part, name) for found in both for part in found])
         for name in ("rest", "moved")

@@ -13,7 +13,7 @@ from swgjoint.json_text import json_text
 from swgjoint.pictures import save_png
 from swgjoint.units import arcmin
 from swgjoint.view.report.report import Cell, Table, write_tables
-from swgjoint.view.words import shown
+from swgjoint.view.words import format_figure
 
 if TYPE_CHECKING:
     from swgjoint.explore.tune.result import GainCandidate, Tuned
@@ -184,7 +184,7 @@ def _summary(found: Tuned) -> Table:
         rows.append(
             [
                 Cell(one.name, "text"),
-                *[Cell(shown(float(x / arcmin))) for x in costs],
+                *[Cell(format_figure(float(x / arcmin))) for x in costs],
                 Cell("-" if one is found.baseline else f"{saved:.1f}"),
                 Cell(str(one.to_json()["broken_limits"])),
             ]
@@ -222,13 +222,15 @@ def _gains(found: Tuned) -> Table:
     rows = []
     for key in keys:
         cells = [
-            Cell(shown(value) if np.isfinite(value) else "none")
+            Cell(format_figure(value) if np.isfinite(value) else "none")
             if (value := (one.values | one.gains).get(key)) is not None
             else Cell("-")
             for one in found.candidates
         ]
         low, high = bounds.get(key, (None, None))
-        searched = "-" if low is None else f"{shown(low)} to {shown(high)}"
+        searched = (
+            "-" if low is None else f"{format_figure(low)} to {format_figure(high)}"
+        )
         rows.append([Cell(key, "text"), *cells, Cell(searched)])
     return Table(
         title="Gains",
@@ -249,7 +251,7 @@ def _by_seed(found: Tuned) -> Table:
         rows.append(
             [
                 Cell(str(seed), "text"),
-                *[Cell(shown(x)) for x in costs],
+                *[Cell(format_figure(x)) for x in costs],
                 Cell(
                     f"{100.0 * (1.0 - costs[-1] / costs[0]):.1f}",
                     "" if better else "bad",

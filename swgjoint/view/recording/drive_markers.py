@@ -51,7 +51,7 @@ def log_drives(stream: Any, prefix: str, assembly: Assembly) -> None:
         )
         place = rr.Transform3D(
             translation=model.jnt_pos[joint],
-            quaternion=turned_to(model.jnt_axis[joint]),
+            quaternion=rotation_to(model.jnt_axis[joint]),
         )
         stream.log(path, disc, place, static=True)
 
@@ -129,7 +129,7 @@ def load_color(share: NDArray[np.float64]) -> NDArray[np.uint32]:
     return np.asarray((red << 24) | (green << 16) | (blue << 8) | np.uint32(255))
 
 
-def turned_to(axis: NDArray[np.float64]) -> NDArray[np.float64]:
+def rotation_to(axis: NDArray[np.float64]) -> NDArray[np.float64]:
     """Turn of the z axis into a direction, x, y, z, w. Shape (4,)."""
     wxyz = np.zeros(4)
     mujoco.mju_quatZ2Vec(wxyz, np.asarray(axis, dtype=float))

@@ -108,7 +108,7 @@ def log_drive(stream: Any, path: str, assembly: Assembly, joint: str) -> None:
     turns = 2.0 * np.pi / parts * np.arange(parts, dtype=float)
     teeth = drive.teeth_flexspline // parts
     triangles = (fields.triangles + n * np.arange(teeth)[:, None, None]).reshape(-1, 3)
-    z = in_front(fields)
+    z = front_planes(fields)
     stream.log(
         f"{path}/flexspline",
         rr.Mesh3D.from_fields(triangle_indices=triangles.astype(np.uint32)),
@@ -129,7 +129,7 @@ def log_drive(stream: Any, path: str, assembly: Assembly, joint: str) -> None:
     )
     count = drive.teeth_circular_spline
     around = 2.0 * np.pi * (np.arange(count) + 0.5) / count
-    ring = np.concatenate([turned(fields.circular_spline, a) for a in around])
+    ring = np.concatenate([rotate_points(fields.circular_spline, a) for a in around])
     white = 0xFFFFFFFF
     tooth = rr.Points3D.from_fields(radii=[0.015 * radius(fields)], colors=[white])
     stream.log(f"{path}/tooth", tooth, static=True)
@@ -226,7 +226,7 @@ def _send_forces(
         for part in (fields.tooth_force, fields.wave_generator_force)
     )
     scale = ARROW * radius(fields) / max(largest, 1e-9)
-    distance, z = np.hypot(*fields.points[:, :2].T), in_front(fields)
+    distance, z = np.hypot(*fields.points[:, :2].T), front_planes(fields)
     edge = fields.points[:, 2] == fields.points[:, 2].min()
     outer = np.where(edge, distance, -np.inf).argmax()
     inner = np.where(edge, distance, np.inf).argmin()
@@ -257,7 +257,7 @@ def eye(fields: DriveFields) -> Any:
     """Camera that looks along the axis, into the open end of a cup."""
     import rerun.blueprint as rrb
 
-    side, r = float(np.sign(in_front(fields))), radius(fields)
+    side, r = float(np.sign(front_planes(fields))), radius(fields)
     # aslant if there is a depth to show
     down = -0.6 * r if side < 0.0 else 0.0
     return rrb.EyeControls3D(
@@ -267,7 +267,7 @@ def eye(fields: DriveFields) -> Any:
     )
 
 
-def in_front(fields: DriveFields) -> float:
+def front_planes(fields: DriveFields) -> float:
     """Where along z outlines and forces lie [m].
 
     Before the open edge, above a model of the plane; hardly, so that nothing shifts
@@ -283,7 +283,7 @@ def radius(fields: DriveFields) -> float:
     return float(np.hypot(*fields.points[:, :2].T).max())
 
 
-def turned(points: Array, angle: float) -> Array:
+def rotate_points(points: Array, angle: float) -> Array:
     """Points of the plane turned about the axis (n, 2)."""
     c, s = np.cos(angle), np.sin(angle)
     return np.asarray(points @ np.array([[c, s], [-s, c]]))
@@ -294,7 +294,7 @@ def all_around(vectors: Table, parts: int) -> Table:
     turns = 2.0 * np.pi / parts * np.arange(parts, dtype=float)
     around = [vectors.copy() for _ in turns]
     for part, angle in zip(around, turns, strict=True):
-        part[..., :2] = turned(part[..., :2].astype(float), angle)
+        part[..., :2] = rotate_points(part[..., :2].astype(float), angle)
     return np.concatenate(around, axis=1)
 
 

@@ -41,13 +41,13 @@ def joint_png(runs: Mapping[str, Run], joint: str) -> bytes:
         color = tuple(c / 255 for c in COLORS[k % len(COLORS)])
         dash = "-" if k < len(COLORS) else "--"
         style: dict[str, Any] = {"color": color, "ls": dash, "lw": 0.9, "label": label}
-        over_time(axes[0, 0], run.time, run.output_torque[:, j], **style)
+        plot_over_time(axes[0, 0], run.time, run.output_torque[:, j], **style)
         if is_rigid(run) and len(runs) > 1:
             continue  # lines at zero that would set the scale
-        over_time(axes[0, 1], run.time, run.torsion[:, j] / arcmin, **style)
+        plot_over_time(axes[0, 1], run.time, run.torsion[:, j] / arcmin, **style)
         error = run.transmission_error[:, j] / arcmin
-        over_time(axes[0, 2], run.time, error, **style)
-        draw_ripple(axes[1, 0], axes[1, 1], run, j, style, line=over_time)
+        plot_over_time(axes[0, 2], run.time, error, **style)
+        draw_ripple(axes[1, 0], axes[1, 1], run, j, style, line=plot_over_time)
         window = run.steady
         axes[1, 2].plot(
             run.torsion[window, j] / arcmin, run.output_torque[window, j], **style
@@ -82,7 +82,7 @@ def png(figure: Any) -> bytes:
     return out.getvalue()
 
 
-def over_time(
+def plot_over_time(
     axis: Any, time: NDArray[np.float64], values: NDArray[np.float64], **style: Any
 ) -> None:
     """A line that keeps every peak and has no more points than the picture shows."""

@@ -34,13 +34,13 @@ from swgjoint.view.plots.spec import spec_picture
 from swgjoint.view.recording.blueprint import joints_by_interest
 from swgjoint.view.report.plots import joint_png
 from swgjoint.view.validity import (
-    left_out_of,
     left_out_share,
     map_error,
+    omissions_of,
     step_error,
     warnings_of,
 )
-from swgjoint.view.words import short, shown, words
+from swgjoint.view.words import format_figure, short, words
 
 if TYPE_CHECKING:
     from swgjoint.maps.drive_map import DriveMap
@@ -235,7 +235,7 @@ def summary_table(runs: Mapping[str, Run]) -> Table:
                 *_cells(max(torsion)),
                 error_cell(joints, max(error)),
                 *_cells(metrics["tool"]["path_rms_mm"], max(peaks)),
-                Cell(shown(within), "good" if within else "bad"),
+                Cell(format_figure(within), "good" if within else "bad"),
                 *_cells(run.time[-1] / run.wall),
             ]
         )
@@ -275,14 +275,14 @@ def ripple_cell(joints: Iterable[Mapping[str, Any]], key: str) -> Cell:
     most = max(told, key=lambda joint: float(joint[key]))
     bound = "> " if most["ripple_is_lower_bound"] else ""
     sign = worst([joint_mark(joint) for joint in told])
-    text = f"{sign} {bound}{shown(most[key])}".strip()
+    text = f"{sign} {bound}{format_figure(most[key])}".strip()
     return Cell(text, "bad" if bound or sign else "")
 
 
 def error_cell(joints: Iterable[Mapping[str, Any]], value: float) -> Cell:
     """Peak to peak of a transmission error, marked as :func:`ripple_cell` does."""
     sign = worst([error_mark(joint, value) for joint in joints])
-    return Cell(f"{sign} {shown(value)}".strip(), "bad" if sign else "")
+    return Cell(f"{sign} {format_figure(value)}".strip(), "bad" if sign else "")
 
 
 def _legend(joints: Iterable[Mapping[str, Any]]) -> list[str]:
@@ -309,7 +309,7 @@ def _label(label: str, run: Run, step: dict[str, Any] | None) -> dict[str, Any]:
     )
     if step is not None and "reason" in step:
         lines.append(Cell(f"change at half the step {step['reason']}"))
-    lines += [Cell(text) for text in left_out_of(run)]
+    lines += [Cell(text) for text in omissions_of(run)]
     changes = (step or {}).get("joints", {})
     rows = []
     for j, joint in enumerate(run.joints):
@@ -385,7 +385,10 @@ def _joint_table(runs: Mapping[str, Run], joint: str) -> Table:
                     ratings["cubed_mean_Nm"],
                     ratings["input_speed_rpm"],
                 ),
-                Cell(shown(ratings["within"]), "good" if ratings["within"] else "bad"),
+                Cell(
+                    format_figure(ratings["within"]),
+                    "good" if ratings["within"] else "bad",
+                ),
             ]
         )
     return Table(
@@ -427,7 +430,10 @@ def _sheet(drive: DriveMap) -> dict[str, Any]:
         rows.append(
             [
                 Cell(name, "text"),
-                Cell(f"{sign} {shown(plain(value))}".strip(), "bad" if sign else ""),
+                Cell(
+                    f"{sign} {format_figure(plain(value))}".strip(),
+                    "bad" if sign else "",
+                ),
                 *(_cells(stated.get(key)) if stated else []),
                 Cell(unit, "text"),
                 Cell(sheet.missing.get(key, why), "text"),
@@ -516,7 +522,7 @@ def _drives(runs: Mapping[str, Run]) -> list[DriveMap]:
 
 
 def _cells(*values: Any) -> list[Cell]:
-    return [Cell(shown(plain(value))) for value in values]
+    return [Cell(format_figure(plain(value))) for value in values]
 
 
 def _inline(data: bytes) -> str:

@@ -10,12 +10,12 @@ from messages import naming
 from solved import RING_TORQUES, hundred_elements, ring_path
 
 from swgjoint.errors import DesignError
-from swgjoint.fe.rings.contacts import linearised, race_on_balls
+from swgjoint.fe.rings.contacts import linearise, race_on_balls
 from swgjoint.fe.rings.equilibrium import RingSolver, rim_rotation
-from swgjoint.fe.rings.friction import rubbed_path
-from swgjoint.fe.rings.loading import loaded, positions, unloaded
+from swgjoint.fe.rings.friction import friction_path
+from swgjoint.fe.rings.loading import positions, solve_loaded, solve_unloaded
 from swgjoint.fe.rings.model import thin_ring
-from swgjoint.fe.rings.state import at_rest
+from swgjoint.fe.rings.state import initial_state
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.teeth.neutral_line import NeutralLine
 from swgjoint.gear.wave_generators.ellipse import Elliptical
@@ -37,14 +37,14 @@ def state(model):
 
 def twisted(model, alpha, torque):
     """Equilibrium at an angle, after a small torque that finds the teeth."""
-    small = loaded(model, unloaded(model, alpha), np.sign(torque))
-    return loaded(model, small, torque)
+    small = solve_loaded(model, solve_unloaded(model, alpha), np.sign(torque))
+    return solve_loaded(model, small, torque)
 
 
 @pytest.fixture(scope="module")
 def near_zero(model):
     """Under 1 N·m, the wave generator where it starts."""
-    return loaded(model, unloaded(model, 0.0), 1.0)
+    return solve_loaded(model, solve_unloaded(model, 0.0), 1.0)
 
 
 @pytest.mark.parametrize(
@@ -57,10 +57,10 @@ def near_zero(model):
 )
 def test_any_wave_generator_angle_has_an_equilibrium(model, near_zero, alpha):
     """Far round, on either side and where the output's angle wraps, like near zero."""
-    rest = unloaded(model, alpha)
+    rest = solve_unloaded(model, alpha)
     assert rest.outcome.ok
     assert rest.rotation == pytest.approx(alpha / model.ratio, abs=1e-9)
-    lag = loaded(model, rest, 1.0).rotation - alpha / model.ratio
+    lag = solve_loaded(model, rest, 1.0).rotation - alpha / model.ratio
     # teeth meet at another phase and balls stand elsewhere
     assert lag == pytest.approx(near_zero.rotation, rel=0.05)
 
@@ -68,7 +68,7 @@ def test_any_wave_generator_angle_has_an_equilibrium(model, near_zero, alpha):
 def test_a_search_begins_with_the_lobes_on_the_wave_generator(model):
     """The rim has turned with the output, its oval with the wave generator."""
     alpha = -1000.0
-    start = at_rest(model, alpha)
+    start = initial_state(model, alpha)
     turn, _ = rim_rotation(model, start.q, start.rotation)
     assert turn == pytest.approx(alpha / model.ratio, abs=1e-9)
     x, y = start.q[: model.rim.size].reshape(-1, 2, 2)[:, 0].T
@@ -82,7 +82,7 @@ def test_potential_is_stationary(model, state):
     rng = np.random.default_rng(0)
 
     def potential(q):
-        there, _, _ = linearised(model, replace(state, q=q), teeth=True)
+        there, _, _ = linearise(model, replace(state, q=q), teeth=True)
         return there.energy + TORQUE * rim_rotation(model, q, state.rotation)[0]
 
     for _ in range(3):
@@ -228,7 +228,7 @@ def test_rigid_race_after_stribeck(model, clearance):
     moved = 10e-6
     race = model.race.reference.copy()
     race[:, 0, 1] -= moved
-    pressed = race_on_balls(round_, at_rest(round_, 0.0), race.ravel())
+    pressed = race_on_balls(round_, initial_state(round_, 0.0), race.ravel())
     resultant = pressed.push.sum(axis=0)
     force = np.abs(resultant[1])
     assert abs(resultant[0]) < 1e-9 * force
@@ -267,7 +267,7 @@ def test_stiffness_scales_with_the_cube_of_the_size():
     torque = np.array([5.0, 60.0])
     with hundred_elements():
         one, two = (
-            rubbed_path(design, torque * by, angles=[0.05])
+            friction_path(design, torque * by, angles=[0.05])
             for design, by in ((small, 1.0), (large, 8.0))
         )
     assert one.outcome.ok
@@ -283,7 +283,7 @@ def test_shares_of_the_compliance():
     assert (sum(found.shares.values()) + series)[1:] == pytest.approx(1.0, rel=1e-5)
     # behind a longer cup the same rings: only the share in series grows
     longer = design.with_changes({"cup.length_mm": 2.0 * design.cup.length_mm})
-    soft = rubbed_path(longer, RING_TORQUES[:1], angles=[0.1])
+    soft = friction_path(longer, RING_TORQUES[:1], angles=[0.1])
     assert soft.series > 1.2 * found.series
     for part in ("rim", "balls", "teeth"):
         own, other = (one.shares[part] * one.compliance for one in (soft, found))
@@ -300,7 +300,7 @@ def test_clearance_is_what_makes_the_stiffness_rise():
         {"wave_generator.bearing.clearance_um": 0.0}
     )
     rise, balls = [], []
-    for found in (rubbed_path(tight, RING_TORQUES, angles=[0.1]), ring_path()):
+    for found in (friction_path(tight, RING_TORQUES, angles=[0.1]), ring_path()):
         slope = np.diff(found.torque[1:]) / np.diff(found.torsion[1:])
         rise.append(slope[-1] / slope[0])
         balls.append(found.balls[1:])

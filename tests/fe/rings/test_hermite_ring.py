@@ -8,7 +8,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.linalg import spsolve
 
 from swgjoint.fe.plane.plain_ring import PlainRing, pull_ring
-from swgjoint.fe.rings.facing import FacingSurface, facing
+from swgjoint.fe.rings.facing import FacingSurface, distances_to_ring
 from swgjoint.fe.rings.hermite_ring import HermiteRing
 from swgjoint.gear.shell_theory import ring_stiffness
 
@@ -137,7 +137,7 @@ def test_distance_from_a_ring_and_its_derivatives(inside):
     beside = FacingSurface(ring=RING, place=place, offset=-2e-3 if inside else 2e-3)
 
     def seen(q, other):
-        return facing(RING, q, beside.points(other)[0], place, inside=inside)
+        return distances_to_ring(RING, q, beside.points(other)[0], place, inside=inside)
 
     found = seen(q, other)
     dofs, rows, bend = beside.rows(other, found)

@@ -15,7 +15,7 @@ from swgjoint.cli.main import main
 from swgjoint.drives.build_map import build_map
 from swgjoint.errors import DesignError
 from swgjoint.fe.rings import sampling
-from swgjoint.fe.rings.loading import loaded, unloaded
+from swgjoint.fe.rings.loading import solve_loaded, solve_unloaded
 from swgjoint.fe.rings.model import thin_ring
 from swgjoint.fe.rings.sampling import ball_passage, sample_rings
 from swgjoint.gear.design.design import Design
@@ -130,9 +130,11 @@ def test_odd_ball_counts_run_smoother():
         model = thin_ring(design)
         count = ball_passage(design, model).per_cage_turn
         found = [
-            loaded(model, loaded(model, rest, 1.0), 48.0)
+            solve_loaded(model, solve_loaded(model, rest, 1.0), 48.0)
             for k in range(3)
-            if (rest := unloaded(model, 0.0, -2 * np.pi / count * k / 3)).outcome.ok
+            if (
+                rest := solve_unloaded(model, 0.0, -2 * np.pi / count * k / 3)
+            ).outcome.ok
         ]
         assert len(found) == 3
         assert all(state.outcome.ok for state in found)

@@ -11,10 +11,10 @@ from swgjoint.fe.plane.continuation import Continuation
 from swgjoint.fe.plane.drive2d import ring_model, sector
 from swgjoint.fe.plane.equilibrium import Load, NewtonSolver
 from swgjoint.fe.rings.equilibrium import RingSolver
-from swgjoint.fe.rings.loading import loaded, unloaded
+from swgjoint.fe.rings.loading import solve_loaded, solve_unloaded
 from swgjoint.fe.rings.model import thin_ring
 from swgjoint.fe.rings.sections import rim_section
-from swgjoint.fe.rings.state import at_rest
+from swgjoint.fe.rings.state import initial_state
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.teeth.tooth_profile import tooth_profile
 
@@ -82,7 +82,7 @@ def test_deflected_rim_holds_the_energy_of_plane_elements(name, tolerance):
     peer = NewtonSolver()(plane, plane.at_rest(), load)
     assert peer.outcome.ok
     model = on_many_balls(design)
-    state = RingSolver()(model, at_rest(model, 0.0), rotation=0.0, teeth=False)
+    state = RingSolver()(model, initial_state(model, 0.0), rotation=0.0, teeth=False)
     assert state.outcome.ok
     # without its teeth the rim would hold 21 and 38 % less
     assert state.energy == pytest.approx(peer.energy, rel=tolerance)
@@ -101,11 +101,11 @@ def test_rim_and_teeth_yield_as_plane_elements(name):
     )
     model = on_many_balls(design)
     peer = plane.meshed(plane.deflected())
-    state = loaded(model, unloaded(model, 0.0), 1.0)
+    state = solve_loaded(model, solve_unloaded(model, 0.0), 1.0)
     over = []
     for torque in (60.0, 75.0, 90.0, 105.0, 120.0):
         peer = plane.to_torque(peer, torque)
-        state = loaded(model, state, torque)
+        state = solve_loaded(model, state, torque)
         assert peer.outcome.ok
         assert state.outcome.ok
         own = state.compliance * (state.shares["rim"] + state.shares["teeth"])

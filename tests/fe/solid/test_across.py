@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from swgjoint.fe.solid.across import crown_bend, spread_over, vertices
+from swgjoint.fe.solid.across import crown_bend, spread_forces, vertices
 from swgjoint.fe.solid.linearise import bore_contact
 from swgjoint.fe.solid.wave_generator.surface import crown
 
@@ -70,7 +70,7 @@ def test_weights_are_derivatives_of_the_least_gap():
 
 def test_spread_forces_keep_force_and_moment():
     """Patches move no force along the width, and none is lost."""
-    spread = spread_over(Z, 1).toarray()
+    spread = spread_forces(Z, 1).toarray()
     assert spread.sum(axis=0) == pytest.approx(1.0)
     assert Z @ spread == pytest.approx(Z, abs=1e-15)
     # a patch is wider than an element

@@ -10,8 +10,8 @@ import pytest
 from swgjoint.fe.solid.corotation import about_z
 from swgjoint.fe.solid.figures.axial_section import (
     axial_sections,
+    axis_sectors,
     coning,
-    on_axes,
     sector_points,
 )
 
@@ -44,7 +44,7 @@ def test_rigid_rotation_is_no_deflection(small_ring, at_rest):
     state = turned(small_ring, at_rest, TURN)
     found = coning(small_ring, state)
     assert np.abs([found.major, found.minor]).max() < 1e-12
-    for sector in on_axes(small_ring, state):
+    for sector in axis_sectors(small_ring, state):
         for part in axial_sections(small_ring, state, sector):
             assert part.moved == pytest.approx(part.rest, abs=1e-12)
 
@@ -76,7 +76,7 @@ def test_small_coning_is_the_recovered_displacement(small_ring, at_rest, deflect
     low = low[np.hypot(*points[:2, low]) < np.hypot(*points[:2, low]).min() + 1e-9]
     low = low[np.argsort(points[2, low])][: len(found.z)]  # the cup goes on behind
     assert points[2, low] == pytest.approx(found.z)
-    both = zip(on_axes(ring, state), (found.major, found.minor), strict=True)
+    both = zip(axis_sectors(ring, state), (found.major, found.minor), strict=True)
     for sector, radial in both:
         # y is radial in the frame of the tooth; the rest is of second order
         assert radial == pytest.approx(u[sector, low, 1], abs=2e-3 * abs(radial).max())
@@ -85,7 +85,7 @@ def test_small_coning_is_the_recovered_displacement(small_ring, at_rest, deflect
 
 def test_the_cup_is_a_cone(small_ring, deflected):
     """The open edge moves farther than the closed one, out and in, on the axes."""
-    major, minor = on_axes(small_ring, deflected)
+    major, minor = axis_sectors(small_ring, deflected)
     assert (major, minor) == (0, 10)  # 20 sectors in the half
     shown = coning(small_ring, deflected).to_json()
     assert shown["major"]["open_edge"] > shown["major"]["closed_edge"] > 0.0

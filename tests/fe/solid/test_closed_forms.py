@@ -10,7 +10,7 @@ import pytest
 
 from swgjoint.fe.common.cyclic import CyclicFactor
 from swgjoint.fe.plane.drive2d import ring_model
-from swgjoint.fe.solid.across import spread_over
+from swgjoint.fe.solid.across import spread_forces
 from swgjoint.fe.solid.corotation import about_z
 from swgjoint.fe.solid.ring_gear import ring_gear
 from swgjoint.fe.solid.strip.masters import strip_masters
@@ -245,7 +245,7 @@ def test_ring_gear_is_the_plane_model_without_poisson_ratio():
     share[[0, -1]] = 0.5
     share /= share.sum()
     # forces on patches that add up to these in the planes
-    share = np.linalg.solve(spread_over(gear.mesh.teeth.z, 1).toarray(), share)
+    share = np.linalg.solve(spread_forces(gear.mesh.teeth.z, 1).toarray(), share)
     size = gear.flank.shape[1] // planes
     flat = dict(zip(plane.offsets.tolist(), plane.flank, strict=True))
     largest = np.abs(flat[0]).max()
@@ -267,6 +267,6 @@ def test_ring_gear_is_reciprocal(small_ring):
     assert np.sum(one * gear.displacement(one)) > 0.0
     # the field under the flanks is that of all nodes
     nodes = gear.nodal_displacement(one)[:, gear.mesh.teeth.flank.ravel(), :2]
-    mean = spread_over(gear.mesh.teeth.z, 2 * gear.mesh.teeth.flank.shape[1]).T
+    mean = spread_forces(gear.mesh.teeth.z, 2 * gear.mesh.teeth.flank.shape[1]).T
     nodes = (mean @ nodes.reshape(21, -1).T).T
     assert nodes == pytest.approx(gear.displacement(one))

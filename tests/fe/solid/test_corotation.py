@@ -9,9 +9,9 @@ from scipy.spatial.transform import Rotation
 
 from swgjoint.fe.solid.corotation import (
     energies,
-    in_global,
     matrices_in_global,
-    projected,
+    project_to_frames,
+    rotate_to_global,
     segment_frames,
     tangent,
 )
@@ -39,7 +39,9 @@ def energy(segment, x):
 
 def gradient(segment, x):
     frames = segment_frames(segment, x, PLACE)
-    return in_global(frames, projected(frames, frames.deformation @ segment.stiffness))
+    return rotate_to_global(
+        frames, project_to_frames(frames, frames.deformation @ segment.stiffness)
+    )
 
 
 def test_infinitesimal_rigid_motion_needs_no_force(segment):

@@ -10,7 +10,7 @@ import pytest
 from messages import naming
 
 from swgjoint.errors import DesignError
-from swgjoint.fe.plane.corotation import rotate, turned
+from swgjoint.fe.plane.corotation import rotate, rotate_right_angle
 from swgjoint.fe.solid.continuation import SolidContinuation
 from swgjoint.fe.solid.drive3d import solid_ring
 from swgjoint.fe.solid.wave_generator.race import AXIAL, NODE, ROLL, SIGN, SolidRace
@@ -213,8 +213,8 @@ def moments(ring, state):
         np.einsum("sij,spj->spi", frame.turn, part)
         for part in (local, state.bore_force.reshape(local.shape))
     )
-    on_bore = 2.0 * float(np.sum(turned(points[..., :2]) * force[..., :2]))
-    return float(np.sum(balls.push * turned(centre))), on_bore
+    on_bore = 2.0 * float(np.sum(rotate_right_angle(points[..., :2]) * force[..., :2]))
+    return float(np.sum(balls.push * rotate_right_angle(centre))), on_bore
 
 
 def test_balls_teeth_and_load_balance(ring, turned_on):

@@ -10,7 +10,7 @@ from messages import names, naming
 
 from swgjoint.errors import InputError
 from swgjoint.fe.common.pattern import Effort, solve_pattern
-from swgjoint.fe.plane.state_arrays import packed, settled, unpacked
+from swgjoint.fe.plane.state_arrays import copy_contiguous, pack, unpack
 from swgjoint.fe.solid.checkpoint import Checkpoint
 from swgjoint.maps.unfinished import Unfinished
 from swgjoint.store import arrays_file
@@ -37,16 +37,16 @@ def test_a_state_comes_back_from_a_file(loaded, tmp_path, caplog):
     The user who says ``--resume`` relies on the states that are there.
     """
     keep = Unfinished(folder=tmp_path / "map")
-    keep.write("a", packed(loaded, "state"))
-    found = keep.read("a", lambda arrays: unpacked(arrays, "state"))
-    assert_same(found, settled(loaded))
+    keep.write("a", pack(loaded, "state"))
+    found = keep.read("a", lambda arrays: unpack(arrays, "state"))
+    assert_same(found, copy_contiguous(loaded))
     kept = Checkpoint.open(tmp_path / "run", {"steps": 2}, resume=False)
     kept.write("a", loaded)
     asked = Checkpoint.open(tmp_path / "run", {"steps": 2}, resume=True)
     same = Checkpoint.open(tmp_path / "run", {"steps": 2}, resume=False)
     path = tmp_path / "run" / "a.npz"
     for again in (asked, same):
-        assert_same(again.read("a"), settled(loaded))
+        assert_same(again.read("a"), copy_contiguous(loaded))
         assert again.read("b") is None
     for damaged in (path.read_bytes()[:-99], arrays_file({"state.kind": "State"})):
         path.write_bytes(damaged)

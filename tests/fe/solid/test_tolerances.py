@@ -15,7 +15,7 @@ from swgjoint.fe.plane.corotation import rotate
 from swgjoint.fe.solid.drive3d import solid_ring
 from swgjoint.fe.solid.tolerance_influence import influence
 from swgjoint.fe.tolerances import sampling as tolerance_sampling
-from swgjoint.fe.tolerances.cycle import gap_errors, pitch_of, pitches_of, shifted
+from swgjoint.fe.tolerances.cycle import gap_errors, pitch_of, pitches_of, shift_errors
 from swgjoint.fe.tolerances.rest import influences
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.tolerances import ToothErrors, axis_tilt
@@ -190,7 +190,7 @@ def test_even_orders_add_and_odd_ones_cancel(design, reference):
     for low, high in ((1, 3), (2, 4)):
         wave = 2e-7 * (np.cos(low * angle) + np.cos(high * angle + 1.0))
         errors = ToothErrors(tangential=wave, radial=np.zeros(42))
-        moved = shifted(errors, pitches, "circular_spline_fixed")
+        moved = shift_errors(errors, pitches, "circular_spline_fixed")
         found[low] = orders(at, (still, moved, np.zeros((42, 2))))[1:13].max()
     # a shift of all teeth turns the output by itself over the pitch radius
     assert found[2] == pytest.approx(2e-7 / 21e-3, rel=0.2)

@@ -55,7 +55,7 @@ class Coning:
         }
 
 
-def on_axes(ring: SolidRing, state: SolidState) -> tuple[int, int]:
+def axis_sectors(ring: SolidRing, state: SolidState) -> tuple[int, int]:
     """Sectors whose teeth stand nearest to the major and the minor axis."""
     place = 2.0 * pi / ring.strip.sectors * np.arange(ring.sectors, dtype=float)
     angle = place + state.rotation - state.wave_generator_angle
@@ -105,7 +105,7 @@ def coning(ring: SolidRing, state: SolidState) -> Coning:
     rest = _meridian(np.asarray(teeth.segment.mesh.p).T[line])[:, 1]
     major, minor = (
         _meridian(sector_points(ring, state, sector)[0][line])[:, 1] - rest
-        for sector in on_axes(ring, state)
+        for sector in axis_sectors(ring, state)
     )
     return Coning(z=teeth.z, major=major, minor=minor)
 

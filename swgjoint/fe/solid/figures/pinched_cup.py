@@ -25,9 +25,9 @@ from swgjoint.fe.solid.corotation import (
     SolidFrames,
     about_z,
     energies,
-    in_global,
     matrices_in_global,
-    projected,
+    project_to_frames,
+    rotate_to_global,
     segment_frames,
     spin,
     tangent,
@@ -231,7 +231,7 @@ class PinchedCup:
             if number == 0:
                 total[:few] -= loads @ segment.loaded_from_masters
                 out[:few, dofs] += pushed
-            out[:, dofs] -= in_global(frame, projected(frame, elastic))
+            out[:, dofs] -= rotate_to_global(frame, project_to_frames(frame, elastic))
             local = matrices_in_global(frame, tangent(segment, frame, total))
             matrix[:, dofs[:, None], dofs] += local
         scale = float(np.mean(np.einsum("sii->si", matrix)))
@@ -264,7 +264,7 @@ class PinchedCup:
         """
         frames = self.frames(self.reference, nonlinear=False)
         carried = loads @ self.segments[0].loaded_from_masters
-        step = self._step(frames, loads, in_global(frames[0], carried))
+        step = self._step(frames, loads, rotate_to_global(frames[0], carried))
         x = self.reference + step.reshape(self.reference.shape)
         moved = self.frames(x, nonlinear=False)
         displacements, stresses = [], {}

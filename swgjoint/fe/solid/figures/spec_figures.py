@@ -10,7 +10,7 @@ from swgjoint.errors import DesignError
 from swgjoint.fe.solid.figures.fatigue import fatigue
 from swgjoint.fe.solid.figures.radial_stiffness import radial_stiffness
 from swgjoint.gear.design.design import Design
-from swgjoint.maps.cache import recalled
+from swgjoint.maps.cache import recall
 from swgjoint.progress import Progress, silent
 
 
@@ -76,7 +76,7 @@ def solid_figures(
         if work is safety:
             parts["torque"] = torque
         try:
-            one = recalled("figures", parts, SolidFigures, work)
+            one = recall("figures", parts, SolidFigures, work)
         except DesignError as fault:
             found.missing[key] = "; ".join(str(fault).splitlines())
         else:

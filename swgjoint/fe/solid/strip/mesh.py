@@ -21,7 +21,7 @@ from swgjoint.fe.plane.sector_mesh import (
     BORE,
     LOWER_RIM,
     SectorMesh,
-    multiplied,
+    refine_count,
     sector_mesh,
 )
 from swgjoint.gear.design.design import Design
@@ -157,7 +157,7 @@ def teeth_mesh(
     plane: SectorMesh, width: float, n: float, apron: SegmentMesh | None = None
 ) -> TeethMesh:
     """The section extruded over the face width, the first part of the cup behind."""
-    z = np.linspace(-0.5 * width, 0.5 * width, multiplied(FACE_WIDTH, n) + 1)
+    z = np.linspace(-0.5 * width, 0.5 * width, refine_count(FACE_WIDTH, n) + 1)
     size = plane.mesh.p.shape[1]
     nodes = np.arange(len(z))[:, None] * size + np.arange(size)
     points = np.concatenate([np.vstack([plane.mesh.p, np.full(size, k)]).T for k in z])
@@ -230,7 +230,7 @@ def cup_segments(
     z0, z1 = 0.5 * width, 0.5 * width + length
     inward = cup.kind == "cup"
     # at the teeth the wall is the lower rim
-    rows = multiplied(LOWER_RIM, n) + 1
+    rows = refine_count(LOWER_RIM, n) + 1
     at_teeth = np.hypot(*face)[-rows:]
     across = np.linspace(1.0, 0.0, rows)  # outside to bore side
     # meridian: (r, z) of outside and bore side at every station of every part
@@ -240,13 +240,13 @@ def cup_segments(
     radii = np.stack([inner + wall * across] * 2)
     for k, (share, count) in enumerate(zip(CYLINDER_PARTS, CYLINDER, strict=True)):
         stop = start + share * straight
-        z = np.linspace(start, stop, multiplied(count, n) + 1)
+        z = np.linspace(start, stop, refine_count(count, n) + 1)
         r = np.repeat(radii[:1], len(z), axis=0)
         if k == 0:
             r[0] = at_teeth
         parts.append((f"cylinder {k + 1}", r, np.repeat(z[:, None], rows, axis=1)))
         start = stop
-    turn = np.linspace(0.0, 0.5 * pi, multiplied(FILLET, n) + 1)[:, None]
+    turn = np.linspace(0.0, 0.5 * pi, refine_count(FILLET, n) + 1)[:, None]
     if inward:
         centre = inner + wall - fillet
         radius = fillet - wall + wall * across
@@ -259,12 +259,14 @@ def cup_segments(
     ends = np.cumsum([0.0, *DIAPHRAGM_PARTS])
     disc = "diaphragm" if inward else "flange"
     for k, count in enumerate(DIAPHRAGM):
-        along = np.linspace(ends[k], ends[k + 1], multiplied(count, n) + 1)[:, None]
+        along = np.linspace(ends[k], ends[k + 1], refine_count(count, n) + 1)[:, None]
         r = np.repeat(centre + along * (bore - centre), rows, axis=1)
         z = np.repeat((z1 - fillet + radius)[None], len(along), axis=0)
         parts.append((f"{disc} {k + 1}", r, z))
     half = plane.half_pitch
-    phi = np.linspace(half, -half, 2 * multiplied(BORE, n) + 1)  # clockwise face first
+    phi = np.linspace(
+        half, -half, 2 * refine_count(BORE, n) + 1
+    )  # clockwise face first
     return tuple(_shell(title, r, z, phi) for title, r, z in parts)
 
 

@@ -32,7 +32,7 @@ def lagrange(points: Array, x: Array) -> Array:
     return weights
 
 
-def through(level: int, depth: Array) -> Array:
+def newton_polynomial(level: int, depth: Array) -> Array:
     """Newton's polynomial that is one at a point of ``THROUGH``, zero at those before.
 
     The first two are straight lines.
@@ -82,5 +82,5 @@ class Patch:
         columns = []
         for level, station in self.points:
             curve = lagrange(lobatto(self.degrees[level]), along)[:, station]
-            columns.append(curve * through(level, depth))
+            columns.append(curve * newton_polynomial(level, depth))
         return np.stack(columns, axis=1)

@@ -12,7 +12,7 @@ from swgjoint.fe.plane.sector_mesh import (
     LAYERS,
     LOWER_RIM,
     SectorMesh,
-    multiplied,
+    refine_count,
 )
 from swgjoint.fe.solid.strip.mesh import (
     LARGEST_WALL,
@@ -31,13 +31,13 @@ def smooth_strip(design: Design) -> StripMesh:
     The rows of elements are those of the toothed strip, so that the cup joins alike.
     """
     n, rim = design.mesh.refinement, design.flexspline.rim_mm * mm
-    side = multiplied(BORE, n)
+    side = refine_count(BORE, n)
     inner, half = design.flexspline_inner_radius, pi / design.drive.teeth_flexspline
     wall = LARGEST_WALL * rim
     if design.cup is not None:
         wall = min(cup_wall(design), wall)
-    above = np.linspace(inner + rim, inner + wall, multiplied(LAYERS, n) + 1)
-    below = np.linspace(inner + wall, inner, multiplied(LOWER_RIM, n) + 1)
+    above = np.linspace(inner + rim, inner + wall, refine_count(LAYERS, n) + 1)
+    below = np.linspace(inner + wall, inner, refine_count(LOWER_RIM, n) + 1)
     radius = np.concatenate([above, below[1:]])
     phi = np.linspace(half, -half, 2 * side + 1)  # clockwise face first
     grid = np.arange(len(radius) * len(phi)).reshape(len(radius), len(phi))

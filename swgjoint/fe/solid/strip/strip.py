@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.interpolate import CubicSpline
 
-from swgjoint.fe.common.contact_patch import averaged_spline
-from swgjoint.fe.solid.across import spread_over
+from swgjoint.fe.common.contact_patch import average_spline
+from swgjoint.fe.solid.across import spread_forces
 from swgjoint.fe.solid.strip.masters import Masters, Orders, strip_masters
 from swgjoint.fe.solid.strip.mesh import StripMesh
 from swgjoint.fe.solid.strip.segment import StripSegment, condense_segment
@@ -54,7 +54,7 @@ class Strip:
     @cached_property
     def spline(self) -> CubicSpline:
         """Weights of the flank nodes of a plane at an arc length."""
-        return averaged_spline(self.mesh.teeth.plane.flank_stations[:-1])
+        return average_spline(self.mesh.teeth.plane.flank_stations[:-1])
 
     @property
     def flank_size(self) -> int:
@@ -101,7 +101,7 @@ def flexspline(
     loaded = (3 * np.concatenate([flank, bore])[:, None] + np.arange(3)).ravel()
     spread = sparse.block_diag(
         [
-            spread_over(mesh.teeth.z, 3 * surface.shape[1])
+            spread_forces(mesh.teeth.z, 3 * surface.shape[1])
             for surface in (mesh.teeth.flank, mesh.teeth.bore)
         ],
         format="csr",

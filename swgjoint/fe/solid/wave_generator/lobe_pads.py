@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.errors import ComputationError
-from swgjoint.fe.solid.across import spread_over
+from swgjoint.fe.solid.across import spread_forces
 from swgjoint.fe.solid.continuation import SolidContinuation
 from swgjoint.fe.solid.ring import SolidRing
 from swgjoint.fe.solid.state import SolidState
@@ -63,7 +63,7 @@ def with_pads(ring: SolidRing, share: Array, deflection: Array) -> SolidRing:
     bore = float(np.hypot(ring.strip.bore[:, 0], ring.strip.bore[:, 1]).min())
     z, loaded = ring.strip.mesh.teeth.z, share > 0.0
     # contact sees displacements averaged over a part of the width
-    deflection = spread_over(z, 1).T @ deflection
+    deflection = spread_forces(z, 1).T @ deflection
     pads = LobePads(
         outline=ring.wave_generator.outline,
         width=ring.wave_generator.width,
