@@ -151,10 +151,10 @@ def run_in_space():
     """As many positions as a profile needs."""
     ring = solid_ring(small, half=True)
     follow = SolidContinuation(ring=ring, ratio=small.ratio)
-    state = follow.to_torque(follow.meshed(follow.deflected()), 5.0)
+    state = follow.to_torque(follow.engage(follow.deflect()), 5.0)
     state = follow.to_angle(state, 0.5 * np.pi / 42)
     assert state.outcome.ok
-    return SolidMaxima.at(ring, state)
+    return SolidMaxima.from_state(ring, state)
 
 
 times = profiled(run_in_space)

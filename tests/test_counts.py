@@ -83,8 +83,8 @@ def test_a_fifth_more_is_found():
 
 def path(follow, torque, angle):
     """Iterations of deflection, engagement, loading and one position, and the last."""
-    states = [follow.deflected()]
-    states.append(follow.meshed(states[-1]))
+    states = [follow.deflect()]
+    states.append(follow.engage(states[-1]))
     states.append(follow.to_torque(states[-1], torque))
     states.append(follow.to_angle(states[-1], angle))
     assert all(state.outcome.ok for state in states)

@@ -103,8 +103,8 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     )
     if args.sort is not None:
         sign = -1.0 if args.sort in LOWER else 1.0
-        known = [row for row in rows if row.told(args.sort) is not None]
-        known.sort(key=lambda row: sign * float(row.told(args.sort)))
+        known = [row for row in rows if row.figure(args.sort) is not None]
+        known.sort(key=lambda row: sign * float(row.figure(args.sort)))
         rows = known + [row for row in rows if row not in known]
     result: dict[str, Any] = {
         "scene": scene.name,

@@ -124,7 +124,7 @@ def result_of(found: Identified) -> dict[str, Any]:
     """The JSON object of an identification, without files."""
     from swgjoint.identify.identification import rms
 
-    measured = found.model.measured()
+    measured = found.model.measured_torques()
     drive = found.drive
     return {
         "estimates": {

@@ -78,7 +78,7 @@ def _write(place: ResultStore, found: Optimum, result: dict[str, Any]) -> list[s
         place.remove(_front(left))
         left += 1
     last = "optimise.json"  # which names them all
-    content = {**result, "files": [*files, place.at(last)]}
+    content = {**result, "files": [*files, place.path_of(last)]}
     return files + write_to(place, {last: (json_text(content) + "\n").encode})
 
 

@@ -79,7 +79,7 @@ def _write(place: ResultStore, found: SweepResult, result: dict[str, Any]) -> li
         },
     )
     last = "sweep.json"  # which names them all
-    content = {**result, "files": [*files, place.at(last)]}
+    content = {**result, "files": [*files, place.path_of(last)]}
     return files + write_to(place, {last: (json_text(content) + "\n").encode})
 
 

@@ -66,13 +66,13 @@ class KinematicErrorTable:
         pairs = frozen_array(self.amplitudes, "amplitudes [rad]", shape=orders.shape)
         object.__setattr__(self, "amplitudes", pairs)
 
-    def on(self, drive: DriveMap) -> DriveMap:
+    def apply_to(self, drive: DriveMap) -> DriveMap:
         """The drive with this kinematic error in place of its own."""
         return with_error(drive, self.orders, self.amplitudes)
 
-    def sized(self, drive: DriveMap, wanted: float) -> KinematicErrorTable:
+    def scale_to(self, drive: DriveMap, wanted: float) -> KinematicErrorTable:
         """The same in proportion: on a drive its peak to peak is that wanted [rad]."""
-        sized = self.amplitudes * wanted / peak_to_peak(self.on(drive))
+        sized = self.amplitudes * wanted / peak_to_peak(self.apply_to(drive))
         return replace(self, amplitudes=sized)
 
 
@@ -160,7 +160,9 @@ def compensate(
 
     def planned(task: Task) -> MotorPlan:
         joints = task.joints
-        drives = tuple(t.on(d) for t, d in zip(tables, joints.drives, strict=True))
+        drives = tuple(
+            t.apply_to(d) for t, d in zip(tables, joints.drives, strict=True)
+        )
         return plan(replace(task, joints=replace(joints, drives=drives)))
 
     return planned

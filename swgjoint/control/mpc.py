@@ -147,7 +147,7 @@ class PredictiveController:
         readings = self._off_plan(k, measured)
         assert self._design is not None
         if self._parts is None or (self._level[k] != self._level[k - 1]).any():
-            self._parts = self._design.at((self._joint, self._level[k]))
+            self._parts = self._design.select((self._joint, self._level[k]))
         parts = self._parts
 
         x = self._state
@@ -163,7 +163,7 @@ class PredictiveController:
         beyond = ((ahead < low) | (ahead > high)).any(axis=-1)
         if beyond.any():
             self.limited += int(beyond.sum())
-            some = parts.at((np.flatnonzero(beyond),))
+            some = parts.select((np.flatnonzero(beyond),))
             free = _times(some.free, off[beyond])
             u[beyond] = solve(
                 some.inverse,
@@ -209,7 +209,7 @@ class PredictiveController:
         self._state[:, 0] = readings[:, 0]
         reads_link = measured.link_angle is not None
         self._state[:, 1] = readings[:, 1 if reads_link else 0]
-        self._design = PredictionMatrices.stacked(
+        self._design = PredictionMatrices.stack(
             [
                 [
                     design(

@@ -49,7 +49,7 @@ class TwoMassModel:
     period: float
     rated_torque: float
 
-    def sampled(self) -> tuple[Array, Array]:
+    def discretise(self) -> tuple[Array, Array]:
         """Transition of (x1, x2, rates, d_m, d_l), and of the motor torque. (6, 7)."""
         i, k, c = self.ratio, self.stiffness, self.damping
         rotor, link = i**2 * self.rotor_inertia, self.link_inertia
@@ -98,7 +98,7 @@ class PredictionMatrices:
     weight: Array
 
     @classmethod
-    def stacked(cls, designs: list[list[PredictionMatrices]]) -> PredictionMatrices:
+    def stack(cls, designs: list[list[PredictionMatrices]]) -> PredictionMatrices:
         """Designs of all joints and stiffnesses, axes in front."""
         return cls(
             **{
@@ -107,7 +107,7 @@ class PredictionMatrices:
             }
         )
 
-    def at(self, index: tuple[NDArray[Any], ...]) -> PredictionMatrices:
+    def select(self, index: tuple[NDArray[Any], ...]) -> PredictionMatrices:
         """Those of joints and stiffnesses."""
         return PredictionMatrices(
             **{f.name: getattr(self, f.name)[index] for f in fields(self)}
@@ -137,7 +137,7 @@ def design(
         reads_link: Whether there is a link encoder.
         reads_torque: Whether there is a torque sensor.
     """
-    whole, push = joint.sampled()
+    whole, push = joint.discretise()
     A, B = whole[:4, :4], push[:4, None]
     Q = np.zeros((4, 4))
     followed = 1 if reads_link or reads_torque else 0

@@ -62,7 +62,7 @@ def build_map(
 
     parts = {"design": design.content_hash(), "model": model, "angles": angles}
 
-    keep = Unfinished.of(parts) if cache else None
+    keep = Unfinished.from_parts(parts) if cache else None
 
     def build() -> DriveMap:
         if model == "3d":

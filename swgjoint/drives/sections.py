@@ -102,7 +102,7 @@ class JointSection(Section):
             raise Fault(("drive", "given beside linear; accepted: one of the two"))
         return self
 
-    def over(self, base: JointSection) -> JointSection:
+    def fill_from(self, base: JointSection) -> JointSection:
         """These settings, completed by others."""
         own = self.model_dump(exclude_none=True)
         values = {key: getattr(self, key) for key in own}

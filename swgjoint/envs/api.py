@@ -129,9 +129,9 @@ class SingleEnv(gymnasium.Env[Array, Array]):
             reading_age=task.reading_age,
         )
 
-    def measured(self, observation: Array) -> Measured:
+    def read_measurements(self, observation: Array) -> Measured:
         """What a controller reads from an observation; shapes (n_joints,)."""
-        return self.core.measured(observation)
+        return self.core.read_measurements(observation)
 
 
 class BatchEnv(VectorEnv[Array, Array, Array]):
@@ -281,9 +281,9 @@ class BatchEnv(VectorEnv[Array, Array, Array]):
         """The commanded motions, the episodes in front of the joints."""
         return self.core.task
 
-    def measured(self, observation: Array) -> Measured:
+    def read_measurements(self, observation: Array) -> Measured:
         """What a controller reads from observations; shapes (n, n_joints)."""
-        return self.core.measured(observation)
+        return self.core.read_measurements(observation)
 
 
 def _of(rows: NDArray[np.bool_], info: dict[str, Any]) -> dict[str, Any]:

@@ -159,7 +159,7 @@ class ArmCore(Core):
                 ratcheting=ratcheting,
                 motor_torque=task.joints.torque_limit,
             ),
-            sensors=Sensors.of(s.sensors),
+            sensors=Sensors.from_argument(s.sensors),
             tolerances=tolerances,
             period=task.period,
             steps=steps,
@@ -224,7 +224,7 @@ class ArmCore(Core):
 
     def command(self, action: Array) -> Array:
         """What the scene's loops get, with what the action adds."""
-        s, plan = self.settings, self.coming()
+        s, plan = self.settings, self.next_plan()
         here = np.minimum(self.instant + 1, self.steps)
         if s.action == "torque":
             own = self.loop.command(plan[:, 0], plan[:, 1])

@@ -166,7 +166,7 @@ class BenchCore(Core):
         )
         loop = MotorLoop.none(joints.ratio)
         if loop_Hz is not None:
-            loop = MotorLoop.of(
+            loop = MotorLoop.from_frequency(
                 joints, frequency=loop_Hz, damping_ratio=loop_damping_ratio
             )
         motor = spec.add_actuator(name="motor", target=attached.rotor)
@@ -203,7 +203,7 @@ class BenchCore(Core):
                 ratcheting=(ratings.ratcheting_torque or np.inf) * one,
                 motor_torque=limit * one,
             ),
-            sensors=Sensors.of(s.sensors),
+            sensors=Sensors.from_argument(s.sensors),
             tolerances=tolerances,
             period=s.period_s,
             steps=s.steps,

@@ -233,7 +233,9 @@ class Core(ABC):
                 if self.plant.variable:
                     self.variations[k] = specimens = tuple(v for v, _ in drawn)
                     self.plant.vary(k, specimens)
-                    maps = tuple(v.of(m) for v, m in zip(specimens, maps, strict=True))
+                    maps = tuple(
+                        v.apply_to(m) for v, m in zip(specimens, maps, strict=True)
+                    )
             self._plan[self._planned[k]] = plan = self.draw(rng)
             self._normal[k] = rng.standard_normal(self._normal.shape[1:])
             angle, torque[k] = self.start(plan)
@@ -279,7 +281,7 @@ class Core(ABC):
         self.judge()
         self.remember()
 
-    def coming(self) -> Array:
+    def next_plan(self) -> Array:
         """Plan at the end of the step that begins. Shape (n, 5, n_joints)."""
         after = np.minimum(self.instant + 1, self.steps)
         return np.asarray(self._plan[self._planned, after])
@@ -375,7 +377,7 @@ class Core(ABC):
             )
         return self._task
 
-    def measured(self, observation: Array) -> Measured:
+    def read_measurements(self, observation: Array) -> Measured:
         """What a controller reads from observations of any leading axes."""
         n, last = len(self.joints.names), observation.shape[-1]
         torque = last - n if self.sensors.torque_sensor else None

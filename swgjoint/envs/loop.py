@@ -37,7 +37,9 @@ class MotorLoop:
         return cls(stiffness=0.0 * ratio, damping=0.0 * ratio, ratio=ratio)
 
     @classmethod
-    def of(cls, joints: KnownJoints, *, frequency: float, damping_ratio: float) -> Self:
+    def from_frequency(
+        cls, joints: KnownJoints, *, frequency: float, damping_ratio: float
+    ) -> Self:
         """Gains for motor and link together on a rigid drive.
 
         Args:

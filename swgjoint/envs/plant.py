@@ -181,7 +181,7 @@ def specimen(attached: JointDrive, variation: Variation) -> JointDrive:
     """The drive on a joint with the map of one specimen."""
     return replace(
         attached,
-        drive=variation.of(attached.drive),
+        drive=variation.apply_to(attached.drive),
         stiffness=attached.stiffness * (1.0 + variation.stiffness),
     )
 

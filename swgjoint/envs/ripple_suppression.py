@@ -136,7 +136,7 @@ class RippleCore(BenchCore):
 
     def command(self, action: Array) -> Array:
         """The reference of the loop, known torques and a share of the authority."""
-        plan, ratio = self.coming(), self.joint.ratio
+        plan, ratio = self.next_plan(), self.joint.ratio
         rotor = self.settings.rotor_inertia_kgm2
         known = plan[:, 4] / ratio + ratio * rotor * plan[:, 2]
         own = self.loop.command(plan[:, 0], plan[:, 1])

@@ -53,7 +53,7 @@ class Sensors:
                 object.__setattr__(self, field.name, int(value))
 
     @classmethod
-    def of(cls, argument: Mapping[str, float] | Sensors | None) -> Sensors:
+    def from_argument(cls, argument: Mapping[str, float] | Sensors | None) -> Sensors:
         """What the argument ``sensors`` of an environment means; None: defaults."""
         if argument is None or isinstance(argument, Sensors):
             return argument or cls()

@@ -106,18 +106,18 @@ def simulate_meshing(
             )
         return state
 
-    state = checked(follow.deflected(), "deflection by the wave generator")
-    setup = [SetupState.at(ring, "wave_generator", state)]
-    state = checked(follow.meshed(state), "engagement of the teeth")
-    setup.append(SetupState.at(ring, "meshed", state))
+    state = checked(follow.deflect(), "deflection by the wave generator")
+    setup = [SetupState.from_state(ring, "wave_generator", state)]
+    state = checked(follow.engage(state), "engagement of the teeth")
+    setup.append(SetupState.from_state(ring, "meshed", state))
     if torque == 0.0:
         small = 0.01 * ratings_of(design).rated_torque
-        unloaded = follow.unloaded(state, small)
+        unloaded = follow.unload(state, small)
         state = unloaded.state
     else:
         state = follow.to_torque(state, torque)
     checked(state, f"loading to {overload(design, torque) or f'{torque:g} N·m'}")
-    setup.append(SetupState.at(ring, "torque", state))
+    setup.append(SetupState.from_state(ring, "torque", state))
 
     rows = []
     for k in range(steps):
@@ -125,7 +125,7 @@ def simulate_meshing(
         if k == 0:
             found = state
         elif torque == 0.0:
-            tried = follow.unloaded_to(unloaded, angle)
+            tried = follow.turn_unloaded(unloaded, angle)
             found = tried.state
             # a failed one may be the last good state under the small torque
             unloaded = tried if found.outcome.ok else unloaded
@@ -171,7 +171,7 @@ def _step(
         friction_work=state.friction_work,
         pairs_in_contact=_pairs(ring, state),
         contact_nodes=ring.copies * ring.stations.nodes_touching(state.touching),
-        stress=MemberMaxima.at(ring, state),
+        stress=MemberMaxima.from_state(ring, state),
         iterations=len(state.history),
         state=state,
     )

@@ -37,9 +37,9 @@ class SetupState:
     stress: MemberMaxima
 
     @classmethod
-    def at(cls, model: RingModel, name: str, state: State) -> SetupState:
+    def from_state(cls, model: RingModel, name: str, state: State) -> SetupState:
         """Recover the stresses of a state."""
-        return cls(name=name, state=state, stress=MemberMaxima.at(model, state))
+        return cls(name=name, state=state, stress=MemberMaxima.from_state(model, state))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

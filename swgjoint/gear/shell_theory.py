@@ -109,7 +109,7 @@ class ShellDimensions:
     """w_0 [m]."""
 
     @classmethod
-    def of(cls, design: Design) -> ShellDimensions:
+    def from_design(cls, design: Design) -> ShellDimensions:
         """Those of a design with a cup."""
         if design.cup is None:
             raise ValueError(f"{design.drive.name} has no [cup]")

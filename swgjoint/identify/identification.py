@@ -202,7 +202,7 @@ def identify(
 
 
 def _doubts_of(found: Identified, estimates: Mapping[str, Estimate]) -> tuple[str, ...]:
-    measured = found.model.measured()
+    measured = found.model.measured_torques()
     left = {key: rms(r) / rms(measured[key]) for key, r in found.residuals.items()}
     units = [note for note in found.notes if "plausible: " in note]
     return (*doubts_of(estimates, left, found.model.step), *units)
@@ -225,14 +225,14 @@ def _identified(
     skew: bool,
 ) -> Identified:
     """Find the parameters from a log as it is."""
-    samples = log.averaged(window)
+    samples = log.average(window)
     whole_turn = np.ptp(samples.link_angle) >= _TURN * 2.0 * np.pi
     if orders is None:
         orders = ORDERS if whole_turn else ORDERS_OF_PART
     if len({*map(tuple, orders), (0, 0)}) != len(orders) + 1:
         shown = ", ".join(f"{p}:{q}" for p, q in orders)
         raise InputError(f"orders {shown}; accepted: each once, not 0:0")
-    model = Model.of(
+    model = Model.from_log(
         log,
         samples,
         layout=layout,
@@ -329,7 +329,7 @@ def _solve(model: Model) -> tuple[Array, dict[str, Array], Array]:
     values = np.array([p.start for p in unknowns])
     scale = np.array([p.scale for p in unknowns])
     bounds = (np.array([p.least for p in unknowns]), np.inf)
-    measured = model.measured()
+    measured = model.measured_torques()
     weight = {key: 1.0 / max(rms(x), 1e-12) for key, x in measured.items()}
 
     def residual(x: Array, weight: Mapping[str, float]) -> Array:

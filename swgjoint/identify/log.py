@@ -88,7 +88,7 @@ class BenchLog:
                 f" {self.time[back[0]]:g}; accepted: increasing"
             )
 
-    def averaged(self, window: float) -> Averaged:
+    def average(self, window: float) -> Averaged:
         """Means over windows [s]; a window with no sample is left out.
 
         Raises:

@@ -87,7 +87,7 @@ class Model:
     sin: Array
 
     @classmethod
-    def of(
+    def from_log(
         cls,
         log: BenchLog,
         samples: Averaged,
@@ -175,7 +175,7 @@ class Model:
         """Signed ratio i."""
         return signed_ratio(self.layout, *self.teeth)
 
-    def measured(self) -> dict[str, Array]:
+    def measured_torques(self) -> dict[str, Array]:
         """Torques of the log by channel [N·m]."""
         both = {
             "output_torque": self.samples.output_torque,

@@ -271,7 +271,7 @@ class JointDrive:
             instance = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_PLUGIN, self.plugin)
             first = int(model.plugin_stateadr[instance]) + ACCELERATIONS
             rest = data.plugin_state[first : first + len(self.elements)]
-            sliders = replace(Sliders.relaxed(self.elements), rest=rest.copy())
+            sliders = replace(Sliders.relax(self.elements), rest=rest.copy())
             slipping = float(sliders.torque(torsion))
             if self.friction is not None:
                 relaxed, known = data.plugin_state[first + len(self.elements) :][:2]

@@ -83,7 +83,7 @@ class Surroundings:
                     )
                     self.held.setdefault(name, why)
 
-    def known(self, name: str, joints: Iterable[str] | None = None) -> str:
+    def nearest_names(self, name: str, joints: Iterable[str] | None = None) -> str:
         """The joints that there are, or of many the nearest names."""
         names = list(self.joints if joints is None else joints)
         if len(names) > 20:
@@ -109,7 +109,9 @@ class Surroundings:
         """
         found = self.joints.get(name)
         if found is None:
-            raise InputError(f"joint {name!r} is not in the model; {self.known(name)}")
+            raise InputError(
+                f"joint {name!r} is not in the model; {self.nearest_names(name)}"
+            )
         if found.type != mujoco.mjtJoint.mjJNT_HINGE:
             kind = mujoco.mjtJoint(found.type).name.removeprefix("mjJNT_").lower()
             raise InputError(f"joint {name!r} is a {kind} joint; a drive needs a hinge")

@@ -70,7 +70,9 @@ def chosen_hinges(spec: mujoco.MjSpec, keys: Iterable[str]) -> dict[str, str]:
         if key not in patterns and not meant[key]:
             wrong.append(_no_hinge(key, around))
         elif not meant[key]:
-            known = around.known(key, [joint.name for joint in hinges if joint.name])
+            known = around.nearest_names(
+                key, [joint.name for joint in hinges if joint.name]
+            )
             wrong.append(f"pattern {key!r} matches no hinge; {known}")
         elif key not in taken and left_out[key]:
             reasons = "; ".join(left_out[key])

@@ -70,7 +70,7 @@ class Variation:
             float,
         )
 
-    def of(self, drive: DriveMap) -> DriveMap:
+    def apply_to(self, drive: DriveMap) -> DriveMap:
         """The map of the specimen, what the plugin then computes."""
         shift = drive.angle_orders @ np.array([self.theta, self.psi])
         size, losses = 1.0 + self.stiffness, 1.0 + self.losses

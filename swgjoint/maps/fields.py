@@ -108,7 +108,7 @@ class DriveFields:
         if (np.diff(self.torque) <= 0.0).any():
             raise ValueError("fields: torque [N·m] must increase")
 
-    def at(
+    def evaluate_at(
         self, place: Array, torque: float | Array
     ) -> tuple[Table, Table, Table, Table]:
         """Displacement, von Mises stress, tooth and wave-generator force at places.
@@ -186,7 +186,7 @@ class DriveFields:
             for value in (rotation, wave_generator_angle, torque)
         )
         angle = 2.0 * pi / teeth * np.arange(teeth // parts, dtype=float) + turn
-        u, stress, tooth, bore = self.at(
+        u, stress, tooth, bore = self.evaluate_at(
             angle - passed, np.broadcast_to(load, angle.shape)
         )
         u += self.points.astype(np.float32)

@@ -74,7 +74,7 @@ class Sliders:
     """r, the torsion without torque [rad]. Shape (n,)."""
 
     @classmethod
-    def relaxed(cls, elements: Sequence[Jenkin], torsion: float = 0.0) -> Sliders:
+    def relax(cls, elements: Sequence[Jenkin], torsion: float = 0.0) -> Sliders:
         """Elements without torque at a torsion [rad]."""
         return cls(
             stiffness=np.array([e.stiffness for e in elements], dtype=float),
@@ -82,7 +82,7 @@ class Sliders:
             rest=np.full(len(elements), torsion, dtype=float),
         )
 
-    def moved(self, torsion: float) -> Sliders:
+    def move_to(self, torsion: float) -> Sliders:
         """After a path of one direction to a torsion [rad]."""
         rest = np.clip(self.rest, torsion - self.reach, torsion + self.reach)
         return Sliders(stiffness=self.stiffness, reach=self.reach, rest=rest)

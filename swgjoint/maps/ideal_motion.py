@@ -41,7 +41,7 @@ class IdealMotion:
     """Their V'' below and above the knots. Shape (2, n, 2)."""
 
     @classmethod
-    def of(cls, drive: Potential, theta: Array) -> IdealMotion:
+    def from_map(cls, drive: Potential, theta: Array) -> IdealMotion:
         """Sum the harmonics at psi = theta/i."""
         phases = drive.phases(theta, theta / drive.ratio)
         cos, sin = np.cos(phases), np.sin(phases)

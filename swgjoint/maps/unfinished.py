@@ -31,7 +31,7 @@ class Unfinished:
     folder: Path
 
     @classmethod
-    def of(cls, parts: Mapping[str, Any]) -> Unfinished | None:
+    def from_parts(cls, parts: Mapping[str, Any]) -> Unfinished | None:
         """The parts of a map; None if there is no cache.
 
         Args:

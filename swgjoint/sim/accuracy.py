@@ -237,7 +237,7 @@ class Stepper:
     data: mujoco.MjData
 
     @classmethod
-    def of(cls, whole: Assembly) -> Stepper:
+    def from_assembly(cls, whole: Assembly) -> Stepper:
         """At the start, with the inputs of the first step held."""
         data = mujoco.MjData(whole.model)
         set_start(whole, data)
@@ -278,4 +278,4 @@ def rigid_arm(scene: Scene, drives: Mapping[str, DriveMap] | None = None) -> Ste
     """The arm with rigid joints at the scene's step."""
     step = scene.simulation.step_s
     setting = Setting(level="rigid", integrator="discrete", step=step)
-    return Stepper.of(assemble_setting(scene, setting, drives))
+    return Stepper.from_assembly(assemble_setting(scene, setting, drives))

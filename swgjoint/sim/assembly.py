@@ -80,7 +80,7 @@ class Assembly:
         """Step of the engine [s]."""
         return float(self.model.opt.timestep)
 
-    def recorded(self) -> Assembly:
+    def without_sub_steps(self) -> Assembly:
         """The same with the samples that a run records, one per step of the scene."""
         n = self.sub_steps
         return replace(
@@ -361,7 +361,7 @@ def _complete_sections(
     scene: Scene, joints: tuple[str, ...]
 ) -> tuple[JointSection, ...]:
     """Settings of all joints; refuses what is missing, all at once."""
-    sections = tuple(scene.of_joint(name) for name in joints)
+    sections = tuple(scene.joint_settings(name) for name in joints)
     lines = []
     for name, section in zip(joints, sections, strict=True):
         if section.drive is None and section.linear is None:

@@ -51,7 +51,7 @@ class Readings:
         """Motor angles and speeds at sample k [rad], [rad/s]. Shapes (n_joints,)."""
         angle = self._read(self.encoder, theta, k)
         if self.encoder.counts_per_turn is None and not self.encoder.noise_arcsec:
-            return angle, rate[self.taken(self.encoder, k)]
+            return angle, rate[self.sample_of(self.encoder, k)]
         last, self._last = self._last, angle
         if last is None:
             return angle, self._first_speed
@@ -63,10 +63,14 @@ class Readings:
 
     def torque(self, k: int, torque: Array) -> Array:
         """Output torques at sample k [N·m]. Shape (n_joints,)."""
-        return self._noisy(torque[self.taken(self._torque, k)], self._torque.noise_Nm)
+        return self._noisy(
+            torque[self.sample_of(self._torque, k)], self._torque.noise_Nm
+        )
 
     def _read(self, sensor: Sensor, angle: Array, k: int) -> Array:
-        got = self._noisy(angle[self.taken(sensor, k)], sensor.noise_arcsec * arcsec)
+        got = self._noisy(
+            angle[self.sample_of(sensor, k)], sensor.noise_arcsec * arcsec
+        )
         if sensor.counts_per_turn is None:
             return np.asarray(got)
         count = 2.0 * np.pi / sensor.counts_per_turn
@@ -77,7 +81,7 @@ class Readings:
             return exact
         return exact + deviation * self._noise.standard_normal(exact.shape)
 
-    def taken(self, sensor: Sensor | TorqueSensor, k: int) -> int:
+    def sample_of(self, sensor: Sensor | TorqueSensor, k: int) -> int:
         """Sample at which a reading was taken that is used at sample k, 0 at least."""
         return max(k - round(sensor.delay_s / self._step), 0)
 
@@ -131,10 +135,10 @@ class SampledLoop:
         readings = self._readings
         angle, speed = readings.motor(k, theta, theta_rate)
         # a reading is held against the command of the sample at which it was taken
-        then = moved = readings.taken(readings.encoder, k)
+        then = moved = readings.sample_of(readings.encoder, k)
         if self._by_link:
             angle = ratio * readings.link(k, psi)
-            then = readings.taken(readings.link_encoder, k)
+            then = readings.sample_of(readings.link_encoder, k)
         error = ratio * path.position[then] - angle
         velocity = path.velocity[moved]
         if self.controller.kind == "computed_torque":

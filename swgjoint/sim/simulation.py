@@ -229,7 +229,7 @@ def _recorded(
         wanted: Motor torque that a sampled loop asked for at every step of the engine
             [N·m]; None for the engine's own loops.
     """
-    assembly, ratio = whole.recorded(), whole.ratio
+    assembly, ratio = whole.without_sub_steps(), whole.ratio
     model, path = assembly.model, assembly.trajectory
     q = states[:, 1 : 1 + model.nq]
     v = states[:, 1 + model.nq : 1 + model.nq + model.nv]

@@ -34,7 +34,7 @@ def resolving_step(scene: Scene, arm: RigidArm) -> float:
     speed = trajectory_of(scene, arm).top_speed
     needed = STEPS[0]
     for name, top in zip(arm.joints, speed, strict=True):
-        section = scene.of_joint(name)
+        section = scene.joint_settings(name)
         if section.drive is None or section.level not in (None, "kinematic", "full"):
             continue
         source = find_drive(section.drive)

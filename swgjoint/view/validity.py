@@ -79,7 +79,7 @@ def _same_orders(run: Run) -> tuple[Scene, dict[str, DriveMap]]:
     sections, drives = {}, {}
     for joint, transmission in zip(run.joints, run.assembly.transmissions, strict=True):
         name = f"the drive of {joint} as it was run"
-        section = scene.of_joint(joint)
+        section = scene.joint_settings(joint)
         sections[joint] = section.model_copy(update={"drive": name, "linear": None})
         drives[name] = transmission.attached.drive
     return scene.model_copy(update={"joints": sections}), drives

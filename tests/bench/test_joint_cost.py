@@ -200,7 +200,9 @@ def test_cost_counts_sub_steps(bench, monkeypatch):
 
     def stepper(step):
         setting = Setting(level="rigid", integrator="discrete", step=step)
-        return Stepper.of(assemble_setting(bench.scene, setting, bench.drives))
+        return Stepper.from_assembly(
+            assemble_setting(bench.scene, setting, bench.drives)
+        )
 
     assert relative_cost(stepper(1e-3), rigid, pairs=3) > 0.0
     monkeypatch.setattr(Stepper, "seconds", lambda self: 2e-6)

@@ -53,11 +53,11 @@ design = Design.load("reference-3d-modified").with_changes({
 ring = timed("condensation", lambda: solid_ring(design, half=True))
 follow = SolidContinuation(ring=ring, ratio=design.ratio)
 state = timed("deflection", follow.deflected)
-state = timed("engagement and load", lambda: follow.to_torque(follow.meshed(state), 5))
+state = timed("engagement and load", lambda: follow.to_torque(follow.engage(state), 5))
 angle = 0.5 * np.pi / 42
 state = timed("position", lambda: follow.to_angle(state, angle))
 assert state.outcome.ok
-timed("stresses", lambda: SolidMaxima.at(ring, state))
+timed("stresses", lambda: SolidMaxima.from_state(ring, state))
 """,
     "joint step": """
 import mujoco

@@ -98,9 +98,9 @@ def test_the_drive_replaces_that_of_the_named_joints_alone(capsys):
     assert soft["joint"] == stiff["joint"] == joints[0]
     assert (soft["design"], stiff["design"]) == (SOFT, STIFF)
     scene = scene_of_arm(arm, overrides=quick_scene()[1::2])
-    before = [scene.of_joint(name).drive for name in joints]
+    before = [scene.joint_settings(name).drive for name in joints]
     changed = with_drive(scene, STIFF, joints[:1])
-    after = [changed.of_joint(name).drive for name in joints]
+    after = [changed.joint_settings(name).drive for name in joints]
     assert after == [STIFF, *before[1:]]
     by_hand = run_scene(changed).metrics()["joints"][joints[0]]
     assert stiff["torsion_arcmin"] == abs(by_hand["torsion_arcmin"]["mean"])

@@ -130,7 +130,10 @@ def solid(monkeypatch):
 
     def safety(design, torques, progress):
         calls.append(("fatigue", *torques))
-        limits, shell = FatigueLimits.of(design), ShellDimensions.of(design)
+        limits, shell = (
+            FatigueLimits.from_design(design),
+            ShellDimensions.from_design(design),
+        )
         sections = tuple(
             SectionFatigue(
                 z=z,

@@ -28,7 +28,7 @@ def episode(env, controller, steps):
     controller.start(task)
     errors, torques = [], []
     for k in range(steps):
-        torque = controller.torque(k, inside.measured(observation))
+        torque = controller.torque(k, inside.read_measurements(observation))
         action = np.clip(torque / task.joints.torque_limit, -1.0, 1.0)
         observation, _, _, _, info = env.step(action)
         errors.append(info["link_error_arcmin"])

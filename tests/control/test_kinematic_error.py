@@ -34,7 +34,7 @@ def linear(layout="circular_spline_fixed"):
 def synthetic_record(drive, noise, seed=0, turns=1.0, torsion=1e-3):
     """Motor and link angles of a slow motion under a load that turns the output."""
     psi = np.linspace(0.0, 2.0 * np.pi * turns, 20_000)
-    true, theta = TABLE.on(drive), drive.ratio * psi
+    true, theta = TABLE.apply_to(drive), drive.ratio * psi
     for _ in range(30):
         error = true.error_at(true.phases(theta, psi))[0]
         theta = drive.ratio * (psi - error + torsion)
@@ -57,7 +57,7 @@ def test_a_noisy_record_tells_the_harmonics(layout):
 
 def test_the_table_is_the_error_of_a_map(synthetic_map):
     """Its error in place of the map's own, nothing else changed."""
-    changed = TABLE.on(synthetic_map)
+    changed = TABLE.apply_to(synthetic_map)
     theta, psi = np.random.default_rng(2).uniform(-4.0, 4.0, (2, 50))
     phases = np.stack([p * theta + q * (theta - psi) for p, q in ORDERS], axis=-1)
     expected = np.cos(phases) @ AMPLITUDES[:, 0] + np.sin(phases) @ AMPLITUDES[:, 1]
@@ -92,7 +92,7 @@ def test_records_that_do_not_tell_are_refused():
 
 def test_a_table_from_another_load_compensates_the_link(turn):
     """Recorded with noise at 40 N·m, used at 20 N·m: a twentieth is left."""
-    known, plant = linear(), TABLE.on(linear())
+    known, plant = linear(), TABLE.apply_to(linear())
     record = TurnRecorder(MotorPID())
     turn(plant, known, record, speed=12.0, duration=30.5, load=40.0, step=2e-3,
          sensors__link__noise_arcsec=2.0)  # fmt: skip

@@ -113,7 +113,7 @@ def test_the_ripple_of_two_per_turn_falls_tenfold(turn, signal):
             controller = LearningCompensation(
                 controller, orders=orders, signal=signal, rate=0.8, turns=1.0
             )
-        run = turn(plant.on(LINEAR), LINEAR, controller, speed=30.0, duration=1.8,
+        run = turn(plant.apply_to(LINEAR), LINEAR, controller, speed=30.0, duration=1.8,
                    **keys)  # fmt: skip
         found.append(ripple(run, orders, 600)[0])
     assert found[0] > 0.1  # N·m

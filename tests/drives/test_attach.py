@@ -39,7 +39,7 @@ def test_patterns_give_each_joint_its_drive(spec):
 def test_the_rotor_of_a_catalogue_drive_is_that_of_a_scene(spec):
     """Twice the wave generator's inertia, for a name and for its map."""
     scene = scene_of_arm("ur5e", drive="CSG-17-100")
-    wanted = scene.of_joint("elbow_joint").rotor_inertia_kgm2
+    wanted = scene.joint_settings("elbow_joint").rotor_inertia_kgm2
     named = swgjoint.attach(spec, joint="elbow_joint", drive="CSG-17-100")
     drive = DriveMap.from_catalogue("CSG-17-100")
     given = swgjoint.attach(spec, joint="wrist_1_joint", drive=drive)

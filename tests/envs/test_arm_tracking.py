@@ -105,7 +105,7 @@ def test_sensors_know_the_load_from_the_first_instant():
         sensors={"torque_sensor": True, "link_encoder": True},
     )
     observation, info = env.reset(seed=0)
-    read = env.measured(observation)
+    read = env.read_measurements(observation)
     weight = env.task.link_torque[0]
     np.testing.assert_allclose(info["output_torque_Nm"], weight, rtol=1e-3, atol=1e-4)
     # noise of a thousandth of the rated torque, five of its deviations
@@ -132,10 +132,10 @@ def test_delayed_readings_begin_where_the_arm_stands():
     # the second time the ring of readings is not where it began
     for steps in (5, 8):
         observation, info = env.reset(seed=0)
-        read, true = [env.measured(observation)], [info]
+        read, true = [env.read_measurements(observation)], [info]
         for _ in range(steps):
             observation, *_, info = env.step(np.full(6, 0.5))
-            read.append(env.measured(observation))
+            read.append(env.read_measurements(observation))
             true.append(info)
         # all but the last joint of the path stand away from 0
         assert (np.abs(true[0]["motor_angle_rad"][:-1]) > 10.0).all()

@@ -39,7 +39,7 @@ EXACT = {
 
 def pd(env, observation, k, frequency=8.0):
     """Action of motor-side PD with known torque; broadcasts over a batch."""
-    task, got = env.unwrapped.task, env.unwrapped.measured(observation)
+    task, got = env.unwrapped.task, env.unwrapped.read_measurements(observation)
     ratio, rotor = task.joints.ratio, task.joints.rotor_inertia
     inertia = rotor + task.joints.link_inertia / ratio**2
     omega = 2.0 * np.pi * frequency
@@ -104,9 +104,9 @@ def test_sensors_have_resolution_and_delay():
     env = JointTrackingEnv(sensors={**keys, "link_encoder": True})
     rows, _, _ = episode(env, seed=1, steps=300)
     count = 2.0 * np.pi / counts
-    read = np.array([env.measured(o).motor_angle[0] for o, _, _ in rows])
-    speed = np.array([env.measured(o).motor_speed[0] for o, _, _ in rows])
-    link = np.array([env.measured(o).link_angle[0] for o, _, _ in rows])
+    read = np.array([env.read_measurements(o).motor_angle[0] for o, _, _ in rows])
+    speed = np.array([env.read_measurements(o).motor_speed[0] for o, _, _ in rows])
+    link = np.array([env.read_measurements(o).link_angle[0] for o, _, _ in rows])
     true = np.array([i["motor_angle_rad"] for _, _, i in rows])
     np.testing.assert_array_equal(read[3:], np.floor(true[:-3] / count) * count)
     np.testing.assert_allclose(speed[1:], np.diff(read) / 1e-3, atol=1e-9)
@@ -124,13 +124,13 @@ def test_noise_has_the_stated_deviation():
         rows.append((before[-1][-1], env.step(np.zeros(1))))
         before.append(rows[-1][1])
     off = [
-        env.measured(after[0]).motor_angle[0] - info["motor_angle_rad"]
+        env.read_measurements(after[0]).motor_angle[0] - info["motor_angle_rad"]
         for info, after in rows
     ]
     assert np.std(off) == pytest.approx(1e-3, rel=0.3)
     rated = env.task.joints.drives[0].ratings.rated_torque
     torque = [
-        env.measured(after[0]).output_torque[0] - info["output_torque_Nm"]
+        env.read_measurements(after[0]).output_torque[0] - info["output_torque_Nm"]
         for info, after in rows
     ]
     assert np.std(torque) == pytest.approx(1e-3 * rated, rel=0.3)
@@ -285,7 +285,7 @@ def test_bad_arguments_give_one_line(keys, match):
     """What, the value, and what is accepted."""
     with pytest.raises(InputError, match=naming(*match)):
         JointTrackingEnv(**keys)
-    assert Sensors.of(None) == Sensors()
+    assert Sensors.from_argument(None) == Sensors()
 
 
 def test_whole_numbers_of_any_type_are_integers():

@@ -21,7 +21,7 @@ def rms_of(env) -> float:
     controller.start(env.task)
     limit, errors = env.core.limits.motor_torque[0], []
     for k in range(env.core.steps):
-        torque = controller.torque(k, env.measured(observation))
+        torque = controller.torque(k, env.read_measurements(observation))
         observation, _, ended, _, info = env.step(torque / limit)
         assert not ended
         errors.append(info["link_error_arcmin"])

@@ -89,7 +89,7 @@ def test_reward_and_observation_are_what_the_docstring_says():
     observation, _ = env.reset(seed=3)
     for _ in range(300):
         observation, *_ = env.step(np.zeros(1))
-    angle = env.measured(observation).motor_angle[0]
+    angle = env.read_measurements(observation).motor_angle[0]
     np.testing.assert_allclose(observation[4:6], [np.sin(angle), np.cos(angle)])
     assert abs(angle) > 1.0
 

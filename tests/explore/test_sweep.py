@@ -273,7 +273,7 @@ def test_results_lie_wherever_fsspec_reaches(counted):
     assert again.records == found.records
     assert place.write("a.csv", b"x") == "memory://sweeps/one/a.csv"
     assert place.read("a.csv") == b"x"
-    assert place.at("a.csv") == "memory://sweeps/one/a.csv"
+    assert place.path_of("a.csv") == "memory://sweeps/one/a.csv"
     place.remove("a.csv")
     assert place.read("a.csv") is None
     assert place.read("b.csv") is None

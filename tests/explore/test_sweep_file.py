@@ -242,7 +242,9 @@ def test_scene_keys_change_the_scene():
     )
     points = points_of(file)
     assert [p.asked.scene.simulation.step_s for p in points] == [0.001, 0.0005]
-    assert {p.asked.scene.of_joint("joint").drive for p in points} == {"CSG-25-100"}
+    assert {p.asked.scene.joint_settings("joint").drive for p in points} == {
+        "CSG-25-100"
+    }
     assert {p.asked.design for p in points} == {None}
     assert len({p.asked.key for p in points}) == 2
 

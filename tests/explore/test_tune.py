@@ -88,7 +88,7 @@ def test_cost_is_that_of_the_single_environment(trials):
     # nobody tells a tuned controller how old its readings are
     controller.start(replace(task, reading_age=ReadingAge()))
     for k in range(500):
-        torque = controller.torque(k, env.measured(observation))
+        torque = controller.torque(k, env.read_measurements(observation))
         action = torque / task.joints.torque_limit
         observation, _, _, over, info = env.step(action)
         share = info["motor_torque_Nm"] / task.joints.torque_limit[0]
@@ -104,7 +104,7 @@ def test_broken_limits_cost_a_finite_worst(trials):
         "frequency_Hz": np.array([14.0, 400.0, 4000.0]),
         "damping_ratio": np.array([0.7, 0.001, 30.0]),
     }
-    costs, trace = trials.traced(PD, values)
+    costs, trace = trials.cost_and_traces(PD, values)
     assert np.isfinite(costs).all() and costs.max() <= trials.worst
     assert (costs[1:].min(axis=0) > 50.0 * costs[0]).all()
     broken = np.isnan(trace.error).any(axis=0).reshape(3, 2)

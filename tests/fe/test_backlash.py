@@ -45,7 +45,7 @@ def test_torque_reverses_through_the_clearance():
     """From one flank to the other at a fixed input, and back to the same place."""
     design = loose(0.9)
     follow = Continuation(model=ring_model(design, half=True), ratio=design.ratio)
-    first = follow.to_torque(follow.meshed(follow.deflected()), 10.0)
+    first = follow.to_torque(follow.engage(follow.deflect()), 10.0)
     other = follow.to_torque(first, -10.0)
     again = follow.to_torque(other, 10.0)
     assert first.outcome.ok and other.outcome.ok and again.outcome.ok

@@ -22,7 +22,7 @@ def chain(count=8):
 
 
 def stations():
-    return BoreStations.between_nodes(chain(), layer=2.1e9)
+    return BoreStations.subdivide(chain(), layer=2.1e9)
 
 
 def test_stations_of_the_undeformed_bore_lie_on_its_circle():
@@ -57,11 +57,11 @@ def test_force_between_nodes_meets_the_compliance_of_a_node():
     The nodes yield like those of a half-space.
     """
     count = 40
-    own = BoreStations.between_nodes(chain(count), layer=2.1e9)
+    own = BoreStations.subdivide(chain(count), layer=2.1e9)
     apart = np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
     yielding = 4.0 - np.log(apart + 0.5)
     normal = own.positions(chain(count)[None]) / RADIUS
-    rows = own.along(normal)[0].reshape(own.stiffness.size, count, 2)
+    rows = own.project(normal)[0].reshape(own.stiffness.size, count, 2)
     radial = np.einsum("qni,ni->qn", rows, chain(count) / RADIUS)
     inner = radial[20 * own.per_interval : 21 * own.per_interval]
     part = np.linspace(0.0, 1.0, 21)
@@ -85,7 +85,7 @@ def test_input_torque_does_not_feel_the_nodes_of_the_bore():
     )
     model = ring_model(design, half=True)
     follow = Continuation(model=model, ratio=design.ratio)
-    state = follow.to_torque(follow.meshed(follow.deflected()), 20.0)
+    state = follow.to_torque(follow.engage(follow.deflect()), 20.0)
     per_tooth, angles = model.element.bore_size + 1, 40
     torque = []
     for angle in 2.0 * pi / 122 * np.arange(angles) / angles:
@@ -104,11 +104,11 @@ def test_intervals_far_from_contact_decide_nothing(name, monkeypatch):
     design = Design.preset(name).with_changes({"mesh.refinement": 0.5})
     model = ring_model(design, half=True)
     follow = Continuation(model=model, ratio=design.ratio)
-    one = follow.to_torque(follow.meshed(follow.deflected()), 15.0)
+    one = follow.to_torque(follow.engage(follow.deflect()), 15.0)
     coarse, _, _ = linearise._gaps(model, one)
     monkeypatch.setattr(linearise, "FAR", np.inf)
     exact, _, _ = linearise._gaps(model, one)
-    other = follow.to_torque(follow.meshed(follow.deflected()), 15.0)
+    other = follow.to_torque(follow.engage(follow.deflect()), 15.0)
     same = coarse == exact
     assert 0.1 < same.mean() < 0.9
     assert one.touching.any() and same[one.touching].all()
@@ -133,7 +133,7 @@ def test_narrow_contacts_have_stations_enough_for_the_energy(name):
     assert model.stations.per_interval == NARROW_POINTS
     follow = Continuation(model=model, ratio=design.ratio)
     torque, angles, found = 1.2, 24, []
-    state = follow.to_torque(follow.meshed(follow.deflected()), torque)
+    state = follow.to_torque(follow.engage(follow.deflect()), torque)
     for angle in 2.0 * pi / 122 * np.arange(angles) / angles:
         state = follow.to_angle(state, float(angle))
         found.append(follow.input_torque(state))

@@ -178,9 +178,9 @@ def test_a_failed_solve_is_not_tried_again(tmp_path, caplog):
         return SimpleNamespace(outcome=Outcome.DIVERGED)
 
     for _ in range(2):
-        assert grid().solved(0.0, 1.0, failing) is None
+        assert grid().solve_at(0.0, 1.0, failing) is None
     assert len(tried) == 1
-    assert grid().solved(0.25, 1.0, failing) is None
+    assert grid().solve_at(0.25, 1.0, failing) is None
     assert len(tried) == 2
     assert names(caplog.text, "another angle", "computed again")
 

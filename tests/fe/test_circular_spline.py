@@ -36,7 +36,7 @@ def test_compliance_between_points_is_that_of_the_fields():
     rng = np.random.default_rng(2)
     tooth = np.array([3, 3, 4, 120])
     weight = rng.normal(size=(4, ring().flank_dofs))
-    found = compliance.between(tooth, weight, 122)
+    found = compliance.contact_compliance(tooth, weight, 122)
     for k in range(4):
         force = np.zeros((122, ring().flank_dofs))
         force[tooth[k]] = weight[k]
@@ -75,7 +75,7 @@ def test_feet_on_a_deformed_flank():
     surface = ring()
     stations = surface.compliance.element.mesh.flank_stations[:-1]
     wave = 2e-5 * np.stack([np.sin(3e3 * stations), np.cos(2e3 * stations)], axis=-1)
-    flanks = FlankSplines.through(surface.spline, wave[None])
+    flanks = FlankSplines.fit(surface.spline, wave[None])
     s = np.linspace(*surface.compliance.element.flank_range, 40)[2:-2]
     base, normal, _ = surface.profile.evaluate(s)
     points = base + 3e-5 * normal
@@ -83,14 +83,14 @@ def test_feet_on_a_deformed_flank():
     feet = surface.feet(points, flanks, index)
     dense = np.linspace(stations[0], stations[-1], 200_001)
     curve = surface.profile.evaluate(dense)[0]
-    curve = curve + flanks.at(np.zeros(dense.size, dtype=int), dense)[0]
+    curve = curve + flanks.evaluate_at(np.zeros(dense.size, dtype=int), dense)[0]
     nearest = np.array([np.hypot(*(curve - p).T).min() for p in points])
     assert np.abs(feet.gap) == pytest.approx(nearest, abs=1e-9)
     spline = surface.spline(feet.station) @ wave
-    moved, slope = flanks.at(index, feet.station)
+    moved, slope = flanks.evaluate_at(index, feet.station)
     assert np.allclose(moved, spline, atol=1e-15)
     h = 1e-8
-    steps = [flanks.at(index, feet.station + k * h)[0] for k in (-1, 1)]
+    steps = [flanks.evaluate_at(index, feet.station + k * h)[0] for k in (-1, 1)]
     assert slope == pytest.approx((steps[1] - steps[0]) / (2 * h), abs=1e-6)
 
 
@@ -136,7 +136,7 @@ def test_free_rim_keeps_the_energy_balance():
     """T_wg is the derivative of U + T psi also where the whole ring deforms."""
     design = free_rim(10.0)
     follow = Continuation(model=ring_model(design, half=True), ratio=design.ratio)
-    state = follow.to_torque(follow.meshed(follow.deflected()), 20.0)
+    state = follow.to_torque(follow.engage(follow.deflect()), 20.0)
     potential, step = [], 1e-4
     for angle in (0.01 - step, 0.01, 0.01 + step):
         state = follow.to_angle(state, angle)
@@ -152,5 +152,5 @@ def test_a_free_rim_that_is_too_soft_is_an_outcome():
     """A 2 mm ring under 20 N·m leaves the range of its linear model."""
     design = free_rim(2.0)
     follow = Continuation(model=ring_model(design, half=True), ratio=design.ratio)
-    state = follow.to_torque(follow.meshed(follow.deflected()), 20.0)
+    state = follow.to_torque(follow.engage(follow.deflect()), 20.0)
     assert not state.outcome.ok

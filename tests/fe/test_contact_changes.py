@@ -27,7 +27,7 @@ LAST = changes((12.8, 7, 5e-6), (21.0, 3, -2e-6), (29.0, 8, 3e-6))
 
 def test_an_interval_has_the_changes_inside_it():
     """Places in parts of its length, steps of the compliance there."""
-    steps = FIRST.between(LOW, HIGH)
+    steps = FIRST.steps_between(LOW, HIGH)
     assert steps.place == pytest.approx([0.1, 0.5, 0.9])
     assert steps.jump == pytest.approx([4e-6, -2e-6, 1e-6])
     assert steps.contact.tolist() == [7, 3, 5]
@@ -35,8 +35,8 @@ def test_an_interval_has_the_changes_inside_it():
 
 def test_what_both_ends_predict_is_one_step_next_to_the_nearer_prediction():
     """Errors grow with the square of the distance from the end."""
-    first, last = FIRST.between(LOW, HIGH), LAST.between(LOW, HIGH)
-    both = Steps.merged(first, last)
+    first, last = FIRST.steps_between(LOW, HIGH), LAST.steps_between(LOW, HIGH)
+    both = Steps.merge(first, last)
     place = dict(zip(both.contact.tolist(), both.place, strict=True))
     jump = dict(zip(both.contact.tolist(), both.jump, strict=True))
     assert set(place) == {7, 3, 5, 8}
@@ -51,11 +51,11 @@ def test_what_both_ends_predict_is_one_step_next_to_the_nearer_prediction():
 
 def test_predictions_seen_in_a_mirror_are_those_of_opposite_torques():
     """The same steps the other way round; twice gives the first ones."""
-    seen = FIRST.mirrored()
+    seen = FIRST.mirror()
     assert seen.torque == pytest.approx([-35.0, -28.0, -20.0, -12.0])
     assert seen.compliance == pytest.approx(FIRST.compliance[::-1])
     assert seen.contact.tolist() == [1, 5, 3, 7]
-    again = seen.mirrored()
+    again = seen.mirror()
     assert np.array_equal(again.torque, FIRST.torque)
 
 
@@ -71,10 +71,10 @@ def test_mean_and_moment_of_the_compliance_place_two_steps():
         contact=np.array([1, 2]),
         doubt=np.array([0.1, 0.1]),
     )
-    found = steps.fitted(mean, moment, 1e-12)
+    found = steps.fit_moments(mean, moment, 1e-12)
     assert found.place == pytest.approx(true, abs=1e-4)
     # what a cubic takes is no reason to move a step
-    assert steps.fitted(mean, moment, 1e-2).place == pytest.approx(
+    assert steps.fit_moments(mean, moment, 1e-2).place == pytest.approx(
         steps.place, abs=1e-4
     )
 

@@ -47,7 +47,7 @@ def test_kinematic_error_does_not_depend_on_the_mesh(name, meshes, angles):
     for refinement in meshes:
         design = Design.preset(name).with_changes({"mesh.refinement": refinement})
         follow = Continuation(model=ring_model(design, half=True), ratio=design.ratio)
-        state = follow.to_torque(follow.meshed(follow.deflected()), 0.0)
+        state = follow.to_torque(follow.engage(follow.deflect()), 0.0)
         error = []
         for angle in 2.0 * np.pi / 122 * np.arange(angles) / angles:
             state = follow.to_angle(state, float(angle))

@@ -39,7 +39,7 @@ def loaded(name: str, part: float) -> tuple[Design, Continuation, State]:
     """A coarse drive at an angle of its own, under a part of its peak torque."""
     design = coarse(name)
     follow = follower_in_plane(design)
-    state = follow.meshed(follow.deflected())
+    state = follow.engage(follow.deflect())
     state = follow.to_torque(state, part * ratings_of(design).repeated_peak)
     return design, follow, follow.to_angle(state, 0.37 * 2.0 * pi / design.periodicity)
 
@@ -96,7 +96,7 @@ def test_forces_of_the_teeth_balance_the_torque_where_many_contacts_change():
     twin = replace(held, station=held.station + 1e-7)
     state = replace(
         state,
-        contacts=Contacts.joined(held, twin),
+        contacts=Contacts.join(held, twin),
         tooth_force=np.concatenate([force * 2.0 / 3.0, force / 3.0]),
     )
     ring = linearise(follow.model, state, state.torque)
@@ -112,7 +112,7 @@ def test_forces_of_the_teeth_balance_the_torque_where_many_contacts_change():
         carries=carries,
     )
     none = np.zeros((len(ring.gap), ring.gap.shape[1] // ring.stations.per_interval))
-    linear = drive.influence(Supports.of(ring, state, none.astype(bool)))
+    linear = drive.influence(Supports.from_state(ring, state, none.astype(bool)))
     arm = np.einsum("ki,ki->k", rotate_right_angle(contacts.point), contacts.normal)
     moments, opened = [], []
     torques = state.torque * np.linspace(1.0, 0.4, 13)
@@ -139,7 +139,7 @@ def test_points_of_a_flank_that_are_nearly_one_are_one():
     assert held is not None
     twin = replace(held, station=held.station + 0.4 * ALIKE)
     other = replace(held, station=held.station + 3.0 * ALIKE)
-    three = Contacts.joined(Contacts.joined(held, twin), other)
+    three = Contacts.join(Contacts.join(held, twin), other)
     found, carries = distinct(three, state)
     assert len(found) == 2 * len(held)
     assert carries.sum() == len(held)
@@ -169,7 +169,7 @@ def test_an_exchange_changes_the_gradient_as_the_station_does():
     near = (np.abs(ring.gap) < 3e-8) | state.touching
     stations = near & (np.random.default_rng(1).random(near.shape) < 0.5)
     assert (stations & state.touching).any() and (stations & ~state.touching).any()
-    found = ring.exchanged(stations, state.touching)
+    found = ring.exchange(stations, state.touching)
     other = replace(state, touching=state.touching ^ stations)
     wanted = linearise(model, other, state.torque)
     scale = np.abs(wanted.gradient).max()

@@ -31,7 +31,7 @@ def turned(torque: float, steps: int):
 def _turned(torque: float, steps: int):
     design = rubbing()
     follow = Continuation(model=ring_model(design, half=True), ratio=design.ratio)
-    states = [follow.to_torque(follow.meshed(follow.deflected()), torque)]
+    states = [follow.to_torque(follow.engage(follow.deflect()), torque)]
     for k in range(1, 2 * steps + 1):
         states.append(follow.to_angle(states[-1], PITCH * k / steps))
     assert all(state.outcome.ok for state in states)
@@ -46,7 +46,7 @@ def test_slip_is_differentiated_right():
     """Change of s_f + s_c by the motion of either flank, against differences."""
     model = ring_model(rubbing(), half=True)
     follow = Continuation(model=model, ratio=-60.0)
-    state = follow.to_torque(follow.meshed(follow.deflected()), 20.0)
+    state = follow.to_torque(follow.engage(follow.deflect()), 20.0)
     ring, c = linearise(model, state, 20.0), state.contacts
     rng, step = np.random.default_rng(1), 1e-8
 
@@ -111,7 +111,7 @@ def test_loop_at_a_locked_input_encloses_the_work():
     # the ellipse holds the whole rim: its flanks hardly slide under torque
     design = coarse("reference-2d-simplified", **{"friction.tooth_coefficient": 0.1})
     follow = Continuation(model=ring_model(design, half=True), ratio=design.ratio)
-    state = follow.meshed(follow.deflected())
+    state = follow.engage(follow.deflect())
     # contacts come and go within a step: 40 steps a leg leave 0.5 %, 160 leave 2e-5
     legs = [np.linspace(a, b, 161)[1:] for a, b in ((0, 20), (20, -20), (-20, 20))]
     loop = []

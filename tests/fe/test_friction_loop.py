@@ -124,7 +124,7 @@ def test_nothing_is_lost_where_nothing_slips():
     """After a reversal the teeth stick: a small cycle returns and takes no work."""
     design = rubbing(0.1)
     follow = Continuation(model=ring_model(design, half=True), ratio=design.ratio)
-    state = follow.to_torque(follow.meshed(follow.deflected()), 30.0)
+    state = follow.to_torque(follow.engage(follow.deflect()), 30.0)
     small = [follow.to_torque(state, 29.9)]
     for torque in (29.98, 29.9, 29.98, 29.9):
         small.append(follow.to_torque(small[-1], torque))

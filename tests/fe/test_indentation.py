@@ -101,7 +101,7 @@ def test_points_of_a_pair_of_flanks_are_one_strip():
     whole = strain_energy(LAW, one, np.array([100.0]))
     assert strain_energy(LAW, two, np.array([30.0, 70.0])) == pytest.approx(whole)
     assert strain_energy(LAW, other, np.array([30.0, 70.0])) < 0.8 * whole
-    strips = Strips.of(LAW, two, one, np.array([100.0]))
+    strips = Strips.from_contacts(LAW, two, one, np.array([100.0]))
     there = strips.compliance @ np.array([30.0, 70.0]) + strips.offset
     assert there == pytest.approx(LAW.approach(np.full(2, 100.0)))
     assert strips.error(np.array([30.0, 70.0])) < 1e-18
@@ -296,7 +296,7 @@ def test_indentation_makes_a_drive_softer_and_conserves_its_energy():
     plain = replace(follow, model=replace(follow.model, indentation=None))
     found = {}
     for name, one in (("strips", follow), ("patch", plain)):
-        state = one.meshed(one.deflected())
+        state = one.engage(one.deflect())
         low, high = (one.to_torque(state, t) for t in (19.0, 21.0))
         torsion = low.rotation - high.rotation
         # the mean torque; the compliance hardly changes over the interval

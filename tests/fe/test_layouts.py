@@ -43,7 +43,7 @@ def follow(layout):
 @cache
 def loaded(layout):
     f = follow(layout)
-    return f.to_torque(f.meshed(f.deflected()), TORQUE)
+    return f.to_torque(f.engage(f.deflect()), TORQUE)
 
 
 @pytest.mark.parametrize("layout", LAYOUTS)

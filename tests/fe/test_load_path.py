@@ -51,7 +51,9 @@ ROUND_OFF = np.array([1e-12, 1e-11, 1e-12])
 
 def test_one_event_in_each_interval_is_exact():
     """Error, energy and compliance between the samples, to round-off."""
-    apart = np.abs(path(TORQUES, EVENTS).at(FINE) - drive(FINE, EVENTS)).max(axis=1)
+    apart = np.abs(path(TORQUES, EVENTS).evaluate_at(FINE) - drive(FINE, EVENTS)).max(
+        axis=1
+    )
     assert (apart < ROUND_OFF).all()
 
 
@@ -79,7 +81,7 @@ def test_one_event_on_a_slope_is_exact():
     assert explained.place[0, 0] == pytest.approx(0.4, rel=1e-6)
     # two equal jumps explain it as well: the curve lies between, the doubt says so
     x = np.linspace(0.0, 10.0, 101)
-    apart = np.abs(one.at(x) - drive(x, *given))[0].max()
+    apart = np.abs(one.evaluate_at(x) - drive(x, *given))[0].max()
     assert apart <= one.doubt[0][0]
 
 
@@ -90,14 +92,14 @@ def test_two_equal_events_are_among_the_explanations():
     places = np.sort(one._explained[1].place[0]) * 10.0
     assert places == pytest.approx([2.0, 7.0], rel=1e-6)
     x = np.linspace(0.0, 10.0, 101)
-    assert np.abs(one.at(x) - drive(x, events))[0].max() <= one.doubt[0][0]
+    assert np.abs(one.evaluate_at(x) - drive(x, events))[0].max() <= one.doubt[0][0]
 
 
 def test_a_smooth_path_is_that_of_its_compliance():
     """Compliance in proportion to the torque, no jump: exact, and no events."""
     given = ((), 5e-7)
     curve = path(TORQUES, *given)
-    error, energy, _ = np.abs(curve.at(FINE) - drive(FINE, *given)).max(axis=1)
+    error, energy, _ = np.abs(curve.evaluate_at(FINE) - drive(FINE, *given)).max(axis=1)
     # both explanations count, a slope and two jumps a fifth from the ends
     assert error <= curve.doubt[0].max()
     assert error < 0.02 * (5e-7 * 17.0) * 17.0
@@ -112,8 +114,8 @@ def test_the_potential_balances_between_the_samples():
         [np.linspace(a + 0.1, b - 0.1, 200) for a, b in pairwise(TORQUES)]
     )
     step = 1e-4
-    error, _, compliance = curve.at(places)
-    up, down = curve.at(places + step), curve.at(places - step)
+    error, _, compliance = curve.evaluate_at(places)
+    up, down = curve.evaluate_at(places + step), curve.evaluate_at(places - step)
     potential = [
         v[1] + t * v[0] for v, t in ((up, places + step), (down, places - step))
     ]
@@ -130,7 +132,7 @@ def test_equilibria_come_back_bit_for_bit(seed):
     rng = np.random.default_rng(seed)
     given = path(np.cumsum(rng.uniform(0.5, 9.0, 7)), EVENTS)
     own = np.stack([given.output_error, given.energy, given.compliance])
-    assert np.array_equal(given.at(given.torque), own)
+    assert np.array_equal(given.evaluate_at(given.torque), own)
 
 
 def test_the_doubt_tells_how_far_off_the_curve_is():
@@ -140,7 +142,7 @@ def test_the_doubt_tells_how_far_off_the_curve_is():
     for _ in range(40):
         events = [(p, 1e-5 * rng.normal()) for p in rng.uniform(0.0, 47.0, 12)]
         curve, x = path(TORQUES, events), np.linspace(0.0, 47.0, 800)
-        apart = np.abs(curve.at(x)[0] - drive(x, events)[0])
+        apart = np.abs(curve.evaluate_at(x)[0] - drive(x, events)[0])
         told.append(curve.doubt[0].max())
         true.append(apart.max())
     ratio = np.array(true) / np.array(told)
@@ -195,19 +197,19 @@ def test_predicted_events_make_the_curve_exact():
     given = MANY, 2e-8
     plain = path(TORQUES, *given)
     curve = replace(plain, changes=predicted(TORQUES, MANY))
-    apart = np.abs(curve.at(FINE) - drive(FINE, *given)).max(axis=1)
+    apart = np.abs(curve.evaluate_at(FINE) - drive(FINE, *given)).max(axis=1)
     assert (apart < ROUND_OFF).all()
     assert np.abs(plain.at(FINE)[0] - drive(FINE, *given)[0]).max() > 1e-6
     assert curve.doubt[0].max() < 1e-3 * plain.doubt[0].max()
     own = np.stack([curve.output_error, curve.energy, curve.compliance])
-    assert np.array_equal(curve.at(TORQUES), own)
+    assert np.array_equal(curve.evaluate_at(TORQUES), own)
 
 
 def test_the_doubt_of_predictions_tells_how_far_off_they_are():
     """Events displaced by the square of the distance from the end that predicts."""
     plain = path(TORQUES, MANY)
     curve = replace(plain, changes=predicted(TORQUES, MANY, bend=2e-3))
-    apart = np.abs(curve.at(FINE)[0] - drive(FINE, MANY)[0]).max()
+    apart = np.abs(curve.evaluate_at(FINE)[0] - drive(FINE, MANY)[0]).max()
     assert 0.2 < apart / curve.doubt[0].max() < 2.0
     assert apart < 0.3 * np.abs(plain.at(FINE)[0] - drive(FINE, MANY)[0]).max()
 
@@ -219,14 +221,14 @@ def test_without_a_prediction_of_both_ends_the_equilibria_alone_count():
     given[1] = None
     curve = replace(plain, changes=tuple(given))
     inside = FINE < TORQUES[2]
-    assert np.array_equal(curve.at(FINE[inside]), plain.at(FINE[inside]))
-    assert not np.array_equal(curve.at(FINE), plain.at(FINE))
+    assert np.array_equal(curve.evaluate_at(FINE[inside]), plain.at(FINE[inside]))
+    assert not np.array_equal(curve.evaluate_at(FINE), plain.at(FINE))
 
 
 def test_torques_outside_are_refused():
     """No extrapolation; the range is named."""
     curve = path(TORQUES, EVENTS)
     with pytest.raises(ValueError, match=naming("47.1", "47 N·m")):
-        curve.at([47.1])
+        curve.evaluate_at([47.1])
     with pytest.raises(ValueError, match=naming("torque", "increase")):
         path([1.0, 1.0])

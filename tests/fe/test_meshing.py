@@ -54,7 +54,7 @@ def follow(half=True):
 
 @cache
 def meshed():
-    return follow().meshed(follow().deflected())
+    return follow().engage(follow().deflect())
 
 
 @pytest.mark.parametrize(
@@ -149,7 +149,9 @@ def test_nothing_penetrates():
     assert np.abs(open_gaps(model, state)).max() < 1e-11
     found = ring.search.search(ring.flank, 1e-6, None)
     # elsewhere on a pair of flanks they are no closer than their strip lets them
-    strips = Strips.of(model.indentation, found, state.contacts, state.tooth_force)
+    strips = Strips.from_contacts(
+        model.indentation, found, state.contacts, state.tooth_force
+    )
     approach = model.indentation.approach(strips.force)[strips.strip]
     assert (found.gap + approach).min() > -1e-11
     # the weights are the derivative of the gap by the flank displacement
@@ -176,11 +178,11 @@ def test_gradient_and_tangent_are_derivatives_of_the_energy():
     )
     here = linearise(model, state, None)
     rng = np.random.default_rng(3)
-    increment = CyclicFactor(here.anchored(), here.face_dofs).solve(
+    increment = CyclicFactor(here.anchor_tangent(), here.face_dofs).solve(
         rng.normal(size=(*here.gradient.shape, 1))
     )[..., 0]
     increment *= 1.0 / np.abs(increment).max()
-    shift = here.in_global_frame(increment)
+    shift = here.rotate_to_global(increment)
     size, inside = model.element.face_size, model.element.bore_size
 
     def moved(way):
@@ -216,7 +218,7 @@ def test_gradient_and_tangent_are_derivatives_of_the_energy():
 def test_stress_is_continuous_across_the_faces():
     """Both sectors of a face report the same stress, seen from their frames."""
     model = follow().model
-    state = follow().deflected()
+    state = follow().deflect()
     ring = circular_spline_stress(model, follow().to_torque(meshed(), TORQUE))
     for stress, element in (
         (flexspline_stress(model, state), model.element),

@@ -47,7 +47,7 @@ def in_series(layout, theta, torque):
     turned back until what is fixed stands at zero.
     """
     follow = follower(layout)
-    state = follow.to_torque(follow.meshed(follow.deflected()), torque)
+    state = follow.to_torque(follow.engage(follow.deflect()), torque)
     inner = theta
     for _ in range(6):
         state = follow.to_angle(state, inner)
@@ -79,7 +79,7 @@ def test_output_yields_as_two_springs_do(layout):
     design = mounted(layout)
     theta = 0.3 * 2.0 * pi / 122
     follow = follower(layout)
-    rigid = follow.to_torque(follow.meshed(follow.deflected()), TORQUE)
+    rigid = follow.to_torque(follow.engage(follow.deflect()), TORQUE)
     rigid = follow.to_angle(rigid, theta)
     psi, _, energy = in_series(layout, theta, TORQUE)
     yielding = series_compliance(design, cup=False)

@@ -64,7 +64,7 @@ def drive(*, half=True, cage_held=False):
 def turned_on(*, half=True, cage_held=False):
     """Under torque, at no position of symmetry of teeth and balls."""
     follow = drive(half=half, cage_held=cage_held)
-    state = follow.to_torque(follow.meshed(follow.deflected()), TORQUE)
+    state = follow.to_torque(follow.engage(follow.deflect()), TORQUE)
     state = follow.to_angle(state, 0.4 * PITCH)
     assert state.outcome.ok
     return state
@@ -124,7 +124,7 @@ def test_newton_step_sees_the_tangent_of_the_whole_ring():
     way = rng.standard_normal((model.sectors, here.gradient.shape[1]))
     face = model.face_dofs
     way[:, -face:] = np.roll(way[:, :face], -1, axis=0)
-    shift = here.in_global_frame(way)
+    shift = here.rotate_to_global(way)
     size, inside = model.element.face_size, model.element.bore_size
     nodes = way[:, model.race_dofs[:-4]].reshape(state.race.shape)
 
@@ -151,14 +151,14 @@ def test_work_without_teeth_equals_energy():
     Both torques are ripples, small against what a coarse race takes to stay in place.
     """
     model, follow = drive().model, drive()
-    race = PlaneRace.of(small(), model.element, half=True, elements=760)
+    race = PlaneRace.from_design(small(), model.element, half=True, elements=760)
     model = replace(model, race=race)
     start = follow.solver(
-        model, model.at_rest(0.11, 0.0), Load(rotation=0.0, teeth=False)
+        model, model.initial_guess(0.11, 0.0), Load(rotation=0.0, teeth=False)
     )
 
     def held(alpha, psi):
-        moved = model.moved(start, alpha, psi, 0.0)
+        moved = model.predict_field(start, alpha, psi, 0.0)
         return follow.solver(model, moved, Load(rotation=psi, teeth=False))
 
     h = 1e-4
@@ -194,9 +194,11 @@ def test_moments_balance():
     off = []
     for elements in (190, 380):
         model, design = drive().model, small()
-        race = PlaneRace.of(design, model.element, half=True, elements=elements)
+        race = PlaneRace.from_design(
+            design, model.element, half=True, elements=elements
+        )
         follow = Continuation(model=replace(model, race=race), ratio=design.ratio)
-        state = follow.to_torque(follow.meshed(follow.deflected()), TORQUE)
+        state = follow.to_torque(follow.engage(follow.deflect()), TORQUE)
         state = follow.to_angle(state, 0.4 * PITCH)
         alpha = state.wave_generator_angle
         nodes = model.skeleton(state)[:, model.bore_nodes]
@@ -247,7 +249,7 @@ def test_odd_balls_need_the_whole_drive():
 def test_held_cage_repeats_after_a_pitch():
     """Error, torque and energy; the mean torque is that of the ratio."""
     follow = drive(cage_held=True)
-    state = follow.to_torque(follow.meshed(follow.deflected()), TORQUE)
+    state = follow.to_torque(follow.engage(follow.deflect()), TORQUE)
     rows = []
     for k in range(13):
         state = follow.to_angle(state, k / 12 * PITCH)
@@ -263,7 +265,7 @@ def test_turning_the_drive_as_a_whole_changes_nothing():
     """Wave generator, flexspline and race by one angle: same gaps and energy."""
     state, model = turned_on(cage_held=True), drive(cage_held=True).model
     turn, alpha = 0.7, state.wave_generator_angle
-    moved = model.moved(state, alpha + turn, state.rotation + turn, turn)
+    moved = model.predict_field(state, alpha + turn, state.rotation + turn, turn)
     found = [
         model.race.forces(
             s.race,
@@ -300,21 +302,21 @@ def test_many_hard_balls_are_the_rigid_surface():
         follow, state = on_rigid_ring(design), None
         for factor in harder:
             model = follow.model
-            constant = factor * BallBearing.of(design).hertz_constant()
+            constant = factor * BallBearing.from_design(design).hertz_constant()
             own = replace(model.race.on_balls, ball_constant=constant)
             model = replace(model, race=replace(model.race, on_balls=own))
             follow = replace(follow, model=model)
-            start = model.at_rest() if state is None else state
+            start = model.initial_guess() if state is None else state
             state = follow.solver(model, start, Load(rotation=0.0, teeth=False))
             assert state.outcome.ok
-        state = follow.to_torque(follow.meshed(state), TORQUE)
+        state = follow.to_torque(follow.engage(state), TORQUE)
         assert state.outcome.ok
         nodes = model.skeleton(state)[:, model.bore_nodes]
         gap, _, _ = model.wave_generator_gap(nodes, 0.0)
         torsion.append(-state.rotation)
         deepest.append(-gap[state.touching].min())
     follow = on_rigid_ring(small(), bearing=False)
-    rigid = -follow.to_torque(follow.meshed(follow.deflected()), TORQUE).rotation
+    rigid = -follow.to_torque(follow.engage(follow.deflect()), TORQUE).rotation
     over = np.array(torsion) / rigid
     assert over[0] > 3.0 and over[0] > over[1] > over[2] > 1.0
     assert over[2] < 1.05 and deepest[2] < 3.5e-6
@@ -337,7 +339,7 @@ def test_thin_rings_tell_the_same():
         # the teeth of the rings have the patch of a contact alone
         model = replace(ring_model(design), indentation=None)
         follow = Continuation(model=model, ratio=design.ratio)
-        state, rings = follow.meshed(follow.deflected()), thin_ring(design)
+        state, rings = follow.engage(follow.deflect()), thin_ring(design)
         twin, found, theirs = solve_unloaded(rings, 0.0), [], []
         for torque in (5.0, 14.0, 48.0, 100.0):
             state, twin = (
@@ -363,7 +365,7 @@ def test_no_bearing_is_no_change():
     for design, bearing in ((plain, True), (small(), False)):
         model = ring_model(design, half=True, bearing=bearing)
         follow = Continuation(model=model, ratio=design.ratio)
-        states.append(follow.to_torque(follow.meshed(follow.deflected()), TORQUE))
+        states.append(follow.to_torque(follow.engage(follow.deflect()), TORQUE))
         assert states[-1].race is None
     for name in ("rotation", "energy", "compliance", "wave_generator_torque"):
         assert getattr(states[0], name) == getattr(states[1], name)

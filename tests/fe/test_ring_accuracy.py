@@ -73,7 +73,7 @@ def test_a_failure_says_where(monkeypatch):
     def stuck(model, state, torque):
         return replace(state, outcome=Outcome.MAX_ITERATIONS)
 
-    monkeypatch.setattr(ring_accuracy, "loaded", stuck)
+    monkeypatch.setattr(ring_accuracy, "solve_loaded", stuck)
     with pytest.raises(
         ComputationError, match=naming("size-25-50", "5 N·m", "0.5 rad", "load steps")
     ):

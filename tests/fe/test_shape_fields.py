@@ -41,7 +41,7 @@ def follow(design):
 
 def compared(shown, follow, design, torque, angle):
     """Largest difference of positions [m] and stresses [Pa]; the largest of those."""
-    state = follow.to_torque(follow.meshed(follow.deflected()), torque)
+    state = follow.to_torque(follow.engage(follow.deflect()), torque)
     state = follow.to_angle(state, angle)
     assert state.outcome.ok
     surface = plane_surface(follow.model)

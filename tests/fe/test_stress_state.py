@@ -88,7 +88,7 @@ def test_axial_stress_follows_the_plane():
         design = design_of(kind)
         model = ring_model(design, half=True)
         follow = Continuation(model=model, ratio=design.ratio)
-        state = follow.to_torque(follow.meshed(follow.deflected()), 20.0)
+        state = follow.to_torque(follow.engage(follow.deflect()), 20.0)
         assert state.outcome.ok
         for member, stress in (
             ("flexspline", flexspline_stress(model, state)),

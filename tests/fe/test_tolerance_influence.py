@@ -62,7 +62,7 @@ def test_without_errors_the_perfect_drive_comes_back(reference):
 
 def check_linear(follow, part):
     """Linearised without load the drive under rated torque is right to a part."""
-    begin = follow.meshed(follow.deflected())
+    begin = follow.engage(follow.deflect())
     loaded, linear = follow.to_torque(begin, 20.0), follow.influence(begin)
     found = linear.respond(none_of(linear), 20.0)
     assert found.output_angle[0] == pytest.approx(loaded.rotation, rel=part)
@@ -138,7 +138,7 @@ def test_a_pitch_on_the_next_teeth_stand_alike(name):
     moved = full_solves(design, follow, found, np.array([pitches]), (20.0,))
     model = ring_model(design, friction=False)
     turned = Continuation(model=model, ratio=design.ratio, layout=design.drive.layout)
-    there = turned.to_torque(turned.meshed(turned.deflected()), 20.0)
+    there = turned.to_torque(turned.engage(turned.deflect()), 20.0)
     here = turned.output_angle(there)
     angle = pitches * pitch_of(design)
     there = turned.to_angle(there, angle)

@@ -24,7 +24,7 @@ def orders(torque=4.0, positions=16, **values):
     """Amplitudes per turn of the wave generator, whole pitches apart [rad]."""
     design = flawed(**values)
     follow = Continuation(model=ring_model(design), ratio=design.ratio)
-    state = follow.to_torque(follow.meshed(follow.deflected()), torque)
+    state = follow.to_torque(follow.engage(follow.deflect()), torque)
     error = []
     for k in range(positions):
         angle = FEW_PITCH * round(62 * k / positions)
@@ -76,7 +76,7 @@ def test_teeth_shifted_alike_turn_the_member():
     angles = []
     for model in (perfect, moved):
         follow = Continuation(model=model, ratio=design.ratio)
-        state = follow.to_torque(follow.meshed(follow.deflected()), 4.0)
+        state = follow.to_torque(follow.engage(follow.deflect()), 4.0)
         angles.append(follow.output_angle(state))
     # the teeth touch on radii from 60.4 to 61.6 mm
     assert angles[0] - angles[1] == pytest.approx(shift / 61e-3, rel=0.02)
@@ -92,7 +92,7 @@ def test_errors_keep_the_energy_balance():
         circular_spline_ovality_um=5.0,
     )
     follow = Continuation(model=ring_model(design), ratio=design.ratio)
-    state = follow.to_torque(follow.meshed(follow.deflected()), 20.0)
+    state = follow.to_torque(follow.engage(follow.deflect()), 20.0)
     potential, step = [], 1e-4
     for angle in (0.013 - step, 0.013, 0.013 + step):
         state = follow.to_angle(state, angle)

@@ -58,11 +58,11 @@ def test_conjugate_teeth_just_touch_where_the_elements_put_them():
     model = ring_model(drive, half=True, profiles={"circular_spline": profile})
     follow = Continuation(model=model, ratio=drive.ratio)
     for angle in 2.0 * np.pi / 122 * np.arange(4) / 4:
-        state = follow.deflected(float(angle))
+        state = follow.deflect(float(angle))
         ring = linearise(model, state, None)
         gap = ring.search.search(ring.flank, 2e-5, None).gap
         assert abs(gap.min()) < 0.3e-6
     # and they carry: engaged and loaded like any other teeth
-    loaded = follow.to_torque(follow.meshed(follow.deflected()), 20.0)
+    loaded = follow.to_torque(follow.engage(follow.deflect()), 20.0)
     assert loaded.outcome.ok
     assert -25e-6 < loaded.rotation < -15e-6

@@ -60,19 +60,19 @@ class KnownDrive:
             moment=moment + torque / self.ratio,
         )
 
-    def deflected(self) -> Known:
+    def deflect(self) -> Known:
         """As of a follower."""
         return self.at(0.0, 0.0)
 
-    def meshed(self, state: Known) -> Known:
+    def engage(self, state: Known) -> Known:
         """As of a follower."""
         return state
 
-    def unloaded(self, state: Known, small: float) -> Unloaded[Known]:
+    def unload(self, state: Known, small: float) -> Unloaded[Known]:
         """As of a follower."""
         return Unloaded(state=self.at(0.0, state.theta), small=small)
 
-    def unloaded_to(self, rest: Unloaded[Known], theta: float) -> Unloaded[Known]:
+    def turn_unloaded(self, rest: Unloaded[Known], theta: float) -> Unloaded[Known]:
         """As of a follower."""
         return Unloaded(state=self.at(0.0, theta), small=rest.small)
 
@@ -217,12 +217,14 @@ def test_other_angles_are_missed_by_what_the_samples_cannot_know():
     drive = KnownDrive(drops=((2.1, 2e-4),), swing=0.4)
     columns = grid(drive, count=48)
     others = [columns.unseen_column(k + 0.38) for k in range(0, 48, 5)]
-    missed = [columns.missed(count, others, [2.0, PEAK]) for count in (6, 12, 24, 48)]
+    missed = [
+        columns.largest_miss(count, others, [2.0, PEAK]) for count in (6, 12, 24, 48)
+    ]
     assert missed[0] > 0.1
     assert missed[3] < 0.03
     assert (np.diff(missed) < 0.0).all()
     # at the peak, where it always has come, a sine is all there is
-    assert columns.missed(6, others, [PEAK]) < 1e-9
+    assert columns.largest_miss(6, others, [PEAK]) < 1e-9
 
 
 def test_the_torque_beyond_the_peak_turns_the_stiffest_angle_as_far_as_the_softest():

@@ -107,7 +107,7 @@ def differences(design: Design) -> tuple[np.ndarray, dict[str, dict[str, float]]
     series = series_compliance(design, cup=True)
     peak = ratings_of(design).repeated_peak
     signs = (1.0,) if design.wave_generator.kind in SYMMETRIC else (1.0, -1.0)
-    rest = follow.meshed(follow.deflected())
+    rest = follow.engage(follow.deflect())
     for sign in signs:
         state = rest
         for part in PARTS:

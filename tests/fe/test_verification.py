@@ -22,7 +22,7 @@ def follow():
 
 @cache
 def loaded():
-    meshed = follow().meshed(follow().deflected())
+    meshed = follow().engage(follow().deflect())
     return follow().to_torque(meshed, TORQUE)
 
 

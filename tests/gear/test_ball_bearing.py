@@ -63,7 +63,7 @@ def test_planes_may_be_named_either_way():
 
 def test_family_ball_is_near_palmgren():
     """The law of the handbooks for steel lies within a tenth in approach."""
-    bearing = BallBearing.of(Design.load("size-25-100"))
+    bearing = BallBearing.from_design(Design.load("size-25-100"))
     # both races of a steel ball D: 4.36e-4 Q^(2/3) / D^(1/3) mm, textbook figure
     palmgren = 4.36e-4 * 1e-3 / (bearing.ball_diameter * 1e3) ** (1 / 3)
     assert bearing.hertz_constant() ** (-2 / 3) == pytest.approx(palmgren, rel=0.1)
@@ -71,7 +71,7 @@ def test_family_ball_is_near_palmgren():
 
 def test_cam_bulges_and_race_bends_around_the_ball():
     """Both contacts in series, with the curvature of the raceways on either side."""
-    bearing = BallBearing.of(Design.load("size-25-100"))
+    bearing = BallBearing.from_design(Design.load("size-25-100"))
     inner, outer = bearing.raceways
     ball = 2.0 / bearing.ball_diameter
     across = ball * (1.0 - 1.0 / (2.0 * 0.52))
@@ -91,7 +91,7 @@ def test_bearing_is_measured_inwards_from_the_bore():
             "wave_generator.bearing.clearance_um": 20.0,
         }
     )
-    bearing = BallBearing.of(design)
+    bearing = BallBearing.from_design(design)
     inner, outer = bearing.raceways
     bore = design.flexspline_inner_radius
     assert outer == pytest.approx(bore - 3e-6 - bearing.race_thickness, abs=1e-15)
@@ -100,14 +100,14 @@ def test_bearing_is_measured_inwards_from_the_bore():
 
 def test_modulus_of_like_bodies():
     """E* is half of E/(1 - nu^2) for two bodies of one steel."""
-    bearing = BallBearing.of(Design.load("size-25-100"))
+    bearing = BallBearing.from_design(Design.load("size-25-100"))
     assert effective_modulus(bearing) == pytest.approx(210e9 / 2 / (1 - 0.29**2))
 
 
 def test_constant_scales_with_the_root_of_length():
     """K of twice the bearing is the root of two times larger, Q/D^2 the same."""
-    small = BallBearing.of(Design.load("size-20-100"))
-    large = BallBearing.of(Design.load("size-40-100"))
+    small = BallBearing.from_design(Design.load("size-20-100"))
+    large = BallBearing.from_design(Design.load("size-40-100"))
     # only the clearance class does not scale
     assert large.hertz_constant() == pytest.approx(
         sqrt(2.0) * small.hertz_constant(), rel=1e-4

@@ -32,7 +32,7 @@ def test_every_variant_is_feasible(variant):
 def test_what_is_stated_is_what_is_run(size, ratio):
     """The figures that the file prints with a source are those of the family."""
     design, stated = Design.preset(f"size-{size}-{ratio}"), STUDY.stated
-    bearing, d = BallBearing.of(design), 2.54 * size * mm
+    bearing, d = BallBearing.from_design(design), 2.54 * size * mm
     race, steel = stated["outer_race"], stated["steel"]
     for value, multiple in (
         (design.drive.face_width_mm * mm, stated["face_width"]["per_pitch_diameter"]),

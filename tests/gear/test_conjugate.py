@@ -74,7 +74,7 @@ def gaps(given, made, motion, theta, count=601):
     """Distance of points of the given flank to the generated one (n_theta, count)."""
     points, _, _ = given.evaluate(np.linspace(*given.contact_range, count))
     wide = np.broadcast_to(points, (len(theta), *points.shape))
-    seen = motion.to(made.member, theta).points(wide).reshape(-1, 2)
+    seen = motion.map_to(made.member, theta).points(wide).reshape(-1, 2)
     return made.signed_distance(seen)[0].reshape(len(theta), count)
 
 
@@ -110,13 +110,13 @@ def test_every_point_of_the_flank_touches_once(member, kind, generator):
     (motion,) = motions
 
     def slip(theta):
-        moved = motion.to(given.member, theta)
+        moved = motion.map_to(given.member, theta)
         return np.sum(moved.vectors(normals) * moved.velocities(points), axis=-1)
 
     # the distance is smallest where the slip changes sign
     grid = np.linspace(-0.15, 0.15, 241)
     seen = np.stack(
-        [motion.to(given.member, np.full(len(s), t)).points(points) for t in grid]
+        [motion.map_to(given.member, np.full(len(s), t)).points(points) for t in grid]
     )
     gap = given.signed_distance(seen.reshape(-1, 2))[0].reshape(len(grid), len(s))
     k = np.clip(np.argmin(gap, axis=0), 1, len(grid) - 2)
@@ -129,10 +129,10 @@ def test_every_point_of_the_flank_touches_once(member, kind, generator):
     theta = 0.5 * (low + high)
     residual = np.abs(slip(theta)) / motion.line.radius
     assert residual.max() < 1e-10
-    touching = motion.to(given.member, theta).points(points)
+    touching = motion.map_to(given.member, theta).points(points)
     distance, other, _ = given.signed_distance(touching)
     assert np.abs(distance).max() < 1e-10
-    turned = motion.to(given.member, theta).vectors(normals)
+    turned = motion.map_to(given.member, theta).vectors(normals)
     assert np.abs(other + turned).max() < 1e-6
 
 

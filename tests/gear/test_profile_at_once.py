@@ -23,7 +23,7 @@ def test_at_once_equals_piece_by_piece(name, member):
     for k, part in enumerate(profile.segments):
         here = index == k
         along = s[here] - profile.stations[k]
-        point, normal, bend = part.at(along, profile.side)
+        point, normal, bend = part.evaluate_at(along, profile.side)
         assert np.abs(points[here] - point).max() < 1e-16
         assert np.abs(normals[here] - normal).max() < 2e-15
         assert np.array_equal(curvature[here], bend)

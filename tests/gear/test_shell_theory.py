@@ -127,8 +127,8 @@ def test_safety_factor_of_one_stress_alone():
 
 def test_dimensions_of_the_design():
     """The bundled cup of that article has its numbers; a ring has none."""
-    own = ShellDimensions.of(Design.load("stress-cup"))
+    own = ShellDimensions.from_design(Design.load("stress-cup"))
     for name in SHELL.__dataclass_fields__:
         assert getattr(own, name) == pytest.approx(getattr(SHELL, name), rel=1e-6)
     with pytest.raises(ValueError, match=naming("reference-2d", "[cup]")):
-        ShellDimensions.of(Design.load("reference-2d"))
+        ShellDimensions.from_design(Design.load("reference-2d"))

@@ -559,7 +559,7 @@ def test_bad_logs_are_one_line(tmp_path):
         with pytest.raises(InputError, match=naming("log", *line)):
             BenchLog(
                 time=times, motor_angle=zero, link_angle=zero, output_torque=zero
-            ).averaged(0.01)
+            ).average(0.01)
 
 
 def late_by(rows: np.ndarray, seconds: float) -> np.ndarray:

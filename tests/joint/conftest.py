@@ -76,7 +76,7 @@ class Bench:
         torsion = drive.torsion(*x)
         potential = drive.energy(torsion, *x)
         if drive.hysteresis and self.drive.plugin:
-            sliders = Sliders.relaxed(drive.hysteresis)
+            sliders = Sliders.relax(drive.hysteresis)
             potential += replace(sliders, rest=self.rest.copy()).energy(torsion)
         if drive.friction and self.drive.plugin and self.bristle[1]:
             stretch = float(np.dot(drive.friction_direction, x)) - self.bristle[0]

@@ -52,7 +52,7 @@ def random_motion(b, rng):
     theta = rng.uniform(-8, 8)
     psi = theta / drive.ratio - rng.uniform(-1, 1) * drive.torsion_knots[-1]
     rates = rng.normal(0, 20), rng.normal(0, 0.5)
-    rest = SPECIMEN.of(drive).torsion(theta, psi) + 2e-4 * rng.standard_normal(1)
+    rest = SPECIMEN.apply_to(drive).torsion(theta, psi) + 2e-4 * rng.standard_normal(1)
     beta = float(np.dot(drive.friction_direction, [theta, psi]))
     relaxed = beta + 1e-3 * rng.standard_normal()
     b.place(theta, psi, *rates)
@@ -63,10 +63,10 @@ def random_motion(b, rng):
 
 @pytest.mark.parametrize("integrator", ["RK4", "discrete"])
 def test_force_equals_twin_of_the_varied_map(bench, lossy, integrator):
-    """Force, direction and stiffness are the twin's of ``Variation.of``."""
+    """Force, direction and stiffness are the twin's of ``Variation.apply_to``."""
     b = bench(lossy, damping_ratio=0.05, integrator=integrator, variable=True)
     vary(b)
-    other = SPECIMEN.of(lossy)
+    other = SPECIMEN.apply_to(lossy)
     rng = np.random.default_rng(2)
     t = b.model.tendon(b.drive.tendon).id
     f = b.model.tendon("j_friction").id
@@ -101,7 +101,7 @@ def test_specimen_moves_as_its_own_map(bench, lossy):
     """300 loaded steps of the specimen equal those of a model with its map."""
     b = bench(lossy, variable=True)
     vary(b)
-    own = bench(SPECIMEN.of(lossy), link=0.4, damping_ratio=0.0)
+    own = bench(SPECIMEN.apply_to(lossy), link=0.4, damping_ratio=0.0)
     ends = []
     for one in (b, own):
         one.place(0.2, 0.2 / lossy.ratio, 20.0, 20.0 / lossy.ratio)

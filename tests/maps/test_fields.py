@@ -60,7 +60,7 @@ def shown():
 def test_samples_come_back_and_places_between_are_near(shown):
     """Exact at samples; a step of the place errs by its square."""
     place = np.pi / PLACES * np.array([0.0, 7.0, 7.5, PLACES + 3.0, -2.0]) - 0.02
-    u, stress, tooth, bore = shown.at(place, 20.0)
+    u, stress, tooth, bore = shown.evaluate_at(place, 20.0)
     error = np.abs(u[:, 0] - moved(place, 20.0)).max(axis=1)
     # single precision of a millimetre
     assert error[[0, 1, 3, 4]] == pytest.approx(0.0, abs=1e-9)
@@ -72,8 +72,12 @@ def test_samples_come_back_and_places_between_are_near(shown):
 def test_beyond_the_torques_the_last_ones_hold(shown):
     """No extrapolation of a picture."""
     place = np.array([0.3])
-    assert shown.at(place, 99.0)[0] == pytest.approx(shown.at(place, 20.0)[0])
-    assert shown.at(place, -99.0)[0] == pytest.approx(shown.at(place, -10.0)[0])
+    assert shown.evaluate_at(place, 99.0)[0] == pytest.approx(
+        shown.evaluate_at(place, 20.0)[0]
+    )
+    assert shown.evaluate_at(place, -99.0)[0] == pytest.approx(
+        shown.evaluate_at(place, -10.0)[0]
+    )
 
 
 def test_the_picture_turns_with_everything(shown):

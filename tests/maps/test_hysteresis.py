@@ -40,9 +40,9 @@ def test_play_is_the_return_mapping():
     x = 1e-3 * np.random.default_rng(1).standard_normal(500)
     want = sum(return_mapping(e, x) for e in ELEMENTS)
     np.testing.assert_allclose(play_hysteresis(ELEMENTS, x), want, atol=1e-12)
-    sliders = Sliders.relaxed(ELEMENTS)
+    sliders = Sliders.relax(ELEMENTS)
     for k, value in enumerate(x):
-        sliders = sliders.moved(value)
+        sliders = sliders.move_to(value)
         assert float(sliders.torque(value)) == pytest.approx(want[k], abs=1e-12)
 
 
@@ -68,7 +68,7 @@ def test_work_is_stored_or_slipped(turns, values):
     """Over any path work = change of energy + sum of f |slip|, and no cycle gains."""
     elements = [Jenkin(stiffness=k, yield_torque=f) for k, f in values]
     force = np.array([e.yield_torque for e in elements])
-    start = Sliders.relaxed(elements)
+    start = Sliders.relax(elements)
     sliders, here, work, slip = start, 0.0, 0.0, 0.0
     for end in [*turns, 0.0]:
         # exact by trapezoid: every element bends at most once on a leg
@@ -79,7 +79,7 @@ def test_work_is_stored_or_slipped(turns, values):
         points = np.unique([low, *bends[(bends > low) & (bends < high)], high])
         leg = float(np.trapezoid(sliders.torque(points), points))
         work += leg if end >= here else -leg
-        after = sliders.moved(end)
+        after = sliders.move_to(end)
         slip += float(force @ np.abs(after.rest - sliders.rest))
         sliders, here = after, end
     stored = float(sliders.energy(here))
@@ -92,7 +92,7 @@ def test_work_is_stored_or_slipped(turns, values):
 
 def test_tangent_is_the_slope_of_the_torque():
     """The stiffness of the sticking elements against differences."""
-    sliders = Sliders.relaxed(ELEMENTS, 1e-4).moved(8e-4).moved(3e-4)
+    sliders = Sliders.relax(ELEMENTS, 1e-4).move_to(8e-4).move_to(3e-4)
     x = np.linspace(-1.01e-3, 1e-3, 41)  # off the corners
     slope = (sliders.torque(x + 1e-9) - sliders.torque(x - 1e-9)) / 2e-9
     np.testing.assert_allclose(sliders.tangent(x), slope, atol=1e-2)

@@ -36,7 +36,7 @@ def read(drive: DriveMap) -> MapValidation:
 
 
 def largest(found: MapValidation, low: float, high: float) -> tuple[float, float]:
-    both = found.between(low, high)
+    both = found.worst_between(low, high)
     return both["input_torque"].largest, both["output_error"].largest
 
 
@@ -48,9 +48,9 @@ def test_a_row_counts_at_its_own_torque_and_a_line_between_two(synthetic_map):
     assert largest(found, 10.0, 10.0) == pytest.approx((0.26, 0.025))
     assert largest(found, 0.0, 1.0) == pytest.approx(ROWS[5.0])
     assert largest(found, 90.0, 99.0) == pytest.approx(ROWS[30.0])
-    worst = found.between(4.0, 40.0)["input_torque"]
+    worst = found.worst_between(4.0, 40.0)["input_torque"]
     assert (worst.torque, worst.largest, worst.from_rows) == (15.0, 0.5, ())
-    line = found.between(1.0, 10.0)["input_torque"]
+    line = found.worst_between(1.0, 10.0)["input_torque"]
     assert (line.torque, line.from_rows) == (10.0, (5.0, 15.0))
     assert names(str(line), "26 %", "10 N·m", "5", "15 N·m")
     assert Difference.from_json(line.to_json()) == line
@@ -95,7 +95,7 @@ def test_marks_follow_the_two_limits():
 def test_a_transmission_error_is_marked_by_what_the_difference_is_of_it(synthetic_map):
     """20 % of 1 arcmin: all of 0.2, a fifth of 1, a fiftieth of 10 arcmin."""
     drive = validated_map(synthetic_map, {20.0: (0.0, 0.2)}, error=arcmin)
-    found = read(drive).between(15.0, 25.0)
+    found = read(drive).worst_between(15.0, 25.0)
     joint = {
         "ripple_valid": True,
         "map_difference": {key: one.to_json() for key, one in found.items()},

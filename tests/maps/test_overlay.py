@@ -69,11 +69,11 @@ def _at_rest(drive: DriveMap, loop: TorqueLoop) -> np.ndarray:
     from swgjoint.maps.hysteresis import Sliders
 
     free = float(output_angle(drive, 0.0, 0.0))
-    sliders = Sliders.relaxed(drive.hysteresis, float(drive.torsion(0.0, free)))
+    sliders = Sliders.relax(drive.hysteresis, float(drive.torsion(0.0, free)))
     found = []
     for torque in loop.torque:
         psi = float(output_angle(drive, 0.0, torque, sliders))
-        sliders = sliders.moved(float(drive.torsion(0.0, psi)))
+        sliders = sliders.move_to(float(drive.torsion(0.0, psi)))
         found.append(free - psi)
     return np.array(found)
 

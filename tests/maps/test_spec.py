@@ -95,7 +95,7 @@ def test_accuracy_equals_a_dense_evaluation(synthetic_map):
         ("transmission_accuracy_rated_arcmin", 50.0),
     ):
         turn = error_turn(synthetic_map, torque)
-        angle, error = turn.over_output_turn()
+        angle, error = turn.output_turn()
         assert angle[-1] == pytest.approx(60 * 2 * np.pi)
         step, ends = angle[1], []
         for sign in (1, -1):
@@ -111,7 +111,7 @@ def test_no_load_error_is_the_kinematic_error():
     orders, amplitudes = [(2, 0), (0, 2)], [(3e-5, 0.0), (0.0, 1e-5)]
     drive = with_angles(DriveMap.linear(1e4), orders, amplitudes)
     turn = error_turn(drive)
-    theta, error = turn.over_output_turn()
+    theta, error = turn.output_turn()
     psi = theta / drive.ratio + error
     e0 = 3e-5 * np.cos(2 * theta) + 1e-5 * np.sin(2 * (theta - psi))
     assert np.abs(error - e0).max() < 1e-12
@@ -156,7 +156,7 @@ def test_period_of_the_pattern():
     later = output_angle(with_beta, 2 * np.pi * 121 + 1.0, 0.0)
     first = output_angle(with_beta, 1.0, 0.0)
     assert later - first == pytest.approx(-4 * np.pi, abs=1e-12)
-    assert turn.over_output_turn()[0][-1] == pytest.approx(2 * np.pi * 60.5)
+    assert turn.output_turn()[0][-1] == pytest.approx(2 * np.pi * 60.5)
 
 
 def test_clearance_shows_as_the_width_of_the_loop():

@@ -45,7 +45,7 @@ def deflected(design: Design, orders: Orders) -> tuple[SolidRing, SolidState, fl
     """On the wave generator alone; seconds of an iteration."""
     ring = solid_ring(design, half=True, elastic_circular_spline=False, orders=orders)
     clock = time.process_time()
-    state = SolidContinuation(ring=ring, ratio=design.ratio).deflected()
+    state = SolidContinuation(ring=ring, ratio=design.ratio).deflect()
     assert state.outcome.ok, state.outcome
     return ring, state, (time.process_time() - clock) / len(state.history)
 

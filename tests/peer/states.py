@@ -56,14 +56,14 @@ def _follow(kind: str, refinement: int, elastic: bool) -> Continuation:
 @cache
 def deflected(kind: str, refinement: int, elastic: bool) -> State:
     """The wave generator alone."""
-    return _checked(_follow(kind, refinement, elastic).deflected())
+    return _checked(_follow(kind, refinement, elastic).deflect())
 
 
 @cache
 def loaded(kind: str, refinement: int, elastic: bool) -> State:
     """At the torque, the wave generator not turned."""
     follow = _follow(kind, refinement, elastic)
-    meshed = _checked(follow.meshed(deflected(kind, refinement, elastic)))
+    meshed = _checked(follow.engage(deflected(kind, refinement, elastic)))
     return _checked(follow.to_torque(meshed, torque_of(kind)))
 
 

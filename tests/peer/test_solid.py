@@ -134,7 +134,7 @@ def test_wave_generator_state_holds_in_calculix(tmp_path, monkeypatch):
     monkeypatch.setattr(elasticity, "ElementHexIncompatible", CentreJacobian)
     design = Design.load("reference-3d-modified").with_changes({"mesh.refinement": 0.5})
     ring = solid_ring(design, half=True, elastic_circular_spline=False)
-    state = SolidContinuation(ring=ring, ratio=design.ratio).deflected()
+    state = SolidContinuation(ring=ring, ratio=design.ratio).deflect()
     found = solid_replay(design, ring, state, tmp_path)
     for name, apart in found.shape.items():
         assert np.abs(apart).max() < 0.7 * um, name  # 0.57 at the back, axially

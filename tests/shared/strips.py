@@ -20,6 +20,6 @@ def open_gaps(model: RingModel, state: State) -> NDArray[np.float64]:
         return np.zeros(0)
     if model.indentation is None:
         return contacts.gap
-    strips = Strips.of(model.indentation, contacts, None, state.tooth_force)
+    strips = Strips.from_contacts(model.indentation, contacts, None, state.tooth_force)
     force = strips.sums(state.tooth_force)
     return contacts.gap + model.indentation.approach(force)[strips.strip]

@@ -279,13 +279,15 @@ def test_drives_by_rule_are_the_smallest_that_carry_the_arm(tmp_path):
         arm.joints, np.abs(arm.gravity(path)).max(axis=0), strict=True
     ):
         fits = [drive for drive, torque in rated.items() if torque >= needed]
-        assert scene.of_joint(name).drive == fits[0]
-    lift = scene.of_joint("shoulder_lift_joint")
+        assert scene.joint_settings(name).drive == fits[0]
+    lift = scene.joint_settings("shoulder_lift_joint")
     assert (lift.drive, lift.rotor_inertia_kgm2) == ("CSG-25-100", 8.26e-5)
     scene = scene_of_arm(urdf(tmp_path))
-    assert scene.of_joint("lift").drive == "CSG-17-100"  # 60 of 70 N·m
+    assert scene.joint_settings("lift").drive == "CSG-17-100"  # 60 of 70 N·m
     chosen = scene_of_arm("ur5e", drive="reference-2d")
-    assert {chosen.of_joint(name).drive for name in arm.joints} == {"reference-2d"}
+    assert {chosen.joint_settings(name).drive for name in arm.joints} == {
+        "reference-2d"
+    }
 
 
 def test_run_takes_an_arm_and_leaves_its_scene(tmp_path, capsys):

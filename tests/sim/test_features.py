@@ -46,7 +46,7 @@ def test_a_plain_scene_has_no_trace_of_any_feature(name, synthetic_map):
     fittings = {
         joint: Fitting(
             drive=synthetic_map,
-            rotor_inertia=scene.of_joint(joint).rotor_inertia_kgm2,
+            rotor_inertia=scene.joint_settings(joint).rotor_inertia_kgm2,
             max_input_speed=60.0 * float(path.top_speed[j]) or None,
         )
         for j, joint in enumerate(arm.joints)

@@ -123,14 +123,14 @@ def test_an_override_may_replace_a_named_drive_by_a_linear_one():
 def test_a_joint_inherits_what_it_does_not_say():
     """Own keys win over the defaults, key by key; a drive counts as one key."""
     scene = Scene.from_toml(GOOD)
-    own = scene.of_joint("joint")
+    own = scene.joint_settings("joint")
     assert (own.drive, own.level, own.rotor_inertia_kgm2) == (
         "reference-2d",
         "full",
         5e-5,
     )
     linear = JointSection.model_validate({"linear": {"stiffness_Nm_rad": 1e4}})
-    mixed = linear.over(scene.defaults)
+    mixed = linear.fill_from(scene.defaults)
     assert mixed.drive is None
     assert mixed.linear.stiffness_Nm_rad == 1e4
 
@@ -140,10 +140,10 @@ def test_one_drive_or_level_for_all_joints():
     scene = Scene.from_toml(
         GOOD.replace("5e-5", "5e-5\ndrive = 'own'\nlevel = 'linear'")
     )
-    other = scene.with_drive("b.swg").with_level("rigid").of_joint("joint")
+    other = scene.with_drive("b.swg").with_level("rigid").joint_settings("joint")
     assert (other.drive, other.level) == ("b.swg", "rigid")
     assert other.rotor_inertia_kgm2 == 5e-5
-    assert scene.of_joint("joint").drive == "own"
+    assert scene.joint_settings("joint").drive == "own"
 
 
 def test_paths_in_a_file_are_relative_to_it(tmp_path):

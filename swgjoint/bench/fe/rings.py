@@ -62,7 +62,7 @@ def solve_by_rings(design: Design, setting: FeSetting, begin: float) -> Found:
         state = require_equilibrium(solve_loaded(model, sides[0], rated))
         if not error:
             place: Array = np.arange(4 * count, dtype=np.float64) / 4.0
-            points, _, _ = model.rim.at(state.q[: model.rim.size], place)
+            points, _, _ = model.rim.evaluate_at(state.q[: model.rim.size], place)
             shape = rim_shape(points, model.rim.radius, state.alpha)
         error.append(middle.rotation - angle / design.ratio)
         compliance.append(state.compliance + series)
@@ -97,7 +97,7 @@ def _rim_stress(design: Design, model: ThinRing, state: RingState) -> float:
     centre: Array = np.arange(rim.elements, dtype=np.float64) + 0.5
     change = []
     for q in (state.q[: rim.size], rim.reference.ravel()):
-        _, v, w = rim.at(q, centre)
+        _, v, w = rim.evaluate_at(q, centre)
         length = np.hypot(v[:, 0], v[:, 1])
         turning = (v[:, 0] * w[:, 1] - v[:, 1] * w[:, 0]) / length**2 / rim.step
         change.append((length / rim.step, turning))
@@ -114,7 +114,7 @@ def _closed_form(design: Design, begin: float) -> Found:
     return Found(
         stiffness=1.0 / series_compliance(design, cup=True),
         kinematic_error=np.zeros(POSITIONS),
-        tensile=ShellDimensions.of(design).bending_stress(),
+        tensile=ShellDimensions.from_design(design).bending_stress(),
         rim_shape=np.asarray(lobe_height(design) * np.cos(2.0 * phi)),
         wall_s=time.perf_counter() - begin,
     )

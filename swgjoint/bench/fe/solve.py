@@ -83,7 +83,7 @@ def solve_setting(design: Design, setting: FeSetting) -> Found:
             SolidContinuation(
                 ring=ring, ratio=changed.ratio, layout=changed.drive.layout
             ),
-            lambda state: SolidMaxima.at(ring, state).flexspline,
+            lambda state: SolidMaxima.from_state(ring, state).flexspline,
             lambda state: _solid_rim(ring, state),
             series=series_compliance(changed, cup=False),
             nodes=sum(s.mesh.mesh.p.shape[1] for s in ring.strip.segments),
@@ -93,7 +93,7 @@ def solve_setting(design: Design, setting: FeSetting) -> Found:
     return _measured(
         changed,
         Continuation(model=plane, ratio=changed.ratio, layout=changed.drive.layout),
-        lambda state: MemberMaxima.at(plane, state).flexspline,
+        lambda state: MemberMaxima.from_state(plane, state).flexspline,
         lambda state: _plane_rim(plane, state),
         series=series_compliance(changed, cup=True),
         nodes=plane.element.mesh.mesh.p.shape[1],
@@ -123,15 +123,15 @@ def _measured(
         begin: When the setting began [s].
     """
     rated, theta = ratings_of(design).rated_torque, positions(design)
-    rest = follow.unloaded(
-        require_equilibrium(follow.meshed(require_equilibrium(follow.deflected()))),
+    rest = follow.unload(
+        require_equilibrium(follow.engage(require_equilibrium(follow.deflect()))),
         SMALL * rated,
     )
     state = follow.to_torque(rest.state if rest.sides is None else rest.sides[0], rated)
     error, compliance, tensile, shape = [], [], [], np.zeros(RIM)
     for k, angle in enumerate(theta):
         if k:
-            rest = follow.unloaded_to(rest, float(angle))
+            rest = follow.turn_unloaded(rest, float(angle))
             state = follow.to_angle(state, float(angle))
         require_equilibrium(rest.state)
         require_equilibrium(state)

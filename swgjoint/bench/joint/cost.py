@@ -262,7 +262,7 @@ def _costs(got: SettingOutcome, rigid: Stepper | None) -> dict[str, Any]:
         "wall_s": got.run.wall,
     }
     if rigid is not None:
-        speed = relative_speed(Stepper.of(got.assembly), rigid)
+        speed = relative_speed(Stepper.from_assembly(got.assembly), rigid)
         found |= {"steps_ratio": speed / parts, "cost": cost_at(got.assembly, speed)}
     return found
 

@@ -51,7 +51,9 @@ class ArmTask:
 def run_arm(task: ArmTask) -> list[StabilityRow]:
     """Fall and controlled motion of one arm at all steps."""
     scene = Scene.load_file(task.scene)
-    names = {scene.of_joint(joint).drive or "" for joint in RigidArm(scene.arm).joints}
+    names = {
+        scene.joint_settings(joint).drive or "" for joint in RigidArm(scene.arm).joints
+    }
     drives = {
         name: with_kinematic_error(
             DriveMap.from_catalogue(name, kinematic_error_arcmin=0.0)
@@ -113,7 +115,7 @@ def _fall(
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_LIMIT
     attached, regions = [], []
     for name in arm.joints:
-        section = scene.of_joint(name)
+        section = scene.joint_settings(name)
         got = attach(
             spec,
             joint=name,

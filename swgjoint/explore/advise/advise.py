@@ -118,7 +118,7 @@ def _loaded(
     known = dict(drives or {})
     rigid = assemble(scene.with_level("rigid"), drives=known, progress=progress)
     for name in rigid.joints:
-        drive_of(scene.of_joint(name), known=known, progress=progress)
+        drive_of(scene.joint_settings(name), known=known, progress=progress)
     return known
 
 

@@ -97,7 +97,7 @@ class SettingSearch:
                     rows.append(self._row(setting, None, None, "refused", str(exc)))
                     continue
                 measured[setting] = whole
-                cost = relative_cost(Stepper.of(whole), rigid)
+                cost = relative_cost(Stepper.from_assembly(whole), rigid)
                 heapq.heappush(heap, (cost, k, setting))
                 continue
             row = self._try(setting, measured.pop(setting), cost)

@@ -93,7 +93,7 @@ class Compared:
     missed: tuple[str, ...] = ()
     """Limits of the spec that it does not keep."""
 
-    def told(self, key: str) -> Any:
+    def figure(self, key: str) -> Any:
         """A figure; None where the run cannot tell it."""
         return None if self.ripple_missing and key in RIPPLE else getattr(self, key)
 
@@ -226,7 +226,7 @@ def missed_limits(row: Compared, spec: Mapping[str, float]) -> tuple[str, ...]:
     """
     found = []
     for key, limit in spec.items():
-        value = row.told(key)
+        value = row.figure(key)
         if key == STIFFNESS and value is None and row.level in UNYIELDING:
             continue
         valid = key not in RIPPLE or row.ripple_valid is not False

@@ -122,5 +122,5 @@ def _changed(
 
 def drives_of(scene: Scene, joints: Sequence[str]) -> tuple[str, ...]:
     """References of the drives that a scene has in these joints, each once."""
-    found = (scene.of_joint(name).drive for name in joints)
+    found = (scene.joint_settings(name).drive for name in joints)
     return tuple(dict.fromkeys(name for name in found if name is not None))

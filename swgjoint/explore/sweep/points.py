@@ -51,7 +51,7 @@ class Point:
         """The design and scene with what is computed of them; None without a key."""
         if self.key is None:
             return None
-        design, scene = self.bases.changed(self.values)
+        design, scene = self.bases.apply(self.values)
         file = self.bases.file
         return Asked(
             key=self.key,
@@ -81,7 +81,7 @@ class Bases:
             self._designs[reference] = Design.load(reference)
         return self._designs[reference]
 
-    def changed(self, values: Values) -> tuple[Design | None, Scene | None]:
+    def apply(self, values: Values) -> tuple[Design | None, Scene | None]:
         """The design and the scene that the values of a point make, checked."""
         file, base = self.file, self.file.design
         changes: dict[str, Values] = {"design": {}, "scene": {}}
@@ -189,7 +189,7 @@ def points_of(file: SweepFile) -> list[Point]:
 
 def _point(bases: Bases, values: Values) -> Point:
     try:
-        key = key_of(_parts(bases, *bases.changed(values)))
+        key = key_of(_parts(bases, *bases.apply(values)))
     except InputError as error:
         lines = (line.split(" with changes: ")[-1] for line in str(error).splitlines())
         return Point(values=values, key=None, fault="; ".join(lines), bases=bases)

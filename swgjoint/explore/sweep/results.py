@@ -19,7 +19,7 @@ from swgjoint.store import DamagedError, json_content, json_file, warn_ignored
 class ResultStore(Protocol):
     """A folder."""
 
-    def at(self, name: str) -> str:
+    def path_of(self, name: str) -> str:
         """Path of a file."""
 
     def read(self, name: str) -> bytes | None:
@@ -38,7 +38,7 @@ class Folder:
     def __init__(self, path: str | Path) -> None:
         self.path = output_folder(path)
 
-    def at(self, name: str) -> str:
+    def path_of(self, name: str) -> str:
         """See :class:`ResultStore`."""
         return str(self.path / name)
 
@@ -50,7 +50,7 @@ class Folder:
             return None
         except OSError as error:  # a file where a folder should be, no permission
             why = error.strerror or error
-            raise InputError(f"cannot read {self.at(name)}: {why}") from None
+            raise InputError(f"cannot read {self.path_of(name)}: {why}") from None
 
     def write(self, name: str, data: bytes) -> str:
         """See :class:`ResultStore`."""
@@ -86,7 +86,7 @@ class Remote:
             raise InputError(f"results at {address!r}: {error}") from None
         self._scheme = address.partition("://")[0]
 
-    def at(self, name: str) -> str:
+    def path_of(self, name: str) -> str:
         """See :class:`ResultStore`."""
         return f"{self._scheme}://{f'{self._root}/{name}'.lstrip('/')}"
 
@@ -106,7 +106,7 @@ class Remote:
         self._files.makedirs(folder, exist_ok=True)
         self._files.pipe_file(beside, data)
         self._files.mv(beside, target)
-        return self.at(name)
+        return self.path_of(name)
 
     def remove(self, name: str) -> None:
         """See :class:`ResultStore`."""
@@ -126,7 +126,7 @@ def read_record(place: ResultStore, key: str) -> Record | None:
     try:
         return json_content(data, Record)
     except DamagedError as error:
-        warn_ignored(place.at(_name(key)), error)
+        warn_ignored(place.path_of(_name(key)), error)
         return None
 
 
@@ -151,7 +151,7 @@ def write_to(
     """
     files: list[str] = []
     for name, make in outputs.items():
-        with attempt_output(place.at(name)):
+        with attempt_output(place.path_of(name)):
             data = make()
             if data is not None:
                 files.append(place.write(name, data))

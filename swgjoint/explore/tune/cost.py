@@ -133,7 +133,7 @@ class Trials:
         """
         return self._run(tunable, values, None)
 
-    def traced(
+    def cost_and_traces(
         self, tunable: Tunable, values: Mapping[str, Array]
     ) -> tuple[Array, Trace]:
         """Costs [rad], shape (candidates, seeds), and what the episodes looked like."""

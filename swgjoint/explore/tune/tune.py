@@ -136,7 +136,7 @@ def tune(
         best = _values(parameters, searches[name].best()[None])
         for label, values in (("by rule", neutral), ("tuned", best)):
             progress("held-out seeds", len(candidates), 2 * len(tunables))
-            costs, trace = last.traced(tunable, values)
+            costs, trace = last.cost_and_traces(tunable, values)
             candidates.append(
                 _candidate(
                     label,

@@ -39,7 +39,7 @@ class ContactChanges:
         object.__setattr__(self, "torque", torque)
         object.__setattr__(self, "compliance", compliance)
 
-    def mirrored(self) -> ContactChanges:
+    def mirror(self) -> ContactChanges:
         """Those of the mirrored drive, under the opposite torque."""
         return ContactChanges(
             torque=-self.torque[::-1],
@@ -47,7 +47,7 @@ class ContactChanges:
             compliance=self.compliance[::-1],
         )
 
-    def between(self, low: float, high: float) -> Steps:
+    def steps_between(self, low: float, high: float) -> Steps:
         """Steps of the compliance in a range of the torque, as parts of its length."""
         inside = (self.torque > low) & (self.torque < high)
         return Steps(
@@ -70,7 +70,7 @@ class Steps:
     """Uncertainty of the places."""
 
     @classmethod
-    def merged(cls, first: Steps, last: Steps) -> Steps:
+    def merge(cls, first: Steps, last: Steps) -> Steps:
         """From predictions at both ends, which err by the square of the distance.
 
         A change that both predict is one step between the two; one that an end predicts
@@ -100,7 +100,7 @@ class Steps:
             doubt=np.concatenate([np.abs(b - a), np.full(only.size, LONE)]),
         )
 
-    def fitted(self, mean: float, moment: float, smooth: float) -> Steps:
+    def fit_moments(self, mean: float, moment: float, smooth: float) -> Steps:
         """Moved so that C has a given mean and first moment.
 
         Both are linear in small shifts of the steps and in the coefficients of a cubic.

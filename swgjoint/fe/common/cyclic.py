@@ -39,7 +39,7 @@ class Insides:
             np.matmul(inverse, columns[inner], out=reach)
             np.subtract(columns[outer], columns[inner].T @ reach, out=schur)
 
-    def on_faces(self, rhs: Array) -> Array:
+    def face_loads(self, rhs: Array) -> Array:
         """Right-hand sides of the faces (N, face, k) from those of sectors (N, n, k).
 
         Contributions of both sectors to a face add up.
@@ -130,7 +130,7 @@ class CyclicFactor:
             Solution at the degrees of freedom of each sector (N, n, k).
         """
         face = self._face
-        faces = self._insides.on_faces(rhs)
+        faces = self._insides.face_loads(rhs)
         folded = faces[self._order].reshape(self._sectors * face, -1)
         solved, info = dgbtrs(self._lu, self._band, self._band, folded, self._pivots)
         if info != 0:

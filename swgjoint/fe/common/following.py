@@ -86,23 +86,23 @@ class Follower(ABC, Generic[AnyState]):
         """Psi [rad]."""
 
     @abstractmethod
-    def deflected(self, angle: float = 0.0) -> AnyState:
+    def deflect(self, angle: float = 0.0) -> AnyState:
         """Wave generator in place, members at the ideal ratio, no tooth contact."""
 
     @abstractmethod
-    def loaded(self, start: AnyState, torque: float, angle: float) -> AnyState:
+    def load(self, start: AnyState, torque: float, angle: float) -> AnyState:
         """Equilibrium under a torque, from a start with its input at that angle."""
 
     @abstractmethod
-    def held(self, state: AnyState) -> AnyState:
+    def hold_output(self, state: AnyState) -> AnyState:
         """Equilibrium with the output where it is; the torque is what that takes."""
 
     @abstractmethod
-    def ahead(self, state: AnyState, angle: float) -> AnyState:
+    def predict(self, state: AnyState, angle: float) -> AnyState:
         """Predictor: input and output turned by the ideal ratio."""
 
     @abstractmethod
-    def turned(self, state: AnyState, output: float) -> AnyState:
+    def rotate_output(self, state: AnyState, output: float) -> AnyState:
         """Predictor: the output turned at a fixed input."""
 
     def predicted_changes(
@@ -133,9 +133,9 @@ class Follower(ABC, Generic[AnyState]):
             tilt: Slope of the axis of the circular spline over z (2,) [rad].
         """
 
-    def meshed(self, deflected: AnyState) -> AnyState:
+    def engage(self, deflected: AnyState) -> AnyState:
         """Teeth in contact, no member rotated; the torque is what that takes."""
-        return self.held(deflected)
+        return self.hold_output(deflected)
 
     def to_torque(self, state: AnyState, torque: float) -> AnyState:
         """Change the torque at a fixed input; the last good state if stuck.
@@ -148,7 +148,7 @@ class Follower(ABC, Generic[AnyState]):
         def loaded(start: AnyState) -> AnyState:
             def step(s: AnyState, part: float) -> AnyState:
                 load = start.torque + part * (torque - start.torque)
-                return self.loaded(s, load, angle)
+                return self.load(s, load, angle)
 
             return follow(start, step)
 
@@ -169,21 +169,21 @@ class Follower(ABC, Generic[AnyState]):
 
         def step(s: AnyState, part: float) -> AnyState:
             theta = first + part * (angle - first)
-            return self.loaded(self.ahead(s, theta), state.torque, theta)
+            return self.load(self.predict(s, theta), state.torque, theta)
 
         if is_free(state):
-            return self.held(self.ahead(state, angle))
+            return self.hold_output(self.predict(state, angle))
         found = follow(state, step)
         if found.outcome.ok:
             return found
         if state.torque == 0.0 and found.outcome is Outcome.SINGULAR:
-            return self.held(self.ahead(state, angle))
-        again = self.held(self.deflected(angle))
+            return self.hold_output(self.predict(state, angle))
+        again = self.hold_output(self.deflect(angle))
         if again.outcome.ok:
             again = self.to_torque(again, state.torque)
         return again if again.outcome.ok else found
 
-    def unloaded(self, state: AnyState, small: float) -> Unloaded[AnyState]:
+    def unload(self, state: AnyState, small: float) -> Unloaded[AnyState]:
         """Equilibrium without torque at a fixed input.
 
         Where clearance leaves the output free it stands in the middle of its positions
@@ -196,7 +196,7 @@ class Follower(ABC, Generic[AnyState]):
         sides = self.to_torque(state, small), self.to_torque(state, -small)
         return self._between(sides, small)
 
-    def unloaded_to(
+    def turn_unloaded(
         self, unloaded: Unloaded[AnyState], angle: float
     ) -> Unloaded[AnyState]:
         """Turn the input without torque."""
@@ -208,7 +208,7 @@ class Follower(ABC, Generic[AnyState]):
             )
         found = self.to_angle(unloaded.state, angle)
         if found.outcome.ok and is_free(found):
-            return self.unloaded(found, small)
+            return self.unload(found, small)
         return Unloaded(state=found, small=small)
 
     def _between(
@@ -218,7 +218,9 @@ class Follower(ABC, Generic[AnyState]):
             if not side.outcome.ok:
                 return Unloaded(state=side, small=small)
         middle = 0.5 * sum(self.output_angle(side) for side in sides)
-        found = replace(self.held(self.turned(sides[0], middle)), torque=0.0)
+        found = replace(
+            self.hold_output(self.rotate_output(sides[0], middle)), torque=0.0
+        )
         return Unloaded(state=found, small=small, sides=sides)
 
     def _taken_up(self, state: AnyState, torque: float) -> AnyState:
@@ -229,7 +231,9 @@ class Follower(ABC, Generic[AnyState]):
         apart = 0.0
         found = state
         for k in range(1, TAKE_UP + 1):
-            found = self.held(self.turned(found, first + direction * k * pitch / 100))
+            found = self.hold_output(
+                self.rotate_output(found, first + direction * k * pitch / 100)
+            )
             if not found.outcome.ok:
                 return found
             if not is_free(found) and found.torque * torque > 0.0:
@@ -242,7 +246,9 @@ class Follower(ABC, Generic[AnyState]):
             if abs(found.torque) <= abs(torque):
                 break
             middle = 0.5 * (apart + reached)
-            tried = self.held(self.turned(found, first + direction * middle))
+            tried = self.hold_output(
+                self.rotate_output(found, first + direction * middle)
+            )
             held = tried.outcome.ok and not is_free(tried)
             if held and tried.torque * torque > 0.0:
                 found, reached = tried, middle

@@ -55,7 +55,7 @@ class SlipHistory:
     @cached_property
     def pairs(self) -> Pairs:
         """The pairs of flanks of the candidates."""
-        return Pairs.of(self.contacts, self.normal)
+        return Pairs.from_contacts(self.contacts, self.normal)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -76,7 +76,7 @@ class Pairs:
     """sigma (n_pairs,) [m]."""
 
     @classmethod
-    def of(cls, contacts: Contacts, normal: Array) -> Pairs:
+    def from_contacts(cls, contacts: Contacts, normal: Array) -> Pairs:
         """Gather contacts; where none carries force the closest one stands for all."""
         keys = np.stack([contacts.sector, contacts.side, contacts.tooth], axis=-1)
         key, pair = np.unique(keys, axis=0, return_inverse=True)
@@ -90,7 +90,7 @@ class Pairs:
         share /= share.sum(axis=1, keepdims=True)
         return cls(key=key, pair=pair, share=share, slip=share @ contacts.slip)
 
-    def found_in(self, others: Pairs) -> Index:
+    def find_in(self, others: Pairs) -> Index:
         """Index of the same pair in others, -1 without it (n_pairs,)."""
         found = np.full(len(self.key), -1, dtype=np.int64)
         same = (self.key[:, None] == others.key).all(axis=-1)
@@ -104,7 +104,7 @@ def _since(history: SlipHistory | None, pairs: Pairs) -> tuple[Array, Array, Ind
     slip, force = np.zeros(len(pairs.key)), np.zeros(len(pairs.key))
     if history is None:
         return slip, force, np.full(len(pairs.key), -1, dtype=np.int64)
-    index = pairs.found_in(history.pairs)
+    index = pairs.find_in(history.pairs)
     known = index >= 0
     before = (history.pairs.share > 0.0) @ history.force
     slip[known] = pairs.slip[known] - history.pairs.slip[index[known]]
@@ -131,7 +131,7 @@ class Sliding:
     """1/k [m/N]."""
 
     @classmethod
-    def of(
+    def from_trial(
         cls,
         friction: CoulombFriction,
         contacts: Contacts,
@@ -156,7 +156,7 @@ class Sliding:
             left = heir >= 0
             np.add.at(normal, heir[left], last.normal[left])
             np.add.at(before, heir[left], last.force[left])
-        pairs = Pairs.of(contacts, normal)
+        pairs = Pairs.from_contacts(contacts, normal)
         member = pairs.share > 0.0
         slip, force, known = _since(history, pairs)
         trial = force + friction.stiffness * slip
@@ -166,7 +166,7 @@ class Sliding:
         sticks &= (limit > 0.0) & (known >= 0)  # no past, no friction yet
         condition = (-slip - force / friction.stiffness)[pairs.pair]
         return cls(
-            lines=Contacts.joined(contacts, contacts.along_flanks(condition)),
+            lines=Contacts.join(contacts, contacts.tangential(condition)),
             stick=pairs.share[sticks],
             push=np.where(sticks, 0.0, friction.coefficient * np.sign(trial))[
                 pairs.pair
@@ -176,7 +176,7 @@ class Sliding:
             softness=1.0 / friction.stiffness,
         )
 
-    def lagged(self) -> Sliding:
+    def lag(self) -> Sliding:
         """Sliding under the normal forces of the last iteration: symmetric."""
         fixed = self.limit * np.sign(self.push)
         return replace(self, push=np.zeros_like(self.push), fixed=fixed)
@@ -196,7 +196,7 @@ class Sliding:
         top = np.concatenate([np.eye(n), np.zeros((n, len(self.stick)))], axis=1)
         return np.concatenate([top, np.hstack([np.diag(self.push), self.stick.T])])
 
-    def reduced(self, matrix: Array, offset: Array) -> tuple[Array, Array]:
+    def reduce(self, matrix: Array, offset: Array) -> tuple[Array, Array]:
         """Conditions of gaps and sticking, in the unknowns.
 
         Args:

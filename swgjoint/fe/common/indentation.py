@@ -66,7 +66,7 @@ class Indentation:
                 raise ValueError(f"{key} = {getattr(self, key)!r}; accepted: above 0")
 
     @classmethod
-    def of_members(
+    def from_members(
         cls,
         softness: tuple[float, ...],
         patch: tuple[float, ...],
@@ -190,7 +190,7 @@ class Strips:
     """Of each strip, about which the law is linearised (n_strips,) [N]."""
 
     @classmethod
-    def of(
+    def from_contacts(
         cls, law: Indentation, contacts: Contacts, held: Contacts | None, force: Array
     ) -> Strips:
         """Gather candidates under the forces of contacts that may be others.
@@ -220,7 +220,7 @@ class Strips:
         same = self.strip[:, None] == self.strip
         return np.where(same, self.law.slope(self.force)[self.strip], 0.0)
 
-    def linearised(self) -> tuple[Array, Array]:
+    def linearise(self) -> tuple[Array, Array]:
         """Linear law for a drive that is linearised once, to superpose tooth errors.
 
         A strip under force keeps its tangent. A strip without force may come to carry
@@ -254,7 +254,7 @@ def strain_energy(law: Indentation, contacts: Contacts | None, force: Array) -> 
     """Energy of the strips under the forces of their contacts [J]."""
     if contacts is None or not len(contacts):
         return 0.0
-    strips = Strips.of(law, contacts, None, force)
+    strips = Strips.from_contacts(law, contacts, None, force)
     return float(law.energy(strips.sums(force)).sum())
 
 

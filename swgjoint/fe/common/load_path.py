@@ -82,7 +82,7 @@ class LoadPath:
         """Of the intervals [N·m]. Shape (n - 1,)."""
         return np.diff(self.torque)
 
-    def at(self, torque: ArrayLike) -> Array:
+    def evaluate_at(self, torque: ArrayLike) -> Array:
         """Output error [rad], strain energy [J], compliance [rad/(N·m)] on the curve.
 
         Args:
@@ -192,13 +192,13 @@ class LoadPath:
         for j, (one, two) in enumerate(pairwise(self.changes)):
             if one is not None and two is not None:
                 low, high = self.torque[j : j + 2]
-                first, last = one.between(low, high), two.between(low, high)
+                first, last = one.steps_between(low, high), two.steps_between(low, high)
                 known[j] = True
-                steps[j] = [first, last, Steps.merged(first, last)]
+                steps[j] = [first, last, Steps.merge(first, last)]
         c0, change, mean, moment = self._known
         for k in np.flatnonzero(known).tolist():
             smooth = SMOOTH * max(c0[k], c0[k] + change[k])
-            steps[k][2] = steps[k][2].fitted(
+            steps[k][2] = steps[k][2].fit_moments(
                 mean[k] - change[k] / 2.0, moment[k] - change[k] / 6.0, smooth
             )
         curves = [

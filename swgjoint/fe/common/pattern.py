@@ -141,7 +141,7 @@ def solve_pattern(
     places = unseen_places(effort.unseen[1], effort.most_angles)
     others = [grid.unseen_column(place) for place in places]
     first = [0.0, *grid.levels]
-    missed = grid.missed(count, others, first)
+    missed = grid.largest_miss(count, others, first)
     reserved = len(others) * effort.unseen[0] * len(grid.signs)
 
     def budget() -> int:
@@ -164,19 +164,19 @@ def solve_pattern(
             break
         count, before = 2 * count, missed
         grid.solve_columns(count)
-        missed = grid.missed(count, others, first)
+        missed = grid.largest_miss(count, others, first)
         if missed > STALLED * before:
             break
     doubt = grid.divide(count, budget(), TORQUE_GOAL)
     # contacts may change between the angles under other torques alone
     unseen = grid.unseen(others, effort.unseen[0])
     reserved = 0
-    missed = grid.missed(count, others, np.unique(unseen.torque))
+    missed = grid.largest_miss(count, others, np.unique(unseen.torque))
     while doubles(GOAL):
         count, before = 2 * count, missed
         grid.solve_columns(count)
         doubt = grid.divide(count, budget(), TORQUE_GOAL)
-        missed = grid.missed(count, others, np.unique(unseen.torque))
+        missed = grid.largest_miss(count, others, np.unique(unseen.torque))
         if missed > STALLED * before:
             break
     if effort.beyond:
@@ -227,7 +227,7 @@ def _second_pitch(
     state, again = columns[-1].states[torque], []
     for angle in grid.period + theta[::EVERY]:
         solve = partial(follow.to_angle, state, float(angle))
-        found = grid.solved(float(angle), torque, solve)
+        found = grid.solve_at(float(angle), torque, solve)
         again.append(np.nan if found is None else follow.output_angle(found))
         state = state if found is None else found
         grid.count()
@@ -245,7 +245,7 @@ def _mirror(grid: ColumnGrid[AnyState], torque: float, count: int) -> dict[str, 
     step = grid.finest // count
     one, image = grid.columns[step], grid.columns[grid.finest - step]
     solve = partial(grid.follow.to_torque, one.rest.state, -torque)
-    found = grid.solved(one.theta, -torque, solve)
+    found = grid.solve_at(one.theta, -torque, solve)
     difference = None
     if found is not None:
         wanted = -grid.figures(image.states[torque], image.theta)[0]

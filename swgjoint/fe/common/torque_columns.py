@@ -61,7 +61,7 @@ class AngleColumn(Generic[AnyState]):
     )
     """The last curve of each sign, see :meth:`ColumnGrid.path`."""
 
-    def towards(self, torque: float) -> AnyState:
+    def start_towards(self, torque: float) -> AnyState:
         """Where a torque of this sign begins."""
         if self.rest.sides is None:
             return self.rest.state
@@ -70,7 +70,7 @@ class AngleColumn(Generic[AnyState]):
     def nearest(self, torque: float) -> AnyState:
         """The equilibrium of the same sign at the nearest torque."""
         near = {t: s for t, s in self.states.items() if t * torque > 0.0}
-        near[0.0] = self.towards(torque)
+        near[0.0] = self.start_towards(torque)
         return near[min(near, key=lambda t: abs(t - torque))]
 
 
@@ -160,16 +160,16 @@ class ColumnGrid(Generic[AnyState]):
         """Load the first position from zero torque outwards until a solve fails."""
 
         def unloaded() -> Unloaded[AnyState]:
-            state = self.follow.meshed(self.follow.deflected())
+            state = self.follow.engage(self.follow.deflect())
             if not state.outcome.ok:
                 raise _no_rest(0.0, state)
-            return self.follow.unloaded(state, self.small)
+            return self.follow.unload(state, self.small)
 
         column = self._rest(0.0, unloaded)
         for sign in (1.0, -1.0):
-            state = column.towards(sign)
+            state = column.start_towards(sign)
             for torque in sorted((t for t in self.levels if t * sign > 0.0), key=abs):
-                found = self.solved(
+                found = self.solve_at(
                     0.0, torque, partial(self.follow.to_torque, state, torque)
                 )
                 if found is None:
@@ -182,7 +182,9 @@ class ColumnGrid(Generic[AnyState]):
         self, before: AngleColumn[AnyState], theta: float
     ) -> AngleColumn[AnyState]:
         """The same torques a step on; none beyond one that fails."""
-        column = self._rest(theta, partial(self.follow.unloaded_to, before.rest, theta))
+        column = self._rest(
+            theta, partial(self.follow.turn_unloaded, before.rest, theta)
+        )
 
         def beside(torque: float) -> AnyState:
             state = self.follow.to_angle(before.states[torque], theta)
@@ -194,7 +196,7 @@ class ColumnGrid(Generic[AnyState]):
         for torque in sorted(self.levels, key=abs):
             if (torque > 0.0) in lost:
                 continue
-            state = self.solved(theta, torque, partial(beside, torque))
+            state = self.solve_at(theta, torque, partial(beside, torque))
             if state is None:
                 lost.add(torque > 0.0)
             else:
@@ -234,7 +236,7 @@ class ColumnGrid(Generic[AnyState]):
             else:
                 near = column.nearest(torque)
                 solve = partial(self.follow.to_torque, near, torque)
-            state = self.solved(column.theta, torque, solve)
+            state = self.solve_at(column.theta, torque, solve)
             if state is None:
                 column.failed.add(torque)
             else:
@@ -248,7 +250,7 @@ class ColumnGrid(Generic[AnyState]):
 
     # -- interruptions -----------------------------------------------------------------
 
-    def solved(
+    def solve_at(
         self, theta: float, torque: float, solve: Callable[[], AnyState]
     ) -> AnyState | None:
         """An equilibrium, solved now or before an interruption; None if that fails."""
@@ -318,7 +320,7 @@ class ColumnGrid(Generic[AnyState]):
         known = column.paths.get(sign)
         if known is not None and np.array_equal(known[0].torque, torque):
             return known
-        states: list[AnyState] = [column.towards(sign)]
+        states: list[AnyState] = [column.start_towards(sign)]
         states += [column.states[t] for t in outward]
         top = abs(outward[-1])
         figures = np.array([self.figures(s, column.theta) for s in states])
@@ -342,11 +344,11 @@ class ColumnGrid(Generic[AnyState]):
             low, high = state.torque - AHEAD * top, state.torque + AHEAD * top
             found = self.follow.predicted_changes(state, low, high)
             if found is not None and sign < 0.0:
-                found = found.mirrored()
+                found = found.mirror()
             column.changes[key] = found
         return column.changes[key]
 
-    def missed(
+    def largest_miss(
         self, count: int, others: list[AngleColumn[AnyState]], torques: Iterable[float]
     ) -> float:
         """Largest part of the peak to peak that other angles are off by.
@@ -385,7 +387,7 @@ class ColumnGrid(Generic[AnyState]):
             error, energy, _, _ = self._row(columns, 0.0)
             return error, energy
         sign = math.copysign(1.0, torque)
-        table = [self.path(one, sign)[0].at([abs(torque)]) for one in columns]
+        table = [self.path(one, sign)[0].evaluate_at([abs(torque)]) for one in columns]
         error, energy, _ = np.array(table)[:, :, 0].T
         return sign * error, energy
 
@@ -411,7 +413,7 @@ class ColumnGrid(Generic[AnyState]):
         first = max(curve.torque[0] for curve in curves)
         top = max(abs(t) for t in self.levels if t * sign > 0.0)
         torque = np.linspace(first, top, 49)
-        tables = np.array([curve.at(torque) for curve in curves])
+        tables = np.array([curve.evaluate_at(torque) for curve in curves])
         errors = tables[:, 0]
         potential = tables[:, 1] + torque * errors
         _, slope = periodic(potential, self._parts(count))
@@ -570,7 +572,7 @@ class ColumnGrid(Generic[AnyState]):
                 torque = np.concatenate([[least], torque])
             values = np.array(
                 [
-                    np.vstack([curve.at(torque), np.interp(torque, *solved)])
+                    np.vstack([curve.evaluate_at(torque), np.interp(torque, *solved)])
                     for curve, solved in paths
                 ]
             )  # (count, 4, n)

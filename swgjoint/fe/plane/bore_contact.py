@@ -63,7 +63,7 @@ class BoreStations:
         by_node = self.weights.reshape(-1, self.weights.shape[2])
         return np.asarray((self._windows(nodes) @ by_node.T).reshape(len(nodes), -1, 2))
 
-    def along(self, direction: Array) -> Array:
+    def project(self, direction: Array) -> Array:
         """Displacements along directions (N, q, 2), by the nodes (N, q, 2 m)."""
         local = self._local(direction)
         count, intervals, p, width = local.shape
@@ -121,12 +121,12 @@ class BoreStations:
         return -(-int(touching.sum()) // self.per_interval)
 
     @classmethod
-    def at_nodes(cls, stiffness: Array) -> Self:
+    def from_nodes(cls, stiffness: Array) -> Self:
         """The nodes themselves, with their stiffnesses (m,) [N/m]."""
         return cls(weights=np.eye(2)[None], stiffness=stiffness)
 
     @classmethod
-    def between_nodes(cls, nodes: Array, *, layer: float, points: int = POINTS) -> Self:
+    def subdivide(cls, nodes: Array, *, layer: float, points: int = POINTS) -> Self:
         """Equal steps through the intervals, all but the first and the last.
 
         Args:

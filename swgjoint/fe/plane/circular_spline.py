@@ -204,7 +204,7 @@ class CircularSpline:
         side = -1.0 if self.profile.internal else 1.0
         for _ in range(steps):
             base, outward, curvature = self.profile.evaluate(s)
-            moved, slope = flanks.at(index, s)
+            moved, slope = flanks.evaluate_at(index, s)
             tangent = side * np.stack([outward[:, 1], -outward[:, 0]], axis=-1) + slope
             rest = points - base - moved
             size = np.hypot(tangent[:, 0], tangent[:, 1])
@@ -219,7 +219,10 @@ class CircularSpline:
         gap = np.where(outside & ~corner, np.inf, gap)
         if corner.any():
             at = np.flatnonzero(corner)
-            end = self.profile.evaluate(s[at])[0] + flanks.at(index[at], s[at])[0]
+            end = (
+                self.profile.evaluate(s[at])[0]
+                + flanks.evaluate_at(index[at], s[at])[0]
+            )
             rest[at] = points[at] - end
             gap[at] = np.inf
             if facing is not None:
@@ -261,7 +264,7 @@ class FlankSplines:
     """Ascending powers of (s - break). Shape (n_flanks, n_intervals, 4, 2)."""
 
     @classmethod
-    def through(cls, spline: CubicSpline, nodes: Array) -> FlankSplines:
+    def fit(cls, spline: CubicSpline, nodes: Array) -> FlankSplines:
         """Splines through node displacements (n_flanks, n_nodes, 2)."""
         cardinal = np.asarray(spline.c)[::-1]  # (4, n_intervals, n_nodes)
         return cls(
@@ -269,7 +272,7 @@ class FlankSplines:
             coefficients=np.einsum("pjn,fni->fjpi", cardinal, nodes, optimize=True),
         )
 
-    def at(self, flank: Index, s: Array) -> tuple[Array, Array]:
+    def evaluate_at(self, flank: Index, s: Array) -> tuple[Array, Array]:
         """Displacement and its derivative by s, (n, 2) each."""
         j = np.searchsorted(self.breaks, s, side="right") - 1
         j = np.clip(j, 0, len(self.breaks) - 2)

@@ -43,7 +43,7 @@ class CondensedRing:
 
     @cached_property
     def _factor(self) -> CyclicFactor:
-        return CyclicFactor(self.ring.anchored(), self.ring.face_dofs)
+        return CyclicFactor(self.ring.anchor_tangent(), self.ring.face_dofs)
 
     @cached_property
     def _rows(self) -> Array:
@@ -70,7 +70,7 @@ class CondensedRing:
         right[self.ring.fixed] = 0.0
         return self._factor.solve(right)
 
-    def by_torque(self) -> Array:
+    def torque_response(self) -> Array:
         """Displacements per torque on the output of the whole drive (N, n_dofs)."""
         system, _ = self._teeth
         n = len(self.contacts)
@@ -105,7 +105,7 @@ class CondensedRing:
         system[:n, :n] += np.where(same, local @ contacts.weight.T, 0.0)
         compliance = model.circular_spline.compliance
         if compliance is not None:
-            system[:n, :n] += compliance.between(
+            system[:n, :n] += compliance.contact_compliance(
                 contacts.tooth, contacts.ring_weight, model.ring_teeth
             )
         system[n, n] -= 1.0 / ring.anchor_stiffness
@@ -119,10 +119,10 @@ class CondensedRing:
         )
         offset[:n] += contacts.gap - old
         if model.indentation is not None:
-            strips = Strips.of(
+            strips = Strips.from_contacts(
                 model.indentation, contacts, state.contacts, state.tooth_force
             )
-            compliant, approach = strips.linearised()
+            compliant, approach = strips.linearise()
             system[:n, :n] += compliant
             offset[:n] += approach
         if self.ring_is_output:
@@ -248,7 +248,7 @@ class Supports:
     """F at the state where closed, elsewhere g (k,) [N], [m]."""
 
     @classmethod
-    def of(cls, ring: Linearised, state: State, used: Mask) -> Supports:
+    def from_state(cls, ring: Linearised, state: State, used: Mask) -> Supports:
         """Supports of the intervals marked in ``used`` (N, intervals)."""
         p = ring.stations.per_interval
         touching = state.touching.reshape(len(used), -1, p)

@@ -53,7 +53,7 @@ def predicted_changes(
         carries=carries,
     )
     apart = max(high - state.torque, state.torque - low)
-    supports = Supports.of(ring, state, _supports_within(drive, FAR * apart))
+    supports = Supports.from_state(ring, state, _supports_within(drive, FAR * apart))
     at = supports.intervals
     numbers = np.concatenate(
         [
@@ -81,7 +81,7 @@ def _supports_within(drive: CondensedRing, torque: float) -> Mask:
     p = ring.stations.per_interval
     shape = (len(ring.gap), -1, p)
     gap, touching = ring.gap.reshape(shape), state.touching.reshape(shape)
-    slope = (ring.gap_after(drive.by_torque()) - ring.gap).reshape(shape)
+    slope = (ring.gap_after(drive.torque_response()) - ring.gap).reshape(shape)
     closed = touching.any(axis=2)
     k = np.where(touching, ring.stations.stiffness.reshape(shape[1:]), 0.0)
     with np.errstate(divide="ignore", invalid="ignore"):

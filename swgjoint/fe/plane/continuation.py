@@ -60,40 +60,40 @@ class Continuation(Follower[State]):
         """Psi [rad]."""
         return state.ring_rotation if self.ring_is_output else state.rotation
 
-    def deflected(self, angle: float = 0.0) -> State:
+    def deflect(self, angle: float = 0.0) -> State:
         """Wave generator in place, members at the ideal ratio, no tooth contact."""
         alpha, rotation, ring_rotation = self._ideal(angle)
-        start = self.model.at_rest(alpha, rotation)
+        start = self.model.initial_guess(alpha, rotation)
         load = Load(rotation=rotation, teeth=False)
         state = self.solver(self.model, start, load)
         return replace(state, ring_rotation=ring_rotation)
 
-    def loaded(self, start: State, torque: float, angle: float) -> State:
+    def load(self, start: State, torque: float, angle: float) -> State:
         """Equilibrium under a torque, from a start with its input at that angle."""
         if not self.ring_is_output:
             return self.solver(self.model, start, Load(torque=torque))
         held = angle if self.layout == "wave_generator_fixed" else 0.0
         return self.solver(self.model, start, Load(torque=torque, rotation=held))
 
-    def held(self, state: State) -> State:
+    def hold_output(self, state: State) -> State:
         """Equilibrium with the output where it is; the torque is what that takes."""
         found = self.solver(self.model, state, Load(rotation=state.rotation))
         if self.ring_is_output:
             return replace(found, torque=-found.tooth_moment)
         return found
 
-    def turned(self, state: State, output: float) -> State:
+    def rotate_output(self, state: State, output: float) -> State:
         """Predictor: the output turned at a fixed input."""
         alpha = state.wave_generator_angle
         if self.ring_is_output:
-            return self.model.moved(state, alpha, state.rotation, output)
-        return self.model.moved(state, alpha, output, state.ring_rotation)
+            return self.model.predict_field(state, alpha, state.rotation, output)
+        return self.model.predict_field(state, alpha, output, state.ring_rotation)
 
-    def ahead(self, state: State, angle: float) -> State:
+    def predict(self, state: State, angle: float) -> State:
         """Predictor: input and output turned by the ideal ratio."""
         was, now = self._ideal(self.input_angle(state)), self._ideal(angle)
         alpha, rotation, ring_rotation = (y - x for x, y in zip(was, now, strict=True))
-        return self.model.moved(
+        return self.model.predict_field(
             state,
             state.wave_generator_angle + alpha,
             state.rotation + rotation,

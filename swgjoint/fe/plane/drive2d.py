@@ -200,7 +200,7 @@ def ring_model(
     height, race = lobe_height(design), None
     if bearing and carries_bearing(design):
         raise_faults(bearing_checks(design))
-        race = PlaneRace.of(design, element, half=half, cage_held=cage_held)
+        race = PlaneRace.from_design(design, element, half=half, cage_held=cage_held)
         height = race.on_balls.lobe_height
     return RingModel(
         **shifts,
@@ -236,7 +236,7 @@ def indentation(
         )
         softness.append(softness_of(modulus, design.drive.face_width_mm * mm))
         patch.append(half_length(own.spline.x))
-    return Indentation.of_members(
+    return Indentation.from_members(
         tuple(softness), tuple(patch), (element.profile, ring.profile)
     )
 

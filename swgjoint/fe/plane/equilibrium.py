@@ -211,7 +211,7 @@ def _solve_linear(
     m, lines, sliding = len(contacts), contacts, None
     if model.friction is not None and m:
         last = state.candidates or state.slip
-        sliding = Sliding.of(model.friction, contacts, state.slip, last)
+        sliding = Sliding.from_trial(model.friction, contacts, state.slip, last)
         lines = sliding.lines
     n, rows = len(lines), ring.gap_gradient(lines)
     levers = np.zeros((*ring.gradient.shape, n + 2))
@@ -222,7 +222,7 @@ def _solve_linear(
     rhs = -ring.gradient
     columns = np.concatenate([rhs[:, :, None], levers], axis=2)
     columns[ring.fixed] = 0.0
-    solved = CyclicFactor(ring.anchored(), ring.face_dofs).solve(columns)
+    solved = CyclicFactor(ring.anchor_tangent(), ring.face_dofs).solve(columns)
     base, response = solved[:, :, 0], solved[:, :, 1:]
 
     # forces on the lines, displacement of the anchor, rotation of the circular spline,
@@ -237,12 +237,12 @@ def _solve_linear(
     matrix[:n, :n] += np.where(same, local @ lines.weight.T, 0.0)
     ring_compliance = model.circular_spline.compliance
     if ring_compliance is not None:
-        matrix[:n, :n] += ring_compliance.between(
+        matrix[:n, :n] += ring_compliance.contact_compliance(
             lines.tooth, lines.ring_weight, model.ring_teeth
         )
     strips = None
     if model.indentation is not None and m:
-        strips = Strips.of(
+        strips = Strips.from_contacts(
             model.indentation, contacts, state.contacts, state.tooth_force
         )
         matrix[:m, :m] += strips.compliance
@@ -272,7 +272,7 @@ def _solve_linear(
         used = np.append(used, k + 2)
     guess = offset[:m] < 0.0
     if state.contacts is not None and len(state.contacts):
-        guess = contacts.on_flanks_of(state.contacts)
+        guess = contacts.share_flank_with(state.contacts)
     if pressing is not None:
         guess = np.isin(np.arange(m), pressing)
 
@@ -290,12 +290,12 @@ def _solve_linear(
     else:
         full = matrix, offset
         try:
-            matrix, offset = sliding.reduced(*full)
+            matrix, offset = sliding.reduce(*full)
             found, active = solved_for(matrix, offset)
         except ActiveSetError:
             # without friction in proportion to the normal forces it is symmetric
-            sliding = sliding.lagged()
-            matrix, offset = sliding.reduced(*full)
+            sliding = sliding.lag()
+            matrix, offset = sliding.reduce(*full)
             found, active = solved_for(matrix, offset)
     z = np.zeros(k + 3)
     z[used] = found
@@ -317,7 +317,7 @@ def _solve_linear(
         compliance=compliance / model.copies,
         ring_turn=float(ring_turn),
         increment=increment,
-        shift=ring.in_global_frame(increment),
+        shift=ring.rotate_to_global(increment),
         race_shift=increment[:, model.race_dofs[:-NODE]].reshape(
             model.sectors, -1, 2, 2
         ),
@@ -342,7 +342,7 @@ def _exchanged(
     bad = _wrong(state, ring.gap_after(step.increment)) > TOUCH
     if not bad.any() or not (state.touching ^ bad).any():
         return None
-    return replace(state, touching=state.touching ^ bad), ring.exchanged(
+    return replace(state, touching=state.touching ^ bad), ring.exchange(
         bad, state.touching
     )
 

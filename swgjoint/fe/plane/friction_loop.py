@@ -138,7 +138,7 @@ def _kept(
 
 def _along(follow: Continuation, theta: float, torques: Array) -> list[State]:
     """Equilibria along a path of the torque that begins at zero, input locked."""
-    state = follow.meshed(follow.deflected(theta))
+    state = follow.engage(follow.deflect(theta))
     states: list[State] = []
     for torque in torques.tolist():
         if state.outcome.ok:

@@ -83,7 +83,7 @@ class Linearised:
         ring = self.search.circular_spline
         return Contacts.none(self.flank.shape[1], ring.flank_dofs)
 
-    def anchored(self) -> Array:
+    def anchor_tangent(self) -> Array:
         """Tangent with the anchor spring, fixed components replaced by identity."""
         matrix = self.hessian.copy()
         matrix[0] += self.anchor_stiffness * np.outer(self.anchor[0], self.anchor[0])
@@ -107,7 +107,7 @@ class Linearised:
         rows[:, self.dofs] = rotate(seen, frames.angle[s][:, None]).reshape(count, n)
         return np.asarray(rows * self.sign[s])
 
-    def in_global_frame(self, increment: Array) -> Array:
+    def rotate_to_global(self, increment: Array) -> Array:
         """Increment of the skeletons as vectors (N, n_a, 2)."""
         own = (increment * self.sign)[:, self.dofs]
         return np.asarray(own.reshape(len(own), -1, 2))
@@ -120,7 +120,7 @@ class Linearised:
         shift = self.stations.positions(moved.reshape(len(moved), -1, 2))
         return np.asarray(self.gap + np.einsum("sqi,sqi->sq", shift, self.normal))
 
-    def exchanged(self, stations: Mask, touching: Mask) -> Linearised:
+    def exchange(self, stations: Mask, touching: Mask) -> Linearised:
         """The tangent with the contact state of some stations (N, q) inverted.
 
         For a rigid wave generator. Its curvature is neglected there, because the gap of
@@ -144,7 +144,7 @@ class Linearised:
         """Derivative of the gaps of the stations by ``gap_dofs`` (N, q, k)."""
         rows = self.race_rows
         if rows is None:
-            rows = self.stations.along(self.normal)
+            rows = self.stations.project(self.normal)
         return np.asarray(rows * self.sign[:, None, self.gap_dofs])
 
 
@@ -236,13 +236,13 @@ def linearise(model: RingModel, state: State, torque: float | None) -> Linearise
         rotation_gradient=sign * rotation_gradient,
         anchor=anchor,
         anchor_stiffness=float(np.mean(np.diag(element.stiffness))),
-        flank=model.placed(flank, model.tooth_shift),
+        flank=model.shift_flank(flank, model.tooth_shift),
         ring_elastic=ring_elastic,
         search=ToothContact(
             rubs=model.friction is not None,
             element=element,
             circular_spline=model.circular_spline,
-            ring_flank=model.placed(ring_elastic, model.ring_tooth_shift),
+            ring_flank=model.shift_flank(ring_elastic, model.ring_tooth_shift),
             angle=angle,
             bearing=angle - np.arctan2(centre[:, 0], centre[:, 1]),
         ),

@@ -94,7 +94,7 @@ class PlaneRace:
     """Angle of ball 0 from the major axis at alpha = 0 [rad]."""
 
     @classmethod
-    def of(
+    def from_design(
         cls,
         design: Design,
         element: Superelement,
@@ -116,7 +116,7 @@ class PlaneRace:
         """
         teeth, size = element.sectors, element.face_size
         per_sector = -(-elements // teeth)
-        own = RaceOnBalls.of(design, teeth * per_sector)
+        own = RaceOnBalls.from_design(design, teeth * per_sector)
         x = element.skeleton[np.r_[size - 1 : size + element.bore_size, -1]]
         apart = np.hypot(*np.diff(x, axis=0).T)
         # half of the intervals on both sides; a corner is shared by two sectors
@@ -149,7 +149,7 @@ class PlaneRace:
         """Angles of the sectors in the undeformed ring (N,) [rad]."""
         return self._pitch * np.arange(self.sectors, dtype=np.float64)
 
-    def at_rest(self, alpha: float, rotation: float) -> Array:
+    def initial_guess(self, alpha: float, rotation: float) -> Array:
         """Start of a search: deflected by the lobes, pressed on the balls there.
 
         Args:
@@ -169,7 +169,7 @@ class PlaneRace:
         still = self.on_balls.race.reference[: self.per_sector]
         return rotate(still, -0.5 * self._pitch)
 
-    def displaced(self, race: Array, rotation: float) -> Array:
+    def displacements(self, race: Array, rotation: float) -> Array:
         """Motion of the nodes in the frames of the teeth, turned with the flexspline.
 
         Args:
@@ -179,7 +179,7 @@ class PlaneRace:
         angle = (self._turns + rotation)[:, None, None]
         return rotate(race, -angle) - self._still
 
-    def placed(self, displaced: Array, rotation: float) -> Array:
+    def coordinates(self, displaced: Array, rotation: float) -> Array:
         """Coordinates of nodes that have moved so in the frames of the teeth."""
         angle = (self._turns + rotation)[:, None, None]
         return rotate(displaced + self._still, angle)
@@ -215,7 +215,7 @@ class PlaneRace:
         nodal, blocks = ring.forces(q)
         gradient[:, bore : bore + NODE * m] = nodal[: flat.size].reshape(n, -1)
         add(element // m, local, None, blocks[: n * m])
-        balls = own.pressed(q, alpha, self.phase, self._feet(race, alpha))
+        balls = own.press_balls(q, alpha, self.phase, self._feet(race, alpha))
         on = np.flatnonzero(balls.overlap > 0.0)
         on = on[balls.seen.dofs[on, 0] < flat.size]
         near, force = balls.seen.chosen(on), balls.force[on]

@@ -136,14 +136,16 @@ def ratcheting_path(
     """
     follow = path_follower(design)
     pitch = 2.0 * pi / design.drive.teeth_flexspline
-    state = follow.meshed(follow.deflected(input_angle))
+    state = follow.engage(follow.deflect(input_angle))
     if not state.outcome.ok:
         raise ComputationError(f"{design.drive.name}: {state.outcome.value}")
     first = follow.output_angle(state)
     states, turned = [state], [0.0]
     part, increment, outcome = 0.0, step, Outcome.CONVERGED
     while part < upto - 1e-9:
-        tried = follow.held(follow.turned(state, first - (part + increment) * pitch))
+        tried = follow.hold_output(
+            follow.rotate_output(state, first - (part + increment) * pitch)
+        )
         if not tried.outcome.ok:
             increment *= 0.5
             if increment < SHORTEST:

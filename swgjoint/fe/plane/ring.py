@@ -110,12 +110,12 @@ class RingModel:
     def stations(self) -> BoreStations:
         """Where the bore presses: between its nodes, on a race at them."""
         if self.race is not None:
-            return BoreStations.at_nodes(self.race.press)
+            return BoreStations.from_nodes(self.race.press)
         skeleton = self.element.skeleton
         own = skeleton[np.append(self.bore_nodes, len(skeleton) - 1)]
         pitch = 2.0 * pi / self.element.sectors
         before, after = rotate(own[-2], -pitch), rotate(own[1], pitch)
-        return BoreStations.between_nodes(
+        return BoreStations.subdivide(
             np.stack([before, *own, after]), layer=self.layer, points=self.points
         )
 
@@ -207,7 +207,7 @@ class RingModel:
             self.element, self.skeleton(state), self.place, fixed=fixed
         )
 
-    def at_rest(self, alpha: float = 0.0, rotation: float = 0.0) -> State:
+    def initial_guess(self, alpha: float = 0.0, rotation: float = 0.0) -> State:
         """Start of a search: the inextensional two-lobe shape of a thin ring.
 
         Radial w0 cos 2 phi, tangential -w0/2 sin 2 phi, cross-sections turned by
@@ -236,7 +236,7 @@ class RingModel:
             gap, _, _ = self.wave_generator_gap(points, alpha)
             touching = gap < 0.01 * w0
         else:
-            race = self.race.at_rest(alpha, rotation)
+            race = self.race.initial_guess(alpha, rotation)
             # nothing but the rim keeps the race on its balls
             touching = np.cos(2.0 * phi[:, self.bore_nodes]) > AT_LOBE
         return State(
@@ -299,7 +299,7 @@ class RingModel:
         gradient = (cosine * rotate_right_angle(x0) - sine * x0) / (sine**2 + cosine**2)
         return float(np.arctan2(sine, cosine)), gradient
 
-    def moved(
+    def predict_field(
         self, state: State, alpha: float, rotation: float, ring_rotation: float
     ) -> State:
         """Predictor: the field turned with the wave generator and the members.
@@ -324,8 +324,8 @@ class RingModel:
         )
         race = state.race
         if self.race is not None and race is not None:
-            race = shift_rows(self.race.displaced(race, state.rotation), shift)
-            race = self.race.placed(race, rotation)
+            race = shift_rows(self.race.displacements(race, state.rotation), shift)
+            race = self.race.coordinates(race, rotation)
         return replace(
             state,
             race=race,
@@ -343,7 +343,7 @@ class RingModel:
             ring_rotation=ring_rotation,
         )
 
-    def placed(self, flank: Array, shift: Array | None) -> Array:
+    def shift_flank(self, flank: Array, shift: Array | None) -> Array:
         """Displacements of flank nodes (N, 2 n) [m] with the errors of their teeth."""
         if shift is None:
             return flank

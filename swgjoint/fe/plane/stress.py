@@ -78,7 +78,7 @@ class StressMaxima:
     von_mises: float
 
     @classmethod
-    def of(cls, stress: Array) -> StressMaxima:
+    def from_stress(cls, stress: Array) -> StressMaxima:
         """Maxima over all nodes of stresses (..., 4)."""
         tensile, compressive, von_mises = stress_maxima(stress)
         return cls(
@@ -104,12 +104,12 @@ class MemberMaxima:
     """None while it is rigid."""
 
     @classmethod
-    def at(cls, model: RingModel, state: State) -> MemberMaxima:
+    def from_state(cls, model: RingModel, state: State) -> MemberMaxima:
         """Recover the stresses of a state."""
         ring = circular_spline_stress(model, state)
         return cls(
-            flexspline=StressMaxima.of(flexspline_stress(model, state)),
-            circular_spline=None if ring is None else StressMaxima.of(ring),
+            flexspline=StressMaxima.from_stress(flexspline_stress(model, state)),
+            circular_spline=None if ring is None else StressMaxima.from_stress(ring),
         )
 
     def to_json(self) -> dict[str, dict[str, float] | None]:

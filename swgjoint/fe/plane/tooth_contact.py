@@ -88,7 +88,7 @@ class Contacts:
         )
 
     @classmethod
-    def joined(cls, first: Contacts, second: Contacts) -> Contacts:
+    def join(cls, first: Contacts, second: Contacts) -> Contacts:
         """The points of both, one after the other."""
         return cls(
             **{
@@ -97,7 +97,7 @@ class Contacts:
             }
         )
 
-    def along_flanks(self, gap: Array) -> Contacts:
+    def tangential(self, gap: Array) -> Contacts:
         """The same points with the tangent in place of the normal."""
         return replace(
             self,
@@ -123,7 +123,7 @@ class Contacts:
             result[found] = near[found]
         return result
 
-    def on_flanks_of(self, others: Contacts) -> NDArray[np.bool_]:
+    def share_flank_with(self, others: Contacts) -> NDArray[np.bool_]:
         """Which points lie on a flank on which others lie. Shape (n,)."""
         key, other = 2 * self.sector + self.side, 2 * others.sector + others.side
         return np.isin(key, other)
@@ -184,7 +184,7 @@ class ToothContact:
             return None
         shaped = self.ring_flank.reshape(-1, 2, ring.flank_dofs // 4, 2)
         shaped = shaped * _MIRROR[:, None, :]
-        return FlankSplines.through(ring.spline, shaped.reshape(-1, *shaped.shape[2:]))
+        return FlankSplines.fit(ring.spline, shaped.reshape(-1, *shaped.shape[2:]))
 
     def search(
         self,

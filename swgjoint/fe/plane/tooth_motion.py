@@ -84,7 +84,7 @@ def deflected_rim(design: Design) -> DeflectedRim:
         friction=False,
         bearing=False,
     )
-    state = Continuation(model=model, ratio=design.ratio).deflected()
+    state = Continuation(model=model, ratio=design.ratio).deflect()
     if not state.outcome.ok:
         raise ComputationError(
             f"{design.drive.name}: deflection by the wave generator failed: "

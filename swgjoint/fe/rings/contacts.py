@@ -55,7 +55,7 @@ def linearise(
 
 def race_on_balls(model: ThinRing, state: RingState, race: Array) -> PressedBalls:
     """Balls of a state under a race with given coordinates."""
-    return model.pressed(race, state.alpha, state.phase, state.ball_feet)
+    return model.press_balls(race, state.alpha, state.phase, state.ball_feet)
 
 
 def _balls(
@@ -104,7 +104,7 @@ def _teeth(
     """Contact of the flanks."""
     nodes = rim.reshape(-1, 2, 2)[:: model.nodes_per_tooth]
     foot, slope = nodes[:, 0], nodes[:, 1]
-    contacts, angle = model.teeth.seen(foot, slope)
+    contacts, angle = model.teeth.find_contacts(foot, slope)
     rows, second = model.teeth.rows(contacts, foot, slope, angle)
     k = model.teeth.stiffness
     force = -k * contacts.gap

@@ -83,7 +83,7 @@ def distances_to_ring(
     place = ring.nearest(q, points, start, own)
     element, xi = ring.split(place, own)
     value, slope, _ = hermite(xi)
-    r, v, w = ring.at(q, place, own)
+    r, v, w = ring.evaluate_at(q, place, own)
     length = np.hypot(v[:, 0], v[:, 1])
     tangent = v / length[:, None]
     outward = np.stack([tangent[:, 1], -tangent[:, 0]], -1)
@@ -122,7 +122,7 @@ class FacingSurface:
 
     def points(self, q: Array) -> tuple[Array, Array, Array, Array]:
         """Points (n, 2), tangents, outward normals there, lengths of the derivative."""
-        r, v, _ = self.ring.at(q, self.place)
+        r, v, _ = self.ring.evaluate_at(q, self.place)
         length = np.hypot(v[:, 0], v[:, 1])
         tangent = v / length[:, None]
         outward = np.stack([tangent[:, 1], -tangent[:, 0]], -1)

@@ -72,7 +72,7 @@ class RubbedPath:
         """R/mu from torque to torque [N·m]. Shape (n - 1,)."""
         return np.asarray((self.teeth_work + self.race_work) / np.diff(self.torsion))
 
-    def at(self, torque: float) -> float:
+    def torsion_at(self, torque: float) -> float:
         """Torsion at a torque, on a straight line below the second one [rad].
 
         Args:
@@ -100,7 +100,7 @@ class RubbedPath:
         Raises:
             InputError: If the path does not reach R.
         """
-        return 2.0 * self.at(mu * float(self.torque_per_mu[0]))
+        return 2.0 * self.torsion_at(mu * float(self.torque_per_mu[0]))
 
     def widths(self, mu: float) -> Array:
         """Width 2 R/K between the torques [rad]. Shape (n - 1,)."""

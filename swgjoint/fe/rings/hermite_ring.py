@@ -114,7 +114,7 @@ class HermiteRing:
         x = q.reshape(self.elements, 2, 2)
         return np.concatenate([x, np.roll(x, -1, axis=0)], axis=1)
 
-    def at(
+    def evaluate_at(
         self, q: Array, place: Array, own: Index | None = None
     ) -> tuple[Array, Array, Array]:
         """Position and its first two derivatives by the element parameter, (n, 2) each.
@@ -235,7 +235,7 @@ class HermiteRing:
         """
         place = start
         for _ in range(6):
-            r, v, w = self.at(q, place, own)
+            r, v, w = self.evaluate_at(q, place, own)
             rest = points - r
             slope = np.einsum("ni,ni->n", rest, v)
             gain = np.einsum("ni,ni->n", v, v) - np.einsum("ni,ni->n", rest, w)

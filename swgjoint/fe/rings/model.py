@@ -123,7 +123,7 @@ def thin_ring(design: Design) -> ThinRing:
     """
     check_modelled(design)
     raise_faults(bearing_checks(design))
-    bearing = BallBearing.of(design)
+    bearing = BallBearing.from_design(design)
     flexspline = tooth_profile(design, "flexspline")
     circular_spline = tooth_profile(design, "circular_spline")
     own = sector(design, "flexspline", flexspline)
@@ -144,7 +144,7 @@ def thin_ring(design: Design) -> ThinRing:
     )
     ring_errors = tooth_errors(design, "circular_spline").shift
     return ThinRing(
-        **vars(RaceOnBalls.of(design, rim.elements)),
+        **vars(RaceOnBalls.from_design(design, rim.elements)),
         rim=rim,
         nodes_per_tooth=per_tooth,
         teeth=RingTeeth(

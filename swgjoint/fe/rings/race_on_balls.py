@@ -63,9 +63,9 @@ class RaceOnBalls:
     lost."""
 
     @classmethod
-    def of(cls, design: Design, elements: int) -> RaceOnBalls:
+    def from_design(cls, design: Design, elements: int) -> RaceOnBalls:
         """Those of a design, the race of so many elements."""
-        bearing = BallBearing.of(design)
+        bearing = BallBearing.from_design(design)
         inwards = (
             0.5 * (bearing.fit_clearance + bearing.clearance + bearing.ball_diameter)
             + bearing.race_thickness
@@ -112,7 +112,7 @@ class RaceOnBalls:
         rolled = rotate(pose.d_point, alpha)
         return centre, rotate_right_angle(centre) + lag * rolled, rolled
 
-    def pressed(
+    def press_balls(
         self, race: Array, alpha: float, phase: float, feet: Array
     ) -> PressedBalls:
         """The balls under a race.

@@ -74,7 +74,7 @@ class RingTeeth:
             return CircularSpline(profile=profile)
         return CircularSpline(profile=profile, weights=_flank_spline(profile))
 
-    def seen(self, foot: Array, slope: Array) -> tuple[Contacts, Array]:
+    def find_contacts(self, foot: Array, slope: Array) -> tuple[Contacts, Array]:
         """Contacts of teeth on a deformed rim, and the angles of the teeth.
 
         Args:

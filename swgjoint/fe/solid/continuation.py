@@ -60,36 +60,36 @@ class SolidContinuation(Follower[SolidState]):
         """Psi [rad]."""
         return state.ring_rotation if self.ring_is_output else state.rotation
 
-    def deflected(self, angle: float = 0.0) -> SolidState:
+    def deflect(self, angle: float = 0.0) -> SolidState:
         """Wave generator in place, members at the ideal ratio, no tooth contact."""
         alpha, rotation, ring_rotation = self._ideal(angle)
-        start = self.ring.at_rest(alpha, rotation)
+        start = self.ring.initial_guess(alpha, rotation)
         load = SolidLoad(rotation=rotation, teeth=False)
         state = self.solver(self.ring, start, load)
         return replace(state, ring_rotation=ring_rotation)
 
-    def loaded(self, start: SolidState, torque: float, angle: float) -> SolidState:
+    def load(self, start: SolidState, torque: float, angle: float) -> SolidState:
         """Equilibrium under a torque, from a start with its input at that angle."""
         if not self.ring_is_output:
             return self.solver(self.ring, start, SolidLoad(torque=torque))
         held = angle if self.layout == "wave_generator_fixed" else 0.0
         return self.solver(self.ring, start, SolidLoad(torque=torque, rotation=held))
 
-    def held(self, state: SolidState) -> SolidState:
+    def hold_output(self, state: SolidState) -> SolidState:
         """Equilibrium with the output where it is; the torque is what that takes."""
         found = self.solver(self.ring, state, SolidLoad(rotation=state.rotation))
         if self.ring_is_output:
             return replace(found, torque=-found.tooth_moment)
         return found
 
-    def turned(self, state: SolidState, output: float) -> SolidState:
+    def rotate_output(self, state: SolidState, output: float) -> SolidState:
         """Predictor: the output turned at a fixed input, within a field that stays."""
         alpha = state.wave_generator_angle
         if self.ring_is_output:
             return self._moved(state, alpha, state.rotation, output)
         return self._moved(state, alpha, output, state.ring_rotation)
 
-    def ahead(self, state: SolidState, angle: float) -> SolidState:
+    def predict(self, state: SolidState, angle: float) -> SolidState:
         """Predictor: the field travels with the wave generator, the members turn."""
         was, now = self._ideal(self.input_angle(state)), self._ideal(angle)
         alpha, rotation, ring_rotation = (y - x for x, y in zip(was, now, strict=True))
@@ -135,8 +135,8 @@ class SolidContinuation(Follower[SolidState]):
         x = np.einsum("sij,saj->sai", now, moved)
         race = state.race
         if ring.race is not None and race is not None:
-            moved = shift_rows(ring.race.displaced(race, state.rotation), shift)
-            race = ring.race.placed(moved, rotation)
+            moved = shift_rows(ring.race.displacements(race, state.rotation), shift)
+            race = ring.race.coordinates(moved, rotation)
         return replace(
             state,
             faces=x[:, :size],

@@ -93,7 +93,7 @@ def solid_ring(
         }
     return SolidRing(
         strip=strip,
-        wave_generator=WaveGeneratorSurface.of(design),
+        wave_generator=WaveGeneratorSurface.from_design(design),
         teeth=SolidTeeth(
             strip=strip,
             circular_spline=surface,
@@ -111,7 +111,7 @@ def solid_ring(
         nonlinear=nonlinear,
         race=None
         if bearing is None
-        else SolidRace.of(design, half=half, axially_free=bearing == "free"),
+        else SolidRace.from_design(design, half=half, axially_free=bearing == "free"),
     )
 
 

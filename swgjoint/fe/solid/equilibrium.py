@@ -188,7 +188,7 @@ def _solve_linear(
     if len(used):
         guess = offset[:n] < 0.0
         if state.held is not None and found is not None and len(state.held):
-            guess = found.contacts.on_flanks_of(state.held.contacts)
+            guess = found.contacts.share_flank_with(state.held.contacts)
         unknown[used], active = solve_mixed(
             system[np.ix_(used, used)], offset[used], n, 0, guess
         )

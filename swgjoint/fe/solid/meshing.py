@@ -222,15 +222,13 @@ def simulate_solid_meshing(
 
     def set_up(name: str, what: str, solve: Callable[[], SolidState]) -> SolidState:
         state = checked(reached(name, solve), what)
-        stress = SolidMaxima.at(ring, state)
+        stress = SolidMaxima.from_state(ring, state)
         setup.append(SolidSetup(name=name, state=state, stress=stress))
         progress("setting up", len(setup), 3)
         return state
 
-    alone = set_up(
-        "wave_generator", "deflection by the wave generator", follow.deflected
-    )
-    meshed = set_up("meshed", "engagement of the teeth", lambda: follow.meshed(alone))
+    alone = set_up("wave_generator", "deflection by the wave generator", follow.deflect)
+    meshed = set_up("meshed", "engagement of the teeth", lambda: follow.engage(alone))
     state = set_up(
         "torque",
         f"loading to {overload(design, torque) or f'{torque:g} N·m'}",
@@ -276,7 +274,7 @@ def _step(
         tooth_moment=state.tooth_moment,
         energy=state.energy + 0.5 * series * state.torque**2,
         pairs_in_contact=ring.copies * len(pairs),
-        stress=SolidMaxima.at(ring, state),
+        stress=SolidMaxima.from_state(ring, state),
         iterations=len(state.history),
         state=state,
     )

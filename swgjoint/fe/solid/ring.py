@@ -134,7 +134,7 @@ class SolidRing:
         moved += self.loads(state) @ teeth.compliance[:, first:]
         return self.strip.bore + moved.reshape(len(moved), -1, 3)
 
-    def at_rest(self, alpha: float = 0.0, rotation: float = 0.0) -> SolidState:
+    def initial_guess(self, alpha: float = 0.0, rotation: float = 0.0) -> SolidState:
         """Start of a search: a cup whose wall stays straight and does not stretch.
 
         Radial w0 s cos 2 phi with s falling from the teeth to the closed end,
@@ -169,7 +169,7 @@ class SolidRing:
         last = strip.masters.size - size
         race, touching = None, np.zeros((self.sectors, points), bool)
         if self.race is not None:
-            race = self.race.at_rest(alpha, rotation, closed)
+            race = self.race.initial_guess(alpha, rotation, closed)
             # nothing but the rim keeps the race on its balls
             along = np.arange(self.sectors) * 2.0 * pi / strip.sectors
             at_lobe = np.cos(2.0 * (along + rotation - alpha)) > 0.9

@@ -64,7 +64,7 @@ class RingFactor:
             Solution at the degrees of freedom of each sector (N, n, k).
         """
         last, lu = self._last, self._lu
-        faces = self._insides.on_faces(rhs)
+        faces = self._insides.face_loads(rhs)
         for k in range(last):
             faces[k] = lu_solve(lu[k], faces[k], check_finite=False)
             if k < last - 1:

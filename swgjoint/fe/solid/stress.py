@@ -130,7 +130,7 @@ class SolidMaxima:
     place: StressPlace
 
     @classmethod
-    def at(cls, ring: SolidRing, state: SolidState) -> SolidMaxima:
+    def from_state(cls, ring: SolidRing, state: SolidState) -> SolidMaxima:
         """Recover the stresses of a state."""
         by_part, places = {}, {}
         for name, stress in flexspline_stresses(ring, state).items():

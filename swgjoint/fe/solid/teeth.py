@@ -162,7 +162,7 @@ class SolidTeeth:
             numbers.append(np.full(len(found), p))
         contacts = parts[0]
         for part in parts[1:]:
-            contacts = Contacts.joined(contacts, part)
+            contacts = Contacts.join(contacts, part)
         return self._rows(contacts, np.concatenate(numbers), frame, nodes, angle)
 
     def ring_place(self, ring_rotation: float) -> Array:
@@ -239,7 +239,7 @@ class SolidTeeth:
         same = sector[:, None] == sector[None, :]
         matrix = np.where(same, found.weight @ own @ found.weight.T, 0.0)
         if self.ring_gear is not None:
-            matrix += self.ring_gear.between(
+            matrix += self.ring_gear.contact_compliance(
                 found.contacts.tooth, found.ring_weight, self.ring_teeth
             )
         return matrix

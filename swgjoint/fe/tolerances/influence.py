@@ -45,7 +45,7 @@ def influence(model: RingModel, state: State, *, ring_is_output: bool) -> Influe
     assert model.circular_spline.compliance is not None
     ring = linearise(model, state, None if ring_is_output else state.torque)
     contacts, carries = _tooth_contacts(model, ring, state)
-    supports = Supports.of(ring, state, _near_supports(model, ring, state))
+    supports = Supports.from_state(ring, state, _near_supports(model, ring, state))
     drive = CondensedRing(
         model=model,
         state=state,
@@ -78,7 +78,7 @@ def _tooth_contacts(
     more = near.chosen(np.zeros(added.size, dtype=np.int64))
     sector, side = np.divmod(key[added], 2)
     more = replace(more, sector=sector, side=side, station=place[added])
-    found = ring.search.search(ring.flank, reach, Contacts.joined(held, more))
+    found = ring.search.search(ring.flank, reach, Contacts.join(held, more))
     return distinct(found, state)
 
 

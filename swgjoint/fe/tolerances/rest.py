@@ -77,14 +77,14 @@ def influences(
     """
     period, small = pitch_of(design), SMALL * ratings_of(design).rated_torque
     follow = perfect_drive(design, model)
-    state = follow.meshed(follow.deflected())
+    state = follow.engage(follow.deflect())
     rest = Unloaded(state=state, small=small)
     found = []
     for k in range(phases):
         if k:
-            rest = follow.unloaded_to(rest, period * k / phases)
+            rest = follow.turn_unloaded(rest, period * k / phases)
         elif state.outcome.ok:
-            rest = follow.unloaded(state, small)
+            rest = follow.unload(state, small)
         if not rest.state.outcome.ok:
             raise ComputationError(
                 f"{design.drive.name}: no equilibrium without torque and errors:"

@@ -46,7 +46,7 @@ class BallBearing:
     """Of balls and races."""
 
     @classmethod
-    def of(cls, design: Design) -> BallBearing:
+    def from_design(cls, design: Design) -> BallBearing:
         """Bearing of a design.
 
         What the design does not give is the plain thing: a rectangular race as wide as

@@ -34,11 +34,11 @@ def bearing_checks(design: Design) -> list[Check]:
     fit_um = bearing.fit_clearance_um or 0.0
     lobes_left = lobes - 0.5 * (bearing.clearance_um + fit_um) * um / mm
     thinnest = THINNEST_RACE * bearing.ball_diameter_mm
-    width = BallBearing.of(design).race_width / mm
+    width = BallBearing.from_design(design).race_width / mm
     widest = WIDEST_RACE * design.drive.face_width_mm
     return [
         *_cam(design),
-        Check.above(
+        Check.strict_lower_limit(
             "bearing: deflection that its clearances leave",
             lobes_left,
             0.0,
@@ -47,7 +47,7 @@ def bearing_checks(design: Design) -> list[Check]:
             f" fit_clearance_um = {fit_um:g}: half of both takes up the lobes of"
             f" {lobes:.4g} mm; accepted: below {2.0 * lobes * mm / um:.4g} um together",
         ),
-        Check.at_least(
+        Check.lower_limit(
             "bearing: thickness of the race",
             bearing.race_thickness_mm,
             thinnest,
@@ -56,7 +56,7 @@ def bearing_checks(design: Design) -> list[Check]:
             f" balls of {bearing.ball_diameter_mm:g} mm would cut through; accepted: at"
             f" least {thinnest:.4g} mm",
         ),
-        Check.at_most(
+        Check.upper_limit(
             "bearing: width of the race",
             width,
             widest,
@@ -64,7 +64,7 @@ def bearing_checks(design: Design) -> list[Check]:
             f"{where}.race_width_mm = {width:g}: far wider than the teeth; accepted: at"
             f" most {widest:.4g} mm",
         ),
-        Check.above(
+        Check.strict_lower_limit(
             "bearing: clearance between balls",
             clearance,
             0.0,
@@ -78,7 +78,7 @@ def bearing_checks(design: Design) -> list[Check]:
 
 def _cam(design: Design) -> list[Check]:
     """The cam below race and balls is a curve without corners."""
-    bearing = BallBearing.of(design)
+    bearing = BallBearing.from_design(design)
     try:
         outline = with_checks(design)[0]
     except DesignError:
@@ -89,7 +89,7 @@ def _cam(design: Design) -> list[Check]:
     sharpest = 1.0 / float(outline.evaluate(stations)[2].max())
     value = (sharpest - depth) / mm
     return [
-        Check.above(
+        Check.strict_lower_limit(
             "bearing: sharpest radius of the cam below it",
             value,
             0.0,

@@ -23,7 +23,7 @@ class Check:
     """Whether the value is round-off that says nothing of a design which passes."""
 
     @classmethod
-    def at_most(
+    def upper_limit(
         cls, name: str, value: float, limit: float, unit: str, fault: str
     ) -> Check:
         """Passes where value <= limit."""
@@ -37,7 +37,7 @@ class Check:
         )
 
     @classmethod
-    def at_least(
+    def lower_limit(
         cls, name: str, value: float, limit: float, unit: str, fault: str
     ) -> Check:
         """Passes where value >= limit."""
@@ -51,7 +51,7 @@ class Check:
         )
 
     @classmethod
-    def above(
+    def strict_lower_limit(
         cls, name: str, value: float, limit: float, unit: str, fault: str
     ) -> Check:
         """Passes where value > limit."""

@@ -108,7 +108,7 @@ def _tooth(design: Design, member: str, profile: ToothProfile) -> list[Check]:
     name = _name(member)
     return [
         _round_off(
-            Check.at_most(
+            Check.upper_limit(
                 f"{name}: gap between segments",
                 gap / mm,
                 CLOSED / mm,
@@ -118,7 +118,7 @@ def _tooth(design: Design, member: str, profile: ToothProfile) -> list[Check]:
             )
         ),
         _round_off(
-            Check.at_most(
+            Check.upper_limit(
                 f"{name}: corner at a junction",
                 corner,
                 TANGENCY_RAD,
@@ -127,7 +127,7 @@ def _tooth(design: Design, member: str, profile: ToothProfile) -> list[Check]:
                 f" {TANGENCY_RAD:g} rad",
             )
         ),
-        Check.above(
+        Check.strict_lower_limit(
             f"{name}: shortest segment",
             shortest,
             0.0,
@@ -135,7 +135,7 @@ def _tooth(design: Design, member: str, profile: ToothProfile) -> list[Check]:
             f"{where}: a segment of {shortest:.3g} mm; accepted: above 0 mm",
         ),
         _round_off(
-            Check.at_most(
+            Check.upper_limit(
                 f"{name}: end of the flank beside the middle of the gap",
                 beside / deg,
                 1e-10,
@@ -167,7 +167,7 @@ def engagement_checks(design: Design, path: ToothPath) -> list[Check]:
     opened *= np.cos(design.circular_spline.pressure_angle_deg * deg)
     value = design.circular_spline.thickness_coefficient
     return [
-        Check.at_least(
+        Check.lower_limit(
             f"teeth: clearance of rigid flanks ({where}, {theta:.3g} deg from the"
             " lobe)",
             least / um,
@@ -179,7 +179,7 @@ def engagement_checks(design: Design, path: ToothPath) -> list[Check]:
             f" module, about {value - (limit - least) / opened:.4g} without other"
             " changes",
         ),
-        Check.above(
+        Check.strict_lower_limit(
             "teeth: engaged over",
             path.engaged / deg,
             0.0,
@@ -203,7 +203,7 @@ def _fit(design: Design, profiles: Mapping[str, ToothProfile]) -> list[Check]:
         clearance = (root - tip) / mm
         value = getattr(design, member).addendum_coefficient
         checks.append(
-            Check.at_least(
+            Check.lower_limit(
                 f"{_name(member)}: tip clearance at the major axis",
                 # tip and root on the same circle by rounding is no overlap
                 clearance if abs(clearance) > 1e-12 else 0.0,
@@ -220,7 +220,7 @@ def _fit(design: Design, profiles: Mapping[str, ToothProfile]) -> list[Check]:
     value = design.flexspline.addendum_coefficient
     other = design.circular_spline.addendum_coefficient
     checks.append(
-        Check.above(
+        Check.strict_lower_limit(
             "teeth: clearance of the tips at the minor axis",
             apart,
             0.0,
@@ -246,7 +246,7 @@ def _cup(design: Design) -> list[Check]:
         else min(cup.bore_radius_mm - radius - wall, cup.length_mm)
     )
     return [
-        Check.at_most(
+        Check.upper_limit(
             "cup: fillet",
             cup.fillet_mm,
             room,

@@ -26,7 +26,7 @@ class ToothFault(DesignError):
         """What other processes get: the line."""
         return DesignError, (str(self),)
 
-    def bounded(self, accepted: str) -> ToothFault:
+    def with_bounds(self, accepted: str) -> ToothFault:
         """The same with what is accepted as values."""
         cause = self.what.partition("; accepted")[0]
         return ToothFault(
@@ -83,7 +83,7 @@ class Blank:
             value = getattr(value, name)
         return value
 
-    def changed(self, key: str, value: float) -> Blank:
+    def with_change(self, key: str, value: float) -> Blank:
         """The blank of a member with another value for a dotted key, not checked."""
         table, _, last = key.rpartition(".")
         update = {last: value}

@@ -477,7 +477,7 @@ class _Builder:
         parts = []
         for motion in envelope.motions:
             theta = np.linspace(-0.25, 0.25, 201) * motion.half_range
-            moved = motion.to(envelope.receiver, theta)
+            moved = motion.map_to(envelope.receiver, theta)
             wide = np.broadcast_to(points, (len(theta), *points.shape))
             parts.append(moved.points(wide).reshape(-1, 2))
         return np.asarray(np.concatenate(parts) @ self.turn)

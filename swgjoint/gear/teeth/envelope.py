@@ -81,7 +81,7 @@ class Envelope:
     def slip(self, motion: ToothMotion, s: Array, theta: Array) -> Array:
         """Speed towards the receiver along the common normal, n . v (n,) [m/rad]."""
         points, normals, _ = self.given.evaluate(s)
-        moved = motion.to(self.receiver, theta)
+        moved = motion.map_to(self.receiver, theta)
         return np.asarray(
             np.sum(moved.vectors(normals) * moved.velocities(points), axis=-1)
         )
@@ -129,14 +129,14 @@ class Envelope:
         guess = np.interp(s, run.station[order], run.theta[order])
         theta = self.contact(run.motion, s, guess)
         points, normals, _ = self.given.evaluate(s)
-        moved = run.motion.to(self.receiver, theta)
+        moved = run.motion.map_to(self.receiver, theta)
         return moved.points(points), -moved.vectors(normals), theta
 
     def trace_edge(self, run: EnvelopeRun, theta: Array) -> tuple[Array, Array]:
         """Path of the edge of the given flank, with the receiver's outward normals."""
         low = np.full(theta.shape, self.given.contact_range[0])
         points, normals, _ = self.given.evaluate(low)
-        moved = run.motion.to(self.receiver, theta)
+        moved = run.motion.map_to(self.receiver, theta)
         velocity = moved.velocities(points)
         normal = np.stack([-velocity[:, 1], velocity[:, 0]], axis=-1)
         normal /= np.hypot(normal[:, 0], normal[:, 1])[:, None]
@@ -155,7 +155,7 @@ class Envelope:
         theta = np.linspace(-1.0, 1.0, POSITIONS) * self.motions[0].half_range
         radii, angles = [], []
         for motion in self.motions:
-            moved = motion.to(self.receiver, theta)
+            moved = motion.map_to(self.receiver, theta)
             seen = moved.points(np.broadcast_to(points, (len(theta), *points.shape)))
             radii.append(np.hypot(seen[..., 0], seen[..., 1]))
             angles.append(np.arctan2(seen[..., 0], seen[..., 1]))
@@ -176,7 +176,7 @@ class Envelope:
         top = np.array([0.0, self.given.addendum_radius])
         theta = self._table[2]
         wide = np.broadcast_to(top, (len(theta), 2))
-        paths = [m.to(self.receiver, theta).points(wide) for m in self.motions]
+        paths = [m.map_to(self.receiver, theta).points(wide) for m in self.motions]
         return self._deepest(np.hypot(*np.concatenate(paths).T))
 
     @property

@@ -83,8 +83,8 @@ class ToothProfile:
         """Gap and corner at every junction, each segment evaluated at its very end."""
         found = []
         for left, right in pairwise(self.segments):
-            (end,), (before,), _ = left.at(np.array([left.length]), self.side)
-            (start,), (after,), _ = right.at(np.array([0.0]), self.side)
+            (end,), (before,), _ = left.evaluate_at(np.array([left.length]), self.side)
+            (start,), (after,), _ = right.evaluate_at(np.array([0.0]), self.side)
             cross = before[0] * after[1] - before[1] * after[0]
             corner = abs(float(np.arctan2(cross, before @ after)))
             gap = float(np.hypot(*(end - start)))
@@ -111,7 +111,7 @@ class ToothProfile:
             here = index == k
             if not here.any():
                 continue
-            found = part.at(s[here] - stations[k], self.side)
+            found = part.evaluate_at(s[here] - stations[k], self.side)
             points[here], normals[here], curvature[here] = found
         return points, normals, curvature
 
@@ -193,8 +193,8 @@ class ToothProfile:
         found = []
         for left, right in pairwise(self.segments):
             if right.edge:
-                (vertex,), (after,), _ = right.at(np.array([0.0]), self.side)
-                _, (before,), _ = left.at(np.array([left.length]), self.side)
+                (vertex,), (after,), _ = right.evaluate_at(np.array([0.0]), self.side)
+                _, (before,), _ = left.evaluate_at(np.array([left.length]), self.side)
                 travel = [self.side * np.array([n[1], -n[0]]) for n in (before, after)]
                 found.append((vertex, travel[0], travel[1]))
         return tuple(found)

@@ -51,7 +51,7 @@ class Piece(Protocol):
         """Whether the segment starts at an edge, not tangent to the one before."""
         ...
 
-    def at(self, s: Array, side: float) -> tuple[Array, Array, Array]:
+    def evaluate_at(self, s: Array, side: float) -> tuple[Array, Array, Array]:
         """Points (n, 2) [m], outward normals (n, 2), curvatures (n,) [1/m]."""
         ...
 
@@ -93,7 +93,7 @@ class Segment:
         direction = (end - start) / self.length
         return direction, side * np.array([-direction[1], direction[0]])
 
-    def at(self, s: Array, side: float) -> tuple[Array, Array, Array]:
+    def evaluate_at(self, s: Array, side: float) -> tuple[Array, Array, Array]:
         """Points, outward normals and curvatures at arc length s from the start."""
         t = s / self.length
         if self.radius == 0.0:

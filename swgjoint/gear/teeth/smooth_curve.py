@@ -92,7 +92,7 @@ class SmoothCurve:
             value += c[j]
         return value.T, (first / h).T, (second / h**2).T
 
-    def at(self, s: Array, side: float) -> tuple[Array, Array, Array]:
+    def evaluate_at(self, s: Array, side: float) -> tuple[Array, Array, Array]:
         """Points, outward normals and curvatures at arc length s from the start."""
         points, tangent, bend = self._derivatives(s)
         size = np.hypot(tangent[:, 0], tangent[:, 1])
@@ -135,7 +135,7 @@ class SmoothCurve:
             moving = moving[np.abs(new - old) > 1e-9]
             if not moving.size:
                 break
-        foot, normal, curvature = self.at(s, side)
+        foot, normal, curvature = self.evaluate_at(s, side)
         rel = points - foot
         distance = np.sum(rel * normal, axis=-1)
         # beyond the ends the rest of the step points outwards

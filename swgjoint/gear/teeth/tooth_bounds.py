@@ -50,7 +50,7 @@ def with_bounds(
     for key in (*lengths, *MEMBER_KEYS):
         bound = nearest_bound(
             start.value(key),
-            lambda value, key=key: builds(start.changed(key, value)),  # type: ignore[misc]
+            lambda value, key=key: builds(start.with_change(key, value)),  # type: ignore[misc]
             high=MEMBER_KEYS.get(key, float("inf")),
         )
         if bound is not None:
@@ -65,7 +65,7 @@ def with_bounds(
         if fault.key in lengths:
             size = start.value(fault.key) * all_of_them.accepted
             told[0] += f", this one {size:.4g}{_unit(fault.key)}"
-    return fault.bounded(" or ".join(told)) if told else fault
+    return fault.with_bounds(" or ".join(told)) if told else fault
 
 
 def _common(
@@ -76,7 +76,7 @@ def _common(
     def builds_with(factor: float) -> bool:
         changed = start
         for key in lengths:
-            changed = changed.changed(key, factor * start.value(key))
+            changed = changed.with_change(key, factor * start.value(key))
         return builds(changed)
 
     return nearest_bound(1.0, builds_with)

@@ -155,7 +155,7 @@ class ToothMotion:
             d_shift=-_apply(d_turn, there.shift) - _apply(turn, there.d_shift),
         )
 
-    def to(self, receiver: Receiver, theta: Array) -> MovedFlank:
+    def map_to(self, receiver: Receiver, theta: Array) -> MovedFlank:
         """From the other member's right flank to that of the receiver."""
         if receiver == "flexspline":
             return self.to_flexspline(theta)

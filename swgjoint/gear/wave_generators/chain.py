@@ -54,7 +54,7 @@ class Chain(ClosedCurve):
     @cached_property
     def _starts(self) -> tuple[Array, Array]:
         """Points and tangents at the starts of the pieces. Shapes (n_pieces, 2)."""
-        at = [piece.at(np.zeros(1)) for piece in self.pieces]
+        at = [piece.evaluate_at(np.zeros(1)) for piece in self.pieces]
         normals = np.concatenate([normal for _, normal, _ in at])
         tangents = np.stack([-normals[:, 1], normals[:, 0]], axis=-1)
         return np.concatenate([point for point, _, _ in at]), tangents
@@ -76,7 +76,7 @@ class Chain(ClosedCurve):
             index = np.flatnonzero(inside)
             if not index.size:
                 continue
-            foot, normal, bend = piece.at(piece.foot(points[index]))
+            foot, normal, bend = piece.evaluate_at(piece.foot(points[index]))
             rel = points[index] - foot
             size = np.hypot(rel[:, 0], rel[:, 1])
             better = size < nearest[index]
@@ -89,7 +89,9 @@ class Chain(ClosedCurve):
     def corners(self) -> Array:
         """Turn of the tangent at the junctions, zero where smooth (n_pieces,) [rad]."""
         _, after = self._starts
-        ends = [piece.at(np.array([piece.length]))[1][0] for piece in self.pieces]
+        ends = [
+            piece.evaluate_at(np.array([piece.length]))[1][0] for piece in self.pieces
+        ]
         before = np.array([[-n[1], n[0]] for n in ends])
         after = np.roll(after, -1, axis=0)
         cross = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
@@ -98,5 +100,7 @@ class Chain(ClosedCurve):
     def gaps(self) -> Array:
         """Distance between the end of a piece and the start of the next (n,) [m]."""
         starts, _ = self._starts
-        ends = [piece.at(np.array([piece.length]))[0][0] for piece in self.pieces]
+        ends = [
+            piece.evaluate_at(np.array([piece.length]))[0][0] for piece in self.pieces
+        ]
         return np.asarray(np.hypot(*(np.array(ends) - np.roll(starts, -1, axis=0)).T))

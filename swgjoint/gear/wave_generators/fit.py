@@ -36,7 +36,7 @@ def wave_generator_checks(
     shown = outline.major / mm
     limit = (bore + w0 + room) / mm
     checks = [
-        Check.at_most(
+        Check.upper_limit(
             "wave generator: largest radius",
             shown,
             # the axis a itself, rounded in another way, is no fault
@@ -50,7 +50,7 @@ def wave_generator_checks(
     ]
     stretch = outline.perimeter / (2.0 * pi * bore) - 1.0
     checks.append(
-        Check.at_most(
+        Check.upper_limit(
             "wave generator: stretch of the bore around it",
             100.0 * stretch,
             100.0 * MAX_STRETCH,
@@ -63,7 +63,7 @@ def wave_generator_checks(
         corner = float(np.abs(outline.corners()).max())
         checks.append(
             replace(
-                Check.at_most(
+                Check.upper_limit(
                     "wave generator: corner at its joints",
                     corner,
                     TANGENT,
@@ -152,7 +152,7 @@ def _convex(design: Design, outline: Radial) -> Check:
         if spec.kind == "cosine"
         else "radius_mm"
     )
-    return Check.at_least(
+    return Check.lower_limit(
         "wave generator: smallest curvature",
         least,
         0.0,

@@ -26,7 +26,7 @@ class OutlinePiece(Protocol):
         """Arc length [m]."""
         ...
 
-    def at(self, s: Array) -> tuple[Array, Array, Array]:
+    def evaluate_at(self, s: Array) -> tuple[Array, Array, Array]:
         """Points (n, 2) [m], outward normals (n, 2), curvatures (n,) [1/m]."""
         ...
 
@@ -56,7 +56,7 @@ class Arc:
         """Arc length [m]."""
         return self.radius * (self.end - self.start)
 
-    def at(self, s: Array) -> tuple[Array, Array, Array]:
+    def evaluate_at(self, s: Array) -> tuple[Array, Array, Array]:
         """See :class:`OutlinePiece`."""
         angle = self.start + s / self.radius
         normals = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
@@ -73,7 +73,7 @@ class Arc:
 
     def largest_radius(self) -> float:
         """See :class:`OutlinePiece`."""
-        ends, normals, _ = self.at(np.array([0.0, self.length]))
+        ends, normals, _ = self.evaluate_at(np.array([0.0, self.length]))
         # the far point from the axis lies beyond the centre, if the arc reaches there
         ox, oy = self.centre
         side = normals[:, 0] * oy - normals[:, 1] * ox
@@ -98,7 +98,7 @@ class Line:
     def _direction(self) -> Array:
         return np.subtract(self.end, self.start) / self.length
 
-    def at(self, s: Array) -> tuple[Array, Array, Array]:
+    def evaluate_at(self, s: Array) -> tuple[Array, Array, Array]:
         """See :class:`OutlinePiece`."""
         s = np.asarray(s, dtype=float)
         direction = self._direction
@@ -147,7 +147,7 @@ class Parabola:
         c, d = cos(self.turn), sin(self.turn)
         return np.array([[c, d], [-d, c]])
 
-    def at(self, s: Array) -> tuple[Array, Array, Array]:
+    def evaluate_at(self, s: Array) -> tuple[Array, Array, Array]:
         """See :class:`OutlinePiece`; the arc length is inverted by Newton's method."""
         a = self.coefficient
         wanted = self._from_apex(self.start) - np.asarray(s, dtype=float)

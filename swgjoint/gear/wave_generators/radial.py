@@ -48,7 +48,7 @@ class Radial(ClosedCurve):
         """Length of the outline [m]."""
         return float(self._panels[1][-1])
 
-    def at(self, phi: Array) -> tuple[Array, Array, Array]:
+    def evaluate_at(self, phi: Array) -> tuple[Array, Array, Array]:
         """Points, normals and curvatures at the angles phi [rad]."""
         r, dr, ddr = (self.radius(phi, k) for k in range(3))
         radial = np.stack([-np.sin(phi), np.cos(phi)], axis=-1)
@@ -72,14 +72,14 @@ class Radial(ClosedCurve):
             phi = phi - step
             if np.max(np.abs(step), initial=0.0) < 1e-15:
                 break
-        return self.at(phi)
+        return self.evaluate_at(phi)
 
     @cached_property
     def _nearest(self) -> tuple[Array, Any]:
         from scipy.spatial import cKDTree
 
         phi = np.linspace(0.0, 2.0 * np.pi, 4 * _PANELS, endpoint=False)
-        return phi, cKDTree(self.at(phi)[0])
+        return phi, cKDTree(self.evaluate_at(phi)[0])
 
     def signed_distance(self, points: Array) -> tuple[Array, Array, Array]:
         """Newton's method on the angle from the nearest of many outline points.
@@ -91,7 +91,7 @@ class Radial(ClosedCurve):
         phi = start[tree.query(points)[1]]
         limit = 4.0 * (start[1] - start[0])
         for _ in range(50):
-            foot, normal, curvature = self.at(phi)
+            foot, normal, curvature = self.evaluate_at(phi)
             rel = points - foot
             speed = np.hypot(self.radius(phi), self.radius(phi, 1))
             along = rel[:, 1] * normal[:, 0] - rel[:, 0] * normal[:, 1]
@@ -101,13 +101,13 @@ class Radial(ClosedCurve):
             phi = phi + step
             if np.max(np.abs(step), initial=0.0) < 1e-15:
                 break
-        foot, normal, curvature = self.at(phi)
+        foot, normal, curvature = self.evaluate_at(phi)
         return np.sum((points - foot) * normal, axis=-1), normal, curvature
 
     def least_curvature(self) -> float:
         """Smallest curvature over the outline, sampled [1/m]."""
         phi = np.concatenate([self._nearest[0], self._breaks()])
-        return float(self.at(phi)[2].min())
+        return float(self.evaluate_at(phi)[2].min())
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

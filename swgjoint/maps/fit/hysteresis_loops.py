@@ -222,13 +222,13 @@ def played_loop(drive: Potential, loop: FrictionLoop) -> FrictionLoop:
     """What the map does along the torques of a loop."""
     theta = loop.input_angle
     free = float(output_angle(drive, theta, 0.0))
-    sliders = Sliders.relaxed(drive.hysteresis, float(drive.torsion(theta, free)))
+    sliders = Sliders.relax(drive.hysteresis, float(drive.torsion(theta, free)))
     psi = np.full(loop.torque.size, free)
     turns = np.flatnonzero(np.diff(np.sign(np.diff(loop.torque)))) + 1
     for begin, end in pairwise([0, *turns.tolist(), loop.torque.size - 1]):
         leg = slice(begin + 1, end + 1)
         psi[leg] = output_angle(drive, theta, loop.torque[leg], sliders)
-        sliders = sliders.moved(float(drive.torsion(theta, psi[end])))
+        sliders = sliders.move_to(float(drive.torsion(theta, psi[end])))
     elastic = output_angle(replace(drive, hysteresis=()), theta, loop.torque)
     ideal = theta / drive.ratio
     x = drive.torsion(theta, elastic)

@@ -207,7 +207,7 @@ def _played(
     Between two turns of the path the direction is one, also where samples jitter.
     """
     free = float(output_angle(drive, theta, 0.0))
-    sliders = Sliders.relaxed(drive.hysteresis, float(drive.torsion(theta, free)))
+    sliders = Sliders.relax(drive.hysteresis, float(drive.torsion(theta, free)))
     torque = from_its_side(measured.torque, REST * drive.ratings.rated_torque)
     rounds = []
     for _ in range(2):
@@ -215,7 +215,7 @@ def _played(
         for begin, end in measured.turns():
             leg = slice(begin, end + 1)
             psi[leg] = output_angle(drive, theta, torque[leg], sliders)
-            sliders = sliders.moved(float(drive.torsion(theta, psi[end])))
+            sliders = sliders.move_to(float(drive.torsion(theta, psi[end])))
         rounds.append(free - psi)
     return rounds[0], rounds[1]
 

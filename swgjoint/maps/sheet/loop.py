@@ -160,11 +160,11 @@ def torque_loop(drive: Potential, *, theta: float = 0.0) -> TorqueLoop:
         np.append(-up[-2:0:-1], -side),
     ]
     free = output_angle(drive, theta, 0.0)
-    sliders = Sliders.relaxed(drive.hysteresis, float(drive.torsion(theta, free)))
+    sliders = Sliders.relax(drive.hysteresis, float(drive.torsion(theta, free)))
     parts: list[Array] = []
     for leg in legs * (2 if drive.hysteresis else 1):
         psi = output_angle(drive, theta, leg, sliders)
-        sliders = sliders.moved(float(drive.torsion(theta, psi[-1])))
+        sliders = sliders.move_to(float(drive.torsion(theta, psi[-1])))
         parts.append(float(free) - psi)
     torque = np.concatenate(legs)
     torque[np.abs(torque) == side] = 0.0

@@ -125,7 +125,7 @@ class MapValidation:
         rows = [row for key in QUANTITIES for row in self.rows[key]]
         return tuple(sorted({row[0] for row in rows if row[1] > limit}))
 
-    def between(self, low: float, high: float) -> dict[str, Difference]:
+    def worst_between(self, low: float, high: float) -> dict[str, Difference]:
         """Largest differences over a range of torques.
 
         Rows inside the range count as they are; its ends lie between two rows and get

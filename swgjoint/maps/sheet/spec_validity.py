@@ -40,7 +40,7 @@ def judge_figures(
     if found is None:
         return {}
     rated = drive.ratings.rated_torque
-    no_load, loaded = (found.between(load, load) for load in (0.0, rated))
+    no_load, loaded = (found.worst_between(load, load) for load in (0.0, rated))
     worst = max(loaded.values(), key=lambda one: one.largest)
     if worst.largest > LIMIT:
         for key in RIPPLE_KEYS:

@@ -55,7 +55,7 @@ class Turn:
         signal = frozen_array(self.signal, "signal", ndim=1)
         object.__setattr__(self, "signal", signal)
 
-    def over_output_turn(self) -> tuple[Array, Array]:
+    def output_turn(self) -> tuple[Array, Array]:
         """Input angle [rad] and signal over one output turn, both ends included."""
         n = self.signal.size
         step = 2.0 * pi * float(self.period_turns) / n
@@ -160,7 +160,7 @@ def ripple_turn(drive: Potential, torque: float) -> Turn:
 def _along(drive: Potential, theta: Array, of: Callable[[IdealMotion], Array]) -> Array:
     """A quantity at many input angles, some at a time."""
     parts = [
-        of(IdealMotion.of(drive, theta[k : k + CHUNK]))
+        of(IdealMotion.from_map(drive, theta[k : k + CHUNK]))
         for k in range(0, theta.size, CHUNK)
     ]
     return np.concatenate(parts)

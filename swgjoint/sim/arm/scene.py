@@ -172,7 +172,7 @@ def arm_scene(
     kept = {
         joint: one
         for joint, one in choice.items()
-        if scene.of_joint(joint).drive == one.drive
+        if scene.joint_settings(joint).drive == one.drive
     }
     return ArmScene(scene=scene, drive_choice=kept)
 

@@ -114,7 +114,7 @@ def dissipation(run: Run, j: int) -> float:
     total = attached.damping / step * float(twist @ twist)
     slipping = run.slipping_torque[:, j]
     total += _work(slipping, run.torsion[:, j])
-    total -= transmission.held(run.torsion[:, j])
+    total -= transmission.hysteresis_energy_change(run.torsion[:, j])
     turn = np.diff(run.motor_position[:, j])
     if attached.native is not None:
         total += attached.native.friction * float(np.abs(turn).sum())
@@ -218,7 +218,9 @@ def _elastic(run: Run, j: int) -> float:
         return 0.0
     theta, psi = run.motor_position[[0, -1], j], run.position[[0, -1], j]
     first, last = law.energy(law.torsion(theta, psi), theta, psi)
-    return float(last - first) + transmission.held(run.torsion[:, j])
+    return float(last - first) + transmission.hysteresis_energy_change(
+        run.torsion[:, j]
+    )
 
 
 def _rigid_energies(run: Run) -> tuple[float, float]:

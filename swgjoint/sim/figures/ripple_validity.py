@@ -106,7 +106,7 @@ def map_label(run: Run, j: int, *, told: bool) -> dict[str, Any]:
         }
     torque = run.output_torque[run.steady, j]
     low, high = float(torque.min()), float(torque.max())
-    differences = found.between(low, high)
+    differences = found.worst_between(low, high)
     worst = max(one.largest for one in differences.values())
     return {
         "ripple_valid": worst <= LIMIT if told else None,

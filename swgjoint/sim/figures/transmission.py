@@ -127,7 +127,7 @@ class Transmission:
             friction=rubs,
         )
 
-    def held(self, torsion: Array) -> float:
+    def hysteresis_energy_change(self, torsion: Array) -> float:
         """Change of the energy in the springs of the hysteresis over a record [J].
 
         Args:

@@ -264,9 +264,9 @@ class Scene(Section):
         copy._where = self._where
         return copy
 
-    def of_joint(self, name: str) -> JointSection:
+    def joint_settings(self, name: str) -> JointSection:
         """Settings of one joint, its own over the defaults."""
-        return self.joints.get(name, JointSection()).over(self.defaults)
+        return self.joints.get(name, JointSection()).fill_from(self.defaults)
 
 
 def _faults_of(model: type[Section], entry: dict[str, Any], path: str) -> list[str]:

@@ -59,7 +59,7 @@ def lobe_rows(own: Force, found: Found) -> list[Row]:
     if cup is not None:
         nominal = cup.force_at(cup.height)
         if cup.height <= cup.highest:
-            wedged = nominal + cup.on_teeth_at(cup.height)
+            wedged = nominal + cup.tooth_force_at(cup.height)
         take_up = cup.take_up
         if not isinf(take_up):
             closed = cup.force_at(take_up)

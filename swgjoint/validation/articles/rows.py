@@ -306,7 +306,7 @@ def force_rows(own: Force, found: Mapping[str, Found]) -> list[Row]:
 
 def stress_rows(own: StressAndFatigue, found: Mapping[str, Found]) -> list[Row]:
     """Stress without torque: shell theory and finite elements."""
-    shell = ShellDimensions.of(changed_design(own.base))
+    shell = ShellDimensions.from_design(changed_design(own.base))
     four, fine = found["four"], found["four, fine"]
 
     row = partial(_row, "stress", own.base)
@@ -408,7 +408,7 @@ def _torque_at(allowable: float, shell: ShellDimensions, steel: Material) -> flo
 def fatigue_rows(own: StressAndFatigue, found: Mapping[str, Found]) -> list[Row]:
     """Safety factors over the torque."""
     design = changed_design(own.base)
-    shell, radius = ShellDimensions.of(design), 0.5 * design.pitch_diameter
+    shell, radius = ShellDimensions.from_design(design), 0.5 * design.pitch_diameter
     steel = design.material_of("flexspline")
     assert steel.fatigue_limit_bending and steel.fatigue_limit_torsion
     rows = [

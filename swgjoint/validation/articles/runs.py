@@ -83,9 +83,9 @@ def _lobes(task: ArticleTask) -> Found:
 def _four(task: ArticleTask) -> Found:
     """Load case of the article by torque; radial displacement [mm], stress [MPa]."""
     cup = pinched_cup(task.design)
-    shell = ShellDimensions.of(task.design)
+    shell = ShellDimensions.from_design(task.design)
     loaded = four_forces(cup, shell.deflection)
-    limits = FatigueLimits.of(task.design)
+    limits = FatigueLimits.from_design(task.design)
     rows = []
     for torque in (0.0, *task.torques):
         stresses = loaded.stresses(torque)
@@ -114,7 +114,7 @@ def _fatigue(task: ArticleTask) -> Found:
 def _deflected(task: ArticleTask) -> Found:
     """On the wave generator, no tooth contact: displacement [mm], stress [MPa]."""
     ring = solid_ring(task.design, half="auto", elastic_circular_spline=False)
-    state = SolidContinuation(ring=ring, ratio=task.design.ratio).deflected()
+    state = SolidContinuation(ring=ring, ratio=task.design.ratio).deflect()
     if not state.outcome.ok:
         raise ComputationError(f"{task.name}: {state.outcome.value}")
     frame, teeth = ring.frames(state)[0], ring.strip.teeth
@@ -126,7 +126,7 @@ def _deflected(task: ArticleTask) -> Found:
     angle = 2.0 * np.pi * np.arange(ring.sectors) / ring.strip.sectors
     from_major = np.abs((angle + 0.5 * np.pi) % np.pi - 0.5 * np.pi)
 
-    maxima = SolidMaxima.at(ring, state)
+    maxima = SolidMaxima.from_state(ring, state)
     by_sector = np.max(
         [
             stress_maxima(part)[2].max(axis=1)

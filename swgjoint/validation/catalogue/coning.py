@@ -41,7 +41,7 @@ def coning_tasks(study: CatalogueFile) -> list[CatalogueTask]:
         CatalogueTask(
             name=f"coning {ratio} {name}",
             kind=kind,
-            design=study.coned(ratio, straight=straight),
+            design=study.coned_design(ratio, straight=straight),
             torques=edges(catalogue_row(size, ratio))[1:],
             work=ratio * {"coning ring": 0.02, "coning rigid": 0.5}.get(kind, 1.5),
         )

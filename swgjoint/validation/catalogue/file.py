@@ -107,7 +107,7 @@ class CatalogueFile(Section):
                 return None if value is None else float(value)
         return None
 
-    def coned(self, ratio: int, *, straight: bool) -> Design:
+    def coned_design(self, ratio: int, *, straight: bool) -> Design:
         """A design in space; straight: without relief along the face width."""
         own = self.coning
         variant = next(v for v in self.variants if v.name == own.variant)

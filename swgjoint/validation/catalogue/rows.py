@@ -55,7 +55,7 @@ def friction_of_path(found: Found, design: Design) -> RubbedPath:
 def stiffnesses(path: RubbedPath, row: CatalogueRow) -> Array:
     """K1, K2, K3: both signs are mirror images, so torsion begins at zero [N·m/rad]."""
     torques = edges(row)
-    x = np.array([0.0, *map(path.at, torques[1:])])
+    x = np.array([0.0, *map(path.torsion_at, torques[1:])])
     return np.asarray(np.diff(torques) / np.diff(x))
 
 
@@ -76,7 +76,7 @@ def stiffness_rows(
         for mu in study.coefficients:
             loss = path.hysteresis_loss(mu) / arcmin
             values.setdefault("hysteresis loss", []).append(loss)
-        lost = 2.0 * path.at(LOST_MOTION_TORQUE * row.rated_torque) / arcmin
+        lost = 2.0 * path.torsion_at(LOST_MOTION_TORQUE * row.rated_torque) / arcmin
         values.setdefault("lost motion", []).append(lost)
     reason = "; ".join(dict.fromkeys(faults)) or None
     whole = not faults

@@ -164,7 +164,7 @@ def two_per_turn(run: Run) -> float:
     angles = KinematicErrorTable(
         orders=np.array(TWO_PER_TURN), amplitudes=np.zeros((len(TWO_PER_TURN), 2))
     )
-    phases = angles.on(law.with_harmonics(np.zeros(len(law.orders), bool)))
+    phases = angles.apply_to(law.with_harmonics(np.zeros(len(law.orders), bool)))
     waves = phases.phases(theta, psi)[:, 1:]
     line = np.linspace(-1.0, 1.0, theta.size)[:, None]
     basis = np.hstack([np.ones_like(line), line, np.cos(waves), np.sin(waves)])

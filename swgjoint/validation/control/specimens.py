@@ -87,7 +87,7 @@ def _drawn(
     stated = (base.info.get("stated") or {}).get("transmission_accuracy_arcmin")
     wanted = (stated or ACCURACY) * arcmin
     table = KinematicErrorTable(orders=orders, amplitudes=pairs)
-    return table.sized(base, wanted).on(base)
+    return table.scale_to(base, wanted).apply_to(base)
 
 
 def _turned(

@@ -27,7 +27,7 @@ class CaseRecords:
         """Refinements, that of the thesis first."""
         return tuple(sorted(self.nominal))
 
-    def by_mesh(self, kind: Kind, *, tenth: bool) -> dict[float, float]:
+    def stress_by_mesh(self, kind: Kind, *, tenth: bool) -> dict[float, float]:
         """Stress by refinement, where known [MPa]."""
         found = {
             mesh: self.value(kind, tenth=tenth, refinement=mesh) for mesh in self.meshes
@@ -130,7 +130,7 @@ def _row(result: CaseRecords, kind: Kind) -> Row:
         nominal=ours(False),
         away=ours(tenth, away=True),
         fine=ours(tenth, finest),
-        by_mesh={} if tenth else result.by_mesh(kind, tenth=False),
+        by_mesh={} if tenth else result.stress_by_mesh(kind, tenth=False),
         places=result.places(kind, tenth=tenth),
         failures=result.failures,
         note=case.note,
@@ -155,7 +155,7 @@ def _row(result: CaseRecords, kind: Kind) -> Row:
             last_refinement_percent=percent(facts.fine, ours(tenth, before)),
             by_refinement={
                 f"{mesh:g}": value
-                for mesh, value in result.by_mesh(kind, tenth=False).items()
+                for mesh, value in result.stress_by_mesh(kind, tenth=False).items()
             },
             away_from_contacts=ours(False, away=True),
             away_from_contacts_tenth=ours(True, away=True),

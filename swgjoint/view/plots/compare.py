@@ -71,7 +71,7 @@ def columns(rows: Sequence[Compared]) -> dict[str, tuple[str, str]]:
     return {
         key: title
         for key, title in HEADER.items()
-        if any(row.told(key) is not None for row in rows)
+        if any(row.figure(key) is not None for row in rows)
     }
 
 
@@ -133,7 +133,7 @@ def comparison_picture(
     from matplotlib.figure import Figure
 
     panels = [
-        key for key in PANELS if any((row.told(key) or 0.0) > 0.0 for row in rows)
+        key for key in PANELS if any((row.figure(key) or 0.0) > 0.0 for row in rows)
     ]
     across = min(4, len(panels))
     down = -(-len(panels) // across)
@@ -163,7 +163,7 @@ def _bars(
     limit: float | None,
 ) -> None:
     """One figure of all rows, each bar with its value."""
-    values = [row.told(key) for row in rows]
+    values = [row.figure(key) for row in rows]
     heights = [value or 0.0 for value in values]
     seen = [value for value in heights if value > 0.0]
     wide = max(seen) > _WIDE * min(seen)

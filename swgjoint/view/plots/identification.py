@@ -30,7 +30,7 @@ def picture(found: Identified) -> Figure:
     """Every channel over time with its residual; torsion loop; kinematic error."""
     from matplotlib.figure import Figure
 
-    measured = found.model.measured()
+    measured = found.model.measured_torques()
     figure = Figure(figsize=(12.0, 3.2 * (len(measured) + 1)), layout="constrained")
     axes = figure.subplots(len(measured) + 1, 2)
     time = found.samples.time[found.model.kept]
@@ -65,9 +65,9 @@ def _loop(ax: Any, found: Identified) -> None:
     values = np.array([e.value for e in found.estimates.values()])
     a, b = model.amplitudes(values).T
     error = found.estimates["zero"].value + model.cos @ a + model.sin @ b
-    torque = model.measured().get("output_torque")
+    torque = model.measured_torques().get("output_torque")
     if torque is None:
-        torque = model.ratio * model.measured()["motor_torque"]
+        torque = model.ratio * model.measured_torques()["motor_torque"]
     x = (model.torsion + error)[model.kept]
     ax.plot(x / arcmin, torque, ".", ms=1.5, color="0.6", label="log")
     along = np.linspace(x.min(), x.max(), 400)

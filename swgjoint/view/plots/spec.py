@@ -77,7 +77,7 @@ def _turn(ax: Any, sheet: SpecSheet) -> None:
         label, colour = _ERRORS[key]
         turn = sheet.turns[key]
         periods = turn.turns / float(turn.period_turns)
-        angle, error = turn.over_output_turn()
+        angle, error = turn.output_turn()
         if periods > _MANY:  # a whole turn would be a solid block
             part = slice(0, 2 * turn.signal.size + 1)
             angle, error = angle[part], error[part]

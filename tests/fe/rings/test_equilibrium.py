@@ -144,7 +144,7 @@ def test_tooth_gaps_and_their_derivatives(model, state):
     """First and second derivatives of the gaps against differences."""
     rng = np.random.default_rng(4)
     nodes = state.q[: model.rim.size].reshape(-1, 2, 2)[:: model.nodes_per_tooth]
-    contacts, angle = model.teeth.seen(nodes[:, 0], nodes[:, 1])
+    contacts, angle = model.teeth.find_contacts(nodes[:, 0], nodes[:, 1])
     rows, second = model.teeth.rows(contacts, nodes[:, 0], nodes[:, 1], angle)
     move = rng.normal(size=nodes.shape) * 2e-7
     # turned without stretch, whose product with the turn the tangent leaves out
@@ -153,7 +153,7 @@ def test_tooth_gaps_and_their_derivatives(model, state):
 
     def gaps(step):
         there = nodes + step * move
-        found, _ = model.teeth.seen(there[:, 0], there[:, 1])
+        found, _ = model.teeth.find_contacts(there[:, 0], there[:, 1])
         near = contacts.nearest_in(found)
         return np.where(near >= 0, found.gap[near], np.nan)
 

@@ -79,7 +79,7 @@ def test_deflected_rim_holds_the_energy_of_plane_elements(name, tolerance):
     design = Design.load(name)
     plane = ring_model(design, half=True, elastic_circular_spline=False, bearing=False)
     load = Load(rotation=0.0, teeth=False)
-    peer = NewtonSolver()(plane, plane.at_rest(), load)
+    peer = NewtonSolver()(plane, plane.initial_guess(), load)
     assert peer.outcome.ok
     model = on_many_balls(design)
     state = RingSolver()(model, initial_state(model, 0.0), rotation=0.0, teeth=False)
@@ -100,7 +100,7 @@ def test_rim_and_teeth_yield_as_plane_elements(name):
         layout=design.drive.layout,
     )
     model = on_many_balls(design)
-    peer = plane.meshed(plane.deflected())
+    peer = plane.engage(plane.deflect())
     state = solve_loaded(model, solve_unloaded(model, 0.0), 1.0)
     over = []
     for torque in (60.0, 75.0, 90.0, 105.0, 120.0):

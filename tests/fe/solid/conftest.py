@@ -93,7 +93,7 @@ def loaded(small_design, small_drive, deflected, kept_once):
     """At 5 N·m, 0.4 of a pitch on: no position of symmetry."""
 
     def solve():
-        state = small_drive.to_torque(small_drive.meshed(deflected), TORQUE)
+        state = small_drive.to_torque(small_drive.engage(deflected), TORQUE)
         return small_drive.to_angle(state, 0.4 * 2.0 * np.pi / 42)
 
     return kept_once(f"loaded {small_design.content_hash()} {ORDERS}", solve)

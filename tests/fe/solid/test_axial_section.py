@@ -34,7 +34,7 @@ def turned(ring, state, angle):
 def at_rest(small_ring):
     """The undeformed flexspline as a state."""
     x, size = small_ring.reference, small_ring.strip.masters.face_size
-    start = small_ring.at_rest()
+    start = small_ring.initial_guess()
     last = small_ring.strip.masters.size - size
     return replace(start, faces=x[:, :size], inside=x[:, size:last])
 

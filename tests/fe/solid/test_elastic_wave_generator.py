@@ -140,7 +140,7 @@ def test_outside_the_range_is_refused(cup):
     with pytest.raises(
         InputError, match=naming("deflection", "0.495 mm", "0.49 mm", "teeth")
     ):
-        cup.on_teeth_at(0.495e-3)
+        cup.tooth_force_at(0.495e-3)
     with pytest.raises(
         InputError,
         match=naming("lobe force", "99 N", "0", f"{cup.force_at(0.5e-3):.4g} N"),
@@ -209,6 +209,6 @@ def test_a_pad_presses_as_the_load_does(design, ring):
     cup, share = cup_of(ring, design), cup_of(ring, design).share("mid_face")
     pulled = cup.pull(30.0, nonlinear=True)
     padded = with_pads(ring, share, pulled.of_planes)
-    state = SolidContinuation(ring=padded, ratio=design.ratio).deflected()
+    state = SolidContinuation(ring=padded, ratio=design.ratio).deflect()
     # the pad touches nodes, the load is spread over them
     assert pad_force(padded, state) == pytest.approx(30.0, rel=2e-3)

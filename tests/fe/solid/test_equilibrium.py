@@ -71,7 +71,7 @@ def test_input_torque_is_the_slope_of_the_energy_over_a_pitch(small_drive, loade
 def test_turning_everything_changes_nothing(small_drive, deflected):
     """Wave generator and bore turned by 0.37 rad: the same energy, the shape turned."""
     ring, angle = small_drive.ring, 0.37
-    start = ring.at_rest(angle, angle)
+    start = ring.initial_guess(angle, angle)
     turned = small_drive.solver(ring, start, SolidLoad(rotation=angle, teeth=False))
     assert turned.outcome.ok
     assert turned.energy == pytest.approx(deflected.energy, rel=1e-9)
@@ -84,7 +84,7 @@ def test_turning_everything_changes_nothing(small_drive, deflected):
 def test_shape_travels_with_the_wave_generator(small_drive, deflected):
     """One tooth pitch on, the bore held: every sector is like the one before it."""
     ring, pitch = small_drive.ring, 2 * pi / 40
-    start = ring.at_rest(pitch, 0.0)
+    start = ring.initial_guess(pitch, 0.0)
     ahead = small_drive.solver(ring, start, SolidLoad(rotation=0.0, teeth=False))
     assert ahead.energy == pytest.approx(deflected.energy, rel=1e-9)
     expected = deflected.faces[:-1] @ about_z(np.array(pitch)).T
@@ -122,7 +122,7 @@ def test_linear_level_finds_its_equilibrium(small_design, small_ring, deflected)
     """With the contact known there is nothing left to iterate; the shape differs."""
     ring = replace(small_ring, nonlinear=False)
     follow = SolidContinuation(ring=ring, ratio=small_design.ratio)
-    state = follow.deflected()
+    state = follow.deflect()
     assert state.outcome.ok
     # tenths of a millimetre apart: a lobe of a twentieth of the radius
     assert 1e-5 < np.abs(state.faces - deflected.faces).max() < 5e-4
@@ -134,7 +134,7 @@ def test_half_model_is_the_whole_drive(small_design, small_ring, loaded, small_d
     teeth = replace(small_ring.teeth, ring_teeth=42)
     whole = replace(small_ring, half=False, teeth=teeth)
     follow = SolidContinuation(ring=whole, ratio=small_design.ratio)
-    state = follow.to_torque(follow.meshed(follow.deflected()), TORQUE)
+    state = follow.to_torque(follow.engage(follow.deflect()), TORQUE)
     state = follow.to_angle(state, loaded.wave_generator_angle)
     assert state.outcome.ok
     assert state.energy == pytest.approx(loaded.energy, rel=1e-8)
@@ -167,6 +167,6 @@ def test_crowned_wave_generator_engages_under_a_short_cup():
     )
     # with fewer masters it does not rock
     follow = SolidContinuation(ring=solid_ring(design, half=True), ratio=design.ratio)
-    engaged = follow.meshed(follow.deflected())
+    engaged = follow.engage(follow.deflect())
     assert engaged.outcome.ok
     assert len(engaged.history) < 40

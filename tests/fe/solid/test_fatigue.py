@@ -95,7 +95,7 @@ def test_safety_factors_of_a_known_history():
     """Amplitudes and means of cosines give what the formula gives."""
     wave = np.cos(2 * PHI)[:, None]
     stress = field(120e6 * wave, 36e6 * wave, 25e6 + 15e6 * wave)
-    shell = ShellDimensions.of(Design.load("stress-cup"))
+    shell = ShellDimensions.from_design(Design.load("stress-cup"))
     strip = small_cup().strip
     found = assess(strip, {"teeth": stress}, 100.0, LIMITS, shell)
     expected = safety_factor(
@@ -159,7 +159,7 @@ def test_torque_runs_through_the_cylinder():
 def test_bending_of_four_forces_is_the_shell_theory():
     """No torque: C_sigma w_0 E s/r^2 and a third more, as only the roots bend."""
     design = small_design()
-    shell = ShellDimensions.of(design)
+    shell = ShellDimensions.from_design(design)
     found = assess(small_cup().strip, four().stresses(0.0), 0.0, LIMITS, shell)
     ratio = found.middle.normal_amplitude / (
         shell.bending_stress(1.510) * 0.3e-3 / shell.deflection

@@ -41,7 +41,7 @@ def driven(follow, loaded):
         rotation=loaded.rotation - turn,
         ring_rotation=-turn,
     )
-    return follow.loaded(start, -loaded.tooth_moment, follow.input_angle(start))
+    return follow.load(start, -loaded.tooth_moment, follow.input_angle(start))
 
 
 def test_same_state_from_another_member(follow, driven, loaded):

@@ -19,13 +19,13 @@ def test_compliance_is_the_slope_of_the_rotation(small_drive, loaded):
     slope = (loaded.rotation - more.rotation) / (0.001 * loaded.torque)
     # the curvature of the contacts is not in the frozen tangent
     assert loaded.compliance == pytest.approx(slope, rel=0.01)
-    assert np.isnan(small_drive.held(loaded).compliance)
+    assert np.isnan(small_drive.hold_output(loaded).compliance)
 
 
 def test_a_flexspline_turns_within_its_field(small_drive, deflected):
     """The predictor keeps the wave where it is and turns what it runs through."""
     pitch = 2.0 * np.pi / small_drive.teeth
-    turned = small_drive.turned(deflected, pitch)
+    turned = small_drive.rotate_output(deflected, pitch)
     assert turned.wave_generator_angle == deflected.wave_generator_angle
     assert turned.rotation == pytest.approx(deflected.rotation + pitch)
     radius = np.linalg.norm(deflected.faces[..., :2], axis=-1)

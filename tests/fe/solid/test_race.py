@@ -55,13 +55,13 @@ def drive(design, ring):
 @pytest.fixture(scope="module")
 def deflected(drive):
     """On the balls, no tooth contact."""
-    return drive.deflected()
+    return drive.deflect()
 
 
 @pytest.fixture(scope="module")
 def turned_on(drive, deflected):
     """Under torque, at no position of symmetry of teeth and balls."""
-    state = drive.to_torque(drive.meshed(deflected), TORQUE)
+    state = drive.to_torque(drive.engage(deflected), TORQUE)
     return drive.to_angle(state, 0.4 * 2.0 * pi / 42)
 
 
@@ -190,11 +190,11 @@ def test_anchor_gives_way_to_the_softest_roll():
 
     At size 25 and ratio 100, whose 200 short elements are stiff and whose race is not.
     """
-    race = SolidRace.of(Design.load("size-25-100"), half=False)
+    race = SolidRace.from_design(Design.load("size-25-100"), half=False)
     r, roll = race.on_balls.race.radius, 0.01
     motions = [(roll, -roll * r * part, 2) for part in np.linspace(0.2, 0.35, 16)]
     softest = min(motions, key=lambda motion: out_of_plane_energy(race, *motion))
-    here = race.placed(np.zeros((race.sectors, 2, 4)), 0.0)
+    here = race.coordinates(np.zeros((race.sectors, 2, 4)), 0.0)
     moved = race.elements(rolled(race, *softest))
     tangent = race.forces(here, 0.0).hessian
     stiff = 0.5 * float(np.einsum("si,sij,sj->", moved, tangent, moved))
@@ -241,7 +241,7 @@ def test_ball_and_bore_forces_balance(design, few_masters):
     whole = solid_ring(
         odd, bearing="free", elastic_circular_spline=False, orders=few_masters
     )
-    state = SolidContinuation(ring=whole, ratio=odd.ratio).deflected(0.1)
+    state = SolidContinuation(ring=whole, ratio=odd.ratio).deflect(0.1)
     assert state.outcome.ok
     balls = whole.race.forces(state.race, state.wave_generator_angle).balls
     frame = whole.frames(state)[0]
@@ -268,7 +268,7 @@ def test_rigid_race_after_stribeck(ring, clearance, figure):
     moved[:, 0, 1] = -10e-6
     still = np.arange(race.sectors)
     moved[:, 0, :2] = rotate(moved[:, 0, :2], -race.pitch * still)
-    found = race.forces(race.placed(moved, 0.0), 0.0)
+    found = race.forces(race.coordinates(moved, 0.0), 0.0)
     resultant = found.balls.push.sum(axis=0)
     assert abs(resultant[0]) < 1e-9 * abs(resultant[1])
     assert found.balls.force[0] == found.balls.force.max()  # the ball at the top
@@ -317,7 +317,7 @@ def test_input_torque_is_the_slope_of_the_energy(ring, drive, turned_on):
 def test_race_rolls_with_the_cone_unless_its_warping_is_held(ring, design, deflected):
     """At a lobe the edge towards the closed end goes in; held axially by less."""
     stiff = replace(ring, race=replace(ring.race, axially_free=False))
-    held = SolidContinuation(ring=stiff, ratio=design.ratio).deflected()
+    held = SolidContinuation(ring=stiff, ratio=design.ratio).deflect()
     assert held.outcome.ok
     free, less = (state.race[0, 0, 2] for state in (deflected, held))
     assert free < 1.2 * less < 0.0
@@ -331,7 +331,7 @@ def test_bearing_is_absent_unless_asked_for(design, few_masters):
         design, half=True, elastic_circular_spline=False, orders=few_masters
     )
     assert plain.race is None
-    assert plain.at_rest().race is None
+    assert plain.initial_guess().race is None
     assert plain.size == 3 * plain.strip.masters.size
 
 

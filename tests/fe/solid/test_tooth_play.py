@@ -28,7 +28,7 @@ def drive(small_design, few_masters):
 @pytest.fixture(scope="module")
 def found(drive):
     """On its wave generator, and its play."""
-    state, ring = drive.deflected(), drive.ring
+    state, ring = drive.deflect(), drive.ring
     return state, play(ring, ring.frames(state)[0], ring.loads(state), drive.ratio)
 
 
@@ -38,7 +38,7 @@ def test_the_solved_output_is_free_over_the_play(drive, found, side):
     state, free = found
     # the ratio of 20 is 5 % of it
     for share, touches in ((0.995, False), (1.005, True)):
-        there = drive.held(drive.turned(state, side * 0.5 * share * free))
+        there = drive.hold_output(drive.rotate_output(state, side * 0.5 * share * free))
         assert there.outcome.ok
         assert is_free(there) is not touches
 

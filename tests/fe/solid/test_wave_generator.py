@@ -15,7 +15,7 @@ ALPHA = 0.7
 
 
 def surface(**changes):
-    return WaveGeneratorSurface.of(
+    return WaveGeneratorSurface.from_design(
         Design.load("reference-3d-modified").with_changes(**changes)
     )
 

@@ -47,7 +47,7 @@ class FatigueLimits:
     torsion: float
 
     @classmethod
-    def of(cls, design: Design) -> FatigueLimits:
+    def from_design(cls, design: Design) -> FatigueLimits:
         """Those of the flexspline.
 
         Raises:
@@ -157,7 +157,10 @@ def fatigue(
         DesignError: If the design cannot be built or lacks endurance limits.
         ComputationError: If a solve fails or memory will not do.
     """
-    limits, shell = FatigueLimits.of(design), ShellDimensions.of(design)
+    limits, shell = (
+        FatigueLimits.from_design(design),
+        ShellDimensions.from_design(design),
+    )
     ring = solid_ring(design, half="auto")
     follow = SolidContinuation(
         ring=ring, ratio=design.ratio, layout=design.drive.layout
@@ -171,8 +174,8 @@ def fatigue(
         progress("fatigue", count, total)
         return state
 
-    state = reached(follow.deflected(), "deflection by the wave generator", 1)
-    state = reached(follow.meshed(state), "engagement of the teeth", 2)
+    state = reached(follow.deflect(), "deflection by the wave generator", 1)
+    state = reached(follow.engage(state), "engagement of the teeth", 2)
     found: list[Fatigue] = []
     for torque in torques:
         state = follow.to_torque(state, torque)

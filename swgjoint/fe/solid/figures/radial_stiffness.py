@@ -118,7 +118,7 @@ def smooth_cup_stiffness(design: Design, *, open_edge: bool = False) -> float:
         open_edge: Load at the open end instead of mid-face.
     """
     assert design.cup is not None
-    shell = ShellDimensions.of(design)
+    shell = ShellDimensions.from_design(design)
     width = design.drive.face_width_mm * mm
     wall = design.cup.thickness_coefficient * shell.wall
     length = width + shell.length - 0.5 * wall  # to the middle of the diaphragm

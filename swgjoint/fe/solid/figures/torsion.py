@@ -77,7 +77,7 @@ def solid_torsion(
     follow = SolidContinuation(
         ring=ring, ratio=design.ratio, layout=design.drive.layout
     )
-    state = follow.meshed(follow.deflected())
+    state = follow.engage(follow.deflect())
     series = series_compliance(design, cup=False)
     width = design.drive.face_width_mm * mm
     rows = []

@@ -131,7 +131,7 @@ class LobeCharacteristic:
             return inf
         return float(brentq(self.play_at, w[free[-1]], w[free[-1] + 1]))
 
-    def on_teeth_at(self, deflection: float) -> float:
+    def tooth_force_at(self, deflection: float) -> float:
         """Part of the force of a lobe that the teeth take [N].
 
         Raises:
@@ -168,7 +168,7 @@ class LobeCharacteristic:
 
             def pushed(w: float) -> float:
                 springs = generator.preload + k * (self.height - w)
-                return springs - self.force_at(w) - self.on_teeth_at(w)
+                return springs - self.force_at(w) - self.tooth_force_at(w)
 
             if not pushed(low) >= 0.0 >= pushed(high):
                 least, most = (generator.preload - pushed(end) for end in (low, high))
@@ -177,7 +177,7 @@ class LobeCharacteristic:
                     f" accepted: {least:.4g} to {most:.4g} N"
                 )
             w = float(brentq(pushed, low, high, xtol=1e-15))
-        on_teeth = self.on_teeth_at(w)
+        on_teeth = self.tooth_force_at(w)
         return WorkingPoint(
             deflection=w,
             force=self.force_at(w) + on_teeth,

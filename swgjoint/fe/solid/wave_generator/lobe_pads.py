@@ -92,8 +92,8 @@ def force_on_teeth(
     """
     padded = with_pads(ring, share, deflection)
     follow = SolidContinuation(ring=padded, ratio=ratio)
-    alone = _checked(follow.deflected(), padded.lobe_height)
-    meshed = _checked(follow.meshed(alone), padded.lobe_height)
+    alone = _checked(follow.deflect(), padded.lobe_height)
+    meshed = _checked(follow.engage(alone), padded.lobe_height)
     return pad_force(padded, meshed) - pad_force(padded, alone)
 
 

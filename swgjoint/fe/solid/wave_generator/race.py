@@ -64,14 +64,16 @@ class SolidRace:
     """Angle of ball 0 from the major axis at alpha = 0 [rad]."""
 
     @classmethod
-    def of(cls, design: Design, *, half: bool, axially_free: bool = True) -> SolidRace:
+    def from_design(
+        cls, design: Design, *, half: bool, axially_free: bool = True
+    ) -> SolidRace:
         """That of a design; its flexspline has as many sectors as the race elements."""
-        own = RaceOnBalls.of(design, design.drive.teeth_flexspline)
+        own = RaceOnBalls.from_design(design, design.drive.teeth_flexspline)
         return cls(
             on_balls=own,
             half=half,
-            outside=RaceOutside.of(design),
-            roll=RaceRoll.of(own.bearing, own.race),
+            outside=RaceOutside.from_design(design),
+            roll=RaceRoll.from_bearing(own.bearing, own.race),
             axially_free=axially_free,
         )
 
@@ -89,7 +91,7 @@ class SolidRace:
         """Which places along the axis lie on the race."""
         return self.outside.covers(z)
 
-    def at_rest(self, alpha: float, rotation: float, closed: float) -> Array:
+    def initial_guess(self, alpha: float, rotation: float, closed: float) -> Array:
         """Start of a search: deflected by the lobes, pressed on the balls there.
 
         Args:
@@ -116,7 +118,7 @@ class SolidRace:
         still[:, :2] = rotate(still[:, :2], -0.5 * self.pitch)
         return still
 
-    def displaced(self, race: Array, rotation: float) -> Array:
+    def displacements(self, race: Array, rotation: float) -> Array:
         """Motion of the nodes in the frames of the teeth, turned with the flexspline.
 
         Args:
@@ -127,7 +129,7 @@ class SolidRace:
         flat = rotate(race[..., :2], -angle[:, None])
         return np.concatenate([flat, race[..., 2:]], axis=-1) - self._still
 
-    def placed(self, displaced: Array, rotation: float) -> Array:
+    def coordinates(self, displaced: Array, rotation: float) -> Array:
         """Coordinates of nodes that have moved so in the frames of the teeth."""
         race = displaced + self._still
         angle = self.pitch * np.arange(self.sectors, dtype=np.float64) + rotation
@@ -152,7 +154,7 @@ class SolidRace:
         gradient, hessian = np.zeros((n, 2 * NODE)), np.zeros((n, 2 * NODE, 2 * NODE))
         gradient[:, PLANE[:4]] = nodal.reshape(-1, 4)[:n]
         hessian[:, PLANE[:, None], PLANE] = blocks[:n]
-        balls = self.on_balls.pressed(q, alpha, self.phase, self._feet(race, alpha))
+        balls = self.on_balls.press_balls(q, alpha, self.phase, self._feet(race, alpha))
         on = np.flatnonzero(balls.overlap > 0.0)
         on = on[balls.seen.dofs[on, 0] // 4 < n]
         near, force = balls.seen.chosen(on), balls.force[on]

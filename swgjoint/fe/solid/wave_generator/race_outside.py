@@ -39,9 +39,9 @@ class RaceOutside:
     circular: bool
 
     @classmethod
-    def of(cls, design: Design) -> RaceOutside:
+    def from_design(cls, design: Design) -> RaceOutside:
         """That of a design."""
-        bearing, shape = BallBearing.of(design), design.micro_geometry
+        bearing, shape = BallBearing.from_design(design), design.micro_geometry
         return cls(
             thickness=bearing.race_thickness,
             width=bearing.race_width,

@@ -36,7 +36,7 @@ class RaceRoll:
     """G J [N m^2]."""
 
     @classmethod
-    def of(cls, bearing: BallBearing, ring: HermiteRing) -> RaceRoll:
+    def from_bearing(cls, bearing: BallBearing, ring: HermiteRing) -> RaceRoll:
         """That of a bearing; the groove takes its part of J, none of I_z."""
         t, b, steel = bearing.race_thickness, bearing.race_width, bearing.material
         torsion = bearing.groove_inertia_factor * b * t**3 / 3.0 * (1.0 - 0.63 * t / b)

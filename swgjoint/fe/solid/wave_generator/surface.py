@@ -39,7 +39,7 @@ class WaveGeneratorSurface:
     """Centre of the outline in the frame that turns with it (2,) [m]."""
 
     @classmethod
-    def of(cls, design: Design) -> WaveGeneratorSurface:
+    def from_design(cls, design: Design) -> WaveGeneratorSurface:
         """That of a design."""
         shape = design.micro_geometry
         return cls(
