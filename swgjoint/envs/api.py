@@ -218,7 +218,7 @@ class BatchEnv(VectorEnv[Array, Array, Array]):
         good = isinstance(mask, np.ndarray) and mask.dtype == np.bool_
         if not (good and mask.shape == (n,) and mask.any()):
             raise InputError(
-                f"reset_mask {format_value(mask)}; accepted: an array of {n} truth values, at"
+                f"reset_mask {format_value(mask)}; accepted: an array of {n} bools, at"
                 " least one of them True"
             )
         if not self._rngs:

@@ -73,8 +73,8 @@ class ArmSettings:
         check_flag("friction", self.friction)
         if not isinstance(self.scene, str | Path):
             raise InputError(
-                f"scene {format_value(self.scene)}; accepted: name or path of a scene, or an"
-                " arm"
+                f"scene {format_value(self.scene)}; accepted: a name or path of a scene"
+                " an arm"
             )
         if self.action not in ACTIONS:
             raise InputError(f"action {self.action!r}; accepted: {', '.join(ACTIONS)}")

@@ -80,8 +80,8 @@ class BenchSettings:
         check_flag("friction", self.friction)
         if not isinstance(self.drive, str | DriveMap):
             raise InputError(
-                f"drive {format_value(self.drive)}; accepted: a catalogue name, a map or"
-                " design file, or a DriveMap"
+                f"drive {format_value(self.drive)}; accepted: a catalogue name, a map"
+                " or design file, or a DriveMap"
             )
         if self.level not in LEVELS:
             raise InputError(

@@ -217,8 +217,9 @@ class JointTrackingEnv(SingleEnv):
         sensors: Mapping with fields of :class:`~swgjoint.envs.sensors.Sensors`.
         randomise: True, or a mapping with fields of
             :class:`~swgjoint.envs.specimen.SpecimenTolerances`: every episode has a
-            drive and a load of its own. ``task`` keeps the nominal ones. At ``linear`` True draws
-            the load's inertia alone, and tolerances of the drive are refused. False.
+            drive and a load of its own. ``task`` keeps the nominal ones. At ``linear``
+            True draws the load's inertia alone, and tolerances of the drive are
+            refused. False.
         reference: One or several of ``sinusoid``, ``multisine``, ``point_to_point``.
         error_scale_arcmin: Of the reward; 3.
         effort_weight: Of the reward; 0.1.

@@ -65,7 +65,8 @@ class Sensors:
             )
         if unknown := [key for key in argument if key not in known]:
             raise InputError(
-                f"sensor {format_value(unknown[0])}; accepted: {', '.join(sorted(known))}"
+                f"sensor {format_value(unknown[0])}; accepted:"
+                f" {', '.join(sorted(known))}"
             )
         return cls(**argument)  # type: ignore[arg-type]
 

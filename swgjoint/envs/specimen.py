@@ -77,7 +77,8 @@ class SpecimenTolerances:
             if not good:
                 accepted = "True, False" if flag else "0 to 1, 1 excluded"
                 raise InputError(
-                    f"tolerance {field.name} {format_value(value)}; accepted: {accepted}"
+                    f"tolerance {field.name} {format_value(value)}; accepted:"
+                    f" {accepted}"
                 )
 
     def draw(self, rng: np.random.Generator) -> tuple[Variation, float]:

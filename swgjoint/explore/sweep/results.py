@@ -99,7 +99,7 @@ class Remote:
         return data
 
     def write(self, name: str, data: bytes) -> str:
-        """See :class:`ResultStore`; moved into place, as not all systems write whole."""
+        """See :class:`ResultStore`; moved into place: not all systems write whole."""
         target = f"{self._root}/{name}"
         folder, _, last = target.rpartition("/")
         beside = f"{folder}/.{last}.{secrets.token_hex(4)}"

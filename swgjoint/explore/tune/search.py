@@ -253,8 +253,8 @@ def read_journal(
         ) from None
     except Exception as error:  # a file may be anything
         raise InputError(
-            f"{path} is no journal of a tuning run: {one_line(error)}; accepted: another"
-            " --out"
+            f"{path} is no journal of a tuning run: {one_line(error)}; accepted:"
+            " another --out"
         ) from None
     for key, value in header.items():
         if kept.get(key) != value:

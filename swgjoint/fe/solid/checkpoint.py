@@ -62,8 +62,8 @@ class Checkpoint:
             return cls(folder=folder, asked=resume)
         except (OSError, DamagedError) as error:
             raise InputError(
-                f"{file} is of no run that --resume could go on with: {one_line(error)};"
-                " accepted: another --out"
+                f"{file} is of no run that --resume could go on with:"
+                f" {one_line(error)}; accepted: another --out"
             ) from None
         if there != settings:
             keys = [k for k in {**settings, **there} if there.get(k) != settings.get(k)]
@@ -113,7 +113,8 @@ class Checkpoint:
         except Exception as error:  # a file may be anything
             if self.asked:
                 raise InputError(
-                    f"--resume: {path}: {one_line(error)}; remove it to compute it again"
+                    f"--resume: {path}: {one_line(error)}; remove it to compute it"
+                    " again"
                 ) from None
             warn_ignored(path, error)
             return None

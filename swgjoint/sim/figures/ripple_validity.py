@@ -49,7 +49,7 @@ def ripple_label(run: Run, j: int, ripple: Array) -> dict[str, Any]:
         ``ripple_missing``: why there is none to tell, None where there is.
         ``ripple_noise_percent``: rms of the noise of the integration, of the rated
         torque. ``ripple_left_out_percent``: rms of the orders that the step leaves out.
-        ``ripple_is_lower_bound``: whether they matter. ``find_resolving_step``: the strongest
+        ``ripple_is_lower_bound``: whether they matter. ``resolving``: the strongest
         order that is left out with the step, and the speed of the joint at the step of
         the run, that carry it; None where nothing is left out.
     """
