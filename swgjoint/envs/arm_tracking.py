@@ -74,7 +74,7 @@ class ArmSettings:
         if not isinstance(self.scene, str | Path):
             raise InputError(
                 f"scene {format_value(self.scene)}; accepted: a name or path of a scene"
-                " an arm"
+                " or of an arm"
             )
         if self.action not in ACTIONS:
             raise InputError(f"action {self.action!r}; accepted: {', '.join(ACTIONS)}")

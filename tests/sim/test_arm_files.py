@@ -496,3 +496,14 @@ def test_numbers_of_a_urdf_are_named(tmp_path, capfd):
         RigidArm(str(file))
     file.write_text(sound.replace('effort="60"', 'effort="inf"'))
     assert "lift" not in RigidArm(str(file)).effort
+
+
+def test_names_that_are_no_text_are_refused(tmp_path):
+    """The engine takes any bytes as a name; the line names the file and the byte."""
+    path = tmp_path / "arm.xml"
+    path.write_bytes(
+        b'<mujoco><worldbody><body name="lin\xb5"><joint name="j"/><geom size=".1"/>'
+        b"</body></worldbody></mujoco>"
+    )
+    with pytest.raises(InputError, match=naming("arm.xml", "0xb5", "UTF-8")):
+        scene_of_arm(path)

@@ -63,7 +63,18 @@ def read_arm(path: Path, reading: ArmReading | None = None) -> ArmFile:
     Raises:
         InputError: If the file is no arm, or none of its hinges moves on its own.
     """
-    reading = reading or ArmReading()
+    try:
+        return _arm_of(path, reading or ArmReading())
+    except UnicodeDecodeError as error:  # the engine reads names of any bytes
+        byte = error.object[error.start]
+        raise InputError(
+            f"{path}: a name in the file has the byte 0x{byte:02x}, which is not UTF-8;"
+            " accepted: text in UTF-8"
+        ) from None
+
+
+def _arm_of(path: Path, reading: ArmReading) -> ArmFile:
+    """See :func:`read_arm`."""
     spec = _spec_of(path)
     if reading.balance_inertia:
         _balance_inertia(spec)
