@@ -23,7 +23,6 @@ Source:
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 
 from swgjoint.control.motor_side import MotorPlan, known_friction
@@ -31,8 +30,7 @@ from swgjoint.errors import ComputationError
 from swgjoint.joint.prescribed import motor_of_link
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.controller import Task
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 RTOL = 1e-9
 """Torque left over rated torque at which a motor angle is accepted."""

@@ -23,9 +23,8 @@ from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.fit.error_fit import ORDERS
 from swgjoint.maps.fit.error_spectrum import peak_to_peak, with_error
 from swgjoint.sim.controller import Controller, Measured, Task
+from swgjoint.typing import Array
 from swgjoint.units import deg
-
-Array = NDArray[np.float64]
 
 SEARCHED: tuple[tuple[int, int], ...] = (*ORDERS, (1, 1), (8, 0), (0, 8))
 """(p, q) that a record is searched for: low orders of either member, the output turn,

@@ -46,8 +46,8 @@ from numpy.typing import NDArray
 from swgjoint.errors import InputError
 from swgjoint.gear.kinematics import angle_coefficients
 from swgjoint.sim.controller import Controller, Measured, Task
+from swgjoint.typing import Array
 
-Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 LEARNED: tuple[tuple[int, int], ...] = ((2, 0), (0, 2), (1, 1), (4, 0), (0, 4))

@@ -19,11 +19,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from swgjoint.sim.controller import KnownJoints, Measured, Task
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 SLOW = 0.05
 """Speed over which a friction feed-forward changes its sign [rad/s of the motor]."""

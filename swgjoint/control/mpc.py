@@ -47,7 +47,7 @@ from dataclasses import replace
 
 import mujoco
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from swgjoint.control.flexible import flexible_plan
 from swgjoint.control.motor_side import Planner
@@ -56,8 +56,7 @@ from swgjoint.control.mpc_solver import solve
 from swgjoint.errors import InputError
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.controller import KnownJoints, Measured, Task
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 HORIZON = 20
 """Instants that are looked ahead."""

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 from scipy.linalg import expm, solve_discrete_are
 
 from swgjoint.control.mpc_solver import prepare
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 ENCODER = 1e-3
 """What the motor's encoder, and the link's times the ratio, may be off [rad].

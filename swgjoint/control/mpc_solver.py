@@ -19,9 +19,8 @@ Source:
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 ITERATIONS = 300
 TOLERANCE = 1e-6

@@ -22,12 +22,10 @@ from __future__ import annotations
 from collections import deque
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.errors import InputError
 from swgjoint.sim.controller import Controller, Measured, Task
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 FASTEST = 0.25
 """Largest bandwidth times period; the sum in place of the integral rings from 1 on."""

@@ -30,15 +30,14 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
 from swgjoint.control.symbolic import casadi
 from swgjoint.control.symbolic_arm import SymbolicArm
 from swgjoint.errors import ComputationError, InputError
 from swgjoint.joint.drive import JointDrive
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 DEGREE = 3
 """Points of an interval: of sixth order at its end."""

@@ -14,11 +14,9 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.errors import InputError, MissingExtraError
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 
 class PinocchioArm:

@@ -30,12 +30,10 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.errors import MissingExtraError
 from swgjoint.maps.drive_map import DriveMap
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 LARGE = 20_000
 """Numbers in a map from which its functions keep matrices instead of scalars."""

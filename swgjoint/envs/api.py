@@ -18,8 +18,7 @@ from swgjoint.envs.core import Core, Entry, bounds
 from swgjoint.envs.picture import Picture
 from swgjoint.errors import InputError
 from swgjoint.sim.controller import Measured, Task
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 
 def _check_began(began: bool) -> None:

@@ -8,7 +8,6 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.envs.arguments import check_flag, check_number, format_value
 from swgjoint.envs.core import Core, Entry, EpisodeLimits, ceiling, error_bounds
@@ -29,8 +28,7 @@ from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.arm.rigid_arm import RigidArm, compile_spec
 from swgjoint.sim.controller import KnownJoints
 from swgjoint.sim.figures.transmission import transmission_of
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 LEVELS = ("full", "linear")
 MAX_SUB_STEPS = 16

@@ -24,9 +24,9 @@ from swgjoint.errors import InputError
 from swgjoint.joint.variation import Variation
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.controller import KnownJoints, Measured, ReadingAge, Task
+from swgjoint.typing import Array
 from swgjoint.units import arcmin
 
-Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
 
 TRACKED = 50.0 * arcmin

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.envs.api import BatchEnv, SingleEnv
 from swgjoint.envs.arguments import format_value
@@ -13,9 +12,8 @@ from swgjoint.envs.bench import BenchCore, BenchSettings
 from swgjoint.envs.core import Entry, ceiling
 from swgjoint.envs.references import KINDS, draw_motion, smooth_step
 from swgjoint.errors import InputError
+from swgjoint.typing import Array
 from swgjoint.units import arcmin
-
-Array = NDArray[np.float64]
 
 LOAD_RAMP = 0.3
 """Time over which the load grows [s]."""

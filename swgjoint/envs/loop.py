@@ -6,11 +6,9 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.sim.controller import KnownJoints
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -16,8 +16,8 @@ from swgjoint.joint.drive import JointDrive
 from swgjoint.joint.response import responses
 from swgjoint.joint.variation import SIZE, Variation
 from swgjoint.maps.drive_map import DriveMap
+from swgjoint.typing import Array
 
-Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 

@@ -14,15 +14,13 @@ from typing import Any
 import gymnasium
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.envs.api import SingleEnv
 from swgjoint.errors import InputError
+from swgjoint.typing import Array
 from swgjoint.view.recording.columns import Column
 from swgjoint.view.recording.geometry import quaternion_xyzw, shape_of
 from swgjoint.view.recording.recording import end_stream, recording_file
-
-Array = NDArray[np.float64]
 
 SHOWN = (
     "reward",

@@ -13,9 +13,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
+
 Motion = tuple[Array, Array, Array]
 """Position [rad], velocity [rad/s], acceleration [rad/s²]; shapes (n,)."""
 

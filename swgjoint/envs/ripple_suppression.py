@@ -14,9 +14,8 @@ from swgjoint.envs.core import Entry, Rows, ceiling
 from swgjoint.envs.references import smooth_step
 from swgjoint.errors import InputError
 from swgjoint.gear.kinematics import angle_coefficients
+from swgjoint.typing import Array
 from swgjoint.units import arcmin
-
-Array = NDArray[np.float64]
 
 RAMP = 0.5
 """Time in which speed and load grow; then the motion is steady [s]."""

@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from swgjoint.envs.arguments import format_value, is_flag, is_number, is_whole
 from swgjoint.errors import InputError
+from swgjoint.typing import Array
 from swgjoint.units import arcsec
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)

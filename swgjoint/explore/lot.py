@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import binomtest
 
 from swgjoint.code_hash import code_hash
@@ -37,8 +36,6 @@ from swgjoint.pool import run_all
 from swgjoint.progress import Progress, silent
 from swgjoint.store import json_file, keep
 from swgjoint.units import arcmin
-
-Array = NDArray[np.float64]
 
 UPPER = ("transmission_accuracy_arcmin", "ripple_rms_percent")
 """Figures with an upper limit."""

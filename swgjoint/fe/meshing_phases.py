@@ -14,10 +14,10 @@ and means are then those of that phase, not of the passage of a tooth.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.gear.catalogue import ratings_of
 from swgjoint.gear.design.design import Design
+from swgjoint.typing import Array
 
 STEPS = 35
 """Positions of the thesis (section 3.4.5); the default where they spread."""
@@ -31,8 +31,6 @@ OVERLOAD = 10.0
 """Of the rated torque, from which a torque is more likely a mistake than a load: strain
 wave gears ratchet below [-]."""
 _ROUND_OFF = 1e-6  # pitches
-
-Array = NDArray[np.float64]
 
 
 def phases_of(design: Design, steps: int, turn: float) -> Array:

@@ -8,7 +8,6 @@ from math import nan, pi
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.errors import Outcome
 from swgjoint.fe.common.stress_state import stress_state_label
@@ -22,9 +21,8 @@ from swgjoint.fe.plane.superelement import Superelement
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.tolerances import has_errors
 from swgjoint.gear.mounting import springs_of
+from swgjoint.typing import Array
 from swgjoint.units import arcsec, deg
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.integrate import solve_bvp
 from scipy.interpolate import CubicSpline
 
 from swgjoint.errors import ComputationError
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 
 def small_deflection(angle: ArrayLike) -> Array:

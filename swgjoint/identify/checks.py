@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.errors import InputError
 from swgjoint.gear.kinematics import LAYOUTS
@@ -15,13 +14,13 @@ from swgjoint.gear.kinematics import ratio as signed_ratio
 from swgjoint.identify.log import BenchLog
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.fit.loop_units import TORSION_AT_RATED
+from swgjoint.typing import Array
 from swgjoint.units import arcmin
 
 if TYPE_CHECKING:
     from swgjoint.identify.identification import Estimate
     from swgjoint.identify.model import Model
 
-Array = NDArray[np.float64]
 
 MOVES = 0.05
 """Motion of the link beyond what torsion alone can be [rad]: three times 60 arcmin."""

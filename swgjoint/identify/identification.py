@@ -44,7 +44,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.errors import ComputationError, InputError
 from swgjoint.gear.kinematics import LAYOUTS
@@ -54,8 +53,7 @@ from swgjoint.identify.identified_map import map_of
 from swgjoint.identify.log import FEWEST, Averaged, BenchLog
 from swgjoint.identify.model import Model
 from swgjoint.maps.drive_map import DriveMap
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 WINDOW = 0.005
 """Samples are averaged over this time [s]."""

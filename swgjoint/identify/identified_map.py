@@ -15,8 +15,7 @@ from swgjoint.maps.fit.friction_fit import PRESLIDING, RELAXATION
 from swgjoint.maps.friction import Friction
 from swgjoint.maps.hysteresis import Jenkin
 from swgjoint.maps.torsion_law import potential_of_stiffness
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 _PIECES = 16  # of the cubic spring
 

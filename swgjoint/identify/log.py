@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from swgjoint.csv_columns import header_of, read_columns
 from swgjoint.errors import InputError
+from swgjoint.typing import Array
 from swgjoint.units import arcmin, deg
-
-Array = NDArray[np.float64]
 
 NEEDED = {
     "time": {"time_s": 1.0},

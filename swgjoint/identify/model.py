@@ -19,8 +19,7 @@ from swgjoint.maps.friction import play_bristle
 from swgjoint.maps.from_catalogue import three_lines
 from swgjoint.maps.hysteresis import stretches
 from swgjoint.maps.torsion_law import torque_at_knots
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 SPRINGS = {
     "three_lines": ("K1", "K2", "K3"),

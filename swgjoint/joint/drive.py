@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from swgjoint.errors import InputError
 from swgjoint.joint.native import NativeSpring
@@ -14,8 +14,7 @@ from swgjoint.joint.prescribed import error_of_motor, motor_of_link
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.friction import Friction
 from swgjoint.maps.hysteresis import Jenkin, Sliders
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 LEAST_DAMPING_RATIO = 0.001
 """Damping ratio from which a drive needs no help in a contact [-]."""

@@ -24,12 +24,10 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.hysteresis import Jenkin
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 MAX_CORNERS = 4
 """Most tendons with a dead band: each costs the engine a few percent of a step."""

@@ -9,12 +9,10 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.errors import InputError
 from swgjoint.joint.obstacles import Surroundings
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 ROTOR_MASS = 1e-9
 """Mass of the rotor body [kg]; the arm's model already holds the motor's mass."""

@@ -18,12 +18,11 @@ commanded motor angle, :math:`n |\theta - \theta_r|` in phase at order n.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from swgjoint.errors import ComputationError
 from swgjoint.maps.drive_map import DriveMap
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 
 def kinematic_part(drive: DriveMap) -> DriveMap:

@@ -44,12 +44,10 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.joint.friction_step import FrictionStep, friction_step, stretch_after
 from swgjoint.maps.drive_map import DriveMap
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -17,14 +17,12 @@ from math import isfinite
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.errors import InputError
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.friction import Friction
 from swgjoint.maps.hysteresis import Jenkin
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 SIZE = 5
 """Numbers that the plugin reads."""

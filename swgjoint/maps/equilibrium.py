@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from swgjoint.errors import ComputationError
 from swgjoint.maps.hysteresis import Sliders
 from swgjoint.maps.potential import Potential
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 CHUNK = 2**14
 """Angles times harmonics that are evaluated at once: they stay in the cache."""

@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.arrays import frozen_array
+from swgjoint.typing import Array
 
-Array = NDArray[np.float64]
 Table = NDArray[np.float32]
 
 

@@ -38,8 +38,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swgjoint.errors import InputError
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 _UNITS = {
     "coulomb": "N·m",

@@ -26,11 +26,10 @@ from dataclasses import dataclass
 from math import isfinite
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from swgjoint.errors import InputError
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 MAX_ELEMENTS = 64
 """More elements than a measured loop can tell apart."""

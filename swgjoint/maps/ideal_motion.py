@@ -14,12 +14,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.maps.equilibrium import output_angle
 from swgjoint.maps.potential import Potential
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 _NEWTON = 12
 _BEND = 1e-3

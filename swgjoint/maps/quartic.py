@@ -5,9 +5,8 @@ from __future__ import annotations
 from math import comb
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 
 def quartic_chain(knots: Array, values: Array) -> tuple[Array, Array]:

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from swgjoint.arrays import frozen_array
 from swgjoint.gear.ratings import Ratings
 from swgjoint.maps.fields import DriveFields
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -9,9 +9,8 @@ odd corners rounded by parabolas, monotone wherever every k is positive.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 
 def torque_at_knots(knots: Array, stiffness: Array) -> Array:

@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.errors import ComputationError, SwgError
 from swgjoint.maps.drive_map import DriveMap
@@ -22,9 +21,8 @@ from swgjoint.sim.figures.metrics import torque_ripple
 from swgjoint.sim.run import Run
 from swgjoint.sim.scene.scene import Scene
 from swgjoint.sim.simulation import simulate
+from swgjoint.typing import Array
 from swgjoint.units import arcmin, mm
-
-Array = NDArray[np.float64]
 
 SCENE_INTEGRATORS = ("discrete", "RK4")
 RECORD = 1e-3

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.drives.sections import MotorLimits
 from swgjoint.sim.figures.transmission import Transmission
@@ -18,12 +17,12 @@ from swgjoint.sim.scene.feature_sections import (
     JointSine,
     ToolForce,
 )
+from swgjoint.typing import Array
 from swgjoint.units import rpm
 
 if TYPE_CHECKING:
     from swgjoint.sim.assembly import Assembly
 
-Array = NDArray[np.float64]
 
 SETPOINTS = int(
     mujoco.mjtCtrlInput.mjINPUT_POS

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.drives.references import check_joint_names, drive_of
-from swgjoint.drives.sections import JointSection
 from swgjoint.errors import InputError
 from swgjoint.joint.attach import attach_all
 from swgjoint.joint.fitting import Fitting
@@ -21,7 +20,16 @@ from swgjoint.progress import Progress, silent
 from swgjoint.sim.actuators import Loops, add_actuators
 from swgjoint.sim.arm.payload import arms_of
 from swgjoint.sim.arm.rigid_arm import RigidArm, compile_spec
-from swgjoint.sim.control import control_gains, feedforward, integral_gain
+from swgjoint.sim.assembly_steps import (
+    complete_sections,
+    interpolate_samples,
+    joints_in_contact,
+    load_torque,
+    motor_loops,
+    prescribed_errors,
+    site_of_force,
+)
+from swgjoint.sim.control import feedforward
 from swgjoint.sim.figures.transmission import Transmission, transmission_of
 from swgjoint.sim.motion.commanded import check_motion, trajectory_of
 from swgjoint.sim.motion.start_check import check_link, check_ranges
@@ -29,8 +37,7 @@ from swgjoint.sim.motion.trajectory import Trajectory
 from swgjoint.sim.run_memory import require_run_memory
 from swgjoint.sim.scene.feature_sections import Disturbance, ToolForce
 from swgjoint.sim.scene.scene import Scene
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -154,7 +161,7 @@ def assemble(
         where=scene.where,
         arm=scene.arm,
     )
-    sections = _complete_sections(scene, arm.joints)
+    sections = complete_sections(scene, arm.joints)
     check_motion(scene, {section.level for section in sections})
     if scene.sensors and scene.sensors.torque and controlled_by is None:
         raise InputError(
@@ -189,7 +196,9 @@ def assemble(
         )
     got = attach_all(spec, fittings)
     transmissions, sub_steps, outside = [], 1, {}
-    for name, touches in zip(arm.joints, _touching(arm, trajectory), strict=True):
+    for name, touches in zip(
+        arm.joints, joints_in_contact(arm, trajectory), strict=True
+    ):
         attached, fitting = got[name], fittings[name]
         check_link(attached, arm, where=scene.where)
         region = check_region(
@@ -215,14 +224,14 @@ def assemble(
         transmissions = [replace(t, attached=got[t.joint]) for t in transmissions]
     load = np.array(
         [
-            _load_torque(scene, name, t.drive)
+            load_torque(scene, name, t.drive)
             for name, t in zip(arm.joints, transmissions, strict=True)
         ]
     )
     ratio = np.array([t.ratio for t in transmissions])
     rotor = np.array([t.rotor_inertia for t in transmissions])
     link_inertia = known_arm.inertia(trajectory.position[0])
-    loops = _loops(scene, transmissions, sections, rotor + link_inertia / ratio**2)
+    loops = motor_loops(scene, transmissions, sections, rotor + link_inertia / ratio**2)
     if controlled_by is not None:
         loops = replace(loops, sampled=True)
     add_actuators(
@@ -231,22 +240,24 @@ def assemble(
         loops,
         load,
         scene.disturbance,
-        tool_site=_site_of_force(scene, arm),
+        tool_site=site_of_force(scene, arm),
     )
     model = compile_spec(spec, where=f"scene {scene.name!r}")
     # torques of the rigid arm change little within a step
     coarse = trajectory.every(sub_steps)
     motion = (coarse.position, coarse.velocity, coarse.acceleration)
-    link_torque = load + _between(arm.torques(*motion), sub_steps)
+    link_torque = load + interpolate_samples(arm.torques(*motion), sub_steps)
     kind = scene.controller.feedforward
     if scene.controller.kind == "computed_torque":
         kind = "gravity_inertia"  # where it starts; its loop has its own
     known_torque = link_torque
     if kind == "gravity":
-        known_torque = load + _between(known_arm.gravity(coarse.position), sub_steps)
+        known_torque = load + interpolate_samples(
+            known_arm.gravity(coarse.position), sub_steps
+        )
     elif known_arm is not arm:
-        known_torque = load + _between(known_arm.torques(*motion), sub_steps)
-    prescribed, prescribed_rate = _prescribed(
+        known_torque = load + interpolate_samples(known_arm.torques(*motion), sub_steps)
+    prescribed, prescribed_rate = prescribed_errors(
         trajectory.position,
         transmissions,
         step=float(model.opt.timestep),
@@ -279,113 +290,6 @@ def assemble(
         controlled_by=controlled_by,
         **_addresses(model, arm.joints, transmissions),
     )
-
-
-def _loops(
-    scene: Scene,
-    transmissions: list[Transmission],
-    sections: tuple[JointSection, ...],
-    inertia: Array,
-) -> Loops:
-    """Gains and limits of all motors.
-
-    Args:
-        scene: The scene.
-        transmissions: Of all joints.
-        sections: Of all joints.
-        inertia: Of motor and link at the motor [kg·m²]. Shape (n_joints,).
-    """
-    section = scene.controller
-    stiffness, damping = control_gains(section, inertia)
-    own = [t.drive.ratings.rated_torque / abs(t.ratio) for t in transmissions]
-    limit = section.integral_limit_Nm
-    return Loops(
-        stiffness=stiffness,
-        damping=damping,
-        integral=integral_gain(section, stiffness, inertia),
-        integral_limit=np.array(own) if limit is None else np.full(len(own), limit),
-        limits=tuple(s.motor for s in sections),
-        sampled=scene.sampled,
-    )
-
-
-def _site_of_force(scene: Scene, arm: RigidArm) -> str:
-    """Name of the tool site; refuses a force on a tool that does not exist."""
-    if arm.tool < 0 and any(isinstance(d, ToolForce) for d in scene.disturbance):
-        raise InputError(
-            f"{scene.where}: disturbance: tool_force on arm {scene.arm!r}, which has no"
-            " site for the tool; needed: tool_site"
-        )
-    return scene.tool_site
-
-
-def _touching(arm: RigidArm, trajectory: Trajectory) -> NDArray[np.bool_]:
-    """Joints on which contacts or limits may act. Shape (n_joints,)."""
-    model = arm.model
-    collides = bool(model.geom_contype.any() and model.geom_conaffinity.any())
-    low, high = model.jnt_range.T
-    path, slack = trajectory.position, 1e-3  # drives give way by minutes of arc [rad]
-    beyond = (path <= low + slack) | (path >= high - slack)
-    return np.asarray(collides | (model.jnt_limited.astype(bool) & beyond.any(axis=0)))
-
-
-def _between(values: Array, n: int) -> Array:
-    """Values at n samples per sample, on straight lines. Shape (n (m - 1) + 1, ...)."""
-    if n == 1:
-        return values
-    part = (np.arange(n) / n)[None, :, None]
-    lines = values[:-1, None] * (1.0 - part) + values[1:, None] * part
-    return np.vstack([lines.reshape(-1, values.shape[1]), values[-1:]])
-
-
-def _prescribed(
-    position: Array, transmissions: list[Transmission], *, step: float, discrete: bool
-) -> tuple[Array, Array]:
-    """Error and rate that level ``kinematic`` prescribes on the motion."""
-    # one more sample in front for the rate of the first, as if the motion went on
-    path = np.vstack([2.0 * position[:1] - position[1:2], position])
-    error = np.column_stack(
-        [
-            t.attached.prescribed_error(t.ratio * path[:, j])
-            for j, t in enumerate(transmissions)
-        ]
-    )
-    # positions of the discrete integrator change by the velocity after the step
-    rate = np.diff(error, axis=0) / step
-    if not discrete:
-        rate = np.gradient(error, step, axis=0)[1:]
-    return error[1:], rate
-
-
-def _complete_sections(
-    scene: Scene, joints: tuple[str, ...]
-) -> tuple[JointSection, ...]:
-    """Settings of all joints; refuses what is missing, all at once."""
-    sections = tuple(scene.joint_settings(name) for name in joints)
-    lines = []
-    for name, section in zip(joints, sections, strict=True):
-        if section.drive is None and section.linear is None:
-            lines.append(
-                f"{scene.where}: joints.{name}.drive: missing; accepted: drive or"
-                " linear, here or in [defaults]"
-            )
-        if section.rotor_inertia_kgm2 is None:
-            lines.append(
-                f"{scene.where}: joints.{name}.rotor_inertia_kgm2: missing; accepted:"
-                " > 0 kg·m² and <= 1 kg·m², here or in [defaults]"
-            )
-    if lines:
-        raise InputError("\n".join(lines))
-    return sections
-
-
-def _load_torque(scene: Scene, joint: str, drive: DriveMap) -> float:
-    load = scene.load.get(joint)
-    if load is None:
-        return 0.0
-    if load.torque_Nm is not None:
-        return load.torque_Nm
-    return (load.rated_fraction or 0.0) * drive.ratings.rated_torque
 
 
 def _addresses(

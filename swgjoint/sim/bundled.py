@@ -5,8 +5,8 @@ from __future__ import annotations
 import warnings
 from typing import Any
 
-from swgjoint.faults import read_toml
 from swgjoint.models_path import KINDS, bundled_names, models_path
+from swgjoint.toml_file import read_toml
 
 NOTES = {
     "drives": "Any command that takes a drive takes these names, designs (swgjoint list"

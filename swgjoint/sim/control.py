@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.sim.scene.sections import ControllerSection, FeedForward
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 DEFAULT_FREQUENCY = 8.0
 """Natural frequency of the motor control where a scene gives none [Hz]."""

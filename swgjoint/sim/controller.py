@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.maps.drive_map import DriveMap
+from swgjoint.typing import Array
 
-Array = NDArray[np.float64]
 Number = TypeVar("Number", np.float64, np.complex128)
 
 

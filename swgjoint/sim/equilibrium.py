@@ -6,17 +6,16 @@ from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.errors import ComputationError, InputError
 from swgjoint.joint.response import responses
 from swgjoint.sim.figures.transmission import Transmission
 from swgjoint.sim.motion.start_check import touching_bodies
+from swgjoint.typing import Array
 
 if TYPE_CHECKING:
     from swgjoint.sim.assembly import Assembly
 
-Array = NDArray[np.float64]
 
 RTOL = 1e-9
 """Torque residual over the rated torque at which an equilibrium is accepted; the

@@ -9,13 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.sim.assembly import Assembly
 from swgjoint.sim.figures.contains import contents
 from swgjoint.sim.figures.metrics import run_metrics
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

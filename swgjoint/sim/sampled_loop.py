@@ -12,17 +12,16 @@ from typing import TYPE_CHECKING, Protocol
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.errors import ComputationError
 from swgjoint.sim.controller import Controller, Measured, Task
 from swgjoint.sim.scene.feature_sections import Sensor, TorqueSensor
+from swgjoint.typing import Array
 from swgjoint.units import arcsec
 
 if TYPE_CHECKING:
     from swgjoint.sim.assembly import Assembly
 
-Array = NDArray[np.float64]
 
 _CHUNK = 1000  # recorded states between two signs of life
 _STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS

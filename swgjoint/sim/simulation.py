@@ -11,7 +11,6 @@ from typing import Any
 import mujoco
 import numpy as np
 from mujoco.rollout import Rollout
-from numpy.typing import NDArray
 
 from swgjoint.errors import ComputationError, InputError
 from swgjoint.maps.drive_map import DriveMap
@@ -24,8 +23,7 @@ from swgjoint.sim.run import Run
 from swgjoint.sim.sampled_loop import GivenLoop, Loop, SampledLoop, run_sampled
 from swgjoint.sim.scene.scene import Scene
 from swgjoint.sim.scene.task import task_of
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 _CHUNK = 1000  # steps of the engine between two signs of life
 _STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS

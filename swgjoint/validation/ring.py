@@ -14,7 +14,6 @@ from dataclasses import dataclass
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from swgjoint.errors import InputError
@@ -25,8 +24,6 @@ from swgjoint.json_text import json_text
 from swgjoint.units import mm
 from swgjoint.validation.rows import Row, StudyOptions, StudyResult
 from swgjoint.view.plots.plain_ring import ring_picture
-
-Array = NDArray[np.float64]
 
 # thesis Table 4.1, the reference design, and Table A.1, the test ring
 TEETH, ADDENDUM, DEDENDUM, RIM = 120, 0.6, 0.8, 1.0

@@ -19,9 +19,10 @@ import tempfile
 from swgjoint.explore.sweep.file import SweepFile
 from swgjoint.explore.sweep.results import place_of
 from swgjoint.explore.sweep.sweep import run_sweep
-from swgjoint.faults import parse_toml, validate
+from swgjoint.faults import validate
 from swgjoint.pool import LocalPool
 from swgjoint.progress import StderrProgress
+from swgjoint.toml_file import parse_toml
 
 WANTED = 0.9
 FILE = """

@@ -22,10 +22,11 @@ from swgjoint.explore.optimise.optimise import optimise
 from swgjoint.explore.optimise.search import search
 from swgjoint.explore.sweep.figures import Record
 from swgjoint.explore.sweep.results import place_of
-from swgjoint.faults import parse_toml, validate
+from swgjoint.faults import validate
 from swgjoint.gear.design.design import Design
 from swgjoint.models_path import bundled_names
 from swgjoint.pool import LocalPool
+from swgjoint.toml_file import parse_toml
 from swgjoint.view.plots.optimise import optimum_picture
 
 pytest.importorskip("optuna", reason="needs swgjoint[tune]")

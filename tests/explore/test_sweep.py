@@ -22,10 +22,11 @@ from swgjoint.explore.sweep.points import _engine_version, points_of
 from swgjoint.explore.sweep.results import csv_text, parquet_bytes, place_of
 from swgjoint.explore.sweep.sweep import run_sweep
 from swgjoint.explore.sweep.tasks import RunTask
-from swgjoint.faults import parse_toml, validate
+from swgjoint.faults import validate
 from swgjoint.pool import LocalPool, Lost
 from swgjoint.sim.scene.scene import Scene
 from swgjoint.store import json_content, json_file
+from swgjoint.toml_file import parse_toml
 from swgjoint.view.plots.sweep import label_of, sweep_picture
 
 SHEET = """

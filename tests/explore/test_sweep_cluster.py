@@ -18,8 +18,9 @@ from swgjoint.explore.sweep.executor import DaskPool, dask_pool, slurm_cluster
 from swgjoint.explore.sweep.file import SweepFile
 from swgjoint.explore.sweep.sweep import run_sweep
 from swgjoint.explore.sweep.tasks import SlurmCluster
-from swgjoint.faults import parse_toml, validate
+from swgjoint.faults import validate
 from swgjoint.pool import LocalPool, Lost
+from swgjoint.toml_file import parse_toml
 
 pytest.importorskip("distributed", reason="needs swgjoint[cluster]")
 

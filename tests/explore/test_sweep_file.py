@@ -13,11 +13,12 @@ from swgjoint.explore.sweep.file import SweepFile
 from swgjoint.explore.sweep.keys import kind_of, known_keys
 from swgjoint.explore.sweep.points import points_of, values_of
 from swgjoint.explore.sweep.validity import validity_of
-from swgjoint.faults import parse_toml, validate
+from swgjoint.faults import validate
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.feasibility import design_checks
 from swgjoint.models_path import bundled_names, models_path
 from swgjoint.sim.scene.scene import Scene
+from swgjoint.toml_file import parse_toml
 
 HEAD = """
 design = "reference-2d"

@@ -17,11 +17,11 @@ from swgjoint.fe.plane.condensed_ring import (
     Supports,
     distinct,
 )
+from swgjoint.fe.plane.contact_points import Contacts
 from swgjoint.fe.plane.continuation import Continuation
 from swgjoint.fe.plane.corotation import rotate_right_angle
 from swgjoint.fe.plane.linearise import linearise
 from swgjoint.fe.plane.state import State
-from swgjoint.fe.plane.tooth_contact import Contacts
 from swgjoint.gear.catalogue import ratings_of
 from swgjoint.gear.design.design import Design
 

@@ -29,9 +29,9 @@ from swgjoint.fe.common.indentation import (
     strain_energy,
 )
 from swgjoint.fe.common.sampling import follower_in_plane
+from swgjoint.fe.plane.contact_points import Contacts
 from swgjoint.fe.plane.drive2d import ring_model, sector
 from swgjoint.fe.plane.sector_mesh import sector_mesh
-from swgjoint.fe.plane.tooth_contact import Contacts
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.teeth.tooth_profile import tooth_profile
 from swgjoint.units import mm

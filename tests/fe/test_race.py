@@ -22,8 +22,8 @@ from swgjoint.fe.plane.drive2d import (
     ring_model,
     unmodelled_parts,
 )
-from swgjoint.fe.plane.equilibrium import Load
 from swgjoint.fe.plane.linearise import linearise
+from swgjoint.fe.plane.newton_step import Load
 from swgjoint.fe.plane.race import PlaneRace
 from swgjoint.fe.rings.loading import solve_loaded, solve_unloaded
 from swgjoint.fe.rings.model import thin_ring

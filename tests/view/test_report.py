@@ -14,7 +14,8 @@ from swgjoint.errors import InputError
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.run import Run
 from swgjoint.view.report.plots import envelope
-from swgjoint.view.report.report import Cell, Table, write_report
+from swgjoint.view.report.report import write_report
+from swgjoint.view.report.tables import Cell, Table
 from swgjoint.view.run import run_scene
 from swgjoint.view.validity import STEP_KEYS, _same_orders, step_error
 from swgjoint.view.words import format_figure, words

@@ -11,7 +11,6 @@ import numpy as np
 from swgjoint.bench.fe.setting import (
     POSITIONS,
     RIM,
-    Array,
     FeSetting,
     Found,
     mean_of,
@@ -29,6 +28,7 @@ from swgjoint.gear.design.design import Design
 from swgjoint.gear.mounting import series_compliance
 from swgjoint.gear.shell_theory import ShellDimensions
 from swgjoint.gear.wave_generators.wave_generator import lobe_height
+from swgjoint.typing import Array
 from swgjoint.units import mm
 
 

@@ -12,15 +12,13 @@ from math import pi
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.errors import ComputationError
 from swgjoint.fe.plane.state import State
 from swgjoint.fe.rings.state import RingState
 from swgjoint.fe.solid.state import SolidState
 from swgjoint.gear.design.design import Design
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 AnyState = TypeVar("AnyState", State, SolidState, RingState)
 

@@ -13,7 +13,6 @@ import numpy as np
 from swgjoint.bench.fe.rings import solve_by_rings
 from swgjoint.bench.fe.setting import (
     RIM,
-    Array,
     FeSetting,
     Found,
     mean_of,
@@ -37,6 +36,7 @@ from swgjoint.fe.solid.stress import SolidMaxima
 from swgjoint.gear.catalogue import ratings_of
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.mounting import series_compliance
+from swgjoint.typing import Array
 
 
 @dataclass(frozen=True, kw_only=True)

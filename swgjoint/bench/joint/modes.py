@@ -23,8 +23,8 @@ from swgjoint.joint.step_damping import restore_damping
 from swgjoint.sim.actuators import control_inputs
 from swgjoint.sim.assembly import Assembly
 from swgjoint.sim.equilibrium import set_start
+from swgjoint.typing import Array
 
-Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 EXACT_STEP = 1e-5

@@ -14,7 +14,6 @@ from dataclasses import dataclass, field, replace
 from math import cos, sin
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.bench.stability.joint import (
     ERROR,
@@ -29,8 +28,7 @@ from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.assembly import Assembly
 from swgjoint.sim.run import Run
 from swgjoint.sim.scene.scene import Scene
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 STIFFNESS = 3e4
 """Of the bench's drive at no torque [N·m/rad]: 39 Hz between rotor and link."""

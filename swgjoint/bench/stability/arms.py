@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.bench.stability.joint import Course, with_kinematic_error
 from swgjoint.bench.stability.rows import DEFAULT, StabilityRow, outcome_of
@@ -23,10 +22,9 @@ from swgjoint.joint.region import MAX_SUB_STEPS, check_region
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.arm.rigid_arm import RigidArm, compile_spec
 from swgjoint.sim.scene.scene import Scene
+from swgjoint.typing import Array
 from swgjoint.units import arcmin
 from swgjoint.view.run import run_scene
-
-Array = NDArray[np.float64]
 
 SCENES = ("ur5e-catalogue", "iiwa14-sweep", "kinova-sweep", "panda-sweep")
 STEPS = (5e-4, 1e-3, 2e-3)

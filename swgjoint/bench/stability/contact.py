@@ -14,7 +14,6 @@ from itertools import product
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.bench.stability.catalogue import CatalogueDrive, catalogue_drives
 from swgjoint.bench.stability.joint import GAIN, with_kinematic_error
@@ -23,8 +22,7 @@ from swgjoint.joint.attach import attach
 from swgjoint.joint.drive import JointDrive
 from swgjoint.joint.region import MAX_SUB_STEPS, check_region
 from swgjoint.maps.drive_map import DriveMap
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 KINDS = ("floor", "limit")
 MASSES = (0.3, 3.0)

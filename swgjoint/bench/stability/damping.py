@@ -15,11 +15,9 @@ from math import sqrt
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.bench.stability.joint import RATIO, REACH, Joint
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 SMALL = 1e-5
 """Torsion of the vibration over that at full torque [-]."""

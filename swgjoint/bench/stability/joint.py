@@ -24,9 +24,8 @@ from swgjoint.joint.drive import JointDrive
 from swgjoint.joint.native import native_map
 from swgjoint.joint.region import Region, check_region
 from swgjoint.maps.drive_map import DriveMap
+from swgjoint.typing import Array
 from swgjoint.units import arcmin
-
-Array = NDArray[np.float64]
 
 RATIO = 100
 ORDERS = (2, 4)

@@ -15,7 +15,6 @@ from dataclasses import dataclass
 from math import cos, sin, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.bench.stability.joint import (
     ERROR,
@@ -27,9 +26,8 @@ from swgjoint.bench.stability.joint import (
     Start,
 )
 from swgjoint.errors import ComputationError
+from swgjoint.typing import Array
 from swgjoint.units import arcmin
-
-Array = NDArray[np.float64]
 
 WINDOW = 0.1
 """Time over which a run is compared [s]."""

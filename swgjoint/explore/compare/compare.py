@@ -20,7 +20,6 @@ from swgjoint.drives.references import find_drive, given_drives, load_drive
 from swgjoint.drives.sections import LEVELS
 from swgjoint.errors import ComputationError, InputError
 from swgjoint.explore.compare.scene import drives_of, with_drive, with_level
-from swgjoint.faults import read_toml
 from swgjoint.gear.design.design import Design
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.sheet.validity_marks import joints_judged
@@ -31,6 +30,7 @@ from swgjoint.sim.figures.keys import LOWER, RIPPLE, UPPER
 from swgjoint.sim.figures.metrics import drive_order, strongest_left_out
 from swgjoint.sim.run import Run
 from swgjoint.sim.scene.scene import Scene
+from swgjoint.toml_file import read_toml
 from swgjoint.view.run import run_scene
 
 STRESS_POSITIONS = 6

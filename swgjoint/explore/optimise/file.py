@@ -18,8 +18,9 @@ from swgjoint.explore.sweep.tasks import (
     Text,
     task_faults,
 )
-from swgjoint.faults import Fault, Section, read_toml, unit_of, validate
+from swgjoint.faults import Fault, Section, unit_of, validate
 from swgjoint.models_path import find
+from swgjoint.toml_file import read_toml
 
 REFINEMENT = "mesh.refinement"
 

@@ -6,14 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.explore.optimise.file import Objective, OptimisationFile
 from swgjoint.explore.sweep.figures import Record
 from swgjoint.explore.sweep.points import Values
 from swgjoint.gear.design.design import Design
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

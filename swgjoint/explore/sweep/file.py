@@ -11,8 +11,9 @@ from pydantic import model_validator
 from swgjoint.explore.sweep.keys import is_path
 from swgjoint.explore.sweep.plan import AnyPlan, Plan, plan_faults
 from swgjoint.explore.sweep.tasks import AskedFile, task_faults
-from swgjoint.faults import Fault, read_toml, validate
+from swgjoint.faults import Fault, validate
 from swgjoint.models_path import find
+from swgjoint.toml_file import read_toml
 
 
 class SweepFile(AskedFile):

@@ -22,15 +22,13 @@ from difflib import get_close_matches
 from typing import Any, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.control.motor_side import MotorPlan
 from swgjoint.errors import InputError
 from swgjoint.explore.tune.gains import Tunable, build, parts_of, weight_plan
 from swgjoint.sim.controller import KnownJoints, ReadingAge, Task
+from swgjoint.typing import Array
 from swgjoint.units import arcmin
-
-Array = NDArray[np.float64]
 
 PREFIX = "swgjoint/"
 TUNABLE = ("JointTracking-v0",)

@@ -18,7 +18,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.control.flexible import flexible_plan
 from swgjoint.control.motor_side import (
@@ -31,8 +30,7 @@ from swgjoint.control.motor_side import (
 )
 from swgjoint.errors import InputError
 from swgjoint.sim.controller import KnownJoints, Task
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 BANDWIDTH, DAMPING = 1.0 / 3.0, 0.7
 """Of the textbook rule: over the anti-resonance, and ratio."""

@@ -7,15 +7,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.errors import InputError
 from swgjoint.explore.tune.cost import Trace
 from swgjoint.explore.tune.gains import GainParameter
 from swgjoint.explore.tune.search import OPTIMISERS, GainSearch
+from swgjoint.typing import Array
 from swgjoint.units import arcmin
-
-Array = NDArray[np.float64]
 
 MINUTES = 3.0
 

@@ -14,13 +14,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.errors import InputError, MissingExtraError
 from swgjoint.files import read_regular, write_whole
 from swgjoint.store import arrays_content, arrays_file, one_line
+from swgjoint.typing import Array
 
-Array = NDArray[np.float64]
 Evaluate = Callable[[Array], Array]
 """Places (n, d) to costs (n,)."""
 

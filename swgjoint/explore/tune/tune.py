@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.errors import InputError
 from swgjoint.explore.tune.cost import Trace, Trials, environment_named
@@ -47,8 +46,7 @@ from swgjoint.explore.tune.search import (
 from swgjoint.json_text import json_text, plain
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.progress import Progress, silent
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 PD_SHARE = 0.2
 """Of the budget, for the two gains of plain PD."""

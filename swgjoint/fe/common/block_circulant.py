@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
+from swgjoint.typing import Array, Index
 
 
 def respond(offsets: Index, blocks: Array, force: Array) -> Array:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 FAINT = 1e-8
 """Part of the torque that takes up a clearance, that acts at its ends: no stiffness is

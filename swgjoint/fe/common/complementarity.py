@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from swgjoint.errors import Outcome
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from swgjoint.typing import Array, Mask
 
 
 class ActiveSetError(ArithmeticError):

@@ -17,10 +17,9 @@ from __future__ import annotations
 from math import ceil
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 PATCH_PARTS = 14
 """Half lengths of a patch in the flank between the lands' ends: 0.15 mm at module 1,

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg.lapack import dgbtrf, dgbtrs
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
+from swgjoint.typing import Array, Index
 
 
 class SingularRingError(ArithmeticError):

@@ -8,18 +8,15 @@ from dataclasses import dataclass, replace
 from math import pi
 from typing import TYPE_CHECKING, Generic, TypeVar
 
-import numpy as np
-from numpy.typing import NDArray
-
 from swgjoint.errors import Outcome
 from swgjoint.fe.common.contact_changes import ContactChanges
 from swgjoint.fe.common.influence import Influence
+from swgjoint.typing import Array
 
 if TYPE_CHECKING:
     from swgjoint.fe.plane.state import State
     from swgjoint.fe.solid.state import SolidState
 
-Array = NDArray[np.float64]
 
 HALVINGS = 5
 TAKE_UP = 150

@@ -19,12 +19,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from swgjoint.fe.plane.tooth_contact import Contacts
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
+from swgjoint.fe.plane.contact_points import Contacts
+from swgjoint.typing import Array, Index
 
 STICK_STIFFNESS = 0.05
 """k in face width times Young's modulus: a tooth sticks within some ten nanometres,

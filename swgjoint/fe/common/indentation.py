@@ -30,13 +30,10 @@ from dataclasses import dataclass
 from math import exp, log, pi
 
 import numpy as np
-from numpy.typing import NDArray
 
-from swgjoint.fe.plane.tooth_contact import Contacts
+from swgjoint.fe.plane.contact_points import Contacts
 from swgjoint.gear.teeth.profile import ToothProfile
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
+from swgjoint.typing import Array, Index
 
 CENTRE_OVER_PATCH = 2.0 * log(2.0) + 0.5 - 1727.0 / 840.0
 """c: of the weights (1 - x^2)^3 of a patch."""

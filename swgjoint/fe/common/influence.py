@@ -18,14 +18,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.fe.common.contact_changes import ContactChanges
 from swgjoint.fe.common.pivoting import exchange, solve_active, solve_many
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
-Mask = NDArray[np.bool_]
+from swgjoint.typing import Array, Index, Mask
 
 MOST_CHANGES = 60
 """Changes of contact on one side of a torque that are followed."""

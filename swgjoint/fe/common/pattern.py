@@ -16,8 +16,7 @@ from swgjoint.fe.common.torque_choice import unseen_places
 from swgjoint.fe.common.torque_columns import ColumnGrid
 from swgjoint.maps.samples import FullSolves
 from swgjoint.maps.unfinished import Unfinished
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 EVERY = 4
 """Of the first positions are solved in the second pitch, too."""

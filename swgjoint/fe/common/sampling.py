@@ -8,9 +8,6 @@ from functools import partial
 from math import pi
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from swgjoint.errors import ComputationError
 from swgjoint.fe.common.pattern import Effort, Pattern, solve_pattern
 from swgjoint.fe.common.stress_state import stress_state_label
@@ -31,8 +28,6 @@ from swgjoint.gear.mounting import series_compliance, springs_of
 from swgjoint.maps.samples import MapSamples
 from swgjoint.maps.unfinished import Unfinished
 from swgjoint.progress import Progress, silent
-
-Array = NDArray[np.float64]
 
 ANGLES = 24
 """Input positions over one pitch to begin with, doubled up to :data:`MOST_ANGLES`:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.fe.plane.sector_mesh import SectorMesh, sector_mesh
 from swgjoint.fe.plane.superelement import condense
@@ -15,8 +14,6 @@ from swgjoint.gear.teeth.profile import ToothProfile
 from swgjoint.gear.teeth.tooth_profile import tooth_profile
 from swgjoint.gear.wide_ring import RimAcross, edge_confinement, rim_confinement
 from swgjoint.units import mm
-
-Array = NDArray[np.float64]
 
 COARSE = 0.5
 """Refinement of the sector whose stiffness decides: the same for every mesh of a drive,

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.fe.common.load_path import LoadPath
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 FEWEST_TORQUES = 40
 """Of one sign in the table."""

@@ -9,7 +9,6 @@ from functools import partial
 from typing import Any, Generic, TypeVar, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.errors import ComputationError
 from swgjoint.fe.common.clearance import across_clearance
@@ -20,8 +19,8 @@ from swgjoint.fe.common.torque_choice import common_torques, periodic, unseen_pa
 from swgjoint.fe.plane.state_arrays import copy_contiguous, pack, unpack
 from swgjoint.maps.samples import FullSolves
 from swgjoint.maps.unfinished import Unfinished
+from swgjoint.typing import Array
 
-Array = NDArray[np.float64]
 T = TypeVar("T")
 
 POTENTIAL_WAVES = 1.0

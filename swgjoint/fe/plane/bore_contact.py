@@ -25,8 +25,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
+from swgjoint.typing import Array
 
 POINTS = 24
 """Stations between neighbouring nodes."""

@@ -20,9 +20,7 @@ from swgjoint.fe.common.cyclic import CyclicFactor
 from swgjoint.fe.plane.corotation import rotate, rotate_right_angle
 from swgjoint.fe.plane.superelement import Superelement
 from swgjoint.gear.teeth.profile import ToothProfile
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
+from swgjoint.typing import Array, Index
 
 NEGLIGIBLE = 1e-9
 """Blocks below this part of the largest one are left out."""

@@ -6,20 +6,16 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.fe.common.cyclic import CyclicFactor
 from swgjoint.fe.common.indentation import Strips
 from swgjoint.fe.common.influence import Gaps, Influence, pivot_system
+from swgjoint.fe.plane.contact_points import Contacts
 from swgjoint.fe.plane.corotation import rotate_right_angle
 from swgjoint.fe.plane.linearise import Linearised
 from swgjoint.fe.plane.ring import RingModel
 from swgjoint.fe.plane.state import State
-from swgjoint.fe.plane.tooth_contact import Contacts
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
-Mask = NDArray[np.bool_]
+from swgjoint.typing import Array, Index, Mask
 
 REACH = 0.03
 """Gap up to which a contact may close, in lobe heights."""

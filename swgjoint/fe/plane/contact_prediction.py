@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.fe.common.contact_changes import ContactChanges
 from swgjoint.fe.plane.condensed_ring import REACH, CondensedRing, Supports, distinct
 from swgjoint.fe.plane.linearise import linearise
 from swgjoint.fe.plane.ring import RingModel
 from swgjoint.fe.plane.state import State
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from swgjoint.typing import Mask
 
 MOST_SUPPORTS = 80
 """Intervals of the bore of a prediction that may change sides."""

@@ -4,20 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-from numpy.typing import NDArray
-
 from swgjoint.fe.common.contact_changes import ContactChanges
 from swgjoint.fe.common.following import Follower
 from swgjoint.fe.common.influence import Influence
 from swgjoint.fe.plane.contact_prediction import predicted_changes
-from swgjoint.fe.plane.equilibrium import Load, NewtonSolver
+from swgjoint.fe.plane.equilibrium import NewtonSolver
+from swgjoint.fe.plane.newton_step import Load
 from swgjoint.fe.plane.ring import RingModel
 from swgjoint.fe.plane.state import State
 from swgjoint.fe.tolerances.influence import influence
 from swgjoint.gear.kinematics import Layout
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -20,11 +20,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.fe.plane.superelement import Superelement
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 
 def rotate(vectors: Array, angle: Array | float) -> Array:

@@ -6,9 +6,6 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
 from swgjoint.errors import DesignError
 from swgjoint.fe.common.contact_patch import half_length
 from swgjoint.fe.common.friction import STICK_STIFFNESS, CoulombFriction
@@ -32,9 +29,8 @@ from swgjoint.gear.design.tolerances import (
 from swgjoint.gear.teeth.profile import ToothProfile
 from swgjoint.gear.teeth.tooth_profile import tooth_profile
 from swgjoint.gear.wave_generators.wave_generator import lobe_height, wave_generator
+from swgjoint.typing import Array
 from swgjoint.units import mm
-
-Array = NDArray[np.float64]
 
 NARROW = ("parabolic", "asymmetric_parabolic", "four_roller")
 """Wave generators whose contact with the bore is narrower than its nodes are apart."""

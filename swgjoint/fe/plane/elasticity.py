@@ -8,14 +8,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 from skfem import Basis, BilinearForm, ElementVector, MeshQuad
 from skfem.helpers import ddot, eye, sym_grad, trace
 
 from swgjoint.fe.common.element import ElementQuadIncompatible
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 
 def plane_basis(mesh: MeshQuad) -> Basis:

@@ -10,24 +10,26 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.errors import Outcome
-from swgjoint.fe.common.complementarity import ActiveSetError, solve_mixed
-from swgjoint.fe.common.cyclic import CyclicFactor, SingularRingError
+from swgjoint.fe.common.complementarity import ActiveSetError
+from swgjoint.fe.common.cyclic import SingularRingError
 from swgjoint.fe.common.friction import (
-    Sliding,
     SlipHistory,
     dissipated_work,
     spring_energy,
 )
-from swgjoint.fe.common.indentation import Strips, strain_energy
+from swgjoint.fe.common.indentation import strain_energy
 from swgjoint.fe.plane.corotation import elastic_energy, rotate_right_angle
 from swgjoint.fe.plane.linearise import Linearised, linearise
-from swgjoint.fe.plane.race import NODE
+from swgjoint.fe.plane.newton_step import (
+    Load,
+    NewtonStep,
+    solve_newton_step,
+    wrong_stations,
+)
 from swgjoint.fe.plane.ring import RingModel
 from swgjoint.fe.plane.state import State
-from swgjoint.fe.plane.tooth_contact import Contacts
 
 RING_RANGE = 0.2
 """Displacement of the circular spline, in lobe heights, at which its linear model ends:
@@ -35,39 +37,6 @@ at a half of it the input torque still agrees with the energy to seven digits.""
 
 TOUCH = 1e-15
 """Gap that counts as none [m]."""
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Load:
-    """What is prescribed.
-
-    The torque alone: the flexspline is the output. The rotation alone: the flexspline
-    is held. Both: the flexspline is held and the circular spline is the output.
-    """
-
-    torque: float | None = None
-    """T that the output exerts on its load, whole drive [N·m]."""
-    rotation: float | None = None
-    """Best-fit rotation of the flexspline's bore [rad]."""
-    teeth: bool = True
-    """Whether the teeth touch."""
-
-    def __post_init__(self) -> None:
-        if self.torque is None and self.rotation is None:
-            raise ValueError("give a torque, a rotation, or both")
-
-    @property
-    def on_flexspline(self) -> float | None:
-        """Torque that the flexspline exerts on a load [N·m]."""
-        return self.torque if self.rotation is None else None
-
-    @property
-    def on_ring(self) -> float | None:
-        """Torque that the circular spline exerts on a load [N·m]."""
-        return self.torque if self.rotation is not None else None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -113,13 +82,13 @@ class NewtonSolver:
                     contacts = ring.search.search(
                         ring.flank, reach, state.contacts, thorough=thorough
                     )
-                step = _solve_linear(model, state, ring, load, contacts)
+                step = solve_newton_step(model, state, ring, load, contacts)
                 for _ in range(self.exchanges):
                     exchanged = _exchanged(state, ring, step, self.exchange_below)
                     if exchanged is None:
                         break
                     state, ring = exchanged
-                    step = _solve_linear(
+                    step = solve_newton_step(
                         model, state, ring, load, contacts, step.active
                     )
                 history.append(step.largest)
@@ -154,182 +123,8 @@ class NewtonSolver:
         return _finished(model, state, outcome, history, self.ring_range)
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Step:
-    """Solution of one linearised problem."""
-
-    lines: Contacts
-    """Normals of the candidates, then, with friction, their tangents."""
-    line_force: Array
-    """Forces along them [N]."""
-    contacts: Contacts
-    """The candidates."""
-    active: NDArray[np.int64]
-    """Those that carry force."""
-    torque: float
-    holding_torque: float
-    compliance: float
-    ring_turn: float
-    """Increment of the circular spline's rotation [rad]."""
-    increment: Array
-    """Of every sector (N, n) [m]."""
-    shift: Array
-    """Of the skeleton in the global frame (N, n_a, 2) [m]."""
-    race_shift: Array
-    """Of the race's nodes (N, m, 2, 2) [m]; empty without a race."""
-    pressure: Array
-    """Force of the wave generator at each station of the bore (N, q) [N]."""
-    strip_error: float
-    """Of the approach of the flanks, whose law is linearised [m]."""
-
-    @property
-    def largest(self) -> float:
-        """Largest displacement increment [m]."""
-        of_race = float(np.abs(self.race_shift).max(initial=0.0))
-        return max(float(np.abs(self.shift).max()), of_race, self.strip_error)
-
-
-def _solve_linear(
-    model: RingModel,
-    state: State,
-    ring: Linearised,
-    load: Load,
-    contacts: Contacts,
-    pressing: NDArray[np.int64] | None = None,
-) -> _Step:
-    """Condense the ring to its contact forces, solve for them, go back.
-
-    The contacts that are ``pressing``, if given, are the first guess of those that
-    carry force.
-
-    Columns of the ring's inverse: the load, every contact candidate, a soft anchor that
-    keeps the rotation of the whole ring regular and is taken out again as an unknown,
-    and the gradient of the output rotation.
-    """
-    element = model.element
-    # lines of force: the normals and, with friction, the tangents of the contacts
-    m, lines, sliding = len(contacts), contacts, None
-    if model.friction is not None and m:
-        last = state.candidates or state.slip
-        sliding = Sliding.from_trial(model.friction, contacts, state.slip, last)
-        lines = sliding.lines
-    n, rows = len(lines), ring.gap_gradient(lines)
-    levers = np.zeros((*ring.gradient.shape, n + 2))
-    levers[lines.sector, :, np.arange(n)] = rows
-    levers[:, :, n] = ring.anchor
-    levers[:, :, n + 1] = ring.rotation_gradient
-
-    rhs = -ring.gradient
-    columns = np.concatenate([rhs[:, :, None], levers], axis=2)
-    columns[ring.fixed] = 0.0
-    solved = CyclicFactor(ring.anchor_tangent(), ring.face_dofs).solve(columns)
-    base, response = solved[:, :, 0], solved[:, :, 1:]
-
-    # forces on the lines, displacement of the anchor, rotation of the circular spline,
-    # multiplier of the flexspline's rotation
-    matrix, offset = np.zeros((n + 3, n + 3)), np.zeros(n + 3)
-    own = np.r_[0 : n + 1, n + 2]
-    matrix[np.ix_(np.arange(n), own)] = np.einsum(
-        "kn,knl->kl", rows, response[lines.sector]
-    )
-    local = lines.weight @ element.flank_compliance
-    same = lines.sector[:, None] == lines.sector[None, :]
-    matrix[:n, :n] += np.where(same, local @ lines.weight.T, 0.0)
-    ring_compliance = model.circular_spline.compliance
-    if ring_compliance is not None:
-        matrix[:n, :n] += ring_compliance.contact_compliance(
-            lines.tooth, lines.ring_weight, model.ring_teeth
-        )
-    strips = None
-    if model.indentation is not None and m:
-        strips = Strips.from_contacts(
-            model.indentation, contacts, state.contacts, state.tooth_force
-        )
-        matrix[:m, :m] += strips.compliance
-    last_two = np.array([n, n + 2])
-    matrix[np.ix_(last_two, own)] = np.einsum("snf,snl->fl", levers[:, :, n:], response)
-    matrix[:n, last_two] = matrix[last_two, :n].T
-    matrix[n, n] -= 1.0 / ring.anchor_stiffness
-    # turning the circular spline towards the teeth closes the gap by the lever arm
-    arm = np.einsum("ki,ki->k", rotate_right_angle(lines.point), lines.normal)
-    matrix[:n, n + 1] = matrix[n + 1, :n] = -arm
-    offset[n + 1] = -(load.on_ring or 0.0) / model.copies
-    # gaps as if the old tooth forces were gone; the new ones bring their own share
-    old = np.einsum("kb,kb->k", local, state.flank_force[lines.sector])
-    old += np.einsum("kb,kb->k", lines.ring_weight, ring.ring_elastic[lines.tooth])
-    moved = np.einsum("kn,kn->k", rows, base[lines.sector])
-    offset[:n] = lines.gap - old + moved
-    if strips is not None:
-        offset[:m] += strips.offset
-    offset[last_two] = np.einsum("snf,sn->f", levers[:, :, n:], base)
-    offset[n + 2] += ring.rotation - (load.rotation or 0.0)
-
-    k = m if sliding is None else m + len(sliding.stick)
-    used = np.arange(k + 1)
-    if load.on_ring is not None:
-        used = np.append(used, k + 1)
-    if load.rotation is not None:
-        used = np.append(used, k + 2)
-    guess = offset[:m] < 0.0
-    if state.contacts is not None and len(state.contacts):
-        guess = contacts.share_flank_with(state.contacts)
-    if pressing is not None:
-        guess = np.isin(np.arange(m), pressing)
-
-    def solved_for(matrix: Array, offset: Array) -> tuple[Array, Mask]:
-        return solve_mixed(
-            matrix[np.ix_(used, used)],
-            offset[used],
-            m,
-            int(load.rotation is not None),
-            guess,
-        )
-
-    if sliding is None:
-        found, active = solved_for(matrix, offset)
-    else:
-        full = matrix, offset
-        try:
-            matrix, offset = sliding.reduce(*full)
-            found, active = solved_for(matrix, offset)
-        except ActiveSetError:
-            # without friction in proportion to the normal forces it is symmetric
-            sliding = sliding.lag()
-            matrix, offset = sliding.reduce(*full)
-            found, active = solved_for(matrix, offset)
-    z = np.zeros(k + 3)
-    z[used] = found
-    held = np.concatenate([np.flatnonzero(active), used[m:]])
-    compliance = _output_compliance(matrix, held, k, load)
-    force = z[:k] if sliding is None else sliding.forces(z[:k])
-    anchor, ring_turn, multiplier = z[k:]
-
-    solution = np.concatenate([force, [anchor, multiplier]])
-    increment = base + response @ solution
-    holding = model.copies * float(multiplier)
-    return _Step(
-        lines=lines,
-        line_force=force,
-        contacts=contacts,
-        active=np.flatnonzero(active),
-        torque=-holding if load.torque is None else load.torque,
-        holding_torque=holding if load.on_flexspline is None else -load.on_flexspline,
-        compliance=compliance / model.copies,
-        ring_turn=float(ring_turn),
-        increment=increment,
-        shift=ring.rotate_to_global(increment),
-        race_shift=increment[:, model.race_dofs[:-NODE]].reshape(
-            model.sectors, -1, 2, 2
-        ),
-        pressure=np.where(
-            state.touching, -model.stations.stiffness * ring.gap_after(increment), 0.0
-        ),
-        strip_error=0.0 if strips is None else strips.error(force[:m]),
-    )
-
-
 def _exchanged(
-    state: State, ring: Linearised, step: _Step, below: float
+    state: State, ring: Linearised, step: NewtonStep, below: float
 ) -> tuple[State, Linearised] | None:
     """Invert the contact state of the bore stations that a step closes or opens.
 
@@ -339,7 +134,7 @@ def _exchanged(
     """
     if ring.race_rows is not None or not step.largest < below:
         return None
-    bad = _wrong(state, ring.gap_after(step.increment)) > TOUCH
+    bad = wrong_stations(state, ring.gap_after(step.increment)) > TOUCH
     if not bad.any() or not (state.touching ^ bad).any():
         return None
     return replace(state, touching=state.touching ^ bad), ring.exchange(
@@ -347,44 +142,18 @@ def _exchanged(
     )
 
 
-def _wrong(state: State, gap: Array) -> Array:
-    """How far the stations are on the wrong side (N, q) [m]."""
-    return np.asarray(np.where(state.touching, gap, -gap))
-
-
-def _output_compliance(
-    matrix: Array, held: NDArray[np.int64], k: int, load: Load
-) -> float:
-    """Rotation of the output against its load, per torque of the model.
-
-    Args:
-        matrix: Of k force unknowns, then anchor, ring and multiplier.
-        held: Unknowns that are not zero.
-        k: Force unknowns.
-        load: What is prescribed.
-    """
-    system = matrix[np.ix_(held, held)]
-    if load.on_ring is not None:
-        unit = (held == k + 1).astype(float)
-        return -float(np.linalg.solve(system, unit)[held == k + 1][0])
-    held = held[held <= k]
-    reach, turn = matrix[held, k + 2], matrix[k + 2, held]
-    system = matrix[np.ix_(held, held)]
-    return float(matrix[k + 2, k + 2] - turn @ np.linalg.solve(system, reach))
-
-
 def _advance(
     model: RingModel,
     state: State,
     ring: Linearised,
-    step: _Step,
+    step: NewtonStep,
     damping: float,
     *,
     one_at_a_time: bool,
 ) -> tuple[State, bool]:
     """Move, exchange tooth forces, update the wave generator's active set."""
     after = ring.gap_after(damping * step.increment)
-    wrong = _wrong(state, after)
+    wrong = wrong_stations(state, after)
     bad = wrong > TOUCH
     # without any contact the rim springs back: let go of the worst node only
     if bad.any() and (one_at_a_time or not (state.touching ^ bad).any()):

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
 from swgjoint.fe.plane.corotation import rotate
@@ -24,9 +23,8 @@ from swgjoint.fe.plane.stress import (
     turned_stress,
 )
 from swgjoint.fe.plane.superelement import Superelement
+from swgjoint.typing import Array, Index
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 Arc = tuple[float, float]
 
 ARC_GAP = 1.5

@@ -7,7 +7,6 @@ from math import pi
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.errors import ComputationError
 from swgjoint.fe.common.sampling import SYMMETRIC, maps_bearing
@@ -20,8 +19,7 @@ from swgjoint.gear.mounting import series_compliance
 from swgjoint.maps.fit.hysteresis_loops import FrictionLoop
 from swgjoint.maps.unfinished import Unfinished
 from swgjoint.progress import Progress, silent
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 POSITIONS = 4
 """Input positions over one pitch, half a step from its ends. With a symmetric wave

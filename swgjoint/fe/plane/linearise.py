@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.fe.plane.bore_contact import BoreStations
+from swgjoint.fe.plane.contact_points import Contacts
 from swgjoint.fe.plane.corotation import (
     Frames,
     elastic_force,
@@ -19,11 +19,8 @@ from swgjoint.fe.plane.corotation import (
 from swgjoint.fe.plane.ring import RingModel
 from swgjoint.fe.plane.state import State
 from swgjoint.fe.plane.superelement import Superelement
-from swgjoint.fe.plane.tooth_contact import Contacts, ToothContact
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
-Mask = NDArray[np.bool_]
+from swgjoint.fe.plane.tooth_contact import ToothContact
+from swgjoint.typing import Array, Index, Mask
 
 FAR = 0.03
 """Gap, in lobe heights, from which the stations of an interval of the bore count as

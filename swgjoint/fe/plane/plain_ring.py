@@ -11,7 +11,6 @@ from math import pi
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.sparse.linalg import spsolve
 from skfem import (
@@ -27,8 +26,7 @@ from skfem import (
 from skfem.helpers import ddot, eye, grad, mul, trace, transpose
 
 from swgjoint.errors import ComputationError, Outcome
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 RADIAL, AROUND = 2, 32
 """Elements of the coarsest mesh through the thickness and over a quarter."""

@@ -19,17 +19,13 @@ from functools import cached_property
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.fe.plane.corotation import rotate
 from swgjoint.fe.plane.superelement import Superelement
 from swgjoint.fe.rings.facing import distances_to_ring
 from swgjoint.fe.rings.race_on_balls import PressedBalls, RaceOnBalls, pressed_form
 from swgjoint.gear.design.design import Design
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
-Mask = NDArray[np.bool_]
+from swgjoint.typing import Array, Index, Mask
 
 ELEMENTS = 190
 """Fewest elements of the race: eight between neighbouring balls of 23. Where a ball

@@ -32,8 +32,7 @@ from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.tolerances import without_errors
 from swgjoint.gear.wave_generators.wave_generator import lobe_height
 from swgjoint.progress import Progress, silent
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 STEP = 0.04
 """Of the output, parts of a pitch."""

@@ -26,10 +26,7 @@ from swgjoint.fe.plane.race import NODE, PlaneRace
 from swgjoint.fe.plane.state import State
 from swgjoint.fe.plane.superelement import Superelement
 from swgjoint.gear.wave_generators.wave_generator import WaveGenerator
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
-
+from swgjoint.typing import Array, Index
 
 AT_LOBE = 0.9
 """Cosine of twice the angle from the major axis, above which nodes of the bore lie on

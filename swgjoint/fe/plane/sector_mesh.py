@@ -6,13 +6,10 @@ from dataclasses import dataclass
 from math import ceil, cos, sin
 
 import numpy as np
-from numpy.typing import NDArray
 from skfem import MeshQuad
 
 from swgjoint.gear.teeth.profile import ToothProfile
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
+from swgjoint.typing import Array, Index
 
 # elements of the thesis mesh per half tooth: along the flank, in depth below it, on the
 # inner (outer) diameter, and through the lower rim; 181 nodes and 146 elements a tooth

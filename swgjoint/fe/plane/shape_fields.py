@@ -12,7 +12,6 @@ from itertools import pairwise
 from math import gcd, pi
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.fe.common.following import AnyState
 from swgjoint.fe.plane.corotation import rotate
@@ -25,9 +24,7 @@ from swgjoint.gear.design.design import Design
 from swgjoint.gear.teeth.tooth_profile import tooth_profile
 from swgjoint.gear.wave_generators.wave_generator import wave_generator
 from swgjoint.maps.fields import DriveFields
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
+from swgjoint.typing import Array, Index
 
 PHASES = 4
 """Positions within a pitch that are kept."""

@@ -5,14 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.errors import Outcome
 from swgjoint.fe.common.friction import SlipHistory
-from swgjoint.fe.plane.tooth_contact import Contacts
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from swgjoint.fe.plane.contact_points import Contacts
+from swgjoint.typing import Array, Mask
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -11,8 +11,8 @@ import numpy as np
 from swgjoint.errors import Outcome
 from swgjoint.fe.common.following import Unloaded
 from swgjoint.fe.common.friction import SlipHistory
+from swgjoint.fe.plane.contact_points import Contacts
 from swgjoint.fe.plane.state import State
-from swgjoint.fe.plane.tooth_contact import Contacts
 from swgjoint.fe.solid.state import SolidState
 from swgjoint.fe.solid.teeth import ToothRows
 

@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.fe.plane.elasticity import stress_maxima
 from swgjoint.fe.plane.ring import RingModel
 from swgjoint.fe.plane.state import State
 from swgjoint.fe.plane.superelement import Superelement
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 
 def flexspline_stress(model: RingModel, state: State) -> Array:

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.sparse.linalg import splu
 
@@ -18,9 +17,7 @@ from swgjoint.fe.plane.elasticity import (
 )
 from swgjoint.fe.plane.sector_mesh import SectorMesh
 from swgjoint.gear.teeth.profile import ToothProfile
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
+from swgjoint.typing import Array, Index
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -13,7 +13,7 @@ from functools import cached_property
 from math import pi
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 
 from swgjoint.errors import ComputationError
@@ -26,9 +26,8 @@ from swgjoint.gear.teeth.neutral_line import Pose
 from swgjoint.gear.teeth.profile import ToothProfile
 from swgjoint.gear.teeth.tooth_motion import tooth_motions
 from swgjoint.gear.teeth.tooth_profile import tooth_profile
+from swgjoint.typing import Array
 from swgjoint.units import mm
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from swgjoint.errors import ComputationError
 from swgjoint.fe.rings.loading import SMALL, solve_loaded, solve_unloaded
 from swgjoint.fe.rings.model import thin_ring
 from swgjoint.gear.catalogue import ratings_of
 from swgjoint.gear.design.design import Design
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 
 def transmission_error(

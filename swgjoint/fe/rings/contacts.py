@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.fe.plane.corotation import rotate, rotate_right_angle
 from swgjoint.fe.rings.assembly import BandedAssembly
@@ -13,9 +12,7 @@ from swgjoint.fe.rings.facing import Facing, distances_to_ring
 from swgjoint.fe.rings.model import ThinRing
 from swgjoint.fe.rings.race_on_balls import PressedBalls, pressed_form
 from swgjoint.fe.rings.state import RingState
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
+from swgjoint.typing import Array, Index
 
 PARTS = ("rim", "race", "balls", "bore", "teeth")
 """What stores energy; bore is what the rim presses on the race."""

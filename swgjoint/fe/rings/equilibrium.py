@@ -17,15 +17,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.errors import Outcome
 from swgjoint.fe.plane.corotation import rotate_right_angle
 from swgjoint.fe.rings.contacts import linearise
 from swgjoint.fe.rings.model import ThinRing
 from swgjoint.fe.rings.state import RingState
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -21,7 +21,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from swgjoint.errors import InputError, Outcome
 from swgjoint.fe.rings.contacts import PARTS
@@ -31,8 +31,7 @@ from swgjoint.fe.rings.sliding import sliding_sums
 from swgjoint.gear.catalogue import ratings_of
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.mounting import series_compliance
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 POSITIONS = 2
 """Wave-generator angles of a mean: torsion differs by 0.2 % between them."""

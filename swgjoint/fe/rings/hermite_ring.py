@@ -18,10 +18,9 @@ from functools import cached_property
 from math import pi
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
+from swgjoint.typing import Array, Index
 
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(3)
 GAUSS = 0.5 * (_POINTS + 1.0), 0.5 * _WEIGHTS

@@ -5,13 +5,11 @@ from __future__ import annotations
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.fe.rings.equilibrium import RingSolver
 from swgjoint.fe.rings.model import ThinRing
 from swgjoint.fe.rings.state import RingState, initial_state
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 SMALL = 0.01
 """Part of the rated torque that takes up a clearance of the teeth."""

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.errors import DesignError
 from swgjoint.fe.plane.drive2d import sector
@@ -26,10 +25,8 @@ from swgjoint.gear.design.check import raise_faults
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.tolerances import tooth_errors
 from swgjoint.gear.teeth.tooth_profile import tooth_profile
+from swgjoint.typing import Index
 from swgjoint.units import mm
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 ELEMENTS = 190
 """Fewest elements of a ring: eight between neighbouring balls of 23."""

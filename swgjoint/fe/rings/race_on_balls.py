@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.fe.plane.corotation import rotate, rotate_right_angle
 from swgjoint.fe.rings.facing import Facing, distances_to_ring
@@ -16,8 +15,7 @@ from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.tolerances import flawed_wave_generator, wave_generator_offset
 from swgjoint.gear.teeth.neutral_line import NeutralLine
 from swgjoint.gear.wave_generators.wave_generator import lobe_height
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -26,7 +26,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from swgjoint.errors import ComputationError
 from swgjoint.fe.rings.loading import positions, solve_loaded, without_torque
@@ -34,8 +34,7 @@ from swgjoint.fe.rings.model import ThinRing, thin_ring
 from swgjoint.fe.rings.sliding import sliding_sums
 from swgjoint.fe.rings.state import RingState
 from swgjoint.gear.design.design import Design
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 POSITIONS = 8
 """Wave-generator angles of a mean."""

@@ -15,7 +15,6 @@ from math import pi
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.errors import ComputationError, DesignError
 from swgjoint.fe.common.clearance import across_clearance
@@ -34,8 +33,7 @@ from swgjoint.gear.mounting import series_compliance, springs_of
 from swgjoint.maps.samples import FullSolves, MapSamples
 from swgjoint.maps.unfinished import Unfinished
 from swgjoint.progress import Progress, silent
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 PHASES = 12
 """Positions of the balls over one passage."""

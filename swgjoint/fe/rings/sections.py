@@ -11,12 +11,9 @@ from dataclasses import dataclass
 from math import cos, pi, sin
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.fe.plane.circular_spline import ring_compliance
 from swgjoint.fe.plane.superelement import Superelement
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)

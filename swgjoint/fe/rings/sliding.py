@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.fe.plane.corotation import rotate
 from swgjoint.fe.rings.facing import distances_to_ring
 from swgjoint.fe.rings.model import ThinRing
 from swgjoint.fe.rings.state import RingState
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 
 def sliding_sums(

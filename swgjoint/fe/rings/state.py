@@ -6,13 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.errors import Outcome
-from swgjoint.fe.plane.tooth_contact import Contacts
+from swgjoint.fe.plane.contact_points import Contacts
 from swgjoint.fe.rings.model import ThinRing
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -10,16 +10,14 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from swgjoint.fe.plane.circular_spline import CircularSpline
+from swgjoint.fe.plane.contact_points import Contacts
 from swgjoint.fe.plane.corotation import rotate, rotate_right_angle
-from swgjoint.fe.plane.tooth_contact import Contacts, ToothContact
+from swgjoint.fe.plane.tooth_contact import ToothContact
 from swgjoint.gear.teeth.profile import ToothProfile
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
+from swgjoint.typing import Array
 
 NODES = 10
 """Of a flank; the search for minima of the gap begins at twice as many places."""

@@ -23,14 +23,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 from scipy.interpolate import CubicSpline
 
 from swgjoint.fe.common.contact_patch import average_spline
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from swgjoint.typing import Array, Mask
 
 PATCH = 0.15
 """Half of the width over which a contact force is spread, in face widths: one and a

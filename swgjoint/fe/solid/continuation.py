@@ -6,7 +6,6 @@ from dataclasses import dataclass, field, replace
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.fe.common.following import Follower
 from swgjoint.fe.common.influence import Influence
@@ -17,8 +16,7 @@ from swgjoint.fe.solid.ring import SolidRing
 from swgjoint.fe.solid.state import SolidState
 from swgjoint.fe.solid.tolerance_influence import influence
 from swgjoint.gear.kinematics import Layout, member_angles
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -16,11 +16,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.fe.solid.strip.segment import StripSegment
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 # v x w = LEVI[i, j, k] v_j w_k
 LEVI = np.zeros((3, 3, 3))

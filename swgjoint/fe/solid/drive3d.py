@@ -4,9 +4,6 @@ from __future__ import annotations
 
 from typing import Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
 from swgjoint.errors import DesignError
 from swgjoint.fe.common.contact_patch import average_spline
 from swgjoint.fe.plane.circular_spline import CircularSpline
@@ -26,9 +23,8 @@ from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.tolerances import axis_tilt, has_errors, tooth_errors
 from swgjoint.gear.teeth.tooth_profile import tooth_profile
 from swgjoint.gear.wave_generators.wave_generator import lobe_height
+from swgjoint.typing import Array
 from swgjoint.units import mm, um
-
-Array = NDArray[np.float64]
 
 Bearing = Literal["free", "held"]
 """Along the axis the grooves of the balls give way to the race, or hold it."""

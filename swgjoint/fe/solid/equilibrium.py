@@ -15,15 +15,14 @@ from numpy.typing import NDArray
 from swgjoint.errors import Outcome
 from swgjoint.fe.common.complementarity import ActiveSetError, solve_mixed
 from swgjoint.fe.common.cyclic import SingularRingError
-from swgjoint.fe.solid.corotation import about_z, energies
+from swgjoint.fe.solid.condensation import condense
+from swgjoint.fe.solid.corotation import energies
 from swgjoint.fe.solid.linearise import SolidLinearised, linearise
 from swgjoint.fe.solid.ring import SolidRing
-from swgjoint.fe.solid.ring_factor import RingFactor
 from swgjoint.fe.solid.state import SolidState
 from swgjoint.fe.solid.teeth import ToothRows
 from swgjoint.fe.solid.wave_generator.race import NODE
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 RELEASES = 6
 """How often planes may give up a contact that they share; some would for ever."""
@@ -224,134 +223,6 @@ def _solve_linear(
         holding_torque=holding,
         compliance=compliance,
     )
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Condensed:
-    """The linearised ring seen from its n tooth contacts and its rotations.
-
-    Unknowns are the tooth forces, then how far the bore of the diaphragm and the
-    circular spline turn. What they give are the gaps, then minus the moments on the
-    two; with these signs the matrix is symmetric.
-    """
-
-    system: Array
-    """(n + 2, n + 2)."""
-    offset: Array
-    """The same at no tooth force, members where they are (n + 2,)."""
-    coupling: Array
-    """Gaps to the wave generator by tooth forces (n, p) [m/N]."""
-    base: Array
-    """Motion of the masters at no tooth force (N, size) [m]."""
-    response: Array
-    """The same by tooth forces and the rotation of the bore (N, size, n + 1)."""
-
-
-def condense(
-    ring: SolidRing,
-    state: SolidState,
-    linear: SolidLinearised,
-    found: ToothRows | None,
-    rotation: float | None = None,
-) -> Condensed:
-    """Condense the ring to tooth contacts and rotations.
-
-    Args:
-        ring: The ring.
-        state: At which it is linearised.
-        linear: Its tangent there.
-        found: Tooth contacts.
-        rotation: To which the bore of the diaphragm is brought; where it is if None.
-    """
-    masters, bore, strip = ring.strip.masters, linear.bore, ring.strip
-    teeth_dofs, held = ring.dofs(strip.teeth.masters), ring.dofs(masters.held)
-    n_sectors, size = linear.gradient.shape
-    n = 0 if found is None else len(found)
-    # known motions of the bore of the diaphragm: to its place, and turning
-    rotation = state.rotation if rotation is None else rotation
-    target = np.einsum("ij,saj->sai", about_z(np.array(rotation)), ring.reference)
-    value = np.zeros((n_sectors, size, 2))
-    still = target - ring.masters(state)
-    value[:, held, 0] = still[:, masters.held].reshape(n_sectors, -1)
-    around = np.stack([-target[..., 1], target[..., 0], 0.0 * target[..., 2]], axis=-1)
-    value[:, held, 1] = around[:, masters.held].reshape(n_sectors, -1)
-
-    # rows of the candidates with the wave generator's contact condensed
-    rows, local, gap = np.zeros((n, size)), np.zeros((n, n)), np.zeros(n)
-    coupling = np.zeros((n, bore.gap.shape[1]))
-    if found is not None and n:
-        sector = found.contacts.sector
-        loads = ring.loads(state)
-        flank = strip.flank_dofs
-        through = found.weight @ strip.teeth.compliance[:flank]
-        at_bore = through[:, flank:].reshape(n, -1, 3)
-        coupling = np.einsum("kbi,kbi->kb", at_bore, bore.normal[sector])
-        coupling = bore.with_vertices(coupling, sector)
-        eased = np.einsum("kp,kpq->kq", coupling, bore.inverse[sector])
-        into = ring.contact_dofs
-        rows[:, into] = -np.einsum("kp,kpm->km", eased, bore.rows[sector])
-        rows[:, teeth_dofs] += found.rows
-        same = sector[:, None] == sector[None, :]
-        local = ring.teeth.compliance(found)
-        local -= np.where(same, np.einsum("kp,lp->kl", eased, coupling), 0.0)
-        old = np.einsum("kb,kb->k", through, loads[sector])
-        if ring.teeth.ring_gear is not None:
-            moved = ring.teeth.ring_gear.displacement(state.ring_force)
-            old += np.einsum("kb,kb->k", found.ring_weight, moved[found.contacts.tooth])
-        gap = found.contacts.gap - old
-        gap -= np.einsum("kp,kp->k", eased, bore.free_gap[sector])
-
-    out_of = linear.gradient + linear.pushed
-    columns = np.zeros((n_sectors, size, n + 2))
-    columns[:, :, 0] = -out_of
-    columns[:, :, [0, n + 1]] -= linear.hessian @ value
-    if found is not None and n:
-        columns[found.contacts.sector, :, 1 + np.arange(n)] = rows
-    matrix = linear.hessian.copy()
-    scale = float(np.mean(np.einsum("sii->si", matrix)))
-    matrix[:, held] = 0.0
-    matrix[:, :, held] = 0.0
-    matrix[:, held, held] = scale
-    columns[:, held] = 0.0
-    if linear.race is not None:
-        fixed = np.zeros((n_sectors, size), dtype=bool)
-        fixed[:, ring.race_dofs] = linear.race.fixed
-        matrix[fixed], columns[fixed] = 0.0, 0.0
-        matrix.transpose(0, 2, 1)[fixed] = 0.0
-        matrix.reshape(n_sectors, -1)[:, :: size + 1][fixed] = scale
-    solved = _solve_ring(ring, matrix, columns)
-    base, response = solved[:, :, 0] + value[:, :, 0], solved[:, :, 1:]
-    response[:, :, n] += value[:, :, 1]
-
-    # gaps, the torque on the bore of the diaphragm and that on the circular spline
-    system, offset = np.zeros((n + 2, n + 2)), np.zeros(n + 2)
-    lever = value[:, held, 1]
-    into = np.einsum("sh,shi->si", lever, linear.hessian[:, held])
-    system[n, : n + 1] = np.einsum("si,sik->k", into, response)
-    offset[n] = np.sum(lever * out_of[:, held]) + np.sum(into * base)
-    if found is not None and n:
-        seen = np.einsum("ki,kil->kl", rows, response[found.contacts.sector])
-        system[:n, : n + 1] = seen
-        system[:n, :n] += local
-        # turning the circular spline towards the teeth closes the gap by the lever arm
-        system[:n, n + 1] = system[n + 1, :n] = -found.ring_arm
-        offset[:n] = gap + np.einsum("ki,ki->k", rows, base[found.contacts.sector])
-    system[n], offset[n] = -system[n], -offset[n]
-    return Condensed(
-        system=system, offset=offset, coupling=coupling, base=base, response=response
-    )
-
-
-def _solve_ring(ring: SolidRing, matrix: Array, columns: Array) -> Array:
-    """Solve, the last face of a half model written in the frame of the first one."""
-    sign = ring.face_closure
-    size = len(sign)
-    matrix[-1, -size:] *= sign[:, None]
-    matrix[-1, :, -size:] *= sign
-    columns[-1, -size:] *= sign[:, None]
-    solved = RingFactor(matrix, size).solve(columns)
-    solved[-1, -size:] *= sign[:, None]
-    return solved
 
 
 def _advance(

@@ -31,10 +31,7 @@ from swgjoint.fe.solid.corotation import (
 )
 from swgjoint.fe.solid.ring import SolidRing
 from swgjoint.fe.solid.state import SolidState
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
-Mask = NDArray[np.bool_]
+from swgjoint.typing import Array, Index, Mask
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.errors import ComputationError
 from swgjoint.fe.meshing_phases import default_steps, overload
@@ -30,8 +29,6 @@ from swgjoint.gear.design.tolerances import has_errors
 from swgjoint.gear.mounting import series_compliance, springs_of
 from swgjoint.progress import Progress, silent
 from swgjoint.units import deg
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

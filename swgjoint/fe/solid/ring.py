@@ -7,7 +7,6 @@ from functools import cached_property
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.fe.solid.corotation import SolidFrames, about_z, segment_frames
 from swgjoint.fe.solid.state import SolidState
@@ -15,9 +14,7 @@ from swgjoint.fe.solid.strip.strip import Strip
 from swgjoint.fe.solid.teeth import SolidTeeth
 from swgjoint.fe.solid.wave_generator.race import NODE, SIGN, SolidRace
 from swgjoint.fe.solid.wave_generator.surface import WaveGeneratorSurface
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
+from swgjoint.typing import Array, Index
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

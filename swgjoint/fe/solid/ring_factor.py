@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import lu_factor, lu_solve
 
 from swgjoint.fe.common.cyclic import Insides, SingularRingError
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 
 class RingFactor:

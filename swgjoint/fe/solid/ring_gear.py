@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
 from swgjoint.errors import DesignError
@@ -18,9 +17,7 @@ from swgjoint.fe.solid.strip.elasticity import Solid, solid
 from swgjoint.fe.solid.strip.mesh import StripMesh
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.teeth.profile import ToothProfile
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
+from swgjoint.typing import Array, Index
 
 REACH = 4
 """Teeth on either side of a loaded one that feel it: beyond, a fixed outside leaves

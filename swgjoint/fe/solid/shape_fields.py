@@ -7,7 +7,6 @@ face width, and down the outside of the cup, one row of nodes a section.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.fe.plane.shape_fields import (
     EVERY,
@@ -21,9 +20,7 @@ from swgjoint.fe.solid.ring import SolidRing
 from swgjoint.fe.solid.state import SolidState
 from swgjoint.fe.solid.stress import flexspline_stresses
 from swgjoint.fe.solid.strip.elasticity import stress_maxima
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
+from swgjoint.typing import Index
 
 
 def solid_surface(ring: SolidRing) -> ShapeSurface:

@@ -5,13 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.fe.plane.state import StateFigures
 from swgjoint.fe.solid.teeth import ToothRows
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from swgjoint.typing import Array, Mask
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -6,16 +6,13 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.fe.plane.stress import StressMaxima
 from swgjoint.fe.solid.corotation import about_z
 from swgjoint.fe.solid.ring import SolidRing
 from swgjoint.fe.solid.state import SolidState
 from swgjoint.fe.solid.strip.elasticity import COLUMNS, ROWS, stress_maxima
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
+from swgjoint.typing import Array, Index
 
 
 def flexspline_stresses(ring: SolidRing, state: SolidState) -> dict[str, Array]:

@@ -9,18 +9,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.fe.plane.circular_spline import CircularSpline
+from swgjoint.fe.plane.contact_points import Contacts
 from swgjoint.fe.plane.corotation import rotate
-from swgjoint.fe.plane.tooth_contact import Contacts, ToothContact
+from swgjoint.fe.plane.tooth_contact import ToothContact
 from swgjoint.fe.solid.corotation import SolidFrames, spin
 from swgjoint.fe.solid.ring_gear import RingGear
 from swgjoint.fe.solid.strip.strip import Strip
 from swgjoint.fe.solid.wave_generator.surface import crown
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
+from swgjoint.typing import Array, Index
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

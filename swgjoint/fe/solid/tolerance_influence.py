@@ -7,18 +7,15 @@ the wave generator stays as in the perfect drive.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.fe.common.influence import Gaps, Influence, pivot_system
 from swgjoint.fe.plane.corotation import rotate
-from swgjoint.fe.solid.equilibrium import condense
+from swgjoint.fe.solid.condensation import condense
 from swgjoint.fe.solid.linearise import SolidLinearised, linearise
 from swgjoint.fe.solid.ring import SolidRing
 from swgjoint.fe.solid.state import SolidState
 from swgjoint.fe.solid.teeth import ToothRows
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
+from swgjoint.typing import Mask
 
 REACH = 0.03
 """Gap up to which a contact may close, in lobe heights. More points along the flanks

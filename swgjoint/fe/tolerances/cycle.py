@@ -5,14 +5,11 @@ from __future__ import annotations
 from math import lcm, pi
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.fe.plane.corotation import rotate
 from swgjoint.gear.design.design import Design, MemberName
 from swgjoint.gear.design.tolerances import ToothErrors, axis_tilt, tooth_errors
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
+from swgjoint.typing import Array, Index
 
 MEMBERS: tuple[MemberName, MemberName] = ("flexspline", "circular_spline")
 

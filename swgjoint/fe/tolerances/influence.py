@@ -5,19 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.fe.common.influence import Influence
 from swgjoint.fe.plane.condensed_ring import REACH, CondensedRing, Supports, distinct
+from swgjoint.fe.plane.contact_points import Contacts
 from swgjoint.fe.plane.corotation import rotate
 from swgjoint.fe.plane.linearise import Linearised, linearise
 from swgjoint.fe.plane.ring import RingModel
 from swgjoint.fe.plane.state import State
-from swgjoint.fe.plane.tooth_contact import Contacts
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
-Mask = NDArray[np.bool_]
+from swgjoint.typing import Mask
 
 STATIONS = 30
 """Points along a flank that may touch, beside those of the perfect drive: contacts

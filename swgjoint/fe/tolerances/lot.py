@@ -28,9 +28,7 @@ from swgjoint.gear.design.tolerances import (
 )
 from swgjoint.gear.mounting import series_compliance
 from swgjoint.gear.wave_generators.wave_generator import wave_generator
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
+from swgjoint.typing import Array, Index
 
 PHASES = 4
 """Positions within a pitch."""

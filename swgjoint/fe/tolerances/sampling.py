@@ -13,7 +13,6 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.errors import ComputationError
 from swgjoint.fe.common.clearance import FAINT, across_clearance
@@ -29,9 +28,7 @@ from swgjoint.gear.design.tolerances import (
 from swgjoint.maps.samples import FullSolves, ToleranceSamples
 from swgjoint.maps.unfinished import Unfinished
 from swgjoint.progress import Progress, silent
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
+from swgjoint.typing import Array, Index
 
 PHASES = {"2d": 6, "3d": 4}
 """Positions within a pitch: what the errors add varies slowly within one."""

@@ -12,7 +12,7 @@ from typing import Any, Literal, Self
 from pydantic import model_validator
 
 from swgjoint.errors import DesignError, InputError
-from swgjoint.faults import Fault, Section, parse_toml, read_toml, validate
+from swgjoint.faults import Fault, Section, validate
 from swgjoint.gear import kinematics
 from swgjoint.gear.design.family import family_design, family_member
 from swgjoint.gear.design.material import Material
@@ -34,6 +34,7 @@ from swgjoint.gear.design.sections import (
 )
 from swgjoint.gear.wave_generators.sections import WaveGenerator
 from swgjoint.models_path import bundled_names, find
+from swgjoint.toml_file import parse_toml, read_toml
 from swgjoint.toml_text import toml_text
 from swgjoint.units import GPa, MPa, mm
 

@@ -7,13 +7,12 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.gear.teeth.profile import ToothProfile
 from swgjoint.gear.wave_generators.wave_generator import WaveGenerator
+from swgjoint.typing import Array
 from swgjoint.units import mm
 
-Array = NDArray[np.float64]
 Curves = Mapping[str, Sequence["Curve"]]
 """Curves by layer: flexspline, circular_spline, wave_generator."""
 

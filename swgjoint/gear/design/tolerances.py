@@ -9,14 +9,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.gear.design.design import Design, MemberName
 from swgjoint.gear.wave_generators.oval import Oval
 from swgjoint.gear.wave_generators.wave_generator import WaveGenerator, wave_generator
+from swgjoint.typing import Array
 from swgjoint.units import arcmin, um
-
-Array = NDArray[np.float64]
 
 HARMONICS = (1, 2, 3, 4)
 """Of the cumulative pitch error, with amplitudes 1/k."""

@@ -16,7 +16,6 @@ from itertools import pairwise
 from math import atan2, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.errors import DesignError
 from swgjoint.gear.design.design import Design
@@ -27,9 +26,8 @@ from swgjoint.gear.teeth.profile import TANGENCY_RAD, ToothProfile
 from swgjoint.gear.teeth.segments import Piece, Point, arc, line
 from swgjoint.gear.teeth.smooth_curve import smooth_curve
 from swgjoint.gear.teeth.tooth_motion import Receiver, ToothMotion, tooth_motions
+from swgjoint.typing import Array
 from swgjoint.units import deg, mm
-
-Array = NDArray[np.float64]
 
 DEPARTURES = (45.0 * deg, 30.0 * deg, 20.0 * deg, 12.0 * deg)
 """Inclinations at which the flank may leave the envelope towards the root [rad].

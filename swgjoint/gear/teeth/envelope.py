@@ -12,13 +12,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.gear.teeth.profile import ToothProfile
 from swgjoint.gear.teeth.tooth_motion import Receiver, ToothMotion
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
+from swgjoint.typing import Array
 
 POSITIONS, RADII, PER_PIECE = 601, 241, 48
 STEEPEST = np.deg2rad(75.0)

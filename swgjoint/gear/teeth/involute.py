@@ -13,16 +13,15 @@ from dataclasses import dataclass
 from math import atan, cos, sin, sqrt, tan
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.sections import Involute
 from swgjoint.gear.teeth.blank import Blank, blank
 from swgjoint.gear.teeth.profile import ToothProfile
 from swgjoint.gear.teeth.smooth_curve import smooth_curve
+from swgjoint.typing import Array
 from swgjoint.units import deg, mm
 
-Array = NDArray[np.float64]
 Trace = Callable[[Array], tuple[Array, Array]]
 
 TIP_ROUNDING = 0.25

@@ -11,14 +11,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from swgjoint.errors import DesignError
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.wave_generators.wave_generator import WaveGenerator, wave_generator
+from swgjoint.typing import Array
 from swgjoint.units import mm
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -16,8 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from swgjoint.gear.teeth.segments import Piece, Segment
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 TANGENCY_RAD = 1e-10
 """Largest corner at a junction of two segments that counts as tangent [rad]."""

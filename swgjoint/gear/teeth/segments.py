@@ -9,7 +9,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
+
 Bools = NDArray[np.bool_]
 Point = tuple[float, float]
 

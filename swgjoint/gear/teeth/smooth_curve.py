@@ -7,12 +7,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.arrays import frozen_array
 from swgjoint.gear.teeth.segments import Bools, Point
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 NODES = 33
 """Nodes of a generated curve; involutes and fillets then err below 1e-13 m."""

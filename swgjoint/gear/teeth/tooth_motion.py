@@ -11,12 +11,12 @@ from dataclasses import dataclass
 from typing import Literal, Protocol
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.teeth.neutral_line import Pose, neutral_line
+from swgjoint.typing import Array
 
-Array = NDArray[np.float64]
 Receiver = Literal["flexspline", "circular_spline"]
 
 SAME = 1e-9

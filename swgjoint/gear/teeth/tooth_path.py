@@ -11,15 +11,14 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.arrays import frozen_array
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.teeth.profile import ToothProfile
 from swgjoint.gear.teeth.tooth_motion import ToothMotion, tooth_motions
 from swgjoint.gear.teeth.tooth_profile import tooth_profile
+from swgjoint.typing import Array
 
-Array = NDArray[np.float64]
 Where = Literal["flank", "flexspline_tip", "circular_spline_tip"]
 
 POSITIONS, POINTS = 721, 401

@@ -8,8 +8,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from swgjoint.gear.wave_generators.curve import Array, ClosedCurve
+from swgjoint.gear.wave_generators.curve import ClosedCurve
 from swgjoint.gear.wave_generators.pieces import OutlinePiece
+from swgjoint.typing import Array
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

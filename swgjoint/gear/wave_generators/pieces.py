@@ -13,7 +13,7 @@ from typing import Protocol
 
 import numpy as np
 
-from swgjoint.gear.wave_generators.curve import Array
+from swgjoint.typing import Array
 
 Point = tuple[float, float]
 

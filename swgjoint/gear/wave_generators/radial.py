@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from swgjoint.gear.wave_generators.curve import Array, ClosedCurve
+from swgjoint.gear.wave_generators.curve import ClosedCurve
+from swgjoint.typing import Array
 
 _PANELS = 720
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(10)

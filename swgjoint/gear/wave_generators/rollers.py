@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from swgjoint.gear.wave_generators.chain import Chain
-from swgjoint.gear.wave_generators.curve import Array, ClosedCurve
+from swgjoint.gear.wave_generators.curve import ClosedCurve
 from swgjoint.gear.wave_generators.pieces import Arc, Line, OutlinePiece
+from swgjoint.typing import Array
 
 
 @dataclass(frozen=True, kw_only=True)

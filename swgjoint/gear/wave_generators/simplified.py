@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from swgjoint.gear.wave_generators.curve import Array, ClosedCurve
+from swgjoint.gear.wave_generators.curve import ClosedCurve
+from swgjoint.typing import Array
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,9 +12,8 @@ from numpy.typing import NDArray
 from swgjoint.errors import InputError
 from swgjoint.gear.kinematics import angle_coefficients
 from swgjoint.gear.kinematics import ratio as signed_ratio
+from swgjoint.typing import Array
 from swgjoint.units import arcmin, deg
-
-Array = NDArray[np.float64]
 
 ORDERS: tuple[tuple[int, int], ...] = (
     *((p, 0) for p in range(1, 7)),

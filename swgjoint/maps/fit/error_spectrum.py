@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, TypeVar
 from zlib import crc32
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from swgjoint.errors import InputError
 from swgjoint.gear.kinematics import angle_coefficients
@@ -35,7 +35,6 @@ if TYPE_CHECKING:
 
     Map = TypeVar("Map", bound=Potential)
 
-Array = NDArray[np.float64]
 
 AMPLITUDES: dict[tuple[int, int], float] = {
     (2, 0): 1.0,

@@ -28,8 +28,7 @@ from swgjoint.maps.fit.torsion_table import interpolate_on_knots
 from swgjoint.maps.fit.validation import validation
 from swgjoint.maps.quartic import quartic_chain
 from swgjoint.maps.samples import FullSolves, MapSamples, ToleranceSamples
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 KEEP = 0.005
 """Harmonics are kept whose kinematic error, or input-torque ripple at some load,

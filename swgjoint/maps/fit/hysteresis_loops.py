@@ -25,7 +25,6 @@ from itertools import pairwise
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
 from swgjoint.arrays import frozen_array
@@ -33,10 +32,10 @@ from swgjoint.maps.equilibrium import output_angle
 from swgjoint.maps.fit.torsion_fit import FAINT
 from swgjoint.maps.hysteresis import Jenkin, Sliders, stretches
 from swgjoint.maps.potential import Potential
+from swgjoint.typing import Array
 from swgjoint.units import arcmin
 
 Map = TypeVar("Map", bound=Potential)
-Array = NDArray[np.float64]
 
 REACHES = 2.0 ** -np.arange(0.0, 10.5, 0.5)
 """Yield torsions of the elements that are tried, parts of the travel: from that of an

@@ -14,13 +14,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.maps.fit.torsion_fit import SOFTEST, TorsionFit
 from swgjoint.maps.potential import Potential
 from swgjoint.maps.sheet.loop import LOST_MOTION_TORQUE, TorqueLoop, torque_loop
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 CLOSE = 0.002
 """Part by which hysteresis loss and lost motion may miss those of the loop."""

@@ -13,16 +13,14 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.maps.equilibrium import output_angle
 from swgjoint.maps.fit.loop_match import readings
 from swgjoint.maps.hysteresis import Sliders
 from swgjoint.maps.potential import Potential
 from swgjoint.maps.sheet.loop import NO_WIDTH, REST, TorqueLoop
+from swgjoint.typing import Array
 from swgjoint.units import arcmin
-
-Array = NDArray[np.float64]
 
 COMPARED = ("hysteresis_loss_arcmin", "lost_motion_arcmin")
 """What is read about zero torque from both loops."""

@@ -21,17 +21,15 @@ from math import comb
 from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.errors import InputError
+from swgjoint.typing import Array
 from swgjoint.units import arcmin
 
 if TYPE_CHECKING:
     from swgjoint.maps.potential import Potential
 
     Map = TypeVar("Map", bound=Potential)
-
-Array = NDArray[np.float64]
 
 
 def pruned_map(drive: Map, tolerance: float) -> Map:

@@ -16,9 +16,7 @@ from numpy.typing import NDArray
 from swgjoint.maps.fit.torsion_table import interpolate_on_knots
 from swgjoint.maps.quartic import evaluate, quartic_chain
 from swgjoint.maps.samples import MapSamples
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
+from swgjoint.typing import Array, Index
 
 KEEP_TORQUE = 0.05
 """Harmonics of toleranced drives are kept whose input torque reaches this part of the

@@ -6,14 +6,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.maps.hysteresis import Jenkin, stretches
 from swgjoint.maps.sheet.loop import TorqueLoop
 from swgjoint.maps.torsion_law import torque_at_knots
+from swgjoint.typing import Array
 from swgjoint.units import arcmin
-
-Array = NDArray[np.float64]
 
 INTERVALS = 48
 SOFTEST = 0.02

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 
 def interpolate_on_knots(torsion: Array, curve: Array, knots: Array) -> Array:

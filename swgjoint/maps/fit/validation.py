@@ -8,14 +8,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.maps.equilibrium import output_angle
 from swgjoint.maps.potential import Potential
 from swgjoint.maps.samples import FullSolves, MapSamples
 from swgjoint.maps.sheet.map_validity import QUANTITIES, STIFFNESS, UNITS
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 POSITIONS = 500
 """Of the cycle of a drive with errors of its teeth, at which its map is evaluated."""

@@ -15,15 +15,14 @@ with F the friction that slips, b the direction of the relative rotation and
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from swgjoint.errors import ComputationError
 from swgjoint.maps.equilibrium import output_angle
 from swgjoint.maps.potential import Potential
 from swgjoint.maps.sheet.turn import period_of
+from swgjoint.typing import Array
 from swgjoint.units import rpm
-
-Array = NDArray[np.float64]
 
 RUNNING_SPEED = 2000.0 * rpm
 """Input speed at which catalogues state running torque and efficiency [rad/s]."""

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from swgjoint.arrays import frozen_array
 from swgjoint.gear.catalogue import CatalogueRow
@@ -18,8 +18,7 @@ from swgjoint.gear.ratings import Ratings
 from swgjoint.maps.equilibrium import output_angle
 from swgjoint.maps.hysteresis import Sliders
 from swgjoint.maps.potential import Potential
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 POINTS = 80
 """Torques on each of the four legs of a computed loop."""

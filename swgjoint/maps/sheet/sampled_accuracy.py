@@ -6,13 +6,11 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.kinematics import angle_coefficients
+from swgjoint.typing import Array
 from swgjoint.units import arcmin
-
-Array = NDArray[np.float64]
 
 ORDERS = tuple(pq for k in range(2, 13, 2) for pq in ((k, 0), (0, k)))
 """(p, q) of p alpha + q beta that are told from the rest of the error: two lobes leave

@@ -10,7 +10,6 @@ from math import isnan
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.errors import InputError
 from swgjoint.gear.catalogue_stated import LOSS_KEYS
@@ -27,9 +26,8 @@ from swgjoint.maps.sheet.loop import NO_WIDTH, TorqueLoop, largest_torque, torqu
 from swgjoint.maps.sheet.map_validity import Difference, validation_json
 from swgjoint.maps.sheet.spec_validity import judge_figures
 from swgjoint.maps.sheet.turn import Turn, error_turn, ripple_turn, strongest_orders
+from swgjoint.typing import Array
 from swgjoint.units import arcmin, rpm
-
-Array = NDArray[np.float64]
 
 RATING_KEYS = (
     "T1_Nm",

@@ -8,14 +8,12 @@ from fractions import Fraction
 from math import ceil, gcd, pi
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.arrays import frozen_array
 from swgjoint.errors import ComputationError
 from swgjoint.maps.ideal_motion import IdealMotion
 from swgjoint.maps.potential import Potential
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 PER_WAVE = 16
 """Samples of the shortest strong wave; with the parabola through each extreme the

@@ -7,13 +7,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.gear.catalogue import CatalogueRow, catalogue_rows
 from swgjoint.sim.arm.rigid_arm import RigidArm
 from swgjoint.sim.motion.trajectory import Trajectory
-
-Array = NDArray[np.float64]
 
 SERIES = "CSG"
 RATIO = 100

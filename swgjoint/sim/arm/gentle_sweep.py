@@ -12,9 +12,8 @@ from swgjoint.errors import InputError
 from swgjoint.sim.arm.number_checks import LARGEST
 from swgjoint.sim.arm.reading import ArmReading
 from swgjoint.sim.arm.rigid_arm import RigidArm
+from swgjoint.typing import Array
 from swgjoint.units import deg, mm
-
-Array = NDArray[np.float64]
 
 SWEEP = 20.0 * deg
 """Travel of every joint, less where its range is short or something is near [rad]."""

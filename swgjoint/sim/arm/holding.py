@@ -8,12 +8,11 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.errors import InputError
 from swgjoint.sim.arm.reading import ArmReading
+from swgjoint.typing import Array
 
-Array = NDArray[np.float64]
 Pose = tuple[Array, Array]
 """Position [m] and unit quaternion (w, x, y, z)."""
 

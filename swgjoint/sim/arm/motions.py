@@ -5,12 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.sim.arm.rigid_arm import RigidArm
+from swgjoint.typing import Array
 from swgjoint.units import deg
-
-Array = NDArray[np.float64]
 
 SWEEP_TIMING = {"hold_s": 0.25, "ramp_s": 0.5, "settle_s": 0.25}
 DURATION = 4.0

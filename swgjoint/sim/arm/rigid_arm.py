@@ -9,7 +9,6 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.errors import InputError
 from swgjoint.models_path import find
@@ -17,8 +16,7 @@ from swgjoint.sim.arm.compiling import compile_spec as compile_spec
 from swgjoint.sim.arm.file import read_arm
 from swgjoint.sim.arm.number_checks import check_numbers
 from swgjoint.sim.arm.reading import ArmReading
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 
 class RigidArm:

@@ -11,7 +11,6 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.drives.rotors import catalogue_rotor_inertia
 from swgjoint.errors import InputError
@@ -30,9 +29,8 @@ from swgjoint.sim.arm.rigid_arm import RigidArm
 from swgjoint.sim.motion.commanded import trajectory_of
 from swgjoint.sim.scene.scene import Scene, parse_override
 from swgjoint.sim.step_choice import resolving_step
+from swgjoint.typing import Array
 from swgjoint.units import deg
-
-Array = NDArray[np.float64]
 
 ROTOR_INERTIA = 1e-4
 """Where the drive is not of the catalogue [kg·m²]: assumed, as in scene ``bench``."""

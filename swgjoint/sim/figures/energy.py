@@ -18,15 +18,14 @@ from typing import TYPE_CHECKING, Any
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.sim.actuators import disturbance_at
 from swgjoint.sim.scene.feature_sections import ToolForce
+from swgjoint.typing import Array
 
 if TYPE_CHECKING:
     from swgjoint.sim.run import Run
 
-Array = NDArray[np.float64]
 
 IDLE = 1e-3
 """Mean torque over rated torque below which a joint does no work to speak of."""

@@ -20,8 +20,8 @@ from swgjoint.errors import ComputationError, InputError
 from swgjoint.joint.attach import attach
 from swgjoint.joint.step_damping import damp_as_asked, is_implicit
 from swgjoint.maps.drive_map import DriveMap
+from swgjoint.typing import Array
 
-Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 JOINT = "joint"

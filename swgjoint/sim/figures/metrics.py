@@ -14,7 +14,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.joint.step_error import LinearMotorLoop, step_error
 from swgjoint.sim.figures.energy import joint_energy, run_energy
@@ -26,13 +25,13 @@ from swgjoint.sim.figures.ripple_validity import (
 )
 from swgjoint.sim.figures.tool_metrics import joint_settling, tool_metrics
 from swgjoint.sim.figures.verdict import PHASE_STEP, judge_run
+from swgjoint.typing import Array
 from swgjoint.units import arcmin, deg, mm, rpm
 
 if TYPE_CHECKING:
     from swgjoint.sim.figures.transmission import Transmission
     from swgjoint.sim.run import Run
 
-Array = NDArray[np.float64]
 
 NOISE = 1e-6
 """Lines below this share of the rated torque, or of one arcmin, are round-off."""

@@ -17,16 +17,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.maps.sheet.map_validity import LIMIT, map_validation
 from swgjoint.sim.figures.verdict import PHASE_STEP
+from swgjoint.typing import Array
 from swgjoint.units import deg
 
 if TYPE_CHECKING:
     from swgjoint.sim.run import Run
 
-Array = NDArray[np.float64]
 
 HARMONIC_LEVELS = ("kinematic", "full")
 SHARE = 0.05

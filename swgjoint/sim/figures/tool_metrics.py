@@ -15,14 +15,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from swgjoint.typing import Array
 from swgjoint.units import arcmin, mm
 
 if TYPE_CHECKING:
     from swgjoint.sim.run import Run
 
-Array = NDArray[np.float64]
 
 PATH_POINTS = 50
 """Planes along a path in which the passes are compared."""

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.joint.drive import JointDrive, JointSignals
 from swgjoint.joint.native import native_map
@@ -13,8 +12,7 @@ from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.fit.error_spectrum import with_error
 from swgjoint.maps.friction import play_friction
 from swgjoint.maps.hysteresis import play_hysteresis, stretches
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 _CHUNK = 1024  # samples at once: the coefficient table of a chunk stays in the cache
 STIFF = 1e3

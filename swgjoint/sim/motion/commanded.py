@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.errors import InputError
 from swgjoint.sim.arm.rigid_arm import RigidArm
@@ -25,9 +24,8 @@ from swgjoint.sim.scene.trajectory_sections import (
     SweepSection,
     Trapezoid,
 )
+from swgjoint.typing import Array
 from swgjoint.units import deg, mm
-
-Array = NDArray[np.float64]
 
 HOLDS_ORIENTATION = 6
 """Joints from which on the tool keeps its orientation unless the scene says."""

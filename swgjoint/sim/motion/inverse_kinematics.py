@@ -16,13 +16,11 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.errors import InputError
 from swgjoint.sim.arm.rigid_arm import RigidArm
+from swgjoint.typing import Array
 from swgjoint.units import mm
-
-Array = NDArray[np.float64]
 
 TOLERANCE = 1e-12
 """Error of a pose, metres and radians together."""

@@ -5,14 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.csv_columns import header_of, read_columns
 from swgjoint.errors import InputError
 from swgjoint.sim.motion.trajectory import Trajectory, smooth_ramp, window
+from swgjoint.typing import Array
 from swgjoint.units import deg
-
-Array = NDArray[np.float64]
 
 CLOSEST, LONGEST = 1e-6, 1e4
 """Times between points of a file and of the whole motion [s]: the shortest step and the

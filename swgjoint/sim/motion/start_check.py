@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.errors import InputError
 from swgjoint.joint.drive import JointDrive
 from swgjoint.sim.arm.rigid_arm import RigidArm
 from swgjoint.sim.motion.trajectory import Trajectory
+from swgjoint.typing import Array
 from swgjoint.units import deg, mm
-
-Array = NDArray[np.float64]
 
 FASTEST = 1e10
 """Acceleration of a link by the largest torque that the engine still carries [rad/s²].

@@ -5,12 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.sim.motion.inverse_kinematics import ToolKinematics, follow
 from swgjoint.sim.motion.trajectory import Trajectory, smooth_ramp, window
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 DIRECTIONS = {
     "+x": (1.0, 0.0),

@@ -10,16 +10,7 @@ from pydantic import Field, PrivateAttr, model_validator
 
 from swgjoint.drives.sections import JointSection, Level
 from swgjoint.errors import InputError
-from swgjoint.faults import (
-    MAX_DEPTH,
-    Fault,
-    Section,
-    parse_toml,
-    parse_value,
-    read_toml,
-    shorten,
-    validate,
-)
+from swgjoint.faults import Fault, Section, shorten, validate
 from swgjoint.models_path import find, is_file
 from swgjoint.sim.arm.reading import ArmReading
 from swgjoint.sim.scene.feature_sections import (
@@ -42,6 +33,7 @@ from swgjoint.sim.scene.trajectory_sections import (
     ChirpSection,
     TrajectorySection,
 )
+from swgjoint.toml_file import MAX_DEPTH, parse_toml, parse_value, read_toml
 from swgjoint.units import deg
 
 MAX_STEPS = 2_000_000

@@ -8,9 +8,10 @@ from typing import Annotated, Any
 from pydantic import Field, model_validator
 
 from swgjoint.errors import InputError
-from swgjoint.faults import Fault, Section, read_toml, validate
+from swgjoint.faults import Fault, Section, validate
 from swgjoint.gear.design.design import Design
 from swgjoint.models_path import find
+from swgjoint.toml_file import read_toml
 
 Positive = Annotated[float, Field(gt=0, le=1e6)]
 Text = Annotated[str, Field(min_length=1, max_length=200)]

@@ -3,24 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import partial
 from typing import Any
 
-from scipy.optimize import brentq
-
-from swgjoint.gear.design.material import Material
 from swgjoint.gear.shell_theory import (
     SERIES_SUM,
-    FatigueFactors,
-    ShellDimensions,
     ring_stiffness,
-    shell_safety_factor,
 )
-from swgjoint.units import MPa, mm
+from swgjoint.units import mm
 from swgjoint.validation.articles.file import (
     Deflection,
     Force,
-    StressAndFatigue,
     changed_design,
 )
 from swgjoint.validation.articles.runs import Found
@@ -29,18 +21,14 @@ from swgjoint.validation.rows import Row
 HELD_BACK = "held back"
 
 
-def _value(found: Found, pick: Callable[[Found], float]) -> float | None:
+def value_or_none(found: Found, pick: Callable[[Found], float]) -> float | None:
+    """A figure of a computation; None if the computation failed."""
     return None if "fault" in found else pick(found)
 
 
-def _reason(found: Found, reason: str) -> str:
+def reason_or_failure(found: Found, reason: str) -> str:
+    """The reason of a row, or why its computation failed."""
     return str(found.get("fault", reason))
-
-
-def _at(found: Found, torque: float) -> Found:
-    """What was found at a torque, if it was computed there."""
-    rows = found.get("by_torque", [])
-    return next((row for row in rows if row["torque_Nm"] == torque), {})
 
 
 def deflection_rows(own: Deflection, results: Mapping[str, Found]) -> list[Row]:
@@ -64,10 +52,12 @@ def deflection_rows(own: Deflection, results: Mapping[str, Found]) -> list[Row]:
             value, better, why = ours, None, reason
         else:
             key = ours
-            value = _value(found, lambda f: float(f[key]))
-            better = _value(fine, lambda f: float(f[key]))
-            why = _reason(found, reason)
-        return _row("deflection", own.base, quantity, unit, source, value, why, better)
+            value = value_or_none(found, lambda f: float(f[key]))
+            better = value_or_none(fine, lambda f: float(f[key]))
+            why = reason_or_failure(found, reason)
+        return article_row(
+            "deflection", own.base, quantity, unit, source, value, why, better
+        )
 
     coned = ""
     if "fault" not in found:
@@ -136,11 +126,11 @@ def deflection_rows(own: Deflection, results: Mapping[str, Found]) -> list[Row]:
                 quantity=f"largest radial displacement, {v.name}",
                 unit="mm",
                 source_value=None,
-                ours=_value(
+                ours=value_or_none(
                     results[f"deflection, {v.name}"],
                     lambda f: float(f["largest_radial_mm"]),
                 ),
-                reason=_reason(
+                reason=reason_or_failure(
                     results[f"deflection, {v.name}"], "not stated by the article"
                 ),
                 more={"part": "deflection"},
@@ -150,7 +140,7 @@ def deflection_rows(own: Deflection, results: Mapping[str, Found]) -> list[Row]:
     ]
 
 
-def _row(
+def article_row(
     part: str,
     case: str,
     quantity: str,
@@ -172,18 +162,6 @@ def _row(
         reason=reason,
         more={"part": part} | more,
     )
-
-
-def _at_torque(found: Found, k: int, *keys: str) -> float | None:
-    """What a computation says at its torque number k, None where it failed."""
-
-    def value(f: Found) -> float:
-        part = f["by_torque"][k]
-        for key in keys:
-            part = part[key]
-        return float(part)
-
-    return _value(found, value)
 
 
 def force_rows(own: Force, found: Mapping[str, Found]) -> list[Row]:
@@ -210,7 +188,7 @@ def force_rows(own: Force, found: Mapping[str, Found]) -> list[Row]:
         converged: float | None = None,
         **more: Any,
     ) -> Row:
-        return _row(
+        return article_row(
             "force", own.base, quantity, unit, source, ours, reason, converged, **more
         )
 
@@ -248,9 +226,9 @@ def force_rows(own: Force, found: Mapping[str, Found]) -> list[Row]:
             row(
                 text,
                 None,
-                _value(base, lambda f, place=place: f[place]),  # type: ignore[misc]
-                _reason(base, f"experiment {HELD_BACK}{span}"),
-                converged=_value(fine, lambda f, place=place: f[place]),  # type: ignore[misc]
+                value_or_none(base, lambda f, place=place: f[place]),  # type: ignore[misc]
+                reason_or_failure(base, f"experiment {HELD_BACK}{span}"),
+                converged=value_or_none(fine, lambda f, place=place: f[place]),  # type: ignore[misc]
                 low=low,
                 high=high,
             )
@@ -261,8 +239,8 @@ def force_rows(own: Force, found: Mapping[str, Found]) -> list[Row]:
             row(
                 f"the same at mid-face, {text} by w_0",
                 None,
-                _value(large, lambda f, key=key: f[key]),  # type: ignore[misc]
-                _reason(large, f"{HELD_BACK}; large rotations, secant"),
+                value_or_none(large, lambda f, key=key: f[key]),  # type: ignore[misc]
+                reason_or_failure(large, f"{HELD_BACK}; large rotations, secant"),
             )
         )
     ratio = None
@@ -273,7 +251,7 @@ def force_rows(own: Force, found: Mapping[str, Found]) -> list[Row]:
             "influence coefficient K",
             None,
             ratio,
-            _reason(
+            reason_or_failure(
                 base,
                 f"{HELD_BACK}; at mid-face, over the theory of {length:g} mm",
             ),
@@ -284,8 +262,8 @@ def force_rows(own: Force, found: Mapping[str, Found]) -> list[Row]:
         row(
             "without teeth, loads at mid-face",
             None,
-            _value(smooth, lambda f: float(f["mid_face"])),
-            _reason(
+            value_or_none(smooth, lambda f: float(f["mid_face"])),
+            reason_or_failure(
                 smooth,
                 "teeth stiffen the wall; the article's shell is stiffer because it"
                 " bends all of its length as much as the loaded end",
@@ -296,213 +274,9 @@ def force_rows(own: Force, found: Mapping[str, Found]) -> list[Row]:
         row(
             name,
             None,
-            _value(result, lambda f: float(f["mid_face"])),
-            _reason(result, "not stated by the article"),
+            value_or_none(result, lambda f: float(f["mid_face"])),
+            reason_or_failure(result, "not stated by the article"),
         )
         for name, result in varied.items()
     ]
-    return rows
-
-
-def stress_rows(own: StressAndFatigue, found: Mapping[str, Found]) -> list[Row]:
-    """Stress without torque: shell theory and finite elements."""
-    shell = ShellDimensions.from_design(changed_design(own.base))
-    four, fine = found["four"], found["four, fine"]
-
-    row = partial(_row, "stress", own.base)
-
-    def at_rest(*keys: str) -> tuple[float | None, float | None]:
-        return _at_torque(four, 0, *keys), _at_torque(fine, 0, *keys)
-
-    nominal, nominal_fine = at_rest("mid_face", "normal_amplitude_MPa")
-    peak, peak_fine = at_rest("von_mises_amplitude_MPa", "root, mid-face")
-    largest, largest_fine = at_rest("von_mises_MPa")
-    factor = FatigueFactors().bending_shape
-    rows = [
-        row(
-            "bending stress, 1.5 E s_1 w_0/r_m^2",
-            "MPa",
-            own.bending_MPa,
-            shell.bending_stress() / MPa,
-            "the printed formula and numbers give this",
-        ),
-        row(
-            f"the same with C_sigma = {factor:g}",
-            "MPa",
-            own.bending_MPa,
-            shell.bending_stress(factor) / MPa,
-            "four forces at 25 deg",
-        ),
-        row(
-            "four forces: nominal stress at the roots, mid-face",
-            "MPa",
-            None,
-            nominal,
-            _reason(four, "only the sections between the teeth bend"),
-            nominal_fine,
-        ),
-        row(
-            "four forces: half range of von Mises stress at a root, mid-face",
-            "MPa",
-            None,
-            peak,
-            _reason(four, "with the notch that the fillet is"),
-            peak_fine,
-        ),
-        row(
-            "four forces: largest von Mises stress",
-            "MPa",
-            None,
-            largest,
-            _reason(four, f"{HELD_BACK}; ours in a tooth fillet, tooth form chosen"),
-            largest_fine,
-        ),
-    ]
-    for name, text in (
-        ("ellipse", "rigid ellipse"),
-        ("crowned", "rigid ellipse, crowned and sloped"),
-    ):
-        result, finer = found[name], found.get(f"{name}, fine", {})
-        place = str(result.get("von_mises_part", ""))
-        rows.append(
-            row(
-                f"{text}: largest radial displacement",
-                "mm",
-                own.largest_radial_mm if name == "ellipse" else None,
-                _value(result, lambda f: float(f["largest_radial_mm"])),
-                _reason(result, "the source sets w_0 = 0.372 mm by pressure on areas"),
-                finer.get("largest_radial_mm"),
-            )
-        )
-        rows.append(
-            row(
-                f"{text}: largest von Mises stress",
-                "MPa",
-                None,
-                _value(result, lambda f: float(f["von_mises_MPa"])),
-                _reason(
-                    result,
-                    f"at the {place}; a straight generator bends the cup at its edge,"
-                    " which four forces do not",
-                ),
-                finer.get("von_mises_MPa"),
-            )
-        )
-    return rows
-
-
-def _torque_at(allowable: float, shell: ShellDimensions, steel: Material) -> float:
-    """Torque at which the closed forms reach a safety factor [N·m]."""
-    assert steel.fatigue_limit_bending and steel.fatigue_limit_torsion
-    limits = steel.fatigue_limit_bending, steel.fatigue_limit_torsion
-
-    def above(torque: float) -> float:
-        found = shell_safety_factor(
-            shell, torque, bending_limit=limits[0], torsion_limit=limits[1]
-        )
-        return found.combined - allowable
-
-    return float(brentq(above, 0.0, 1e5))
-
-
-def fatigue_rows(own: StressAndFatigue, found: Mapping[str, Found]) -> list[Row]:
-    """Safety factors over the torque."""
-    design = changed_design(own.base)
-    shell, radius = ShellDimensions.from_design(design), 0.5 * design.pitch_diameter
-    steel = design.material_of("flexspline")
-    assert steel.fatigue_limit_bending and steel.fatigue_limit_torsion
-    rows = [
-        Row(
-            case=own.base,
-            quantity=f"torque at S = {own.allowable:g}, shell theory",
-            unit="N·m",
-            source_value=None,
-            ours=_torque_at(own.allowable, shell, steel),
-            reason=f"{HELD_BACK}; the torque is even shear alone here",
-            more={"part": "fatigue"},
-        )
-    ]
-
-    def pick(name: str, k: int, *keys: str) -> float | None:
-        return _at_torque(found[name], k, *keys)
-
-    for k, torque in enumerate(own.torques_Nm):
-
-        def row(
-            quantity: str,
-            ours: float | None,
-            reason: str,
-            *,
-            unit: str = "-",
-            source: float | None = None,
-            converged: float | None = None,
-            torque: float = torque,
-        ) -> None:
-            case = f"{own.base} {torque:g} N·m"
-            values = quantity, unit, source, ours, reason, converged
-            rows.append(_row("fatigue", case, *values, torque_Nm=torque))
-
-        theory = shell_safety_factor(
-            shell,
-            torque,
-            bending_limit=steel.fatigue_limit_bending,
-            torsion_limit=steel.fatigue_limit_torsion,
-        ).combined
-        row(
-            "nodal force T/(R N)",
-            torque / (radius * own.nodes),
-            "58 N by the formula at 20 N·m; R chosen with the teeth",
-            unit="N",
-            source=own.nodal_force_N[k],
-        )
-        row(
-            "S, shell theory",
-            theory,
-            f"{HELD_BACK}; its torque is even shear alone",
-        )
-        four, fine = found["four"], found["four, fine"]
-        lifted = (pick("four", k + 1, "least_force_N") or 0.0) < 0.0
-        row(
-            "S, four forces, mid-face",
-            pick("four", k + 1, "mid_face", "S"),
-            _reason(
-                four,
-                f"{HELD_BACK}; forces on 11 teeth bend the ring between its supports"
-                + (", of which one pulls" if lifted else ""),
-            ),
-            converged=None
-            if "fault" in fine
-            else pick("four, fine", k + 1, "mid_face", "S"),
-        )
-        row(
-            "largest von Mises stress, four forces",
-            pick("four", k + 1, "von_mises_MPa"),
-            _reason(four, "tooth fillets and the loaded teeth; the source's is a fit"),
-            unit="MPa",
-            source=own.von_mises_MPa[k],
-            converged=pick("four, fine", k + 1, "von_mises_MPa"),
-        )
-        for name, text in (("fatigue", "ellipse"), ("fatigue, crowned", "crowned")):
-            result = found[name]
-            on_fine = {}
-            if name == "fatigue":
-                on_fine = _at(found["fatigue, fine"], torque)
-            row(
-                f"S, meshing, {text}, mid-face",
-                pick(name, k, "mid_face", "S"),
-                _reason(result, f"{HELD_BACK}; nominal stress times K_sigma"),
-                converged=on_fine.get("mid_face", {}).get("S"),
-            )
-            row(
-                f"S, meshing, {text}, worst section",
-                pick(name, k, "worst_section", "S"),
-                _reason(result, f"{HELD_BACK}; with the ellipse at the back edge"),
-                converged=on_fine.get("worst_section", {}).get("S"),
-            )
-            row(
-                f"S, meshing, {text}, without factors",
-                pick(name, k, "S_without_factors_mid_face"),
-                _reason(result, f"{HELD_BACK}; from the peak in the fillet, mid-face"),
-                converged=on_fine.get("S_without_factors_mid_face"),
-            )
     return rows

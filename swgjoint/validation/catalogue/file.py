@@ -9,10 +9,11 @@ import numpy as np
 from pydantic import Field
 
 from swgjoint.errors import InputError
-from swgjoint.faults import Section, read_toml, validate
+from swgjoint.faults import Section, validate
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.family import BEARING_BORE, CLEARANCE
 from swgjoint.models_path import find
+from swgjoint.toml_file import read_toml
 
 Whole = Annotated[int, Field(gt=0, le=1000)]
 Numbers = Annotated[tuple[Whole, ...], Field(strict=False)]

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.errors import InputError
 from swgjoint.gear.catalogue import CatalogueRow, catalogue_rows, table
 from swgjoint.maps.sheet.loop import LOST_MOTION_TORQUE, largest_torque
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 STIFFNESS = ("K1", "K2", "K3")
 RATIO_CLASS = 80

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.errors import Outcome
 from swgjoint.fe.rings.friction import RubbedPath
@@ -14,6 +13,7 @@ from swgjoint.gear.design.design import Design
 from swgjoint.gear.mounting import series_compliance
 from swgjoint.maps.sheet.loop import LOST_MOTION_TORQUE
 from swgjoint.maps.sheet.sampled_accuracy import accuracy_bracket
+from swgjoint.typing import Array
 from swgjoint.units import arcmin
 from swgjoint.validation.catalogue.file import CatalogueFile, variant_design
 from swgjoint.validation.catalogue.printed import (
@@ -24,8 +24,6 @@ from swgjoint.validation.catalogue.printed import (
 )
 from swgjoint.validation.catalogue.runs import Found
 from swgjoint.validation.rows import Row
-
-Array = NDArray[np.float64]
 
 
 def friction_of_path(found: Found, design: Design) -> RubbedPath:

@@ -9,17 +9,16 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.code_hash import code_hash
 from swgjoint.errors import ComputationError, DesignError
 from swgjoint.gear.design.design import Design
 from swgjoint.maps.cache import recall
+from swgjoint.typing import Array
 
 if TYPE_CHECKING:
     from swgjoint.fe.rings.friction import RubbedPath
 
-Array = NDArray[np.float64]
 
 Found = dict[str, Any]
 

@@ -6,20 +6,18 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
 from swgjoint.fe.rings.friction import RubbedPath
 from swgjoint.gear.catalogue import CatalogueRow
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.mounting import series_compliance
+from swgjoint.typing import Array
 from swgjoint.units import arcmin
 from swgjoint.validation.catalogue.file import CatalogueFile, variant_design
 from swgjoint.validation.catalogue.printed import STIFFNESS, catalogue_row, edges
 from swgjoint.validation.catalogue.rows import friction_of_path, stiffnesses
 from swgjoint.validation.catalogue.runs import Found
-
-Array = NDArray[np.float64]
 
 
 def cube_scaling(

@@ -11,7 +11,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.control.kinematic_error import (
     JointRecord,
@@ -23,11 +22,10 @@ from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.controller import Controller
 from swgjoint.sim.run import Run
 from swgjoint.sim.scene.scene import Scene
+from swgjoint.typing import Array
 from swgjoint.units import arcmin
 from swgjoint.validation.control.specimens import nominal, specimen
 from swgjoint.view.run import run_scene
-
-Array = NDArray[np.float64]
 
 FREQUENCY = 20.0
 """Natural frequency of every rung's loop on the motor [Hz]; damping ratio 1."""

@@ -19,7 +19,6 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.control.flexible import flexible_plan
 from swgjoint.control.kinematic_error import (
@@ -37,6 +36,7 @@ from swgjoint.maps.drive_map import DriveMap
 from swgjoint.pool import run_all
 from swgjoint.progress import Progress, silent
 from swgjoint.sim.controller import Controller
+from swgjoint.typing import Array
 from swgjoint.validation.control.bench import (
     DELAY,
     FREQUENCY,
@@ -49,8 +49,6 @@ from swgjoint.validation.control.bench import (
 )
 from swgjoint.validation.control.specimens import nominal, specimen
 from swgjoint.validation.rows import Row, StudyOptions, StudyResult
-
-Array = NDArray[np.float64]
 
 DRIVE = "CSG-25-100"
 SEEDS = 10

@@ -13,14 +13,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.control.kinematic_error import KinematicErrorTable
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.fit.error_spectrum import AMPLITUDES
 from swgjoint.units import arcmin
-
-Array = NDArray[np.float64]
 
 RANDOM = 0.07
 """Over the amplitude of 2 alpha: what single pitches leave in every order of

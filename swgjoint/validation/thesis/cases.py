@@ -11,9 +11,10 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, model_validator
 
 from swgjoint.errors import DesignError, InputError
-from swgjoint.faults import Fault, Section, read_toml, validate
+from swgjoint.faults import Fault, Section, validate
 from swgjoint.gear.design.design import Design
 from swgjoint.models_path import find
+from swgjoint.toml_file import read_toml
 
 Kind = Literal["tensile", "compressive", "von_mises"]
 KINDS: tuple[Kind, ...] = ("tensile", "compressive", "von_mises")

@@ -13,8 +13,6 @@ from swgjoint.fe.plane.ring import RingModel
 from swgjoint.fe.plane.state import State
 from swgjoint.fe.plane.stress import KINDS, flexspline_stress
 
-Array = NDArray[np.float64]
-
 PLACES = ("fillet", "flank", "bore", "inside", "contact")
 NEAR = 0.25
 """A node this near to a tooth contact that carries force counts as its neighbourhood

@@ -11,7 +11,7 @@ from swgjoint.maps.sheet.validity_marks import error_mark, joint_mark, mark_lege
 from swgjoint.pictures import save_png
 from swgjoint.sim.figures.keys import LOWER, RIPPLE
 from swgjoint.view.recording.entities import COLORS
-from swgjoint.view.report.report import Cell, Table
+from swgjoint.view.report.tables import Cell, Table
 from swgjoint.view.words import format_figure
 
 if TYPE_CHECKING:

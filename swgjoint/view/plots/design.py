@@ -6,19 +6,18 @@ import io
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.gear.teeth.neutral_line import neutral_line
 from swgjoint.gear.teeth.tooth_profile import tooth_profile
 from swgjoint.gear.wave_generators.wave_generator import lobe_height, wave_generator
 from swgjoint.pictures import save_png
+from swgjoint.typing import Array
 from swgjoint.units import mm
 
 if TYPE_CHECKING:
     from swgjoint.gear.design.design import Design
     from swgjoint.gear.teeth.profile import ToothProfile
 
-Array = NDArray[np.float64]
 _FLEXSPLINE, _CIRCULAR_SPLINE, _WAVE_GENERATOR = "tab:blue", "tab:red", "tab:green"
 _FOLLOWS = 0.02
 """A rim is drawn along an outline whose length is within this of the bore's."""

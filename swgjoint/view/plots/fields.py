@@ -8,7 +8,6 @@ from math import pi
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.fe.plane.corotation import rotate
 from swgjoint.fe.plane.fields import (
@@ -27,7 +26,6 @@ if TYPE_CHECKING:
     from swgjoint.fe.meshing_run import MeshingRun
     from swgjoint.fe.plane.state import State
 
-Array = NDArray[np.float64]
 
 KINDS = ("tensile", "|compressive|", "von Mises")
 SHOWN_TEETH = 6.0  # to either side of an axis

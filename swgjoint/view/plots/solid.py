@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.pictures import save_png
+from swgjoint.typing import Array
 from swgjoint.units import deg, mm
 
 if TYPE_CHECKING:
@@ -16,7 +17,6 @@ if TYPE_CHECKING:
     from swgjoint.fe.solid.ring import SolidRing
     from swgjoint.fe.solid.state import SolidState
 
-Array = NDArray[np.float64]
 
 SHOWN = 0.2
 """Largest drawn deflection over the size of the section, at most."""

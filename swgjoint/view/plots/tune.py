@@ -12,7 +12,8 @@ from swgjoint.files import Outputs
 from swgjoint.json_text import json_text
 from swgjoint.pictures import save_png
 from swgjoint.units import arcmin
-from swgjoint.view.report.report import Cell, Table, write_tables
+from swgjoint.view.report.report import write_tables
+from swgjoint.view.report.tables import Cell, Table
 from swgjoint.view.words import format_figure
 
 if TYPE_CHECKING:

@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.maps.fields import DriveFields, FlexsplineShape, Table
+from swgjoint.typing import Array
 from swgjoint.units import MPa
 from swgjoint.view.recording.columns import Column
 
@@ -32,7 +33,6 @@ if TYPE_CHECKING:
     from swgjoint.sim.assembly import Assembly
     from swgjoint.sim.run import Run
 
-Array = NDArray[np.float64]
 
 FRAMES = 100
 """Most of one drive in a recording."""

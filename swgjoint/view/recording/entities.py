@@ -34,6 +34,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.sim.figures.metrics import torque_deviation
+from swgjoint.typing import Array
 from swgjoint.units import arcmin, deg, mm
 from swgjoint.view.recording.blueprint import SPACING, has_torsion
 from swgjoint.view.recording.columns import Column
@@ -62,7 +63,6 @@ if TYPE_CHECKING:
     from swgjoint.sim.assembly import Assembly
     from swgjoint.sim.run import Run
 
-Array = NDArray[np.float64]
 
 TIMELINE = "time"
 COLORS = ((31, 119, 180), (214, 96, 30), (110, 110, 110), (44, 140, 70))

@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.sim.figures.metrics import highest_resolved_order, torque_ripple
+from swgjoint.typing import Array
 from swgjoint.units import arcmin
 from swgjoint.view.recording.columns import Column, Numbers
 
 if TYPE_CHECKING:
     from swgjoint.sim.run import Run
 
-Array = NDArray[np.float64]
 
 BARS = 400
 """Bars of a spectrum at most; each is the largest amplitude of its part."""

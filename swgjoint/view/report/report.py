@@ -2,69 +2,37 @@
 
 from __future__ import annotations
 
-import base64
-import platform
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
-from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from swgjoint import __version__
 from swgjoint.files import write_whole
-from swgjoint.json_text import json_text, plain
-from swgjoint.maps.sheet.map_validity import (
-    NOT_VALIDATED,
-    map_validation,
-    validation_summary,
-)
-from swgjoint.maps.sheet.spec_sheet import measure_spec, validity
-from swgjoint.maps.sheet.validity_marks import (
-    error_mark,
-    joint_mark,
-    mark,
-    mark_legend,
-    worst,
-)
+from swgjoint.json_text import json_text
 from swgjoint.progress import Progress, silent
-from swgjoint.sim.figures.verdict import NOT_VALID, VALID
 from swgjoint.toml_text import toml_text
-from swgjoint.view.plots.spec import spec_picture
 from swgjoint.view.recording.blueprint import joints_by_interest
 from swgjoint.view.report.plots import joint_png
-from swgjoint.view.validity import (
-    left_out_share,
-    map_error,
-    omissions_of,
-    step_error,
-    warnings_of,
+from swgjoint.view.report.tables import (
+    Table,
+    _joint_table,
+    alerts,
+    inline_picture,
+    label_table,
+    provenance_table,
+    sheet_table,
+    summary_table,
+    versions_table,
 )
-from swgjoint.view.words import format_figure, short, words
+from swgjoint.view.validity import (
+    step_error,
+)
+from swgjoint.view.words import short
 
 if TYPE_CHECKING:
     from swgjoint.maps.drive_map import DriveMap
     from swgjoint.sim.run import Run
-
-PACKAGES = ("mujoco", "numpy", "scipy", "scikit-fem", "rerun-sdk", "matplotlib")
-
-
-@dataclass(frozen=True)
-class Cell:
-    """One figure of a table, as text; ``mark`` is ``good``, ``bad`` or ``text``."""
-
-    text: str
-    mark: str = ""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Table:
-    """Header of (name, unit), rows of cells, remarks below."""
-
-    header: Sequence[tuple[str, str]]
-    rows: Sequence[Sequence[Cell]]
-    title: str = ""
-    notes: Sequence[str] = ()
 
 
 def write_report(
@@ -104,21 +72,21 @@ def write_report(
 
     labels = []
     for label, run in runs.items():
-        labels.append(_label(label, run, step_error(run) if check_step else None))
+        labels.append(label_table(label, run, step_error(run) if check_step else None))
         count()
     panels = []
     for joint in joints:
         panels.append(
             {
                 "title": short(joint),
-                "picture": _inline(joint_png(runs, joint)),
+                "picture": inline_picture(joint_png(runs, joint)),
                 "table": _joint_table(runs, joint),
             }
         )
         count()
     sheets = []
     for drive in drives:
-        sheets.append(_sheet(drive))
+        sheets.append(sheet_table(drive))
         count()
     return _write_page(
         path,
@@ -143,7 +111,7 @@ def write_report(
             {"title": f"Model of {label}", "text": json_text(run.contains)}
             for label, run in runs.items()
         ],
-        provenance=_provenance(drives),
+        provenance=provenance_table(drives),
     )
 
 
@@ -188,326 +156,12 @@ def _write_page(
         version=__version__,
         date=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
         pictures=[
-            {"title": title, "data": _inline(data)} for title, data in pictures.items()
+            {"title": title, "data": inline_picture(data)}
+            for title, data in pictures.items()
         ],
-        versions=_versions(),
+        versions=versions_table(),
     )
     return write_whole(path, page)
-
-
-WINDOWS = {
-    "constant speed": "at the constant-speed part of the motion",
-    "motion": "over the whole motion",
-}
-"""What figures are taken over."""
-
-
-def alerts(runs: Mapping[str, Run]) -> list[str]:
-    """Why runs are not valid, one line a reason."""
-    return [
-        f"{label}: {NOT_VALID}: {reason}"
-        for label, run in runs.items()
-        for reason in run.metrics()["reasons"]
-    ]
-
-
-def summary_table(runs: Mapping[str, Run]) -> Table:
-    """One line a run: worst joint and tool."""
-    rows, window = [], ""
-    for label, run in runs.items():
-        metrics = run.metrics()
-        window = metrics["window_of"]
-        joints = metrics["joints"].values()
-        peaks = [
-            joint["ratings"]["peak_Nm"] / joint["ratings"]["repeated_peak_Nm"]
-            for joint in joints
-        ]
-        within = all(joint["ratings"]["within"] for joint in joints)
-        torsion = [abs(j["torsion_arcmin"]["mean"]) for j in joints]
-        error = [j["transmission_error_arcmin"]["pp"] for j in joints]
-        valid = metrics["verdict"] == VALID
-        rows.append(
-            [
-                Cell(label, "text"),
-                Cell(metrics["verdict"], "good" if valid else "bad"),
-                ripple_cell(joints, "ripple_rms_percent"),
-                ripple_cell(joints, "ripple_pp_percent"),
-                *_cells(max(torsion)),
-                error_cell(joints, max(error)),
-                *_cells(metrics["tool"]["path_rms_mm"], max(peaks)),
-                Cell(format_figure(within), "good" if within else "bad"),
-                *_cells(run.time[-1] / run.wall),
-            ]
-        )
-    return Table(
-        header=[
-            ("", ""),
-            ("verdict", ""),
-            ("ripple rms", "% of rated"),
-            ("ripple", "% of rated, pp"),
-            ("torsion, mean", "arcmin"),
-            ("transmission error", "arcmin, pp"),
-            ("tool off its path", "mm, rms"),
-            ("peak torque", "of repeated peak"),
-            ("within ratings", ""),
-            ("speed", "times real time"),
-        ],
-        rows=rows,
-        notes=[
-            f"Largest of all joints, {WINDOWS[window]}.",
-            *_legend(
-                joint
-                for run in runs.values()
-                for joint in run.metrics()["joints"].values()
-            ),
-        ],
-    )
-
-
-def ripple_cell(joints: Iterable[Mapping[str, Any]], key: str) -> Cell:
-    """Largest ripple of some joints: a dash for none, > where orders are left out.
-
-    ~ and ! where the map of a joint among them differs from unseen solves.
-    """
-    told = [joint for joint in joints if joint["ripple_missing"] is None]
-    if not told:
-        return Cell("-")
-    most = max(told, key=lambda joint: float(joint[key]))
-    bound = "> " if most["ripple_is_lower_bound"] else ""
-    sign = worst([joint_mark(joint) for joint in told])
-    text = f"{sign} {bound}{format_figure(most[key])}".strip()
-    return Cell(text, "bad" if bound or sign else "")
-
-
-def error_cell(joints: Iterable[Mapping[str, Any]], value: float) -> Cell:
-    """Peak to peak of a transmission error, marked as :func:`ripple_cell` does."""
-    sign = worst([error_mark(joint, value) for joint in joints])
-    return Cell(f"{sign} {format_figure(value)}".strip(), "bad" if sign else "")
-
-
-def _legend(joints: Iterable[Mapping[str, Any]]) -> list[str]:
-    """What the marks of figures mean; none without marks."""
-    marks = set()
-    for joint in joints:
-        error = joint["transmission_error_arcmin"]["pp"]
-        marks |= {joint_mark(joint), error_mark(joint, error)}
-    return [f"{mark_legend(marks)}."] if marks - {""} else []
-
-
-def _label(label: str, run: Run, step: dict[str, Any] | None) -> dict[str, Any]:
-    """What limits the figures of one run, and their change at half the step."""
-    simulation = run.assembly.scene.simulation
-    metrics = run.metrics()
-    limits = [*metrics["reasons"], *warnings_of(metrics["joints"])]
-    lines = [Cell(text, "bad") for text in limits]
-    lines.append(
-        Cell(
-            f"{simulation.integrator} at {1e3 * run.assembly.step:g} ms; figures from"
-            f" {metrics['window_s'][0]:.3g} to {metrics['window_s'][1]:.3g} s;"
-            f" ripple: {metrics['ripple_of']}"
-        )
-    )
-    if step is not None and "reason" in step:
-        lines.append(Cell(f"change at half the step {step['reason']}"))
-    lines += [Cell(text) for text in omissions_of(run)]
-    changes = (step or {}).get("joints", {})
-    rows = []
-    for j, joint in enumerate(run.joints):
-        figures, transmission = metrics["joints"][joint], run.assembly.transmissions[j]
-        low, high = figures["ratings"]["map_range_Nm"]
-        left = [f"{item['order']:.4g}" for item in figures["unresolved"]]
-        orders = f"{' '.join(left[:3])}{' ...' if left[3:] else ''}" or "none"
-        change = changes.get(joint, {})
-        rows.append(
-            [
-                Cell(short(joint), "text"),
-                Cell(figures["level"]),
-                Cell(f"{transmission.drive.name} ({figures['source']})"),
-                Cell(f"{low:.3g}\u00a0to\u00a0{high:.3g}"),
-                *_cells(figures["highest_resolved_order"]),
-                Cell(orders),
-                *_cells(left_out_share(run, j)),
-                *[
-                    Cell("-" if key not in change else f"{change[key]:.1g}")
-                    for key in (
-                        "ripple_rms_percent",
-                        "transmission_error_arcmin",
-                        "torsion_arcmin",
-                    )
-                ],
-            ]
-        )
-    table = Table(
-        header=[
-            ("joint", ""),
-            ("level", ""),
-            ("drive (source)", ""),
-            ("map covers", "N·m"),
-            ("orders resolved up to", "per input turn"),
-            ("orders left out", "per input turn"),
-            ("their torque", "N·m, rated load"),
-            ("ripple rms ±", "%"),
-            ("transm. error ±", "arcmin"),
-            ("torsion ±", "arcmin"),
-        ],
-        rows=rows,
-        notes=[
-            "± is the change when the step is halved and the same orders are kept; the"
-            " error of the step is up to twice that."
-        ],
-    )
-    return {"title": label, "lines": lines, "table": table}
-
-
-def _joint_table(runs: Mapping[str, Run], joint: str) -> Table:
-    """Figures of one joint in every run."""
-    rows = []
-    for label, run in runs.items():
-        figures = run.metrics()["joints"][joint]
-        ratings = figures["ratings"]
-        torsion = figures["torsion_arcmin"]
-        error = figures["transmission_error_arcmin"]
-        orders = ", ".join(
-            f"{line['order']:.1f}{'' if line['drive_order'] else '*'}"
-            f" ({line['amplitude_percent']:.3f} %)"
-            for line in figures["orders"]
-        )
-        rows.append(
-            [
-                Cell(label, "text"),
-                *_cells(torsion["mean"], torsion["pp"], error["mean"]),
-                error_cell([figures], error["pp"]),
-                ripple_cell([figures], "ripple_rms_percent"),
-                ripple_cell([figures], "ripple_pp_percent"),
-                Cell(f"{joint_mark(figures)} {orders}".strip() if orders else "-"),
-                *_cells(
-                    ratings["peak_Nm"],
-                    ratings["cubed_mean_Nm"],
-                    ratings["input_speed_rpm"],
-                ),
-                Cell(
-                    format_figure(ratings["within"]),
-                    "good" if ratings["within"] else "bad",
-                ),
-            ]
-        )
-    return Table(
-        header=[
-            ("", ""),
-            ("torsion, mean", "arcmin"),
-            ("pp", "arcmin"),
-            ("transm. error, mean", "arcmin"),
-            ("pp", "arcmin"),
-            ("ripple rms", "% of rated"),
-            ("pp", "% of rated"),
-            ("strongest orders", "per input turn"),
-            ("peak torque", "N·m"),
-            ("cubed mean", "N·m"),
-            ("input speed", "rpm"),
-            ("within ratings", ""),
-        ],
-        rows=rows,
-        notes=[
-            "* no order of this joint's drive: vibration or another joint.",
-            *_legend(run.metrics()["joints"][joint] for run in runs.values()),
-        ],
-    )
-
-
-def _sheet(drive: DriveMap) -> dict[str, Any]:
-    """Spec sheet of one drive, beside what its maker states."""
-    sheet = measure_spec(drive)
-    stated = drive.info.get("stated")
-    stated = stated if isinstance(stated, Mapping) else {}
-    rows = []
-    for key, value in sheet.figures.items():
-        if key == "orders":
-            continue
-        name, unit = words(key)
-        doubt = sheet.uncertain.get(key) if value is not None else None
-        sign = "" if doubt is None else mark(doubt.largest)
-        why = "" if doubt is None else f"the map {doubt}"
-        rows.append(
-            [
-                Cell(name, "text"),
-                Cell(
-                    f"{sign} {format_figure(plain(value))}".strip(),
-                    "bad" if sign else "",
-                ),
-                *(_cells(stated.get(key)) if stated else []),
-                Cell(unit, "text"),
-                Cell(sheet.missing.get(key, why), "text"),
-            ]
-        )
-    label = validity(drive)
-    low, high = label["torque_range_Nm"]
-    source = (
-        f"Level {label['level']}, {low:.4g} to {high:.4g} N·m"
-        f"{'; the loop leaves that range' if label['beyond_range'] else ''}; ratings:"
-        f" {label['ratings']}; hysteresis: {label['hysteresis']}; friction:"
-        f" {label['friction']}; {_validated(drive)}."
-    )
-    return {
-        "title": drive.name,
-        "source": source,
-        "picture": _inline(spec_picture(drive.name, sheet)),
-        "table": Table(
-            header=[
-                ("", ""),
-                ("measured", ""),
-                *([("stated", "")] if stated else []),
-                ("", ""),
-                ("", ""),
-            ],
-            rows=rows,
-        ),
-    }
-
-
-def _validated(drive: DriveMap) -> str:
-    """The validation of a map in one phrase."""
-    found, _ = map_validation(drive)
-    return NOT_VALIDATED if found is None else validation_summary(found)
-
-
-def _provenance(drives: Sequence[DriveMap]) -> Table:
-    """Where every map comes from and what is known of its error."""
-    rows = []
-    for drive in drives:
-        info = drive.info
-        label = info.get("label")
-        method = (
-            ", ".join(
-                f"{key.replace('_', ' ')}: {value}"
-                for key, value in label.items()
-                if value is not None
-            )
-            if isinstance(label, Mapping)
-            else str(info.get("source", drive.level))
-        )
-        rows.append(
-            [
-                Cell(drive.name, "text"),
-                Cell(drive.level, "text"),
-                Cell(method, "text"),
-                Cell(str(info.get("design_hash", "-"))[:16], "text"),
-                Cell(str(info.get("ratings_source", drive.ratings.source)), "text"),
-                Cell("; ".join(map_error(drive)), "text"),
-            ]
-        )
-    names = ("drive", "level", "map from", "design hash", "ratings", "error of the map")
-    return Table(title="Maps", header=[(name, "") for name in names], rows=rows)
-
-
-def _versions() -> Table:
-    versions = {"python": platform.python_version(), "swgjoint": __version__}
-    for name in PACKAGES:
-        versions[name] = metadata.version(name)
-    return Table(
-        title="Versions",
-        header=[(name, "") for name in versions],
-        rows=[[Cell(value, "text") for value in versions.values()]],
-    )
 
 
 def _drives(runs: Mapping[str, Run]) -> list[DriveMap]:
@@ -519,14 +173,6 @@ def _drives(runs: Mapping[str, Run]) -> list[DriveMap]:
             key = (drive.name, drive.level, str(drive.info.get("design_hash")))
             found.setdefault(key, drive)
     return list(found.values())
-
-
-def _cells(*values: Any) -> list[Cell]:
-    return [Cell(format_figure(plain(value))) for value in values]
-
-
-def _inline(data: bytes) -> str:
-    return base64.b64encode(data).decode("ascii")
 
 
 def _template() -> Any:

@@ -9,7 +9,8 @@ import pytest
 
 from swgjoint.fe.plane.continuation import Continuation
 from swgjoint.fe.plane.drive2d import ring_model, sector
-from swgjoint.fe.plane.equilibrium import Load, NewtonSolver
+from swgjoint.fe.plane.equilibrium import NewtonSolver
+from swgjoint.fe.plane.newton_step import Load
 from swgjoint.fe.rings.equilibrium import RingSolver
 from swgjoint.fe.rings.loading import solve_loaded, solve_unloaded
 from swgjoint.fe.rings.model import thin_ring

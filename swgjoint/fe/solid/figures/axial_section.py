@@ -11,14 +11,11 @@ from dataclasses import dataclass
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.fe.solid.ring import SolidRing
 from swgjoint.fe.solid.state import SolidState
+from swgjoint.typing import Array, Index
 from swgjoint.units import mm
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 ON_AXIS = 1e-9
 """Distance from the plane of the section below which a node lies in it [m]."""

@@ -18,7 +18,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.errors import ComputationError, DesignError
 from swgjoint.fe.solid.continuation import SolidContinuation
@@ -34,9 +33,8 @@ from swgjoint.gear.shell_theory import (
     shell_safety_factor,
 )
 from swgjoint.progress import Progress, silent
+from swgjoint.typing import Array
 from swgjoint.units import MPa, mm
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,12 +14,10 @@ from dataclasses import dataclass
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.fe.solid.figures.pinched_cup import PinchedCup
+from swgjoint.typing import Array
 from swgjoint.units import deg
-
-Array = NDArray[np.float64]
 
 ANGLE = 25.0 * deg
 """beta of the article."""

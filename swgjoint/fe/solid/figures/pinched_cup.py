@@ -18,7 +18,6 @@ from functools import cached_property
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.errors import ComputationError, DesignError, Outcome
 from swgjoint.fe.solid.corotation import (
@@ -42,10 +41,8 @@ from swgjoint.fe.solid.strip.smooth_strip import smooth_strip
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.teeth.profile import ToothProfile
 from swgjoint.gear.teeth.tooth_profile import tooth_profile
+from swgjoint.typing import Array, Index
 from swgjoint.units import mm
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 PLACES = ("mid_face", "open_edge", "face_width")
 """Where the load acts along the axis; the last one is spread evenly over the teeth."""

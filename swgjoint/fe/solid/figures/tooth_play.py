@@ -6,12 +6,10 @@ from dataclasses import replace
 from math import inf, nan
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.fe.solid.corotation import SolidFrames, about_z
 from swgjoint.fe.solid.ring import SolidRing
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 REACH = 0.5
 """Gaps of teeth that count [modules]; without any the teeth pass each other."""

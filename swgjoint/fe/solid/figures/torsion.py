@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.errors import ComputationError
 from swgjoint.fe.solid.continuation import SolidContinuation
@@ -16,9 +15,8 @@ from swgjoint.fe.solid.state import SolidState
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.mounting import series_compliance
 from swgjoint.progress import Progress, silent
+from swgjoint.typing import Array
 from swgjoint.units import mm
-
-Array = NDArray[np.float64]
 
 SMALL = 0.01
 """Part of the first torque that takes up the play."""

@@ -6,14 +6,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 from skfem import Basis, BilinearForm, ElementVector, MeshHex
 from skfem.helpers import ddot, eye, sym_grad, trace
 
 from swgjoint.fe.solid.strip.hexahedron import ElementHexIncompatible
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 # components of stress and strain: xx, yy, zz, xy, yz, zx
 ROWS, COLUMNS = (0, 1, 2, 0, 1, 2), (0, 1, 2, 1, 2, 0)

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from skfem import MeshHex
 
@@ -26,10 +25,8 @@ from swgjoint.fe.plane.sector_mesh import (
 )
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.teeth.profile import ToothProfile
+from swgjoint.typing import Array, Index
 from swgjoint.units import mm
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 # elements of the thesis along the face width; the cup then has 24 stations of 33 nodes
 FACE_WIDTH = 10

@@ -7,10 +7,8 @@ from functools import cache
 
 import numpy as np
 from numpy.polynomial import Legendre
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
+from swgjoint.typing import Array, Index
 
 THROUGH = (0.0, 1.0, 0.5, 0.25, 0.75)
 """Masters through the wall, from the outside: each one raises the degree by one."""

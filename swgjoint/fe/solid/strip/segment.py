@@ -5,16 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from swgjoint.fe.solid.strip.elasticity import Solid, solid
 from swgjoint.fe.solid.strip.masters import SegmentMasters
 from swgjoint.fe.solid.strip.mesh import SegmentMesh
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
+from swgjoint.typing import Array, Index
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

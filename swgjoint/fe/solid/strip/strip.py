@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 from scipy.interpolate import CubicSpline
 
@@ -17,9 +16,7 @@ from swgjoint.fe.solid.strip.mesh import StripMesh
 from swgjoint.fe.solid.strip.segment import StripSegment, condense_segment
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.teeth.profile import ToothProfile
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
+from swgjoint.typing import Array
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -23,7 +23,6 @@ from dataclasses import dataclass, replace
 from math import inf, isinf, nan
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline, PchipInterpolator
 from scipy.optimize import brentq
 
@@ -36,9 +35,8 @@ from swgjoint.fe.solid.wave_generator.lobe_pads import force_on_teeth
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.wave_generators.wave_generator import lobe_height
 from swgjoint.progress import Progress, silent
+from swgjoint.typing import Array
 from swgjoint.units import mm
-
-Array = NDArray[np.float64]
 
 HEIGHTS = (0.25, 0.5, 0.75, 0.85, 0.95, 1.05, 1.15, 1.25)
 """Of the lobes over that of the drive, about, where the cup is solved."""

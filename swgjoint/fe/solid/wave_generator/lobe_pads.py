@@ -10,7 +10,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.errors import ComputationError
 from swgjoint.fe.solid.across import spread_forces
@@ -18,8 +17,7 @@ from swgjoint.fe.solid.continuation import SolidContinuation
 from swgjoint.fe.solid.ring import SolidRing
 from swgjoint.fe.solid.state import SolidState
 from swgjoint.fe.solid.wave_generator.surface import WaveGeneratorSurface
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 NEAR = 0.49
 """Half of the width of a pad [pitches]: the nodes of one tooth."""

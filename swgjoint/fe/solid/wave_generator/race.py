@@ -20,7 +20,6 @@ from dataclasses import dataclass
 from math import pi
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.fe.plane.corotation import rotate
 from swgjoint.fe.plane.race import RaceForces
@@ -28,10 +27,7 @@ from swgjoint.fe.rings.race_on_balls import RaceOnBalls, pressed_form
 from swgjoint.fe.solid.wave_generator.race_outside import RaceOutside
 from swgjoint.fe.solid.wave_generator.race_roll import RaceRoll
 from swgjoint.gear.design.design import Design
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
-Mask = NDArray[np.bool_]
+from swgjoint.typing import Array, Mask
 
 KINDS = ("x", "y", "roll", "axial")
 """Of a node; values, then derivatives by the parameter of an element."""

@@ -12,16 +12,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.fe.rings.hermite_ring import hermite
 from swgjoint.fe.solid.wave_generator.surface import crown
 from swgjoint.gear.bearing.ball_bearing import BallBearing
 from swgjoint.gear.design.design import Design
+from swgjoint.typing import Array, Mask
 from swgjoint.units import mm, um
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -15,12 +15,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.fe.rings.hermite_ring import HermiteRing, hermite
 from swgjoint.gear.bearing.ball_bearing import BallBearing
-
-Array = NDArray[np.float64]
+from swgjoint.typing import Array
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -12,15 +12,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.fe.plane.corotation import rotate
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.tolerances import flawed_wave_generator, wave_generator_offset
 from swgjoint.gear.wave_generators.wave_generator import WaveGenerator
+from swgjoint.typing import Array
 from swgjoint.units import mm, um
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

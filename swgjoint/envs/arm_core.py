@@ -1,0 +1,360 @@
+"""Episodes of an arm that follows the path of a scene."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.drives.references import names_catalogue
+from swgjoint.envs.arguments import check_flag, check_number, format_value
+from swgjoint.envs.core import Core, Entry, EpisodeLimits, ceiling, error_bounds
+from swgjoint.envs.loop import MotorLoop
+from swgjoint.envs.plant import Plant, specimen
+from swgjoint.envs.sensors import Sensors
+from swgjoint.envs.specimen import SpecimenTolerances, load_drive_once, tolerances_of
+from swgjoint.errors import InputError
+from swgjoint.joint.region import check_region
+from swgjoint.maps.drive_map import DriveMap
+from swgjoint.sim.arm.payload import arms_of
+from swgjoint.sim.arm.rigid_arm import RigidArm
+from swgjoint.sim.arm.scene import is_arm, scene_of_arm
+from swgjoint.sim.assembly import Assembly, assemble
+from swgjoint.sim.equilibrium import start_state
+from swgjoint.sim.motion.commanded import trajectory_of
+from swgjoint.sim.scene.scene import Scene
+from swgjoint.sim.scene.task import task_of
+from swgjoint.typing import Array
+from swgjoint.units import arcmin
+
+ACTIONS = ("torque", "setpoint")
+
+
+ANGLE_MARGIN = 0.3
+"""Beyond the range of the path, where an episode ends [rad]."""
+
+
+SPEED_MARGIN = 20.0
+"""Beyond twice the fastest motor speed of the path, likewise [rad/s]."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ArmSettings:
+    """Arguments of ``ArmTracking-v0``."""
+
+    scene: str | Path = "ur5e-circle"
+    level: str = "full"
+    friction: bool = True
+    kinematic_error_arcmin: float | None = None
+    action: str = "torque"
+    authority_of_rated: float = 0.2
+    shift_arcmin: float = 10.0
+    episode_s: float = 2.0
+    sensors: Mapping[str, float] | Sensors | None = None
+    randomise: bool | Mapping[str, float] | SpecimenTolerances = False
+    error_scale_mm: float = 1.0
+    effort_weight: float = 0.1
+
+    def __post_init__(self) -> None:
+        for key, unit in (
+            ("authority_of_rated", ""),
+            ("shift_arcmin", "arcmin"),
+            ("episode_s", "s"),
+            ("error_scale_mm", "mm"),
+        ):
+            check_number(key, getattr(self, key), unit, zero=False)
+        check_number("effort_weight", self.effort_weight, "", zero=True)
+        error = self.kinematic_error_arcmin
+        if error is not None:
+            check_number("kinematic_error_arcmin", error, "arcmin", zero=True)
+        check_flag("friction", self.friction)
+        if not isinstance(self.scene, str | Path):
+            raise InputError(
+                f"scene {format_value(self.scene)}; accepted: a name or path of a scene"
+                " or of an arm"
+            )
+        if self.action not in ACTIONS:
+            raise InputError(f"action {self.action!r}; accepted: {', '.join(ACTIONS)}")
+        if self.level not in ("full", "linear"):
+            raise InputError(
+                f"level {self.level!r} of an environment; accepted: full, linear"
+            )
+
+
+class ArmCore(Core):
+    """Episodes of ``ArmTracking-v0``."""
+
+    def __init__(self, count: int, threads: int, settings: ArmSettings) -> None:
+        """Assemble the scene once, then ``count`` simulations of it."""
+        self.settings = s = settings
+        tolerances = tolerances_of(s.randomise, s.level)
+        variable = tolerances is not None and s.level == "full"
+        scene = _scene(s)
+        assembly = assemble(scene, drives=_drives(scene), variable=variable)
+        _check(scene, assembly)
+        task = task_of(assembly)
+        steps = min(round(s.episode_s / task.period), len(task.position) - 1)
+        drives = [t.attached for t in assembly.transmissions]
+        if tolerances is not None and variable:
+            for one in drives:
+                for kind in tolerances.extremes():
+                    check_region(
+                        specimen(one, kind),
+                        timestep=assembly.step,
+                        integrator=scene.simulation.integrator,
+                    ).require(1)
+        plant = Plant(
+            assembly.model,
+            drives,
+            count,
+            sub_steps=round(task.period / assembly.step),
+            threads=threads,
+            variable=variable,
+        )
+        load = np.broadcast_to(assembly.load, (steps + 1, len(drives)))
+        self._path = np.stack(
+            [
+                task.position[: steps + 1],
+                task.velocity[: steps + 1],
+                task.acceleration[: steps + 1],
+                load,
+                task.link_torque[: steps + 1],
+            ],
+            axis=1,
+        )
+        self._by_joint = _tool_slopes(assembly, self._path[:, 0])
+        maps = [t.drive for t in assembly.transmissions]
+        rated, momentary, ratcheting = np.array(
+            [
+                (
+                    m.ratings.rated_torque,
+                    m.ratings.momentary_peak,
+                    m.ratings.ratcheting_torque or np.inf,
+                )
+                for m in maps
+            ]
+        ).T
+        ratio = np.abs(task.joints.ratio)
+        path = self._path[:, 0]
+        self._authority = s.authority_of_rated * rated / ratio
+        self._feedforward = assembly.feedforward[:: assembly.sub_steps][: steps + 1]
+        self._start = _start(assembly)
+        top = 2.0 * ratio * np.abs(self._path[:, 1]).max(axis=0) + SPEED_MARGIN
+        super().__init__(
+            plant,
+            joints=task.joints,
+            loop=MotorLoop(
+                stiffness=assembly.loops.stiffness,
+                damping=assembly.loops.damping,
+                ratio=task.joints.ratio,
+            ),
+            limits=EpisodeLimits(
+                angle=0.5 * np.ptp(path, axis=0) + ANGLE_MARGIN,
+                centre=0.5 * (path.max(axis=0) + path.min(axis=0)),
+                motor_speed=top,
+                momentary_peak=momentary,
+                ratcheting=ratcheting,
+                motor_torque=task.joints.torque_limit,
+            ),
+            sensors=Sensors.from_argument(s.sensors),
+            tolerances=tolerances,
+            period=task.period,
+            steps=steps,
+            shared=True,
+        )
+
+    def entries(self) -> tuple[tuple[Entry, ...], tuple[Entry, ...]]:
+        """Of observation and action."""
+        n, limits, s = len(self.joints.names), self.limits, self.settings
+        reach = np.abs(limits.centre) + limits.angle
+        ratio = np.abs(self.joints.ratio)
+        angle = float(np.max(ratio * reach))
+        speed = 1.5 * float(limits.motor_speed.max())
+        off = np.array(
+            [
+                error_bounds(
+                    one,
+                    speed=float(np.abs(self._path[:, 1, j]).max()),
+                    acceleration=float(np.abs(self._path[:, 2, j]).max()),
+                    age=self.sensors.delay_periods * self.period,
+                    period=self.period,
+                )
+                for j, one in enumerate(self.joints.ratio)
+            ]
+        ).max(axis=0)
+
+        def each(what: str, unit: str, top: float) -> Entry:
+            top = ceiling(top)
+            return Entry(
+                meaning=f"{what} of every joint", unit=unit, low=-top, high=top, count=n
+            )
+
+        link_speed = max(float(np.abs(self._path[:, 1]).max()), 0.01)
+        torque = max(float(np.abs(self._path[:, 4]).max()), 0.1)
+        further = []
+        if self.sensors.link_encoder:
+            further.append(each("link angle, read,", "rad", 1.01 * float(reach.max())))
+        if self.sensors.torque_sensor:
+            top = 1.1 * float(limits.momentary_peak.max())
+            further.append(each("output torque, read,", "N·m", top))
+        what = {
+            "torque": "added motor torque, of its authority,",
+            "setpoint": "shift of the set-point, of its largest,",
+        }[s.action]
+        return (
+            each("motor angle, read,", "rad", 1.01 * angle),
+            each("motor speed, change of the reading,", "rad/s", speed),
+            each("motor angle, ratio * reference - read,", "rad", float(off[0])),
+            each("motor speed, ratio * reference - read,", "rad/s", float(off[1])),
+            each("reference speed of the link", "rad/s", link_speed),
+            each("known torque of the link", "N·m", torque),
+            each("last action", "1", 1.0),
+            *further,
+        ), (each(what, "1", 1.0),)
+
+    def vary_load(self, index: int, shares: Array) -> None:
+        """Nothing: the payload is the scene's."""
+
+    def draw(self, rng: np.random.Generator) -> Array:
+        """The path of the scene."""
+        return self._path
+
+    def command(self, action: Array) -> Array:
+        """What the scene's loops get, with what the action adds."""
+        s, plan = self.settings, self.next_plan()
+        here = np.minimum(self.instant + 1, self.steps)
+        if s.action == "torque":
+            own = self.loop.command(plan[:, 0], plan[:, 1])
+            own = own + action * self._authority
+        else:
+            shift = s.shift_arcmin * arcmin * action
+            own = self.loop.command(plan[:, 0] + shift, plan[:, 1])
+        return np.asarray(own + self._feedforward[here])
+
+    def start(self, plan: Array) -> tuple[Array, Array]:
+        """Motor angles and torques of the drives where the scene starts."""
+        return self._start
+
+    def columns(self) -> list[Array]:
+        """See the table of :class:`ArmTrackingEnv`."""
+        read, ratio, now = self._readout, self.joints.ratio, self.now
+        angle, speed = read.value[:, : ratio.size], read.motor_speed
+        return [
+            angle,
+            speed,
+            ratio * now[:, 0] - angle,
+            ratio * now[:, 1] - speed,
+            now[:, 1],
+            now[:, 4],
+            self.action,
+            *self.readings(),
+        ]
+
+    def judge(self) -> None:
+        """Errors of links and tool."""
+        super().judge()
+        slopes = self._by_joint[self._here]  # (n, 3, n_joints)
+        # sums joint by joint: their order must not depend on the number of episodes
+        offset = [np.zeros(len(slopes)) for _ in range(3)]
+        for axis in range(3):
+            for j in range(slopes.shape[2]):
+                offset[axis] = offset[axis] + slopes[:, axis, j] * self.link_error[:, j]
+        x, y, z = offset
+        self.tool_error = np.sqrt(x * x + y * y + z * z)
+
+    def reward(self) -> Array:
+        """See :class:`ArmTrackingEnv`."""
+        s, effort = self.settings, np.zeros(len(self.action))
+        for share in self.action.T:
+            effort = effort + share * share
+        error = self.tool_error / (1e-3 * s.error_scale_mm)
+        mean = effort / self.action.shape[1]
+        return np.asarray(1.0 / (1.0 + error * error) - s.effort_weight * mean)
+
+    def info(self) -> dict[str, NDArray[Any]]:
+        """With the error of the tool."""
+        return super().info() | {"tool_error_mm": 1e3 * self.tool_error}
+
+
+def _scene(settings: ArmSettings) -> Scene:
+    """The scene with the level, friction and kinematic error that are asked for."""
+    name = str(settings.scene)
+    scene = scene_of_arm(name) if is_arm(name) else Scene.load_file(name)
+    scene = scene.with_level(settings.level)  # type: ignore[arg-type]
+    scene = scene.with_friction(bool(settings.friction))
+    return scene.with_kinematic_error(settings.kinematic_error_arcmin)
+
+
+def _drives(scene: Scene) -> dict[str, DriveMap]:
+    """Maps that take finite elements or a file, once for all environments.
+
+    A scene that episodes cannot have is refused before any is built.
+    """
+    sections = [scene.defaults, *scene.joints.values()]
+    names = {s.drive for s in sections if s.drive is not None and s.model is None}
+    slow = sorted(name for name in names if not names_catalogue(name))
+    if slow:
+        arm, _ = arms_of(
+            scene.arm,
+            tool_site=scene.tool_site,
+            payload=scene.payload,
+            where=scene.where,
+            reading=scene.reading,
+        )
+        _check_motion(scene, arm, trajectory_of(scene, arm).velocity[0])
+    return {name: load_drive_once(name) for name in slow}
+
+
+def _check_motion(scene: Scene, arm: RigidArm, first: Array) -> None:
+    """Refuse disturbances, an arm without tool, a first velocity [rad/s]."""
+    where = f"scene {scene.name!r}"
+    if scene.disturbance:
+        raise InputError(f"{where} has disturbances; accepted: a scene without")
+    if arm.tool < 0:
+        raise InputError(f"{where}: the arm has no tool site; needed: one to judge by")
+    if np.abs(first).max() > 0.0:
+        raise InputError(f"{where} starts moving; accepted: a path that starts at rest")
+
+
+def _check(scene: Scene, assembly: Assembly) -> None:
+    """Refuse what episodes do not have."""
+    _check_motion(scene, assembly.arm, assembly.trajectory.velocity[0])
+    where, loops = f"scene {scene.name!r}", assembly.loops
+    if loops.sampled or any(loops.setpoints(j) for j in range(len(assembly.joints))):
+        raise InputError(
+            f"{where}: controller {scene.controller.kind!r} with its sensors, period or"
+            " motor lines; accepted: kind pd in the engine's step, without them"
+        )
+    if scene.simulation.integrator != "discrete":
+        raise InputError(
+            f"{where}: integrator {scene.simulation.integrator!r}; accepted: discrete"
+        )
+
+
+def _start(assembly: Assembly) -> tuple[Array, Array]:
+    """Motor angles [rad] and drive torques [N·m] where the scene starts."""
+    qpos, _ = start_state(assembly)
+    theta, psi = qpos[assembly.motor_position], qpos[assembly.link_position]
+    torque = [
+        float(t.law.forces(a, b)[1])
+        for t, a, b in zip(assembly.transmissions, theta, psi, strict=True)
+        if t.law is not None
+    ]
+    return theta, np.array(torque)
+
+
+def _tool_slopes(assembly: Assembly, path: Array) -> Array:
+    """Displacement of the tool per link angle along the path [m]. (n, 3, n_joints)."""
+    arm, out = assembly.arm, np.empty((len(path), 3, path.shape[1]))
+    data = mujoco.MjData(arm.model)
+    for row, q in zip(out, path, strict=True):
+        data.qpos[:] = q
+        mujoco.mj_kinematics(arm.model, data)
+        mujoco.mj_comPos(arm.model, data)
+        mujoco.mj_jacSite(arm.model, data, row, None, arm.tool)
+    return out

@@ -1,0 +1,158 @@
+"""Curves of the compliance between two equilibria of a load path."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.fe.common.contact_changes import Steps
+from swgjoint.typing import Array, Mask
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Curves:
+    """Compliance over intervals of length 1: a cubic plus jumps."""
+
+    power: Array
+    """Ascending coefficients (n, 4)."""
+    place: Array
+    """Of the jumps, in [0, 1] (n, m)."""
+    jump: Array
+    """(n, m)."""
+    feasible: NDArray[np.bool_]
+    """Whether the explanation exists (n,)."""
+
+    @classmethod
+    def where(cls, mask: Mask, one: Curves, other: Curves) -> Curves:
+        """One of two by interval (n,)."""
+        place, jump = [
+            np.concatenate([mask[:, None] * a, ~mask[:, None] * b], axis=1)
+            for a, b in ((one.place, other.place), (one.jump, other.jump))
+        ]
+        return cls(
+            power=np.where(mask[:, None], one.power, other.power),
+            place=place,
+            jump=jump,
+            feasible=np.where(mask, one.feasible, other.feasible),
+        )
+
+    @property
+    def bend(self) -> Curves:
+        """Deviation of the cubic from a straight line, without the steps."""
+        power = self.power.copy()
+        power[:, 1] = -power[:, 2:].sum(axis=1)
+        power[:, 0] = 0.0
+        return replace(self, power=power, jump=np.zeros_like(self.jump))
+
+    def of(self, k: NDArray[np.intp]) -> Curves:
+        """Those of some intervals."""
+        return Curves(
+            power=self.power[k],
+            place=self.place[k],
+            jump=self.jump[k],
+            feasible=self.feasible[k],
+        )
+
+    def integrals(self, x: Array) -> tuple[Array, Array, Array]:
+        """C and what it integrates to once and twice from 0 to x (n,)."""
+        k = np.arange(4)
+        powers = x[:, None] ** k
+        after = np.maximum(x[:, None] - self.place, 0.0)
+        jumped = (x[:, None] >= self.place) * self.jump
+        c = (self.power * powers).sum(axis=1) + jumped.sum(axis=1)
+        once = (self.power * powers / (k + 1)).sum(axis=1) * x
+        once += (self.jump * after).sum(axis=1)
+        twice = (self.power * powers / ((k + 1) * (k + 2))).sum(axis=1) * x**2
+        twice += 0.5 * (self.jump * after**2).sum(axis=1)
+        return c, once, twice
+
+    def on(self, grid: Array) -> tuple[Array, Array]:
+        """Both integrals at places of every interval (n, m)."""
+        n, m = grid.shape
+        k = np.repeat(np.arange(n), m)
+        _, once, twice = self.of(k).integrals(grid.ravel())
+        return once.reshape(n, m), twice.reshape(n, m)
+
+
+def one_jump(c0: Array, change: Array, mean: Array, moment: Array) -> Curves:
+    r"""C0 + g x + (Delta - g) H(x - a) with the given mean and moment.
+
+    With p = 1 - a the mean is g/2 + (Delta - g) p and the moment g/6 + (Delta - g)
+    p^2/2; without p a quadratic for the slope g is left, of which the flatter root
+    counts.
+    """
+    b = mean - 2.0 * moment - change / 3.0
+    k = 2.0 * moment * change - mean**2
+    root = np.sqrt(np.maximum(b**2 - k / 3.0, 0.0))
+    below = -b - np.where(b < 0.0, -root, root)
+    scale = np.abs(c0) + np.abs(mean)
+    flat = np.abs(below) <= 1e-13 * scale
+    slope = np.where(flat, change, 2.0 * k / np.where(flat, 1.0, below))
+    jump = change - slope
+    smooth = np.abs(jump) <= 1e-12 * scale
+    after = (mean - 0.5 * slope) / np.where(smooth, 1.0, jump)
+    after = np.where(smooth, 0.0, after)
+    missed = np.abs(mean - 0.5 * slope - jump * after)
+    missed += np.abs(moment - slope / 6.0 - 0.5 * jump * after**2)
+    feasible = (after >= -1e-9) & (after <= 1.0 + 1e-9) & (missed <= 1e-9 * scale)
+    power = np.stack([c0, slope, 0.0 * c0, 0.0 * c0], axis=1)
+    return Curves(
+        power=power,
+        place=1.0 - np.clip(after, 0.0, 1.0)[:, None],
+        jump=jump[:, None],
+        feasible=feasible,
+    )
+
+
+def two_jumps(c0: Array, change: Array, mean: Array, moment: Array) -> Curves:
+    """C0, then two jumps of a half of the change each."""
+    scale = np.abs(c0) + np.abs(mean)
+    flat = np.abs(change) <= 1e-12 * scale
+    by = np.where(flat, 1.0, change)
+    # p = 1 - a and q = 1 - b of both places: their sum, and the sum of their squares
+    total, squares = 2.0 * mean / by, 4.0 * moment / by
+    apart = 2.0 * squares - total**2
+    half = np.sqrt(np.maximum(apart, 0.0))
+    # where the jumps are one, round-off may part them the wrong way
+    slack = 1e-9 * scale / np.abs(by)
+    after = 0.5 * np.stack([total + half, total - half], axis=1)
+    inside = (after >= -1e-9).all(axis=1) & (after <= 1.0 + 1e-9).all(axis=1)
+    return Curves(
+        power=np.stack([c0, 0.0 * c0, 0.0 * c0, 0.0 * c0], axis=1),
+        place=1.0 - np.clip(after, 0.0, 1.0),
+        jump=np.repeat(0.5 * change[:, None], 2, axis=1),
+        feasible=inside & ~flat & (apart >= -slack),
+    )
+
+
+def steps_on_cubic(
+    c0: Array, change: Array, mean: Array, moment: Array, steps: list[Steps]
+) -> Curves:
+    """Given steps in every interval, plus the cubic that meets all four figures."""
+    most = max((own.place.size for own in steps), default=0)
+    place, jump = np.zeros((c0.size, most)), np.zeros((c0.size, most))
+    for k, own in enumerate(steps):
+        place[k, : own.place.size], jump[k, : own.jump.size] = own.place, own.jump
+    after = 1.0 - place
+    cubic = fit_cubic(
+        c0,
+        change - jump.sum(axis=1),
+        mean - (jump * after).sum(axis=1),
+        moment - 0.5 * (jump * after**2).sum(axis=1),
+    )
+    return replace(cubic, place=place, jump=jump)
+
+
+def fit_cubic(c0: Array, change: Array, mean: Array, moment: Array) -> Curves:
+    """C0 + Delta x + x (1 - x) (a + b x): the quintic Hermite curve of G."""
+    mean, moment = mean - 0.5 * change, moment - change / 6.0
+    b = 60.0 * mean - 120.0 * moment
+    a = 6.0 * mean - 0.5 * b
+    return Curves(
+        power=np.stack([c0, change + a, b - a, -b], axis=1),
+        place=np.zeros((c0.size, 1)),
+        jump=np.zeros((c0.size, 1)),
+        feasible=np.ones(c0.size, dtype=bool),
+    )

@@ -1,0 +1,126 @@
+"""Steps from a scene to its compiled model."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from swgjoint.drives.sections import JointSection
+from swgjoint.errors import InputError
+from swgjoint.maps.drive_map import DriveMap
+from swgjoint.sim.actuators import Loops
+from swgjoint.sim.arm.rigid_arm import RigidArm
+from swgjoint.sim.control import control_gains, integral_gain
+from swgjoint.sim.figures.transmission import Transmission
+from swgjoint.sim.motion.trajectory import Trajectory
+from swgjoint.sim.scene.feature_sections import ToolForce
+from swgjoint.sim.scene.scene import Scene
+from swgjoint.typing import Array
+
+
+def motor_loops(
+    scene: Scene,
+    transmissions: list[Transmission],
+    sections: tuple[JointSection, ...],
+    inertia: Array,
+) -> Loops:
+    """Gains and limits of all motors.
+
+    Args:
+        scene: The scene.
+        transmissions: Of all joints.
+        sections: Of all joints.
+        inertia: Of motor and link at the motor [kg·m²]. Shape (n_joints,).
+    """
+    section = scene.controller
+    stiffness, damping = control_gains(section, inertia)
+    own = [t.drive.ratings.rated_torque / abs(t.ratio) for t in transmissions]
+    limit = section.integral_limit_Nm
+    return Loops(
+        stiffness=stiffness,
+        damping=damping,
+        integral=integral_gain(section, stiffness, inertia),
+        integral_limit=np.array(own) if limit is None else np.full(len(own), limit),
+        limits=tuple(s.motor for s in sections),
+        sampled=scene.sampled,
+    )
+
+
+def site_of_force(scene: Scene, arm: RigidArm) -> str:
+    """Name of the tool site; refuses a force on a tool that does not exist."""
+    if arm.tool < 0 and any(isinstance(d, ToolForce) for d in scene.disturbance):
+        raise InputError(
+            f"{scene.where}: disturbance: tool_force on arm {scene.arm!r}, which has no"
+            " site for the tool; needed: tool_site"
+        )
+    return scene.tool_site
+
+
+def joints_in_contact(arm: RigidArm, trajectory: Trajectory) -> NDArray[np.bool_]:
+    """Joints on which contacts or limits may act. Shape (n_joints,)."""
+    model = arm.model
+    collides = bool(model.geom_contype.any() and model.geom_conaffinity.any())
+    low, high = model.jnt_range.T
+    path, slack = trajectory.position, 1e-3  # drives give way by minutes of arc [rad]
+    beyond = (path <= low + slack) | (path >= high - slack)
+    return np.asarray(collides | (model.jnt_limited.astype(bool) & beyond.any(axis=0)))
+
+
+def interpolate_samples(values: Array, n: int) -> Array:
+    """Values at n samples per sample, on straight lines. Shape (n (m - 1) + 1, ...)."""
+    if n == 1:
+        return values
+    part = (np.arange(n) / n)[None, :, None]
+    lines = values[:-1, None] * (1.0 - part) + values[1:, None] * part
+    return np.vstack([lines.reshape(-1, values.shape[1]), values[-1:]])
+
+
+def prescribed_errors(
+    position: Array, transmissions: list[Transmission], *, step: float, discrete: bool
+) -> tuple[Array, Array]:
+    """Error and rate that level ``kinematic`` prescribes on the motion."""
+    # one more sample in front for the rate of the first, as if the motion went on
+    path = np.vstack([2.0 * position[:1] - position[1:2], position])
+    error = np.column_stack(
+        [
+            t.attached.prescribed_error(t.ratio * path[:, j])
+            for j, t in enumerate(transmissions)
+        ]
+    )
+    # positions of the discrete integrator change by the velocity after the step
+    rate = np.diff(error, axis=0) / step
+    if not discrete:
+        rate = np.gradient(error, step, axis=0)[1:]
+    return error[1:], rate
+
+
+def complete_sections(
+    scene: Scene, joints: tuple[str, ...]
+) -> tuple[JointSection, ...]:
+    """Settings of all joints; refuses what is missing, all at once."""
+    sections = tuple(scene.joint_settings(name) for name in joints)
+    lines = []
+    for name, section in zip(joints, sections, strict=True):
+        if section.drive is None and section.linear is None:
+            lines.append(
+                f"{scene.where}: joints.{name}.drive: missing; accepted: drive or"
+                " linear, here or in [defaults]"
+            )
+        if section.rotor_inertia_kgm2 is None:
+            lines.append(
+                f"{scene.where}: joints.{name}.rotor_inertia_kgm2: missing; accepted:"
+                " > 0 kg·m² and <= 1 kg·m², here or in [defaults]"
+            )
+    if lines:
+        raise InputError("\n".join(lines))
+    return sections
+
+
+def load_torque(scene: Scene, joint: str, drive: DriveMap) -> float:
+    """Constant load torque of a joint [N·m]; zero without a load."""
+    load = scene.load.get(joint)
+    if load is None:
+        return 0.0
+    if load.torque_Nm is not None:
+        return load.torque_Nm
+    return (load.rated_fraction or 0.0) * drive.ratings.rated_torque

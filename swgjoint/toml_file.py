@@ -1,0 +1,176 @@
+"""TOML from elsewhere: size, depth and types are checked before use."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from swgjoint.errors import InputError
+from swgjoint.faults import CONTROL_CHARACTERS, shorten
+
+MAX_BYTES = 2_000_000
+"""No input file of ours is longer; a longer one is not read."""
+
+
+MAX_DEPTH = 16
+"""Tables and lists inside each other; our files have five."""
+
+
+MAX_KEY = 200
+"""Characters of a key."""
+
+
+_INTEGERS = range(-(2**63), 2**63)
+"""Of TOML 1.0.0, section "Integer"."""
+
+
+# more parts than MAX_DEPTH joined by dots: parsing those takes quadratic time
+_LONG_KEY = re.compile(
+    r"(?<![\w\"'-])[\w\"'-]++(?:[ \t]*+\.[ \t]*+[\w\"'-]++)"
+    rf"{{{MAX_DEPTH}}}"
+)
+
+
+_LONG = f"a key of more than {MAX_DEPTH} parts joined by dots"
+
+
+_OTHER_FILES = {
+    ".xml": "arm (MJCF)",
+    ".urdf": "arm (URDF)",
+    ".xacro": "template of an arm (URDF)",
+    ".swg": "map of a drive",
+    ".rrd": "recording",
+    ".csv": "table (CSV)",
+}
+"""Files of other formats, by their suffix."""
+
+
+_MARKS = {
+    "design": {"drive", "flexspline", "circular_spline", "wave_generator"},
+    "scene": {"arm", "trajectory", "simulation", "controller"},
+    "optimisation": {"plan", "objectives"},
+    "sweep": {"plan"},
+    "spec": {"spec"},
+}
+"""Tables and keys by which the files of each kind are known."""
+
+
+def read_toml(
+    path: Path, *, what: str, error: type[InputError] = InputError
+) -> dict[str, Any]:
+    """Parse a TOML file; every failure is one line.
+
+    Raises:
+        InputError: If the file is missing, too long, not UTF-8, not TOML, or a file of
+            another kind than ``what``.
+    """
+    try:
+        size = path.stat().st_size
+        other = _OTHER_FILES.get(path.suffix.lower())
+        if other is not None:
+            raise error(f"{path}: this is {_a(other)}; {_a(what)} is needed, as TOML")
+        if size > MAX_BYTES:
+            raise error(f"{path}: {size} bytes; {_a(what)} has at most {MAX_BYTES}")
+        data = parse_toml(path.read_bytes().decode(), where=str(path), error=error)
+    except OSError as exc:
+        raise error(f"{path}: cannot read the {what}: {exc.strerror}") from None
+    except UnicodeDecodeError as exc:
+        raise error(f"{path}: not UTF-8 text at byte {exc.start}") from None
+    kind = kind_of_file(data)
+    if kind is not None and what in _MARKS and kind != what:
+        raise error(f"{path}: this is {_a(kind)} file; {_a(what)} is needed")
+    return data
+
+
+def kind_of_file(data: Mapping[str, Any]) -> str | None:
+    """What kind of file the tables belong to; None where they do not tell."""
+    if set(data) == {"spec"}:
+        return "spec"
+    for kind in ("optimisation", "sweep"):
+        if _MARKS[kind] <= set(data):
+            return kind
+    found = [kind for kind in ("design", "scene") if len(_MARKS[kind] & set(data)) > 1]
+    return found[0] if len(found) == 1 else None
+
+
+def _a(noun: str) -> str:
+    return f"{'an' if noun[0] in 'aeiou' else 'a'} {noun}"
+
+
+def parse_toml(
+    text: str, *, where: str, error: type[InputError] = InputError
+) -> dict[str, Any]:
+    """Parse TOML text from elsewhere.
+
+    The one door for it: what passes is at most :data:`MAX_DEPTH` deep, its integers
+    have 64 bits, its keys are short and its texts hold no control characters, so that
+    no reader behind has to expect anything else.
+
+    Raises:
+        InputError: With one line about the first fault.
+    """
+    if _LONG_KEY.search(text):
+        raise error(f"{where}: {_LONG}")
+    try:
+        data = tomllib.loads(text)
+    except RecursionError:
+        raise error(f"{where}: {_too_deep()}") from None
+    except ValueError as exc:  # also of Python, for an integer of thousands of digits
+        raise error(f"{where}: not valid TOML: {exc}") from None
+    fault = _first_fault(data)
+    if fault is not None:
+        raise error(f"{where}: {fault}")
+    return data
+
+
+def parse_value(text: str, *, where: str) -> Any:
+    """A TOML value from elsewhere; a bare word is a text.
+
+    Raises:
+        InputError: If it is a value that :func:`parse_toml` refuses in a file.
+    """
+    if _LONG_KEY.search(text):
+        raise InputError(f"{where}: {_LONG}")
+    try:
+        value = tomllib.loads(f"value = {text}")["value"]
+    except RecursionError:
+        raise InputError(f"{where}: {_too_deep()}") from None
+    except tomllib.TOMLDecodeError:
+        value = text.strip()
+    except ValueError as exc:
+        raise InputError(f"{where}: not a valid value: {exc}") from None
+    fault = _first_fault({where: value})
+    if fault is not None:
+        raise InputError(fault)
+    return value
+
+
+def _too_deep() -> str:
+    return f"TOML tables or lists nested too deep; accepted: {MAX_DEPTH} levels"
+
+
+def _first_fault(data: dict[str, Any]) -> str | None:
+    """What no file of ours holds, wherever it stands; walks without recursion."""
+    todo: list[tuple[str, Any, int]] = [("", data, 0)]
+    while todo:
+        path, value, depth = todo.pop()
+        if depth > MAX_DEPTH:
+            return f"{shorten(path)}: {_too_deep()}"
+        if isinstance(value, dict):
+            for key, item in value.items():
+                if len(key) > MAX_KEY or CONTROL_CHARACTERS.search(key):
+                    return (
+                        f"{shorten(key)}: not a key; accepted: up to {MAX_KEY}"
+                        " characters, no control characters"
+                    )
+                todo.append((f"{path}.{key}" if path else key, item, depth + 1))
+        elif isinstance(value, list):
+            todo += [(f"{path}[{k}]", item, depth + 1) for k, item in enumerate(value)]
+        elif isinstance(value, int) and value not in _INTEGERS:
+            return f"{shorten(path)}: an integer of more than 64 bits"
+        elif isinstance(value, str) and CONTROL_CHARACTERS.search(value):
+            return f"{shorten(path)} = {shorten(value)!r}: a control character"
+    return None
