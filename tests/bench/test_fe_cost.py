@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from messages import naming
-from solve_setting import small_cup
+from solved import small_cup
 
 from swgjoint.bench.fe import cost as fe_cost
 from swgjoint.bench.fe import solve as fe_cost_solve
@@ -54,7 +54,7 @@ def solve(monkeypatch):
             return {setting.key: table[setting.key] for setting in settings}
 
         monkeypatch.setattr(fe_cost, "_solve_all", all_of)
-        monkeypatch.setattr(fe_cost, "stored_of", lambda design: {})
+        monkeypatch.setattr(fe_cost, "load_stored", lambda design: {})
 
     return given
 
@@ -180,7 +180,7 @@ def test_stored_settings_are_of_their_design_and_tell_drift(tmp_path, monkeypatc
         return {WITNESS: replace(was, stiffness=1.01e5, cpu_s=1.5 * was.cpu_s)}
 
     monkeypatch.setattr(fe_cost, "_solve_all", now)
-    monkeypatch.setattr(fe_cost, "stored_of", lambda design: kept)
+    monkeypatch.setattr(fe_cost, "load_stored", lambda design: kept)
     result = run_fe_cost(design=CUP, settings=settings)
     assert result["rows"][0]["outcome"].startswith("left out")
     assert not result["rows"][0]["stored"] and result["rows"][-1]["stored"]
@@ -249,7 +249,7 @@ def test_a_process_that_dies_is_a_row(tmp_path, monkeypatch):
     """Killed or out of memory: why stands in its place, the others go on."""
     (tmp_path / "fates.py").write_text(FATED)
     monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.setattr(fe_cost, "solved_in", import_module("fates").fated)
+    monkeypatch.setattr(fe_cost, "solve_in_process", import_module("fates").fated)
     settings = [FeSetting(model="2d", refinement=n) for n in (1.0, 2.0, 3.0)]
     got = fe_cost._solve_all(
         CUP, settings, jobs=2, stage="settings", progress=lambda *_: None
@@ -276,7 +276,7 @@ def test_a_process_has_one_thread(tmp_path, monkeypatch):
         monkeypatch.setenv(name, "3")
     (tmp_path / "threads.py").write_text(THREADS)
     monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.setattr(fe_cost, "solved_in", import_module("threads").threads)
+    monkeypatch.setattr(fe_cost, "solve_in_process", import_module("threads").threads)
     got = fe_cost._solve_all(
         CUP, [PLANE], jobs=1, stage="settings", progress=lambda *_: None
     )

@@ -10,7 +10,7 @@ from messages import names
 from solved import small_cup
 
 from swgjoint.bench.fe import cost as fe_cost
-from swgjoint.bench.fe.cost import Setting
+from swgjoint.bench.fe.setting import FeSetting
 from swgjoint.bench.scaling import scaling
 from swgjoint.cli import bench
 from swgjoint.cli.main import main
@@ -23,8 +23,8 @@ SMALL = small_cup()
 def test_bench_fe(monkeypatch, capsys, tmp_path):
     """One JSON object with a row for every setting and quantity, then as a table."""
     settings = (
-        Setting(model="ring", refinement=0),
-        *(Setting(model="2d", refinement=n) for n in (0.5, 0.6)),
+        FeSetting(model="ring", refinement=0),
+        *(FeSetting(model="2d", refinement=n) for n in (0.5, 0.6)),
     )
     monkeypatch.setattr(
         fe_cost.run_fe_cost,

@@ -25,7 +25,7 @@ def instant(monkeypatch):
         away=stresses,
         places={kind: {"fillet": 35} for kind in stresses},
     )
-    monkeypatch.setattr(thesis, "recorded", lambda spec: found)
+    monkeypatch.setattr(thesis, "record_run", lambda spec: found)
 
 
 def test_json_of_the_contract(instant, capsys):

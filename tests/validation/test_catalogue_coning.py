@@ -98,7 +98,7 @@ def test_coning_runs_when_it_is_asked_for(computed, monkeypatch):
     for name in ("scaling", "shares", "friction", "individual_summary"):
         monkeypatch.setattr(study, name, lambda *_: {"rows": [], "lines": []})
     monkeypatch.setattr(study, "ratcheting_orders", lambda *_: [])
-    monkeypatch.setattr(study, "scaled_against_computed", lambda *_: [])
+    monkeypatch.setattr(study, "compare_scaling", lambda *_: [])
     study.run_catalogue(StudyOptions(jobs=1))
     assert "coning" not in seen
     assert seen == list(study.PARTS)
