@@ -28,7 +28,7 @@ from swgjoint.provenance import provenance
 COMMON = """
 import json, time
 import numpy as np
-from swgjoint.gear.design import Design
+from swgjoint.gear.design.design import Design
 marks = {}
 def timed(name, work):
     begin = time.process_time()

@@ -207,8 +207,8 @@ import contextlib, importlib, json, os, sys, tempfile
 from pathlib import Path
 import mujoco, numpy
 from swgjoint.maps.drive_map import DriveMap
-from swgjoint.sim.run import run_scene
-from swgjoint.sim.scene import Scene
+from swgjoint.view.run import run_scene
+from swgjoint.sim.scene.scene import Scene
 
 cases = json.load(sys.stdin)
 out = {}

@@ -168,7 +168,7 @@ class Trials:
         alive = np.ones(env.num_envs, dtype=bool)
         steps = len(task.position) - 1
         for k in range(steps):
-            torque = controller.torque(k, env.measured(observation))
+            torque = controller.torque(k, env.read_measurements(observation))
             action = np.nan_to_num(torque / limit, posinf=1.0, neginf=-1.0)
             observation, _, terminated, _, info = env.step(np.clip(action, -1.0, 1.0))
             error = arcmin * info["link_error_arcmin"]

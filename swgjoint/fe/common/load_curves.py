@@ -46,7 +46,7 @@ class Curves:
         power[:, 0] = 0.0
         return replace(self, power=power, jump=np.zeros_like(self.jump))
 
-    def of(self, k: NDArray[np.intp]) -> Curves:
+    def select(self, k: NDArray[np.intp]) -> Curves:
         """Those of some intervals."""
         return Curves(
             power=self.power[k],
@@ -68,11 +68,11 @@ class Curves:
         twice += 0.5 * (self.jump * after**2).sum(axis=1)
         return c, once, twice
 
-    def on(self, grid: Array) -> tuple[Array, Array]:
+    def integrals_on(self, grid: Array) -> tuple[Array, Array]:
         """Both integrals at places of every interval (n, m)."""
         n, m = grid.shape
         k = np.repeat(np.arange(n), m)
-        _, once, twice = self.of(k).integrals(grid.ravel())
+        _, once, twice = self.select(k).integrals(grid.ravel())
         return once.reshape(n, m), twice.reshape(n, m)
 
 

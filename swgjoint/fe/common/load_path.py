@@ -106,7 +106,7 @@ class LoadPath:
         k = np.clip(np.searchsorted(self.torque, wanted, side="right") - 1, 0, last)
         h = self.length[k]
         x = (wanted - self.torque[k]) / h
-        compliance, once, twice = self._curves.of(k).integrals(x)
+        compliance, once, twice = self._curves.select(k).integrals(x)
         e0, e = self.output_error[k], self.output_error[k] - h * once
         potential = self._potential[k] + h * (x * e0 - h * twice)
         found = np.stack([e, potential - wanted * e, compliance])
@@ -243,7 +243,7 @@ class LoadPath:
         """Of the explanations, integrated once and twice (n - 1, grid)."""
         one, two, cubic = self._explained
         grid = np.broadcast_to(_GRID, (self.length.size, _GRID.size))
-        values = [curves.on(grid) for curves in (one, two, cubic)]
+        values = [curves.integrals_on(grid) for curves in (one, two, cubic)]
         both = one.feasible & two.feasible
         neither = ~one.feasible & ~two.feasible
         # without a jump that explains them: what bends the curve at all
@@ -256,7 +256,7 @@ class LoadPath:
             apart = np.where(both[:, None], a - b, apart)
             found.append(np.abs(np.where(neither[:, None], c - line, apart)))
         known, first, last, merged = self._predicted
-        predictions = (curves.on(grid) for curves in (first, last, merged.bend))
+        predictions = (curves.integrals_on(grid) for curves in (first, last, merged.bend))
         for own, a, b, bend in zip(found, *predictions, strict=True):
             apart = AGREED * np.abs(a - b) + BENT * np.abs(bend)
             own[known] = apart[known]

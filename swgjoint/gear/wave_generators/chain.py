@@ -47,7 +47,7 @@ class Chain(ClosedCurve):
         curvature = np.empty(along.shape)
         for k in np.unique(owner):
             here = owner == k
-            points[here], normals[here], curvature[here] = self.pieces[k].at(
+            points[here], normals[here], curvature[here] = self.pieces[k].evaluate_at(
                 along[here] - self.stations[k]
             )
         return points, normals, curvature

@@ -179,7 +179,7 @@ def _template() -> Any:
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
-        loader=PackageLoader("swgjoint.view", "."),
+        loader=PackageLoader("swgjoint.view.report", "."),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=False,
