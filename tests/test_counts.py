@@ -13,9 +13,10 @@ import numpy as np
 import pytest
 
 from swgjoint.fe.common import complementarity
-from swgjoint.fe.plane import equilibrium
+from swgjoint.fe.plane import newton_step
 from swgjoint.fe.plane.continuation import Continuation
 from swgjoint.fe.plane.drive2d import ring_model
+from swgjoint.fe.solid import condensation
 from swgjoint.fe.solid import equilibrium as solid_equilibrium
 from swgjoint.fe.solid.continuation import SolidContinuation
 from swgjoint.fe.solid.drive3d import solid_ring
@@ -101,8 +102,8 @@ def plane():
 
 def test_plane_iterations_and_factorisations(plane, counter):
     """One complementarity problem a factorisation; no try fails."""
-    counter.watch(equilibrium, "CyclicFactor")
-    counter.watch(equilibrium, "solve_mixed")
+    counter.watch(newton_step, "CyclicFactor")
+    counter.watch(newton_step, "solve_mixed")
     iterations, _ = path(plane, 20.0, 0.25 * PITCH)
     made = counter.taken()
     assert near(sum(iterations), PLANE_ITERATIONS)
@@ -166,7 +167,7 @@ def small_solid():
 @pytest.mark.fe
 def test_solid_iterations_and_factorisations(small_solid, counter):
     """One factorisation and one complementarity problem an iteration."""
-    counter.watch(solid_equilibrium, "RingFactor")
+    counter.watch(condensation, "RingFactor")
     counter.watch(solid_equilibrium, "solve_mixed")
     counter.watch(complementarity, "_solve_active")
     iterations, _ = path(small_solid, 5.0, 0.25 * 2.0 * np.pi / 42)

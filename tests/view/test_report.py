@@ -73,10 +73,8 @@ def written(synthetic_map: DriveMap, tmp_path) -> tuple[Run, str]:
 @pytest.fixture
 def without_pictures(monkeypatch):
     """The first bytes of a PNG in place of every picture."""
-    for picture in ("joint_png", "spec_picture"):
-        monkeypatch.setattr(
-            f"swgjoint.view.report.report.{picture}", lambda *_: b"\x89PNG"
-        )
+    for picture in ("report.joint_png", "tables.spec_picture"):
+        monkeypatch.setattr(f"swgjoint.view.report.{picture}", lambda *_: b"\x89PNG")
 
 
 def test_the_page_needs_nothing_else(written):
