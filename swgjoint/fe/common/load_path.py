@@ -256,7 +256,9 @@ class LoadPath:
             apart = np.where(both[:, None], a - b, apart)
             found.append(np.abs(np.where(neither[:, None], c - line, apart)))
         known, first, last, merged = self._predicted
-        predictions = (curves.integrals_on(grid) for curves in (first, last, merged.bend))
+        predictions = (
+            curves.integrals_on(grid) for curves in (first, last, merged.bend)
+        )
         for own, a, b, bend in zip(found, *predictions, strict=True):
             apart = AGREED * np.abs(a - b) + BENT * np.abs(bend)
             own[known] = apart[known]
