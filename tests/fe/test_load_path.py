@@ -160,7 +160,8 @@ def test_dividing_where_it_says_makes_the_curve_exact():
         curve = path(torque, events)
         part = curve.doubt[0]
         torque = np.sort(np.append(torque, curve.division[part.argmax()]))
-    assert np.abs(path(torque, events).at(x) - drive(x, events))[0].max() < 1e-9
+    apart = path(torque, events).evaluate_at(x) - drive(x, events)
+    assert np.abs(apart[0]).max() < 1e-9
 
 
 MANY = tuple(
@@ -199,7 +200,7 @@ def test_predicted_events_make_the_curve_exact():
     curve = replace(plain, changes=predicted(TORQUES, MANY))
     apart = np.abs(curve.evaluate_at(FINE) - drive(FINE, *given)).max(axis=1)
     assert (apart < ROUND_OFF).all()
-    assert np.abs(plain.at(FINE)[0] - drive(FINE, *given)[0]).max() > 1e-6
+    assert np.abs(plain.evaluate_at(FINE)[0] - drive(FINE, *given)[0]).max() > 1e-6
     assert curve.doubt[0].max() < 1e-3 * plain.doubt[0].max()
     own = np.stack([curve.output_error, curve.energy, curve.compliance])
     assert np.array_equal(curve.evaluate_at(TORQUES), own)
@@ -211,7 +212,7 @@ def test_the_doubt_of_predictions_tells_how_far_off_they_are():
     curve = replace(plain, changes=predicted(TORQUES, MANY, bend=2e-3))
     apart = np.abs(curve.evaluate_at(FINE)[0] - drive(FINE, MANY)[0]).max()
     assert 0.2 < apart / curve.doubt[0].max() < 2.0
-    assert apart < 0.3 * np.abs(plain.at(FINE)[0] - drive(FINE, MANY)[0]).max()
+    assert apart < 0.3 * np.abs(plain.evaluate_at(FINE)[0] - drive(FINE, MANY)[0]).max()
 
 
 def test_without_a_prediction_of_both_ends_the_equilibria_alone_count():
@@ -221,8 +222,9 @@ def test_without_a_prediction_of_both_ends_the_equilibria_alone_count():
     given[1] = None
     curve = replace(plain, changes=tuple(given))
     inside = FINE < TORQUES[2]
-    assert np.array_equal(curve.evaluate_at(FINE[inside]), plain.at(FINE[inside]))
-    assert not np.array_equal(curve.evaluate_at(FINE), plain.at(FINE))
+    same = (one.evaluate_at(FINE[inside]) for one in (curve, plain))
+    assert np.array_equal(*same)
+    assert not np.array_equal(curve.evaluate_at(FINE), plain.evaluate_at(FINE))
 
 
 def test_torques_outside_are_refused():

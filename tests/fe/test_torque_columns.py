@@ -143,7 +143,6 @@ def grid(drive: KnownDrive, count: int = 6, levels=(2.0, PEAK)) -> ColumnGrid:
         small=0.01,
         tick=lambda: None,
         keep=None,
-        restored=lambda solves: None,
     )
     found.solve_columns(count)
     return found

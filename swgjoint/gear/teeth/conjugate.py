@@ -11,23 +11,22 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cached_property
 from itertools import pairwise
-from math import atan2, sqrt
 
 import numpy as np
 
 from swgjoint.errors import DesignError
 from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.sections import Conjugate
-from swgjoint.gear.teeth.blank import Blank, blank
+from swgjoint.gear.teeth.blank import blank
+from swgjoint.gear.teeth.conjugate_root import SHORTEST, RootBuilder, polar_angle
 from swgjoint.gear.teeth.envelope import Envelope, EnvelopeRun
 from swgjoint.gear.teeth.profile import TANGENCY_RAD, ToothProfile
-from swgjoint.gear.teeth.segments import Piece, Point, arc, line
+from swgjoint.gear.teeth.segments import Piece, Point
 from swgjoint.gear.teeth.smooth_curve import smooth_curve
 from swgjoint.gear.teeth.tooth_motion import Receiver, ToothMotion, tooth_motions
 from swgjoint.typing import Array
-from swgjoint.units import deg, mm
+from swgjoint.units import deg
 
 DEPARTURES = (45.0 * deg, 30.0 * deg, 20.0 * deg, 12.0 * deg)
 """Inclinations at which the flank may leave the envelope towards the root [rad].
@@ -37,12 +36,8 @@ departure.
 """
 WANTED_FILLET = 0.1
 """Radius of a good fillet, multiple of the module."""
-ROOT_END = 0.98
-"""A fillet of our choice leaves that much of half the pitch, and a short root land."""
 SHARPEST = 0.1
 """Smallest radius of curvature of an edge's path that is followed, of the module."""
-SHORTEST = 4e-6
-"""Pieces shorter than that are left out, the chain goes on tangentially [m]."""
 OVERLAP = 1e-9
 """Largest overlap of the pair that is accepted [m]."""
 NODES, EDGE_NODES, DENSE, SAMPLES = 41, 121, 161, 33
@@ -80,20 +75,8 @@ def conjugate_profile(
     return _Builder(start, envelope).build()
 
 
-class _Builder:
+class _Builder(RootBuilder):
     """From the branches of an envelope to a closed flank."""
-
-    def __init__(self, start: Blank, envelope: Envelope) -> None:
-        self.start, self.envelope = start, envelope
-        if start.spec.thickness_coefficient > 1.0:
-            raise start.fault(
-                "thickness_coefficient",
-                "thicker than the conjugate tooth; accepted: <= 1",
-            )
-        # clockwise turn of the envelope: backlash makes the tooth thinner
-        turn = start.half_thickness - 0.5 * start.half_pitch
-        c, d = np.cos(turn), np.sin(turn)
-        self.turn = np.array([[c, -d], [d, c]])
 
     def build(self) -> ToothProfile:
         start, envelope = self.start, self.envelope
@@ -145,7 +128,7 @@ class _Builder:
                 "wider tip of the other member",
             )
         pieces, below, end = best
-        top = _angle(pieces[0].start)
+        top = polar_angle(pieces[0].start)
         if top <= 0.0:
             raise start.fault(
                 "addendum_coefficient",
@@ -385,104 +368,6 @@ class _Builder:
         return pieces
 
     # -- the root -----------------------------------------------------------------
-
-    def _fillet(
-        self, leave: tuple[Point, Array], radius: float, limit: float
-    ) -> tuple[float, Point] | None:
-        """Length of the line and centre of the arc for a fillet radius, if it fits.
-
-        The line starts at the departure P with tangent t, normal n: the centre
-        P + l t + r n lies at the distance r_D +- r from the axis, quadratic in l.
-        """
-        start = self.start
-        (px, py), n = leave
-        t = start.side * np.array([n[1], -n[0]])
-        q = np.array([px, py]) + radius * n
-        goal = start.root + start.side * radius
-        along = float(q @ t)
-        square = along**2 - float(q @ q) + goal**2
-        if square < 0.0 or goal <= 0.0:
-            return None
-        length = -along - start.side * sqrt(square)
-        centre = q + length * t
-        if length < SHORTEST or _angle((centre[0], centre[1])) > limit:
-            return None
-        return length, (float(centre[0]), float(centre[1]))
-
-    def _root(self, leave: tuple[Point, Array]) -> tuple[list[Piece], float] | None:
-        """Line and fillet: as asked, or the largest that clears the mating tip."""
-        spec = self.start.spec.profile
-        assert isinstance(spec, Conjugate)
-        if spec.root_radius_mm is not None:
-            return self._root_with(
-                leave, spec.root_radius_mm * mm, self.start.half_pitch
-            )
-        low, high = 0.0, 2.0 * self.start.module
-        best: tuple[list[Piece], float] | None = None
-        for _ in range(14):
-            middle = 0.5 * (low + high)
-            built = self._root_with(leave, middle, ROOT_END * self.start.half_pitch)
-            if built is None:
-                high = middle
-            else:
-                low, best = middle, built
-        return best
-
-    def _root_with(
-        self, leave: tuple[Point, Array], radius: float, limit: float
-    ) -> tuple[list[Piece], float] | None:
-        """Pieces of the root for one fillet radius, None where they do not fit.
-
-        The arc must end within the angle ``limit`` from the tooth axis [rad].
-        """
-        start = self.start
-        found = self._fillet(leave, radius, limit)
-        if found is None:
-            return None
-        length, centre = found
-        (px, py), n = leave
-        side = start.side
-        t = side * np.array([n[1], -n[0]])
-        first = atan2(-n[1], -n[0])
-        # the arc ends on the ray from the axis through its centre
-        last = atan2(-side * centre[1], -side * centre[0])
-        turn = (last - first + np.pi) % (2.0 * np.pi) - np.pi
-        if side * turn <= 0.0:
-            return None
-        corner = (float(px + length * t[0]), float(py + length * t[1]))
-        pieces: list[Piece] = [
-            line("straight", (px, py), corner),
-            arc("fillet", centre, radius, first, first + turn, False),
-        ]
-        return (pieces, _angle(centre)) if self._clear(pieces) else None
-
-    def _clear(self, pieces: list[Piece]) -> bool:
-        """Whether the mating tip keeps off the line and the fillet."""
-        points = self._tips
-        for piece in pieces:
-            distance, _, _, inside = piece.project(points, self.start.side)
-            if (distance[inside] < -1e-12).any():
-                return False
-        return True
-
-    @cached_property
-    def _tips(self) -> Array:
-        """Points of the given flank at all positions near the lobe (n, 2) [m]."""
-        envelope = self.envelope
-        points, _, _ = envelope.given.evaluate(
-            np.linspace(*envelope.given.contact_range, 150)
-        )
-        parts = []
-        for motion in envelope.motions:
-            theta = np.linspace(-0.25, 0.25, 201) * motion.half_range
-            moved = motion.map_to(envelope.receiver, theta)
-            wide = np.broadcast_to(points, (len(theta), *points.shape))
-            parts.append(moved.points(wide).reshape(-1, 2))
-        return np.asarray(np.concatenate(parts) @ self.turn)
-
-
-def _angle(point: Point) -> float:
-    return atan2(point[0], point[1])
 
 
 def _crossing(f: Callable[[float], float], guess: float, step: float) -> float:
