@@ -194,7 +194,7 @@ def _place(model: mujoco.MjModel, drive: JointDrive) -> Any:
         raise InputError(
             f"joint {drive.joint!r}: its drive may deviate from its map by numbers in"
             " the model, which MuJoCo Warp does not read; accepted: variable=False,"
-            " with the map of Variation.of for another specimen"
+            " with the map of Variation.apply_to for another specimen"
         )
     one = WarpDrive()
     one.tendon = tendon

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from swgjoint.errors import InputError
-from swgjoint.fe.plane.plain_ring import PlainRing, PulledRing, pull_ring
+from swgjoint.fe.rings.plain_ring import PlainRing, PulledRing, pull_ring
 from swgjoint.files import Outputs
 from swgjoint.gear.pulled_ring import elastica, small_deflection
 from swgjoint.json_text import json_text

@@ -52,7 +52,7 @@ design = Design.load("reference-3d-modified").with_changes({
 })
 ring = timed("condensation", lambda: solid_ring(design, half=True))
 follow = SolidContinuation(ring=ring, ratio=design.ratio)
-state = timed("deflection", follow.deflected)
+state = timed("deflection", follow.deflect)
 state = timed("engagement and load", lambda: follow.to_torque(follow.engage(state), 5))
 angle = 0.5 * np.pi / 42
 state = timed("position", lambda: follow.to_angle(state, angle))

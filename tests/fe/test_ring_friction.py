@@ -113,13 +113,13 @@ def test_a_loop_of_known_friction():
 
 def test_a_path_says_nothing_beyond_its_end():
     """One line with what it reaches, instead of the last torsion."""
-    assert known().at(35.0) == pytest.approx(0.4)
-    assert known().at(0.0) == pytest.approx(0.05)
+    assert known().torsion_at(35.0) == pytest.approx(0.4)
+    assert known().torsion_at(0.0) == pytest.approx(0.05)
     for torque in (35.1, -0.1, float("nan")):
         with pytest.raises(
             InputError, match=naming("torque", f"{torque:g} N·m", "0", "35 N·m")
         ):
-            known().at(torque)
+            known().torsion_at(torque)
     with pytest.raises(InputError, match=naming("torque", "36 N·m", "0", "35 N·m")):
         known().hysteresis_loss(12.0)
 

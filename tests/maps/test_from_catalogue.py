@@ -12,9 +12,7 @@ from messages import names, naming
 from swgjoint.errors import InputError
 from swgjoint.gear import catalogue_stated
 from swgjoint.gear.catalogue import catalogue_rows, table
-from swgjoint.gear.catalogue_stated import (
-    _faults,
-)
+from swgjoint.gear.catalogue_stated import _faults
 from swgjoint.gear.kinematics import LAYOUTS
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.file import map_bytes, map_from_bytes

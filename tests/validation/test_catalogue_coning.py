@@ -95,7 +95,7 @@ def test_coning_runs_when_it_is_asked_for(computed, monkeypatch):
 
     monkeypatch.setattr(study, "tasks_of", tasks_of)
     monkeypatch.setattr(study, "rows_of", lambda *_: [])
-    for name in ("scaling", "shares", "friction", "individual_summary"):
+    for name in ("cube_scaling", "shares", "friction", "individual_summary"):
         monkeypatch.setattr(study, name, lambda *_: {"rows": [], "lines": []})
     monkeypatch.setattr(study, "ratcheting_orders", lambda *_: [])
     monkeypatch.setattr(study, "compare_scaling", lambda *_: [])

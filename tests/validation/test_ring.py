@@ -12,7 +12,7 @@ from messages import naming
 
 from swgjoint.cli.main import main
 from swgjoint.errors import ComputationError
-from swgjoint.fe.plane.plain_ring import PlainRing, pull_ring
+from swgjoint.fe.rings.plain_ring import PlainRing, pull_ring
 from swgjoint.gear.pulled_ring import elastica, small_deflection
 from swgjoint.units import mm
 from swgjoint.validation import ring as study

@@ -13,7 +13,7 @@ from swgjoint.errors import ComputationError
 from swgjoint.fe.common.contact_changes import ContactChanges
 from swgjoint.fe.common.following import AnyState, Follower, Unloaded
 from swgjoint.fe.common.load_path import LoadPath
-from swgjoint.fe.plane.state_arrays import copy_contiguous, pack, unpack
+from swgjoint.fe.common.state_arrays import copy_contiguous, pack, unpack
 from swgjoint.maps.unfinished import Unfinished
 from swgjoint.typing import Array
 

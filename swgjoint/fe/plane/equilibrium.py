@@ -14,11 +14,7 @@ import numpy as np
 from swgjoint.errors import Outcome
 from swgjoint.fe.common.complementarity import ActiveSetError
 from swgjoint.fe.common.cyclic import SingularRingError
-from swgjoint.fe.common.friction import (
-    SlipHistory,
-    dissipated_work,
-    spring_energy,
-)
+from swgjoint.fe.common.friction import SlipHistory, dissipated_work, spring_energy
 from swgjoint.fe.common.indentation import strain_energy
 from swgjoint.fe.plane.corotation import elastic_energy, rotate_right_angle
 from swgjoint.fe.plane.linearise import Linearised, linearise

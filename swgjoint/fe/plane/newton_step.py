@@ -9,9 +9,7 @@ from numpy.typing import NDArray
 
 from swgjoint.fe.common.complementarity import ActiveSetError, solve_mixed
 from swgjoint.fe.common.cyclic import CyclicFactor
-from swgjoint.fe.common.friction import (
-    Sliding,
-)
+from swgjoint.fe.common.friction import Sliding
 from swgjoint.fe.common.indentation import Strips
 from swgjoint.fe.plane.contact_points import Contacts
 from swgjoint.fe.plane.corotation import rotate_right_angle

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from swgjoint.errors import InputError
-from swgjoint.fe.plane.state_arrays import pack, unpack
+from swgjoint.fe.common.state_arrays import pack, unpack
 from swgjoint.fe.solid.state import SolidState
 from swgjoint.files import read_regular, write_whole
 from swgjoint.json_text import json_text

@@ -5,16 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from swgjoint.gear.shell_theory import (
-    SERIES_SUM,
-    ring_stiffness,
-)
+from swgjoint.gear.shell_theory import SERIES_SUM, ring_stiffness
 from swgjoint.units import mm
-from swgjoint.validation.articles.file import (
-    Deflection,
-    Force,
-    changed_design,
-)
+from swgjoint.validation.articles.file import Deflection, Force, changed_design
 from swgjoint.validation.articles.runs import Found
 from swgjoint.validation.rows import Row
 

@@ -14,10 +14,7 @@ from swgjoint.gear.shell_theory import (
     shell_safety_factor,
 )
 from swgjoint.units import MPa
-from swgjoint.validation.articles.file import (
-    StressAndFatigue,
-    changed_design,
-)
+from swgjoint.validation.articles.file import StressAndFatigue, changed_design
 from swgjoint.validation.articles.rows import (
     HELD_BACK,
     article_row,

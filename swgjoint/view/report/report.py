@@ -25,9 +25,7 @@ from swgjoint.view.report.tables import (
     summary_table,
     versions_table,
 )
-from swgjoint.view.validity import (
-    step_error,
-)
+from swgjoint.view.validity import step_error
 from swgjoint.view.words import short
 
 if TYPE_CHECKING:

@@ -26,12 +26,7 @@ from swgjoint.maps.sheet.validity_marks import (
 )
 from swgjoint.sim.figures.verdict import NOT_VALID, VALID
 from swgjoint.view.plots.spec import spec_picture
-from swgjoint.view.validity import (
-    left_out_share,
-    map_error,
-    omissions_of,
-    warnings_of,
-)
+from swgjoint.view.validity import left_out_share, map_error, omissions_of, warnings_of
 from swgjoint.view.words import format_figure, short, words
 
 if TYPE_CHECKING:

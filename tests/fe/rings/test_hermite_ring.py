@@ -7,9 +7,9 @@ import pytest
 from scipy.sparse import coo_matrix
 from scipy.sparse.linalg import spsolve
 
-from swgjoint.fe.plane.plain_ring import PlainRing, pull_ring
 from swgjoint.fe.rings.facing import FacingSurface, distances_to_ring
 from swgjoint.fe.rings.hermite_ring import HermiteRing
+from swgjoint.fe.rings.plain_ring import PlainRing, pull_ring
 from swgjoint.gear.shell_theory import ring_stiffness
 
 RING = HermiteRing(radius=30e-3, elements=24, stretching=2e6, bending=0.1)

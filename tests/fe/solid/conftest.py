@@ -85,7 +85,7 @@ def kept_once():
 def deflected(small_design, small_drive, kept_once):
     """On the wave generator, no tooth contact."""
     name = f"deflected {small_design.content_hash()} {ORDERS}"
-    return kept_once(name, small_drive.deflected)
+    return kept_once(name, small_drive.deflect)
 
 
 @pytest.fixture(scope="session")

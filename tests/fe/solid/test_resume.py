@@ -10,7 +10,7 @@ from messages import names, naming
 
 from swgjoint.errors import InputError
 from swgjoint.fe.common.pattern import Effort, solve_pattern
-from swgjoint.fe.plane.state_arrays import copy_contiguous, pack, unpack
+from swgjoint.fe.common.state_arrays import copy_contiguous, pack, unpack
 from swgjoint.fe.solid.checkpoint import Checkpoint
 from swgjoint.maps.unfinished import Unfinished
 from swgjoint.store import arrays_file
