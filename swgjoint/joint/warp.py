@@ -37,16 +37,8 @@ from swgjoint.maps.drive_map import DriveMap
 try:
     import warp as wp
 
-    from swgjoint.joint.warp_law import (
-        Maps,
-        WarpDrive,
-        WarpStep,
-        factor_mass_matrix,
-        law,
-        real,
-        respond,
-        vec5,
-    )
+    from swgjoint.joint.warp_law import WarpStep, factor_mass_matrix, law, respond
+    from swgjoint.joint.warp_potential import Maps, WarpDrive, real, vec5
 except ImportError as error:
     raise MissingExtraError(
         "drives in MuJoCo Warp need mujoco-warp: pip install 'swgjoint[warp]'"

@@ -331,7 +331,9 @@ def test_what_is_not_held_is_refused(synthetic_map):
         warp.install(both.m, both.d, both.plain, both.drives)
     with pytest.raises(
         InputError,
-        match=naming("joint 'j'", "MuJoCo Warp", "variable=False", "Variation.apply_to"),
+        match=naming(
+            "joint 'j'", "MuJoCo Warp", "variable=False", "Variation.apply_to"
+        ),
     ):
         Both(PAIR, synthetic_map, variable=True)
 

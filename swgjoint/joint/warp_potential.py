@@ -1,0 +1,241 @@
+# mypy: ignore-errors
+"""The potential of a map in the language of Warp: sums over harmonics and secants."""
+
+import warp as wp
+
+real = wp.float64
+
+
+vec5 = wp.types.vector(length=5, dtype=real)
+
+
+ZERO = wp.constant(real(0.0))
+
+
+HALF = wp.constant(real(0.5))
+
+
+ONE = wp.constant(real(1.0))
+
+
+@wp.struct
+class WarpDrive:
+    """One drive: where it is in the model, and its rows in the arrays of the maps."""
+
+    tendon: int
+    q_rotor: int
+    q_link: int
+    v_rotor: int
+    v_link: int
+    entry_rotor: int
+    """Of the rotor in the tendon's row of ``ten_J``."""
+    entry_link: int
+    harmonic: int
+    """First one, then how many."""
+    harmonics: int
+    segment: int
+    """Below the knots, between them, and above."""
+    segments: int
+    row: int
+    """First row of the polynomials: segments, harmonics, A and B."""
+    element: int
+    elements: int
+    ratio: real
+    damping: real
+    contact_damping: real
+    friction: int
+    """Its tendon, -1 without."""
+    b_theta: real
+    b_psi: real
+    bristle: real
+    """Stiffness [N·m/rad], then its damping [N·m·s/rad]."""
+    creep: real
+    coulomb: real
+    stiction: real
+    stribeck: real
+    viscous: real
+    load: real
+
+
+@wp.struct
+class Sums:
+    """Harmonics of one segment over a step: coefficients in powers of the torsion."""
+
+    mean: vec5
+    by_theta: vec5
+    by_psi: vec5
+    g_theta: real
+    g_psi: real
+
+
+@wp.struct
+class Secant:
+    """Discrete gradient of V over a step, hysteresis added."""
+
+    begin: real
+    """Torsion at the beginning, and its change."""
+    change: real
+    g_theta: real
+    g_psi: real
+    torque: real
+    slope: real
+    k0: real
+    k1: real
+    e_theta: real
+    e_psi: real
+
+
+@wp.struct
+class Maps:
+    """All maps, one after the other."""
+
+    harmonic: wp.array2d(dtype=real)
+    """n_theta, n_psi, cosine and sine of e0."""
+    segment: wp.array2d(dtype=real)
+    """Begin, end and the torsion about which it expands [rad]."""
+    row: wp.array(dtype=vec5)
+    element: wp.array2d(dtype=real)
+    """Stiffness [N·m/rad] and reach [rad]."""
+
+
+@wp.func
+def value(w: vec5, d: real):
+    """Polynomial of the torsion about the base of its segment."""
+    return w[0] + d * (w[1] + d * (w[2] + d * (w[3] + d * w[4])))
+
+
+@wp.func
+def slope(w: vec5, d: real):
+    """Its first derivative."""
+    return w[1] + d * (real(2.0) * w[2] + d * (real(3.0) * w[3] + d * real(4.0) * w[4]))
+
+
+@wp.func
+def curvature(w: vec5, d: real):
+    """Its second derivative."""
+    return real(2.0) * w[2] + d * (real(6.0) * w[3] + d * real(12.0) * w[4])
+
+
+@wp.func
+def divided_difference(w: vec5, a: real, b: real):
+    """(w(b) - w(a))/(b - a) without a difference."""
+    both = a + b
+    squares = a * a + b * b
+    return w[1] + w[2] * both + w[3] * (squares + a * b) + w[4] * both * squares
+
+
+@wp.func
+def divided_slope(w: vec5, a: real, b: real):
+    """Derivative of that by b."""
+    return (
+        w[2]
+        + w[3] * (a + real(2.0) * b)
+        + w[4] * (a * a + real(2.0) * a * b + real(3.0) * b * b)
+    )
+
+
+@wp.func
+def segment_at(drive: WarpDrive, maps: Maps, torsion: real):
+    """Segment of a drive in which a torsion lies."""
+    found = int(0)  # noqa: RUF046, UP018  # a literal is a constant to Warp
+    for j in range(1, drive.segments):
+        if torsion >= maps.segment[drive.segment + j, 0]:
+            found = j
+    return found
+
+
+@wp.func
+def torsion_at(drive: WarpDrive, maps: Maps, theta: real, psi: real):
+    """theta/i + e0 - psi."""
+    x = theta / drive.ratio - psi
+    for k in range(drive.harmonic, drive.harmonic + drive.harmonics):
+        phase = maps.harmonic[k, 0] * theta + maps.harmonic[k, 1] * psi
+        x += maps.harmonic[k, 2] * wp.cos(phase) + maps.harmonic[k, 3] * wp.sin(phase)
+    return x
+
+
+@wp.func
+def weigh(
+    drive: WarpDrive,
+    maps: Maps,
+    segment: int,
+    theta: real,
+    psi: real,
+    dtheta: real,
+    dpsi: real,
+):
+    """Mean of the harmonics at both ends of a step, and their secants by the angles."""
+    out = Sums()
+    out.g_theta = ONE / drive.ratio
+    out.g_psi = -ONE
+    for k in range(drive.harmonics):
+        n_theta = maps.harmonic[drive.harmonic + k, 0]
+        n_psi = maps.harmonic[drive.harmonic + k, 1]
+        eta = HALF * (n_theta * dtheta + n_psi * dpsi)
+        phase = n_theta * theta + n_psi * psi + eta  # half way
+        sinc = ONE - eta * eta / real(6.0)
+        if wp.abs(eta) > real(1e-4):
+            sinc = wp.sin(eta) / eta
+        c, s = wp.cos(phase), wp.sin(phase)
+        row = drive.row + 2 * (segment * drive.harmonics + k)
+        a, b = maps.row[row], maps.row[row + 1]
+        out.mean += wp.cos(eta) * (c * a + s * b)
+        secant = sinc * (c * b - s * a)
+        out.by_theta += n_theta * secant
+        out.by_psi += n_psi * secant
+        error = sinc * (
+            c * maps.harmonic[drive.harmonic + k, 3]
+            - s * maps.harmonic[drive.harmonic + k, 2]
+        )
+        out.g_theta += n_theta * error
+        out.g_psi += n_psi * error
+    return out
+
+
+@wp.func
+def secant_over(
+    drive: WarpDrive, maps: Maps, theta: real, psi: real, dtheta: real, dpsi: real
+):
+    """Discrete gradient of V over a step of the angles, as in ``drive_map.cc``."""
+    out = Secant()
+    out.begin = torsion_at(drive, maps, theta, psi)
+    j0 = segment_at(drive, maps, out.begin)
+    d0 = out.begin - maps.segment[drive.segment + j0, 2]
+    sums = weigh(drive, maps, j0, theta, psi, dtheta, dpsi)
+    out.g_theta = sums.g_theta
+    out.g_psi = sums.g_psi
+    out.change = sums.g_theta * dtheta + sums.g_psi * dpsi
+    x1 = out.begin + out.change
+    j1 = segment_at(drive, maps, x1)
+    d1 = x1 - maps.segment[drive.segment + j1, 2]
+    last = weigh(drive, maps, j1, theta, psi, dtheta, dpsi)
+    if j0 == j1:
+        out.torque = divided_difference(sums.mean, d0, d1)
+        out.slope = divided_slope(sums.mean, d0, d1)
+    else:
+        # piece by piece across the knots, no difference of two large energies
+        work = real(0.0)
+        begin = real(out.begin)
+        j = int(j0)
+        for _ in range(wp.abs(j1 - j0) + 1):
+            piece = weigh(drive, maps, j, theta, psi, dtheta, dpsi)
+            base = maps.segment[drive.segment + j, 2]
+            to = x1
+            if j < j1:
+                to = maps.segment[drive.segment + j, 1]
+            if j > j1:
+                to = maps.segment[drive.segment + j, 0]
+            work += divided_difference(piece.mean, begin - base, to - base) * (
+                to - begin
+            )
+            begin = to
+            j += wp.where(j1 > j0, 1, -1)
+        out.torque = work / out.change
+        out.slope = (slope(last.mean, d1) - out.torque) / out.change
+    out.k0 = curvature(sums.mean, d0)
+    out.k1 = curvature(last.mean, d1)
+    low, high = HALF * wp.min(out.k0, out.k1), HALF * wp.max(out.k0, out.k1)
+    out.slope = wp.clamp(out.slope, low, high)
+    out.e_theta = HALF * (value(sums.by_theta, d0) + value(last.by_theta, d1))
+    out.e_psi = HALF * (value(sums.by_psi, d0) + value(last.by_psi, d1))
+    return out
