@@ -97,12 +97,20 @@ def split_unit(key: str) -> tuple[str, str]:
 
 
 def unit_of(key: str) -> str:
-    """Unit that a key carries in its last part, or the empty string."""
+    """Unit that a key carries in its last part, or the empty string.
+
+    >>> unit_of("flexspline.rim_mm"), unit_of("torque_Nm")
+    ('mm', 'N·m')
+    """
     return split_unit(key)[1]
 
 
 def shorten(text: str, most: int = 60) -> str:
-    """A foreign text as a message repeats it: cut, without control characters."""
+    """A foreign text as a message repeats it: cut, without control characters.
+
+    >>> shorten("a" * 100, 20)
+    'aaaaaaaaaaaaaaaaa...'
+    """
     text = CONTROL_CHARACTERS.sub("?", text)
     return text if len(text) <= most else f"{text[: most - 3]}..."
 

@@ -34,6 +34,9 @@ def near_names(text: str, names: Iterable[str], n: int = 3) -> list[str]:
     A name that begins with the text, or has all its parts, is nearer than any other
     spelling: ``size-25`` means ``size-25-100`` rather than ``size-32-50``, ``tool_rms``
     means ``tool_path_rms`` rather than ``tool_rp``.
+
+    >>> near_names("CSG-25-10", ["CSG-25-100", "CHA-14-50"])
+    ['CSG-25-100']
     """
     known = {name.lower(): name for name in names}
     wanted = text.lower()
@@ -66,7 +69,11 @@ def models_path() -> Path:
 
 
 def bundled_names(kind: str, suffix: str) -> list[str]:
-    """Names of the bundled files of one kind (``drives``, ``scenes``, ...)."""
+    """Names of the bundled files of one kind (``drives``, ``scenes``, ...).
+
+    >>> bundled_names("scenes", ".toml")[:2]
+    ['bench', 'bench-chirp']
+    """
     return sorted(file.stem for file in (models_path() / kind).glob(f"*{suffix}"))
 
 

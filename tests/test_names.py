@@ -22,7 +22,7 @@ IRREGULAR = set(
     " won wound written".split()
 )
 NOUNS = set(
-    "bearing bending ceiling coning coupling damping housing loading lobe meshing rounding"
+    "bearing bending ceiling coning coupling damping housing loading meshing rounding"
     " running spring starting string ring need speed seed embed run set".split()
 )
 """Words that look like participles and are nouns, or verbs."""

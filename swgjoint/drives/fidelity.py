@@ -8,5 +8,10 @@ from swgjoint.gear.design.design import Design
 
 
 def default_model(design: Design) -> Literal["2d", "3d"]:
-    """``3d`` for a design with a cup, else ``2d``."""
+    """``3d`` for a design with a cup, else ``2d``.
+
+    >>> from swgjoint import Design
+    >>> [default_model(Design.load(name)) for name in ("reference-2d", "reference-3d")]
+    ['2d', '3d']
+    """
     return "2d" if design.cup is None else "3d"

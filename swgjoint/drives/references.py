@@ -212,6 +212,11 @@ def find_drive(reference: str | Path | Design | DriveMap) -> DriveMap | Design:
 
     Raises:
         InputError: If it is none of these.
+
+    >>> find_drive("CSG-25-100").level
+    'catalogue'
+    >>> find_drive("reference-2d").drive.teeth_flexspline
+    120
     """
     if isinstance(reference, DriveMap):
         return reference

@@ -92,6 +92,9 @@ def spec_sheet(
         InputError: If the drive, a key, the fidelity or the file cannot be used.
         DesignError: If the design cannot be built.
         ComputationError: If the finite elements fail.
+
+    >>> spec_sheet("CSG-25-100", only=["rated_torque_Nm"])["rated_torque_Nm"]
+    87.0
     """
     return measure_drive(
         drive, model=model, only=only, measured=measured, progress=progress

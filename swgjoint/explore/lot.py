@@ -242,7 +242,11 @@ def distribution(values: Sequence[float]) -> dict[str, float] | None:
 
 
 def wilson(passed: int, count: int) -> dict[str, float]:
-    """Part that passed and its 95 % interval, score interval of Wilson (1927)."""
+    """Part that passed and its 95 % interval, score interval of Wilson (1927).
+
+    >>> {k: round(v, 3) for k, v in wilson(90, 100).items() if k != "part"}
+    {'low': 0.826, 'high': 0.945}
+    """
     interval = binomtest(passed, count).proportion_ci(0.95, method="wilson")
     return {
         "part": passed / count,

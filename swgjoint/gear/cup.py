@@ -27,6 +27,10 @@ def cup_torsional_stiffness(design: Design) -> float:
 
     Source:
         Bredt's formula for a closed thin section; pure shear of an annular plate.
+
+    >>> from swgjoint import Design
+    >>> round(cup_torsional_stiffness(Design.load("reference-3d")) / 1e3)
+    314
     """
     cup = design.cup
     if cup is None:

@@ -25,6 +25,11 @@ def ratio(layout: str, teeth_flexspline: int, teeth_circular_spline: int) -> flo
 
     Source:
         Thesis eq. (2.2), after Musser.
+
+    >>> ratio("circular_spline_fixed", 120, 122)
+    -60.0
+    >>> ratio("flexspline_fixed", 120, 122)
+    61.0
     """
     if layout == "circular_spline_fixed":
         return teeth_flexspline / (teeth_flexspline - teeth_circular_spline)

@@ -33,7 +33,12 @@ class DriveMap(Potential):
         rated_torque: float = 100.0,
         name: str = "linear",
     ) -> Self:
-        """A map of constant torsional stiffness [N·m/rad] without kinematic error."""
+        """A map of constant torsional stiffness [N·m/rad] without kinematic error.
+
+        >>> from swgjoint import DriveMap
+        >>> DriveMap.linear(2e4, rated_torque=50.0).torque_range
+        (-100.0, 100.0)
+        """
         end = 2.0 * rated_torque / stiffness
         # V = K x^2 / 2 about the first knot at -end
         row = [0.5 * stiffness * end**2, -stiffness * end, 0.5 * stiffness, 0.0, 0.0]
@@ -82,6 +87,11 @@ class DriveMap(Potential):
         Raises:
             InputError: With the nearest names, if there is no such row, or if an option
                 is out of range.
+
+        >>> from swgjoint import DriveMap
+        >>> drive = DriveMap.from_catalogue("CSG-25-100")
+        >>> drive.ratio, drive.ratings.rated_torque
+        (-100.0, 87.0)
         """
         from swgjoint.maps.from_catalogue import map_from_catalogue
 
@@ -149,6 +159,12 @@ class DriveMap(Potential):
 
         Args:
             only: Keys that are wanted, all for none.
+
+        >>> from swgjoint import DriveMap
+        >>> drive = DriveMap.from_catalogue("CSG-25-100")
+        >>> sheet = drive.spec_sheet(["T1_Nm", "K1_Nm_rad"])
+        >>> sheet["T1_Nm"], round(sheet["K1_Nm_rad"])
+        (14.0, 31148)
         """
         from swgjoint.maps.sheet.spec_sheet import spec_sheet
 

@@ -284,7 +284,12 @@ class Potential:
         return float(ends[0]), float(ends[1])
 
     def mean_torsion(self, torque: float) -> float:
-        """Torsion of the mean curve at an output torque [rad]."""
+        """Torsion of the mean curve at an output torque [rad].
+
+        >>> from swgjoint import DriveMap
+        >>> DriveMap.linear(1e4, rated_torque=50.0).mean_torsion(20.0)
+        0.002
+        """
         from scipy.optimize import brentq
 
         # a search asks one after the other: plain numbers make it five times as fast

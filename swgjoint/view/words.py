@@ -13,7 +13,11 @@ _UNITS = {
 
 
 def words(key: str) -> tuple[str, str]:
-    """Key of a spec sheet without its unit, and the unit."""
+    """Key of a spec sheet without its unit, and the unit.
+
+    >>> words("ripple_rms_percent")
+    ('ripple rms', '%')
+    """
     for suffix in sorted(_UNITS, key=len, reverse=True):
         if key.endswith(f"_{suffix}"):
             text = key.removesuffix(f"_{suffix}").removesuffix("_N")
@@ -23,7 +27,11 @@ def words(key: str) -> tuple[str, str]:
 
 
 def format_figure(value: object) -> str:
-    """A figure with four digits, - for None, yes and no."""
+    """A figure with four digits, - for None, yes and no.
+
+    >>> format_figure(0.123456), format_figure(None)
+    ('0.1235', '-')
+    """
     if value is None:
         return "-"
     if isinstance(value, bool):

@@ -44,6 +44,12 @@ def solve_mixed(
 
     Raises:
         ActiveSetError: If no set is found or the matrix is singular.
+
+    >>> import numpy as np
+    >>> M, q = np.array([[2.0, 0.0], [0.0, 1.0]]), np.array([-1.0, 3.0])
+    >>> z, active = solve_mixed(M, q, 2, 0, np.zeros(2, dtype=bool))
+    >>> z.tolist(), active.tolist()
+    ([0.5, 0.0], [True, False])
     """
     n, m = len(offset), inequalities
     active = start.copy()

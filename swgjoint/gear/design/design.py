@@ -125,6 +125,11 @@ class Design(Section):
 
         Raises:
             DesignError: With one line per fault of the file.
+
+        >>> from swgjoint import Design
+        >>> design = Design.load("reference-2d")
+        >>> design.ratio
+        -60.0
         """
         try:
             path = find(reference, "drives", ".toml", what="design")
@@ -169,6 +174,11 @@ class Design(Section):
 
         Raises:
             DesignError: With one line per fault.
+
+        >>> from swgjoint import Design
+        >>> stiff = Design.load("reference-2d").with_changes({"flexspline.rim_mm": 1.2})
+        >>> stiff.flexspline.rim_mm
+        1.2
         """
         data = self.model_dump(exclude_unset=True)
         merged = {

@@ -136,7 +136,11 @@ def constant_speed(
 
 
 def time_grid(duration: float, step: float, sub_steps: int = 1) -> Array:
-    """Times of all states of a run, first and last included [s]."""
+    """Times of all states of a run, first and last included [s].
+
+    >>> time_grid(0.004, 0.001).tolist()
+    [0.0, 0.001, 0.002, 0.003, 0.004]
+    """
     count = round(duration / step) * sub_steps
     return np.asarray(np.arange(count + 1) * (step / sub_steps))
 
