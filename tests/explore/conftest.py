@@ -1,17 +1,5 @@
-"""Fixtures that benchmarks of the joint share."""
+"""Fixtures of this folder."""
 
-from __future__ import annotations
+from cut_bench import bench
 
-from dataclasses import replace
-
-import pytest
-
-from swgjoint.bench.joint.scenes import bench_scene
-
-
-@pytest.fixture(scope="module")
-def bench():
-    """The bench, cut short."""
-    whole = bench_scene("bench")
-    changed = {"simulation.duration_s": 1.0, "trajectory.end_deg.joint": 4.0}
-    return replace(whole, scene=whole.scene.with_changes(changed))
+__all__ = ["bench"]

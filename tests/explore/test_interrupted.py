@@ -46,6 +46,6 @@ def test_a_killed_sweep_goes_on(tmp_path):
     found = interrupted(case, folder, lambda: len(KEPT(folder)) > 1, (whole, printed))
     assert found is not None and 2 <= found.kept < 5
     assert found.same and found.again == 0
-    # one in each of two processes
-    assert found.begun >= found.kept and 0 <= found.twice <= 2
+    # one task in each of two processes, of the designs that fill about two seconds
+    assert found.begun >= found.kept and 0 <= found.twice <= 5 - found.kept
     assert found.litter == found.left == ()

@@ -81,10 +81,8 @@ def test_the_demo_compares_two_drives_with_the_rigid_arm(
 
     The picture of the demo is drawn; those of its report have tests of their own.
     """
-    for picture in ("joint_png", "spec_picture"):
-        monkeypatch.setattr(
-            f"swgjoint.view.report.report.{picture}", lambda *_: b"\x89PNG"
-        )
+    for picture in ("report.joint_png", "tables.spec_picture"):
+        monkeypatch.setattr(f"swgjoint.view.report.{picture}", lambda *_: b"\x89PNG")
     soft = DriveMap.linear(2e4, teeth_flexspline=120, teeth_circular_spline=122)
     maps = {"reference-2d": synthetic_map, "reference-2d-simplified": soft}
     monkeypatch.setattr(

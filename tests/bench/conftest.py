@@ -1,0 +1,5 @@
+"""Fixtures of this folder."""
+
+from cut_bench import bench
+
+__all__ = ["bench"]
