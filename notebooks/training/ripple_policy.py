@@ -21,7 +21,7 @@ def drive_of_training():
         orders=np.array(orders),
         amplitudes=size * np.stack([np.cos(phase), np.sin(phase)], axis=1),
     )
-    return table.scale_to(drive, arcmin).on(drive)
+    return table.scale_to(drive, arcmin).apply_to(drive)
 
 
 ENVIRONMENT = "swgjoint/RippleSuppression-v0"

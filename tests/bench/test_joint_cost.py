@@ -128,7 +128,7 @@ def test_a_coarse_run_lacks_the_upper_lines(reference_run):
         name: getattr(run, name)[::2]
         for name in ("time", "position", "torsion", "output_torque", "tool_position")
     }
-    whole = replace(run.assembly, sub_steps=2).recorded()
+    whole = replace(run.assembly, sub_steps=2).without_sub_steps()
     coarse = replace(run, assembly=whole, **every)
     rated = run.assembly.transmissions[0].drive.ratings.rated_torque
     found = errors(coarse, louder)["ripple_spectrum"]
