@@ -243,7 +243,15 @@ def distribution(values: Sequence[float]) -> dict[str, float] | None:
 
 
 def wilson(passed: int, count: int) -> dict[str, float]:
-    """Part that passed and its 95 % interval, score interval of Wilson (1927)."""
+    """Fraction that passed and its 95 % score interval (Wilson 1927).
+
+    Args:
+        passed: Number of drives that passed.
+        count: Number of drives, at least one.
+
+    >>> {key: round(value, 3) for key, value in wilson(9, 10).items()}
+    {'part': 0.9, 'low': 0.596, 'high': 0.982}
+    """
     interval = binomtest(passed, count).proportion_ci(0.95, method="wilson")
     return {
         "part": passed / count,
@@ -271,7 +279,7 @@ def _solved(task: _Task) -> list[Drawn]:
 
 
 def _one(rests: Sequence[Rest], drive: Design, path: Path | None) -> Drawn:
-    """One drive; beside others it would differ from itself by round-off."""
+    """Solve one drive alone: solving it in a batch changes the round-off."""
     found = _figures(sample_lot([drive], rests), 0, drive)
     if path is not None:
         keep(path, json_file(found))

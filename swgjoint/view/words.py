@@ -13,7 +13,11 @@ _UNITS = {
 
 
 def words(key: str) -> tuple[str, str]:
-    """Key of a spec sheet without its unit, and the unit."""
+    """Split a spec-sheet key into its words and its unit.
+
+    >>> words("lost_motion_arcmin")
+    ('lost motion', 'arcmin')
+    """
     for suffix in sorted(_UNITS, key=len, reverse=True):
         if key.endswith(f"_{suffix}"):
             text = key.removesuffix(f"_{suffix}").removesuffix("_N")
@@ -23,7 +27,7 @@ def words(key: str) -> tuple[str, str]:
 
 
 def shown(value: object) -> str:
-    """A figure with four digits, - for None, yes and no."""
+    """Format a value: four digits, yes or no, - for None."""
     if value is None:
         return "-"
     if isinstance(value, bool):
