@@ -94,7 +94,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             return _command(arguments[0], arguments[1:])
         return _top(arguments)
     except BrokenPipeError:
-        # the reader left; the interpreter must not complain when it flushes
+        # the reading end closed; keep the interpreter from failing on its flush
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         return BROKEN_PIPE
     except KeyboardInterrupt:
@@ -125,7 +125,7 @@ def _top(arguments: list[str]) -> int:
     near = get_close_matches(args.command, COMMANDS, n=1)
     hint = f"did you mean {near[0]}? " if near else ""
     if args.command in COMMANDS:
-        parser.error(f"options stand after the command: swgjoint {args.command} ...")
+        parser.error(f"options follow the command: swgjoint {args.command} ...")
     command = args.command if len(args.command) <= 40 else f"{args.command[:37]}..."
     parser.error(f"unknown command {command!r}; {hint}one of {', '.join(COMMANDS)}")
 
@@ -167,7 +167,7 @@ def _command(name: str, arguments: list[str]) -> int:
         return _refuse(name, str(exc), BAD_INPUT if bad_input else FAILED)
     except BrokenPipeError:
         raise
-    except OSError as exc:  # disk full, no permission: nothing that we can repair
+    except OSError as exc:  # disk full or no permission: not a defect of swgjoint
         what = f"{exc.filename}: " if exc.filename else ""
         return _refuse(name, f"{what}{exc.strerror or exc}", FAILED)
     except Exception as exc:
