@@ -129,15 +129,15 @@ def run_lot(
     jobs: int = 1,
     progress: Progress = silent,
 ) -> dict[str, Any]:
-    """Draw drives, solve them and count those that meet a spec.
+    """Draw and solve a lot of drives and compute its yield against a spec.
 
     Args:
-        design: With tolerances.
-        count: Drives.
-        seed: Of the first; the others follow.
+        design: Design with nonzero tolerances.
+        count: Number of drives.
+        seed: Seed of the first drive; the others follow consecutively.
         sizes: What the tolerances of the design are, see :data:`SIZES`.
         spec: Limits by figure, see :data:`UPPER` and :data:`LOWER`.
-        jobs: Processes.
+        jobs: Number of processes.
         progress: Called with the stage, the tasks done and their number.
 
     Drives are kept in the user's cache as soon as they are solved: a lot that was
@@ -301,7 +301,7 @@ def _figures(lot: Lot, n: int, drive: Design) -> Drawn:
     most = max(sure, low + 2.0 * REST * rest)
     if lot.whole[n]:
         sure = most = float(np.ptp(unloaded))
-    # held on its ideal motion the output feels what the error would move it
+    # torque that holds the output on its ideal motion against the error
     torque = (loaded - loaded.mean()) / compliance
     rated = ratings_of(drive).rated_torque
     return Drawn(

@@ -62,7 +62,7 @@ def run_scene(
         name: What recordings and progress call the run; default: the scene's name.
         recording: File that receives the recording for the viewer, like
             :meth:`SceneRun.to_rerun` but begun while the steps are taken; a recording
-            that cannot be written is an ``OutputWarning``, the run stands.
+            that cannot be written is an ``OutputWarning``; the run is still returned.
         progress: Called with the steps done.
 
     Raises:
