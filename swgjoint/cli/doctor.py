@@ -1,4 +1,4 @@
-"""``swgjoint doctor``: is everything there that a run needs."""
+"""``swgjoint doctor``: check that the installation is complete."""
 
 from __future__ import annotations
 
@@ -64,7 +64,9 @@ def report(result: dict[str, Any]) -> str:
         f"{line:{width}}  {check['detail']}"
         for line, check in zip(lines, result["checks"], strict=True)
     ]
-    verdict = "all required parts are there" if result["ok"] else "not usable as it is"
+    verdict = (
+        "all required parts are installed" if result["ok"] else "not usable as it is"
+    )
     return "\n".join([*body, verdict])
 
 

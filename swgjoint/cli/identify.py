@@ -1,4 +1,4 @@
-"""``swgjoint identify``: from the log of a test bench to a map that can be used."""
+"""``swgjoint identify``: identify a drive map from a test-bench log."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--rotor-inertia",
         type=float,
         metavar="KGM2",
-        help="of motor and wave generator; found where it is not given",
+        help="of motor and wave generator; identified if omitted",
     )
     parser.add_argument(
         "--orders",
@@ -171,7 +171,7 @@ def report(result: dict[str, Any]) -> str:
 
 
 def status(result: dict[str, Any]) -> int:
-    """1 where something says that the parameters are not those of the drive."""
+    """1 if the identified parameters are doubtful."""
     return int(bool(result["doubts"]))
 
 

@@ -1,4 +1,4 @@
-"""``swgjoint lot``: accuracy and ripple of many drives with errors, and the yield."""
+"""``swgjoint lot``: accuracy, ripple and yield of a production lot."""
 
 from __future__ import annotations
 
@@ -17,7 +17,9 @@ MAX_JOBS = 256
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Design, number of drives, how errors are drawn, spec, output folder."""
-    parser.add_argument("design", metavar="DESIGN", help="with [tolerances]")
+    parser.add_argument(
+        "design", metavar="DESIGN", help="design with a [tolerances] table"
+    )
     parser.add_argument(
         "--drives", type=int, default=500, metavar="N", help="default %(default)s"
     )
@@ -29,7 +31,10 @@ def configure(parser: argparse.ArgumentParser) -> None:
         " between zero and them",
     )
     parser.add_argument(
-        "--seed", type=int, default=1, help="of the first drive; default %(default)s"
+        "--seed",
+        type=int,
+        default=1,
+        help="seed of the first drive; default %(default)s",
     )
     parser.add_argument(
         "--spec",

@@ -28,27 +28,27 @@ from swgjoint.errors import InputError, OutputWarning, SwgError, out_of_memory
 from swgjoint.progress import StderrProgress, silent
 
 COMMANDS = {
-    "demo": "the bundled scene, from finite elements to the recording and a picture",
-    "design": "whether designs can be built; pictures, outlines, a new one to scale",
-    "profile": "tooth profile of both members: report and picture",
-    "meshing": "simulation of meshing with finite elements",
-    "map": "build the map of a drive and save it",
-    "identify": "parameters and map of a drive from the log of a test bench",
-    "spec": "catalogue-style sheet of a design, a map or a catalogue drive",
-    "run": "simulate an arm with its drives",
-    "compare": "drives or levels side by side in one scene, against a spec",
-    "lot": "accuracy and ripple of many drives with errors, yield against a spec",
-    "tune": "gains of a controller in an environment, against a textbook rule",
-    "sweep": "many designs, on this machine or a cluster, gone on with after a stop",
-    "optimise": "designs that are good in several figures at once",
-    "study": "our values beside those of a source",
-    "bench": "error against run time",
-    "advise": "the cheapest level, integrator and step within a wanted error",
-    "stability": "stiff and extreme joints: run, cut into sub-steps, or refused",
-    "list": "what is bundled: drives, designs, arms, scenes",
-    "schema": "keys of an input file with unit, range, default and meaning",
-    "view": "open a recording",
-    "doctor": "versions, engine plugin, cache, optional parts",
+    "demo": "run the bundled example from finite elements to a recording and a plot",
+    "design": "check, plot, export or rescale gear designs",
+    "profile": "compute and plot the tooth profiles of both members",
+    "meshing": "simulate meshing with finite elements",
+    "map": "build the map of a drive and save it to a file",
+    "identify": "identify drive parameters and a map from a test-bench log",
+    "spec": "print a data sheet for a design, a map or a catalogue drive",
+    "run": "simulate a robot arm with its drives",
+    "compare": "compare drives or model levels in one scene, against limits",
+    "lot": "estimate accuracy, ripple and yield of a production lot",
+    "tune": "tune controller gains and compare them with a textbook rule",
+    "sweep": "evaluate many designs, locally or on a cluster; resumable",
+    "optimise": "search for Pareto-optimal designs",
+    "study": "compare swgjoint with published values",
+    "bench": "measure error against run time",
+    "advise": "find the cheapest model level, integrator and step for an error",
+    "stability": "test the numerical stability of stiff and extreme joints",
+    "list": "list the bundled drives, designs, arms and scenes",
+    "schema": "list the keys of an input file with unit, range and default",
+    "view": "open a recording in the viewer",
+    "doctor": "check versions, the MuJoCo plugin, the cache and optional parts",
 }
 
 BAD_INPUT = 2
@@ -70,7 +70,7 @@ class Parser(argparse.ArgumentParser):
     """Parser whose errors are one line on stderr, exit status 2."""
 
     def error(self, message: str) -> NoReturn:
-        """Print the fault and where help is."""
+        """Print the error and a pointer to the help text."""
         line = _cut(f"{self.prog}: {message}")
         self.exit(BAD_INPUT, f"{line}; see '{self.prog} --help'\n")
 
@@ -84,7 +84,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = list(sys.argv[1:] if argv is None else argv)
     if "OMP_NUM_THREADS" not in os.environ:
         # before numpy and scipy load theirs: on matrices of this size their threads
-        # wait for each other, and a model in space takes twice as long
+        # wait for each other, and a 3D model takes twice as long
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):  # an ASCII terminal shows ? for a unit
@@ -94,7 +94,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             return _command(arguments[0], arguments[1:])
         return _top(arguments)
     except BrokenPipeError:
-        # the reader left; the interpreter must not complain when it flushes
+        # the reading end closed; keep the interpreter from failing on its flush
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         return BROKEN_PIPE
     except KeyboardInterrupt:
@@ -125,7 +125,7 @@ def _top(arguments: list[str]) -> int:
     near = get_close_matches(args.command, COMMANDS, n=1)
     hint = f"did you mean {near[0]}? " if near else ""
     if args.command in COMMANDS:
-        parser.error(f"options stand after the command: swgjoint {args.command} ...")
+        parser.error(f"options follow the command: swgjoint {args.command} ...")
     command = args.command if len(args.command) <= 40 else f"{args.command[:37]}..."
     parser.error(f"unknown command {command!r}; {hint}one of {', '.join(COMMANDS)}")
 
@@ -141,17 +141,17 @@ def _command(name: str, arguments: list[str]) -> int:
     )
     loudness = parser.add_mutually_exclusive_group()
     loudness.add_argument(
-        "--quiet", action="store_true", help="no progress on stderr; warnings stay"
+        "--quiet", action="store_true", help="hide progress on stderr, keep warnings"
     )
     loudness.add_argument(
         "--verbose",
         action="store_true",
-        help="every step of the progress as a line of its own",
+        help="print every progress step on its own line",
     )
     parser.add_argument(
         "--traceback",
         action="store_true",
-        help="after an internal error, where in the code it happened",
+        help="print the traceback after an internal error",
     )
     parser.epilog = f"{parser.epilog or ''} {STATUSES}".strip()
     args = parser.parse_args(arguments)
@@ -167,7 +167,7 @@ def _command(name: str, arguments: list[str]) -> int:
         return _refuse(name, str(exc), BAD_INPUT if bad_input else FAILED)
     except BrokenPipeError:
         raise
-    except OSError as exc:  # disk full, no permission: nothing that we can repair
+    except OSError as exc:  # disk full or no permission: not a defect of swgjoint
         what = f"{exc.filename}: " if exc.filename else ""
         return _refuse(name, f"{what}{exc.strerror or exc}", FAILED)
     except Exception as exc:

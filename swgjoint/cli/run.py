@@ -50,8 +50,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out",
         metavar="DIR",
-        help="folder that receives run.rrd, for an arm also its scene.toml; none if"
-        " absent",
+        help="write run.rrd there, and scene.toml for an arm; by default nothing is"
+        " written",
     )
     parser.add_argument(
         "--model",
@@ -72,8 +72,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
         metavar="URL",
         nargs="?",
         const="",
-        help="send the run to a viewer on this machine, at the pace of a clock; by"
-        " default to one that is started",
+        help="send the run to a viewer on this machine in real time; without URL, a"
+        " viewer is started",
     )
     add_arm_arguments(parser)
 
@@ -137,7 +137,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def status(result: dict[str, Any]) -> int:
-    """1 where the run is not valid; with ``--strict`` where anything is marked."""
+    """1 if the run is invalid or, with ``--strict``, if any value is marked."""
     from swgjoint.sim.figures.verdict import VALID
     from swgjoint.view.validity import warnings_of
 

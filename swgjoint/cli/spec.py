@@ -91,7 +91,7 @@ def _write(
 
 
 def report(result: dict[str, Any]) -> str:
-    """Figures with units, the strongest orders, what is missing and why."""
+    """Values with units, the strongest orders, and missing values with reasons."""
     from swgjoint.gear.catalogue_stated import LOSS_KEYS
     from swgjoint.maps.sheet.spec_sheet import KEYS, TURN_KEYS
 
@@ -146,7 +146,7 @@ def report(result: dict[str, Any]) -> str:
 
 
 def _details(result: dict[str, Any]) -> list[str]:
-    """What stands behind the figures of the solid model."""
+    """Background of the values computed with the 3D model."""
     lines = []
     if radial := result.get("radial_stiffness"):
         bent = radial["large_rotations"]
@@ -166,7 +166,7 @@ def _details(result: dict[str, Any]) -> list[str]:
             f"ratcheting: {so_far}torque largest after"
             f" {path['at_largest_pitches']:.3g} of a pitch with"
             f" {path['at_largest_pairs']} teeth in contact, wave generator rigid and"
-            " locked, in the plane"
+            " locked, 2D model"
         )
     if slow := result.get("running"):
         lines.append(
@@ -189,7 +189,7 @@ def _details(result: dict[str, Any]) -> list[str]:
 
 
 def _laid(found: dict[str, Any]) -> list[str]:
-    """The measured loop beside the prediction."""
+    """The measured loop compared with the prediction."""
     low, high = found["torque_range_Nm"]
     beyond = "; it leaves the torques of the map" if found["beyond_range"] else ""
     rows = [

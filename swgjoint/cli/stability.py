@@ -59,5 +59,5 @@ def report(result: dict[str, Any]) -> str:
 
 
 def status(result: dict[str, Any]) -> int:
-    """1 if a run went wrong without saying so."""
+    """1 if a run failed without reporting it."""
     return int(bool(result["unexplained"]))

@@ -1,4 +1,4 @@
-"""``swgjoint study``: our values beside those of a source."""
+"""``swgjoint study``: compare swgjoint with published values."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ STUDIES = {
     ),
     "response": (
         "swgjoint.validation.response:run_response",
-        "two-mass frequency response of a joint beside its closed form",
+        "two-mass frequency response of a joint against its closed form",
     ),
     "control": (
         "swgjoint.validation.control.ladder:run_control",

@@ -1,4 +1,4 @@
-"""``swgjoint sweep``: many designs, kept one by one."""
+"""``swgjoint sweep``: evaluate many designs and keep each result."""
 
 from __future__ import annotations
 
@@ -19,9 +19,7 @@ SHOWN = 40
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Sweep file, where it is computed, where results are kept."""
-    parser.epilog = (
-        "A sweep that was stopped, by whatever means, goes on with the same command."
-    )
+    parser.epilog = "Repeat the same command to resume an interrupted sweep."
     parser.add_argument("file", metavar="FILE", help="sweep file or bundled name")
     configure_places(
         parser,
@@ -31,8 +29,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--retry-failed",
         action="store_true",
-        help="compute designs again that failed in an earlier run; those that were lost"
-        " with their process are in any case",
+        help="recompute designs that failed in an earlier run; designs lost with a"
+        " terminated process are always recomputed",
     )
 
 

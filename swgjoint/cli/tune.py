@@ -36,7 +36,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="candidates instead of minutes: the same result on every machine",
     )
     parser.add_argument(
-        "--seed", type=int, default=0, metavar="S", help="of all that is random; 0"
+        "--seed", type=int, default=0, metavar="S", help="random seed; default 0"
     )
     parser.add_argument(
         "--set",
@@ -56,8 +56,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--resume",
         action="store_true",
-        help="go on with the tune.npz of --out, which has to be there; without, one of"
-        " the same settings is gone on with, too",
+        help="require tune.npz in --out and resume from it; without this option, a"
+        " tune.npz with the same settings is resumed as well",
     )
 
 

@@ -126,15 +126,15 @@ def run_lot(
     jobs: int = 1,
     progress: Progress = silent,
 ) -> dict[str, Any]:
-    """Draw drives, solve them and count those that meet a spec.
+    """Draw and solve a lot of drives and compute its yield against a spec.
 
     Args:
-        design: With tolerances.
-        count: Drives.
-        seed: Of the first; the others follow.
+        design: Design with nonzero tolerances.
+        count: Number of drives.
+        seed: Seed of the first drive; the others follow consecutively.
         sizes: What the tolerances of the design are, see :data:`SIZES`.
         spec: Limits by figure, see :data:`UPPER` and :data:`LOWER`.
-        jobs: Processes.
+        jobs: Number of processes.
         progress: Called with the stage, the tasks done and their number.
 
     Drives are kept in the user's cache as soon as they are solved: a lot that was
@@ -242,10 +242,14 @@ def distribution(values: Sequence[float]) -> dict[str, float] | None:
 
 
 def wilson(passed: int, count: int) -> dict[str, float]:
-    """Part that passed and its 95 % interval, score interval of Wilson (1927).
+    """Fraction that passed and its 95 % score interval (Wilson 1927).
 
-    >>> {k: round(v, 3) for k, v in wilson(90, 100).items() if k != "part"}
-    {'low': 0.826, 'high': 0.945}
+    Args:
+        passed: Number of drives that passed.
+        count: Number of drives, at least one.
+
+    >>> {key: round(value, 3) for key, value in wilson(9, 10).items()}
+    {'part': 0.9, 'low': 0.596, 'high': 0.982}
     """
     interval = binomtest(passed, count).proportion_ci(0.95, method="wilson")
     return {
@@ -274,7 +278,7 @@ def _solved(task: _Task) -> list[Drawn]:
 
 
 def _one(rests: Sequence[Rest], drive: Design, path: Path | None) -> Drawn:
-    """One drive; beside others it would differ from itself by round-off."""
+    """Solve one drive alone: solving it in a batch changes the round-off."""
     found = _figures(sample_lot([drive], rests), 0, drive)
     if path is not None:
         keep(path, json_file(found))
@@ -296,7 +300,7 @@ def _figures(lot: Lot, n: int, drive: Design) -> Drawn:
     most = max(sure, low + 2.0 * REST * rest)
     if lot.whole[n]:
         sure = most = float(np.ptp(unloaded))
-    # held on its ideal motion the output feels what the error would move it
+    # torque that holds the output on its ideal motion against the error
     torque = (loaded - loaded.mean()) / compliance
     rated = ratings_of(drive).rated_torque
     return Drawn(

@@ -79,7 +79,7 @@ class _WithMeaning(GenerateJsonSchema):
 
 
 def meanings(cls: type) -> dict[str, str]:
-    """Docstrings beneath the fields of a class and of those that it derives from."""
+    """Field docstrings of a class and its base classes."""
     found: dict[str, str] = {}
     for base in reversed(cls.__mro__):
         found |= _docstrings(base.__module__).get(base.__name__, {})
@@ -143,7 +143,7 @@ def _limits(kind: str) -> dict[str, Any]:
 
 
 def described_keys(schema: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """One entry for each key of a file, tables before their keys.
+    """Flatten a schema into one entry per key, tables before their keys.
 
     Returns:
         ``key`` (dotted; NAME stands for a name that the file chooses, [] for an item of

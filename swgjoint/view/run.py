@@ -48,21 +48,21 @@ def run_scene(
         scene: A scene, the path of a scene file, or the name of a bundled one.
         overrides: Dotted keys of the scene with other values, as a mapping or as
             ``key=value`` texts.
-        drives: Maps that stand for the scene's drive references of these names.
+        drives: Maps that replace the scene's drive references of these names.
         controller: Drives the motors in place of the scene's own law, once a control
             period on what the sensors of the scene read; limits of the motors,
             payload, disturbances and start stay the scene's. It reads the link angle
             where ``controller.feedback`` is ``link``, the output torque where
             ``sensors.torque`` is there.
-        known_drives: What that controller takes the drives of some joints for; others
-            are told as they are simulated.
+        known_drives: Drive maps that the controller assumes for some joints; for the
+            others it assumes the simulated drive.
         known_arm: What it takes the arm for, for instance
             :class:`swgjoint.control.pinocchio_arm.PinocchioArm`, whose torques its
             feed-forward then has; None: the scene's arm, with its payload if known.
         name: What recordings and progress call the run; default: the scene's name.
         recording: File that receives the recording for the viewer, like
             :meth:`SceneRun.to_rerun` but begun while the steps are taken; a recording
-            that cannot be written is an ``OutputWarning``, the run stands.
+            that cannot be written is an ``OutputWarning``; the run is still returned.
         progress: Called with the steps done.
 
     Raises:

@@ -1,4 +1,4 @@
-"""How far the figures of a run may be trusted, in numbers.
+"""Quantified validity of the results of a run.
 
 Three things limit a figure: the map (its level, the torque that it covers, what its
 fit dropped), the orders that the step leaves out, and the step itself. The last is
@@ -93,7 +93,7 @@ def _at(joint: Mapping[str, Any], path: tuple[str, ...]) -> float:
 
 
 def map_error(drive: DriveMap) -> list[str]:
-    """What is known of the error of a map, one line each; empty if nothing is."""
+    """Known errors of a map, one line each; empty if none is known."""
     info = drive.info
     found, reason = map_validation(drive)
     lines = [reason or ""] if found is None else [validation_summary(found)]
@@ -137,7 +137,7 @@ def _numbers(table: Any, *keys: Any) -> list[float] | None:
 
 
 def warnings_of(joints: Mapping[str, Any]) -> list[str]:
-    """What a reader of the figures must know, one line each.
+    """Warnings about the results of a run, one line each.
 
     What takes a run out of its model is in its ``reasons``, see
     :mod:`swgjoint.sim.figures.verdict`.

@@ -13,10 +13,10 @@ _UNITS = {
 
 
 def words(key: str) -> tuple[str, str]:
-    """Key of a spec sheet without its unit, and the unit.
+    """Split a spec-sheet key into its words and its unit.
 
-    >>> words("ripple_rms_percent")
-    ('ripple rms', '%')
+    >>> words("lost_motion_arcmin")
+    ('lost motion', 'arcmin')
     """
     for suffix in sorted(_UNITS, key=len, reverse=True):
         if key.endswith(f"_{suffix}"):
