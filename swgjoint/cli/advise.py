@@ -18,8 +18,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--error",
         required=True,
         metavar="VALUE",
-        help="of the link angle, rms of the worst joint (0.1arcmin, 5arcsec, 2e-5rad),"
-        " or of the tool, rms (0.05mm)",
+        help="largest accepted rms error of the link angle of the worst joint"
+        " (0.1arcmin, 5arcsec, 2e-5rad) or of the tool position (0.05mm)",
     )
     parser.add_argument(
         "--set",

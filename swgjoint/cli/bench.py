@@ -35,19 +35,19 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--design",
         metavar="DESIGN",
-        help=f"of fe: with a cup; default {DESIGN}; of another one, settings that take"
-        " long are left out",
+        help=f"fe: a design with a cup; default {DESIGN}; other designs skip the slow"
+        " settings",
     )
     parser.add_argument(
         "--recompute",
         action="store_true",
-        help="of fe: solve the finest references, too, which else are stored (an hour),"
-        " and write that file anew into --out",
+        help="fe: also solve the finest references (an hour) instead of reading the"
+        " stored ones, and write a new file of references to --out",
     )
     parser.add_argument(
         "--only",
         metavar="SCENE,...",
-        help="of joint: some of its scenes, ur5e, iiwa14, bench; default all",
+        help="joint: run only these scenes (ur5e, iiwa14, bench); default all",
     )
     parser.add_argument(
         "--out",

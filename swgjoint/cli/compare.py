@@ -23,8 +23,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--scene",
         metavar="SCENE|ARM",
         default="bench",
-        help="scene file, MJCF or URDF file of an arm, or bundled name; an arm gets a"
-        " gentle sweep, and drives by rule where none is compared; default bench",
+        help="scene file, MJCF or URDF file of an arm, or bundled name; an arm gets"
+        " a gentle sweep motion, and default drives in joints that are not"
+        " compared; default bench",
     )
     parser.add_argument(
         "--joints",
@@ -32,8 +33,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
         metavar="PATTERN,...",
         action="append",
         default=[],
-        help="compare in these joints alone, such as shoulder_lift or 'wrist_*'; the"
-        " others keep what the scene gives them; repeatable",
+        help="compare drives only in these joints, such as shoulder_lift or"
+        " 'wrist_*'; the other joints keep the drives of the scene; repeatable",
     )
     parser.add_argument(
         "--set",
@@ -44,7 +45,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         help="change a key of the scene; repeatable",
     )
     parser.add_argument("--model", choices=("ring", "2d", "3d"), help="of designs")
-    parser.add_argument("--sort", metavar="KEY", help="best first by this figure")
+    parser.add_argument("--sort", metavar="KEY", help="sort by this figure, best first")
     parser.add_argument(
         "--spec",
         metavar="FILE",

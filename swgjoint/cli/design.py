@@ -28,8 +28,9 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "action",
         choices=ACTIONS,
-        help="check: figures against their limits; show: picture; export: DXF and CSV;"
-        " new: scale DESIGN to other teeth or another module and write its file",
+        help="check: compare figures with their limits; show: draw a picture;"
+        " export: write DXF and CSV; new: scale DESIGN to another tooth count or"
+        " module and write its file",
     )
     parser.add_argument(
         "designs",
@@ -54,7 +55,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         dest="overrides",
-        help="a value after scaling, e.g. flexspline.rim_mm=0.5; repeatable",
+        help="change a value after scaling, e.g. flexspline.rim_mm=0.5; repeatable",
     )
     new.add_argument("-o", "--output", metavar="FILE.toml", help="file to write")
 

@@ -39,7 +39,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "kind",
         choices=KINDS,
-        help="drives: of the catalogue; the others: files that are bundled",
+        help="drives: catalogue drives; otherwise the bundled files of that kind",
     )
 
 

@@ -27,8 +27,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "--sizes",
         choices=("limit", "uniform"),
         default="limit",
-        help="errors as large as the tolerances (the worst lot, default), or drawn"
-        " between zero and them",
+        help="limit: errors as large as the tolerances (worst case, default);"
+        " uniform: errors drawn between zero and the tolerances",
     )
     parser.add_argument(
         "--seed",

@@ -38,8 +38,8 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--no-fields",
         action="store_true",
-        help="without stresses and shapes for the recording: a file of tens of kB"
-        " instead of a MB, the same drive otherwise",
+        help="leave out the stresses and shapes that recordings show; the file"
+        " shrinks from about 1 MB to tens of kB, the drive is the same",
     )
     measured = parser.add_argument_group("measured drive")
     measured.add_argument(

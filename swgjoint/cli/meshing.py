@@ -58,14 +58,14 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--out",
         metavar="DIR",
-        help="write meshing.json and pictures there; of a 3d run also the states, from"
-        " which the same command goes on after a stop",
+        help="write meshing.json and pictures there; a 3d run also keeps its states,"
+        " from which the same command resumes after an interruption",
     )
     parser.add_argument(
         "--resume",
         action="store_true",
-        help="go on with an interrupted 3d run whose states are in --out DIR; without,"
-        " one of the same design and options is gone on with, too",
+        help="require an interrupted 3d run in --out DIR and resume it; without this"
+        " option, a run with the same design and options is resumed as well",
     )
 
 

@@ -31,13 +31,13 @@ def configure(parser: argparse.ArgumentParser) -> None:
         "scene",
         metavar="SCENE|ARM",
         help="scene file, MJCF or URDF file of an arm, or bundled name; an arm gets"
-        " a gentle sweep and, unless --drive says otherwise, drives by rule",
+        " a gentle sweep motion and, unless --drive is given, default drives",
     )
     parser.add_argument(
         "--drive",
         metavar="NAME",
-        help="design, map or catalogue drive of all joints; of one joint:"
-        " --set joints.JOINT.drive=NAME",
+        help="design, map or catalogue drive for all joints; for one joint use --set"
+        " joints.JOINT.drive=NAME",
     )
     parser.add_argument(
         "--set",
@@ -61,11 +61,12 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--strict",
         action="store_true",
-        help="exit status 1 wherever a line doubts a figure: a drive above its ratings,"
-        " a ripple that is a lower bound or uncertain, a link off its command",
+        help="also end with exit status 1 if a figure is doubtful: a drive above its"
+        " ratings, a ripple that is a lower bound or uncertain, a link that"
+        " does not follow its command",
     )
     parser.add_argument(
-        "--report", action="store_true", help="write report.html into DIR, too"
+        "--report", action="store_true", help="also write report.html to DIR"
     )
     parser.add_argument(
         "--live",

@@ -19,7 +19,7 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "kind",
         choices=KINDS,
-        help="spec: limits of compare; lot: limits of lot; optimise: file of a search",
+        help="spec: limits for compare; lot: limits for lot; optimise: search file",
     )
 
 

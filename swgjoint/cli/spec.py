@@ -32,21 +32,22 @@ def configure(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--only",
         metavar="KEY,...",
-        help="compute no more than these keys need: ratings alone need no finite"
-        " elements; stiffness, hysteresis loss and lost motion few positions and no"
-        " manufacturing errors; radial stiffness and the fatigue safety factor those in"
-        " space; the ratcheting torque is computed only where it is named here",
+        help="compute only what these keys need: ratings need no finite elements;"
+        " stiffness, hysteresis loss and lost motion need few positions and no"
+        " manufacturing errors; radial stiffness and fatigue safety factor need"
+        " the 3D model; the ratcheting torque is computed only if it is named"
+        " here",
     )
     parser.add_argument(
         "--measured",
         metavar="LOOP.csv",
-        help="lay a measured torque-torsion loop, input locked, over the prediction:"
-        " columns torque_Nm and torsion_arcmin or torsion_rad",
+        help="compare the prediction with a measured torque-torsion loop (input"
+        " locked); columns torque_Nm and torsion_arcmin or torsion_rad",
     )
     parser.add_argument(
         "--out",
         metavar="DIR",
-        help="write spec.json and spec.png there, with --measured measured.png, too",
+        help="write spec.json and spec.png there, with --measured also measured.png",
     )
 
 
