@@ -56,9 +56,9 @@ _BOUND_ERRORS = {
 }
 _TYPES = {
     "float_type": "a number",
-    "int_type": "a whole number",
-    "int_from_float": "a whole number",
-    "string_type": "a text in quotes",
+    "int_type": "an integer",
+    "int_from_float": "an integer",
+    "string_type": "a quoted string",
     "bool_type": "true or false",
     "finite_number": "a finite number",
     "tuple_type": "a list",
@@ -281,8 +281,8 @@ def _accepted(info: Any, key: str) -> str:
     unit = unit_of(key)
     names: dict[Any, str] = {
         float: "a number",
-        int: "a whole number",
-        str: "a text in quotes",
+        int: "an integer",
+        str: "a quoted string",
     }
     name = names.get(annotation, "a value")
     return f"{name} in {unit}" if unit else name

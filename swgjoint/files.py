@@ -34,7 +34,7 @@ def whole(path: Path) -> Iterator[Path]:
     start = f".{path.name[:40]}.{host}-"
     _clear(path.parent, re.compile(re.escape(start) + r"(\d+)-[0-9a-f]{8}"))
     beside = path.with_name(f"{start}{os.getpid()}-{secrets.token_hex(4)}")
-    # made here, so that it is nobody else's; its mode follows the umask
+    # created exclusively for this process; its mode follows the umask
     beside.open("xb").close()
     try:
         yield beside
@@ -199,7 +199,7 @@ def output_folder(path: str | Path) -> Path:
 
 
 def _check_length(path: Path) -> None:
-    """Refuse a path that no file system takes, or nobody follows."""
+    """Refuse a path that no file system accepts, or that has too many links."""
     try:
         path.exists()
     except OSError as exc:

@@ -12,7 +12,7 @@ from swgjoint.errors import InputError
 from swgjoint.files import output_folder
 
 PARTS = {
-    "fe": "finite elements in the plane and in space, coarse to fine",
+    "fe": "finite elements, 2D and 3D, coarse to fine",
     "joint": "levels, integrators and steps of the joint",
     "scaling": "time over joints, batches, harmonics, teeth, nodes, torque, positions",
 }

@@ -206,7 +206,7 @@ def _refuse(name: str, message: str, status: int) -> int:
 
 
 def _internal(exc: Exception, *, shown: bool) -> str:
-    """One line about an exception that nobody expected."""
+    """One line about an unexpected exception."""
     last = traceback.extract_tb(exc.__traceback__)[-1]
     text = " ".join(str(exc).split())[:200]
     again = "" if shown else " of the same command with --traceback"

@@ -186,7 +186,7 @@ def verdict_lines(metrics: dict[str, Any]) -> list[str]:
 
 
 def assumed_lines(contains: dict[str, Any]) -> list[str]:
-    """Kinematic errors that nobody measured, joints with the same together."""
+    """Assumed kinematic errors, grouped by joints that share them."""
     found: dict[str, list[str]] = {}
     for name, joint in contains["joints"].items():
         what, _, _ = str(joint["kinematic_error"]).partition(", joint ")

@@ -1,4 +1,4 @@
-"""The fidelity of finite elements that a design gets where nobody names one."""
+"""Default fidelity of the finite elements of a design."""
 
 from __future__ import annotations
 

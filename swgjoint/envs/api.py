@@ -185,7 +185,7 @@ class BatchEnv(VectorEnv[Array, Array, Array]):
 
         Args:
             seed: The first, or one each; None goes on with the generators.
-            options: ``reset_mask``, an array of truth values, one per episode: those
+            options: ``reset_mask``, an array of bools, one per episode: those
                 begin anew, the others go on. ``info`` then is that of the former.
 
         Raises:

@@ -10,19 +10,19 @@ from swgjoint.errors import InputError
 
 
 def is_number(value: Any) -> bool:
-    """Whether it is a finite number, which a truth value is not."""
+    """Whether a value is a finite number; a bool is none."""
     plain = isinstance(value, int | float | np.integer | np.floating)
     # compared, not converted: an integer may be beyond the range of floats
     return plain and not isinstance(value, bool) and bool(-1e300 < value < 1e300)
 
 
 def is_whole(value: Any) -> bool:
-    """Whether it is a whole number, whatever its type."""
+    """Whether a value is an integer, of whatever numeric type."""
     return is_number(value) and int(value) == value
 
 
 def is_flag(value: Any) -> bool:
-    """Whether it is a truth value, or 0 or 1."""
+    """Whether a value is a bool, or 0 or 1."""
     return isinstance(value, bool | np.bool_) or (is_number(value) and value in (0, 1))
 
 
@@ -50,6 +50,6 @@ def check_count(key: str, value: Any, least: int) -> None:
 
 
 def check_flag(key: str, value: Any) -> None:
-    """Refuse what is no truth value."""
+    """Refuse a value that is not a bool."""
     if not is_flag(value):
         raise InputError(f"{key} {format_value(value)}; accepted: True, False")

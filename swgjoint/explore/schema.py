@@ -209,7 +209,7 @@ def _type(form: Mapping[str, Any]) -> str:
     names = {
         "object": "table",
         "array": "list",
-        "integer": "whole number",
+        "integer": "integer",
         "string": "text",
         "boolean": "true or false",
     }

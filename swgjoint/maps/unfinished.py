@@ -19,7 +19,7 @@ from swgjoint.maps.cache import key_of
 from swgjoint.store import arrays_content, arrays_file, cache_folder, keep, read_kept
 
 FORGOTTEN = 14 * 24 * 3600.0
-"""Parts that nobody went on with are removed after this time [s]."""
+"""Parts of a map that was not resumed are removed after this time [s]."""
 
 Part = TypeVar("Part")
 

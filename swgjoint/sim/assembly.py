@@ -165,7 +165,7 @@ def assemble(
     check_motion(scene, {section.level for section in sections})
     if scene.sensors and scene.sensors.torque and controlled_by is None:
         raise InputError(
-            f"{scene.where}: sensors.torque: read by nobody; accepted: with a"
+            f"{scene.where}: sensors.torque: unused; accepted: with a"
             " controller that is given to run_scene"
         )
     require_run_memory(scene, len(arm.joints))

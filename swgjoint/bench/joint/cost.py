@@ -268,7 +268,7 @@ def _costs(got: SettingOutcome, rigid: Stepper | None) -> dict[str, Any]:
 
 
 def _mark_pareto(rows: list[dict[str, Any]]) -> None:
-    """Nothing is at most as dear and at most as far off, quantity by quantity."""
+    """Whether a row is Pareto-optimal in cost and error, for every quantity."""
     for row in rows:
         if row["quantity"] == DAMPING:
             row["pareto"] = None

@@ -1,4 +1,4 @@
-"""Time of the plane simulation of meshing over teeth, mesh, torque and positions."""
+"""Run time of the 2D simulation of meshing over teeth, mesh, torque and positions."""
 
 from __future__ import annotations
 

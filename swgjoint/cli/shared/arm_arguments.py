@@ -94,7 +94,7 @@ def scene_of(args: argparse.Namespace, changes: list[str]) -> tuple[Scene, Any]:
 
 
 def choice_lines(choice: dict[str, Any]) -> list[str]:
-    """Drives that nobody has asked for, what decided, and where none is enough."""
+    """Drives chosen by default, what decided, and where no drive is strong enough."""
     rows = [
         (
             joint,

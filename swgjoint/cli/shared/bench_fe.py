@@ -58,7 +58,7 @@ def report(result: dict[str, Any]) -> str:
         if row["value"] is None:
             text.append(f"{row['model']}, {row['setting']}: {row['outcome']}")
     text += ["", _cheapest(result["cheapest"], "cheapest within")]
-    text += ["", _cheapest(result["cheapest_in_the_plane"], "in the plane alone")]
+    text += ["", _cheapest(result["cheapest_in_the_plane"], "2D models only")]
     if result["stored"] is not None:
         text.append(_stored(result["stored"]))
     text += [f"wrote {name}" for name in result["files"]]

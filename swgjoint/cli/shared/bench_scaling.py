@@ -20,7 +20,7 @@ def report(result: dict[str, Any]) -> str:
         )
         for row in result["rows"]
     ]
-    header = ("", "size", "core seconds", "per", "steps/s", "outcome")
+    header = ("", "size", "CPU seconds", "per", "steps/s", "outcome")
     fits = [
         f"{fit['sweep']}: a {fit['per']} takes time ~ size^{fit['exponent']:.2f} from"
         f" {fit['from_size']:g} on (within a factor {fit['spread']:.2f})"

@@ -37,7 +37,7 @@ STRESS_POSITIONS = 6
 """Over one pitch of the fixed member, after which the pattern repeats."""
 SORTABLE = (*UPPER, *LOWER)
 SLOW = "fatigue_safety_factor"
-"""Computed only where a spec or the order asks for it: minutes in space."""
+"""Computed only if a spec or the sorting needs it: the 3D model takes minutes."""
 STIFFNESS = "K1_Nm_rad"
 UNYIELDING = ("rigid", "kinematic")
 """Levels without compliance: they have no stiffness that could be compared."""

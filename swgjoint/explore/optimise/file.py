@@ -104,9 +104,9 @@ class OptimisationFile(AskedFile):
         confirm = self.confirm
         if confirm is not None and self.meshing is None:
             if confirm.positions is not None:
-                faults.append(("confirm.positions", "read by nobody without meshing"))
+                faults.append(("confirm.positions", "unused without meshing"))
             if confirm.model is not None and self.spec is None and self.run is None:
-                faults.append(("confirm.model", "read by nobody but meshing and maps"))
+                faults.append(("confirm.model", "used only by meshing and maps"))
         varied = {key for p in self.plan.parameters for key in p.keys}
         if confirm is not None and confirm.refinement and REFINEMENT in varied:
             told = f"{REFINEMENT} is a parameter; accepted: one of the two"

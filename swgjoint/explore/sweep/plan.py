@@ -38,7 +38,7 @@ class Parameter(Section):
             raise Fault(("values", "accepted: values, or low and high, not both"))
         if self.values is not None:
             if self.count is not None:
-                raise Fault(("count", "read by nobody beside values"))
+                raise Fault(("count", "unused together with values"))
             faults = [
                 (
                     f"values[{k}]",
@@ -92,7 +92,7 @@ class Grid(Section):
 
 
 class LatinHypercube(Section):
-    """One value in each of equally likely parts of every parameter, strewn."""
+    """One random value in each of the equally probable parts of every parameter."""
 
     kind: Literal["latin_hypercube"] = "latin_hypercube"
     designs: Count
@@ -152,12 +152,12 @@ def plan_faults(plan: AnyPlan, kinds: tuple[str, ...]) -> list[tuple[str, str]]:
         if isinstance(plan, List) and ranged:
             faults.append((f"{where}.values", "missing; accepted: a list"))
         if isinstance(plan, Grid) and ranged and parameter.count is None:
-            faults.append((f"{where}.count", "missing; accepted: a whole number >= 2"))
+            faults.append((f"{where}.count", "missing; accepted: an integer >= 2"))
         if (
             isinstance(plan, LatinHypercube | SearchPlan)
             and parameter.count is not None
         ):
-            faults.append((f"{where}.count", "read by nobody; see plan.designs"))
+            faults.append((f"{where}.count", "unused; see plan.designs"))
         if ranged and BASE in parameter.keys:
             faults.append((f"{where}.values", "missing; accepted: names of designs"))
     lengths = [len(p.values) for p in plan.parameters if p.values is not None]

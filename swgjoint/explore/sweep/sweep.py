@@ -1,4 +1,4 @@
-"""Sweeps: many designs computed, kept one by one, and gone on with."""
+"""Sweeps over many designs: each result is kept, and a sweep can be resumed."""
 
 from __future__ import annotations
 

@@ -149,7 +149,7 @@ def task_faults(file: AskedFile) -> list[tuple[str, str]]:
     faults += [("figures", f"{name!r} asked for more than once") for name in twice]
     if file.run is not None and file.design is None:
         faults += [
-            (f"run.{key}", "read by nobody without a design")
+            (f"run.{key}", "unused without a design")
             for key in ("model", "angles")
             if getattr(file.run, key) is not None
         ]

@@ -1,4 +1,4 @@
-"""Following equilibria in torque and input angle, in the plane and in space."""
+"""Continuation of equilibria in torque and input angle, for 2D and 3D models."""
 
 from __future__ import annotations
 

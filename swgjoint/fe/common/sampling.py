@@ -35,11 +35,11 @@ contact events leave corners in the error, which some wave generators pass in a 
 torques and others at every angle."""
 MOST_ANGLES = 96
 SOLVES = 1050
-"""Equilibria of a map in the plane at most; ellipses take a half."""
+"""Largest number of equilibria of a 2D map; an ellipse takes half of it."""
 UNSEEN = (16, 7)
 """Torques of one sign and angles of each that judge the map."""
 SOLID_ANGLES = 16
-"""The same in space, where an equilibrium takes fifty times longer."""
+"""The same for a 3D map, whose equilibria take fifty times longer."""
 SOLID_MOST_ANGLES = 16
 SOLID_SOLVES = 220
 SOLID_UNSEEN = (2, 2)
@@ -122,7 +122,7 @@ def sample_map(
         "keep": keep,
     }
     try:
-        # two calls: states in the plane and in space differ
+        # two calls, because states of 2D and 3D models have different types
         found: Pattern[Any]
         if model == "3d":
             solid = _in_space(design)
@@ -259,7 +259,7 @@ def effort_of(
 
 
 def follower_in_plane(design: Design) -> Continuation:
-    """The drive in the plane as maps sample it, its teeth perfect."""
+    """The 2D drive with perfect teeth, as maps sample it."""
     perfect, bearing = without_errors(design), maps_bearing(design)
     return Continuation(
         model=ring_model(
@@ -285,7 +285,7 @@ def _in_space(design: Design) -> SolidContinuation:
 
 
 def maps_bearing(design: Design) -> bool:
-    """Whether a map of the plane carries the bearing of the wave generator.
+    """Whether a 2D map models the bearing of the wave generator.
 
     Errors are superposed on a rigid wave generator: a map with them is of that drive.
     """

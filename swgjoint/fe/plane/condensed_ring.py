@@ -1,4 +1,4 @@
-"""The drive in the plane linearised at an equilibrium, in its contacts alone."""
+"""The 2D drive linearised at an equilibrium and condensed to its contacts."""
 
 from __future__ import annotations
 

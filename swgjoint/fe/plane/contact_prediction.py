@@ -1,4 +1,4 @@
-"""Changes of contact that an equilibrium of the drive in the plane predicts."""
+"""Changes of contact that an equilibrium of the 2D drive predicts."""
 
 from __future__ import annotations
 

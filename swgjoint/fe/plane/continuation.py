@@ -1,4 +1,4 @@
-"""Following equilibria in the plane, in any layout."""
+"""Continuation of equilibria of the 2D model, in any layout."""
 
 from __future__ import annotations
 

@@ -169,7 +169,7 @@ def ratcheting_path(
 
 
 def path_follower(design: Design) -> Continuation:
-    """The drive in the plane, perfect and smooth, far from its map's torques."""
+    """The 2D drive, perfect and smooth, far from its map's torques."""
     perfect = without_errors(design)
     small = TOLERANCE * lobe_height(design)
     solver = NewtonSolver(

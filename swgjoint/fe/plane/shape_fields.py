@@ -112,7 +112,7 @@ def plane_surface(model: RingModel) -> ShapeSurface:
 
 
 def plane_fields(model: RingModel, state: State, surface: ShapeSurface) -> SectorFields:
-    """An equilibrium in the plane."""
+    """An equilibrium of the 2D model."""
     element, frames = model.element, model.frames(state)
     size = len(element.displacement_from_skeleton)
     u = frames.displacement @ element.displacement_from_skeleton.reshape(2 * size, -1).T
@@ -137,7 +137,7 @@ def plane_fields(model: RingModel, state: State, surface: ShapeSurface) -> Secto
 
 
 def _flat(values: Array) -> Array:
-    """Vectors of the plane as ones in space."""
+    """Plane vectors as 3D vectors."""
     return np.concatenate([values, np.zeros((*values.shape[:-1], 1))], axis=-1)
 
 

@@ -14,7 +14,7 @@ from swgjoint.typing import Array, Mask
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class StateFigures:
-    """What an equilibrium tells in the plane as in space."""
+    """Results that equilibria of 2D and 3D models share."""
 
     wave_generator_angle: float = 0.0
     """In the frame of the solver [rad]."""

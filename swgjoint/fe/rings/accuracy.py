@@ -44,7 +44,7 @@ def transmission_error(
 
 
 def output_turn_angles(design: Design, count: int, seed: int = 0) -> Array:
-    """Input angles strewn over one output turn, one in every equal part (n,) [rad].
+    """Random input angles over one output turn, one in every equal part (n,) [rad].
 
     Strewn, so that no order of tooth, ball or turn is met in step.
     """

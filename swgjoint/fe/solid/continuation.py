@@ -1,4 +1,4 @@
-"""Following equilibria in space."""
+"""Continuation of equilibria of the 3D model."""
 
 from __future__ import annotations
 

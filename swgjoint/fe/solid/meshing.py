@@ -1,4 +1,4 @@
-"""Simulation of meshing in space: deflect, engage, load, turn (thesis chapter 7)."""
+"""3D simulation of meshing: deflect, engage, load, turn (thesis chapter 7)."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class SolidSetup:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SolidStep(Position):
-    """Results at one position in space."""
+    """Results of the 3D model at one position."""
 
     stress: SolidMaxima | None = None
     state: SolidState | None = None
@@ -51,7 +51,7 @@ class SolidStep(Position):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SolidRun(Positions):
-    """A simulation of meshing in space."""
+    """A 3D simulation of meshing."""
 
     design: Design
     model: SolidRing

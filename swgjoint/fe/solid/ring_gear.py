@@ -1,4 +1,4 @@
-"""The elastic circular spline in space: linear, its outside fixed."""
+"""The elastic circular spline in 3D: linear, with its outer surface fixed."""
 
 from __future__ import annotations
 

@@ -41,7 +41,7 @@ def solid_surface(ring: SolidRing) -> ShapeSurface:
 def solid_fields(
     ring: SolidRing, state: SolidState, surface: ShapeSurface
 ) -> SectorFields:
-    """An equilibrium in space."""
+    """An equilibrium of the 3D model."""
     loads, frames = ring.loads(state), ring.frames(state)
     # from where the teeth stood, undeformed and turned with the flexspline
     stood = about_z(np.array(state.rotation)) @ ring.place

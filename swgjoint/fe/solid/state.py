@@ -1,4 +1,4 @@
-"""One equilibrium of the drive in space."""
+"""One equilibrium of the 3D drive."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stress recovery at the nodes of all sectors, in space."""
+"""Stress recovery at the nodes of all sectors of the 3D model."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How the gap of every tooth acts on the output of the drive in space.
+"""How the gap of every tooth acts on the output of the 3D drive.
 
 Tooth contacts may open and close anywhere over the face width; which bore nodes touch
 the wave generator stays as in the perfect drive.

@@ -1,4 +1,4 @@
-"""How the gap of every tooth acts on the output of the drive in the plane."""
+"""How the gap of every tooth acts on the output of the 2D drive."""
 
 from __future__ import annotations
 

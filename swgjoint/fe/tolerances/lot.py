@@ -45,7 +45,7 @@ class Lot:
     """n drives at P input angles; NaN where there is no equilibrium."""
 
     input_angle: Array
-    """theta, strewn over one output turn (P,) [rad]."""
+    """Random input angles theta over one output turn (P,) [rad]."""
     unloaded: Array
     """Kinematic error, psi - theta/i without torque (n, P) [rad]."""
     loaded: Array

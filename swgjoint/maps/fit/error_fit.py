@@ -76,7 +76,7 @@ def fit_error(
     i = signed_ratio(layout, teeth_flexspline, teeth_circular_spline)
     wanted = np.array([pq for pq in orders if tuple(pq) != (0, 0)], dtype=np.int64)
     if wanted.ndim != 2 or wanted.shape[1] != 2:
-        raise InputError(f"orders {orders!r}; accepted: pairs (p, q) of whole numbers")
+        raise InputError(f"orders {orders!r}; accepted: pairs (p, q) of integers")
     n = wanted @ np.array(angle_coefficients(layout), dtype=np.int64)
     per_turn = np.abs(n[:, 0] * i + n[:, 1])
     fits = per_turn * _PER_WAVE <= output.size / (span / (2.0 * np.pi))

@@ -346,7 +346,7 @@ def _known_share(table: Mapping[str, Any], key: str, where: str) -> float | None
 
 def _text(value: Any) -> str:
     if not isinstance(value, str):
-        raise _Fault(f".reason is {_short(value)}; accepted: a text")
+        raise _Fault(f".reason is {_short(value)}; accepted: a string")
     return " ".join(value.split())[:400]
 
 

@@ -32,7 +32,7 @@ def peaks(theta: Array, error: Array, design: Design) -> tuple[float, float]:
     rest, so of it the rms is told.
 
     Args:
-        theta: Input angles, strewn over an output turn (n,) [rad].
+        theta: Random input angles over one output turn [rad]. Shape (n,).
         error: There (n,) [rad].
         design: The drive.
     """

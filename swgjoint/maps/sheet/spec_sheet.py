@@ -55,9 +55,9 @@ TURN_KEYS = (
 """From one output turn."""
 _NO_FRICTION = "the map has no friction of bearing, seals and teeth at speed"
 SOLID_KEYS = ("fatigue_safety_factor", "radial_stiffness_N_mm")
-"""From the finite elements of a design in space, of which a map knows nothing."""
+"""Figures of the 3D finite elements of a design, which no map contains."""
 RATCHETING_KEY = "ratcheting_torque_Nm"
-"""From the finite elements of a design in the plane."""
+"""Figure of the 2D finite elements of a design."""
 SLOW_KEYS = ("no_load_running_torque_Nm", "starting_torque_Nm")
 """From the friction of teeth and race of a design that turns slowly."""
 ABSENT_KEYS = {

@@ -233,7 +233,7 @@ def _keyframes(model: mujoco.MjModel) -> dict[str, dict[str, float]]:
 def _tell_held(
     held: dict[str, str], reading: ArmReading, path: Path, *, moves: bool
 ) -> None:
-    """One line about joints that nobody asked to hold."""
+    """One line about joints that are held although the user did not ask for it."""
     told = {name: why for name, why in held.items() if why != NOT_CHOSEN}
     if not told or not moves:
         return
@@ -336,7 +336,7 @@ def _mesh_file(reference: str, folder: Path, meshdir: str) -> Path | None:
 
 
 def _places(reference: str, folder: Path, meshdir: str) -> Iterable[Path]:
-    """Where a mesh may lie, the likeliest first."""
+    """Paths at which a mesh may be found, the most likely one first."""
     scheme, colon, rest = reference.partition("://")
     if not colon:
         return [folder / meshdir / reference, folder / reference]

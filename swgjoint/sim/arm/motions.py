@@ -1,4 +1,4 @@
-"""Motions for an arm that nobody has written a scene for, gentle ones."""
+"""Gentle default motions for an arm without a scene."""
 
 from __future__ import annotations
 

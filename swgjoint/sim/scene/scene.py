@@ -125,7 +125,7 @@ class Scene(Section):
             faults.append(
                 (
                     "sensors.link",
-                    "read by nobody; accepted: with controller.feedback = 'link'",
+                    "unused; accepted: with controller.feedback = 'link'",
                 )
             )
         faults += [

@@ -109,7 +109,7 @@ class CatalogueFile(Section):
         return None
 
     def coned_design(self, ratio: int, *, straight: bool) -> Design:
-        """A design in space; straight: without relief along the face width."""
+        """Design for the 3D model; straight: without relief along the face width."""
         own = self.coning
         variant = next(v for v in self.variants if v.name == own.variant)
         design = variant_design(own.size, ratio, variant)

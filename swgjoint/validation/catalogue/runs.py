@@ -128,7 +128,7 @@ def _individual(task: CatalogueTask) -> Found:
 
 
 def _accuracy(task: CatalogueTask) -> Found:
-    """Error of the rings over one output turn, hardly loaded."""
+    """Kinematic error of the rings over one output turn at almost no load."""
     from swgjoint.fe.rings.accuracy import output_turn_angles, transmission_error
 
     angles = output_turn_angles(task.design, ANGLES)

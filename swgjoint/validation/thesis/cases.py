@@ -96,7 +96,7 @@ class GroupEntry(Section):
                     (f"cases[{k}].value", "accepted: exactly where the group has keys")
                 )
             if case.name is None and case.value is None:
-                faults.append((f"cases[{k}].name", "missing; accepted: a text"))
+                faults.append((f"cases[{k}].name", "missing; accepted: a string"))
         given = [value for value in values if value is not None]
         if any(b <= a for a, b in pairwise(given)):
             faults.append(("cases", "accepted: values in increasing order"))
@@ -169,7 +169,7 @@ class StudyFile(Section):
 
     @property
     def by_tenth(self) -> bool:
-        """Whether rows are judged at T/10: in the plane only, in space at T."""
+        """Whether rows are judged at T/10: only those of the 2D model."""
         return self.model == "2d"
 
     def chosen(self, only: tuple[str, ...]) -> tuple[GroupEntry, ...]:

@@ -1,4 +1,4 @@
-"""The ladder of controllers as a text table and a picture."""
+"""Comparison of the baseline controllers as a text table and a picture."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pictures of a simulation of meshing in space: contact patterns and sections."""
+"""Pictures of a 3D simulation of meshing: contact patterns and sections."""
 
 from __future__ import annotations
 

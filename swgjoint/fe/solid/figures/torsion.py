@@ -1,4 +1,4 @@
-"""Torsion of the drive in space under torque, the wave generator locked."""
+"""Torsion of the 3D drive under torque with the wave generator locked."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Mesh of one tooth sector of a member in space: a strip of segments along the axis.
+"""3D mesh of one tooth sector of a member: a strip of segments along the axis.
 
 z runs from the open end to the closed one, 0 in the middle of the face width. The
 flexspline's strip has the teeth, three lengths of cylinder, the fillet and two lengths
