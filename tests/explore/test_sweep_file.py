@@ -331,7 +331,7 @@ def test_all_faults_are_listed_at_once():
         (
             GRID + parameter(RIM, "low = 1\nhigh = 2"),
             HEAD,
-            ("plan.parameters[0].count", "whole", ">= 2"),
+            ("plan.parameters[0].count", "integer", ">= 2"),
         ),
         (
             LIST + parameter(RIM, "values=[1]") + parameter(MODULE, "values=[1, 2]"),

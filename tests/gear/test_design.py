@@ -192,7 +192,7 @@ def test_all_faults_at_once(reference):
             "'table'",
         ),
         ("drive.module_mm", "'1'", "> 0 mm", "<= 50 mm"),
-        ("drive.teeth_flexspline", "120.5", "whole", ">= 40", "<= 400"),
+        ("drive.teeth_flexspline", "120.5", "integer", ">= 40", "<= 400"),
         ("circular_spline.profile.tip_radius_mm", "-1 mm", "> 0 mm", "<= 10000 mm"),
         ("drive.face_width_mm", "true", "> 0 mm", "<= 10000 mm"),
         ("material.poisson_ratio", "0.5", ">= 0", "< 0.5"),
