@@ -380,7 +380,7 @@ def test_wrong_headers(synthetic_map, tmp_path):
         },
         ("header", "layout"): {k: v for k, v in header.items() if k != "layout"},
         ("header", "code", "damping_ratio", "versions"): {**header, "code": "x"},
-        ("header", "teeth_flexspline", "120.5", "whole"): {
+        ("header", "teeth_flexspline", "120.5", "integer"): {
             **header,
             "teeth_flexspline": 120.5,
         },
@@ -497,7 +497,7 @@ _RUBS = {
         ),
         ({"viscous_Nms_rad": 1e99}, ("friction", "viscous", "1e+99 N·m·s/rad", ">= 0")),
         ({"load": "much"}, ("header", "friction.load", "'much'", "number")),
-        ({"source": 1.0}, ("header", "friction.source", "1", "text")),
+        ({"source": 1.0}, ("header", "friction.source", "1", "string")),
         ({"more": 1.0}, ("header", "friction.more", *_RUBS)),
         ({"bending_Nm": None}, ("header", "friction.bending_Nm", "number", "N·m")),
     ],
