@@ -12,7 +12,7 @@ INTERPRETER = 0.25e9
 
 
 def available_memory() -> float | None:
-    """Free memory of this machine or container [B]; None where it cannot be told."""
+    """Free memory of this machine or container [B]; None if it is unknown."""
     found = []
     try:
         for line in Path("/proc/meminfo").read_text().splitlines():

@@ -88,7 +88,7 @@ def _front(k: int) -> str:
 
 
 def report(result: dict[str, Any]) -> str:
-    """The start and the designs beside it, the front, what was tried."""
+    """The start and the compared designs, the Pareto front, and all designs tried."""
     names, figures = result["parameters"], result["figures"]
     rivals = [result["start"], *result["beside"]]
     header = ("", *short_headers(names), *short_headers(figures))

@@ -58,7 +58,7 @@ RIDGE = 1e-2
 
 
 class LearningCompensation:
-    """Another controller, and learned motions of the link beside its command."""
+    """A controller whose command is extended by a learned motion of the link."""
 
     def __init__(
         self,

@@ -1,4 +1,4 @@
-"""Constant speed under load: a torque beside the motor's loop removes the ripple."""
+"""Constant speed under load: a torque added to the motor loop removes the ripple."""
 
 from __future__ import annotations
 

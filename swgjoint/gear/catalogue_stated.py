@@ -93,7 +93,7 @@ def stiffness_of(size: int, ratio: int) -> dict[str, float]:
 
 
 def stated_figures(row: CatalogueRow) -> dict[str, float | None]:
-    """What the tables state of one drive beside stiffness and ratings; None if not.
+    """What the tables state of one drive besides stiffness and ratings; else None.
 
     A ratio class holds from its own ratio up to the next class of the series. The
     torques of ratcheting and buckling and the inertia are those of CSG, the losses

@@ -60,7 +60,7 @@ WINDOW = 0.005
 ORDERS: tuple[tuple[int, int], ...] = ((1, 0), (2, 0), (4, 0), (0, 2), (0, 4), (1, -1))
 """(p, q) of p alpha + q beta that a log over a whole output turn is searched for."""
 ORDERS_OF_PART: tuple[tuple[int, int], ...] = ((1, 0), (2, 0), (4, 0))
-"""The same for less than a turn: the angles of both members cannot be told apart."""
+"""The same for less than one turn, where both gear angles look alike."""
 DEVIATIONS = 1.96
 """Half width of an interval in standard deviations: 95 % of a normal distribution."""
 _TURN = 0.95  # of an output turn

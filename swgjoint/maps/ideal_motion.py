@@ -1,4 +1,4 @@
-r"""A map beside its ideal motion: cheap torques of many positions and harmonics.
+r"""A map near its ideal motion: cheap torques for many positions and harmonics.
 
 The output stays within a milliradian of theta/i, over which the phases of the harmonics
 hardly move: to second order in that distance s, at each theta,

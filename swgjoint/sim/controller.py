@@ -1,4 +1,4 @@
-"""What a sampled controller is told before a motion and reads during it.
+"""What a sampled controller receives before a motion and measures during it.
 
 Arrays end with the joints; axes in front of them are motions that run side by side, so
 that one controller drives a single joint, an arm or a batch of either.

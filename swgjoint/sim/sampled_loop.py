@@ -166,7 +166,7 @@ class SampledLoop:
 
 
 class GivenLoop:
-    """A controller from outside, told the task and given what the sensors read."""
+    """A user's controller, which receives the task and the sensor readings."""
 
     def __init__(self, assembly: Assembly, controller: Controller, task: Task) -> None:
         """Start the controller on the task of the scene."""

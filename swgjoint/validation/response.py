@@ -1,6 +1,6 @@
 """``swgjoint study response``: two-mass frequency response of a joint.
 
-At level ``linear`` resonance and anti-resonance stand beside their closed forms. At
+At level ``linear`` resonance and anti-resonance are compared with closed forms. At
 ``full`` the same chirp at rising torque shows what an amplitude-dependent stiffness,
 and hysteresis where the map has it, make of the one resonance.
 """

@@ -137,7 +137,7 @@ def _scaling() -> list[Row]:
 
 
 def _rows(case: RingCase) -> list[Row]:
-    """Deflections of one ring, thin-ring theory beside them."""
+    """Deflections of one ring, and those of thin-ring theory."""
     first, fine = REFINEMENTS[0], REFINEMENTS[-1]
     small = -float(small_deflection(pi / 4))
 

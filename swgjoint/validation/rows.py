@@ -1,4 +1,4 @@
-"""What every study returns: rows that set our values beside those of a source."""
+"""Rows that every study returns: our values compared with those of a source."""
 
 from __future__ import annotations
 

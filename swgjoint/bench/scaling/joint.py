@@ -130,7 +130,7 @@ def chain(joints: float) -> dict[str, Any]:
 
 
 def batch(arms: float) -> dict[str, Any]:
-    """A step of all arms of a batch on one thread; wall time of two beside it."""
+    """Time of one step of all arms of a batch on one thread, and wall time on two."""
     from mujoco.batch import Batch
 
     n = int(arms)

@@ -45,7 +45,7 @@ UNYIELDING = ("rigid", "kinematic")
 
 @dataclass(frozen=True, kw_only=True)
 class Compared:
-    """One argument in the scene; None where a figure cannot be told."""
+    """One argument in the scene; None for a figure that is unknown."""
 
     argument: str
     design: str

@@ -19,7 +19,7 @@ class Candidate:
     """A design and what came of it."""
 
     values: Values
-    """Of the parameters by their column; the name of a design held beside."""
+    """Values of the parameters by column, or the name of a compared design."""
     design: Design | None
     """None where the values make none."""
     record: Record

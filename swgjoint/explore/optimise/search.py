@@ -1,4 +1,4 @@
-"""Generations of a search: values that are drawn, and what the search is told."""
+"""Generations of a search: the values drawn, and the results reported back."""
 
 from __future__ import annotations
 

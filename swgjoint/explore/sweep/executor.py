@@ -66,7 +66,7 @@ class DaskPool:
                 suspects.append(task)
             else:
                 yield task, found
-        # one by one: what waited beside a task that kills its worker is not lost
+        # one by one, so that a task that kills its worker takes no other task with it
         yield from self._run_at(lambda: 1, function, iter(suspects))
 
     def _run_at(

@@ -247,7 +247,7 @@ def _map(
 def _spec(
     design: Design, task: SpecTask
 ) -> tuple[dict[str, float | None], dict[str, str]]:
-    """Figures of the specification sheet, and why some of them cannot be told."""
+    """Figures of the spec sheet, and the reasons for missing ones."""
     from swgjoint.gear.catalogue import ratings_of
     from swgjoint.maps.sheet.spec_sheet import (
         check_keys,

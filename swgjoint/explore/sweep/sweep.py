@@ -18,7 +18,7 @@ from swgjoint.pool import Executor, Lost
 from swgjoint.progress import Progress, silent
 
 TASK_S = 2.0
-"""Work of a task: long beside the handing over, short beside what a death loses."""
+"""Work of a task [s]: long compared with its overhead, short enough to lose."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -62,7 +62,7 @@ def tune(
     resume: bool = False,
     progress: Progress = silent,
 ) -> Tuned:
-    """Tune a controller, and plain PD beside it.
+    """Tune a controller, and a plain PD controller for comparison.
 
     Args:
         settings: What, and how long. With ``evaluations`` the same settings give the

@@ -56,7 +56,7 @@ class AngleColumn(Generic[AnyState]):
 
 @dataclass(kw_only=True, eq=False)
 class SolvedColumns(Generic[AnyState]):
-    """Columns of equilibria, solved one beside the other and kept.
+    """Columns of equilibria at neighbouring angles, solved in turn and kept.
 
     Angles are numbers on the finest grid of the pitch. All solves come in an order that
     the results alone decide: an interrupted run repeats it and reads what it has.

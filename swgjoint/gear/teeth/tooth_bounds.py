@@ -16,7 +16,7 @@ MEMBER_KEYS = {
     "thickness_coefficient": 1.5,
     "pressure_angle_deg": 59.0,
 }
-"""Keys beside the profile that shape a tooth, and the largest value tried."""
+"""Keys besides the profile that shape a tooth, and the largest value tried."""
 SHOWN = 2
 
 

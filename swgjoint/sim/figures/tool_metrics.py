@@ -28,7 +28,7 @@ PATH_POINTS = 50
 ON_PLANE = 1e-9
 """Distance from its plane within which a crossing is found [m]."""
 REST = 16
-"""Samples of rest from which on settling can be told."""
+"""Least number of samples at rest from which settling is determined."""
 
 
 def pose_accuracy(attained: Array, commanded: Array) -> float:

@@ -1,7 +1,7 @@
 """``swgjoint study articles``: three articles on flexsplines, computed again.
 
 Parts: ``deflection`` of the 80:1 drive, ``force`` that deforms XB1-100-80, ``stress``
-and ``fatigue`` of a cup. Closed forms as printed stand beside finite elements in space;
+and ``fatigue`` of a cup. The printed closed forms are compared with 3D finite elements;
 ``converged`` is the same on a finer mesh, where computed: twice the elements of the
 thesis per direction for small deflections, those of the thesis instead of 0.6 of them
 where a wave generator is in contact.

@@ -1,4 +1,4 @@
-"""Rows of the study of the articles: printed values beside ours, with reasons."""
+"""Rows of the study of the articles: printed values, ours, and reasons."""
 
 from __future__ import annotations
 

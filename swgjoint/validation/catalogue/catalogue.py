@@ -1,4 +1,4 @@
-"""``swgjoint study catalogue``: the family of drives beside a catalogue.
+"""``swgjoint study catalogue``: the drive family compared with a catalogue.
 
 Parts: ``stiffness`` (K1, K2, K3, hysteresis loss and lost motion by the thin rings
 with the bearing of the wave generator, and the share of each mechanism),

@@ -51,7 +51,7 @@ def coning_tasks(study: CatalogueFile) -> list[CatalogueTask]:
 
 
 def coning_summary(study: CatalogueFile, found: Mapping[str, Found]) -> dict[str, Any]:
-    """K1, K2, K3 by case beside the catalogue, and where the teeth press."""
+    """K1, K2, K3 of each case over the catalogue, and where the teeth press."""
     rows, lines = [], []
     for ratio in study.coning.ratios:
         row = catalogue_row(study.coning.size, ratio)

@@ -1,4 +1,4 @@
-"""No-load running torque and starting torque beside the catalogue's.
+"""No-load running torque and starting torque compared with the catalogue.
 
 Only sliding teeth and the rim on its race are in ours; the catalogue's has grease,
 seals and the rolling of balls besides, so ours is a lower bound. Whether it is one, the

@@ -117,7 +117,7 @@ def bracket_row(
     above: Sequence[float] = (),
     conditions: str | None = None,
 ) -> Row:
-    """Middle of the bracket beside the catalogue.
+    """Middle of the bracket compared with the catalogue.
 
     Args:
         row: The catalogue's.

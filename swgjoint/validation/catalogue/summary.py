@@ -67,7 +67,7 @@ def _part(value: float) -> str:
 
 
 def _rising(rows: Sequence[Row]) -> list[str]:
-    """In how many cases K1 < K2 < K3 fails, and in how many it cannot be told."""
+    """Numbers of cases in which K1 < K2 < K3 fails, or is unknown."""
     cases: dict[str, list[float]] = {}
     for row in rows:
         if row.quantity in STIFFNESS:

@@ -78,7 +78,7 @@ class RunRecord:
     average: Mapping[str, NUMBER] = field(default_factory=dict)
     """Mean over the positions of the largest nodal stress."""
     away: Mapping[str, NUMBER] = field(default_factory=dict)
-    """The same without the nodes beside loaded tooth contacts."""
+    """The same without the nodes next to loaded tooth contacts."""
     last: Mapping[str, NUMBER] = field(default_factory=dict)
     """Largest nodal stress at the last position."""
     places: Mapping[str, Mapping[str, int]] = field(default_factory=dict)
@@ -136,7 +136,7 @@ def _plane(run: Any) -> list[_Largest | None]:
 
 
 def _solid(run: Any) -> list[_Largest | None]:
-    """The same in space, where nodes beside contacts are not told from others."""
+    """The same for the 3D model, which does not mark nodes next to contacts."""
     rows: list[_Largest | None] = []
     for step in run.steps:
         if step.stress is None:

@@ -44,7 +44,7 @@ class StressPlaces:
         return place
 
     def near_contact(self, state: State) -> NDArray[np.bool_]:
-        """Nodes beside a tooth contact that carries force. Shape (N, n_nodes)."""
+        """Nodes next to a loaded tooth contact. Shape (N, n_nodes)."""
         element = self.model.element
         points = element.mesh.mesh.p.T
         near = np.zeros((self.model.sectors, len(points)), dtype=bool)

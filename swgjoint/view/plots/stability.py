@@ -92,7 +92,7 @@ def _parts(axis: Any, rows: Sequence[StabilityRow]) -> None:
 
 
 def _damping(axis: Any, rows: Sequence[StabilityRow]) -> None:
-    """Damping ratio that the steps give, beside that of the drives."""
+    """Numerical damping ratio of the steps, and damping ratio of the drives."""
     for scheme, colour in _SCHEMES.items():
         if scheme == "discrete, never cut":
             continue

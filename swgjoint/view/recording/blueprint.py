@@ -1,4 +1,4 @@
-"""Default layout of a recording: the arm beside plots of one joint per tab."""
+"""Default layout of a recording: the arm, and tabs with plots of one joint each."""
 
 from __future__ import annotations
 

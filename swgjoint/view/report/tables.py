@@ -274,7 +274,7 @@ def _joint_table(runs: Mapping[str, Run], joint: str) -> Table:
 
 
 def sheet_table(drive: DriveMap) -> dict[str, Any]:
-    """Spec sheet of one drive, beside what its maker states."""
+    """Spec sheet of one drive, compared with the values that its maker states."""
     sheet = measure_spec(drive)
     stated = drive.info.get("stated")
     stated = stated if isinstance(stated, Mapping) else {}
