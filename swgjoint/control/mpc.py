@@ -263,7 +263,7 @@ def _times(matrices: Array, vectors: Array) -> Array:
 
 
 def _stiffness(drive: DriveMap, theta: Array, psi: Array) -> Array:
-    """Of the map along a plan [N·m/rad]."""
+    """Stiffness of the map along a plan [N·m/rad]."""
     found = drive.stiffness(drive.torsion(theta, psi), theta, psi)
     return np.maximum(found, 1e-3 * drive.mean_stiffness)  # clearance has none
 

@@ -79,7 +79,7 @@ class PredictionMatrices:
     reads: Array
     """Readings from the state (n_readings, 6)."""
     gain: Array
-    """Of the Kalman filter (6, n_readings)."""
+    """Gain of the Kalman filter (6, n_readings)."""
     target: Array
     """Set-point of (x1, x2, rates) from the disturbances (4, 2)."""
     steady: Array

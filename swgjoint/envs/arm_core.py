@@ -169,7 +169,7 @@ class ArmCore(Core):
         )
 
     def entries(self) -> tuple[tuple[Entry, ...], tuple[Entry, ...]]:
-        """Of observation and action."""
+        """Entries of observation and action."""
         n, limits, s = len(self.joints.names), self.limits, self.settings
         reach = np.abs(limits.centre) + limits.angle
         ratio = np.abs(self.joints.ratio)

@@ -106,7 +106,7 @@ class BenchSettings:
 
     @property
     def link_inertia(self) -> float:
-        """Of load and payload about the joint, nominal [kg·m²]."""
+        """Link inertia of load and payload about the joint, nominal [kg·m²]."""
         return self.load_inertia_kgm2 + self.payload_kg * REACH**2
 
 

@@ -67,7 +67,7 @@ def table(entries: Sequence[Entry]) -> str:
 
 
 def bounds(entries: Sequence[Entry]) -> tuple[Array, Array]:
-    """Of every number, low and high."""
+    """Bounds of every number, low and high."""
     low, high = np.array([(e.low, e.high) for e in entries for _ in range(e.count)]).T
     return low, high
 
@@ -105,7 +105,7 @@ class EpisodeLimits:
     """What ends an episode; arrays of shape (n_joints,)."""
 
     angle: Array
-    """Of the links about ``centre`` [rad]."""
+    """Angle of the links about ``centre`` [rad]."""
     centre: Array
     """[rad]."""
     motor_speed: Array
@@ -115,7 +115,7 @@ class EpisodeLimits:
     ratcheting: Array
     """Torque at which teeth skip [N·m], inf where it is not known."""
     motor_torque: Array
-    """Of the motors, which hold it themselves [N·m]."""
+    """Torque of the motors, which hold it themselves [N·m]."""
 
 
 class Core(ABC):
@@ -175,14 +175,14 @@ class Core(ABC):
         self.motor_torque = np.zeros((count, n))
         """The last one [N·m]."""
         self.output_torque = np.zeros((count, n))
-        """Of the drives [N·m]."""
+        """Output torque of the drives [N·m]."""
         self._low, self._high = bounds(self.observation_entries)
 
     # -- what an environment adds ---------------------------------------------
 
     @abstractmethod
     def entries(self) -> tuple[tuple[Entry, ...], tuple[Entry, ...]]:
-        """Of observation and action."""
+        """Entries of observation and action."""
 
     @abstractmethod
     def draw(self, rng: np.random.Generator) -> Array:
@@ -213,7 +213,7 @@ class Core(ABC):
 
     @abstractmethod
     def reward(self) -> Array:
-        """Of the step that was taken. Shape (n,)."""
+        """Reward of the step that was taken. Shape (n,)."""
 
     @abstractmethod
     def vary_load(self, index: int, shares: Array) -> None:

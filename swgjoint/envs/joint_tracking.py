@@ -53,7 +53,7 @@ class TrackingSettings(BenchSettings):
 
     @property
     def max_acceleration(self) -> float:
-        """Of references [rad/s²]."""
+        """Largest acceleration of references [rad/s²]."""
         return self.max_speed_rad_s / SHORTEST
 
 
@@ -63,7 +63,7 @@ class TrackingCore(BenchCore):
     settings: TrackingSettings
 
     def entries(self) -> tuple[tuple[Entry, ...], tuple[Entry, ...]]:
-        """Of observation and action."""
+        """Entries of observation and action."""
         s, joint = self.settings, self.joint
         angle, speed = self.motor_entries()
         reach, bend = ceiling(s.max_angle_rad), ceiling(s.max_acceleration)

@@ -92,7 +92,7 @@ class RippleCore(BenchCore):
         self._first = round((RAMP + SETTLE) / s.period_s)
 
     def entries(self) -> tuple[tuple[Entry, ...], tuple[Entry, ...]]:
-        """Of observation and action."""
+        """Entries of observation and action."""
         s = self.settings
         angle, speed = self.motor_entries()
         rated = self.joint.drive.ratings.rated_torque

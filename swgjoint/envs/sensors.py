@@ -22,12 +22,12 @@ class Sensors:
     """
 
     motor_counts: int = 2**17
-    """Of the motor's encoder per turn; 0 reads the angle itself."""
+    """Counts of the motor's encoder per turn; 0 reads the angle itself."""
     motor_noise_rad: float = 2e-5
     """Standard deviation before the reading is rounded."""
     link_encoder: bool = False
     link_counts: int = 2**20
-    """Of the link's encoder per turn; 0 reads the angle itself."""
+    """Counts of the link's encoder per turn; 0 reads the angle itself."""
     link_noise_rad: float = arcsec
     torque_sensor: bool = False
     torque_noise_of_rated: float = 1e-3

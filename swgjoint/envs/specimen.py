@@ -63,9 +63,9 @@ class SpecimenTolerances:
 
     stiffness: float = 0.15
     kinematic_error: float = 0.5
-    """Of its amplitude."""
+    """Share of its amplitude."""
     losses: float = 0.3
-    """Of hysteresis and friction."""
+    """Share of hysteresis and friction."""
     load_inertia: float = 0.2
     phase: bool = True
     """Whether the angle functions begin anywhere in their cycle."""

@@ -31,7 +31,7 @@ class RimAcross:
     """What bends around and across, per metre of face width or of circumference."""
 
     radius: float
-    """Of the neutral line [m]."""
+    """Radius of the neutral line [m]."""
     bending: float
     """Around the axis, in plane stress [N m]: E I over the width."""
     stretching: float

@@ -64,7 +64,7 @@ class Model:
     skew: bool
     """Whether the link angles may be of other instants than the rest."""
     first_skew: float
-    """Of a straight line through the log [s]."""
+    """Skew of a straight line through the log [s]."""
     link_rate: Array
     """[rad/s]."""
     link_acceleration: Array
@@ -72,7 +72,7 @@ class Model:
     torsion: Array
     """theta/i - psi of the log [rad]."""
     mean_stiffness: float
-    """Of a straight line through the log [N·m/rad]."""
+    """Stiffness of a straight line through the log [N·m/rad]."""
     step: float
     """Window of the averages [s]."""
     motor_acceleration: Array
@@ -82,7 +82,7 @@ class Model:
     slipping: Array
     """s, direction in which the friction slips; 0 where it may stick."""
     cos: Array
-    """Of the phase of every harmonic, mean over a window. (n, n_harmonics)."""
+    """Cosine of the phase of every harmonic, mean over a window. (n, n_harmonics)."""
     sin: Array
 
     @classmethod

@@ -41,9 +41,9 @@ class FrictionStep:
     metric: float
     """Torque per change of the speed, over h [N·m/rad]."""
     offset: float
-    """Of the bristle alone, without a rotation [N·m]."""
+    """Torque of the bristle alone, without a rotation [N·m]."""
     rate: float
-    """Of the bristle alone, per rotation [N·m/rad]."""
+    """Torque of the bristle alone, per rotation [N·m/rad]."""
     predicted: float
     """Torque on the predicted step [N·m]."""
 

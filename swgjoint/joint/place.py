@@ -29,7 +29,7 @@ class DrivePlace:
     model: mujoco.MjModel
     """The model before any drive."""
     index: int
-    """Of the joint in it."""
+    """Index of the joint in it."""
     actuators: dict[int, Any]
     """Those that act on the joint, by their place in the model."""
     sensors: tuple[Any, ...]
@@ -39,7 +39,7 @@ class DrivePlace:
     axis: Array
     ref: float
     armature: float
-    """Of the joint and of the actuators on it [kg·m²]."""
+    """Armature of the joint and of the actuators on it [kg·m²]."""
     inertia: float
     """At qpos0, the other joints held, without armature [kg·m²]."""
     has_damping_ratio: bool

@@ -59,7 +59,7 @@ class TwinMotion:
     theta_rate: float
     psi_rate: float
     rotor_weight: float = 0.0
-    """Of the rotor's dof in the inverse mass matrix, see :mod:`.response`
+    """Weight of the rotor's dof in the inverse mass matrix, see :mod:`.response`
     [1/(kg·m²)]."""
     link_weight: float = 0.0
     rotor_acceleration: float = 0.0

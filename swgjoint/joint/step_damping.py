@@ -48,9 +48,9 @@ class StepMode:
     frequency: float
     """That results at the step [rad/s]."""
     own_damping_ratio: float
-    """Of the drive itself, without steps [-]."""
+    """Own damping ratio of the drive itself, without steps [-]."""
     own_frequency: float
-    """Of the drive itself [rad/s]."""
+    """Own frequency of the drive itself [rad/s]."""
 
 
 def left_share(stiffness_step: float) -> float:

@@ -51,7 +51,7 @@ class Variation:
     psi: float = 0.0
     """b, the same of the output [rad]."""
     losses: float = 0.0
-    """Of every torque of hysteresis and friction [-]; where they slip stays."""
+    """Share of every torque of hysteresis and friction [-]; where they slip stays."""
 
     def __post_init__(self) -> None:
         for key, value in zip(self.__dataclass_fields__, self.numbers, strict=True):

@@ -28,7 +28,7 @@ class WarpDrive:
     v_rotor: int
     v_link: int
     entry_rotor: int
-    """Of the rotor in the tendon's row of ``ten_J``."""
+    """Entry of the rotor in the tendon's row of ``ten_J``."""
     entry_link: int
     harmonic: int
     """First one, then how many."""

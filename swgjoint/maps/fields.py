@@ -29,7 +29,7 @@ class FlexsplineShape:
     """The flexspline at one position or several (...), in the frame of the drive."""
 
     points: Table
-    """Of the surface by tooth (..., N, n_nodes, 3) [m]."""
+    """Points of the surface by tooth (..., N, n_nodes, 3) [m]."""
     von_mises: Table
     """There (..., N, n_nodes) [Pa]."""
     tooth_force: Table
@@ -49,13 +49,13 @@ class DriveFields:
     torque: Array
     """T, increasing [N·m]. Shape (n_torques,)."""
     period: float
-    """Of the place: a turn, or half of one where both lobes are alike [rad]."""
+    """Period of the place: a turn, or half of one where both lobes are alike [rad]."""
     first_place: Array
     """Of the stored places by torque: the torsion shifts them (n_torques,) [rad]."""
     points: Array
     """Undeformed nodes of the surface (n_nodes, 3) [m]."""
     triangles: NDArray[np.int64]
-    """Of the surface between them (n_triangles, 3)."""
+    """Triangles of the surface between them (n_triangles, 3)."""
     displacement: Table
     """At equally spaced places over a period (n_torques, n_places, n_nodes, 3) [m]."""
     von_mises: Table

@@ -86,7 +86,7 @@ class Potential:
     hysteresis: tuple[Jenkin, ...] = ()
     """Parallel elements that add to the torque along the torsion; none by default."""
     friction: Friction | None = None
-    """Of the wave generator against the flexspline; None by default."""
+    """Friction of the wave generator against the flexspline; None by default."""
     fields: DriveFields | None = None
     """Shape and stress of the flexspline, to be shown; none without finite elements."""
     info: Mapping[str, Any] = field(default_factory=dict)

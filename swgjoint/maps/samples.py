@@ -38,7 +38,7 @@ class ToleranceSamples:
     """
 
     pitches: int
-    """Of the cycle."""
+    """Number of pitches of the cycle."""
     phases: int
     """Positions in a pitch."""
     torque: Array
@@ -123,7 +123,7 @@ class MapSamples:
     shortfall: str = ""
     """What the solves did not suffice for; empty if they did."""
     fields: DriveFields | None = None
-    """Of the flexspline with perfect teeth, to be shown."""
+    """Fields of the flexspline with perfect teeth, to be shown."""
     info: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

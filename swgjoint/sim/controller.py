@@ -24,15 +24,15 @@ class KnownJoints:
 
     names: tuple[str, ...]
     drives: tuple[DriveMap, ...]
-    """Of every joint; ratio, layout and ratings are theirs."""
+    """Maps of all joints; ratio, layout and ratings are theirs."""
     rotor_inertia: Array
     """Motor rotor and wave generator [kg·m²]. Shape (n_joints,)."""
     link_inertia: Array
     """About every joint where the motion starts, others locked [kg·m²]. Same shape."""
     damping: Array
-    """Of rotor against link along the torsion [N·m·s/rad]. Same shape."""
+    """Damping of rotor against link along the torsion [N·m·s/rad]. Same shape."""
     torque_limit: Array
-    """Of the motors [N·m], inf where there is none. Same shape."""
+    """Torque limit of the motors [N·m], inf where there is none. Same shape."""
 
     @property
     def ratio(self) -> Array:
@@ -131,9 +131,9 @@ class Measured:
     motor_speed: Array
     """[rad/s]."""
     link_angle: Array | None = None
-    """Of a link encoder [rad]; None where there is none."""
+    """Reading of a link encoder [rad]; None where there is none."""
     output_torque: Array | None = None
-    """Of a torque sensor behind the drive [N·m]; None where there is none."""
+    """Reading of a torque sensor behind the drive [N·m]; None where there is none."""
 
 
 class Controller(Protocol):

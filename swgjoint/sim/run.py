@@ -52,9 +52,9 @@ class Run:
     wanted_torque: Array
     """What the controller asked the motors for, without limits [N·m]. Same shape."""
     slipping_torque: Array
-    """Of the hysteresis, along the torsion [N·m]; 0 where there is none. Same shape."""
+    """Hysteresis torque along the torsion [N·m]; zero without hysteresis. Same shape."""
     friction_torque: Array
-    """Of the wave generator against the flexspline [N·m]. Same shape."""
+    """Friction torque of the wave generator on the flexspline [N·m]. Same shape."""
     tool_position: Array
     """Tool in the world [m]. Shape (n, 3), or (n, 0) where the arm has no tool."""
     tool_reference: Array

@@ -26,7 +26,7 @@ class StudyOptions:
     folder: Path | None = None
     """Where tables, report and plots go; None writes nothing."""
     load_inertia: float | None = None
-    """Of the load about the output [kg·m²]; None for the study's own."""
+    """Inertia of the load about the output [kg·m²]; None for the study's own."""
     rotor_inertia: float | None = None
     """Of rotor and wave generator about the input [kg·m²]; None for the study's own."""
     closed_form: bool = False

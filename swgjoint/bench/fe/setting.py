@@ -84,7 +84,7 @@ class Found:
     peak_MB: float | None = None
     """Largest resident memory of the process that did nothing else."""
     nodes: int | None = None
-    """Of one sector of the flexspline."""
+    """Nodes of one sector of the flexspline."""
 
 
 def require_equilibrium(state: AnyState) -> AnyState:

@@ -153,7 +153,7 @@ def _plane_rim(model: RingModel, state: State) -> Array:
 
 
 def _solid_rim(ring: SolidRing, state: SolidState) -> Array:
-    """Of the bore at mid-face, between the planes beside it."""
+    """Solid rim of the bore at mid-face, between the planes beside it."""
     frame, strip = ring.frames(state)[0], ring.strip
     points = np.einsum("sij,spj->spi", frame.turn, ring.bore_positions(frame, state))
     points = points.reshape(len(points), strip.planes, -1, 3)

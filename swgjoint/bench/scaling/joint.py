@@ -99,7 +99,7 @@ def best(work: Callable[[], object], count: int) -> float:
 
 
 def _step_seconds(model: mujoco.MjModel, start: mujoco.MjData, steps: int) -> float:
-    """Of one step, always the same ones."""
+    """Time of one step [s], always the same ones."""
     mujoco.mj_step(model, start, 50)
 
     def work() -> None:

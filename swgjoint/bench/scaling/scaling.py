@@ -35,7 +35,7 @@ class SizeSweep:
 
     name: str
     label: str
-    """Of the axis."""
+    """Label of the axis."""
     per: str
     """What ``seconds`` of a row are per."""
     sizes: tuple[float, ...]

@@ -74,7 +74,7 @@ class GridJoint:
 
     @property
     def frequency(self) -> float:
-        """Of the torsional vibration [rad/s]."""
+        """Frequency of the torsional vibration [rad/s]."""
         reflected = RATIO**2 * self.rotor
         return sqrt(self.stiffness * (1.0 / reflected + 1.0 / self.link))
 

@@ -73,7 +73,7 @@ def drop_joint(drive: DriveMap, *, rotor: float, link: float, step: float) -> Jo
 
 
 def impact_speed() -> float:
-    """Of the rotor before the impact [rad/s]."""
+    """Impact speed of the rotor before the impact [rad/s]."""
     return RATIO * TIP_SPEED / LENGTH
 
 

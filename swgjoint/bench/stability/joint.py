@@ -120,11 +120,11 @@ class Start:
     """How a run starts."""
 
     torque: float = 0.0
-    """Of the drive on the link at the start [N·m]."""
+    """Torque of the drive on the link at the start [N·m]."""
     load: float = 0.0
-    """Of the load against the link from then on, T; the motor gives T/i [N·m]."""
+    """Torque of the load against the link from then on, T; the motor gives T/i [N·m]."""
     speed: float = 0.0
-    """Of the rotor [rad/s]."""
+    """Speed of the rotor [rad/s]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

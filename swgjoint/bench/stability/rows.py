@@ -39,7 +39,7 @@ class StabilityRow:
     error: float | None = None
     """Largest error of the link angle against the reference [arcmin]."""
     numerical_damping_ratio: float | None = None
-    """Of the torsional vibration, given by the steps."""
+    """Numerical damping ratio of the torsional vibration, given by the steps."""
     physical_damping_ratio: float | None = None
     """That the drive itself has; the runs are without."""
     phase_step: float | None = None

@@ -33,7 +33,7 @@ class ErrorBound:
 
     @property
     def unit(self) -> str:
-        """Of ``value``."""
+        """Unit of ``value``."""
         return QUANTITIES[self.quantity]
 
 

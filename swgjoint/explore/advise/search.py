@@ -38,7 +38,7 @@ FEWEST = {"discrete": 0.4, "RK4": 1.5}
 
 
 def choose_row(rows: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
-    """Of the rows within the bound the cheapest; None if there is none.
+    """The cheapest of the rows within the bound; None if there is none.
 
     Of those that cost as much (:data:`ALIKE`) the lowest level, then the smallest
     error, so that two runs on a busy machine advise the same.

@@ -88,7 +88,7 @@ class Compared:
     strongest_order_left_out: tuple[str, ...]
     """Joints too fast for the step to carry the strongest order of their drive."""
     wall_s: float
-    """Of everything, maps included."""
+    """Run time of everything, maps included."""
     run: Run = field(repr=False, compare=False)
     missed: tuple[str, ...] = ()
     """Limits of the spec that it does not keep."""

@@ -265,7 +265,7 @@ def _spec(
 
 
 def _size(design: Design, task: SizeTask) -> dict[str, float | None]:
-    """Of the cylinder around the drive."""
+    """Size of the cylinder around the drive."""
     gear, ring = design.drive, design.circular_spline
     teeth, cup = gear.teeth_circular_spline, design.cup
     depth = ring.dedendum_coefficient * gear.module_mm + ring.rim_mm

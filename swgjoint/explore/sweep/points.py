@@ -41,7 +41,7 @@ class Point:
 
     values: Values
     key: str | None
-    """Of its record; None where the values make no design or scene."""
+    """Key of its record; None where the values make no design or scene."""
     fault: str = ""
     """Why they make none."""
     bases: Bases = field(repr=False, compare=False)

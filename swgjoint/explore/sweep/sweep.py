@@ -37,7 +37,7 @@ class SweepResult:
     work_s: float
     """Sum over the designs computed in this run."""
     wall_s: float
-    """Of this run."""
+    """Run time of this run."""
 
     @property
     def columns(self) -> tuple[str, ...]:

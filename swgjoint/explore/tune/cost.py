@@ -42,11 +42,11 @@ class Trace:
     time: Array
     """At the ends of the control periods [s]. Shape (n,)."""
     reference: Array
-    """Of the link [rad]."""
+    """Reference of the link [rad]."""
     error: Array
     """Link minus reference [rad]; not a number after a broken limit."""
     torque: Array
-    """Of the motor [N·m]."""
+    """Torque of the motor [N·m]."""
 
 
 def environment_named(name: str) -> str:

@@ -60,7 +60,7 @@ class TuneSettings:
 
     @property
     def seeds(self) -> tuple[tuple[int, ...], tuple[int, ...]]:
-        """Of the episodes: those of the searches, and those kept from them."""
+        """Seeds of the episodes: those of the searches, and those kept from them."""
         first = 1000 * self.seed
         return (
             tuple(range(first, first + self.training)),
@@ -75,7 +75,7 @@ class GainCandidate:
     name: str
     controller: str
     values: dict[str, float]
-    """Of its parameters."""
+    """Values of its parameters."""
     gains: dict[str, float]
     """On the motor, in SI units."""
     training: Array
@@ -83,7 +83,7 @@ class GainCandidate:
     held_out: Array
     """Cost by seed that no search has seen [rad]."""
     trace: Trace
-    """Of the held-out episodes."""
+    """Trace of the held-out episodes."""
 
     def to_json(self) -> dict[str, Any]:
         """Figures of the candidate."""
@@ -113,9 +113,9 @@ class Tuned:
     """First the textbook's PD, last the tuned controller."""
     searches: dict[str, GainSearch]
     parameters: tuple[GainParameter, ...]
-    """Of the named controller."""
+    """Parameters of the named controller."""
     anti_resonance: float
-    """Of the nominal plant [Hz]."""
+    """Anti-resonance of the nominal plant [Hz]."""
     error_scale: float
     effort_weight: float
     worst: float

@@ -50,7 +50,7 @@ class GainSearch:
     places: list[Array] = field(default_factory=list)
     """In the unit cube. Shape (n, d) each."""
     costs: list[Array] = field(default_factory=list)
-    """Of every seed. Shape (n, seeds) each."""
+    """Costs of every seed. Shape (n, seeds) each."""
     seconds: list[float] = field(default_factory=list)
     """That the generations took."""
 

@@ -174,7 +174,7 @@ class _Budget:
 
     @property
     def _candidates(self) -> int:
-        """Of this search; the second has what the first left over."""
+        """Candidates of this search; the second has what the first left over."""
         s = self.settings
         assert s.evaluations is not None
         if self.share < 1.0:

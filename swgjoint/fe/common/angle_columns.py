@@ -88,7 +88,7 @@ class SolvedColumns(Generic[AnyState]):
 
     @property
     def signs(self) -> list[float]:
-        """Of the torques."""
+        """Signs of the torques."""
         return [s for s in (1.0, -1.0) if any(t * s > 0.0 for t in self.levels)]
 
     def angles(self, count: int) -> Array:

@@ -68,7 +68,7 @@ class Follower(ABC, Generic[AnyState]):
     @property
     @abstractmethod
     def teeth(self) -> int:
-        """Of the flexspline."""
+        """Number of teeth of the flexspline."""
 
     @abstractmethod
     def input_angle(self, state: AnyState) -> float:

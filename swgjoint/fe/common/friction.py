@@ -68,7 +68,7 @@ class Pairs:
     pair: Index
     """Pair of each contact (n,)."""
     share: Array
-    """Of each contact in its pair (n_pairs, n)."""
+    """Share of each contact in its pair (n_pairs, n)."""
     slip: Array
     """sigma (n_pairs,) [m]."""
 

@@ -96,7 +96,7 @@ class Indentation:
 
     @property
     def _growth(self) -> float:
-        """Of the square of b with the force [m^2/N]."""
+        """Growth of the square of b with the force [m^2/N]."""
         return 2.0 * self.softness * self.radius
 
     def approach(self, force: Array) -> Array:
@@ -182,9 +182,9 @@ class Strips:
 
     law: Indentation
     strip: Index
-    """Of each contact (n,)."""
+    """Strip of each contact (n,)."""
     force: Array
-    """Of each strip, about which the law is linearised (n_strips,) [N]."""
+    """Force of each strip, about which the law is linearised (n_strips,) [N]."""
 
     @classmethod
     def from_contacts(

@@ -18,7 +18,7 @@ class Curves:
     power: Array
     """Ascending coefficients (n, 4)."""
     place: Array
-    """Of the jumps, in [0, 1] (n, m)."""
+    """Place of the jumps, in [0, 1] (n, m)."""
     jump: Array
     """(n, m)."""
     feasible: NDArray[np.bool_]

@@ -84,7 +84,7 @@ class LoadPath:
 
     @property
     def length(self) -> Array:
-        """Of the intervals [N·m]. Shape (n - 1,)."""
+        """Length of the intervals [N·m]. Shape (n - 1,)."""
         return np.diff(self.torque)
 
     def evaluate_at(self, torque: ArrayLike) -> Array:
@@ -240,7 +240,7 @@ class LoadPath:
 
     @cached_property
     def _differences(self) -> tuple[Array, Array]:
-        """Of the explanations, integrated once and twice (n - 1, grid)."""
+        """Differences of the explanations, integrated once and twice (n - 1, grid)."""
         one, two, cubic = self._explained
         grid = np.broadcast_to(_GRID, (self.length.size, _GRID.size))
         values = [curves.integrals_on(grid) for curves in (one, two, cubic)]

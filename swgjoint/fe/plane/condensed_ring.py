@@ -33,7 +33,7 @@ class CondensedRing:
     ring: Linearised
     ring_is_output: bool
     contacts: Contacts
-    """Of teeth, n of them."""
+    """Contacts of teeth, n of them."""
     carries: Mask
     """Which of them carry force (n,)."""
 
@@ -215,7 +215,7 @@ class _Intervals:
     number: Index
     """In its sector."""
     share: Array
-    """Of the stations of the interval in a mean (k, p)."""
+    """Share of the stations of the interval in a mean (k, p)."""
 
     def mean(self, values: Array) -> Array:
         """Means (k, ...) of values at the stations (N, q, ...)."""

@@ -38,7 +38,7 @@ class Continuation(Follower[State]):
 
     @property
     def teeth(self) -> int:
-        """Of the flexspline."""
+        """Number of teeth of the flexspline."""
         return self.model.element.sectors
 
     def input_angle(self, state: State) -> float:

@@ -48,11 +48,11 @@ class Linearised:
     hessian: Array
     """Second derivative (N, n, n) [N/m]."""
     gap: Array
-    """Of the stations of the bore (N, q) [m]."""
+    """Gap of the stations of the bore (N, q) [m]."""
     gap_dofs: Index
     """Degrees of freedom that move them (k,)."""
     stations: BoreStations
-    """Of the bore."""
+    """Stations of the bore."""
     normal: Array
     """Out of what it lies on, at the stations (N, q, 2)."""
     race_rows: Array | None

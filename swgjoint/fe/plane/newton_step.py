@@ -68,15 +68,15 @@ class NewtonStep:
     ring_turn: float
     """Increment of the circular spline's rotation [rad]."""
     increment: Array
-    """Of every sector (N, n) [m]."""
+    """Increment of every sector (N, n) [m]."""
     shift: Array
-    """Of the skeleton in the global frame (N, n_a, 2) [m]."""
+    """Shift of the skeleton in the global frame (N, n_a, 2) [m]."""
     race_shift: Array
-    """Of the race's nodes (N, m, 2, 2) [m]; empty without a race."""
+    """Shift of the race's nodes (N, m, 2, 2) [m]; empty without a race."""
     pressure: Array
     """Force of the wave generator at each station of the bore (N, q) [N]."""
     strip_error: float
-    """Of the approach of the flanks, whose law is linearised [m]."""
+    """Error of the approach of the flanks, whose law is linearised [m]."""
 
     @property
     def largest(self) -> float:

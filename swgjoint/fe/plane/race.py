@@ -41,7 +41,7 @@ class RaceForces:
     """Race and balls at one state, by sectors of m coordinates."""
 
     gradient: Array
-    """Of their energy (N, m) [N]."""
+    """Gradient of their energy (N, m) [N]."""
     hessian: Array
     """(N, m, m) [N/m]."""
     fixed: Mask
@@ -49,7 +49,7 @@ class RaceForces:
     balls: PressedBalls
     """All of the drive."""
     energy: float
-    """Of race and balls, whole drive [J]."""
+    """Energy of race and balls, whole drive [J]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -61,7 +61,7 @@ class PlaneRaceForces(RaceForces):
     """
 
     gap: Array
-    """Of the bore nodes (N, b/2) [m]."""
+    """Gap of the bore nodes (N, b/2) [m]."""
     rows: Array
     """Its derivative (N, b/2, b + r)."""
     normal: Array

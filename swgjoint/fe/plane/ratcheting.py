@@ -62,9 +62,9 @@ class RatchetingPath:
     pairs: NDArray[np.int64]
     """Teeth of the flexspline in contact, whole drive. Shape (n,)."""
     pitch: float
-    """Of the flexspline [rad]."""
+    """Pitch of the flexspline [rad]."""
     outcome: Outcome
-    """Of the solve that ended the path, converged where none failed."""
+    """Outcome of the solve that ended the path, converged where none failed."""
 
     def __post_init__(self) -> None:
         turned = frozen_array(self.turned, "turned [rad]", ndim=1)

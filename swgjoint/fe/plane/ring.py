@@ -48,7 +48,7 @@ class RingModel:
     friction: CoulombFriction | None = None
     """Between the flanks; None without."""
     indentation: Indentation | None = None
-    """Of the flanks; None gives them the patch of a contact alone."""
+    """Indentation of the flanks; None gives them the patch of a contact alone."""
     tooth_shift: Array | None = None
     """Manufacturing errors of the flexspline's teeth in their frames (N, 2) [m]."""
     ring_tooth_shift: Array | None = None

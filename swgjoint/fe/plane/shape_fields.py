@@ -53,7 +53,7 @@ class ShapeSurface:
     """What is shown of a sector."""
 
     nodes: Index
-    """Of the mesh (n,)."""
+    """Nodes of the mesh (n,)."""
     points: Array
     """Undeformed (n, 3) [m]."""
     triangles: Index

@@ -21,7 +21,7 @@ class StateFigures:
     rotation: float = 0.0
     """Best-fit rotation of the bore, in space of the bore of the diaphragm [rad]."""
     ring_rotation: float = 0.0
-    """Of the circular spline [rad]."""
+    """Rotation of the circular spline [rad]."""
     torque: float = 0.0
     """Torque T that the output exerts on its load, whole drive [N·m]."""
     holding_torque: float = 0.0
@@ -62,7 +62,7 @@ class State(StateFigures):
     """Nodes of the wave generator's outer race (N, m, 2, 2), see
     :class:`swgjoint.fe.plane.race.PlaneRace` [m]; None for a rigid wave generator."""
     ball_force: Array | None = None
-    """Of the balls of the whole drive (balls,) [N]."""
+    """Force of the balls of the whole drive (balls,) [N]."""
     contacts: Contacts | None = None
     """Points that carry force."""
     tooth_force: Array = field(default_factory=lambda: np.zeros(0))

@@ -31,7 +31,7 @@ class Facing:
     normal: Array
     """From the ring to the points (n, 2)."""
     tangent: Array
-    """Of the ring, counter-clockwise (n, 2)."""
+    """Tangent of the ring, counter-clockwise (n, 2)."""
     dofs: Index
     """Degrees of freedom of the ring at the feet (n, 8)."""
     by_ring: Array

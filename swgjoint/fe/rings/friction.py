@@ -64,7 +64,7 @@ class RubbedPath:
     tooth_pairs: Array
     """Tooth contacts that do. Shape (n,)."""
     outcome: Outcome
-    """Of the first solve that failed; the path ends before it."""
+    """Outcome of the first solve that failed; the path ends before it."""
 
     @property
     def torque_per_mu(self) -> Array:

@@ -56,7 +56,7 @@ class HermiteRing:
     """
 
     radius: float
-    """Of the undeformed mean line [m]."""
+    """Radius of the undeformed mean line [m]."""
     elements: int
     stretching: float
     """E A [N]."""

@@ -64,7 +64,7 @@ class PulledRing:
     """Outward displacement of the outside in these directions, fixed in space as a dial
     indicator is [m]. Shape (n, m)."""
     force: Array
-    """Of each roller [N]. Shape (n,)."""
+    """Force of each roller [N]. Shape (n,)."""
     outline: Array
     """Deformed outside of a quarter, from the roller (n, k, 2) [m]."""
 

@@ -36,7 +36,7 @@ class PressedBalls:
 
     @property
     def energy(self) -> float:
-        """Of the Hertz contacts [J]."""
+        """Energy of the Hertz contacts [J]."""
         return 0.4 * float(self.force @ self.overlap)
 
 

@@ -73,7 +73,7 @@ class BallPassage:
     per_cage_turn: int
     """Balls, twice for an odd number: then the lobes take turns."""
     per_input_turn: float
-    """Of a ball that rolls without slip."""
+    """Passages per input turn of a ball that rolls without slip."""
     carried_as: int
     """Order of the map."""
 

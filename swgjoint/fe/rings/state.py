@@ -34,7 +34,7 @@ class RingState:
     ball_force: Array | None = None
     """[N]. Shape (balls,)."""
     tooth_force: Array | None = None
-    """Of every tooth contact [N]."""
+    """Tooth force of every tooth contact [N]."""
     contacts: Contacts | None = None
     tooth_moment: float = 0.0
     """Moment of the tooth forces on the flexspline: with that of the balls it must

@@ -53,9 +53,9 @@ class RingTeeth:
     flexspline: ToothProfile
     circular_spline: ToothProfile
     foot_radius: float
-    """Of the mean line that carries them [m]."""
+    """Foot radius of the mean line that carries them [m]."""
     stiffness: float
-    """Of a pair along the common normal [N/m]."""
+    """Stiffness of a pair along the common normal [N/m]."""
     shift: Array
     """Errors of the flexspline's teeth in their frames (N, 2) [m]."""
     ring_shift: Array | None = None

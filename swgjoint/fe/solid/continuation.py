@@ -34,7 +34,7 @@ class SolidContinuation(Follower[SolidState]):
 
     @property
     def teeth(self) -> int:
-        """Of the flexspline."""
+        """Number of teeth of the flexspline."""
         return self.ring.strip.sectors
 
     @property

@@ -39,7 +39,7 @@ class SolidLoad:
     torque: float | None = None
     """T that the output exerts on its load, whole drive [N·m]."""
     rotation: float | None = None
-    """Of the bore of the diaphragm [rad]."""
+    """Rotation of the bore of the diaphragm [rad]."""
     teeth: bool = True
     """Whether the teeth touch."""
 
@@ -130,16 +130,16 @@ class _Step:
 
     found: ToothRows | None
     force: Array
-    """Of the candidates (n,) [N]."""
+    """Force of the candidates (n,) [N]."""
     active: NDArray[np.int64]
     increment: Array
-    """Of the masters in the global frame (N, n) [m]."""
+    """Increment of the masters in the global frame (N, n) [m]."""
     turn: float
-    """Of the bore of the diaphragm [rad]."""
+    """Turn of the bore of the diaphragm [rad]."""
     ring_turn: float
-    """Of the circular spline [rad]."""
+    """Turn of the circular spline [rad]."""
     pressure: Array
-    """Of the wave generator (N, p) [N]."""
+    """Pressure of the wave generator (N, p) [N]."""
     after: Array
     """Gaps to it after the step (N, p) [m]."""
     torque: float

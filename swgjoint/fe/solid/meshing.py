@@ -278,7 +278,7 @@ def _step(
 
 
 def _nodes(ring: SolidRing) -> int:
-    """Of the flexspline; nodes on a face belong to one sector."""
+    """Nodes of the flexspline; nodes on a face belong to one sector."""
     face = sum(len(segment.mesh.first) for segment in ring.strip.segments)
     rows = [s.begin.shape[1] for s in ring.strip.mesh.cup if s.begin is not None]
     return int((ring.strip.mesh.nodes - face + sum(rows)) * ring.sectors)

@@ -39,7 +39,7 @@ class SolidState(StateFigures):
     :class:`swgjoint.fe.solid.wave_generator.race.SolidRace`; None on a rigid wave
     generator."""
     ball_force: Array | None = None
-    """Of the balls of the drive [N]."""
+    """Force of the balls of the drive [N]."""
     held: ToothRows | None = None
     """Tooth contacts that carry force."""
     tooth_force: Array = field(default_factory=lambda: np.zeros(0))

@@ -123,7 +123,7 @@ class SolidMaxima:
     flexspline: StressMaxima
     circular_spline: StressMaxima | None
     by_part: dict[str, StressMaxima]
-    """Of the flexspline by segment."""
+    """Stress maxima of the flexspline by segment."""
     place: StressPlace
 
     @classmethod

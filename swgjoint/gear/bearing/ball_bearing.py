@@ -29,7 +29,7 @@ class BallBearing:
     ball_diameter: float
     """[m]."""
     race_thickness: float
-    """Of the outer race [m]."""
+    """Thickness of the outer race [m]."""
     race_width: float
     """[m]."""
     groove_inertia_factor: float
@@ -39,11 +39,11 @@ class BallBearing:
     clearance: float
     """Radial internal clearance as catalogues print it, on the diameter [m]."""
     fit_clearance: float
-    """Of the outer race in the bore of the rim, on the diameter [m]."""
+    """Fit clearance of the outer race in the bore of the rim, on the diameter [m]."""
     bore_radius: float
-    """Of the rim that the race sits in [m]."""
+    """Bore radius of the rim that the race sits in [m]."""
     material: Material
-    """Of balls and races."""
+    """Material of balls and races."""
 
     @classmethod
     def from_design(cls, design: Design) -> BallBearing:
@@ -84,7 +84,7 @@ class BallBearing:
 
     @property
     def race_radius(self) -> float:
-        """Of the middle of the outer race [m]."""
+        """Radius of the middle of the outer race [m]."""
         return self.bore_radius - 0.5 * (self.fit_clearance + self.race_thickness)
 
     @property

@@ -33,7 +33,7 @@ class Oval(ClosedCurve):
 
     @property
     def perimeter(self) -> float:
-        """Of the nominal outline, by which the arc length is counted [m]."""
+        """Perimeter of the nominal outline, by which the arc length is counted [m]."""
         return self.nominal.perimeter
 
     @property

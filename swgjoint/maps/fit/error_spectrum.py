@@ -59,7 +59,7 @@ _SAMPLES = 2**16  # of a period; the peak to peak then errs by less than 1e-8 of
 
 
 def peak_to_peak(drive: Potential) -> float:
-    """Of e0 over one turn of the output [rad]."""
+    """Peak to peak of e0 over one turn of the output [rad]."""
     psi = np.linspace(0.0, 2.0 * np.pi, 40 * round(abs(drive.ratio)) + 1)
     phases = drive.phases(drive.ratio * psi, psi)
     return float(np.ptp(drive.error_at(phases)[0]))

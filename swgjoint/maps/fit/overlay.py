@@ -44,7 +44,7 @@ class Overlay:
     edges: tuple[float, float, float]
     """T1, T2 and the largest torque of the record [N·m]."""
     rated_torque: float
-    """Of the lost motion [N·m]."""
+    """Rated torque that defines the lost motion [N·m]."""
     beyond_range: bool
     """Whether the record leaves the torques for which the map was made."""
 

@@ -32,7 +32,7 @@ class LoopRecord:
 
     loop: TorqueLoop
     torque: Array
-    """Of the samples that count [N·m]. Shape (n,)."""
+    """Torque of the samples that count [N·m]. Shape (n,)."""
     torsion: Array
     """[rad]. Shape (n,)."""
     knots: Array

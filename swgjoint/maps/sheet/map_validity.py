@@ -61,7 +61,7 @@ class Difference:
 
     @property
     def name(self) -> str:
-        """Of the quantity, in words."""
+        """Name of the quantity, in words."""
         return QUANTITIES.get(self.quantity, self.quantity.replace("_", " "))
 
     def to_json(self) -> dict[str, Any]:

@@ -354,7 +354,7 @@ def _tree(body: mujoco.MjsBody) -> Iterator[mujoco.MjsBody]:
 
 
 def _welds(spec: mujoco.MjSpec, held: set[str]) -> dict[str, tuple[str, str]]:
-    """Of every body the one that it is welded to, and what carries that one."""
+    """For every body the one that it is welded to, and what carries that one."""
     welds = {WORLD: (WORLD, WORLD)}
 
     def visit(body: mujoco.MjsBody, parent: str) -> None:

@@ -25,9 +25,9 @@ class PlayedSignals(JointSignals):
     """Signals of a record, with the torques that have a history; shapes (n,)."""
 
     slipping: Array
-    """Of the hysteresis, along the torsion [N·m]."""
+    """Hysteresis torque along the torsion [N·m]."""
     friction: Array
-    """Of the wave generator against the flexspline [N·m]."""
+    """Friction torque of the wave generator on the flexspline [N·m]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -45,7 +45,7 @@ class Collision:
 
     bodies: tuple[str, str]
     time: float
-    """Of the first state that was looked at and has the contact [s]."""
+    """Time of the first state that was looked at and has the contact [s]."""
     depth: float
     """Largest penetration [m]."""
 

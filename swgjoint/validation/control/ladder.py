@@ -137,7 +137,7 @@ class Ladder:
     figures: dict[str, dict[str, Array]]
     """By rung and figure, one value a seed."""
     shown: dict[str, dict[str, Array]]
-    """Of the first seed, by rung: signals for the picture."""
+    """Signals of the first seed by rung, for the picture."""
 
     @property
     def units(self) -> Mapping[str, str]:

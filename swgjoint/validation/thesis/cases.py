@@ -62,9 +62,9 @@ class GroupEntry(Section):
     changes: Mapping[str, Any] = {}
     torque_Nm: Torque | None = None
     positions: Annotated[int, Field(ge=1, le=1000)] | None = None
-    """Of the wave generator over the turn; those of the file without."""
+    """Positions of the wave generator over the turn; those of the file without."""
     turn_deg: Annotated[float, Field(gt=0, le=360)] | None = None
-    """Of the input; that of the file without."""
+    """Turn of the input [deg]; that of the file without."""
     keys: Annotated[tuple[str, ...], Listed] = ()
     """Dotted keys of the design that take the value of a case: the parameter."""
     symbol: str = ""
@@ -128,9 +128,9 @@ class StudyFile(Section):
     torque_Nm: Torque
     model: Literal["2d", "3d"] = "2d"
     positions: Annotated[int, Field(ge=1, le=1000)]
-    """Of the wave generator over the turn."""
+    """Positions of the wave generator over the turn."""
     turn_deg: Annotated[float, Field(gt=0, le=360)] = 180.0
-    """Of the input."""
+    """Turn of the input [deg]."""
     refinements: Annotated[tuple[Refinement, ...], Listed] = (2.0, 3.0)
     """Meshes beyond that of the thesis for the groups that converge."""
     fine_positions: Annotated[int, Field(ge=1, le=1000)] = 12
@@ -138,7 +138,7 @@ class StudyFile(Section):
     pattern repeats with that pitch, and 35 positions over half a turn (61 pitches) are
     35 equidistant phases of it: the mean over 12 phases agrees to 0.1 %."""
     contradictions: Annotated[tuple[Text, ...], Listed] = ()
-    """Of the source with itself, and what the cases follow."""
+    """Contradictions of the source with itself, and what the cases follow."""
     group: Annotated[tuple[GroupEntry, ...], Field(strict=False, min_length=1)]
 
     @model_validator(mode="after")

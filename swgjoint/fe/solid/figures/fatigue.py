@@ -70,7 +70,7 @@ class SectionFatigue:
     """Nominal stress over a turn at the root of one section [Pa]."""
 
     z: float
-    """Of the section, 0 in the middle of the face width [m]."""
+    """Coordinate z of the section, 0 in the middle of the face width [m]."""
     normal_amplitude: float
     """Around."""
     normal_mean: float

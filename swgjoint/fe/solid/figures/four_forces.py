@@ -32,7 +32,7 @@ class FourForces:
     """A cup under the four forces, without torque and per N·m; frames of the teeth."""
 
     force: Array
-    """Of the areas after and before the major axis (2,) [N]."""
+    """Force of the areas after and before the major axis (2,) [N]."""
     force_by_torque: Array
     """(2,) [N/(N·m)]."""
     radial: Array

@@ -58,7 +58,7 @@ class Pinched:
     """Equilibrium of a cup between two opposite loads."""
 
     force: float
-    """Of each load, outward [N]."""
+    """Force of each load, outward [N]."""
     deflection: float
     """Outward, mean over the wall above the load [m]."""
     under_load: float

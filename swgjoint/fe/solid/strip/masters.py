@@ -61,7 +61,7 @@ class SegmentMasters:
     boundary: Index
     """Node numbers of faces and sections (n_boundary,)."""
     masters: Index
-    """Of the strip, those that this segment hangs on (n_m,)."""
+    """Masters of the strip, those that this segment hangs on (n_m,)."""
     weight: Array
     """Displacement of the boundary by that of these masters (n_boundary, n_m)."""
 

@@ -72,7 +72,7 @@ class TeethMesh:
     plane: SectorMesh
     """The section that was extruded."""
     z: Array
-    """Of the planes (n_planes,) [m]."""
+    """Coordinate z of the planes (n_planes,) [m]."""
     nodes: Index
     """Node numbers by plane and node of the section (n_planes, n_plane_nodes)."""
 

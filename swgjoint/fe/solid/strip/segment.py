@@ -29,7 +29,7 @@ class StripSegment:
     name: str
     mesh: SegmentMesh
     masters: Index
-    """Of the strip (n_m,)."""
+    """Masters of the strip (n_m,)."""
     position: Array
     """Their reference positions (n_m, 3) [m]."""
     stiffness: Array

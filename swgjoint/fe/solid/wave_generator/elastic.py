@@ -49,7 +49,7 @@ class ElasticWaveGenerator:
     """Springs behind two lobes."""
 
     stiffness: float
-    """Of each lobe, inf if rigid [N/m]."""
+    """Stiffness of each lobe, inf if rigid [N/m]."""
     preload: float
     """Force of each lobe at the lobe height of the drive; without effect if rigid [N].
     """
@@ -60,9 +60,9 @@ class WorkingPoint:
     """Where an elastic wave generator and a cup balance, without torque."""
 
     deflection: float
-    """Of a lobe, outward [m]."""
+    """Deflection of a lobe, outward [m]."""
     force: float
-    """Of a lobe [N]."""
+    """Force of a lobe [N]."""
     on_teeth: float
     """Part of the force that presses the teeth into the spaces [N]."""
     play: float
@@ -75,9 +75,9 @@ class LobeCharacteristic:
     """A cup between two lobes, from rest on."""
 
     height: float
-    """Of the lobes of the drive [m]."""
+    """Height of the lobes of the drive [m]."""
     deflection: Array
-    """Of a lobe, increasing from 0 (n,) [m]."""
+    """Deflection of a lobe, increasing from 0 (n,) [m]."""
     force: Array
     """That it takes, the teeth free (n,) [N]."""
     play: Array

@@ -48,7 +48,7 @@ class RaceRoll:
 
     @cached_property
     def stiffness(self) -> Array:
-        """Of an element by u and w of its nodes (8, 8) [N/m]."""
+        """Stiffness of an element by u and w of its nodes (8, 8) [N/m]."""
         points, weights = np.polynomial.legendre.leggauss(4)
         value, first, second = hermite(0.5 * (points + 1.0))
         h, r, per_u = self.ring.step, self.ring.radius, 2.0 / self.width
