@@ -52,7 +52,7 @@ class Run:
     wanted_torque: Array
     """What the controller asked the motors for, without limits [N·m]. Same shape."""
     slipping_torque: Array
-    """Hysteresis torque along the torsion [N·m]; zero without hysteresis. Same shape."""
+    """Hysteresis torque along the torsion [N·m]; zero if there is none. Same shape."""
     friction_torque: Array
     """Friction torque of the wave generator on the flexspline [N·m]. Same shape."""
     tool_position: Array

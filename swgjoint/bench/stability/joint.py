@@ -122,7 +122,7 @@ class Start:
     torque: float = 0.0
     """Torque of the drive on the link at the start [N·m]."""
     load: float = 0.0
-    """Torque of the load against the link from then on, T; the motor gives T/i [N·m]."""
+    """Torque of the load against the link from then on; the motor gives T/i [N·m]."""
     speed: float = 0.0
     """Speed of the rotor [rad/s]."""
 
