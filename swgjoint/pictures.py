@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import re
 import unicodedata
 from typing import IO, Any
@@ -35,6 +36,18 @@ def save_png(figure: Any, out: IO[bytes], *, dpi: float) -> None:
                     tick.label1.set_parse_math(False)
                     tick.label2.set_parse_math(False)
     figure.savefig(out, format="png", dpi=dpi)
+
+
+def png(figure: Any, *, dpi: float) -> bytes:
+    """A matplotlib figure as the bytes of a PNG file.
+
+    Args:
+        figure: The figure.
+        dpi: Resolution [pixels per inch].
+    """
+    out = io.BytesIO()
+    save_png(figure, out, dpi=dpi)
+    return out.getvalue()
 
 
 def plain_text(text: str) -> str:

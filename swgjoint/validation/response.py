@@ -7,7 +7,6 @@ and hysteresis where the map has it, make of the one resonance.
 
 from __future__ import annotations
 
-import io
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -19,7 +18,7 @@ from swgjoint.errors import InputError
 from swgjoint.files import Outputs, file_name
 from swgjoint.json_text import json_text
 from swgjoint.maps.drive_map import DriveMap
-from swgjoint.pictures import save_png
+from swgjoint.pictures import png
 from swgjoint.sim.figures.frequency_response import (
     Chirp,
     FrequencyResponse,
@@ -303,6 +302,4 @@ def response_picture(name: str, found: list[MeasuredResponse]) -> bytes:
         ax.set_ylabel("[rad/s per N·m]")
         ax.grid(alpha=0.3, which="both")
     axes[0].legend(fontsize="small")
-    out = io.BytesIO()
-    save_png(figure, out, dpi=110)
-    return out.getvalue()
+    return png(figure, dpi=110)

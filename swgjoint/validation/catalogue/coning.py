@@ -7,13 +7,12 @@ along the face width, and the thin rings, which do not cone.
 
 from __future__ import annotations
 
-import io
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from swgjoint.pictures import save_png
+from swgjoint.pictures import png
 from swgjoint.validation.catalogue.file import CatalogueFile
 from swgjoint.validation.catalogue.printed import (
     STIFFNESS,
@@ -146,6 +145,4 @@ def coning_picture(rows: Sequence[Mapping[str, Any]]) -> bytes:
     axes[0, 0].legend(fontsize="small")
     axes[1, 0].set_ylabel("centre of tooth forces\nfrom mid-face, open end < 0 [face]")
     axes[1, 0].set_ylim(-0.55, 0.25)
-    out = io.BytesIO()
-    save_png(figure, out, dpi=130)
-    return out.getvalue()
+    return png(figure, dpi=130)

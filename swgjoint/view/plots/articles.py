@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from swgjoint.pictures import save_png
+from swgjoint.pictures import png
 
 if TYPE_CHECKING:
     from swgjoint.validation.articles.runs import Found
@@ -37,9 +36,7 @@ def articles_picture(parts: Sequence[str], found: Mapping[str, Found]) -> bytes 
     axes = figure.subplots(1, len(panels), squeeze=False)[0]
     for ax, draw in zip(axes, panels, strict=True):
         draw(ax, found)
-    out = io.BytesIO()
-    save_png(figure, out, dpi=110)
-    return out.getvalue()
+    return png(figure, dpi=110)
 
 
 def _force(ax: Any, found: Mapping[str, Found]) -> None:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
-from swgjoint.pictures import save_png
+from swgjoint.pictures import png
 
 STYLES = {
     "ring": ("C2", "^", "ring"),
@@ -76,6 +75,4 @@ def cost_picture(
         ax.margins(x=0.12, y=0.1)
     panels[0, 0].legend(fontsize="small")
     figure.suptitle(f"{result['design']} against {reference}")
-    out = io.BytesIO()
-    save_png(figure, out, dpi=100)
-    return out.getvalue()
+    return png(figure, dpi=100)

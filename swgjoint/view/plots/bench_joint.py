@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Sequence
 from typing import Any
 
-from swgjoint.pictures import save_png
+from swgjoint.pictures import png
 from swgjoint.sim.accuracy import QUANTITIES
 
 _COLOURS = {
@@ -57,9 +56,7 @@ def joint_picture(scene: str, rows: Sequence[dict[str, Any]]) -> bytes:
     axes[5].legend(fontsize="x-small")
     against = next(row["reference"] for row in rows)
     figure.suptitle(f"{scene} against {against}")
-    out = io.BytesIO()
-    save_png(figure, out, dpi=90)
-    return out.getvalue()
+    return png(figure, dpi=90)
 
 
 def _points(axis: Any, rows: Sequence[dict[str, Any]]) -> None:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from swgjoint.pictures import save_png
+from swgjoint.pictures import png
 
 if TYPE_CHECKING:
     from swgjoint.validation.rows import Row
@@ -67,6 +66,4 @@ def catalogue_picture(rows: Sequence[Row]) -> bytes | None:
     figure.suptitle(
         "middle and bracket of the variants; triangle: lower bound; grey: goal"
     )
-    out = io.BytesIO()
-    save_png(figure, out, dpi=130)
-    return out.getvalue()
+    return png(figure, dpi=130)

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from swgjoint.maps.sheet.map_validity import QUANTITIES
 from swgjoint.maps.sheet.validity_marks import error_mark, joint_mark, mark_legend
-from swgjoint.pictures import save_png
+from swgjoint.pictures import png
 from swgjoint.sim.figures.keys import LOWER, RIPPLE
 from swgjoint.view.recording.entities import COLORS
 from swgjoint.view.report.tables import Cell, Table
@@ -150,9 +149,7 @@ def comparison_picture(
     axes[0, 0].set_yticks(range(len(rows)), [row.argument for row in rows])
     axes[0, 0].invert_yaxis()
     figure.suptitle(f"scene {scene}, worst joint", fontsize="medium")
-    out = io.BytesIO()
-    save_png(figure, out, dpi=110)
-    return out.getvalue()
+    return png(figure, dpi=110)
 
 
 def _bars(

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import io
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from swgjoint.pictures import save_png
+from swgjoint.pictures import png
 
 if TYPE_CHECKING:
     from swgjoint.validation.control.ladder import Ladder
@@ -73,6 +72,4 @@ def ladder_picture(name: str, found: Ladder) -> bytes:
         ax.grid(alpha=0.3, axis="y")
     count = next(iter(found.figures.values()))[bars[0]].size
     figure.suptitle(f"{name}: above one specimen, below {count} (dots) and their mean")
-    out = io.BytesIO()
-    save_png(figure, out, dpi=100)
-    return out.getvalue()
+    return png(figure, dpi=100)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,7 +9,7 @@ import numpy as np
 from swgjoint.gear.teeth.neutral_line import neutral_line
 from swgjoint.gear.teeth.tooth_profile import tooth_profile
 from swgjoint.gear.wave_generators.wave_generator import lobe_height, wave_generator
-from swgjoint.pictures import save_png
+from swgjoint.pictures import png
 from swgjoint.typing import Array
 from swgjoint.units import mm
 
@@ -44,9 +43,7 @@ def design_picture(design: Design) -> bytes:
         ax.set_xlabel("x [mm]")
         ax.set_ylabel("y [mm]")
     figure.suptitle(f"{design.drive.name}: {_summary(design)}")
-    out = io.BytesIO()
-    save_png(figure, out, dpi=110)
-    return out.getvalue()
+    return png(figure, dpi=110)
 
 
 def _summary(design: Design) -> str:

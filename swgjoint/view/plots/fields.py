@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Sequence
 from math import pi
 from typing import TYPE_CHECKING, Any
@@ -19,7 +18,7 @@ from swgjoint.fe.plane.fields import (
     tooth_forces,
     wave_generator_contact,
 )
-from swgjoint.pictures import save_png
+from swgjoint.pictures import png
 from swgjoint.units import deg, mm
 
 if TYPE_CHECKING:
@@ -293,6 +292,4 @@ def _title(run: MeshingRun, state: State | None) -> str:
 
 
 def _png(figure: Any) -> bytes:
-    out = io.BytesIO()
-    save_png(figure, out, dpi=110)
-    return out.getvalue()
+    return png(figure, dpi=110)

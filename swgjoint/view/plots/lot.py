@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Collection
 from typing import Any
 
 import numpy as np
 
-from swgjoint.pictures import save_png
+from swgjoint.pictures import png
 
 _LABELS = {
     "transmission_accuracy_arcmin": "transmission accuracy [arcmin]",
@@ -58,6 +57,4 @@ def lot_picture(result: dict[str, Any], *, lower: Collection[str]) -> bytes | No
         "uniform": "errors drawn between zero and the tolerances",
     }[result["sizes"]]
     figure.suptitle(f"{result['design']}: {len(rows)} drives, {meaning}", fontsize=11)
-    out = io.BytesIO()
-    save_png(figure, out, dpi=110)
-    return out.getvalue()
+    return png(figure, dpi=110)

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from swgjoint.pictures import save_png
+from swgjoint.pictures import png
 
 _KINDS = {"tensile": "tab:red", "compressive": "tab:blue", "von_mises": "0.3"}
 
@@ -49,9 +48,7 @@ def meshing_picture(result: Mapping[str, Any]) -> bytes:
     torque_Nm = result.get("torque_Nm")
     load = f", {torque_Nm:g} N·m at the output" if torque_Nm is not None else ""
     figure.suptitle(f"Meshing of {name}{load}: {result['outcome']}", fontsize="medium")
-    out = io.BytesIO()
-    save_png(figure, out, dpi=120)
-    return out.getvalue()
+    return png(figure, dpi=120)
 
 
 def _gaps(values: list[float | None]) -> list[float]:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Sequence
 from itertools import cycle
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from swgjoint.pictures import save_png
+from swgjoint.pictures import png
 from swgjoint.view.plots.sweep import label_of
 
 if TYPE_CHECKING:
@@ -30,9 +29,7 @@ def optimum_picture(found: Optimum) -> bytes:
     _course(course, found)
     _values(values, found)
     canvas.suptitle(found.file.description or "search", fontsize=11)
-    out = io.BytesIO()
-    save_png(canvas, out, dpi=100)
-    return out.getvalue()
+    return png(canvas, dpi=100)
 
 
 def _figures(candidates: Sequence[Candidate], name: str, *, confirmed: bool) -> Any:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import io
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from swgjoint.pictures import save_png
+from swgjoint.pictures import png
 from swgjoint.units import arcmin
 
 if TYPE_CHECKING:
@@ -57,6 +56,4 @@ def overlay_picture(name: str, laid: Overlay) -> bytes:
         axis.set_xlabel("torque [N·m]")
         axis.grid(alpha=0.3)
     figure.suptitle(f"{name}: measured loop over the prediction")
-    out = io.BytesIO()
-    save_png(figure, out, dpi=130)
-    return out.getvalue()
+    return png(figure, dpi=130)

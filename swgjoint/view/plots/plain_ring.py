@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Sequence
 from math import pi
 from typing import TYPE_CHECKING, Any
@@ -10,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from swgjoint.gear.pulled_ring import small_deflection
-from swgjoint.pictures import save_png
+from swgjoint.pictures import png
 from swgjoint.units import deg, mm, um
 
 if TYPE_CHECKING:
@@ -34,9 +33,7 @@ def ring_picture(cases: Sequence[RingCase], *, fine: int, total: float) -> bytes
     _shape(shape, cases[0], fine)
     _around(around, cases[0], fine)
     _inward(inward, cases, fine, total)
-    out = io.BytesIO()
-    save_png(figure, out, dpi=110)
-    return out.getvalue()
+    return png(figure, dpi=110)
 
 
 def _shape(ax: Any, case: RingCase, fine: int) -> None:

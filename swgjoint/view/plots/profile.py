@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from swgjoint.pictures import save_png
+from swgjoint.pictures import png
 from swgjoint.units import mm
 
 if TYPE_CHECKING:
@@ -59,6 +58,4 @@ def profile_picture(design: Design, profiles: Mapping[str, ToothProfile]) -> byt
     handles, labels = axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=2)
     figure.suptitle(f"{design.drive.name}: tooth profiles")
-    out = io.BytesIO()
-    save_png(figure, out, dpi=130)
-    return out.getvalue()
+    return png(figure, dpi=130)

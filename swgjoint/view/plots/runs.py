@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from swgjoint.files import write_whole
-from swgjoint.pictures import save_png
+from swgjoint.pictures import png
 from swgjoint.sim.figures.metrics import (
     highest_resolved_order,
     strongest_left_out,
@@ -41,9 +40,7 @@ def comparison_png(
     Returns:
         The path.
     """
-    buffer = io.BytesIO()
-    save_png(comparison_figure(runs, rigid=rigid), buffer, dpi=110)
-    return write_whole(path, buffer.getvalue())
+    return write_whole(path, png(comparison_figure(runs, rigid=rigid), dpi=110))
 
 
 def comparison_figure(runs: Mapping[str, Run], *, rigid: Run | None = None) -> Figure:

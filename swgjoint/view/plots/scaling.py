@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from swgjoint.pictures import save_png
+from swgjoint.pictures import png
 
 
 def scaling_picture(result: Mapping[str, Any], labels: Mapping[str, str]) -> bytes:
@@ -43,6 +42,4 @@ def scaling_picture(result: Mapping[str, Any], labels: Mapping[str, str]) -> byt
         ax.grid(alpha=0.3)
     for ax in panels[len(labels) :]:
         ax.set_visible(False)
-    out = io.BytesIO()
-    save_png(figure, out, dpi=90)
-    return out.getvalue()
+    return png(figure, dpi=90)

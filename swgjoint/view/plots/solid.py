@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import io
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from swgjoint.pictures import save_png
+from swgjoint.pictures import png
 from swgjoint.typing import Array
 from swgjoint.units import deg, mm
 
@@ -165,6 +164,4 @@ def coning_picture(run: SolidRun) -> bytes:
 
 
 def _png(figure: Any) -> bytes:
-    out = io.BytesIO()
-    save_png(figure, out, dpi=110)
-    return out.getvalue()
+    return png(figure, dpi=110)

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import io
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from swgjoint.pictures import save_png
+from swgjoint.pictures import png
 from swgjoint.units import arcmin, rpm
 
 if TYPE_CHECKING:
@@ -35,9 +34,7 @@ def spec_picture(name: str, sheet: SpecSheet) -> bytes:
     for ax, draw in zip(figure.subplots(1, len(panels)), panels, strict=True):
         draw(ax, sheet)
     figure.suptitle(f"{name}: spec sheet")
-    out = io.BytesIO()
-    save_png(figure, out, dpi=130)
-    return out.getvalue()
+    return png(figure, dpi=130)
 
 
 def _loop(ax: Any, sheet: SpecSheet) -> None:

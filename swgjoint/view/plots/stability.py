@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from swgjoint.pictures import save_png
+from swgjoint.pictures import png
 
 if TYPE_CHECKING:
     from swgjoint.bench.stability.rows import StabilityRow
@@ -45,9 +44,7 @@ def stability_picture(rows: Sequence[StabilityRow], *, scheme: str, free: str) -
     _damping(axes["damping"], rows)
     _error(axes["error"], rows)
     _free(axes["free"], [row for row in rows if row.group == free])
-    out = io.BytesIO()
-    save_png(figure, out, dpi=100)
-    return out.getvalue()
+    return png(figure, dpi=100)
 
 
 def _outcomes(axis: Any, rows: Sequence[StabilityRow]) -> None:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from swgjoint.faults import split_unit
-from swgjoint.pictures import save_png
+from swgjoint.pictures import png
 
 if TYPE_CHECKING:
     from swgjoint.explore.sweep.sweep import SweepResult
@@ -67,9 +66,7 @@ def sweep_picture(found: SweepResult) -> bytes:
     ok = sum(record.ok for record in found.records)
     text = f"{ok} designs, {len(rows) - ok} without figures (crosses)"
     canvas.suptitle(f"{found.file.description or 'sweep'}\n{text}", fontsize=10)
-    out = io.BytesIO()
-    save_png(canvas, out, dpi=100)
-    return out.getvalue()
+    return png(canvas, dpi=100)
 
 
 def _numbers(values: Sequence[Any]) -> Any:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from swgjoint.fe.plane.stress import KINDS
-from swgjoint.pictures import save_png
+from swgjoint.pictures import png
 
 if TYPE_CHECKING:
     from swgjoint.validation.thesis.rows import CaseRecords
@@ -53,9 +52,7 @@ def group_picture(results: Sequence[CaseRecords]) -> bytes:
             handles, labels, loc="outside lower center", fontsize="x-small", ncols=7
         )
     figure.suptitle(f"{group.id}: {group.title} ({group.source})", fontsize=11)
-    out = io.BytesIO()
-    save_png(figure, out, dpi=100)
-    return out.getvalue()
+    return png(figure, dpi=100)
 
 
 def _sweep(axis: Any, results: Sequence[CaseRecords], kind: Any) -> None:

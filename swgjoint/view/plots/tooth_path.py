@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import io
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from swgjoint.gear.teeth.tooth_profile import tooth_profile
-from swgjoint.pictures import save_png
+from swgjoint.pictures import png
 from swgjoint.units import deg, mm, um
 
 if TYPE_CHECKING:
@@ -64,6 +63,4 @@ def tooth_path_picture(design: Design, path: ToothPath) -> bytes:
     )
     clearance.grid(alpha=0.3)
     figure.suptitle(f"{design.drive.name}: passage of a rigid tooth")
-    out = io.BytesIO()
-    save_png(figure, out, dpi=110)
-    return out.getvalue()
+    return png(figure, dpi=110)

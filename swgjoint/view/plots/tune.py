@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +9,7 @@ import numpy as np
 
 from swgjoint.files import Outputs
 from swgjoint.json_text import json_text
-from swgjoint.pictures import save_png
+from swgjoint.pictures import png
 from swgjoint.units import arcmin
 from swgjoint.view.report.report import write_tables
 from swgjoint.view.report.tables import Cell, Table
@@ -96,9 +95,7 @@ def picture(found: Tuned) -> bytes:
     _draw_search(axes[0, 0], found)
     _draw_seeds(axes[0, 1], found)
     _draw_episode(axes[1], found)
-    out = io.BytesIO()
-    save_png(figure, out, dpi=110)
-    return out.getvalue()
+    return png(figure, dpi=110)
 
 
 def _draw_search(ax: Any, found: Tuned) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Mapping
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
@@ -10,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from swgjoint.pictures import save_png
+from swgjoint.pictures import png
 from swgjoint.units import arcmin
 from swgjoint.view.plots.runs import draw_ripple
 from swgjoint.view.recording.blueprint import is_rigid
@@ -72,14 +71,7 @@ def joint_png(runs: Mapping[str, Run], joint: str) -> bytes:
             handles, names, loc="outside upper right", ncols=min(6, len(names))
         )
     figure.suptitle(short(joint), x=0.01, ha="left", fontsize=12)
-    return png(figure)
-
-
-def png(figure: Any) -> bytes:
-    """The bytes of a picture."""
-    out = io.BytesIO()
-    save_png(figure, out, dpi=95)
-    return out.getvalue()
+    return png(figure, dpi=95)
 
 
 def plot_over_time(
