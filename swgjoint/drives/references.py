@@ -274,7 +274,14 @@ def _may_be_built(reference: str) -> bool:
 def check_joint_names(
     named: Mapping[str, set[str]], joints: tuple[str, ...], *, where: str, arm: str
 ) -> None:
-    """Refuse keys that name a joint which the arm does not have, all at once."""
+    """Refuse keys that name a joint which the arm does not have, all at once.
+
+    Args:
+        named: Joint names by the key that uses them.
+        joints: Joints of the arm.
+        where: File that is named in messages.
+        arm: Name of the arm.
+    """
     lines = [
         f"{where}: {key}.{name}: no such joint in arm {arm!r}"
         f"{_meant(key, name, joints)}; accepted: {', '.join(joints)}"

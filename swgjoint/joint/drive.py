@@ -205,7 +205,12 @@ class JointDrive:
         )
 
     def output_slope(self, theta: ArrayLike, psi: ArrayLike) -> Array:
-        """Torque on the link per torque along the torsion, -dDelta/dpsi [-]."""
+        """Torque on the link per torque along the torsion, -dDelta/dpsi [-].
+
+        Args:
+            theta: Motor angle of the input [rad].
+            psi: Output angle [rad], of a shape that broadcasts with theta.
+        """
         if self.level != "full":
             return np.ones(np.broadcast(theta, psi).shape)
         return np.asarray(1.0 - self.drive.error_at(self.drive.phases(theta, psi))[2])
@@ -238,6 +243,10 @@ class JointDrive:
         A drive without rotor has no torsion, and as error that of its map at the
         motor angle that belongs to the link (``rigid``: none). Its torque on the link
         is the torque at the joint less what the reflected rotor inertia takes.
+
+        Args:
+            model: The compiled model.
+            data: State after a step.
         """
         joint = model.joint(self.joint)
         q, v = int(joint.qposadr[0]), int(joint.dofadr[0])

@@ -25,6 +25,12 @@ def add_rotor(
 
     A body turns with the link that carries it, with all that follows from its spin;
     lumped, its kinetic energy is that of its own rotation against that link alone.
+
+    Args:
+        spec: The model, which is changed.
+        place: Joint that gets the drive.
+        name: Name of the body; the hinge is named after it.
+        rotor: ``gyroscopic`` or ``lumped``.
     """
     body = place.parent.add_body(name=name, pos=place.pos, quat=place.quat)
     body.explicitinertial = True
@@ -93,7 +99,14 @@ def add_native(
     spring: NativeSpring,
     rotor: Any,
 ) -> None:
-    """Springs, Jenkin tendons and rotor friction; only what there is."""
+    """Springs, Jenkin tendons and rotor friction; only what there is.
+
+    Args:
+        spec: The model, which is changed.
+        drive: The drive.
+        spring: Tendons that follow its mean curve.
+        rotor: Hinge of the rotor.
+    """
     assert drive.tendon is not None
     pair = rotor.name, drive.joint, drive.ratio
     polynomial = spring.linear, 0.0, spring.cubic
@@ -122,7 +135,12 @@ def has_positions(spec: mujoco.MjSpec) -> bool:
 
 
 def extend_keys(spec: mujoco.MjSpec, drives: Iterable[JointDrive]) -> None:
-    """Give every keyframe the new rotors' positions and velocities, without torsion."""
+    """Give every keyframe the new rotors' positions and velocities, without torsion.
+
+    Args:
+        spec: The model, which is changed.
+        drives: Its drives.
+    """
     rotors = [(d.rotor, d.joint, d.ratio) for d in drives if d.rotor is not None]
     if not rotors or not has_positions(spec):
         return

@@ -103,7 +103,13 @@ def friction_step(
 
 
 def stretch_after(friction: Friction, step: FrictionStep, rotation: float) -> float:
-    """Z after the rotation that the step came to [rad]."""
+    """Z after the rotation that the step came to [rad].
+
+    Args:
+        friction: Friction of the drive.
+        step: Linearised friction of the step.
+        rotation: Rotation in the step [rad].
+    """
     end = min(max(step.stretch + rotation, -step.reach), step.reach)
     work = (step.offset + step.rate * rotation) * rotation
     most = sqrt(max(0.0, step.stretch**2 + 2.0 * work / friction.stiffness))

@@ -38,7 +38,12 @@ def ratio_variation(drive: DriveMap) -> float:
 
 
 def error_of_motor(drive: DriveMap, theta: ArrayLike) -> Array:
-    """e0 at motor angles, the output where it then is [rad]. Shape of theta."""
+    """e0 at motor angles, the output where it then is [rad]. Shape of theta.
+
+    Args:
+        drive: The map.
+        theta: Motor angles of any shape [rad].
+    """
     theta = np.asarray(theta, float)
     e0, psi = np.zeros_like(theta), theta / drive.ratio
     # e0 moves psi by an arc minute, so each round shrinks the error by n_psi e0
@@ -52,6 +57,10 @@ def error_of_motor(drive: DriveMap, theta: ArrayLike) -> Array:
 
 def motor_of_link(drive: DriveMap, psi: ArrayLike) -> Array:
     """Motor angle at which the output stands at psi [rad]. Shape of psi.
+
+    Args:
+        drive: The map.
+        psi: Link angles of any shape [rad].
 
     Raises:
         ComputationError: If the error is so steep that several motor angles fit.

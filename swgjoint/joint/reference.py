@@ -105,7 +105,13 @@ class _Secant:
 def gradient_force(
     drive: DriveMap, motion: TwinMotion, *, damping: float
 ) -> tuple[float, float]:
-    """Forces on rotor and link, minus the gradient of V and the damping [N·m]."""
+    """Forces on rotor and link, minus the gradient of V and the damping [N·m].
+
+    Args:
+        drive: The map.
+        motion: State of the pair.
+        damping: Damping of the torsion [N·m·s/rad].
+    """
     theta, psi = drive.forces(motion.theta, motion.psi)
     _, e_theta, e_psi = drive.error_at(drive.phases(motion.theta, motion.psi))
     g_theta, g_psi = 1.0 / drive.ratio + float(e_theta), -1.0 + float(e_psi)
@@ -211,7 +217,13 @@ def scheme_force(
 
 
 def metric_of(drive: DriveMap, force: SchemeForce, *, timestep: float) -> Array:
-    """What the step adds to the inertia of the pair, h² (p g g' + p_b b b'). (2, 2)."""
+    """What the step adds to the inertia of the pair, h² (p g g' + p_b b b'). (2, 2).
+
+    Args:
+        drive: The map.
+        force: Linearised force of the step.
+        timestep: Step h [s].
+    """
     g = np.array([force.g_theta, force.g_psi])
     metric = force.metric * np.outer(g, g)
     if force.friction is not None:
@@ -253,6 +265,11 @@ def rest_after(
     """Plugin state after a step of the scheme: where each element is relaxed [rad].
 
     The end of a step is the beginning of the next; it counts there.
+
+    Args:
+        drive: The map.
+        motion: State of the pair at the end of the step.
+        timestep: Step h [s].
     """
     torsion = float(
         drive.torsion(

@@ -102,7 +102,12 @@ def damp_as_asked(
 
 
 def restore_damping(model: mujoco.MjModel, drives: Iterable[JointDrive]) -> None:
-    """Undo :func:`damp_as_asked` in a model, e.g. for another step or integrator."""
+    """Undo :func:`damp_as_asked` in a model, e.g. for another step or integrator.
+
+    Args:
+        model: The compiled model, which is changed.
+        drives: Its drives.
+    """
     for drive in drives:
         if drive.compensated:
             model.tendon_damping[model.tendon(drive.tendon).id] = drive.damping
@@ -119,7 +124,12 @@ def is_implicit(spec: mujoco.MjSpec) -> bool:
 
 
 def compensation(drive: JointDrive, timestep: float) -> float:
-    """Damping that is taken out of the base spring at a step [N·m·s/rad]."""
+    """Damping that is taken out of the base spring at a step [N·m·s/rad].
+
+    Args:
+        drive: A drive at level ``linear`` or ``native``.
+        timestep: Step h [s].
+    """
     base = drive.stiffness if drive.native is None else drive.native.linear
     share = left_share(timestep**2 * base * drive.mobility)
     return timestep * base * (1.0 - share)

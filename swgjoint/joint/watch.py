@@ -43,7 +43,12 @@ def limits(drives: Iterable[JointDrive]) -> NDArray[np.float64]:
 
 
 def add_watch(spec: mujoco.MjSpec, drives: Iterable[JointDrive]) -> None:
-    """Let the plugin compare the steps of a model with the bounds of its drives."""
+    """Let the plugin compare the steps of a model with the bounds of its drives.
+
+    Args:
+        spec: The model, which is changed.
+        drives: Its drives.
+    """
     bounds = limits(drive for drive in drives if drive.plugin is not None)
     if (bounds[:-1] == UNBOUNDED).all():
         return
@@ -57,7 +62,13 @@ def add_watch(spec: mujoco.MjSpec, drives: Iterable[JointDrive]) -> None:
 def warn_outside(
     drives: Iterable[JointDrive], *, timestep: float, integrator: mujoco.mjtIntegrator
 ) -> None:
-    """Warn, once for all joints, of a step that is outside the region at rest."""
+    """Warn, once for all joints, of a step that is outside the region at rest.
+
+    Args:
+        drives: Drives of the model.
+        timestep: Step h [s].
+        integrator: Integrator of the model.
+    """
     name = integrator.name.removeprefix("mjINT_")
     name = name if name == "RK4" else name.lower()
     regions = [check_region(d, timestep=timestep, integrator=name) for d in drives]

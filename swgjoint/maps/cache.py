@@ -112,13 +112,23 @@ def recall(
 
 
 def entry_of(store: str, parts: Mapping[str, Any]) -> Path | None:
-    """File of a result in the cache, see :func:`recall`; None if that is off."""
+    """File of a result in the cache, see :func:`recall`; None if that is off.
+
+    Args:
+        store: Name of the part of the cache.
+        parts: Everything that the result depends on.
+    """
     folder = cache_folder()
     return None if folder is None else folder / store / f"{key_of(parts)}.json"
 
 
 def recall_kept(path: Path | None, kind: type[Found]) -> Found | None:
-    """What an entry holds; None if there is none or it is damaged."""
+    """What an entry holds; None if there is none or it is damaged.
+
+    Args:
+        path: The file; None if there is no cache.
+        kind: Type that the content must have.
+    """
     if path is None:
         return None
     return read_kept(path, lambda data: json_content(data, kind))

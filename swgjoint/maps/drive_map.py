@@ -35,6 +35,14 @@ class DriveMap(Potential):
     ) -> Self:
         """A map of constant torsional stiffness [N·m/rad] without kinematic error.
 
+        Args:
+            stiffness: Torsional stiffness at the output [N·m/rad].
+            layout: Which member is fixed.
+            teeth_flexspline: Number of teeth of the flexspline.
+            teeth_circular_spline: Number of teeth of the circular spline.
+            rated_torque: Rated torque [N·m]; the other ratings follow from it.
+            name: Name of the drive.
+
         >>> from swgjoint import DriveMap
         >>> DriveMap.linear(2e4, rated_torque=50.0).torque_range
         (-100.0, 100.0)

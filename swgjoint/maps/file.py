@@ -212,6 +212,10 @@ def _plain(value: object) -> object:
 def write_map(drive: Potential, path: str | Path) -> None:
     """Write a ``.swg`` file, whole or not at all.
 
+    Args:
+        drive: The map.
+        path: File to write, ``.swg``.
+
     Raises:
         InputError: If the file cannot be written, or the reader would refuse the map.
     """

@@ -124,7 +124,12 @@ class Friction:
         return self.stiffness * stretch + creep + self.viscous * speed
 
     def steady(self, speed: float, input_torque: float) -> float:
-        """F at constant speed nu, never zero [N·m]."""
+        """F at constant speed nu, never zero [N·m].
+
+        Args:
+            speed: Speed nu between the members that rub [rad/s].
+            input_torque: Torque on the input [N·m].
+        """
         slip = float(self.yield_torque(speed, input_torque))
         return float(np.copysign(slip, speed)) + self.viscous * speed
 

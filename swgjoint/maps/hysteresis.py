@@ -74,7 +74,12 @@ class Sliders:
 
     @classmethod
     def relax(cls, elements: Sequence[Jenkin], torsion: float = 0.0) -> Sliders:
-        """Elements without torque at a torsion [rad]."""
+        """Elements without torque at a torsion [rad].
+
+        Args:
+            elements: Jenkin elements of the drive.
+            torsion: Torsion at which they carry no torque [rad].
+        """
         return cls(
             stiffness=np.array([e.stiffness for e in elements], dtype=float),
             reach=np.array([e.yield_torsion for e in elements], dtype=float),
@@ -108,6 +113,10 @@ def play_hysteresis(elements: Sequence[Jenkin], torsion: Array) -> Array:
     """Torque of the elements along a history of torsion [N·m]. Shapes (n,).
 
     The sliders start relaxed at zero torsion, as the engine resets them.
+
+    Args:
+        elements: Jenkin elements of the drive.
+        torsion: History of the torsion [rad]. Shape (n,).
     """
     total = np.zeros_like(torsion, dtype=float)
     for element in elements:
@@ -116,7 +125,12 @@ def play_hysteresis(elements: Sequence[Jenkin], torsion: Array) -> Array:
 
 
 def stretches(torsion: Array, reach: float) -> Array:
-    """Stretch x - r of one spring along a history, from rest at zero torsion [rad]."""
+    """Stretch x - r of one spring along a history, from rest at zero torsion [rad].
+
+    Args:
+        torsion: History of the torsion [rad]. Shape (n,).
+        reach: Stretch at which the spring slips [rad].
+    """
     found, rest = np.empty(len(torsion)), 0.0
     for k, x in enumerate(np.asarray(torsion, float).tolist()):
         rest = min(max(rest, x - reach), x + reach)

@@ -146,7 +146,12 @@ class Potential:
         return angle_coefficients(self.layout)[1]
 
     def phases(self, theta: ArrayLike, psi: ArrayLike) -> Array:
-        """Phases of the harmonics [rad], appended as the last axis."""
+        """Phases of the harmonics [rad], appended as the last axis.
+
+        Args:
+            theta: Motor angle of the input [rad].
+            psi: Output angle [rad], of a shape that broadcasts with theta.
+        """
         angles = np.stack(
             np.broadcast_arrays(np.asarray(theta, float), np.asarray(psi, float)), -1
         )
@@ -165,7 +170,12 @@ class Potential:
         )
 
     def torsion(self, theta: ArrayLike, psi: ArrayLike) -> Array:
-        """Torsion theta/i + e0 - psi [rad]."""
+        """Torsion theta/i + e0 - psi [rad].
+
+        Args:
+            theta: Motor angle of the input [rad].
+            psi: Output angle [rad], of a shape that broadcasts with theta.
+        """
         e0, _, _ = self.error_at(self.phases(theta, psi))
         ideal = np.asarray(theta, float) / self.ratio
         return np.asarray(ideal + e0 - np.asarray(psi, float))
@@ -174,6 +184,10 @@ class Potential:
 
     def coefficients(self, torsion: ArrayLike, derivative: int = 0) -> Array:
         """A and B, or their first or second derivative, at the given torsion.
+
+        Args:
+            torsion: Torsion of any shape [rad].
+            derivative: 0, 1 or 2 derivatives by the torsion.
 
         Returns:
             Shape torsion.shape + (n_harmonics, 2).
@@ -207,15 +221,33 @@ class Potential:
         )
 
     def energy(self, torsion: ArrayLike, theta: ArrayLike, psi: ArrayLike) -> Array:
-        """V [J]."""
+        """V [J].
+
+        Args:
+            torsion: Torsion [rad].
+            theta: Motor angle of the input [rad].
+            psi: Output angle [rad], of a shape that broadcasts with theta.
+        """
         return self._sum(torsion, self.phases(theta, psi), 0)
 
     def torque(self, torsion: ArrayLike, theta: ArrayLike, psi: ArrayLike) -> Array:
-        """dV/d(torsion) at fixed angles [N·m]."""
+        """dV/d(torsion) at fixed angles [N·m].
+
+        Args:
+            torsion: Torsion [rad].
+            theta: Motor angle of the input [rad].
+            psi: Output angle [rad], of a shape that broadcasts with theta.
+        """
         return self._sum(torsion, self.phases(theta, psi), 1)
 
     def stiffness(self, torsion: ArrayLike, theta: ArrayLike, psi: ArrayLike) -> Array:
-        """Second derivative of V by the torsion at fixed angles [N·m/rad]."""
+        """Second derivative of V by the torsion at fixed angles [N·m/rad].
+
+        Args:
+            torsion: Torsion [rad].
+            theta: Motor angle of the input [rad].
+            psi: Output angle [rad], of a shape that broadcasts with theta.
+        """
         return self._sum(torsion, self.phases(theta, psi), 2)
 
     def forces(self, theta: ArrayLike, psi: ArrayLike) -> tuple[Array, Array]:
@@ -223,12 +255,21 @@ class Potential:
 
         The second is the torque T that the drive exerts on the output; minus the
         first is the external torque that holds the input in slow motion.
+
+        Args:
+            theta: Motor angle of the input [rad].
+            psi: Output angle [rad], of a shape that broadcasts with theta.
         """
         law = self.law(theta, psi)
         return law.input_force, law.output_force
 
     def law(self, theta: ArrayLike, psi: ArrayLike) -> Law:
-        """All that the potential says at given angles; shapes of the angles."""
+        """All that the potential says at given angles; shapes of the angles.
+
+        Args:
+            theta: Motor angle of the input [rad].
+            psi: Output angle [rad], of a shape that broadcasts with theta.
+        """
         phases = self.phases(theta, psi)
         cos, sin = np.cos(phases), np.sin(phases)
         a, b = self.kinematic_error.T

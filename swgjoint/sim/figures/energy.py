@@ -61,6 +61,10 @@ def joint_energy(run: Run, j: int) -> dict[str, Any]:
 
     ``efficiency`` is work out over work in over the part at constant speed, whichever
     side drives; None where the joint has no such part or carries no torque there.
+
+    Args:
+        run: The run.
+        j: Index of the joint.
     """
     window = run.steady
     motor = _motor_work(run, j, slice(None))
@@ -103,7 +107,12 @@ def load_work(run: Run) -> float:
 
 
 def dissipation(run: Run, j: int) -> float:
-    """Damping, slipping and friction of one drive [J]; none without a rotor."""
+    """Damping, slipping and friction of one drive [J]; none without a rotor.
+
+    Args:
+        run: The run.
+        j: Index of the joint.
+    """
     transmission = run.assembly.transmissions[j]
     attached = transmission.attached
     if transmission.law is None:

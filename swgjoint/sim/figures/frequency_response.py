@@ -37,7 +37,12 @@ class TwoMass:
     """Load about the output axis [kg·m²]."""
 
     def resonance(self, stiffness: float, ratio: float) -> float:
-        """Closed form of the undamped resonance [Hz]."""
+        """Closed form of the undamped resonance [Hz].
+
+        Args:
+            stiffness: Torsional stiffness [N·m/rad].
+            ratio: Signed ratio i.
+        """
         reflected = ratio**2 * self.rotor_inertia
         compliance = 1.0 / self.link_inertia + 1.0 / reflected
         return sqrt(stiffness * compliance) / (2.0 * pi)

@@ -60,7 +60,12 @@ def run_metrics(run: Run) -> dict[str, Any]:
 
 
 def joint_metrics(run: Run, j: int) -> dict[str, Any]:
-    """Figures of one joint; torsion and error are zero, never absent, if rigid."""
+    """Figures of one joint; torsion and error are zero, never absent, if rigid.
+
+    Args:
+        run: The run.
+        j: Index of the joint.
+    """
     transmission = run.assembly.transmissions[j]
     drive, window = transmission.drive, run.steady
     rated = drive.ratings.rated_torque
@@ -125,7 +130,12 @@ def _off_command(run: Run, j: int) -> float | None:
 
 
 def orders_untold(angle: Array, highest: float | None) -> str | None:
-    """Why a record has no orders per input turn; None where it has."""
+    """Why a record has no orders per input turn; None where it has.
+
+    Args:
+        angle: Input angle over the record [rad]. Shape (n,).
+        highest: Highest order that the step resolves; None at rest.
+    """
     if highest is None:
         return "the joint has no constant speed"
     if resample(angle, angle) is None:
@@ -142,7 +152,12 @@ def _any_steady(run: Run) -> bool:
 
 
 def use_of_motor(run: Run, j: int) -> dict[str, Any]:
-    """Torque and current of one motor over the run, and how long it was at a limit."""
+    """Torque and current of one motor over the run, and how long it was at a limit.
+
+    Args:
+        run: The run.
+        j: Index of the joint.
+    """
     torque = run.motor_torque[:, j]
     limits = run.assembly.loops.limits[j]
     found: dict[str, Any] = {
@@ -177,6 +192,10 @@ def torque_ripple(run: Run, j: int) -> Array:
     """Ripple of one joint over the constant-speed part [N·m]. Shape (n_window,).
 
     Deviation of the torque less its mean and its straight line in time.
+
+    Args:
+        run: The run.
+        j: Index of the joint.
     """
     rest = torque_deviation(run, j, run.steady)
     rest = rest - rest.mean()
@@ -185,7 +204,12 @@ def torque_ripple(run: Run, j: int) -> Array:
 
 
 def highest_resolved_order(run: Run, j: int) -> float | None:
-    """Highest order per input turn that the step carries; None for a joint at rest."""
+    """Highest order per input turn that the step carries; None for a joint at rest.
+
+    Args:
+        run: The run.
+        j: Index of the joint.
+    """
     speed = np.abs(run.assembly.ratio[j] * run.assembly.trajectory.steady_velocity[j])
     if speed == 0.0:
         return None
@@ -212,6 +236,11 @@ def drive_order(run: Run, j: int, order: float) -> float | None:
 
     Others are vibrations of the arm, products of two orders, and the orders of other
     joints, which reach this one through the arm.
+
+    Args:
+        run: The run.
+        j: Index of the joint.
+        order: Order per turn of the input.
     """
     attached = run.assembly.transmissions[j].attached
     if attached.level not in HARMONIC_LEVELS or not attached.kept_orders:
