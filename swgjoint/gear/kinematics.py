@@ -23,6 +23,11 @@ def ratio(layout: str, teeth_flexspline: int, teeth_circular_spline: int) -> flo
     -60 with the circular spline fixed and +61 with the flexspline fixed for 120/122
     teeth. With the wave generator fixed the flexspline is the input.
 
+    Args:
+        layout: Which member is fixed.
+        teeth_flexspline: Number of teeth of the flexspline.
+        teeth_circular_spline: Number of teeth of the circular spline.
+
     Source:
         Thesis eq. (2.2), after Musser.
 
@@ -49,6 +54,11 @@ def member_angles(layout: str, theta: float, psi: float) -> tuple[float, float, 
     """Rotation of wave generator, flexspline and circular spline [rad].
 
     Relative to the fixed member, with theta that of the input and psi of the output.
+
+    Args:
+        layout: Which member is fixed.
+        theta: Input angle [rad].
+        psi: Output angle [rad].
     """
     angles = {
         "circular_spline_fixed": (theta, psi, 0.0),
@@ -63,6 +73,11 @@ def periodicity(layout: str, teeth_flexspline: int, teeth_circular_spline: int) 
 
     The tooth count of the fixed member; with the wave generator fixed that of the
     input member, the flexspline.
+
+    Args:
+        layout: Which member is fixed.
+        teeth_flexspline: Number of teeth of the flexspline.
+        teeth_circular_spline: Number of teeth of the circular spline.
     """
     return (
         teeth_circular_spline if layout == "circular_spline_fixed" else teeth_flexspline
