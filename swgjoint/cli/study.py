@@ -4,41 +4,12 @@ from __future__ import annotations
 
 import argparse
 import time
-from importlib import import_module
 from typing import Any
 
 from swgjoint.cli.shared.text import table
 from swgjoint.errors import InputError
 from swgjoint.files import output_folder
-
-STUDIES = {
-    "thesis": (
-        "swgjoint.validation.thesis.thesis:run_thesis",
-        "stresses of the thesis, chapters 4 to 6, with the 2D model",
-    ),
-    "ring": (
-        "swgjoint.validation.ring:run_ring",
-        "deflection of a plain ring between two rollers, thesis appendix A",
-    ),
-    "articles": (
-        "swgjoint.validation.articles.articles:run_articles",
-        "force, deflection, stress and fatigue of three articles, with the 3D model",
-    ),
-    "catalogue": (
-        "swgjoint.validation.catalogue.catalogue:run_catalogue",
-        "stiffness, losses and ratcheting of a family of drives beside a catalogue",
-    ),
-    "response": (
-        "swgjoint.validation.response:run_response",
-        "two-mass frequency response of a joint against its closed form",
-    ),
-    "control": (
-        "swgjoint.validation.control.ladder:run_control",
-        "controllers of one joint from PD to learning, on ten specimens of a drive",
-    ),
-}
-"""Name -> function that takes a StudyOptions and returns a StudyResult, and what it
-compares; imported only when chosen."""
+from swgjoint.validation.runner import STUDIES, run_study
 
 MAX_JOBS = 256
 LEAST_INERTIA, MOST_INERTIA = 1e-9, 1e6
@@ -48,7 +19,7 @@ MAX_SEEDS = 10_000
 
 def configure(parser: argparse.ArgumentParser) -> None:
     """Study, its parts, processes, output folder."""
-    listing = "; ".join(f"{name}: {text}" for name, (_, text) in STUDIES.items())
+    listing = "; ".join(f"{name}: {study.title}" for name, study in STUDIES.items())
     parser.add_argument("name", metavar="NAME", choices=STUDIES, help=listing)
     parser.add_argument(
         "--only",
@@ -114,8 +85,8 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     folder = output_folder(args.out) if args.out else None
     from swgjoint.validation.rows import StudyOptions
 
-    module, _, function = STUDIES[args.name][0].partition(":")
-    found = getattr(import_module(module), function)(
+    found = run_study(
+        args.name,
         StudyOptions(
             only=tuple(p.strip() for p in (args.only or "").split(",") if p.strip()),
             model=args.model,
@@ -126,7 +97,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
             rotor_inertia=args.rotor_inertia,
             closed_form=args.closed_form,
             progress=args.progress,
-        )
+        ),
     )
     return {
         "study": args.name,

@@ -15,8 +15,7 @@ import numpy as np
 
 from swgjoint.drives.references import load_drive
 from swgjoint.errors import InputError
-from swgjoint.files import Outputs, file_name
-from swgjoint.json_text import json_text
+from swgjoint.files import file_name
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.pictures import png
 from swgjoint.sim.figures.frequency_response import (
@@ -25,7 +24,7 @@ from swgjoint.sim.figures.frequency_response import (
     TwoMass,
     frequency_response,
 )
-from swgjoint.validation.rows import Row, StudyOptions, StudyResult
+from swgjoint.validation.rows import Page, Row, StudyOptions, StudyResult
 
 DRIVE = "CSG-25-100"
 LINK_RATIO = 1.0
@@ -79,8 +78,8 @@ def run_response(options: StudyOptions) -> StudyResult:
         name: load_drive(name, model=options.model, kinematic_error_arcmin=0.0)
         for name in references
     }
-    outputs = None if options.folder is None else Outputs(options.folder)
     rows: list[Row] = []
+    pages: dict[str, Page] = {}
     summary: list[str] = []
     predicted: list[dict[str, Any]] = []
     for number, (name, drive) in enumerate(drives.items()):
@@ -99,19 +98,13 @@ def run_response(options: StudyOptions) -> StudyResult:
         found = _measured(drive, masses, progress)
         rows += [row for measured in found for row in _rows(name, measured)]
         summary += _summary(name, found)
-        if outputs is not None:
-            outputs.write(
-                f"response-{file_name(drive.name)}.png",
-                partial(response_picture, name, found),
-            )
-    if outputs is not None:
-        content = [row.to_json() for row in rows]
-        outputs.write("response.json", lambda: json_text(content) + "\n")
+        picture = partial(response_picture, name, found)
+        pages[f"response-{file_name(drive.name)}.png"] = picture
     return StudyResult(
         rows=tuple(rows),
         summary=tuple(summary),
         more={"drives": predicted},
-        files=() if outputs is None else tuple(outputs.files),
+        pages=pages,
     )
 
 

@@ -11,6 +11,7 @@ mean radius grows with their square.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from math import pi
 
 import numpy as np
@@ -18,9 +19,7 @@ from scipy.interpolate import CubicSpline
 
 from swgjoint.errors import InputError
 from swgjoint.fe.rings.plain_ring import PlainRing, PulledRing, pull_ring
-from swgjoint.files import Outputs
 from swgjoint.gear.pulled_ring import elastica, small_deflection
-from swgjoint.json_text import json_text
 from swgjoint.units import mm
 from swgjoint.validation.rows import Row, StudyOptions, StudyResult
 from swgjoint.view.plots.plain_ring import ring_picture
@@ -76,10 +75,8 @@ def run_ring(options: StudyOptions) -> StudyResult:
     """Run the study: scaling of Table A.1, then the ring at two thicknesses.
 
     Raises:
-        InputError: If parts or a fidelity other than 2d are asked for.
+        InputError: If parts are chosen: the ring has none.
     """
-    if options.model not in (None, "2d"):
-        raise InputError(f"--model {options.model}: the plain ring is two-dimensional")
     if options.only:
         raise InputError(f"--only {','.join(options.only)}: the ring has no parts")
     cases: list[RingCase] = []
@@ -101,10 +98,11 @@ def run_ring(options: StudyOptions) -> StudyResult:
         title = f"{name} thickness {thickness:g} mm"
         cases.append(RingCase(name=title, ring=ring, pulled=pulled))
     rows = [*_scaling(), *(row for case in cases for row in _rows(case))]
+    picture = partial(ring_picture, cases, fine=REFINEMENTS[-1], total=TOTAL_mm * mm)
     return StudyResult(
         rows=tuple(rows),
         summary=tuple(_summary(case) for case in cases),
-        files=_write(options, rows, cases),
+        pages={"ring.png": picture},
     )
 
 
@@ -196,17 +194,3 @@ def _summary(case: RingCase) -> str:
         f" {TOTAL_mm:g} mm (last refinement changes it by {1e3 * abs(a - b):.2g} µm);"
         f" with small deflections b_G would be {TOTAL_mm * small / (1 + small):.4f} mm"
     )
-
-
-def _write(
-    options: StudyOptions, rows: list[Row], cases: list[RingCase]
-) -> tuple[str, ...]:
-    if options.folder is None:
-        return ()
-    outputs, table = Outputs(options.folder), [row.to_json() for row in rows]
-    outputs.write("ring.json", lambda: json_text(table) + "\n")
-    outputs.write(
-        "ring.png",
-        lambda: ring_picture(cases, fine=REFINEMENTS[-1], total=TOTAL_mm * mm),
-    )
-    return tuple(outputs.files)

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from swgjoint.errors import InputError
 from swgjoint.progress import Progress, silent
+
+Page = Callable[[], bytes | str | None]
+"""Makes the content of a file when it is written; None writes no file."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,4 +84,9 @@ class StudyResult:
     """Lines for the terminal."""
     more: dict[str, Any] = field(default_factory=dict)
     """Further keys of the JSON object."""
+    content: Mapping[str, Any] | None = None
+    """Keys of the JSON file besides ``rows``; None: the file is the list of rows."""
+    pages: Mapping[str, Page] = field(default_factory=dict)
+    """Pictures and texts by file name."""
     files: tuple[str, ...] = ()
+    """Paths of the files that were written."""

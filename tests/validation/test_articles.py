@@ -142,7 +142,7 @@ def test_rows_of_all_parts(computed, capsys, tmp_path):
     assert 500.0 < limit["ours"] < 1500.0 and limit["source_value"] is None
     assert result["failed"] == []
     names = [path.name for path in (tmp_path / "out").iterdir()]
-    assert sorted(names) == ["articles.json", "articles.png"]
+    assert sorted(names) == ["articles.csv", "articles.json", "articles.png"]
     assert (tmp_path / "out/articles.png").read_bytes().startswith(b"\x89PNG")
 
 

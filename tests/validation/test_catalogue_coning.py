@@ -18,6 +18,7 @@ from swgjoint.validation.catalogue.printed import (
     edges,
 )
 from swgjoint.validation.rows import StudyOptions
+from swgjoint.validation.runner import run_study
 
 FAILED = "coning 100 bearing, straight"
 
@@ -68,7 +69,7 @@ def test_cases_are_the_same_drive_in_other_models():
 def test_stiffness_is_that_of_the_segments(computed, tmp_path):
     """K over the catalogue, the drop by the bearing, the failed case, the picture."""
     options = StudyOptions(jobs=1, only=("coning",), folder=tmp_path)
-    found = study.run_catalogue(options)
+    found = run_study("catalogue", options)
     rows = {(row["ratio"], row["case"]): row for row in found.more["coning"]["rows"]}
     assert len(rows) == 11
     printed = catalogue_stiffness(catalogue_row(25, 50))

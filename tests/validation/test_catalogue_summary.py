@@ -22,6 +22,7 @@ from swgjoint.validation.catalogue.summary import (
     summary,
 )
 from swgjoint.validation.rows import StudyOptions
+from swgjoint.validation.runner import run_study
 from swgjoint.view.plots.catalogue import catalogue_picture
 
 
@@ -230,7 +231,7 @@ def test_individual_gears_alone(monkeypatch, tmp_path):
 
     monkeypatch.setattr(study, "run_task", instant)
     options = StudyOptions(jobs=1, only=("individuals",), folder=tmp_path)
-    found = study.run_catalogue(options)
+    found = run_study("catalogue", options)
     assert [Path(name).name for name in found.files] == ["catalogue.json"]
     written = json.loads((tmp_path / "catalogue.json").read_text())
     assert written["rows"] == []

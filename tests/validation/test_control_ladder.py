@@ -134,6 +134,7 @@ def test_command_writes_table_picture_and_values(short, tmp_path, capsys):
     assert "better on 2 of 2" in found["summary"][-1]
     assert sorted(p.name for p in (tmp_path / "new").iterdir()) == [
         "control-CSG-25-100.png",
+        "control.csv",
         "control.json",
     ]
     assert "specimens" in err

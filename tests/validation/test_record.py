@@ -114,10 +114,10 @@ def test_key_depends_on_everything():
         RunSpec(design=SHORT.design, torque=20.0, positions=2, turn=0.02),
         RunSpec(design=finer, torque=20.0, positions=2, turn=0.01),
     ]
-    assert len({spec.key for spec in (SHORT, *others)}) == 5
+    assert len({spec.name for spec in (SHORT, *others)}) == 5
     renamed = SHORT.design.with_changes({"drive.name": "other"})
     again = RunSpec(design=renamed, torque=20.0, positions=2, turn=0.01)
-    assert again.key == SHORT.key
+    assert again.name == SHORT.name
 
 
 def test_a_failure_is_recorded(monkeypatch):

@@ -28,6 +28,7 @@ def test_study_writes_rows_and_a_picture(tmp_path, capsys, monkeypatch):
     assert full[2] > 1.05 * full[1]  # the drive hardens
     assert sorted(path.name for path in tmp_path.iterdir()) == [
         "response-CSG-25-100.png",
+        "response.csv",
         "response.json",
     ]
 

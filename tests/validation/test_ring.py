@@ -113,6 +113,8 @@ def test_study_ring(monkeypatch, capsys, tmp_path):
     for a, b in zip(total[::2], total[1::2], strict=True):
         assert a["ours"] + b["ours"] == pytest.approx(1.575)
         assert b["ours"] == pytest.approx(b["thin_ring_large"], rel=0.05)
-    assert sorted(p.name for p in out.iterdir()) == ["ring.json", "ring.png"]
+    assert sorted(p.name for p in out.iterdir()) == [
+        *("ring.csv", "ring.json", "ring.png")
+    ]
     assert main(["study", "ring", "--model", "3d"]) == 2
     assert main(["study", "ring", "--only", "A.7"]) == 2

@@ -10,6 +10,7 @@ from messages import names, naming
 from swgjoint.errors import InputError
 from swgjoint.faults import validate
 from swgjoint.validation.rows import StudyOptions
+from swgjoint.validation.runner import run_study, write_study
 from swgjoint.validation.thesis import record
 from swgjoint.validation.thesis.cases import KINDS, StudyFile
 from swgjoint.validation.thesis.record import RunRecord
@@ -70,7 +71,7 @@ def result(study, folders):
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("SWGJOINT_CACHE", str(folders[0]))
         patch.setattr(record, "compute", partly)
-        return run_cases(study, StudyOptions(folder=folders[1]))
+        return write_study("thesis", run_cases(study, StudyOptions()), folders[1])
 
 
 def rows_of(result, case):
@@ -226,7 +227,7 @@ def test_table_of_micro_geometry(tmp_path, monkeypatch):
     monkeypatch.setenv("SWGJOINT_CACHE", "")
     monkeypatch.setattr(record, "compute", compute)
     options = StudyOptions(model="3d", only=("table-7.4",), folder=tmp_path / "out")
-    result = run_thesis(options)
+    result = run_study("thesis", options)
     meshes = [(s.torque, s.design.mesh.refinement, s.positions) for s in specs]
     wanted = [(20.0, 1.0, 36), (2.0, 1.0, 36), (20.0, 1.3, 6), (20.0, 1.6, 6)]
     assert sorted(meshes) == sorted(2 * wanted)

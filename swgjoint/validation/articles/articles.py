@@ -9,19 +9,16 @@ where a wave generator is in contact.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
-from swgjoint.errors import InputError
-from swgjoint.files import Outputs
 from swgjoint.gear.design.design import Design
-from swgjoint.json_text import json_text
-from swgjoint.pool import run_all
 from swgjoint.validation.articles.file import ArticlesFile, changed_design
 from swgjoint.validation.articles.lobes import lobe_rows
 from swgjoint.validation.articles.rows import deflection_rows, force_rows
 from swgjoint.validation.articles.runs import ArticleTask, Found, run_task
 from swgjoint.validation.articles.stress_rows import fatigue_rows, stress_rows
 from swgjoint.validation.rows import Row, StudyOptions, StudyResult
+from swgjoint.validation.runner import compute_all
 
 PARTS = ("deflection", "force", "stress", "fatigue")
 FINE = {"mesh.refinement": 2}
@@ -37,28 +34,22 @@ def run_articles(options: StudyOptions) -> StudyResult:
     Raises:
         InputError: If a part or the fidelity is unknown.
     """
-    if options.model not in (None, "3d"):
-        raise InputError(f"--model {options.model}: the articles need solids, 3d")
     parts = options.chosen(PARTS)
+    from swgjoint.view.plots.articles import articles_picture
+
     study = ArticlesFile.load()
-    tasks = {task.name: task for part in parts for task in tasks_of(study, part)}
-    ordered = sorted(tasks.values(), key=lambda task: -task.size)
-    results = run_all(
-        run_task,
-        ordered,
-        jobs=options.jobs,
-        stage="computations",
-        progress=options.progress,
-    )
-    found = dict(zip((task.name for task in ordered), results, strict=True))
+    tasks = [task for part in parts for task in tasks_of(study, part)]
+    found = compute_all(run_task, tasks, options)
     rows = [row for part in parts for row in rows_of(study, part, found)]
     failed = [name for name, result in found.items() if "fault" in result]
     summary = [_summary(part, study, found) for part in parts]
     summary += [f"failed: {name}: {found[name]['fault']}" for name in failed]
     more = {"source": study.source, "computations": found, "failed": failed}
-    files = _write(options, rows, parts, found)
     return StudyResult(
-        rows=tuple(rows), summary=tuple(filter(None, summary)), more=more, files=files
+        rows=tuple(rows),
+        summary=tuple(filter(None, summary)),
+        more=more,
+        pages={"articles.png": lambda: articles_picture(parts, found)},
     )
 
 
@@ -78,13 +69,13 @@ def tasks_of(study: ArticlesFile, part: str) -> list[ArticleTask]:
             ArticleTask(
                 name="force, smooth", kind="pinched", design=design, toothless=True
             ),
-            ArticleTask(name="force, large", kind="rotated", design=design, size=2),
-            ArticleTask(name="force, lobes", kind="lobes", design=design, size=4),
+            ArticleTask(name="force, large", kind="rotated", design=design, work=2),
+            ArticleTask(name="force, lobes", kind="lobes", design=design, work=4),
             ArticleTask(
                 name="force, fine",
                 kind="pinched",
                 design=design.with_changes(FINE),
-                size=15,
+                work=15,
             ),
         ]
         return tasks + [
@@ -99,13 +90,13 @@ def tasks_of(study: ArticlesFile, part: str) -> list[ArticleTask]:
     design, torques = changed_design(stress.base), stress.torques_Nm
     crowned = design.with_changes(stress.crowned)
     tasks = [
-        ArticleTask(name="four", kind="four", design=design, torques=torques, size=2),
+        ArticleTask(name="four", kind="four", design=design, torques=torques, work=2),
         ArticleTask(
             name="four, fine",
             kind="four",
             design=design.with_changes(FINE),
             torques=torques,
-            size=16,
+            work=16,
         ),
     ]
     if part == "stress":
@@ -118,7 +109,7 @@ def tasks_of(study: ArticlesFile, part: str) -> list[ArticleTask]:
     ):
         few = torques[FINE_TORQUES] if name == "fatigue, fine" else torques
         tasks.append(
-            ArticleTask(name=name, kind="fatigue", design=on, torques=few, size=size)
+            ArticleTask(name=name, kind="fatigue", design=on, torques=few, work=size)
         )
     return tasks
 
@@ -126,10 +117,10 @@ def tasks_of(study: ArticlesFile, part: str) -> list[ArticleTask]:
 def _deflected(name: str, design: Design, *, fine: bool = False) -> list[ArticleTask]:
     """On the wave generator, on one mesh or two."""
     coarse = design.with_changes(COARSE)
-    tasks = [ArticleTask(name=name, kind="deflected", design=coarse, size=2)]
+    tasks = [ArticleTask(name=name, kind="deflected", design=coarse, work=2)]
     if fine:
         more = ArticleTask(
-            name=f"{name}, fine", kind="deflected", design=design, size=8
+            name=f"{name}, fine", kind="deflected", design=design, work=8
         )
         tasks.append(more)
     return tasks
@@ -175,19 +166,3 @@ def _summary(part: str, study: ArticlesFile, found: Mapping[str, Found]) -> str:
             f" {last['worst_section']['S']:.3g}"
         )
     return ""
-
-
-def _write(
-    options: StudyOptions,
-    rows: Sequence[Row],
-    parts: Sequence[str],
-    found: Mapping[str, Found],
-) -> tuple[str, ...]:
-    if options.folder is None:
-        return ()
-    from swgjoint.view.plots.articles import articles_picture
-
-    outputs, table = Outputs(options.folder), [row.to_json() for row in rows]
-    outputs.write("articles.json", lambda: json_text(table) + "\n")
-    outputs.write("articles.png", lambda: articles_picture(parts, found))
-    return tuple(outputs.files)

@@ -35,8 +35,8 @@ class ArticleTask:
     toothless: bool = False
     torques: tuple[float, ...] = ()
     """[N·m]."""
-    size: float = 1.0
-    """Rough work, to start long ones first."""
+    work: float = 1.0
+    """Rough work, so that long computations start first."""
 
 
 def run_task(task: ArticleTask) -> Found:

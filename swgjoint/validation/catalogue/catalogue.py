@@ -13,17 +13,10 @@ is the middle of their bracket.
 
 from __future__ import annotations
 
-import csv
-import io
-from collections.abc import Mapping, Sequence
-from pathlib import Path
+from collections.abc import Mapping
 from typing import Any
 
-from swgjoint.errors import InputError
-from swgjoint.files import Outputs
 from swgjoint.gear.design.design import Design
-from swgjoint.json_text import json_text
-from swgjoint.pool import run_all
 from swgjoint.validation.catalogue.coning import (
     coning_picture,
     coning_summary,
@@ -49,7 +42,8 @@ from swgjoint.validation.catalogue.summary import (
     ratcheting_orders,
     summary,
 )
-from swgjoint.validation.rows import Row, StudyOptions, StudyResult
+from swgjoint.validation.rows import Page, Row, StudyOptions, StudyResult
+from swgjoint.validation.runner import compute_all
 
 PARTS = ("stiffness", "individuals", "ratcheting", "accuracy", "losses")
 EXTRA = ("coning",)
@@ -66,22 +60,12 @@ def run_catalogue(options: StudyOptions) -> StudyResult:
     Raises:
         InputError: If a part is unknown or a fidelity is given.
     """
-    if options.model is not None:
-        raise InputError(
-            f"--model {options.model}: every quantity here has a level of its own"
-        )
+    from swgjoint.view.plots.catalogue import catalogue_picture
+
     parts = options.chosen((*PARTS, *EXTRA) if options.only else PARTS)
     study = CatalogueFile.load()
     tasks = [task for part in parts for task in tasks_of(study, part)]
-    ordered = sorted(tasks, key=lambda task: -task.work)
-    results = run_all(
-        run_task,
-        ordered,
-        jobs=options.jobs,
-        stage="computations",
-        progress=options.progress,
-    )
-    found = dict(zip((task.name for task in ordered), results, strict=True))
+    found = compute_all(run_task, tasks, options)
     rows = [row for part in parts for row in rows_of(study, part, found)]
     failed = {name: f["fault"] for name, f in found.items() if "fault" in f}
     lines = summary(study, rows) + loss_lines(rows)
@@ -107,9 +91,16 @@ def run_catalogue(options: StudyOptions) -> StudyResult:
         more["coning"] = coning_summary(study, found)
         lines += more["coning"]["lines"]
     lines += [f"failed: {name}: {fault}" for name, fault in failed.items()]
-    coning = more["coning"]["rows"] if "coning" in parts else None
-    files = _write(options.folder, rows, lines, coning)
-    return StudyResult(rows=tuple(rows), summary=tuple(lines), more=more, files=files)
+    pages: dict[str, Page] = {"catalogue.png": lambda: catalogue_picture(rows)}
+    if "coning" in parts:
+        pages["coning.png"] = lambda: coning_picture(more["coning"]["rows"])
+    return StudyResult(
+        rows=tuple(rows),
+        summary=tuple(lines),
+        more=more,
+        content={"summary": lines},
+        pages=pages,
+    )
 
 
 def tasks_of(study: CatalogueFile, part: str) -> list[CatalogueTask]:
@@ -200,30 +191,3 @@ def rows_of(study: CatalogueFile, part: str, found: Mapping[str, Found]) -> list
     if part not in build:
         return []
     return [one for case in cases for one in build[part](catalogue_row(*case))]
-
-
-def _write(
-    folder: Path | None,
-    rows: Sequence[Row],
-    lines: Sequence[str],
-    coning: Sequence[Any] | None,
-) -> tuple[str, ...]:
-    if folder is None:
-        return ()
-    from swgjoint.view.plots.catalogue import catalogue_picture
-
-    plain = [row.to_json() for row in rows]
-    outputs = Outputs(folder)
-    outputs.write(
-        "catalogue.json", lambda: json_text({"rows": plain, "summary": lines})
-    )
-    if plain:
-        text = io.StringIO()
-        writer = csv.DictWriter(text, fieldnames=list(plain[0]), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(plain)
-        outputs.write("catalogue.csv", text.getvalue)
-    outputs.write("catalogue.png", lambda: catalogue_picture(rows))
-    if coning is not None:
-        outputs.write("coning.png", lambda: coning_picture(coning))
-    return tuple(outputs.files)

@@ -30,8 +30,7 @@ from swgjoint.control.learning import LearningCompensation
 from swgjoint.control.motor_side import MotorPID, ideal_plan, rigid_plan
 from swgjoint.control.mpc import PredictiveController
 from swgjoint.drives.references import load_drive
-from swgjoint.files import Outputs, file_name
-from swgjoint.json_text import json_text
+from swgjoint.files import file_name
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.pool import run_all
 from swgjoint.progress import Progress, silent
@@ -48,7 +47,7 @@ from swgjoint.validation.control.bench import (
     signals_of,
 )
 from swgjoint.validation.control.specimens import nominal, specimen
-from swgjoint.validation.rows import Row, StudyOptions, StudyResult
+from swgjoint.validation.rows import Page, Row, StudyOptions, StudyResult
 
 DRIVE = "CSG-25-100"
 SEEDS = 10
@@ -215,7 +214,7 @@ def run_control(options: StudyOptions) -> StudyResult:
     """
     from swgjoint.view.plots.control import ladder_picture, ladder_table
 
-    outputs = None if options.folder is None else Outputs(options.folder)
+    pages: dict[str, Page] = {}
     references, seeds = options.only or (DRIVE,), options.seeds or SEEDS
     drives = {
         # the errors of specimens are the study's own, of more orders
@@ -236,19 +235,14 @@ def run_control(options: StudyOptions) -> StudyResult:
             rung: {key: values.tolist() for key, values in figures.items()}
             for rung, figures in found.figures.items()
         }
-        if outputs is not None:
-            outputs.write(
-                f"control-{file_name(drive.name)}.png",
-                partial(ladder_picture, name, found),
-            )
-    if outputs is not None:
-        content = {"rows": [row.to_json() for row in rows], "values": more}
-        outputs.write("control.json", lambda: json_text(content) + "\n")
+        picture = partial(ladder_picture, name, found)
+        pages[f"control-{file_name(drive.name)}.png"] = picture
     return StudyResult(
         rows=tuple(rows),
         summary=tuple(summary),
         more={"values": more},
-        files=() if outputs is None else tuple(outputs.files),
+        content={"values": more},
+        pages=pages,
     )
 
 

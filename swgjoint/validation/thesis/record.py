@@ -46,13 +46,13 @@ class RunSpec:
         }
 
     @property
-    def key(self) -> str:
+    def name(self) -> str:
         """Hash of the parts and of all other code."""
         return key_of(self.parts)
 
     @property
-    def size(self) -> float:
-        """Rough work, to start long runs first: positions times nodes."""
+    def work(self) -> float:
+        """Rough work, so that long runs start first: positions times nodes."""
         fine = float(self.design.mesh.refinement)
         work = fine**2 if self.model == "2d" else 30.0 * fine**3
         return self.positions * work

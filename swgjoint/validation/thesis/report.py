@@ -1,18 +1,13 @@
-"""Tables, report and plots of a study of the thesis, written to a folder."""
+"""Report and plots of a study of the thesis."""
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Iterator, Sequence
 from functools import partial
 from itertools import groupby
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from swgjoint.files import Outputs
-from swgjoint.json_text import json_text
-from swgjoint.validation.rows import Row
+from swgjoint.validation.rows import Page, Row
 from swgjoint.validation.thesis.cases import StudyFile
 from swgjoint.validation.thesis.checks import TrendCheck
 from swgjoint.view.plots.thesis import group_picture
@@ -52,44 +47,28 @@ in space rows are judged at T, and finer meshes are at T only""",
 }
 
 
-def write_report(
-    folder: Path,
+def report_pages(
     study: StudyFile,
     results: Sequence[CaseRecords],
     rows: Sequence[Row],
     trends: Sequence[TrendCheck],
     summary: Sequence[str],
-) -> tuple[str, ...]:
-    """Write ``thesis.csv``, ``thesis.md``, ``thesis.json`` and one plot a part.
+) -> dict[str, Page]:
+    """``thesis.md`` and one plot for each part, by file name.
 
-    Returns:
-        The paths.
+    Args:
+        study: The study file.
+        results: Runs of all cases.
+        rows: Rows of the study.
+        trends: Checks of the stated trends.
+        summary: Lines for the head of the report.
     """
-    plain_rows = [row.to_json() for row in rows]
-    outputs = Outputs(folder)
-    outputs.write("thesis.csv", lambda: _csv(plain_rows))
-    outputs.write("thesis.md", lambda: _markdown(study, results, rows, trends, summary))
-    outputs.write("thesis.json", lambda: json_text(plain_rows) + "\n")
+    pages: dict[str, Page] = {
+        "thesis.md": lambda: _markdown(study, results, rows, trends, summary)
+    }
     for part, found in groupby(results, key=lambda result: result.case.group.id):
-        outputs.write(f"{part}.png", partial(group_picture, list(found)))
-    return tuple(outputs.files)
-
-
-def _csv(rows: Sequence[dict[str, Any]]) -> str:
-    """All columns; the counts of places as text."""
-    out = io.StringIO()
-    writer = csv.DictWriter(out, fieldnames=list(rows[0]), lineterminator="\n")
-    writer.writeheader()
-    for row in rows:
-        writer.writerow(
-            {
-                key: " ".join(f"{k}:{n}" for k, n in value.items())
-                if isinstance(value, dict)
-                else value
-                for key, value in row.items()
-            }
-        )
-    return out.getvalue()
+        pages[f"{part}.png"] = partial(group_picture, list(found))
+    return pages
 
 
 def _markdown(

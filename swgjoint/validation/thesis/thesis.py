@@ -17,9 +17,9 @@ import time
 from collections.abc import Mapping, Sequence
 
 from swgjoint.gear.design.design import Design
-from swgjoint.pool import run_all
 from swgjoint.validation.reasons import WITHIN
 from swgjoint.validation.rows import Row, StudyOptions, StudyResult
+from swgjoint.validation.runner import compute_all
 from swgjoint.validation.thesis.cases import Case, StudyFile, case_of
 from swgjoint.validation.thesis.checks import (
     RankCheck,
@@ -28,6 +28,7 @@ from swgjoint.validation.thesis.checks import (
     trend_checks,
 )
 from swgjoint.validation.thesis.record import RunRecord, RunSpec, record_run
+from swgjoint.validation.thesis.report import report_pages
 from swgjoint.validation.thesis.rows import CaseRecords, increase_rows, stress_rows
 
 TENTH = 0.1
@@ -52,18 +53,10 @@ def run_cases(study: StudyFile, options: StudyOptions) -> StudyResult:
         for entry in group.cases
     ]
     plan = {case.name: _specs(study, case) for case in cases}
-    specs = {spec.key: spec for row in plan.values() for spec in row.values()}
-    ordered = sorted(specs.values(), key=lambda spec: -spec.size)
-    records = run_all(
-        record_run,
-        ordered,
-        jobs=options.jobs,
-        stage="simulations of meshing",
-        progress=options.progress,
-    )
-    found = dict(zip((spec.key for spec in ordered), records, strict=True))
-    results = [_collect(study, case, plan[case.name], found) for case in cases]
-    return _result(study, results, options, begin, len(ordered))
+    specs = [spec for row in plan.values() for spec in row.values()]
+    records = compute_all(record_run, specs, options, stage="simulations of meshing")
+    results = [_collect(study, case, plan[case.name], records) for case in cases]
+    return _result(study, results, begin, len(records))
 
 
 def _specs(study: StudyFile, case: Case) -> dict[tuple[bool, float], RunSpec]:
@@ -108,7 +101,7 @@ def _collect(
     specs: Mapping[tuple[bool, float], RunSpec],
     found: Mapping[str, RunRecord],
 ) -> CaseRecords:
-    records = {key: found[spec.key] for key, spec in specs.items()}
+    records = {key: found[spec.name] for key, spec in specs.items()}
     if case.fault is not None:
         refused = RunRecord(outcome="refused", message=case.fault)
         records = {(False, 1): refused, (True, 1): refused}
@@ -120,7 +113,6 @@ def _collect(
 def _result(
     study: StudyFile,
     results: Sequence[CaseRecords],
-    options: StudyOptions,
     begin: float,
     runs: int,
 ) -> StudyResult:
@@ -158,15 +150,13 @@ def _result(
         *_summary(shares, ranks, trends, failed, runs),
         *(f"the source contradicts itself: {text}" for text in study.contradictions),
     )
-    files: tuple[str, ...] = ()
-    if options.folder is not None:
-        from swgjoint.validation.thesis.report import write_report
-
-        seconds = time.perf_counter() - begin
-        files = write_report(
-            options.folder, study, results, rows, trends, (*summary, f"{seconds:.0f} s")
-        )
-    return StudyResult(rows=tuple(rows), summary=summary, more=more, files=files)
+    lines = (*summary, f"{time.perf_counter() - begin:.0f} s")
+    return StudyResult(
+        rows=tuple(rows),
+        summary=summary,
+        more=more,
+        pages=report_pages(study, results, rows, trends, lines),
+    )
 
 
 def _share(rows: Sequence[Row], column: str) -> dict[str, int]:

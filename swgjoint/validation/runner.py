@@ -1,0 +1,199 @@
+"""One runner for all studies: their computations, their rows and their files.
+
+A study is a function that takes :class:`StudyOptions` and returns a
+:class:`StudyResult`. It computes and writes nothing to disk; :func:`run_study` does.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from importlib import import_module
+from pathlib import Path
+from typing import Any, Protocol, TypeVar
+
+from swgjoint.errors import InputError
+from swgjoint.files import Outputs
+from swgjoint.json_text import json_text
+from swgjoint.pool import run_all
+from swgjoint.validation.rows import StudyOptions, StudyResult
+
+
+@dataclass(frozen=True, kw_only=True)
+class StudyEntry:
+    """One study: where its function is, and what it compares."""
+
+    function: str
+    """``module:function``; the module is imported only when the study runs."""
+    title: str
+    """What is compared, one line."""
+    models: tuple[str, ...] = ()
+    """Values of ``--model`` that the study accepts; its own without."""
+    model_reason: str = ""
+    """Why no other fidelity is accepted."""
+
+    def load(self) -> Callable[[StudyOptions], StudyResult]:
+        """Import the function of the study."""
+        module, _, function = self.function.partition(":")
+        loaded: Callable[[StudyOptions], StudyResult] = getattr(
+            import_module(f"swgjoint.validation.{module}"), function
+        )
+        return loaded
+
+
+STUDIES = {
+    "thesis": StudyEntry(
+        function="thesis.thesis:run_thesis",
+        title="stresses of the thesis, chapters 4 to 6, with the 2D model",
+        models=("2d", "3d"),
+    ),
+    "ring": StudyEntry(
+        function="ring:run_ring",
+        title="deflection of a plain ring between two rollers, thesis appendix A",
+        models=("2d",),
+        model_reason="the plain ring is two-dimensional",
+    ),
+    "articles": StudyEntry(
+        function="articles.articles:run_articles",
+        title="force, deflection, stress and fatigue of three articles, with the 3D"
+        " model",
+        models=("3d",),
+        model_reason="the articles need the 3D model",
+    ),
+    "catalogue": StudyEntry(
+        function="catalogue.catalogue:run_catalogue",
+        title="stiffness, losses and ratcheting of a family of drives, compared with"
+        " a catalogue",
+        model_reason="every quantity here has its own fidelity",
+    ),
+    "response": StudyEntry(
+        function="response:run_response",
+        title="two-mass frequency response of a joint against its closed form",
+        models=("2d", "3d"),
+    ),
+    "control": StudyEntry(
+        function="control.ladder:run_control",
+        title="controllers of one joint from PD to learning, on ten specimens of a"
+        " drive",
+        models=("2d", "3d"),
+    ),
+}
+"""All studies by name."""
+
+
+def run_study(name: str, options: StudyOptions) -> StudyResult:
+    """Run a study and write its files.
+
+    A folder receives ``<name>.json``, ``<name>.csv`` with all rows, and the study's own
+    pictures and texts. A file that fails is a warning and costs no other.
+
+    Args:
+        name: Key of :data:`STUDIES`.
+        options: Parts, fidelity, processes and folder.
+
+    Returns:
+        The rows and what they add up to, with the paths of the files.
+
+    Raises:
+        InputError: If there is no such study, or it does not accept an option.
+    """
+    entry = STUDIES.get(name)
+    if entry is None:
+        raise InputError(f"study {name!r}; accepted: {', '.join(STUDIES)}")
+    if options.model not in (None, *entry.models):
+        accepted = ", ".join(entry.models) or "none"
+        raise InputError(
+            f"--model {options.model}: {entry.model_reason}; accepted: {accepted}"
+        )
+    result = entry.load()(options)
+    return (
+        result if options.folder is None else write_study(name, result, options.folder)
+    )
+
+
+def write_study(name: str, result: StudyResult, folder: Path) -> StudyResult:
+    """Write the files of a study.
+
+    Args:
+        name: Name of the study and of its tables.
+        result: Rows and pages.
+        folder: Made if missing.
+
+    Returns:
+        The result with the paths of the files.
+    """
+    outputs = Outputs(folder)
+    rows = [row.to_json() for row in result.rows]
+    content = rows if result.content is None else {"rows": rows, **result.content}
+    outputs.write(f"{name}.json", lambda: json_text(content) + "\n")
+    outputs.write(f"{name}.csv", lambda: rows_csv(rows))
+    for file, make in result.pages.items():
+        outputs.write(file, make)
+    return replace(result, files=tuple(outputs.files))
+
+
+class Computation(Protocol):
+    """One computation of a study, picklable."""
+
+    @property
+    def name(self) -> str:
+        """Unique name."""
+
+    @property
+    def work(self) -> float:
+        """Rough work, so that long computations start first."""
+
+
+Task = TypeVar("Task", bound=Computation)
+Found = TypeVar("Found")
+
+
+def compute_all(
+    compute: Callable[[Task], Found],
+    tasks: Iterable[Task],
+    options: StudyOptions,
+    *,
+    stage: str = "computations",
+) -> dict[str, Found]:
+    """Results of all computations by name; equal names are computed once.
+
+    Args:
+        compute: Computes one task; picklable, called in other processes.
+        tasks: Computations of all parts.
+        options: Processes and progress.
+        stage: Name of the work for the progress.
+    """
+    by_name = {task.name: task for task in tasks}
+    ordered = sorted(by_name.values(), key=lambda task: -task.work)
+    results = run_all(
+        compute, ordered, jobs=options.jobs, stage=stage, progress=options.progress
+    )
+    return dict(zip((task.name for task in ordered), results, strict=True))
+
+
+def rows_csv(rows: Sequence[Mapping[str, Any]]) -> str | None:
+    """Rows as CSV with all their columns; counts by place as text.
+
+    Args:
+        rows: Rows as JSON; a row may lack columns of others.
+
+    Returns:
+        The text, None without rows.
+    """
+    if not rows:
+        return None
+    out = io.StringIO()
+    columns = dict.fromkeys(key for row in rows for key in row)
+    writer = csv.DictWriter(out, fieldnames=list(columns), lineterminator="\n")
+    writer.writeheader()
+    for row in rows:
+        writer.writerow({key: _cell(value) for key, value in row.items()})
+    return out.getvalue()
+
+
+def _cell(value: Any) -> Any:
+    if isinstance(value, dict):
+        return " ".join(f"{key}:{count}" for key, count in value.items())
+    return value
