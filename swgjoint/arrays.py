@@ -17,12 +17,15 @@ def frozen_array(
 
     Args:
         values: Anything that numpy converts to float64.
-        what: Name with unit, for the message.
-        ndim: Wanted number of axes, if any.
-        shape: Wanted shape, None for a free axis.
+        what: Name and unit of the quantity, for the error message.
+        ndim: Required number of axes; None accepts any.
+        shape: Required shape; None for an axis accepts any length.
 
     Raises:
         ValueError: If the shape is wrong or a value is not finite.
+
+    >>> frozen_array([1, 2, 3], "torque [N·m]", ndim=1)
+    array([1., 2., 3.])
     """
     array = np.array(values, dtype=np.float64)
     if ndim is not None and array.ndim != ndim:

@@ -1,4 +1,4 @@
-"""Hash of code for the keys of kept results: a docstring edit leaves it alone."""
+"""Hash of the source code for cache keys; docstrings do not change it."""
 
 from __future__ import annotations
 
@@ -15,17 +15,20 @@ _CODE = (".py", ".cc", ".h")
 
 @lru_cache
 def code_hash(*parts: str) -> str:
-    """Hash of what the code of parts of the package does.
+    """Hash the code of some parts of the package, ignoring comments and docstrings.
 
-    Of Python files the syntax tree counts, without docstrings; other sources count byte
-    by byte. The cache folder remembers the hash of files that did not change, because
-    parsing them takes most of a second.
+    Python files enter as their syntax tree without docstrings, other sources byte by
+    byte. The hash of unchanged files is kept in the cache folder, because parsing them
+    takes most of a second.
 
     Args:
         parts: Files and folders relative to the package: ``"gear"``, ``"units.py"``.
 
     Returns:
         64 hexadecimal digits.
+
+    >>> len(code_hash("units.py"))
+    64
     """
     files = code_files(*parts)
     content = {
@@ -49,7 +52,7 @@ def code_hash(*parts: str) -> str:
 
 
 def code_files(*parts: str) -> list[Path]:
-    """Sources in these files and folders, sorted; a missing one is an error."""
+    """Sorted source files of the given parts; a missing file fails when it is read."""
     found: set[Path] = set()
     for part in parts:
         path = PACKAGE / part
@@ -61,7 +64,7 @@ def code_files(*parts: str) -> list[Path]:
 
 
 def _meaning(source: bytes) -> bytes:
-    """Syntax tree without strings that stand alone, which are docstrings."""
+    """Syntax tree without string statements, which are docstrings."""
     tree = ast.parse(source)
     for node in ast.walk(tree):
         body = getattr(node, "body", None)

@@ -1,4 +1,4 @@
-"""Named columns of numbers from a CSV file, every fault one clear line."""
+"""Read named columns of numbers from a CSV file; each fault is reported in one line."""
 
 from __future__ import annotations
 
@@ -16,48 +16,52 @@ from numpy.typing import NDArray
 from swgjoint.errors import InputError
 
 MAX_BYTES = 200_000_000
-"""Some million samples; a longer file is not a record of one turn or one loop."""
+"""Largest accepted file [B]: several million samples, far more than a record of one
+turn or one loop needs."""
 
 
 LARGEST = 1e12
-"""In SI units: nothing that a test bench measures, its clock included, is larger, and
-powers of it are far below overflow."""
+"""Largest accepted magnitude in SI units. No quantity measured on a test bench is
+larger, not even a time stamp, and powers of this value do not overflow."""
 HEAD_LINES = 10_000
-"""A header stands within these lines, comments included."""
+"""Number of leading lines, comments included, that are searched for the header."""
 SEPARATORS = {",": "','", ";": "';'", "\t": "a tab"}
-"""Between the cells; which one, the header line says."""
+"""Accepted cell separators, with their names in messages. The header line decides
+which one a file uses."""
 _DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Sheet:
-    """Cells of a file."""
+    """Header and cells of a file, as text."""
 
     header: list[str]
     rows: list[tuple[int, list[str]]]
-    """Number of the line in the file, cells."""
+    """Line number in the file and cells of each row."""
     separator: str
 
 
 def read_columns(
     path: str | Path, quantities: Mapping[str, Mapping[str, float]]
 ) -> dict[str, NDArray[np.float64]]:
-    """Columns in SI units, separated by commas, semicolons or tabs.
+    """Read columns of numbers and convert them to SI units.
 
-    Lines that begin with ``#`` are comments; the last one before the numbers may be the
-    header, as ``numpy.savetxt`` writes it.
+    Commas, semicolons or tabs separate the cells. Lines that begin with ``#`` are
+    comments; the last one before the numbers may be the header, as written by
+    ``numpy.savetxt``.
 
     Args:
         path: File with one header line.
-        quantities: Per quantity the accepted column names with their factor to SI.
+        quantities: Accepted column names of each quantity, with the factor that
+            converts the column to SI.
 
     Returns:
-        One array per quantity, all of one length.
+        One array per quantity, all of the same length.
 
     Raises:
-        InputError: If the file cannot be read, a column is missing or doubled, or a
-            cell is no finite number of a size that can be measured; names file and
-            line.
+        InputError: If the file cannot be read, if a column is missing or occurs twice,
+            or if a cell is not a finite number of at most :data:`LARGEST`. The message
+            names the file and the line.
     """
     path = Path(path)
     sheet = _sheet(path, _wanted(quantities))
@@ -90,7 +94,7 @@ def read_columns(
 
 
 def header_of(path: str | Path) -> list[str]:
-    """Names of the columns, none where :func:`read_columns` refuses the file."""
+    """Column names; an empty list if :func:`read_columns` would reject the file."""
     try:
         return _sheet(Path(path), "", limit=HEAD_LINES).header
     except InputError:
@@ -98,7 +102,7 @@ def header_of(path: str | Path) -> list[str]:
 
 
 def _sheet(path: Path, wanted: str, limit: int | None = None) -> Sheet:
-    """Header and cells of a file, of the first lines only if there is a limit."""
+    """Header and cells of a file, or of its first ``limit`` lines."""
     lines = _text(path).splitlines()[:limit]
     body = [
         (number, line)
@@ -152,7 +156,7 @@ def _cells(path: Path, lines: list[str], separator: str) -> list[list[str]]:
 
 
 def _separator(line: str) -> str:
-    """What separates most cells of a line; a comma if nothing does."""
+    """Most frequent separator in a line; a comma if there is none."""
     return max(SEPARATORS, key=line.count)
 
 
@@ -161,7 +165,7 @@ def _is_comment(line: str) -> bool:
 
 
 def _is_numeric(line: str) -> bool:
-    """Whether a line holds numbers alone."""
+    """Whether all cells of a line are finite numbers."""
     try:
         return all(
             isfinite(float(cell.strip(' "'))) for cell in line.split(_separator(line))

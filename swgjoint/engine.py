@@ -1,4 +1,4 @@
-"""Library of the engine plugin and its registration with MuJoCo; imports nothing heavy.
+"""Location of the MuJoCo plugin library and its registration; imports only ``sys``.
 
 The package's entry point in the group ``mujoco.plugins`` is :func:`register`: MuJoCo's
 Python package calls it at the end of its own import, so that saved models with drives
@@ -14,15 +14,15 @@ MUJOCO_VERSION = "4.0.0"
 
 
 def library() -> Path:
-    """Where the installed package keeps the plugin library."""
+    """Path of the plugin library in the installed package."""
     return Path(__file__).parent / "plugin" / "libswgjoint_plugin.so"
 
 
 def register() -> bool:
-    """Register the plugin with MuJoCo if that is imported and everything fits.
+    """Register the plugin if MuJoCo is imported and has the required version.
 
-    Silent otherwise: ``swgjoint.load_plugin`` and ``swgjoint doctor`` say what is
-    missing.
+    A failure is silent here; ``swgjoint.load_plugin`` and ``swgjoint doctor`` report
+    what is missing.
 
     Returns:
         Whether the plugin is registered.

@@ -1,4 +1,7 @@
-"""Exceptions that say what, the value with its unit, where, and what is accepted."""
+"""Exceptions and solver outcomes.
+
+Each message names the fault, its place, the value with its unit, and what is accepted.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +13,7 @@ class SwgError(Exception):
 
 
 class InputError(SwgError, ValueError):
-    """Bad input: a file, key, name or value that cannot be used (exit status 2)."""
+    """A file, key, name or value that cannot be used (exit status 2)."""
 
 
 class DesignError(InputError):
@@ -18,23 +21,23 @@ class DesignError(InputError):
 
 
 class MapFileError(InputError):
-    """A ``.swg`` file that is damaged, hostile or of another schema."""
+    """A ``.swg`` file that is damaged, malicious or of an unsupported schema."""
 
 
 class MissingExtraError(SwgError, ImportError):
-    """An optional dependency is needed and not installed."""
+    """An optional dependency that is needed but not installed."""
 
 
 class ComputationError(SwgError, RuntimeError):
-    """A computation that failed; carries the outcome's advice (exit status 1)."""
+    """A failed computation; the message includes advice (exit status 1)."""
 
 
 class OutputWarning(UserWarning):
-    """A file that belongs to a result could not be written; the result stands."""
+    """An output file could not be written; the result itself remains valid."""
 
 
 def out_of_memory(error: Exception) -> bool:
-    """Whether memory ran out; MuJoCo reports that by errors of its own."""
+    """Whether an error means that memory ran out, including errors of MuJoCo."""
     return isinstance(error, MemoryError) or "could not allocate" in str(error).lower()
 
 

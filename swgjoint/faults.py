@@ -1,6 +1,6 @@
-"""Faults of an input file, all at once: one line per fault with path, value, unit.
+"""Validation of input files: all faults at once, one line each with path and value.
 
-Shared by every TOML file of the package: designs, scenes, sweeps.
+All TOML files of the package use it: designs, scenes, sweeps.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ class Section(BaseModel):
 
 
 class Fault(ValueError):
-    """Faults between several keys: (path below the table, message)."""
+    """Faults that concern several keys: pairs (path below the table, message)."""
 
     def __init__(self, *lines: tuple[str, str]) -> None:
         super().__init__("; ".join(f"{path}: {text}" for path, text in lines))
@@ -89,7 +89,11 @@ class Fault(ValueError):
 
 
 def split_unit(key: str) -> tuple[str, str]:
-    """A key without the unit that it carries in its last part, and that unit."""
+    """Split a key into its name and the unit in its last part.
+
+    >>> split_unit("face_width_mm")
+    ('face_width', 'mm')
+    """
     for suffix, unit in _UNITS.items():
         if key == suffix or key.endswith("_" + suffix):
             return key.removesuffix(suffix).removesuffix("_"), unit
@@ -97,7 +101,7 @@ def split_unit(key: str) -> tuple[str, str]:
 
 
 def unit_of(key: str) -> str:
-    """Unit that a key carries in its last part, or the empty string.
+    """Unit in the last part of a key, or the empty string.
 
     >>> unit_of("flexspline.rim_mm"), unit_of("torque_Nm")
     ('mm', 'N·m')
@@ -106,7 +110,11 @@ def unit_of(key: str) -> str:
 
 
 def shorten(text: str, most: int = 60) -> str:
-    """A foreign text as a message repeats it: cut, without control characters.
+    """Shorten text from a file for a message and replace control characters.
+
+    Args:
+        text: The text.
+        most: Largest length of the result [characters].
 
     >>> shorten("a" * 100, 20)
     'aaaaaaaaaaaaaaaaa...'
@@ -122,10 +130,17 @@ def validate(
     where: str,
     error: type[InputError] = InputError,
 ) -> Model:
-    """The model filled from plain data.
+    """Build a model from plain data.
+
+    Args:
+        model: The class of the table.
+        data: Keys and values as read from the file.
+        where: Name of the file, for messages.
+        error: Exception class to raise.
 
     Raises:
-        InputError: With one line per fault: file, key path, value with unit, accepted.
+        InputError: With one line per fault: file, key path, value with unit, and what
+            is accepted.
     """
     try:
         return model.model_validate(dict(data))
@@ -183,8 +198,8 @@ def _walk(
 ) -> tuple[str, type[BaseModel] | None, Any]:
     """Dotted path, owning model and field of a location.
 
-    pydantic puts the tag of a discriminated union into the location; it is no part of
-    the file's path and is left out.
+    pydantic includes the tag of a discriminated union in the location. The tag is not
+    part of the path in the file and is omitted.
     """
     path, owner, info = "", model, None
     here: type[BaseModel] | None = model
@@ -219,7 +234,7 @@ def _tag(model: type[BaseModel]) -> str:
 
 
 def models_in(annotation: Any) -> list[type[BaseModel]]:
-    """Models that a type annotation holds, through unions and Annotated."""
+    """Models in a type annotation, including those inside unions and Annotated."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]
     found: list[type[BaseModel]] = []
@@ -229,7 +244,7 @@ def models_in(annotation: Any) -> list[type[BaseModel]]:
 
 
 def _limits(info: Any, key: str) -> str:
-    """Bounds of a field with unit, e.g. ``> 0 mm and <= 20 mm``."""
+    """Bounds of a field with their unit, e.g. ``> 0 mm and <= 20 mm``."""
     unit = unit_of(key)
     metadata = list(info.metadata)
     for inner in getattr(info.annotation, "__args__", ()):  # items of a list, X | None
@@ -245,7 +260,7 @@ def _limits(info: Any, key: str) -> str:
 
 
 def _example(info: Any, key: str, path: str, kind: str) -> str:
-    """How a list or a table is written, e.g. ``, e.g. [0, 0, 60]``; else empty."""
+    """Example of a list or a table, e.g. ``, e.g. [0, 0, 60]``; else empty."""
     annotation = getattr(info, "annotation", None)
     if annotation is None:
         return ""
@@ -289,7 +304,7 @@ def _accepted(info: Any, key: str) -> str:
 
 
 def _shown(value: Any, key: str) -> str:
-    """Value as the file has it, cut to a line, with its unit."""
+    """Value as written in the file, shortened, with its unit."""
     text = (
         {True: "true", False: "false"}[value]
         if value is True or value is False

@@ -1,4 +1,4 @@
-"""Outputs that are written whole or not at all."""
+"""Atomic output files: a file is either complete or absent."""
 
 from __future__ import annotations
 
@@ -18,17 +18,18 @@ from swgjoint.errors import InputError, OutputWarning, SwgError, out_of_memory
 from swgjoint.json_text import json_text
 
 DEEPEST = 100
-"""Folders inside each other in the path of an output: making them is recursive."""
+"""Largest depth of the path of an output, because folders are created recursively."""
 LONGEST_NAME = 60
-"""Characters of a foreign name within that of a file, 240 bytes in UTF-8 at most."""
+"""Largest number of characters that a name from an input file contributes to a file
+name; at most 240 bytes in UTF-8."""
 
 
 @contextmanager
 def whole(path: Path) -> Iterator[Path]:
-    """A file beside the target that takes its place at the end if nothing fails.
+    """Write a temporary file that replaces the target if nothing fails.
 
-    Its name tells the machine and the process. What a killed process has left beside
-    this target goes when the next one begins.
+    The temporary file is in the folder of the target; its name contains the host and
+    the process. Temporary files left by killed processes of this host are removed.
     """
     host = hashlib.sha256(platform.node().encode()).hexdigest()[:8]
     start = f".{path.name[:40]}.{host}-"
@@ -44,7 +45,7 @@ def whole(path: Path) -> Iterator[Path]:
 
 
 def _clear(folder: Path, left: re.Pattern[str]) -> None:
-    """Remove temporary files of processes of this machine that are gone."""
+    """Remove temporary files of processes of this host that have ended."""
     with suppress(OSError):  # no such folder, or another process removes them too
         for name in os.listdir(folder):
             found = left.fullmatch(name)
@@ -65,7 +66,11 @@ def _is_gone(process: int) -> bool:
 
 
 def write_whole(path: str | Path, data: bytes | str) -> Path:
-    """Write beside the target and rename, so that no reader sees half a file.
+    """Write a temporary file and rename it, so that no reader sees an incomplete file.
+
+    Args:
+        path: The target.
+        data: Content; text is encoded as UTF-8.
 
     Raises:
         InputError: If the folder does not exist or cannot be written.
@@ -83,14 +88,14 @@ def write_whole(path: str | Path, data: bytes | str) -> Path:
 def attempt_output(
     path: str | Path, *, unless: Callable[[], bool] = lambda: False
 ) -> Iterator[None]:
-    """Turn whatever keeps a file from being written into an ``OutputWarning``.
+    """Turn a failure to write a file into an ``OutputWarning``.
 
-    A picture that cannot be drawn must not cost the figures that it would show.
+    A plot that cannot be drawn must not discard the results that it would show.
 
     Args:
         path: The file.
-        unless: Whether a failure is not that of the file but of its content, which is
-            raised.
+        unless: Called after a failure; returns True if the content rather than the
+            file is at fault, in which case the exception is raised.
     """
     try:
         yield
@@ -106,19 +111,24 @@ def attempt_output(
 
 
 class Outputs:
-    """The files of one result; one that fails is a warning and costs no other.
+    """The output files of one result; a file that fails only causes a warning.
 
     Args:
-        folder: Where they go; it is made when the first one is written.
+        folder: Output folder, created when the first file is written.
     """
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         self.files: list[str] = []
-        """Paths of those that were written."""
+        """Paths of the files that were written."""
 
     def write(self, name: str, make: Callable[[], bytes | str | None]) -> None:
-        """Write what ``make`` returns, whole; nothing where it returns None."""
+        """Write the content that ``make`` returns.
+
+        Args:
+            name: File name in the folder.
+            make: Returns the content, or None to write nothing.
+        """
         path = self._folder / name
         with attempt_output(path):
             content = make()
@@ -128,9 +138,13 @@ class Outputs:
                 self.files.append(str(path))
 
     def write_json(self, name: str, result: dict[str, Any]) -> None:
-        """Write a result with all files in its key ``files``, which this sets.
+        """Write a result as JSON and list all output files in its key ``files``.
 
-        The last one to write, so that it names no file that is not there.
+        Call this last, so that the list is complete.
+
+        Args:
+            name: File name in the folder.
+            result: The result; its key ``files`` is set.
         """
         path = str(self._folder / name)
         content = result | {"files": [path, *self.files]}
@@ -141,7 +155,12 @@ class Outputs:
         result["files"] = self.files
 
     def hand_over(self, name: str, write: Callable[[Path], object]) -> None:
-        """Let ``write`` write the file."""
+        """Let ``write`` write the file.
+
+        Args:
+            name: File name in the folder.
+            write: Called with the path of the file.
+        """
         path = self._folder / name
         with attempt_output(path):
             self._folder.mkdir(parents=True, exist_ok=True)
@@ -150,10 +169,10 @@ class Outputs:
 
 
 def read_regular(path: Path) -> bytes:
-    """Content of a regular file; a pipe or a device would never end.
+    """Content of a regular file; reading a pipe or a device might never end.
 
     Raises:
-        OSError: If it cannot be read or is something else.
+        OSError: If the file cannot be read or is not a regular file.
     """
     if not stat.S_ISREG(path.stat().st_mode):
         raise OSError(f"{path} is no regular file")
@@ -161,11 +180,15 @@ def read_regular(path: Path) -> bytes:
 
 
 def check_output_file(path: str | Path, suffix: str) -> Path:
-    """Refuse an output file that cannot be written, before any long work.
+    """Reject an output file that cannot be written, before a long computation starts.
+
+    Args:
+        path: The file.
+        suffix: Required suffix, including the dot.
 
     Raises:
-        InputError: If the suffix is another one, the folder is missing or read-only,
-            or the path is a folder.
+        InputError: If the suffix is wrong, if the folder is missing or read-only, or if
+            the path is a folder.
     """
     path = Path(path)
     if path.suffix != suffix:
@@ -181,10 +204,12 @@ def check_output_file(path: str | Path, suffix: str) -> Path:
 
 
 def output_folder(path: str | Path) -> Path:
-    """Refuse a folder that cannot be written, before any long work; creates nothing.
+    """Reject a folder that cannot be written, before a long computation starts.
+
+    The folder is not created.
 
     Raises:
-        InputError: If the path or one above it is a file, or is not writable.
+        InputError: If the path or one of its parents is a file or is not writable.
     """
     path = Path(path)
     _check_length(path)
@@ -212,9 +237,13 @@ def _check_length(path: Path) -> None:
 
 
 def file_name(text: str) -> str:
-    """A name from a file as part of the name of a file, in the folder it is meant for.
+    """Make a safe file name from a name in an input file.
 
-    Letters, digits, ``.``, ``_`` and ``-`` stay, so that names of drives do; a slash
-    leads nowhere. Names that differ elsewhere, or late, become the same.
+    Letters, digits, ``.``, ``_`` and ``-`` are kept, so that the names of drives do not
+    change; other characters, slashes included, become ``-``. The result is not unique:
+    names that differ only in replaced characters or beyond the 60th become equal.
+
+    >>> file_name("../CSG 25/100")
+    '-CSG-25-100'
     """
     return re.sub(r"[^\w.-]", "-", text)[:LONGEST_NAME].lstrip(".") or "-"

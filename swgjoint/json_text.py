@@ -1,4 +1,4 @@
-"""Results as JSON: numpy types converted, what is not a number becomes null."""
+"""Results as JSON: numpy types are converted, non-finite numbers become null."""
 
 from __future__ import annotations
 
@@ -12,7 +12,11 @@ from typing import Any
 
 
 def plain(value: Any) -> Any:
-    """``value`` as dicts, lists, texts, finite numbers, booleans and None."""
+    """Convert a value to dicts, lists, strings, finite numbers, booleans and None.
+
+    >>> plain({"torque_Nm": (1.5, float("nan"))})
+    {'torque_Nm': [1.5, None]}
+    """
     if value is None or isinstance(value, bool | str | int):
         return value.name.lower() if isinstance(value, Enum) else value
     if isinstance(value, float):
@@ -36,7 +40,13 @@ def plain(value: Any) -> Any:
 
 
 def json_text(value: Any, *, indent: int | None = 2, ascii_only: bool = False) -> str:
-    """One JSON document."""
+    """Format a value as one JSON document.
+
+    Args:
+        value: Anything that :func:`plain` converts.
+        indent: Indentation [spaces]; None writes one line.
+        ascii_only: Whether characters outside ASCII are escaped.
+    """
     return json.dumps(
         plain(value), indent=indent, ensure_ascii=ascii_only, allow_nan=False
     )

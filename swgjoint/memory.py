@@ -1,4 +1,4 @@
-"""Memory that a computation will take, before it begins."""
+"""Check that a computation fits in memory before it starts."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 from swgjoint.errors import ComputationError
 
 INTERPRETER = 0.25e9
-"""Python with its libraries [B]."""
+"""Memory of the Python process with its libraries [B]."""
 
 
 def available_memory() -> float | None:
@@ -30,15 +30,15 @@ def available_memory() -> float | None:
 
 
 def require_memory(what: str, required: float, *, less: str) -> None:
-    """Refuse a computation that would not fit.
+    """Reject a computation that would not fit in memory.
 
     Args:
-        what: The computation, for the message.
-        required: Estimate of its peak [B].
-        less: What would need less, for the message.
+        what: Name of the computation, for the message.
+        required: Estimated peak memory [B].
+        less: Suggestion that reduces the memory, for the message.
 
     Raises:
-        ComputationError: With both figures and what would need less.
+        ComputationError: If less than ``required`` is free.
     """
     free = available_memory()
     if free is not None and required > free:

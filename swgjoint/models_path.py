@@ -1,4 +1,4 @@
-"""Where the bundled drives, arms, scenes and catalogue tables lie."""
+"""Paths of the bundled drives, arms, scenes and catalogue tables."""
 
 from __future__ import annotations
 
@@ -16,24 +16,30 @@ KINDS = {
     "sweeps": (".toml", "a sweep"),
     "optimisations": (".toml", "an optimisation"),
 }
-"""Folders below ``models/`` with files that a command takes by name: suffix, and what
-one of them is."""
+"""Folders below ``models/`` whose files a command accepts by name: the suffix, and the
+name of one such file in messages."""
 MAX_NAME, MAX_PATH = 255, 4096
-"""Bytes of a file's name and of a path on Linux; other systems take no more."""
+"""Largest length of a file name and of a path on Linux [B]; other systems accept no
+more."""
 ECHOED = 120
-"""Characters of a reference that a message repeats whole."""
+"""Longest reference that a message quotes in full [characters]."""
 SHOWN = 12
-"""Bundled names that a message lists."""
+"""Largest number of bundled names in a message."""
 TOGETHER = {"scenes": ("arms",)}
-"""Kinds that are accepted as well wherever a kind is."""
+"""Other kinds that are accepted in place of a kind."""
 
 
 def near_names(text: str, names: Iterable[str], n: int = 3) -> list[str]:
-    """Names that a wrong one may have meant, the most likely first.
+    """Names that an unknown name may have meant, the most likely first.
 
-    A name that begins with the text, or has all its parts, is nearer than any other
-    spelling: ``size-25`` means ``size-25-100`` rather than ``size-32-50``, ``tool_rms``
-    means ``tool_path_rms`` rather than ``tool_rp``.
+    Names that begin with the text come first, then names that contain all its parts,
+    then similar spellings: ``size-25`` suggests ``size-25-100`` rather than
+    ``size-32-50``, and ``tool_rms`` suggests ``tool_path_rms`` rather than ``tool_rp``.
+
+    Args:
+        text: The unknown name.
+        names: Known names.
+        n: Largest number of suggestions.
 
     >>> near_names("CSG-25-10", ["CSG-25-100", "CHA-14-50"])
     ['CSG-25-100']
@@ -48,7 +54,7 @@ def near_names(text: str, names: Iterable[str], n: int = 3) -> list[str]:
 
 
 def is_file(reference: str | Path) -> bool:
-    """Whether there is a file of this name; a name that no file can have has none."""
+    """Whether the file exists; False for a name that is not a valid path."""
     try:
         return Path(reference).is_file()
     except (OSError, ValueError):  # too long, or with a null character
@@ -60,7 +66,11 @@ def _parts(name: str) -> set[str]:
 
 
 def models_path() -> Path:
-    """Folder of the bundled models, installed or in a clone."""
+    """Folder of the bundled models, in an installed package or in a clone.
+
+    Raises:
+        InputError: If the folder does not exist.
+    """
     package = Path(__file__).resolve().parent
     for folder in (package / "models", package.parent / "models"):
         if (folder / "drives").is_dir():
@@ -69,7 +79,11 @@ def models_path() -> Path:
 
 
 def bundled_names(kind: str, suffix: str) -> list[str]:
-    """Names of the bundled files of one kind (``drives``, ``scenes``, ...).
+    """Names of the bundled files of one kind.
+
+    Args:
+        kind: Folder below ``models/``: ``drives``, ``scenes``, ...
+        suffix: Suffix of the files, including the dot.
 
     >>> bundled_names("scenes", ".toml")[:2]
     ['bench', 'bench-chirp']
@@ -78,19 +92,19 @@ def bundled_names(kind: str, suffix: str) -> list[str]:
 
 
 def find(reference: str | Path, kind: str, suffix: str, *, what: str) -> Path:
-    """Path of a file given as a path or as the name of a bundled one.
+    """Find a file by its path or by the name of a bundled file.
 
-    An existing path wins; a reference without a folder is then looked up among the
-    bundled files, with or without its suffix.
+    An existing path takes precedence. A reference without a folder is then looked up
+    among the bundled files, with or without its suffix.
 
     Args:
         reference: Path or bundled name.
         kind: Folder below ``models/``.
         suffix: Suffix of the bundled files, with its dot.
-        what: Word for messages, e.g. ``design``.
+        what: Name of the kind in messages, e.g. ``design``.
 
     Raises:
-        InputError: If neither exists; names the bundled ones.
+        InputError: If neither exists; the message lists bundled names.
     """
     path = Path(reference)
     text = str(reference)
@@ -122,7 +136,7 @@ def find(reference: str | Path, kind: str, suffix: str, *, what: str) -> Path:
 
 
 def _listed(names: list[str]) -> str:
-    """Names in a message; where they are many, the first ones."""
+    """Names for a message, at most the first :data:`SHOWN`."""
     if len(names) <= SHOWN:
         return ", ".join(names)
     more = f"and {len(names) - SHOWN} more, see 'swgjoint list'"
@@ -130,7 +144,7 @@ def _listed(names: list[str]) -> str:
 
 
 def named_kind(name: str) -> str | None:
-    """Folder below ``models/`` that has a file of this name; None without one."""
+    """Folder below ``models/`` with a file of this name; None if there is none."""
     return next((k for k in KINDS if name in bundled_names(k, KINDS[k][0])), None)
 
 

@@ -1,4 +1,4 @@
-"""How a figure becomes a file: texts that come from elsewhere are shown as they are."""
+"""Write matplotlib figures to files; text from input files is drawn literally."""
 
 from __future__ import annotations
 
@@ -8,26 +8,26 @@ import unicodedata
 from typing import IO, Any
 
 LONGEST_WORD = 80
-"""Characters of a name in a picture; a longer one is cut."""
+"""Longest word in a picture [characters]; longer words are shortened."""
 _UNSEEN = {"Cc", "Cs", "Cf", "Co", "Cn"}
-"""Categories of characters without a shape (Unicode Standard, table 4-4)."""
+"""Categories of invisible characters (Unicode Standard, table 4-4)."""
 
 
 def save_png(figure: Any, out: IO[bytes], *, dpi: float) -> None:
-    """Draw a figure of matplotlib as PNG.
+    """Write a matplotlib figure as PNG.
 
     Args:
-        figure: Without mathematics in its texts: ``$`` is drawn as it is.
-        out: Where the bytes go.
-        dpi: Pixels per inch.
+        figure: The figure; ``$`` in its text is drawn literally, not as mathematics.
+        out: Stream that receives the bytes.
+        dpi: Resolution [pixels per inch].
     """
     from matplotlib.text import Text
     from matplotlib.ticker import FixedFormatter, FuncFormatter
 
     for text in figure.findobj(Text):
         text.set_text(plain_text(text.get_text()))
-    # the texts of ticks are set when they are drawn; those of a logarithmic scale are
-    # mathematics of matplotlib's own
+    # matplotlib sets tick labels when it draws them; those of a logarithmic axis are
+    # its own mathematics and must be parsed
     given = (FixedFormatter, FuncFormatter)
     for axes in figure.axes:
         for axis in (axes.xaxis, axes.yaxis):
@@ -51,7 +51,10 @@ def png(figure: Any, *, dpi: float) -> bytes:
 
 
 def plain_text(text: str) -> str:
-    """A text for a picture: no mathematics, no unseen characters, no endless word."""
+    """Prepare text for a picture.
+
+    Invisible characters become ``?``, long words are shortened and ``$`` is escaped.
+    """
     text = "".join(
         "?" if unicodedata.category(c) in _UNSEEN and c != "\n" else c for c in text
     )

@@ -1,4 +1,4 @@
-"""Independent runs on the processes of one machine, one thread of algebra each."""
+"""Run independent tasks in parallel processes with one linear-algebra thread each."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from swgjoint.progress import Progress, silent
 
 CACHE = "SWGJOINT_CACHE"
 WATCH_S = 1.0
-"""Time between two looks of a process for its parent."""
+"""Interval at which a worker checks that its parent is alive [s]."""
 
 Task = TypeVar("Task")
 Found = TypeVar("Found")
@@ -25,36 +25,36 @@ Found = TypeVar("Found")
 
 @dataclass(frozen=True)
 class Lost:
-    """A task whose process died every time that it was tried."""
+    """A task whose process died at every attempt."""
 
     reason: str
 
 
 class Executor(Protocol):
-    """Where tasks are computed."""
+    """Something that computes tasks in parallel."""
 
     @property
     def workers(self) -> int:
-        """Processes that compute at the same time."""
+        """Number of processes that compute at the same time."""
 
     def run(
         self, function: Callable[[Task], Found], tasks: Iterable[Task]
     ) -> Iterator[tuple[Task, Found | Lost]]:
-        """Every task with its result, in the order in which they are ready.
+        """Yield every task with its result, in the order of completion.
 
         Args:
-            function: Picklable; an exception of it ends the run.
-            tasks: Drawn when a process is about to need the next one.
+            function: Picklable function of one task; its exceptions end the run.
+            tasks: Tasks, drawn one by one when a process is about to need the next.
         """
 
 
 @dataclass(frozen=True)
 class LocalPool:
-    """Processes of this machine (joblib, loky); one job is this process itself.
+    """Processes of this machine (joblib, loky); a single worker is this process itself.
 
-    When a process dies, by the kernel for want of memory or by anybody's hand, the
-    tasks that may have killed it are tried again one at a time, which tells the one
-    that kills from those that were merely beside it.
+    A process may be killed by the kernel when memory runs out, or by a user. The tasks
+    that were running then are repeated one at a time, which identifies the task that
+    caused it.
     """
 
     workers: int
@@ -65,7 +65,7 @@ class LocalPool:
         """See :class:`Executor`."""
         from joblib.externals.loky.process_executor import BrokenProcessPool
 
-        waiting: dict[int, Task] = {}  # drawn and not back, in the order of drawing
+        waiting: dict[int, Task] = {}  # drawn, result pending, in the order of drawing
         left: Iterator[tuple[int, Task]] = enumerate(tasks)
 
         def drawn() -> Iterator[tuple[int, Task]]:
@@ -81,12 +81,12 @@ class LocalPool:
                 return
             except BrokenProcessPool:
                 pass
-            except GeneratorExit:  # the caller stops; joblib would warn of work lost
+            except GeneratorExit:  # the caller stops; joblib would warn about lost work
                 with warnings.catch_warnings():
                     warnings.simplefilter("ignore")
                     results.close()
                 raise
-            # begun in the order of drawing: those that ran are the first of the rest
+            # tasks start in the order of drawing: the first ones waiting were running
             suspects = list(waiting.items())[: self.workers]
             left = chain(list(waiting.items())[self.workers :], left)
             waiting.clear()
@@ -112,7 +112,7 @@ def _parallel(
 ) -> Generator[tuple[int, Found], None, None]:
     from joblib import Parallel, delayed, parallel_config
 
-    # small dense products gain nothing from threads that fight for the cores
+    # small dense products do not gain from several threads that compete for CPUs
     with parallel_config(
         backend="loky",
         n_jobs=jobs,
@@ -135,7 +135,7 @@ def _parallel(
 def _numbered(
     function: Callable[[Task], Found], number: int, task: Task, cache: str | None
 ) -> tuple[int, Found]:
-    # a process that an earlier run has left knows the cache of then
+    # a process kept from an earlier run may still have an old cache folder
     if cache is None:
         os.environ.pop(CACHE, None)
     else:
@@ -144,9 +144,9 @@ def _numbered(
 
 
 def _end_with(parent: int) -> None:
-    """End this process soon after its parent, whatever ended that.
+    """End this process soon after its parent has ended.
 
-    Nobody is left to take the result; what is worth keeping is kept while it computes.
+    No process is left to receive the result; intermediate results are already stored.
     """
 
     def watch() -> None:
@@ -165,17 +165,18 @@ def run_all(
     stage: str = "runs",
     progress: Progress = silent,
 ) -> list[Found]:
-    """Results in the order of the tasks, which are started in that order too.
+    """Run all tasks and return their results in the order of the tasks.
 
     Args:
-        function: Picklable; called in a fresh process unless ``jobs`` is 1.
-        tasks: Put long ones first.
-        jobs: Processes.
-        stage: Name for the progress.
-        progress: Called first of all and after every task.
+        function: Picklable function of one task; called in a worker process unless
+            ``jobs`` is 1.
+        tasks: Tasks, started in this order; put long ones first.
+        jobs: Number of processes.
+        stage: Name of the stage for the progress.
+        progress: Called before the first task and after every task.
 
     Raises:
-        ComputationError: If a process dies of a task.
+        ComputationError: If a task kills its process.
     """
     found: dict[int, Any] = {}
     progress(stage, 0, len(tasks))

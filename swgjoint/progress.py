@@ -1,4 +1,4 @@
-"""Progress of long work: a callback that libraries call and the command line shows."""
+"""Progress of long computations: a callback, and its display on the command line."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable
 
 Progress = Callable[[str, int, int], None]
-"""Called with (stage, done, total)."""
+"""Callback with the arguments (stage, done, total)."""
 
 
 def silent(stage: str, done: int, total: int) -> None:
@@ -15,19 +15,20 @@ def silent(stage: str, done: int, total: int) -> None:
 
 
 LONGEST = 100
-"""Characters of a stage, which may have a name from a file in it."""
+"""Longest stage shown [characters]; a stage may contain a name from a file."""
 
 
 class StderrProgress:
-    """One line per stage on stderr, rewritten in a terminal, sparse in a log.
+    """Print one line per stage on stderr.
 
-    The time left follows from the items that were done while this object watched: what
-    an interrupted run had already done says nothing about the speed of this one, and a
-    single item says nothing at all.
+    In a terminal the line is rewritten at most every 0.1 s; in a log a line is added at
+    most every 5 s. The remaining time is estimated only from items completed since the
+    first call of the stage, because items of an interrupted earlier run do not indicate
+    the speed of this one.
 
     Args:
-        verbose: Whether every step has a line of its own, with the time since the
-            stage began.
+        verbose: Whether to print a line for every step, with the time since the stage
+            began.
     """
 
     def __init__(self, *, verbose: bool = False) -> None:
@@ -39,7 +40,13 @@ class StderrProgress:
         self._open = False
 
     def __call__(self, stage: str, done: int, total: int) -> None:
-        """Show the stage, the share done and the time left."""
+        """Show the progress and the remaining time.
+
+        Args:
+            stage: Name of the stage.
+            done: Number of completed items.
+            total: Number of items.
+        """
         stage = "".join(c if c.isprintable() else "?" for c in stage[:LONGEST])
         now = time.monotonic()
         if stage != self._stage:
@@ -64,7 +71,7 @@ class StderrProgress:
         self._open = not end
 
     def end_line(self) -> None:
-        """End a line that is still being rewritten, so that a message can follow."""
+        """End a line that is being rewritten, so that a message can follow."""
         if self._open:
             print(file=sys.stderr)
             self._open = False

@@ -1,4 +1,4 @@
-"""Where the figures of a benchmark come from."""
+"""Provenance of benchmark results."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ PACKAGES = ("mujoco", "numpy", "scipy", "scikit-fem")
 
 
 def provenance(*, seed: int | None = None) -> dict[str, Any]:
-    """Commit, versions, machine, date.
+    """Commit, package versions, machine and date of a result.
 
     Args:
-        seed: Of whatever was drawn; None where nothing was.
+        seed: Seed of the random numbers; None if there were none.
 
     Returns:
-        ``commit`` is None outside a checkout, and ends ``+`` where files of the
-        package differ from it.
+        A table for JSON. Its ``commit`` is None outside a checkout and ends with ``+``
+        if files of the package have been changed since that commit.
     """
     versions: dict[str, str | None] = {
         "swgjoint": __version__,
@@ -64,7 +64,7 @@ def _commit() -> str | None:
             return None
         return done.stdout.strip()
 
-    # a checkout of something else may lie above an installed package
+    # an installed package may be inside the checkout of another project
     if not git("ls-files", "errors.py"):
         return None
     commit = git("rev-parse", "--short=12", "HEAD")

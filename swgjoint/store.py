@@ -1,8 +1,8 @@
-"""Files that a run keeps and a later run reads: written whole, read through one door.
+"""Cache files: results that one run writes and a later run reads.
 
-Each file carries the SHA-256 of its content. It is checked before anything of the
-content is parsed, and what was parsed has the type that the caller names; whatever else
-a file may be is damaged, and a store computes it again.
+Each file contains the SHA-256 of its content, which is checked before the content is
+parsed. The parsed content must have the type that the caller names. Any other file
+counts as damaged, and its content is computed again.
 """
 
 from __future__ import annotations
@@ -38,13 +38,14 @@ _TAIL = len(_COMMENT) + 64
 
 
 class DamagedError(InputError):
-    """A kept file that is not what a run has written."""
+    """A cache file whose content is not what was written."""
 
 
 def cache_folder() -> Path | None:
-    """Folder of the cache: ``SWGJOINT_CACHE``, else the platform's; None if off.
+    """Folder of the cache; None if the cache is off.
 
-    An empty ``SWGJOINT_CACHE`` switches the cache off.
+    The environment variable ``SWGJOINT_CACHE`` names the folder; if it is empty, the
+    cache is off. Without the variable the cache folder of the platform is used.
     """
     named = os.environ.get("SWGJOINT_CACHE")
     if named is not None:
@@ -56,7 +57,7 @@ def cache_folder() -> Path | None:
             local = os.environ.get("LOCALAPPDATA")
             base = Path(local) if local else Path.home() / "AppData" / "Local"
             return base / "swgjoint" / "Cache"
-        # XDG base directories: a relative path is to be ignored
+        # XDG Base Directory Specification: relative paths must be ignored
         xdg = os.environ.get("XDG_CACHE_HOME", "")
         base = Path(xdg) if os.path.isabs(xdg) else Path.home() / ".cache"
         return base / "swgjoint"
@@ -65,7 +66,7 @@ def cache_folder() -> Path | None:
 
 
 def json_file(content: Any) -> bytes:
-    """A JSON object whose first entry ``sha256`` is the hash of the rest.
+    """Encode a JSON object whose first entry ``sha256`` is the hash of the rest.
 
     Args:
         content: A dataclass or mapping with at least one entry.
@@ -76,10 +77,10 @@ def json_file(content: Any) -> bytes:
 
 
 def json_content(data: bytes, kind: type[T]) -> T:
-    """The content of a JSON file, with the types of ``kind``.
+    """Decode a JSON file of :func:`json_file`, with the types of ``kind``.
 
     Args:
-        data: The file.
+        data: Content of the file.
         kind: A dataclass or a type such as ``dict[str, Any]``.
 
     Raises:
@@ -103,7 +104,7 @@ def _reader(kind: Any) -> TypeAdapter[Any]:
 
 
 def arrays_file(arrays: Mapping[str, Any]) -> bytes:
-    """A file of ``numpy.load`` with the hash as the comment of the archive."""
+    """Encode arrays as an ``.npz`` archive whose comment is the hash."""
     out = io.BytesIO()
     np.savez_compressed(out, **arrays)
     body = out.getvalue()
@@ -111,7 +112,7 @@ def arrays_file(arrays: Mapping[str, Any]) -> bytes:
 
 
 def arrays_content(data: bytes) -> dict[str, Any]:
-    """Arrays of a file by name.
+    """Decode the arrays of :func:`arrays_file`, by name.
 
     Raises:
         DamagedError: If the checksum is wrong.
@@ -134,11 +135,11 @@ def _check(body: bytes, stated: re.Match[bytes] | None) -> None:
 
 
 def read_kept(path: Path, take: Callable[[bytes], T]) -> T | None:
-    """What a file holds that can be computed again; None if it cannot be used.
+    """Read a cache file; None if it is missing or damaged.
 
     Args:
         path: The file.
-        take: Makes the result of its bytes; whatever it raises means damage.
+        take: Converts the bytes to the result; any exception means a damaged file.
     """
     try:
         return take(read_regular(path))
@@ -150,18 +151,28 @@ def read_kept(path: Path, take: Callable[[bytes], T]) -> T | None:
 
 
 def warn_ignored(where: Path | str, why: Exception) -> None:
-    """Warn of something kept that cannot be used."""
+    """Log that a cached result is ignored.
+
+    Args:
+        where: The cache file or the name of the result.
+        why: The reason.
+    """
     _log.warning("%s ignored and computed again: %s", where, one_line(why))
 
 
 def one_line(error: Exception) -> str:
-    """One line about an error."""
+    """First line of the message of an error, or the name of its class."""
     lines = str(error).splitlines() or [type(error).__name__]
     return lines[0]
 
 
 def keep(path: Path, data: bytes) -> None:
-    """Write what can be computed again; a full disk is no reason to stop."""
+    """Write a cache file; a failure such as a full disk is only logged.
+
+    Args:
+        path: The file; its folder is created.
+        data: Its content.
+    """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         write_whole(path, data)

@@ -1,4 +1,4 @@
-"""TOML from elsewhere: size, depth and types are checked before use."""
+"""Read untrusted TOML: size, depth and types are checked before use."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ from swgjoint.errors import InputError
 from swgjoint.faults import CONTROL_CHARACTERS, shorten
 
 MAX_BYTES = 2_000_000
-"""No input file of ours is longer; a longer one is not read."""
+"""Largest accepted file [B]."""
 
 
 MAX_DEPTH = 16
-"""Tables and lists inside each other; our files have five."""
+"""Largest nesting depth of tables and lists; valid input files need five levels."""
 
 
 MAX_KEY = 200
-"""Characters of a key."""
+"""Longest accepted key [characters]."""
 
 
 _INTEGERS = range(-(2**63), 2**63)
-"""Of TOML 1.0.0, section "Integer"."""
+"""Range of integers in TOML 1.0.0, section "Integer"."""
 
 
-# more parts than MAX_DEPTH joined by dots: parsing those takes quadratic time
+# a dotted key of more than MAX_DEPTH parts, whose parsing takes quadratic time
 _LONG_KEY = re.compile(
     r"(?<![\w\"'-])[\w\"'-]++(?:[ \t]*+\.[ \t]*+[\w\"'-]++)"
     rf"{{{MAX_DEPTH}}}"
@@ -45,7 +45,7 @@ _OTHER_FILES = {
     ".rrd": "recording",
     ".csv": "table (CSV)",
 }
-"""Files of other formats, by their suffix."""
+"""Names of other file formats, by suffix."""
 
 
 _MARKS = {
@@ -55,17 +55,22 @@ _MARKS = {
     "sweep": {"plan"},
     "spec": {"spec"},
 }
-"""Tables and keys by which the files of each kind are known."""
+"""Tables and keys that identify each kind of file."""
 
 
 def read_toml(
     path: Path, *, what: str, error: type[InputError] = InputError
 ) -> dict[str, Any]:
-    """Parse a TOML file; every failure is one line.
+    """Parse a TOML file; every failure is reported in one line.
+
+    Args:
+        path: The file.
+        what: Kind of file that is expected, e.g. ``design``.
+        error: Exception class to raise.
 
     Raises:
-        InputError: If the file is missing, too long, not UTF-8, not TOML, or a file of
-            another kind than ``what``.
+        InputError: If the file is missing, too long, not UTF-8, not TOML, or of another
+            kind than ``what``.
     """
     try:
         size = path.stat().st_size
@@ -86,7 +91,7 @@ def read_toml(
 
 
 def kind_of_file(data: Mapping[str, Any]) -> str | None:
-    """What kind of file the tables belong to; None where they do not tell."""
+    """Kind of file that the tables belong to; None if it is ambiguous."""
     if set(data) == {"spec"}:
         return "spec"
     for kind in ("optimisation", "sweep"):
@@ -103,11 +108,16 @@ def _a(noun: str) -> str:
 def parse_toml(
     text: str, *, where: str, error: type[InputError] = InputError
 ) -> dict[str, Any]:
-    """Parse TOML text from elsewhere.
+    """Parse untrusted TOML text.
 
-    The one door for it: what passes is at most :data:`MAX_DEPTH` deep, its integers
-    have 64 bits, its keys are short and its texts hold no control characters, so that
-    no reader behind has to expect anything else.
+    All TOML input passes through this function. It guarantees a depth of at most
+    :data:`MAX_DEPTH`, 64-bit integers, short keys and strings without control
+    characters, so that later code can rely on these properties.
+
+    Args:
+        text: The TOML text.
+        where: Name of its source, for messages.
+        error: Exception class to raise.
 
     Raises:
         InputError: With one line about the first fault.
@@ -127,10 +137,17 @@ def parse_toml(
 
 
 def parse_value(text: str, *, where: str) -> Any:
-    """A TOML value from elsewhere; a bare word is a text.
+    """Parse one untrusted TOML value; a bare word becomes a string.
+
+    Args:
+        text: The value, as written in a TOML file.
+        where: Key or option that it belongs to, for messages.
 
     Raises:
-        InputError: If it is a value that :func:`parse_toml` refuses in a file.
+        InputError: If :func:`parse_toml` would reject the value in a file.
+
+    >>> parse_value("[0.5, 2]", where="--set"), parse_value("qca", where="--set")
+    ([0.5, 2], 'qca')
     """
     if _LONG_KEY.search(text):
         raise InputError(f"{where}: {_LONG}")
@@ -153,7 +170,7 @@ def _too_deep() -> str:
 
 
 def _first_fault(data: dict[str, Any]) -> str | None:
-    """What no file of ours holds, wherever it stands; walks without recursion."""
+    """First fault of the parsed data, found without recursion; None if valid."""
     todo: list[tuple[str, Any, int]] = [("", data, 0)]
     while todo:
         path, value, depth = todo.pop()

@@ -1,4 +1,4 @@
-"""Plain tables as TOML text (the standard library reads TOML and does not write it)."""
+"""Write TOML text, which the standard library can only read."""
 
 from __future__ import annotations
 
@@ -9,7 +9,13 @@ from typing import Any
 
 
 def toml_text(data: Mapping[str, Any]) -> str:
-    """Nested tables of numbers, texts, booleans, lists and lists of tables as TOML."""
+    """Format nested tables of numbers, strings, booleans and lists as TOML.
+
+    >>> print(toml_text({"drive": {"module_mm": 0.5, "teeth": [100, 102]}}), end="")
+    [drive]
+    module_mm = 0.5
+    teeth = [100, 102]
+    """
     lines: list[str] = []
     _write(data, (), lines)
     return "\n".join(lines).strip() + "\n"

@@ -1,6 +1,11 @@
-"""Conversion factors at the rim of the package; everything inside is SI.
+"""Conversion factors for inputs and outputs; the package itself computes in SI units.
 
-``value_in_mm * mm`` is metres, ``angle_in_rad / arcmin`` is arc minutes.
+Multiply by a factor to convert to SI and divide by it to convert from SI:
+
+>>> 120 * mm
+0.12
+>>> round(1e-3 / arcmin, 3)
+3.438
 """
 
 from __future__ import annotations
