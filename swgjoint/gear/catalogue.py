@@ -1,4 +1,4 @@
-"""Catalogue tables, and the ratings of a design that states none."""
+"""Catalogue tables, and default ratings of a design from them."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from swgjoint.models_path import models_path
 from swgjoint.units import mm
 
 SIZE = 2.54 * mm
-"""Pitch diameter of one catalogue size: a tenth of an inch [m]."""
+"""Pitch diameter per unit of catalogue size: a tenth of an inch [m]."""
 FITS_WITHIN = 2.0
-"""A row fits a design whose pitch diameter and ratio are within this factor."""
+"""A row applies to a design if pitch diameter and ratio are within this factor."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,7 +35,7 @@ class CatalogueRow:
 
     @property
     def name(self) -> str:
-        """Name as catalogues write it."""
+        """Name as in catalogues, e.g. ``CSG-25-100``."""
         return f"{self.series}-{self.size}-{self.ratio}"
 
     @property
@@ -49,6 +49,12 @@ def table(name: str) -> tuple[dict[str, float | str | None], ...]:
     """Rows of a bundled catalogue table; empty cells are None, numbers are floats.
 
     Units are in the column names, sources in the comment lines of the file.
+
+    Args:
+        name: Name of the table, without ``.csv``.
+
+    Raises:
+        InputError: If there is no such table.
     """
     path = models_path() / "catalogue" / f"{name}.csv"
     if not path.is_file():
@@ -67,7 +73,7 @@ def _cell(text: str) -> float | str | None:
 
 @lru_cache
 def catalogue_rows() -> tuple[CatalogueRow, ...]:
-    """Every component set with ratings and with the limits T1 and T2 of its size."""
+    """Component sets with their ratings and the torque limits T1 and T2 of the size."""
     limits = {row["size"]: (row["T1_Nm"], row["T2_Nm"]) for row in table("stiffness")}
     rows = []
     for row in table("ratings"):
@@ -91,11 +97,11 @@ def catalogue_rows() -> tuple[CatalogueRow, ...]:
 
 
 def named_rows() -> tuple[CatalogueRow, ...]:
-    """Every drive that has a name: the component sets, then other series.
+    """All drives of the catalogue: the component sets, then the other series.
 
-    Another series has a drive where ``accuracy.csv`` states its accuracy at that size;
-    it takes the ratings of the component set of its size and ratio, for the tables hold
-    none of its own.
+    Another series has a drive of a size if ``accuracy.csv`` states its accuracy. Its
+    ratings are those of the component set of the same size and ratio, because the
+    tables contain no ratings of other series.
     """
     rows = catalogue_rows()
     others = dict.fromkeys((row["series"], row["size"]) for row in table("accuracy"))
@@ -108,7 +114,17 @@ def named_rows() -> tuple[CatalogueRow, ...]:
 
 
 def nearest_row(pitch_diameter: float, ratio: float) -> CatalogueRow:
-    """Row of the nearest pitch diameter [m], then of the nearest ratio, by factor."""
+    """Row with the nearest pitch diameter and, among these, the nearest ratio.
+
+    Both distances are factors (logarithmic).
+
+    Args:
+        pitch_diameter: Pitch diameter of the flexspline [m].
+        ratio: Unsigned ratio with the circular spline fixed [-].
+
+    >>> nearest_row(62e-3, 105).name
+    'CSG-25-100'
+    """
     return min(
         catalogue_rows(),
         key=lambda row: (
@@ -119,13 +135,14 @@ def nearest_row(pitch_diameter: float, ratio: float) -> CatalogueRow:
 
 
 def ratings_of(design: Design) -> Ratings:
-    """Ratings of a design: its own keys, the others from the nearest catalogue row.
+    """Ratings of a design: its own keys, and defaults from the nearest catalogue row.
 
-    The row is scaled to the rated torque that the design states, else with the cube
-    of the pitch diameter. Where no row fits, T1 and T2 are 0.2 and 0.6 of the rated
-    torque, and no torque of ratcheting is told. ``source`` says which rule was used. A
-    default never breaks the order of the torques: it gives way to the design's own
-    values.
+    The row is scaled to the rated torque of the design or, if the design states none,
+    with the cube of the pitch diameter. If no row is within a factor of
+    :data:`FITS_WITHIN`, T1 and T2 are 0.2 and 0.6 of the rated torque, and the
+    ratcheting torque is unknown. The field ``source`` names the rule that was used.
+    Defaults are adjusted to the values of the design so that rated torque <= repeated
+    peak <= momentary peak.
     """
     given = design.ratings
     ratio = design.drive.teeth_flexspline / design.tooth_difference

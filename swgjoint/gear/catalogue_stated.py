@@ -1,4 +1,7 @@
-"""What the shipped catalogue tables state of a drive, and whether they agree."""
+"""Figures that the bundled catalogue tables state for a drive, with consistency checks.
+
+The tables are ``models/catalogue/*.csv``.
+"""
 
 from __future__ import annotations
 
@@ -9,8 +12,8 @@ from swgjoint.errors import InputError
 from swgjoint.gear.catalogue import CatalogueRow, table
 
 SIMILAR = 1.6
-"""Torsion at T1 varies by less than this factor about the median of its ratio class:
-T1 and K1 both grow with the cube of the size, so a misplaced digit stands out."""
+"""Largest factor between the torsion T1/K1 of a row and the median of its ratio class.
+T1 and K1 both grow with the cube of the size, so a misplaced digit is detected."""
 
 _PER_TABLE = 1e4  # K1 to K3 are in 1e4 N·m/rad
 _STATED = (
@@ -23,18 +26,18 @@ _STATED = (
 
 @dataclass(frozen=True, kw_only=True)
 class StatedLosses:
-    """Losses of one drive as a catalogue states them [N·m], [-]."""
+    """Losses of one drive as stated in a catalogue."""
 
     rated_torque: float
-    """At the output."""
+    """Rated torque at the output [N·m]."""
     efficiency: float
-    """At rated torque and 2000 rpm."""
+    """Efficiency at rated torque and 2000 rpm [-]."""
     no_load_running: float
-    """At the input, 2000 rpm."""
+    """No-load running torque at the input at 2000 rpm [N·m]."""
     starting: float
-    """At the input."""
+    """Starting torque at the input [N·m]."""
     back_driving: float
-    """At the output."""
+    """Back-driving torque at the output [N·m]."""
 
 
 LOSS_KEYS = (
@@ -43,19 +46,20 @@ LOSS_KEYS = (
     "back_driving_torque_Nm",
     "efficiency_percent",
 )
-"""Losses at speed, as ``swgjoint spec`` names them."""
+"""Keys of the losses in the output of ``swgjoint spec``."""
 _LOSS_RATIO = 100
 """Ratio of every row of ``losses.csv``."""
 _MILLI = 1e-3
 LOSS_CONDITIONS = "+20 C, grease, RT1-H-CS of the same rated torque, second-hand"
-"""Of all figures of ``losses.csv``; running torque and efficiency at 2000 rpm."""
+"""Conditions of all figures in ``losses.csv``; running torque and efficiency are those
+at 2000 rpm."""
 
 
 def stated_losses(row: CatalogueRow) -> StatedLosses | None:
-    """Row of ``losses.csv`` for a component set of the same ratio and rated torque.
+    """Losses of a component set from ``losses.csv``; None if the table has no such row.
 
-    The table is another maker's (RT1-H-CS), with the sizes and rated torques of CSG at
-    a ratio of 100, and second-hand.
+    The table describes drives of another manufacturer (RT1-H-CS) with the sizes and
+    rated torques of the CSG series at a ratio of 100. Its source is second-hand.
     """
     if row.series != "CSG" or row.ratio != _LOSS_RATIO:
         return None
@@ -72,10 +76,18 @@ def stated_losses(row: CatalogueRow) -> StatedLosses | None:
 
 
 def stiffness_of(size: int, ratio: int) -> dict[str, float]:
-    """Row of ``stiffness.csv`` for a size and ratio: T1, T2 [N·m], K1 to K3 [N·m/rad].
+    """Stiffness figures of a size and ratio: T1, T2 [N·m] and K1 to K3 [N·m/rad].
+
+    Args:
+        size: Catalogue size, the pitch diameter in tenths of an inch.
+        ratio: Ratio; the row of the largest ratio class not above it applies.
 
     Raises:
-        InputError: If the table has no such row or the row contradicts itself.
+        InputError: If ``stiffness.csv`` has no such row or the row is inconsistent.
+
+    >>> figures = stiffness_of(25, 100)
+    >>> figures["T1"], round(figures["K1"])
+    (14.0, 31000)
     """
     row = _of_class("stiffness", size, ratio)
     if row is None:
@@ -95,9 +107,9 @@ def stiffness_of(size: int, ratio: int) -> dict[str, float]:
 def stated_figures(row: CatalogueRow) -> dict[str, float | None]:
     """What the tables state of one drive besides stiffness and ratings; else None.
 
-    A ratio class holds from its own ratio up to the next class of the series. The
-    torques of ratcheting and buckling and the inertia are those of CSG, the losses
-    those of :func:`stated_losses`.
+    A ratio class applies from its own ratio up to the next class of the series.
+    Ratcheting torque, buckling torque and inertia are stated for the CSG series only;
+    the losses are those of :func:`stated_losses`.
     """
     accuracy = _of_class("accuracy", row.size, row.ratio, series=row.series) or {}
     figures: dict[str, float | None] = dict.fromkeys(LOSS_KEYS)
@@ -157,7 +169,7 @@ def _faults(row: dict[str, float | str | None]) -> list[str]:
 def _of_class(
     name: str, size: int, ratio: int, *, series: str | None = None
 ) -> dict[str, float | str | None] | None:
-    """Row of the size and of the largest ratio class that is not above the ratio."""
+    """Row of a size with the largest ratio class that does not exceed the ratio."""
     rows = [
         row
         for row in table(name)

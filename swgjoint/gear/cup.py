@@ -1,4 +1,4 @@
-"""Closed-form torsion of the cup or hat behind the teeth."""
+"""Closed-form torsional stiffness of the cup or hat behind the teeth."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ def cup_torsional_stiffness(design: Design) -> float:
         \frac1K = \frac{L}{2\pi G r^3 t} + \frac{1}{4\pi G t}
             \left|\frac{1}{r_b^2} - \frac{1}{r^2}\right|
 
-    with the wall t of thesis eq. (3.50), both parts of the same thickness, r the mean
-    radius of the cylinder, r_b the bore (cup) or the clamped outer edge (hat). The
-    fillet and the elliptical shape are left out.
+    Here t is the wall thickness of both parts (Yague-Spaude (2021), eq. 3.50), r the
+    mean radius of the cylinder, and r_b the radius of the bore (cup) or of the clamped
+    outer edge (hat). The fillet and the elliptical deformation are neglected.
 
     Args:
         design: A design with a cup.
@@ -25,8 +25,14 @@ def cup_torsional_stiffness(design: Design) -> float:
     Returns:
         Stiffness [N·m/rad].
 
+    Raises:
+        ValueError: If the design has no cup.
+
     Source:
-        Bredt's formula for a closed thin section; pure shear of an annular plate.
+        Bredt's formula for a thin closed section, and pure shear of an annular plate.
+        Yague-Spaude (2021), "Computational Design, Simulation of Meshing, and Stress
+        Analysis of Strain Wave Gear Drives", doctoral dissertation, Rochester Institute
+        of Technology.
 
     >>> from swgjoint import Design
     >>> round(cup_torsional_stiffness(Design.load("reference-3d")) / 1e3)

@@ -1,4 +1,9 @@
-"""Layouts, signed ratios and the two angles that carry all periodicity."""
+"""Layouts, signed ratios, and the two relative angles of the periodic quantities.
+
+"The thesis" is Yague-Spaude (2021), "Computational Design, Simulation of Meshing, and
+Stress Analysis of Strain Wave Gear Drives", doctoral dissertation, Rochester Institute
+of Technology.
+"""
 
 from __future__ import annotations
 
@@ -46,14 +51,22 @@ def ratio(layout: str, teeth_flexspline: int, teeth_circular_spline: int) -> flo
 
 
 def angle_coefficients(layout: str) -> tuple[tuple[int, int], tuple[int, int]]:
-    """Derivatives of alpha and of beta by (theta, psi)."""
+    """Derivatives of alpha and of beta with respect to (theta, psi).
+
+    Alpha is the angle of the wave generator relative to the circular spline, beta that
+    relative to the flexspline.
+
+    >>> angle_coefficients("circular_spline_fixed")
+    ((1, 0), (1, -1))
+    """
     return _ANGLES[layout]
 
 
 def member_angles(layout: str, theta: float, psi: float) -> tuple[float, float, float]:
     """Rotation of wave generator, flexspline and circular spline [rad].
 
-    Relative to the fixed member, with theta that of the input and psi of the output.
+    The rotations are relative to the fixed member; theta is the input angle and psi the
+    output angle.
 
     Args:
         layout: Which member is fixed.
@@ -69,10 +82,10 @@ def member_angles(layout: str, theta: float, psi: float) -> tuple[float, float, 
 
 
 def periodicity(layout: str, teeth_flexspline: int, teeth_circular_spline: int) -> int:
-    """Cycles per input turn in which a perfect gear repeats.
+    """Number of identical cycles of a perfect gear per turn of the input.
 
-    The tooth count of the fixed member; with the wave generator fixed that of the
-    input member, the flexspline.
+    It is the tooth count of the fixed member or, with the wave generator fixed, that of
+    the input member, the flexspline.
 
     Args:
         layout: Which member is fixed.

@@ -1,18 +1,19 @@
-r"""What is in series with the drive: its cup and the springs that it is mounted to.
+r"""Elastic parts in series with the teeth: the cup and the mounting springs.
 
-A boss spring lies between the flexspline and its shaft or frame, a housing spring
-between the circular spline and its own, a coupling between the wave generator and its
-own. Each carries the torque of its member, as a
-share s of the output torque T: 1 of the member that is the output, :math:`1 - 1/i` of
-the fixed one, because the wave generator takes the rest (with the circular spline fixed
-:math:`z_{cs}/z_{fs}`), :math:`1/i` of the input. Where a member
-twists by :math:`s T/k`, the output turns by s times that: a fixed member that turns by
-:math:`\varphi` turns the teeth against the wave generator, :math:`\psi = \varphi +
-(\theta - \varphi)/i`. So the output yields :math:`\sum s^2/k` per torque, and
-:math:`T^2 \sum s^2/2k` is stored; :math:`T_{wg}\,d\theta - T\,d\psi = dU` stays closed.
+A boss spring connects the flexspline to its shaft or frame, a housing spring connects
+the circular spline, and a coupling connects the wave generator. Each spring carries a
+share s of the output torque T: s = 1 for the output member, :math:`s = 1/i` for the
+input member, and :math:`s = 1 - 1/i` for the fixed member (:math:`z_{cs}/z_{fs}` with
+the circular spline fixed).
 
-The shares are those of the mean over a pitch: ripple of the input torque on a spring,
-and the small turn by which it shifts the pattern over theta, are left out.
+If a member twists by :math:`s T/k`, the output turns by s times that angle. For
+example, a fixed member that turns by :math:`\varphi` also turns the teeth relative to
+the wave generator: :math:`\psi = \varphi + (\theta - \varphi)/i`. The compliance at
+the output is therefore :math:`\sum s^2/k` and the stored energy
+:math:`T^2 \sum s^2/2k`, so that :math:`T_{wg}\,d\theta - T\,d\psi = dU` is satisfied.
+
+The shares are mean values over a tooth pitch. The ripple of the input torque on a
+spring, and the small phase shift that it causes, are neglected.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from swgjoint.gear.design.design import Design, MemberName
 
 
 def torque_shares(design: Design) -> dict[MemberName, float]:
-    """Torque that each member's mounting carries, as a part of the output torque."""
+    """Torque in the mounting of each member, divided by the output torque [-]."""
     rest = 1.0 - 1.0 / design.ratio
     flexspline, circular_spline = {
         "circular_spline_fixed": (1.0, rest),
@@ -33,22 +34,23 @@ def torque_shares(design: Design) -> dict[MemberName, float]:
 
 
 def coupling_share(design: Design) -> float:
-    """Torque that the coupling carries, as a part of the output torque."""
+    """Torque in the coupling, divided by the output torque [-]."""
     if design.drive.layout == "wave_generator_fixed":
         return 1.0 - 1.0 / design.ratio
     return 1.0 / design.ratio
 
 
 def series_compliance(design: Design, *, cup: bool) -> float:
-    """Compliance at the output of what is in series with the toothed members.
+    """Compliance, at the output, of the parts in series with the teeth.
 
     Args:
-        design: The drive; ``[boss]``, ``[housing]`` and ``[coupling]`` that are absent
-            do not yield.
-        cup: Whether the closed-form cup counts, where the model has none of its own.
+        design: The drive; without ``[boss]``, ``[housing]`` or ``[coupling]`` that part
+            is rigid.
+        cup: Whether to include the closed-form compliance of the cup, for models that
+            do not contain the cup.
 
     Returns:
-        [rad/(N·m)].
+        Compliance [rad/(N·m)].
     """
     share = torque_shares(design)
     behind_teeth = 0.0
@@ -70,7 +72,10 @@ def series_compliance(design: Design, *, cup: bool) -> float:
 
 
 def springs_of(design: Design) -> dict[str, float] | None:
-    """Stiffness of the springs by name, for the validity label [N·m/rad]."""
+    """Torsional stiffness of the mounting springs by name [N·m/rad]; None without any.
+
+    The validity label of a map lists them.
+    """
     parts = {
         "boss": design.boss,
         "housing": design.housing,

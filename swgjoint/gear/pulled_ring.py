@@ -14,17 +14,24 @@ from swgjoint.typing import Array
 
 
 def small_deflection(angle: ArrayLike) -> Array:
-    r"""Outward deflection over that under the force, small, inextensional.
+    r"""Small outward deflection of an inextensional ring over that at the force.
 
     .. math:: w = \frac{F R^3}{4 E I}
         \left(\cos\psi + \psi\sin\psi - \frac4\pi\right), \quad
         \psi = \frac\pi2 - \varphi
 
     Args:
-        angle: From the axis of the forces, 0 to pi/2 [rad].
+        angle: Angle from the axis of the forces, 0 to pi/2 [rad].
+
+    Returns:
+        Deflection ratio [-], 1 at the force.
 
     Source:
-        Timoshenko, Strength of Materials II, thin ring under two opposite forces.
+        Timoshenko, "Strength of Materials", part II, thin ring under two opposite
+        forces.
+
+    >>> float(small_deflection(0.0))
+    1.0
     """
     across = 0.5 * np.pi - np.asarray(angle, dtype=float)
     shape = np.cos(across) + across * np.sin(across) - 4.0 / np.pi
@@ -33,14 +40,14 @@ def small_deflection(angle: ArrayLike) -> Array:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Elastica:
-    """Inextensional ring with large rotations, one quarter."""
+    """Large deflection of an inextensional ring pulled by two opposite forces."""
 
     deflection: Array
-    """Outward, in the directions asked for, fixed in space [m]."""
+    """Outward deflection in the requested directions, fixed in space [m]."""
     force: float
-    """F R^2/(E I) [-]."""
+    """Dimensionless force F R^2/(E I)."""
     curvature: float
-    """Under the force, times R; 1 in the undeformed ring."""
+    """Curvature at the force times R; 1 in the undeformed ring."""
 
 
 def elastica(radius: float, crown: float, angle: ArrayLike) -> Elastica:
@@ -49,11 +56,11 @@ def elastica(radius: float, crown: float, angle: ArrayLike) -> Elastica:
     .. math:: \theta' = \kappa, \quad \kappa' = \frac{F}{2EI}\cos\theta, \quad
         x' = \cos\theta, \quad y' = \sin\theta
 
-    along the quarter from the crown (s = 0) to the side; by symmetry no force acts
-    along x.
+    The equations describe a quarter of the ring from the crown (s = 0) to the side; by
+    symmetry no force acts along x there.
 
     Args:
-        radius: R [m].
+        radius: Radius R of the undeformed ring [m].
         crown: Outward displacement of each crown [m].
         angle: Directions from the axis of the forces [rad].
 

@@ -1,4 +1,4 @@
-"""Torques that a drive is rated for."""
+"""Rated torques of a drive."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, kw_only=True)
 class Ratings:
-    """Torques at the output that a catalogue states [N·m]."""
+    """Rated torques at the output, as in a catalogue [N·m]."""
 
     rated_torque: float
     repeated_peak: float
@@ -16,4 +16,4 @@ class Ratings:
     T2: float
     source: str = "given"
     ratcheting_torque: float | None = None
-    """At which teeth skip; None where it is not known."""
+    """Output torque at which the teeth skip; None if unknown."""

@@ -1,11 +1,11 @@
-r"""Closed forms of the flexspline as a thin shell: force, stress, fatigue.
+r"""Closed-form force, stress and fatigue strength of the flexspline as a thin shell.
 
-From two articles, whose equations carry no numbers and are named by what they give:
-"deformation force" (force that deforms the flexspline XB1-100-80) and "stress and
-fatigue" (stress and fatigue strength of the flexible gear).
+The formulas are from two articles whose equations are not numbered: "deformation
+force" (force that deforms the flexspline XB1-100-80) and "stress and fatigue" (stress
+and fatigue strength of the flexible gear). Sources below name the quantity instead.
 
-The wall does not stretch. Its radial deflection at the open end is
-:math:`w = w_0\cos 2\varphi` on a wave generator, a Fourier series under point loads.
+The wall is inextensional. Its radial deflection at the open end is
+:math:`w = w_0\cos 2\varphi` on a wave generator and a Fourier series under point loads.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from swgjoint.units import mm
 SERIES_SUM = (pi**2 - 8.0) / 16.0
 """Sum of 1/(n^2 - 1)^2 over even n."""
 PRINTED_SUM = 0.1141
-"""What the article on the deformation force prints for it; its own first three terms,
-1/9 + 1/225 + 1/1225, are already 0.1164."""
+"""Value printed in the article on the deformation force. It is too small: the first
+three terms, 1/9 + 1/225 + 1/1225, already sum to 0.1164."""
 
 
 def ring_stiffness(
@@ -32,19 +32,20 @@ def ring_stiffness(
     *,
     series_sum: float = SERIES_SUM,
 ) -> float:
-    r"""Radial stiffness of a ring or of a tube of free ends, per length [N/m/m].
+    r"""Radial stiffness of a ring, or of a tube with free ends, per length [N/m/m].
 
     .. math:: \frac{P}{w_0} = \frac{\pi E \delta^3}{24 R^3 S}
 
-    Force of each of two opposite point loads over the deflection under it. With XB1's
-    numbers and the printed sum this is 1161 N/mm per metre, 81 N/mm on its length of
-    70 mm; the article prints a slope of about 1625 N/mm, twenty times that.
+    P is each of two opposite point loads and w_0 the deflection under the load. With
+    the dimensions of XB1 and the printed sum the stiffness is 1161 N/mm per metre, or
+    81 N/mm for the length of 70 mm. The article states about 1625 N/mm, twenty times
+    as much.
 
     Args:
-        youngs_modulus: E [Pa].
-        wall: delta [m].
-        radius: R of the middle of the wall [m].
-        series_sum: S; :data:`PRINTED_SUM` for the article's own.
+        youngs_modulus: Young's modulus E [Pa].
+        wall: Wall thickness delta [m].
+        radius: Radius R of the middle of the wall [m].
+        series_sum: Sum S; :data:`PRINTED_SUM` reproduces the article.
 
     Source:
         "Deformation force", P_theory.
@@ -62,27 +63,28 @@ def cup_stiffness(
 ) -> float:
     r"""Radial stiffness of a smooth cup whose wall stays straight and does not stretch.
 
-    Two opposite point loads at the distance x from the closed end, where w = 0:
+    Two opposite point loads act at the distance x from the closed end, where w = 0:
 
     .. math:: \frac{w}{P} = \frac{x^2}{L^2}\frac{2R^3}{\pi D}\sum_{n=2,4,\dots}
         \frac{1}{(n^2-1)^2\left(\frac L3 + \frac{2(1-\nu)R^2}{n^2L}\right)},
         \quad D = \frac{E\delta^3}{12(1-\nu^2)}
 
-    from the energy of :math:`w_n = b_n\frac xL\cos n\varphi`: bending
-    :math:`(n^2-1)w/R^2` around, twist :math:`(n^2-1)b_n/(nRL)`. The bending of the
-    diaphragm, whose edge moves along the axis, is left out.
+    This follows from the energy of :math:`w_n = b_n\frac xL\cos n\varphi` with the
+    circumferential curvature :math:`(n^2-1)w/R^2` and the twist
+    :math:`(n^2-1)b_n/(nRL)`. The bending of the diaphragm, whose edge moves along the
+    axis, is neglected.
 
     Args:
-        youngs_modulus: E [Pa].
-        poisson_ratio: nu [-].
-        wall: delta [m].
-        radius: R of the middle of the wall [m].
-        length: L from the open end to the middle of the diaphragm [m].
-        place: x [m].
+        youngs_modulus: Young's modulus E [Pa].
+        poisson_ratio: Poisson's ratio nu [-].
+        wall: Wall thickness delta [m].
+        radius: Radius R of the middle of the wall [m].
+        length: Length L from the open end to the middle of the diaphragm [m].
+        place: Distance x of the loads from the closed end [m].
 
     Source:
-        Inextensional bending of cylindrical shells, Timoshenko and Woinowsky-Krieger,
-        "Theory of plates and shells", article 123, here for a cup.
+        Timoshenko and Woinowsky-Krieger, "Theory of Plates and Shells", article 123,
+        inextensional bending of cylindrical shells, here applied to a cup.
     """
     rigidity = youngs_modulus * wall**3 / (12.0 * (1.0 - poisson_ratio**2))
     n2 = np.arange(2.0, 2000.0, 2.0) ** 2
@@ -94,23 +96,27 @@ def cup_stiffness(
 
 @dataclass(frozen=True, kw_only=True)
 class ShellDimensions:
-    """What the stresses of the shell depend on."""
+    """Dimensions and elastic constants that determine the stresses of the shell."""
 
     youngs_modulus: float
-    """E [Pa]."""
+    """Young's modulus E [Pa]."""
     poisson_ratio: float
     wall: float
-    """s_1, of the tooth ring [m]."""
+    """Wall thickness s_1 of the tooth ring [m]."""
     radius: float
-    """r_m, of the middle of that wall [m]."""
+    """Radius r_m of the middle of that wall [m]."""
     length: float
-    """L, of the smooth cylinder [m]."""
+    """Length L of the smooth cylinder [m]."""
     deflection: float
-    """w_0 [m]."""
+    """Radial deflection w_0 at the lobe [m]."""
 
     @classmethod
     def from_design(cls, design: Design) -> ShellDimensions:
-        """Those of a design with a cup."""
+        """Shell dimensions of a design with a cup.
+
+        Raises:
+            ValueError: If the design has no cup.
+        """
         if design.cup is None:
             raise ValueError(f"{design.drive.name} has no [cup]")
         material, wall = design.material_of("flexspline"), design.flexspline.rim_mm * mm
@@ -124,30 +130,30 @@ class ShellDimensions:
         )
 
     def bending_stress(self, factor: float = 1.5) -> float:
-        r"""Largest bending stress around, no load [Pa].
+        r"""Largest circumferential bending stress without load [Pa].
 
         .. math:: \sigma_\varphi = \frac{E s_1}{2r_m^2}(w'' + w)
             = C_\sigma\frac{w_0 E s_1}{r_m^2}, \quad C_\sigma = \tfrac32
 
-        163.3 MPa with the article's numbers, 164.4 MPa with its C_sigma = 1.510 of four
-        forces at 25 deg; the article prints 166.98 MPa.
+        With the dimensions of the article this is 163.3 MPa, or 164.4 MPa with its
+        C_sigma = 1.510 for four forces at 25 deg; the article prints 166.98 MPa.
         """
         return (
             factor * self.deflection * self.youngs_modulus * self.wall / self.radius**2
         )
 
     def axial_stress(self, factor: float = 1.5) -> float:
-        """Bending stress along the axis, nu sigma_phi, no load [Pa]."""
+        """Axial bending stress nu sigma_phi without load [Pa]."""
         return self.poisson_ratio * self.bending_stress(factor)
 
     def deformation_shear(self, factor: float) -> float:
-        r"""Shear stress of the deflection that falls to zero over the length [Pa].
+        r"""Shear stress of a deflection that decreases to zero along the cylinder [Pa].
 
         .. math:: \tau_\varphi = C_\tau\frac{w_0 E s_1}{r_m L}
 
-        The article's own :math:`\frac{Es_1}{2r_mL}w'` means C_tau = 1, its fatigue part
-        has 0.506; the twist of an inextensional wall that stays straight gives
-        3/(4 (1 + nu)) = 0.577.
+        The article's formula :math:`\frac{Es_1}{2r_mL}w'` corresponds to C_tau = 1, but
+        its section on fatigue uses 0.506. The twist of an inextensional wall that
+        stays straight gives 3/(4 (1 + nu)) = 0.577.
         """
         return (
             factor
@@ -158,7 +164,7 @@ class ShellDimensions:
         )
 
     def torque_shear(self, torque: float) -> float:
-        r"""Shear stress of the torque spread evenly over the wall [Pa].
+        r"""Shear stress of a torque [N·m], uniform over the wall [Pa].
 
         .. math:: \tau_T = \frac{T}{2\pi r_m^2 s_1}
         """
@@ -167,34 +173,34 @@ class ShellDimensions:
 
 @dataclass(frozen=True, kw_only=True)
 class FatigueFactors:
-    """Constants of the article's assessment."""
+    """Constants of the fatigue assessment in the article."""
 
     bending: float = 2.4
-    """K_sigma, stress concentration in bending."""
+    """Stress concentration factor K_sigma in bending."""
     torsion: float = 1.92
-    """K_tau = 0.8 K_sigma."""
+    """Stress concentration factor in torsion, K_tau = 0.8 K_sigma."""
     mean_shear: float = 0.2
     """Weight of the mean shear stress."""
     biaxial: float = 0.7
-    """K_z, for an axial stress of about 0.3 of that around; von Mises would say
-    1 - 0.3 + 0.3^2 = 0.79."""
+    """Factor K_z for an axial stress of about 0.3 times the circumferential stress; the
+    von Mises criterion would give 1 - 0.3 + 0.3^2 = 0.79."""
     bending_shape: float = 1.510
-    """C_sigma, four forces at 25 deg from the major axis; the series gives 1.519, at
-    the minor axis."""
+    """Coefficient C_sigma for four forces at 25 deg from the major axis; the series
+    gives 1.519, at the minor axis."""
     shear_shape: float = 0.506
-    """C_tau, the same."""
+    """Coefficient C_tau for the same forces."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class SafetyFactor:
-    """Fatigue safety factors of one place."""
+    """Fatigue safety factors at one point."""
 
     normal: float
-    """S_sigma, of normal stress alone."""
+    """Safety factor S_sigma of the normal stress alone."""
     shear: float
-    """S_tau, of shear stress alone."""
+    """Safety factor S_tau of the shear stress alone."""
     combined: float
-    """S."""
+    """Combined safety factor S."""
 
 
 def safety_factor(
@@ -212,16 +218,16 @@ def safety_factor(
         S_\tau = \frac{\tau_{-1}}{K_\tau\tau_a + 0.2\tau_m}, \quad
         S = \frac{S_\sigma S_\tau}{\sqrt{S_\sigma^2 + K_z S_\tau^2}}
 
-    K_z below one makes S exceed S_sigma where the shear is small: the tension along
-    the axis unloads the material under that around.
+    If the shear stress is small, K_z < 1 makes S larger than S_sigma, because axial
+    tension reduces the equivalent stress of circumferential tension.
 
     Args:
-        bending_limit: sigma_-1 [Pa].
-        torsion_limit: tau_-1 [Pa].
-        normal_amplitude: sigma_a [Pa].
-        shear_amplitude: tau_a [Pa].
-        shear_mean: tau_m [Pa].
-        factors: Constants; those of the article without.
+        bending_limit: Endurance limit sigma_-1 in reversed bending [Pa].
+        torsion_limit: Endurance limit tau_-1 in reversed torsion [Pa].
+        normal_amplitude: Amplitude sigma_a of the normal stress [Pa].
+        shear_amplitude: Amplitude tau_a of the shear stress [Pa].
+        shear_mean: Mean shear stress tau_m [Pa].
+        factors: Constants; None for those of the article.
 
     Source:
         "Stress and fatigue", S_sigma, S_tau, S.
@@ -229,7 +235,7 @@ def safety_factor(
     k = factors or FatigueFactors()
     normal = bending_limit / (k.bending * normal_amplitude)
     weighted = k.torsion * shear_amplitude + k.mean_shear * abs(shear_mean)
-    # the same as S above, also where one of the stresses vanishes
+    # equal to S above, and also valid if one of the stresses vanishes
     one, two = 1.0 / normal, weighted / torsion_limit
     return SafetyFactor(
         normal=normal,
@@ -251,7 +257,14 @@ def shell_safety_factor(
     .. math:: \sigma_a = C_\sigma\frac{w_0Es_1}{r_m^2}, \quad
         \tau_a = \tau_m = \tfrac12(\tau_T + \tau_\varphi)
 
-    2.17 at 100 N·m with the article's numbers.
+    With the dimensions of the article the factor is 2.17 at 100 N·m.
+
+    Args:
+        shell: Dimensions of the flexspline.
+        torque: Output torque [N·m].
+        bending_limit: Endurance limit in reversed bending [Pa].
+        torsion_limit: Endurance limit in reversed torsion [Pa].
+        factors: Constants; None for those of the article.
 
     Source:
         "Stress and fatigue", sigma_a, tau_a.

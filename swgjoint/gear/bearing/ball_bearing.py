@@ -1,9 +1,9 @@
 r"""The thin-race ball bearing between wave generator and flexspline.
 
-Everything is measured inwards from the bore of the rim: half the fit clearance, the
-outer race, half the clearance, the balls, and the rigid cam that carries the inner
-raceway. The outline of the wave generator is that of the bore, so the clearances take
-their halves from the deflection at the lobes.
+The parts follow each other inwards from the bore of the rim: half the fit clearance,
+the outer race, half the internal clearance, the balls, and the rigid cam with the inner
+raceway. The outline of the wave generator describes the bore, so half of each clearance
+is subtracted from the deflection at the lobes.
 """
 
 from __future__ import annotations
@@ -16,28 +16,29 @@ from swgjoint.gear.design.material import Material
 from swgjoint.units import GPa, mm, um
 
 GROOVE_CONFORMITY = 0.52
-"""Radius of the grooves over the diameter of the balls where the design has none: the
-middle of the customary 0.515 to 0.53 of deep groove bearings (textbook, not checked).
-The stiffness of a ball moves by some 10 % over that range."""
+"""Default ratio of groove radius to ball diameter: the middle of the customary range
+0.515 to 0.53 of deep groove ball bearings (textbook value, not verified). The stiffness
+of a ball contact varies by about 10 % over that range."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class BallBearing:
-    """Bearing of a design in SI, undeformed and round."""
+    """Undeformed, round ball bearing of a design in SI units."""
 
     balls: int
+    """Number of balls."""
     ball_diameter: float
-    """[m]."""
+    """Ball diameter [m]."""
     race_thickness: float
     """Thickness of the outer race [m]."""
     race_width: float
-    """[m]."""
+    """Width of the outer race [m]."""
     groove_inertia_factor: float
-    """Second moment of the race's section over that of its rectangle."""
+    """Second moment of area of the grooved race over that of its rectangle [-]."""
     groove_conformity: float
-    """Groove radius over ball diameter, both races."""
+    """Groove radius over ball diameter of both races [-]."""
     clearance: float
-    """Radial internal clearance as catalogues print it, on the diameter [m]."""
+    """Radial internal clearance as stated in catalogues, on the diameter [m]."""
     fit_clearance: float
     """Fit clearance of the outer race in the bore of the rim, on the diameter [m]."""
     bore_radius: float
@@ -49,11 +50,16 @@ class BallBearing:
     def from_design(cls, design: Design) -> BallBearing:
         """Bearing of a design.
 
-        What the design does not give is the plain thing: a rectangular race as wide as
-        the teeth, without clearance in the bore, of the flexspline's material.
+        The defaults are a rectangular race as wide as the teeth, no clearance in the
+        bore, and the material of the flexspline.
 
         Raises:
-            ValueError: If the design has none.
+            ValueError: If the design has no bearing.
+
+        >>> from swgjoint import Design
+        >>> bearing = BallBearing.from_design(Design.load("size-25-100"))
+        >>> bearing.balls, round(bearing.ball_diameter * 1e3, 2)
+        (23, 5.27)
         """
         spec = design.wave_generator.bearing
         if spec is None:
@@ -95,29 +101,33 @@ class BallBearing:
 
     @property
     def cage_share(self) -> float:
-        r"""Turn of the cage per turn of the outer race, seen from the cam.
+        r"""Rotation of the cage per rotation of the outer race, relative to the cam.
 
         .. math:: \tfrac12 (1 + D/d_m)
 
-        of a ball that rolls without slip between round raceways (textbook).
+        The formula applies to balls that roll without slip between round raceways
+        (textbook).
         """
         inner, outer = self.raceways
         return 0.5 * (1.0 + self.ball_diameter / (inner + outer))
 
     @property
     def race_stretching(self) -> float:
-        """E A of the outer race, the groove left out [N]."""
+        """Axial stiffness E A of the outer race without its groove [N]."""
         section = self.race_width * self.race_thickness
         return self.material.youngs_modulus * section
 
     @property
     def race_bending(self) -> float:
-        """E I of the outer race [N m^2]."""
+        """Bending stiffness E I of the outer race [N·m²]."""
         plain = self.race_width * self.race_thickness**3 / 12.0
         return self.material.youngs_modulus * self.groove_inertia_factor * plain
 
     def hertz_constant(self) -> float:
-        r"""K of one ball between both raceways, :math:`Q = K\delta^{3/2}` [N/m^1.5].
+        r"""Hertz constant K of a ball between both raceways [N/m^1.5].
+
+        The force of a ball is :math:`Q = K\delta^{3/2}` with the total approach delta
+        of both races:
 
         .. math:: K = \bigl(K_i^{-2/3} + K_o^{-2/3}\bigr)^{-3/2}
         """
@@ -132,16 +142,16 @@ class BallBearing:
 
 
 def effective_modulus(bearing: BallBearing) -> float:
-    """E / (1 - nu^2) / 2 of two bodies of the same material [Pa]."""
+    """Effective modulus E / (2 (1 - nu^2)) of two bodies of equal material [Pa]."""
     steel = bearing.material
     return 0.5 * steel.youngs_modulus / (1.0 - steel.poisson_ratio**2)
 
 
 def point_contact(curvature: float, across: float, modulus: float) -> float:
-    r"""K of a Hertz point contact, :math:`Q = K\delta^{3/2}` [N/m^1.5].
+    r"""Constant K of a Hertz point contact, :math:`Q = K\delta^{3/2}` [N/m^1.5].
 
-    With relative curvatures :math:`2B \ge 2A` of the two planes, semi-axes
-    :math:`a = \kappa b` and complete elliptic integrals of the parameter
+    With relative curvatures :math:`2B \ge 2A` in the two principal planes, semi-axes
+    :math:`a = \kappa b`, and complete elliptic integrals of the parameter
     :math:`m = 1 - 1/\kappa^2`,
 
     .. math:: \frac BA = \frac{\kappa^2 E(m) - K(m)}{K(m) - E(m)}, \quad
@@ -149,13 +159,23 @@ def point_contact(curvature: float, across: float, modulus: float) -> float:
         \delta = \frac{3 Q K(m)}{2\pi\kappa b E^*} .
 
     Args:
-        curvature: Sum of both bodies' curvatures in one plane [1/m].
-        across: The same in the plane across [1/m].
-        modulus: E* of both bodies [Pa].
+        curvature: Sum of the curvatures of both bodies in one principal plane [1/m].
+        across: The same sum in the other principal plane [1/m].
+        modulus: Effective modulus E* of both bodies [Pa].
+
+    Raises:
+        ValueError: If one of the curvature sums is not positive.
 
     Source:
-        Johnson (1985), "Contact Mechanics", section 4.2, eqs (4.26), not checked word
-        by word: the limit of a sphere and the fit of Hamrock and Brewe are tests.
+        Johnson (1985), "Contact Mechanics", Cambridge University Press, section 4.2,
+        eqs (4.26). The equations were not compared with the printed text; tests check
+        the limit of a sphere and the approximation of Hamrock and Brewe.
+
+    A steel ball of 10 mm on a plane, :math:`K = \tfrac43 E^* \sqrt R`:
+
+    >>> k = point_contact(200.0, 200.0, 115e9)
+    >>> round(k / (4 / 3 * 115e9 * 0.005**0.5), 6)
+    1.0
     """
     from scipy.optimize import brentq
     from scipy.special import ellipe, ellipk
@@ -171,7 +191,7 @@ def point_contact(curvature: float, across: float, modulus: float) -> float:
             - larger / smaller
         )
 
-    # K - E vanishes with m: below this ellipticity the contact is a circle
+    # K - E vanishes with m: below this ratio the contact is treated as circular
     kappa = 1.0
     if larger / smaller > 1.0 + 1e-6:
         kappa = brentq(missed, 1.0 + 1e-7, 10.0 * larger / smaller, xtol=1e-13)

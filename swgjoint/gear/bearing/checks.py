@@ -1,4 +1,4 @@
-"""Whether the bearing of the wave generator can be built into the flexspline."""
+"""Checks that the bearing of the wave generator fits into the flexspline."""
 
 from __future__ import annotations
 
@@ -14,14 +14,20 @@ from swgjoint.gear.wave_generators.wave_generator import lobe_height, with_check
 from swgjoint.units import mm, um
 
 THINNEST_RACE = 0.08
-"""Of the ball diameter: grooves are a tenth to a fifth of it deep (customary, not
-checked), and flexible races some 0.25 thick. At 0.02 the search for rest fails."""
+"""Smallest race thickness over ball diameter. Grooves are customarily 0.1 to 0.2 ball
+diameters deep and flexible races about 0.25 thick (not verified). At 0.02 the search
+for the equilibrium fails."""
 WIDEST_RACE = 2.0
-"""Of the face width: all of it counts as pressed, and the rim ends near the teeth."""
+"""Largest race width over face width. The model assumes pressure over the whole race
+width, but the rim ends near the teeth."""
 
 
 def bearing_checks(design: Design) -> list[Check]:
-    """Balls fit on their circle, all inside the outline, and the lobes remain."""
+    """Check that the bearing fits inside the outline and leaves a deflection.
+
+    The balls must fit on their pitch circle, all parts must fit inside the outline of
+    the wave generator, and the clearances must not use up the height of the lobes.
+    """
     bearing = design.wave_generator.bearing
     assert bearing is not None
     bore = design.flexspline_inner_radius / mm
@@ -77,7 +83,7 @@ def bearing_checks(design: Design) -> list[Check]:
 
 
 def _cam(design: Design) -> list[Check]:
-    """The cam below race and balls is a curve without corners."""
+    """Check that the outline of the cam has a positive radius of curvature."""
     bearing = BallBearing.from_design(design)
     try:
         outline = with_checks(design)[0]
