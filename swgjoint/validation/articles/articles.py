@@ -14,9 +14,13 @@ from collections.abc import Mapping
 from swgjoint.gear.design.design import Design
 from swgjoint.validation.articles.file import ArticlesFile, changed_design
 from swgjoint.validation.articles.lobes import lobe_rows
-from swgjoint.validation.articles.rows import deflection_rows, force_rows
+from swgjoint.validation.articles.rows import (
+    deflection_rows,
+    fatigue_rows,
+    force_rows,
+    stress_rows,
+)
 from swgjoint.validation.articles.runs import ArticleTask, Found, run_task
-from swgjoint.validation.articles.stress_rows import fatigue_rows, stress_rows
 from swgjoint.validation.rows import Row, StudyOptions, StudyResult
 from swgjoint.validation.runner import compute_all
 

@@ -12,9 +12,11 @@ from swgjoint.faults import Fault, Section, validate
 from swgjoint.gear.design.design import Design
 from swgjoint.models_path import find
 from swgjoint.toml_file import read_toml
+from swgjoint.validation.row_entry import RowEntry
 
 Positive = Annotated[float, Field(gt=0, le=1e6)]
 Text = Annotated[str, Field(min_length=1, max_length=200)]
+Rows = Annotated[tuple[RowEntry, ...], Field(strict=False, min_length=1)]
 Series = Annotated[tuple[Positive, ...], Field(strict=False, min_length=1)]
 
 
@@ -31,10 +33,11 @@ class Deflection(Section):
     source: Text
     base: Text
     coefficient: Positive
-    table_mm: Positive
-    theory_mm: Positive
-    largest_radial_mm: Positive
+    """Printed lobe height over the theoretical one, w_0*."""
+    varied_quantity: Text
+    """Quantity that the rows of the variations compare."""
     variations: Annotated[tuple[ArticleVariation, ...], Field(strict=False)] = ()
+    rows: Rows
 
 
 class Springs(Section):
@@ -54,7 +57,7 @@ class Force(Section):
     base: Text
     radius_mm: Positive
     series_sum: Positive
-    slope_N_mm: Positive
+    rows: Rows
     variations: Annotated[tuple[ArticleVariation, ...], Field(strict=False)] = ()
     springs: Annotated[tuple[Springs, ...], Field(strict=False)] = ()
 
@@ -64,8 +67,12 @@ class StressAndFatigue(Section):
 
     source: Text
     base: Text
-    bending_MPa: Positive
-    largest_radial_mm: Positive
+    rows: Rows
+    """Stress without torque."""
+    fatigue_rows: Rows
+    """Fatigue, whatever the torque."""
+    torque_rows: Rows
+    """Stress and fatigue at each torque."""
     crowned: Mapping[str, Any]
     """Micro-geometry of the wave generator for comparison."""
     torques_Nm: Series

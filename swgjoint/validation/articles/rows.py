@@ -1,275 +1,218 @@
-"""Rows of the study of the articles: printed values, ours, and reasons."""
+"""Rows of the study of the articles: closed forms, computed values and open points."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
-from swgjoint.gear.shell_theory import SERIES_SUM, ring_stiffness
-from swgjoint.units import mm
-from swgjoint.validation.articles.file import Deflection, Force, changed_design
+from scipy.optimize import brentq
+
+from swgjoint.gear.design.material import Material
+from swgjoint.gear.shell_theory import (
+    SERIES_SUM,
+    FatigueFactors,
+    ShellDimensions,
+    ring_stiffness,
+    shell_safety_factor,
+)
+from swgjoint.units import MPa, mm
+from swgjoint.validation.articles.file import (
+    ArticleVariation,
+    Deflection,
+    Force,
+    StressAndFatigue,
+    changed_design,
+)
 from swgjoint.validation.articles.runs import Found
+from swgjoint.validation.row_entry import RowEntry, fill_rows
 from swgjoint.validation.rows import Row
 
-HELD_BACK = "held back"
+PLACES = ("mid_face", "open_edge", "face_width")
+"""Where the two loads of a pinched cup act."""
 
 
-def value_or_none(found: Found, pick: Callable[[Found], float]) -> float | None:
-    """A figure of a computation; None if the computation failed."""
-    return None if "fault" in found else pick(found)
+def deflection_rows(own: Deflection, found: Mapping[str, Found]) -> list[Row]:
+    """Deflection of the 80:1 drive and the place of its largest stress.
 
-
-def reason_or_failure(found: Found, reason: str) -> str:
-    """The reason of a row, or why its computation failed."""
-    return str(found.get("fault", reason))
-
-
-def deflection_rows(own: Deflection, results: Mapping[str, Found]) -> list[Row]:
-    """Deflection of the 80:1 drive and where its largest stress lies."""
-    found, fine = results["deflection"], results["deflection, fine"]
+    Args:
+        own: Section of the study file.
+        found: Results by computation.
+    """
     drive = changed_design(own.base).drive
     lobe = (
         0.5 * drive.module_mm * (drive.teeth_circular_spline - drive.teeth_flexspline)
     )
-
-    def row(
-        quantity: str,
-        unit: str,
-        source: float | None,
-        ours: float | str,
-        reason: str,
-    ) -> Row:
-        """A value of ours, or the key of one that was computed."""
-        value: float | None
-        if isinstance(ours, float):
-            value, better, why = ours, None, reason
-        else:
-            key = ours
-            value = value_or_none(found, lambda f: float(f[key]))
-            better = value_or_none(fine, lambda f: float(f[key]))
-            why = reason_or_failure(found, reason)
-        return article_row(
-            "deflection", own.base, quantity, unit, source, value, why, better
+    closed = {"lobe_mm": lobe, "height_mm": 2.0 * lobe}
+    base = found["deflection"]
+    texts = {"reduced_lobe": f"{own.coefficient * lobe:g}"}
+    if "fault" not in base:
+        texts |= {
+            "z": f"{base['radial_z_mm']:.3g}",
+            "angle": f"{base['radial_from_major_deg']:.2g}",
+            "part": str(base["von_mises_part"]),
+        }
+    rows = fill_rows(
+        own.rows,
+        {**found, "closed form": closed},
+        texts,
+        case=own.base,
+        part="deflection",
+    )
+    for variation in own.variations:
+        entry = _varied(
+            variation, "deflection", "largest_radial_mm", "mm", own.varied_quantity
         )
-
-    coned = ""
-    if "fault" not in found:
-        coned = (
-            f"at z = {found['radial_z_mm']:.3g} mm and"
-            f" {found['radial_from_major_deg']:.2g} deg from the major axis: the cup"
-            " is coned, so that its open edge moves by more than w_0; face width and"
-            " hat are chosen"
-        )
-    where = str(found.get("von_mises_part", ""))
-    return [
-        row(
-            "w_0 = m (Z_c - Z_f)/2",
-            "mm",
-            own.theory_mm,
-            lobe,
-            f"the table's w_0* = {own.coefficient:g} would make it"
-            f" {own.coefficient * lobe:g} mm",
-        ),
-        row(
-            "wave generator height 2 w_0",
-            "mm",
-            own.table_mm,
-            2.0 * lobe,
-            "the printed m Z_f/n is 40 mm; 2 w_0 is twice the deflection",
-        ),
-        row(
-            "largest radial displacement",
-            "mm",
-            own.largest_radial_mm,
-            "largest_radial_mm",
-            coned,
-        ),
-        row(
-            "the same at mid-face",
-            "mm",
-            None,
-            "at_mid_face_mm",
-            "not printed",
-        ),
-        row(
-            "largest von Mises stress",
-            "MPa",
-            None,
-            "von_mises_MPa",
-            f"not printed; ours at the {where}, which grows on finer meshes",
-        ),
-        row(
-            "its angle from the major axis",
-            "deg",
-            0.0,
-            "von_mises_from_major_deg",
-            "stated: at the major axis, in root and transition",
-        ),
-        row(
-            "von Mises stress at the minor axis",
-            "MPa",
-            None,
-            "at_minor_MPa",
-            "stated: significantly lower; bending around is as large there in shell"
-            " theory, too",
-        ),
-        *(
-            Row(
-                case=own.base,
-                quantity=f"largest radial displacement, {v.name}",
-                unit="mm",
-                source_value=None,
-                ours=value_or_none(
-                    results[f"deflection, {v.name}"],
-                    lambda f: float(f["largest_radial_mm"]),
-                ),
-                reason=reason_or_failure(
-                    results[f"deflection, {v.name}"], "not stated by the article"
-                ),
-                more={"part": "deflection"},
-            )
-            for v in own.variations
-        ),
-    ]
+        rows += fill_rows([entry], found, {}, case=own.base, part="deflection")
+    return rows
 
 
-def article_row(
-    part: str,
-    case: str,
-    quantity: str,
-    unit: str,
-    source: float | None,
-    ours: float | None,
-    reason: str | None,
-    converged: float | None = None,
-    **more: Any,
-) -> Row:
-    """A row of one part of the study."""
-    return Row(
-        case=case,
-        quantity=quantity,
+def _varied(
+    variation: ArticleVariation, part: str, key: str, unit: str, quantity: str = ""
+) -> RowEntry:
+    """The row of a variation, which changes one thing that an article leaves open."""
+    return RowEntry(
+        quantity=f"{quantity}, {variation.name}" if quantity else variation.name,
         unit=unit,
-        source_value=source,
-        ours=ours,
-        converged=converged,
-        reason=reason,
-        more={"part": part} | more,
+        ours=(f"{part}, {variation.name}", key),
+        reason="not stated by the article",
     )
 
 
 def force_rows(own: Force, found: Mapping[str, Found]) -> list[Row]:
-    """Deformation force of XB1-100-80: formula, finite elements, what is open."""
+    """Deformation force of XB1-100-80: formula, finite elements, and open points.
+
+    Args:
+        own: Section of the study file.
+        found: Results by computation.
+    """
     design = changed_design(own.base)
     steel = design.material_of("flexspline")
     assert design.cup is not None
     length = design.cup.length_mm + design.drive.face_width_mm
-    theory = ring_stiffness(
+    per_length = ring_stiffness(
         steel.youngs_modulus,
         design.flexspline.rim_mm * mm,
         own.radius_mm * mm,
         series_sum=own.series_sum,
     )
-    theory *= length * mm / 1e3  # N/mm
-
-    def row(
-        quantity: str,
-        source: float | None,
-        ours: float | None,
-        reason: str,
-        *,
-        unit: str = "N/mm",
-        converged: float | None = None,
-        **more: Any,
-    ) -> Row:
-        return article_row(
-            "force", own.base, quantity, unit, source, ours, reason, converged, **more
-        )
-
-    base, fine, smooth = (found[f"force{n}"] for n in ("", ", fine", ", smooth"))
-    varied = {v.name: found[f"force, {v.name}"] for v in own.variations}
-    rows = [
-        row(
-            "sum of the series",
-            own.series_sum,
-            SERIES_SUM,
-            "its first three terms are 0.1164",
-            unit="-",
-        ),
-        row(
-            f"theory, smooth shell of {length:g} mm",
-            own.slope_N_mm,
-            theory,
-            "the formula is per length, 1161 N/mm per metre; the printed slope is 20"
-            f" times that of {length:g} mm",
-            converged=theory * own.series_sum / SERIES_SUM,
-        ),
-    ]
-    places = {
-        "mid_face": "radial stiffness, loads at mid-face",
-        "open_edge": "the same at the open edge",
-        "face_width": "the same, loads spread over the face width",
+    theory = per_length * length * mm / 1e3  # N/mm
+    closed = {
+        "series_sum": SERIES_SUM,
+        "stiffness": theory,
+        "with_whole_series": theory * own.series_sum / SERIES_SUM,
     }
-    for place, text in places.items():
-        values = [v[place] for v in varied.values() if "fault" not in v]
-        low, high = (min(values), max(values)) if values else (None, None)
-        span = (
-            "" if low is None else f"; {low:.3g} to {high:.3g} with what it leaves open"
+    texts = {"length": f"{length:g}"}
+    values: dict[str, Mapping[str, Any]] = {**found, "closed form": closed}
+    for place in PLACES:
+        varied = [found[f"force, {v.name}"].get(place) for v in own.variations]
+        known = [value for value in varied if value is not None]
+        low, high = (min(known), max(known)) if known else (None, None)
+        values[f"variations, {place}"] = {"low": low, "high": high}
+        texts[f"span_{place}"] = (
+            f"; {low:.3g} to {high:.3g} with what it leaves open" if known else ""
         )
-        rows.append(
-            row(
-                text,
-                None,
-                value_or_none(base, lambda f, place=place: f[place]),  # type: ignore[misc]
-                reason_or_failure(base, f"experiment {HELD_BACK}{span}"),
-                converged=value_or_none(fine, lambda f, place=place: f[place]),  # type: ignore[misc]
-                low=low,
-                high=high,
-            )
-        )
-    large = found["force, large"]
-    for key, text in (("outward", "pulled apart"), ("inward", "pressed together")):
-        rows.append(
-            row(
-                f"the same at mid-face, {text} by w_0",
-                None,
-                value_or_none(large, lambda f, key=key: f[key]),  # type: ignore[misc]
-                reason_or_failure(large, f"{HELD_BACK}; large rotations, secant"),
-            )
-        )
-    ratio = None
-    if "fault" not in base:
-        ratio = base["mid_face"] / theory
-    rows.append(
-        row(
-            "influence coefficient K",
-            None,
-            ratio,
-            reason_or_failure(
-                base,
-                f"{HELD_BACK}; at mid-face, over the theory of {length:g} mm",
-            ),
-            unit="-",
-        )
+    base = found["force"]
+    values["influence"] = (
+        base if "fault" in base else {"coefficient": base["mid_face"] / theory}
     )
-    rows.append(
-        row(
-            "without teeth, loads at mid-face",
-            None,
-            value_or_none(smooth, lambda f: float(f["mid_face"])),
-            reason_or_failure(
-                smooth,
-                "teeth stiffen the wall; the article's shell is stiffer because it"
-                " bends all of its length as much as the loaded end",
-            ),
-        )
+    rows = fill_rows(own.rows, values, texts, case=own.base, part="force")
+    for variation in own.variations:
+        entry = _varied(variation, "force", "mid_face", "N/mm")
+        rows += fill_rows([entry], found, {}, case=own.base, part="force")
+    return rows
+
+
+def stress_rows(own: StressAndFatigue, found: Mapping[str, Found]) -> list[Row]:
+    """Stress without torque: shell theory and finite elements.
+
+    Args:
+        own: Section of the study file.
+        found: Results by computation.
+    """
+    shell = ShellDimensions.from_design(changed_design(own.base))
+    shape = FatigueFactors().bending_shape
+    closed = {
+        "bending_MPa": shell.bending_stress() / MPa,
+        "with_shape_MPa": shell.bending_stress(shape) / MPa,
+    }
+    texts = {
+        "shape": f"{shape:g}",
+        **{
+            key: str(found[key].get("von_mises_part")) for key in ("ellipse", "crowned")
+        },
+    }
+    values = {**found, "closed form": closed}
+    for name in ("four", "four, fine"):
+        values[name] = _at(found[name], 0.0)
+    return fill_rows(own.rows, values, texts, case=own.base, part="stress")
+
+
+def _at(found: Found, torque: float) -> Found:
+    """Result of a computation at one torque; empty if it has none there."""
+    if "fault" in found:
+        return found
+    rows = found["by_torque"]
+    return next((row for row in rows if row["torque_Nm"] == torque), {})
+
+
+def _torque_at(allowable: float, shell: ShellDimensions, steel: Material) -> float:
+    """Torque at which the closed forms reach a safety factor [N·m]."""
+
+    def above(torque: float) -> float:
+        return _safety(shell, torque, steel) - allowable
+
+    return float(brentq(above, 0.0, 1e5))
+
+
+def _safety(shell: ShellDimensions, torque: float, steel: Material) -> float:
+    assert steel.fatigue_limit_bending and steel.fatigue_limit_torsion
+    return shell_safety_factor(
+        shell,
+        torque,
+        bending_limit=steel.fatigue_limit_bending,
+        torsion_limit=steel.fatigue_limit_torsion,
+    ).combined
+
+
+def fatigue_rows(own: StressAndFatigue, found: Mapping[str, Found]) -> list[Row]:
+    """Safety factors over the torque.
+
+    Args:
+        own: Section of the study file.
+        found: Results by computation.
+    """
+    design = changed_design(own.base)
+    shell, radius = ShellDimensions.from_design(design), 0.5 * design.pitch_diameter
+    steel = design.material_of("flexspline")
+    limit = {"torque_Nm": _torque_at(own.allowable, shell, steel)}
+    rows = fill_rows(
+        own.fatigue_rows,
+        {"closed form": limit},
+        {"allowable": f"{own.allowable:g}"},
+        case=own.base,
+        part="fatigue",
     )
-    rows += [
-        row(
-            name,
-            None,
-            value_or_none(result, lambda f: float(f["mid_face"])),
-            reason_or_failure(result, "not stated by the article"),
+    for k, torque in enumerate(own.torques_Nm):
+        values = {
+            name: _at(result, torque)
+            for name, result in found.items()
+            if name.startswith(("four", "fatigue"))
+        }
+        values["closed form"] = {
+            "nodal_force_N": torque / (radius * own.nodes),
+            "safety": _safety(shell, torque, steel),
+        }
+        values["printed"] = {
+            "nodal_force_N": own.nodal_force_N[k],
+            "von_mises_MPa": own.von_mises_MPa[k],
+        }
+        lifted = values["four"].get("least_force_N", 0.0) < 0.0
+        rows += fill_rows(
+            own.torque_rows,
+            values,
+            {"pulls": ", of which one pulls" if lifted else ""},
+            case=f"{own.base} {torque:g} N·m",
+            part="fatigue",
+            torque_Nm=torque,
         )
-        for name, result in varied.items()
-    ]
     return rows

@@ -1,0 +1,91 @@
+"""Rows that a study file describes: printed value, place of our value, and reason."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from string import Template
+from typing import Annotated, Any
+
+from pydantic import Field
+
+from swgjoint.faults import Section
+from swgjoint.validation.rows import Row
+
+Text = Annotated[str, Field(min_length=1, max_length=300)]
+Path = Annotated[tuple[Text, ...], Field(strict=False, min_length=2)]
+"""Name of a computation, then keys of its result."""
+
+Values = Mapping[str, Mapping[str, Any]]
+"""Results by the name of the computation; ``fault`` is the only key of a failed one."""
+
+
+class RowEntry(Section):
+    """One row. ``$name`` in a text stands for a text that the study supplies."""
+
+    quantity: Text
+    unit: Text
+    source_value: float | None = None
+    """Value that the source prints; without it none is printed or it is held back."""
+    source: Path | None = None
+    """Place of the printed value instead, where it is one of a series."""
+    ours: Path
+    """Place of our value."""
+    converged: Path | None = None
+    """Place of the value on a finer mesh."""
+    reason: Text
+    """Why ours differs, or what the source leaves open."""
+    columns: Mapping[str, Path] = {}
+    """Further columns of the row."""
+
+
+def value_at(values: Values, path: Sequence[str] | None) -> Any:
+    """Value at a path; None without a path, or if its computation failed.
+
+    Args:
+        values: Results by computation.
+        path: Name of the computation and keys of its result.
+    """
+    if path is None:
+        return None
+    value: Any = values.get(path[0], {})
+    for key in path[1:]:
+        value = value.get(key) if isinstance(value, Mapping) else None
+    return value
+
+
+def fill_rows(
+    entries: Sequence[RowEntry],
+    values: Values,
+    texts: Mapping[str, str],
+    *,
+    case: str,
+    **more: Any,
+) -> list[Row]:
+    """Rows of a study file with their values.
+
+    Args:
+        entries: Rows as the file describes them.
+        values: Results by computation; a failed one is the reason of its rows.
+        texts: Texts by the name that stands for them.
+        case: Case of all rows.
+        **more: Columns that are the same in all rows.
+    """
+    rows = []
+    for entry in entries:
+        fault = values[entry.ours[0]].get("fault")
+        reason = Template(entry.reason).substitute(texts) if fault is None else fault
+        printed = value_at(values, entry.source)
+        rows.append(
+            Row(
+                case=case,
+                quantity=Template(entry.quantity).substitute(texts),
+                unit=entry.unit,
+                source_value=entry.source_value if printed is None else printed,
+                ours=value_at(values, entry.ours),
+                converged=value_at(values, entry.converged),
+                reason=str(reason),
+                more=more
+                | {key: value_at(values, path) for key, path in entry.columns.items()},
+            )
+        )
+    return rows
