@@ -507,3 +507,19 @@ def test_names_that_are_no_text_are_refused(tmp_path):
     )
     with pytest.raises(InputError, match=naming("arm.xml", "0xb5", "UTF-8")):
         scene_of_arm(path)
+
+
+@pytest.mark.parametrize("where", ["file", "include", "entity"])
+def test_a_class_is_no_format(tmp_path, where):
+    """A name with which the engine would end the process is refused by its file."""
+    name = "a%s%n" if where != "entity" else "a&#37;n"
+    joint = f'<joint name="elbow" class="{name}" axis="0 1 0"/>'
+    part = tmp_path / "part.xml"
+    part.write_text(f'<mujoco><worldbody><body name="b">{joint}</body></worldbody>')
+    body = "<worldbody><body>" + joint + '<geom size="0.1"/></body></worldbody>'
+    inside = '<include file="part.xml"/>' if where == "include" else body
+    path = tmp_path / "arm.xml"
+    path.write_text(f"<mujoco>{inside}</mujoco>")
+    file = "part.xml" if where == "include" else "arm.xml"
+    with pytest.raises(InputError, match=naming(file, "a%", "percent")):
+        scene_of_arm(path)

@@ -14,6 +14,7 @@ import numpy as np
 
 from swgjoint.errors import InputError
 from swgjoint.models_path import is_file
+from swgjoint.sim.arm.class_names import check_class_names
 from swgjoint.sim.arm.compiling import skeleton
 from swgjoint.sim.arm.holding import FREE, NOT_CHOSEN, choose_held, hold
 from swgjoint.sim.arm.number_checks import check_numbers
@@ -193,6 +194,7 @@ def _spec_of(path: Path) -> mujoco.MjSpec:
             f"{path}: a template of a URDF; accepted: what 'xacro {path.name}' makes of"
             " it, as a file ending .urdf"
         )
+    check_class_names(path)
     try:
         if suffix == path.suffix or suffix not in (".urdf", ".xml"):
             return mujoco.MjSpec.from_file(str(path))
