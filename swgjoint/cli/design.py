@@ -340,7 +340,7 @@ def _show(design: Design, path: ToothPath | str, folder: Path) -> dict[str, Any]
 
 def _export(design: Design, folder: Path) -> dict[str, Any]:
     from swgjoint.gear.design.export import (
-        csv_text,
+        curves_csv,
         dxf_text,
         tooth_curve,
         wave_generator_curves,
@@ -353,7 +353,7 @@ def _export(design: Design, folder: Path) -> dict[str, Any]:
     }
     curves["wave_generator"] = wave_generator_curves(wave_generator(design))
     texts = {"outlines.dxf": dxf_text(curves)}
-    texts |= {f"{layer}.csv": csv_text(members) for layer, members in curves.items()}
+    texts |= {f"{layer}.csv": curves_csv(members) for layer, members in curves.items()}
     folder.mkdir(parents=True, exist_ok=True)
     files = [str(write_whole(folder / name, text)) for name, text in texts.items()]
     points = {

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import csv
-import io
 from typing import Any
 
 from swgjoint.cli.shared.text import table
+from swgjoint.csv_text import csv_text
 from swgjoint.errors import InputError
 from swgjoint.files import Outputs, output_folder
 
@@ -82,7 +81,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
     result = {**result, "files": []}
     if folder is not None:
         outputs = Outputs(folder)
-        outputs.write("lot.csv", lambda: _csv(result["rows"]))
+        outputs.write("lot.csv", lambda: csv_text(result["rows"]))
         outputs.write("lot.png", lambda: lot_picture(result, lower=LOWER))
         outputs.write_json("lot.json", result)
     return result
@@ -117,11 +116,3 @@ def report(result: dict[str, Any]) -> str:
 def _share(found: dict[str, Any]) -> str:
     low, high = 100.0 * found["low"], 100.0 * found["high"]
     return f"{100.0 * found['part']:.1f} % ({low:.1f} to {high:.1f})"
-
-
-def _csv(rows: list[dict[str, Any]]) -> str:
-    out = io.StringIO()
-    writer = csv.DictWriter(out, list(rows[0]), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    return out.getvalue()

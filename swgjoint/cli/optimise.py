@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from swgjoint.cli.shared.places import configure_places, places_of
 from swgjoint.cli.shared.text import short_headers, table
+from swgjoint.csv_text import csv_text
 from swgjoint.json_text import json_text
 
 if TYPE_CHECKING:
@@ -56,7 +57,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 def _write(place: ResultStore, found: Optimum, result: dict[str, Any]) -> list[str]:
     """Designs of the front, all that were tried, the picture, the whole as JSON."""
-    from swgjoint.explore.sweep.results import csv_text, write_to
+    from swgjoint.explore.sweep.results import write_to
     from swgjoint.view.plots.optimise import optimum_picture
 
     rows = [

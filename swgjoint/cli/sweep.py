@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from swgjoint.cli.shared.places import configure_places, places_of
 from swgjoint.cli.shared.text import short_headers, table
+from swgjoint.csv_text import csv_text
 from swgjoint.json_text import json_text
 
 if TYPE_CHECKING:
@@ -64,7 +65,7 @@ def run(args: argparse.Namespace) -> dict[str, Any]:
 
 def _write(place: ResultStore, found: SweepResult, result: dict[str, Any]) -> list[str]:
     """One row a design as tables, the picture, and the whole as JSON."""
-    from swgjoint.explore.sweep.results import csv_text, parquet_bytes, write_to
+    from swgjoint.explore.sweep.results import parquet_bytes, write_to
     from swgjoint.view.plots.sweep import sweep_picture
 
     rows = found.rows()

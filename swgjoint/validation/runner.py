@@ -6,14 +6,13 @@ A study is a function that takes :class:`StudyOptions` and returns a
 
 from __future__ import annotations
 
-import csv
-import io
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from importlib import import_module
 from pathlib import Path
-from typing import Any, Protocol, TypeVar
+from typing import Protocol, TypeVar
 
+from swgjoint.csv_text import csv_text
 from swgjoint.errors import InputError
 from swgjoint.files import Outputs
 from swgjoint.json_text import json_text
@@ -128,7 +127,7 @@ def write_study(name: str, result: StudyResult, folder: Path) -> StudyResult:
     rows = [row.to_json() for row in result.rows]
     content = rows if result.content is None else {"rows": rows, **result.content}
     outputs.write(f"{name}.json", lambda: json_text(content) + "\n")
-    outputs.write(f"{name}.csv", lambda: rows_csv(rows))
+    outputs.write(f"{name}.csv", lambda: csv_text(rows) or None)
     for file, make in result.pages.items():
         outputs.write(file, make)
     return replace(result, files=tuple(outputs.files))
@@ -171,29 +170,3 @@ def compute_all(
         compute, ordered, jobs=options.jobs, stage=stage, progress=options.progress
     )
     return dict(zip((task.name for task in ordered), results, strict=True))
-
-
-def rows_csv(rows: Sequence[Mapping[str, Any]]) -> str | None:
-    """Rows as CSV with all their columns; counts by place as text.
-
-    Args:
-        rows: Rows as JSON; a row may lack columns of others.
-
-    Returns:
-        The text, None without rows.
-    """
-    if not rows:
-        return None
-    out = io.StringIO()
-    columns = dict.fromkeys(key for row in rows for key in row)
-    writer = csv.DictWriter(out, fieldnames=list(columns), lineterminator="\n")
-    writer.writeheader()
-    for row in rows:
-        writer.writerow({key: _cell(value) for key, value in row.items()})
-    return out.getvalue()
-
-
-def _cell(value: Any) -> Any:
-    if isinstance(value, dict):
-        return " ".join(f"{key}:{count}" for key, count in value.items())
-    return value

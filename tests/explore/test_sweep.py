@@ -13,13 +13,14 @@ from messages import names, naming
 from validation_record import validated_map
 
 from swgjoint import engine
+from swgjoint.csv_text import csv_text
 from swgjoint.errors import ComputationError, InputError, MissingExtraError
 from swgjoint.explore.sweep import figures as sweep_figures
 from swgjoint.explore.sweep import sweep as sweep_module
 from swgjoint.explore.sweep.figures import Record, compute
 from swgjoint.explore.sweep.file import SweepFile
 from swgjoint.explore.sweep.points import _engine_version, points_of
-from swgjoint.explore.sweep.results import csv_text, parquet_bytes, place_of
+from swgjoint.explore.sweep.results import parquet_bytes, place_of
 from swgjoint.explore.sweep.sweep import run_sweep
 from swgjoint.explore.sweep.tasks import RunTask
 from swgjoint.faults import validate

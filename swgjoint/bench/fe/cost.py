@@ -9,8 +9,6 @@ long and is not stored is left out.
 
 from __future__ import annotations
 
-import csv
-import io
 import os
 import time
 from collections.abc import Iterator, Mapping, Sequence
@@ -29,6 +27,7 @@ from swgjoint.bench.fe.rows import BOUNDS, QUANTITIES, cheapest, rows_of, second
 from swgjoint.bench.fe.setting import POSITIONS, FeSetting, Found
 from swgjoint.bench.fe.solve import SettingTask, solve_in_process
 from swgjoint.bench.fe.stored import FILE, LONG, describe_stored, load_stored, to_store
+from swgjoint.csv_text import csv_text
 from swgjoint.errors import ComputationError, DesignError
 from swgjoint.fe.solid.drive3d import check_modelled
 from swgjoint.files import Outputs
@@ -135,7 +134,7 @@ def run_fe_cost(
     if folder is not None:
         outputs = Outputs(folder)
         outputs.write("bench-fe.json", lambda: json_text(result) + "\n")
-        outputs.write("bench-fe.csv", lambda: _table(rows))
+        outputs.write("bench-fe.csv", lambda: csv_text(rows))
         outputs.write("bench-fe.png", lambda: _picture(result))
         if recompute:
             outputs.write(FILE, lambda: json_file(to_store(design, found)))
@@ -212,11 +211,3 @@ def _work(setting: FeSetting) -> float:
     base = {"ring": 6.0, "2d": 5.0, "3d": 150.0}[setting.model]
     active_sets = 3.0 if setting.kind == "3d linear" else 1.0
     return (2 if setting.full else 1) * active_sets * base * setting.refinement**2
-
-
-def _table(rows: Sequence[dict[str, Any]]) -> str:
-    out = io.StringIO()
-    writer = csv.DictWriter(out, list(rows[0]), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    return out.getvalue()

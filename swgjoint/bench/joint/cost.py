@@ -7,8 +7,6 @@ the part that its steps make.
 
 from __future__ import annotations
 
-import csv
-import io
 import time
 from collections.abc import Sequence
 from functools import partial
@@ -20,6 +18,7 @@ import mujoco
 from swgjoint.bench.joint.modes import numerical_damping
 from swgjoint.bench.joint.scenes import SCENES, BenchScene, bench_scene, exact
 from swgjoint.bench.joint.splits import SPLITS, split
+from swgjoint.csv_text import csv_text
 from swgjoint.errors import ComputationError, InputError
 from swgjoint.files import Outputs
 from swgjoint.joint.attach import LEVELS
@@ -290,13 +289,8 @@ def write_files(result: dict[str, Any], folder: Path) -> list[str]:
     from swgjoint.view.plots.bench_joint import joint_picture
 
     rows = result["rows"]
-    text = io.StringIO()
-    names = list(dict.fromkeys(key for row in rows for key in row))
-    writer = csv.DictWriter(text, fieldnames=names, lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
     outputs = Outputs(folder)
-    outputs.write("bench-joint.csv", text.getvalue)
+    outputs.write("bench-joint.csv", lambda: csv_text(rows))
     outputs.write("bench-joint.json", lambda: json_text(result) + "\n")
     for scene in dict.fromkeys(row["scene"] for row in rows):
         own = [row for row in rows if row["scene"] == scene]

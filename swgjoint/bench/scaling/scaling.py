@@ -9,8 +9,6 @@ where what does not grow no longer counts.
 
 from __future__ import annotations
 
-import csv
-import io
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -21,6 +19,7 @@ import numpy as np
 
 from swgjoint.bench.scaling import fe as scaling_fe
 from swgjoint.bench.scaling import joint as scaling_joint
+from swgjoint.csv_text import csv_text
 from swgjoint.errors import ComputationError
 from swgjoint.files import Outputs
 from swgjoint.json_text import json_text
@@ -161,7 +160,7 @@ def run_scaling(
     if folder is not None:
         outputs, labels = Outputs(folder), {sweep.name: sweep.label for sweep in sweeps}
         outputs.write("bench-scaling.json", lambda: json_text(result) + "\n")
-        outputs.write("bench-scaling.csv", lambda: _table(rows))
+        outputs.write("bench-scaling.csv", lambda: csv_text(rows))
         outputs.write("bench-scaling.png", lambda: scaling_picture(result, labels))
         files = outputs.files
     return result | {"files": files, "wall_s": time.perf_counter() - begin}
@@ -186,12 +185,3 @@ def fit_exponent(
         "seconds_per_unit": float(np.ptp(np.exp(y[[0, -1]])) / np.ptp(np.exp(x))),
         "spread": float(np.exp(np.abs(y - p * x - c).max())),
     }
-
-
-def _table(rows: Sequence[dict[str, Any]]) -> str:
-    names = list(dict.fromkeys(key for row in rows for key in row))
-    out = io.StringIO()
-    writer = csv.DictWriter(out, names, lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)
-    return out.getvalue()

@@ -16,8 +16,6 @@ start, over the kinetic and torsion energy at the start and what the load winds 
 
 from __future__ import annotations
 
-import csv
-import io
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -42,6 +40,7 @@ from swgjoint.bench.stability.rows import (
     counts,
     shares,
 )
+from swgjoint.csv_text import csv_text
 from swgjoint.files import Outputs
 from swgjoint.joint.region import MAX_SUB_STEPS
 from swgjoint.pool import run_all
@@ -136,13 +135,9 @@ def write_files(rows: Sequence[StabilityRow], folder: Path) -> list[str]:
     """Table and picture in a folder; their paths."""
     from swgjoint.view.plots.stability import stability_picture
 
-    text = io.StringIO()
     table = [row.to_json() for row in rows]
-    writer = csv.DictWriter(text, fieldnames=list(table[0]), lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(table)
     outputs = Outputs(folder)
-    outputs.write("stability.csv", text.getvalue)
+    outputs.write("stability.csv", lambda: csv_text(table))
     outputs.write(
         "stability.png", lambda: stability_picture(rows, scheme=DEFAULT, free=FREE)
     )

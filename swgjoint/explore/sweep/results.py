@@ -158,19 +158,6 @@ def write_to(
     return files
 
 
-def csv_text(rows: Sequence[Mapping[str, Any]]) -> str:
-    """Rows with the same keys as CSV; empty where there is no value."""
-    import csv
-    import io
-
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(rows[0].keys())
-    for row in rows:
-        writer.writerow(["" if v is None else v for v in row.values()])
-    return out.getvalue()
-
-
 def parquet_bytes(rows: Sequence[Mapping[str, Any]]) -> bytes | None:
     """Rows with the same keys as Parquet; None where pyarrow is not installed."""
     try:

@@ -75,7 +75,7 @@ def dxf_text(curves: Curves) -> str:
     return "\n".join(lines) + "\n"
 
 
-def csv_text(curves: Sequence[Curve]) -> str:
+def curves_csv(curves: Sequence[Curve]) -> str:
     """Columns curve (counted from 0), x_mm, y_mm; a closed curve is not repeated."""
     lines = ["curve,x_mm,y_mm"]
     for index, curve in enumerate(curves):

@@ -1,0 +1,39 @@
+"""Write rows as CSV text."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+
+def csv_text(rows: Sequence[Mapping[str, Any]]) -> str:
+    r"""Rows as CSV with a header line and the columns of all rows.
+
+    A cell without a value is empty; counts by name are one text.
+
+    Args:
+        rows: Values by column; a row may lack columns of others.
+
+    Returns:
+        The text, empty without rows.
+
+    >>> csv_text([{"a": 1, "b": None}, {"a": 2, "c": {"bore": 3, "flank": 4}}])
+    'a,b,c\n1,,\n2,,bore:3 flank:4\n'
+    """
+    if not rows:
+        return ""
+    out = io.StringIO()
+    columns = dict.fromkeys(key for row in rows for key in row)
+    writer = csv.DictWriter(out, fieldnames=list(columns), lineterminator="\n")
+    writer.writeheader()
+    for row in rows:
+        writer.writerow({key: _cell(value) for key, value in row.items()})
+    return out.getvalue()
+
+
+def _cell(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return " ".join(f"{key}:{count}" for key, count in value.items())
+    return value
