@@ -22,6 +22,7 @@ import mujoco
 import numpy as np
 from mujoco.batch import Batch
 
+from swgjoint.drives.references import load_drive
 from swgjoint.gear.ratings import Ratings
 from swgjoint.joint.attach import LEVELS, attach
 from swgjoint.maps.drive_map import DriveMap
@@ -101,9 +102,17 @@ def cornered(stiffness: float, orders: tuple[int, ...]) -> DriveMap:
 
 
 def build(
-    level: str, *, step: float, orders: tuple[int, ...], bare: bool
+    level: str, *, step: float, orders: tuple[int, ...], bare: bool, map_name: str = ""
 ) -> tuple[mujoco.MjModel, mujoco.MjData]:
-    """The arm at its start, links and motors in place."""
+    """The arm at its start, links and motors in place.
+
+    Args:
+        level: Level of all joints, with ``+`` and what it has besides.
+        step: Timestep [s].
+        orders: Harmonics of the synthetic drive per turn of the motor.
+        bare: Whether the arm has neither actuators nor gravity.
+        map_name: Drive of all joints instead of the synthetic one.
+    """
     spec = RigidArm("iiwa7").spec()
     spec.option.timestep = step
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_DISCRETE
@@ -117,7 +126,9 @@ def build(
         attach(
             spec,
             joint=name,
-            drive=replace(shape(stiffness, orders), hysteresis=elements),
+            drive=load_drive(map_name)
+            if map_name
+            else replace(shape(stiffness, orders), hysteresis=elements),
             level=base,
             rotor_inertia=rotor,
             damping_ratio=0.02,
@@ -163,7 +174,10 @@ def seconds(model: mujoco.MjModel, start: mujoco.MjData, steps: int) -> float:
 def measure(args: argparse.Namespace) -> list[dict[str, float | str]]:
     """One row per level."""
     orders = tuple(args.orders)
-    keys = {"step": args.step, "orders": orders, "bare": args.bare}
+    keys = {
+        **{"step": args.step, "orders": orders, "bare": args.bare},
+        "map_name": args.drive,
+    }
     rigid = build("rigid", **keys)
     rows: list[dict[str, float | str]] = []
     for level in args.levels:
@@ -190,7 +204,11 @@ def measure(args: argparse.Namespace) -> list[dict[str, float | str]]:
 def batch(args: argparse.Namespace) -> dict[str, float]:
     """Steps per second of 64 arms at level full on one and two threads, wall time."""
     model, data = build(
-        "full", step=args.step, orders=tuple(args.orders), bare=args.bare
+        "full",
+        step=args.step,
+        orders=tuple(args.orders),
+        bare=args.bare,
+        map_name=args.drive,
     )
     out = {}
     for threads in (1, 2):
@@ -215,6 +233,7 @@ def main() -> None:
     parser.add_argument("--steps", type=int, default=4_000)
     parser.add_argument("--step", type=float, default=1e-3, help="timestep [s]")
     parser.add_argument("--orders", type=int, nargs="*", default=[2, 4, 202, 404])
+    parser.add_argument("--drive", default="", help="drive of all joints, by name")
     parser.add_argument("--bare", action="store_true", help="without actuators")
     parser.add_argument("--json", action="store_true")
     args = parser.parse_args()
