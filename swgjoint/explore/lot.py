@@ -1,8 +1,9 @@
-"""A lot of drives of one design: how accurate they are, and how many meet a spec.
+"""A lot of drives of one design: their accuracy, and how many of them meet a spec.
 
-Every drive has errors drawn from a seed of its own. The design's tolerances are the
-sizes of the errors themselves (``limit``), which is the worst lot that may be
-delivered, or their limits (``uniform``): then each size is drawn between zero and it.
+The errors of each drive are drawn with a seed of its own. The tolerances of the design
+are either the sizes of the errors (``limit``), which gives the worst lot that may be
+delivered, or their upper limits (``uniform``); then each size is drawn between zero and
+its limit.
 """
 
 from __future__ import annotations
@@ -40,38 +41,41 @@ from swgjoint.units import arcmin
 UPPER = ("transmission_accuracy_arcmin", "ripple_rms_percent")
 """Figures with an upper limit."""
 LOWER = ("torsional_stiffness_Nm_rad",)
-"""Figures with a lower one."""
+"""Figures with a lower limit."""
 FIGURES = UPPER + LOWER
 SIZES = ("limit", "uniform")
 
 CHUNK = 10
-"""Drives of one task, some seconds: it takes the positions without errors with it,
-which are tens of megabytes. Each drive is solved alone and kept as soon as it is."""
+"""Drives per task, which takes some seconds. A task carries the error-free positions,
+tens of megabytes; each drive is solved alone and stored as soon as it is solved."""
 _SIZE_STREAM = 100
-"""Of the random numbers of a drive; those of its errors have lower numbers."""
+"""Stream of the random sizes of a drive; the streams of its errors have lower
+numbers."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Drawn:
-    """One drive of the lot; figures are None where it has no equilibrium."""
+    """One drive of the lot; its figures are None if it has no equilibrium."""
 
     seed: int
     transmission_accuracy_arcmin: float | None
-    """Peak to peak of the kinematic error over one output turn: middle between what
-    its low orders and samples make sure and what the rest may add. With the wave
-    generator fixed turns differ; it is the first one."""
+    """Peak-to-peak kinematic error over one output turn [arcmin]: the middle between
+    the value certain from low orders and samples and the largest value with the
+    remaining orders. With the wave generator fixed, turns differ; this is the first
+    one."""
     ripple_rms_percent: float | None
-    """Torque ripple with the output held on its ideal motion at rated torque, of it."""
+    """Rms torque ripple at rated torque with the output on its ideal motion [% of rated
+    torque]."""
     torsional_stiffness_Nm_rad: float | None
-    """Mean tangent at rated torque."""
+    """Mean tangent stiffness at rated torque [N·m/rad]."""
 
     @property
     def failed(self) -> bool:
-        """Whether there is no equilibrium somewhere."""
+        """Whether a position has no equilibrium."""
         return self.transmission_accuracy_arcmin is None
 
     def meets(self, spec: Mapping[str, float]) -> bool:
-        """Whether every limit is kept; a drive that cannot be solved keeps none."""
+        """Whether every limit is met; a drive that cannot be solved meets none."""
         if self.failed:
             return False
         return all(
@@ -82,7 +86,7 @@ class Drawn:
 
 @dataclass(frozen=True, kw_only=True)
 class _Judged:
-    """:func:`superposition_error` of the first drive, as it is kept."""
+    """Stored :func:`superposition_error` of the first drive."""
 
     error: float | None
 
@@ -92,15 +96,15 @@ class _Task:
     rests: Sequence[Rest]
     drives: tuple[Design, ...]
     paths: tuple[Path | None, ...]
-    """Where they are kept."""
+    """Files in which the drives are stored."""
 
 
 def draw(design: Design, seed: int, sizes: str = "limit") -> Design:
-    """One drive of a design.
+    """Draw one drive of a design.
 
     Args:
-        design: Its ``tolerances`` are the sizes of the errors or their limits.
-        seed: Of all its errors.
+        design: Design whose ``tolerances`` are the sizes of the errors or their limits.
+        seed: Seed of all errors of the drive.
         sizes: One of :data:`SIZES`.
     """
     changes: dict[str, Any] = {"tolerances.seed": seed}
@@ -128,28 +132,28 @@ def run_lot(
 ) -> dict[str, Any]:
     """Draw and solve a lot of drives and compute its yield against a spec.
 
+    Drives are stored in the user's cache as soon as they are solved: an interrupted lot
+    resumes, and a longer lot solves only the additional drives.
+
     Args:
         design: Design with nonzero tolerances.
         count: Number of drives.
         seed: Seed of the first drive; the others follow consecutively.
-        sizes: What the tolerances of the design are, see :data:`SIZES`.
+        sizes: Meaning of the tolerances of the design, see :data:`SIZES`.
         spec: Limits by figure, see :data:`UPPER` and :data:`LOWER`.
         jobs: Number of processes.
-        progress: Called with the stage, the tasks done and their number.
-
-    Drives are kept in the user's cache as soon as they are solved: a lot that was
-    interrupted goes on, and a longer one solves those alone that it has more.
+        progress: Called with the stage, the number of finished tasks and their total.
 
     Returns:
         ``rows`` (:class:`Drawn` and, with a spec, ``passed``), ``figures``
-        (:func:`distribution` of each), ``yield`` (None without a spec; ``part``,
-        its 95 % interval ``low`` and ``high``, and that of each limit alone in
-        ``by_limit``), ``validity`` (level, torque, what is left out,
-        ``superposition_error``: of the first drive against full solves, part of its
+        (:func:`distribution` of each), ``yield`` (None without a spec; ``part``, its
+        95 % interval ``low`` and ``high``, and that of each limit alone in
+        ``by_limit``), ``validity`` (level, torque, effects left out,
+        ``superposition_error``: difference of the first drive from full solves over its
         peak to peak), ``failed``, ``wall_s``, ``sizes``, ``spec``, ``design``.
 
     Raises:
-        DesignError: If it cannot be built, or has no errors to draw.
+        DesignError: If the design cannot be built, or has no errors to draw.
         ComputationError: If the drive without errors cannot be solved.
     """
     begin = time.perf_counter()
@@ -268,7 +272,7 @@ def _yields(rows: Sequence[Drawn], spec: Mapping[str, float]) -> dict[str, Any]:
 
 @lru_cache
 def _own_version() -> str:
-    """Hash of the code of this part that decides the figures of a drive."""
+    """Hash of the code in this file that determines the figures of a drive."""
     return code_hash("explore/lot.py", "maps/sheet/sampled_accuracy.py")
 
 
@@ -278,7 +282,7 @@ def _solved(task: _Task) -> list[Drawn]:
 
 
 def _one(rests: Sequence[Rest], drive: Design, path: Path | None) -> Drawn:
-    """Solve one drive alone: solving it in a batch changes the round-off."""
+    """Solve one drive alone: solving it in a batch would change its round-off."""
     found = _figures(sample_lot([drive], rests), 0, drive)
     if path is not None:
         keep(path, json_file(found))

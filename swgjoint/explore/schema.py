@@ -1,7 +1,7 @@
 """JSON Schema of every input file, with unit, range, default and meaning of each key.
 
 Range and default come from the models that check the files, the meaning from the
-docstring beneath a field, the unit from the ending of the key.
+docstring below a field, the unit from the ending of the key.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ def file_schema(kind: str) -> dict[str, Any]:
     """JSON Schema of one kind of file.
 
     Args:
-        kind: One of :data:`KINDS`; ``spec`` is the file of limits of ``compare``,
-            ``lot`` that of ``lot``, ``optimise`` a file of a search.
+        kind: One of :data:`KINDS`; ``spec`` is the file of limits for ``compare``,
+            ``lot`` that for ``lot``, ``optimise`` a file of a search.
     """
     if kind in ("spec", "lot"):
         return _limits(kind)
@@ -88,7 +88,7 @@ def meanings(cls: type) -> dict[str, str]:
 
 @lru_cache
 def _docstrings(module: str) -> dict[str, dict[str, str]]:
-    """Docstrings beneath annotated names, by class, of a module of this package."""
+    """Docstrings below annotated names of a module of this package, by class."""
     if module.partition(".")[0] != "swgjoint":
         return {}
     tree = ast.parse(inspect.getsource(sys.modules[module]))
@@ -146,9 +146,10 @@ def described_keys(schema: Mapping[str, Any]) -> list[dict[str, Any]]:
     """Flatten a schema into one entry per key, tables before their keys.
 
     Returns:
-        ``key`` (dotted; NAME stands for a name that the file chooses, [] for an item of
-        a list), ``of_kind`` (kind of the table it belongs to, or None), ``type``,
-        ``unit``, ``range``, ``default`` (None without), ``required``, ``meaning``.
+        ``key`` (dotted; NAME is a placeholder for a name that the file chooses, [] for
+        an item of a list), ``of_kind`` (kind of the table it belongs to, or None),
+        ``type``, ``unit``, ``range``, ``default`` (None if there is none),
+        ``required``, ``meaning``.
     """
     return list(_keys(schema, schema, "", None))
 
@@ -180,7 +181,7 @@ def _keys(
 def _below(
     form: Mapping[str, Any], root: Mapping[str, Any], key: str
 ) -> Iterator[dict[str, Any]]:
-    """Keys of a table, of tables under chosen names, and of a list of tables."""
+    """Keys of a table, of tables with chosen names, and of a list of tables."""
     if "properties" in form:
         kind = form["properties"].get("kind", {}).get("const")
         yield from _keys(form, root, f"{key}.", kind)
@@ -191,7 +192,7 @@ def _below(
 
 
 def _forms(entry: Mapping[str, Any], root: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """What an entry may be, references followed."""
+    """Alternatives of an entry, with references resolved."""
     if "$ref" in entry:
         name = entry["$ref"].rpartition("/")[2]
         return _forms(root["$defs"][name], root)

@@ -1,1 +1,1 @@
-"""The cheapest level, integrator and step within a wanted error."""
+"""The cheapest level, integrator and step that meet a required error."""

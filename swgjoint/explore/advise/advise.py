@@ -1,8 +1,8 @@
 """``swgjoint advise``: the cheapest level, integrator and step within an error.
 
-Everything is measured on the scene itself. The reference is level ``full`` with its
-step halved until two extrapolations to step zero agree; then settings are tried from
-the cheapest on, until one is within the bound.
+All errors are measured on the scene itself. The reference is level ``full``, whose step
+is halved until two extrapolations to step zero agree. Settings are then tried in the
+order of their cost until one is within the bound.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from swgjoint.sim.assembly import assemble
 from swgjoint.sim.scene.scene import Scene
 
 STEPS = (1e-4, 2e-4, 5e-4, 1e-3, 2e-3, 5e-3)
-"""Of the settings that are tried [s]."""
+"""Steps that are tried [s]."""
 
 
 def advise(
@@ -41,22 +41,23 @@ def advise(
 
     Args:
         scene: The scene; its own levels, integrator and step do not matter.
-        bound: The error.
-        drives: Maps that stand for drive references of the scene.
-        levels: Those that are tried.
-        steps: Those that are tried [s].
+        bound: Largest accepted error.
+        drives: Maps that replace drive references of the scene.
+        levels: Levels to try.
+        steps: Steps to try [s].
         progress: Called while maps are built and after every run.
 
     Returns:
         ``level``, ``integrator``, ``step_s``, ``sub_steps``, ``expected_error`` in
         ``unit``, ``expected_error_arcmin`` (of the link angle), ``cost`` (CPU time per
-        simulated time over that of the rigid arm at 1 ms), ``reference``, ``rows``
-        (what was tried, from the cheapest on), ``wall_s``.
+        simulated time, divided by that of the rigid arm at 1 ms), ``reference``,
+        ``rows`` (settings that were tried, the cheapest first), ``wall_s``.
 
     Raises:
-        InputError: If the scene cannot be run, or has no tool for a bound of it.
-        ComputationError: If the reference does not settle, or nothing is within the
-            bound; the message names the best.
+        InputError: If the scene cannot be run, or has no tool although the bound is one
+            of the tool position.
+        ComputationError: If the reference does not converge, or no setting is within
+            the bound; the message names the best one.
     """
     begin = time.perf_counter()
     known = _loaded(scene, drives, progress)
@@ -114,7 +115,7 @@ def advise(
 def _loaded(
     scene: Scene, drives: Mapping[str, DriveMap] | None, progress: Progress
 ) -> dict[str, DriveMap]:
-    """Maps of all joints, built once; the scene is refused here if it must be."""
+    """Maps of all joints, built once; an unusable scene is rejected here."""
     known = dict(drives or {})
     rigid = assemble(scene.with_level("rigid"), drives=known, progress=progress)
     for name in rigid.joints:

@@ -1,4 +1,4 @@
-"""The error that ``swgjoint advise`` may leave, with its unit."""
+"""The error that ``swgjoint advise`` accepts, with its unit."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ UNITS = {
 
 @dataclass(frozen=True, kw_only=True)
 class ErrorBound:
-    """An error that is accepted: of the link angle or of the tool, rms."""
+    """An accepted rms error of the link angle or of the tool position."""
 
     text: str
     quantity: str
     value: float
-    """In the unit that ``QUANTITIES`` has for it."""
+    """Error, in the unit that ``QUANTITIES`` lists for its quantity."""
 
     @property
     def unit(self) -> str:
@@ -38,10 +38,10 @@ class ErrorBound:
 
 
 def parse_bound(text: str) -> ErrorBound:
-    """A number with its unit, such as ``0.1arcmin``, ``2e-5rad`` or ``0.05mm``.
+    """Parse a number with its unit, such as ``0.1arcmin``, ``2e-5rad`` or ``0.05mm``.
 
     Raises:
-        InputError: If it is none or not above zero.
+        InputError: If the text is not such a number, or it is not above zero.
     """
     accepted = f"accepted: a number > 0 with one of {', '.join(UNITS)}, as in 0.1arcmin"
     found = re.fullmatch(r"\s*([0-9.]+(?:e[+-]?[0-9]+)?)\s*([a-z]+)\s*", text, re.I)

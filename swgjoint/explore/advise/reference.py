@@ -1,4 +1,4 @@
-"""What ``swgjoint advise`` compares with: level ``full`` at no step."""
+"""The reference of ``swgjoint advise``: level ``full`` extrapolated to step zero."""
 
 from __future__ import annotations
 
@@ -16,21 +16,22 @@ from swgjoint.sim.run import Run
 from swgjoint.sim.scene.scene import Scene
 
 REFERENCE_STEPS = tuple(1e-3 / 2**k for k in range(1, 7))
-"""Of the reference, as far as it takes [s]."""
+"""Steps of the reference, used in this order until it converges [s]."""
 SETTLED, TRUSTED = 0.02, 0.2
-"""Shares of the bound: disagreement of two extrapolations below which the reference is
-taken, and above which the scene has none."""
+"""Disagreement of two extrapolations, over the bound: below the first value the
+reference has converged, above the second one the scene has no reference."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class FullReference:
-    """Level ``full`` without an error of its steps."""
+    """Level ``full`` without time-discretisation error."""
 
     run: Run
     step: float
-    """Smallest one that it was extrapolated from [s]."""
+    """Smallest step that was used for the extrapolation [s]."""
     error: float
-    """Disagreement with the extrapolation from twice that step, unit of the bound."""
+    """Difference from the extrapolation from twice that step, in the unit of the
+    bound."""
 
 
 def settle(
@@ -39,14 +40,21 @@ def settle(
     drives: Mapping[str, DriveMap],
     progress: Progress = silent,
 ) -> FullReference:
-    """The reference, its step halved until two extrapolations agree.
+    """Compute the reference: halve the step until two extrapolations agree.
 
-    The scheme is of the first order in the link angle, for positions of the engine lead
-    by half a step: 2 x(h) - x(2h). A shorter step carries more harmonics, too, which
-    the two then do not agree on.
+    The scheme is of first order in the link angle, because the positions of the engine
+    lead by half a step; the extrapolation is 2 x(h) - x(2h). A shorter step also
+    resolves more harmonics, about which the two extrapolations then disagree.
+
+    Args:
+        scene: The scene.
+        bound: Error for which the reference is computed.
+        drives: Maps by drive reference.
+        progress: Called after every run.
 
     Raises:
-        ComputationError: If they never do within :data:`TRUSTED` of the bound.
+        ComputationError: If the disagreement stays above :data:`TRUSTED` times the
+            bound.
     """
     last: Run | None = None
     best: Run | None = None
@@ -84,7 +92,7 @@ def settle(
 
 
 def _extrapolated(fine: Run, coarse: Run) -> Run:
-    """Twice the finer run less the coarser one, at the samples of the coarser one."""
+    """Twice the finer run minus the coarser one, at the samples of the coarser one."""
     own, theirs = common_samples(fine, coarse)
     names = ("position", "torsion", "output_torque", "tool_position")
     return replace(

@@ -1,4 +1,4 @@
-"""The settings that ``swgjoint advise`` tries, and which of them it names."""
+"""The settings that ``swgjoint advise`` tries, and the choice among them."""
 
 from __future__ import annotations
 
@@ -29,19 +29,21 @@ from swgjoint.sim.assembly import Assembly
 from swgjoint.sim.scene.scene import Scene
 
 FLAT = 0.9
-"""Error over that at the last, longer step from which on a level's own error is what
-remains: shorter steps of it are not tried."""
+"""Ratio of the error to that at the next longer step above which the error of the level
+itself dominates; shorter steps of that level are not tried."""
 ALIKE = 1.05
-"""Factor within which costs count as equal: timing tells no less apart."""
+"""Factor within which costs count as equal, because timing resolves no smaller
+difference."""
 FEWEST = {"discrete": 0.4, "RK4": 1.5}
-"""Cost of a setting at 1 ms at the least, before it was measured: tried in order."""
+"""Lower bound of the cost of a setting at 1 ms before it is measured; it gives the
+order."""
 
 
 def choose_row(rows: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
     """The cheapest of the rows within the bound; None if there is none.
 
-    Of those that cost as much (:data:`ALIKE`) the lowest level, then the smallest
-    error, so that two runs on a busy machine advise the same.
+    Among rows of equal cost (:data:`ALIKE`) the lowest level is chosen, then the
+    smallest error, so that two runs on a busy machine give the same advice.
     """
     within = [row for row in rows if row["within"]]
     least = min((row["cost"] for row in within), default=np.inf)
@@ -54,7 +56,7 @@ def choose_row(rows: Sequence[Mapping[str, Any]]) -> Mapping[str, Any] | None:
 
 @dataclass(frozen=True, kw_only=True)
 class SettingSearch:
-    """Settings of one scene from the cheapest on."""
+    """Settings of one scene, the cheapest first."""
 
     scene: Scene
     bound: ErrorBound
@@ -64,7 +66,18 @@ class SettingSearch:
     def run(
         self, levels: Sequence[str], steps: Sequence[float], progress: Progress
     ) -> list[dict[str, Any]]:
-        """Rows of what was tried: up to what costs as much as the first one within."""
+        """Run settings in the order of their cost until one is within the bound.
+
+        Settings of about the same cost as this one are run, too.
+
+        Args:
+            levels: Levels to try.
+            steps: Steps to try [s].
+            progress: Called after every run.
+
+        Returns:
+            One row per setting that was run.
+        """
         rigid = rigid_arm(self.scene, self.drives)
         settings = [
             Setting(level=level, integrator=integrator, step=step)

@@ -1,1 +1,1 @@
-"""Drives and levels side by side in one scene."""
+"""Comparison of drives and levels in one scene."""

@@ -1,8 +1,8 @@
-"""Drives side by side in one scene: stiffness, ripple, error, stress, run time.
+"""Compare drives in one scene: stiffness, ripple, error, stress, run time.
 
-Each argument is a design, a map, a catalogue drive or a level. A drive takes the place
-of that of every driven joint, or of some chosen ones; a level keeps the scene's drives.
-Figures of the scene are those of its worst joint among them.
+Each argument is a design, a map, a catalogue drive or a level. A drive replaces the
+drive of every driven joint, or of selected joints; a level keeps the drives of the
+scene. The figures of a scene are those of the worst of these joints.
 """
 
 from __future__ import annotations
@@ -34,10 +34,11 @@ from swgjoint.toml_file import read_toml
 from swgjoint.view.run import run_scene
 
 STRESS_POSITIONS = 6
-"""Over one pitch of the fixed member, after which the pattern repeats."""
+"""Positions over one pitch of the fixed member, after which the mesh cycle repeats."""
 SORTABLE = (*UPPER, *LOWER)
 SLOW = "fatigue_safety_factor"
-"""Computed only if a spec or the sorting needs it: the 3D model takes minutes."""
+"""Figure that is computed only if a spec or the sorting needs it: the 3D model takes
+minutes."""
 STIFFNESS = "K1_Nm_rad"
 UNYIELDING = ("rigid", "kinematic")
 """Levels without compliance: they have no stiffness that could be compared."""
@@ -45,7 +46,7 @@ UNYIELDING = ("rigid", "kinematic")
 
 @dataclass(frozen=True, kw_only=True)
 class Compared:
-    """One argument in the scene; None for a figure that is unknown."""
+    """Results of one argument in the scene; an unknown figure is None."""
 
     argument: str
     design: str
@@ -53,24 +54,27 @@ class Compared:
     verdict: str
     """Whether the run is valid, see :mod:`swgjoint.sim.figures.verdict`."""
     reasons: tuple[str, ...]
-    """Why it is not."""
+    """Reasons why the run is not valid."""
     ripple_rms_percent: float
     ripple_pp_percent: float
     ripple_missing: str | None
-    """Why there is no ripple to tell: its figures are vibration and round-off."""
+    """Why no ripple is reported: its figures are vibration and round-off."""
     ripple_is_lower_bound: bool
-    """Whether the step leaves orders out that matter, in the joint with most ripple."""
+    """Whether the step leaves out orders that matter, in the joint with the largest
+    ripple."""
     ripple_valid: bool | None
     """Whether the maps of all joints are within the limit of their validation at the
-    torques of the run; None where no map has one."""
+    torques of the run; None if no map has a validation."""
     map_difference: dict[str, Any] | None
-    """Worst differences of these maps from unseen solves by quantity, as of a joint."""
+    """Largest differences of these maps from unseen solves, by quantity, as for a
+    joint."""
     transmission_error_arcmin: float
-    """Peak to peak."""
+    """Peak-to-peak transmission error [arcmin]."""
     transmission_error_ripple_arcmin: float
-    """Peak to peak of its strongest line at an order of the drive."""
+    """Peak-to-peak amplitude of the strongest spectral line at an order of the drive
+    [arcmin]."""
     torsion_arcmin: float
-    """Largest mean, without its sign."""
+    """Largest absolute mean torsion of a joint [arcmin]."""
     tool_path_rms_mm: float | None
     tool_ap_mm: float | None
     tool_rp_mm: float | None
@@ -78,34 +82,35 @@ class Compared:
     von_mises_MPa: float | None
     fatigue_safety_factor: float | None
     peak_torque_of_rating: float
-    """Over the repeated peak torque."""
+    """Peak torque over the repeated peak torque [-]."""
     cubed_mean_torque_of_rating: float
-    """Over the rated torque."""
+    """Cubic mean torque over the rated torque [-]."""
     real_time_factor: float
-    """Simulated time over that of the steps."""
+    """Simulated time over the computing time of the steps."""
     joint: str
-    """The one with the most ripple."""
+    """Joint with the largest ripple."""
     strongest_order_left_out: tuple[str, ...]
-    """Joints too fast for the step to carry the strongest order of their drive."""
+    """Joints that turn too fast for the step to resolve the strongest order of their
+    drive."""
     wall_s: float
-    """Run time of everything, maps included."""
+    """Total computing time, maps included [s]."""
     run: Run = field(repr=False, compare=False)
     missed: tuple[str, ...] = ()
-    """Limits of the spec that it does not keep."""
+    """Limits of the spec that are not met."""
 
     def figure(self, key: str) -> Any:
-        """A figure; None where the run cannot tell it."""
+        """Value of a figure; None if the run does not provide it."""
         return None if self.ripple_missing and key in RIPPLE else getattr(self, key)
 
     def to_json(self) -> dict[str, Any]:
-        """All figures."""
+        """All figures as JSON."""
         return {
             key: getattr(self, key) for key in self.__dataclass_fields__ if key != "run"
         }
 
 
 def read_spec(path: str | Path, accepted: Sequence[str] = SORTABLE) -> dict[str, float]:
-    """Limits of a ``[spec]`` table.
+    """Read the limits of a ``[spec]`` table.
 
     Args:
         path: TOML file.
@@ -123,15 +128,15 @@ def read_spec(path: str | Path, accepted: Sequence[str] = SORTABLE) -> dict[str,
 def checked_limits(
     limits: Mapping[str, Any], accepted: Sequence[str] = SORTABLE, *, where: str = ""
 ) -> dict[str, float]:
-    """Limits by figure, all of them positive numbers.
+    """Check limits by figure: all of them must be positive numbers.
 
     Args:
         limits: Values by figure.
         accepted: Figures that may be limited.
-        where: What messages put before the name of a figure.
+        where: Text that messages put before the name of a figure.
 
     Raises:
-        InputError: With one line for every other figure or value.
+        InputError: With one line for every unknown figure and unusable value.
     """
     faults = []
     for key, value in limits.items():
@@ -163,18 +168,18 @@ def compare(
     joints: Sequence[str] = (),
     progress: Progress = silent,
 ) -> list[Compared]:
-    """Run the scene once for every argument, in the order given.
+    """Run the scene once for every argument, in the given order.
 
     Args:
         arguments: Designs, maps, catalogue drives or levels.
         scene: The scene.
-        model: Fidelity of designs, those of the scene among them; their default if
-            None. Maps and catalogue drives have none.
+        model: Fidelity of all designs, including those of the scene; None: the default
+            of each design. Maps and catalogue drives have none.
         spec: Limits by figure; see :data:`UPPER` and :data:`LOWER`.
         fatigue: Whether to assess the fatigue of designs with a cup.
         joints: Joints that get the drive or the level, and whose figures count; every
             driven joint if empty.
-        progress: Called with the stage, what is done and their number.
+        progress: Called with the stage, the number of finished runs and their total.
 
     Raises:
         InputError: If an argument is none of these.
@@ -220,9 +225,13 @@ def _is_design(reference: str) -> bool:
 
 
 def missed_limits(row: Compared, spec: Mapping[str, float]) -> tuple[str, ...]:
-    """Limits that a row does not keep: figures not known or not valid among them.
+    """Limits that a row does not meet; unknown and invalid figures miss theirs.
 
-    A level without compliance keeps every lower limit of the stiffness.
+    A level without compliance meets every lower limit of the stiffness.
+
+    Args:
+        row: Results of one argument.
+        spec: Limits by figure.
     """
     found = []
     for key, limit in spec.items():
@@ -248,13 +257,14 @@ def row_of(
     level: str | None,
     of: Sequence[str] = (),
 ) -> Compared:
-    """Figures of one run; those of the design itself are filled in later.
+    """Figures of one run; those of the design itself are added later.
 
     Args:
         name: The argument.
         run: Its run.
-        drive: The drive that it names; None for a level, which has that of the scene.
-        level: The level that it names, None for a drive.
+        drive: Drive that the argument names; None for a level, which uses the drives of
+            the scene.
+        level: Level that the argument names; None for a drive.
         of: Joints whose figures count; all if empty.
     """
     metrics = run.metrics()
@@ -314,9 +324,9 @@ def row_of(
 
 
 def _error_ripple(run: Run, joints: Mapping[str, Any]) -> float:
-    """Twice the strongest line of the transmission error at an order of its drive.
+    """Twice the strongest transmission-error line at an order of the drive.
 
-    The whole peak to peak is mostly torsion that follows the load.
+    Most of the total peak-to-peak value is torsion that follows the load.
     """
     lines = [
         2.0 * float(line["amplitude_arcmin"])
@@ -331,7 +341,7 @@ def _error_ripple(run: Run, joints: Mapping[str, Any]) -> float:
 def _safety(
     source: Design | DriveMap, drive: DriveMap, progress: Progress
 ) -> float | None:
-    """Least fatigue safety factor of a design with a cup at rated torque [-]."""
+    """Smallest fatigue safety factor of a design with a cup at rated torque [-]."""
     if isinstance(source, DriveMap) or source.cup is None:
         return None
     from swgjoint.fe.solid.figures.spec_figures import solid_figures
@@ -343,7 +353,7 @@ def _safety(
 def _stress(
     source: Design | DriveMap, drive: DriveMap, model: str | None
 ) -> float | None:
-    """Mean over a pitch of the largest von Mises stress at rated torque [MPa]."""
+    """Mean over one pitch of the largest von Mises stress at rated torque [MPa]."""
     if isinstance(source, DriveMap):
         return None
     from swgjoint.fe.meshing import simulate_meshing

@@ -1,4 +1,4 @@
-"""The scene of a comparison: where from, and which joints get what is compared."""
+"""The scene of a comparison, and the joints whose drive or level is replaced."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _END = "_joint"
 
 
 def scene_or_arm(reference: str, overrides: Iterable[str] = ()) -> Scene:
-    """The scene of a file or a bundled name, or one made around an arm.
+    """Load a scene from a file or a bundled name, or make one around an arm.
 
     Args:
         reference: Scene file, MJCF or URDF file of an arm, or bundled name.
@@ -35,12 +35,12 @@ def scene_or_arm(reference: str, overrides: Iterable[str] = ()) -> Scene:
 def resolve_step(
     scene: Scene, arguments: Iterable[str], joints: Sequence[str] = ()
 ) -> Scene:
-    """The scene at a step that carries the ripple of every drive that is compared.
+    """Choose a step that resolves the ripple of every compared drive.
 
     Args:
-        scene: The scene; a step that is short enough stays.
+        scene: The scene; a step that is short enough is kept.
         arguments: Drives and levels that are compared.
-        joints: Joints that get them; every driven one if empty.
+        joints: Joints that get them; every driven joint if empty.
     """
     arm = rigid_arm_of(scene)
     steps = [
@@ -55,15 +55,15 @@ def resolve_step(
 
 
 def joints_named(scene: Scene, patterns: Sequence[str]) -> tuple[str, ...]:
-    """Joints of the scene's arm that the patterns name, in its order; () for none.
+    """Joints of the scene's arm that match the patterns, in the order of the arm.
 
     Args:
         scene: The scene.
-        patterns: Names or shell patterns, several with commas between; the ending
-            ``_joint`` may be left out.
+        patterns: Names or shell patterns, also several separated by commas; the ending
+            ``_joint`` may be left out. No patterns match no joint.
 
     Raises:
-        InputError: If a pattern names no joint.
+        InputError: If a pattern matches no joint.
     """
     wanted = [p.strip() for text in patterns for p in text.split(",") if p.strip()]
     if not wanted:
@@ -89,7 +89,13 @@ def _fits(name: str, pattern: str) -> bool:
 
 
 def with_drive(scene: Scene, reference: str, joints: Sequence[str] = ()) -> Scene:
-    """The scene with another drive in these joints; in every driven one without."""
+    """The scene with another drive in some joints.
+
+    Args:
+        scene: The scene.
+        reference: Design, map or catalogue drive.
+        joints: Joints that get it; every driven joint if empty.
+    """
 
     def changed(section: JointSection) -> JointSection:
         if not joints and section.drive is None and section.linear is None:
@@ -101,7 +107,13 @@ def with_drive(scene: Scene, reference: str, joints: Sequence[str] = ()) -> Scen
 
 
 def with_level(scene: Scene, level: str, joints: Sequence[str] = ()) -> Scene:
-    """The scene with another level in these joints; in every joint without."""
+    """The scene with another level in some joints.
+
+    Args:
+        scene: The scene.
+        level: Level of the joint model.
+        joints: Joints that get it; every joint if empty.
+    """
     return _changed(scene, lambda s: s.model_copy(update={"level": level}), joints)
 
 
@@ -121,6 +133,11 @@ def _changed(
 
 
 def drives_of(scene: Scene, joints: Sequence[str]) -> tuple[str, ...]:
-    """References of the drives that a scene has in these joints, each once."""
+    """References of the drives in some joints of a scene, each once.
+
+    Args:
+        scene: The scene.
+        joints: Names of the joints.
+    """
     found = (scene.joint_settings(name).drive for name in joints)
     return tuple(dict.fromkeys(name for name in found if name is not None))

@@ -1,4 +1,4 @@
-"""Files of ``models/optimisations``: what is sought, among which designs."""
+"""Files of ``models/optimisations``: the objectives, and the designs to search."""
 
 from __future__ import annotations
 
@@ -26,19 +26,19 @@ REFINEMENT = "mesh.refinement"
 
 
 class Objective(Section):
-    """A figure that is to be small or large."""
+    """A figure to minimise or maximise."""
 
     figure: Text
     goal: Literal["minimise", "maximise"] = "minimise"
 
     @property
     def sign(self) -> float:
-        """Times this the figure is to be small."""
+        """Factor that turns the figure into one to minimise."""
         return 1.0 if self.goal == "minimise" else -1.0
 
 
 class Limit(Section):
-    """Bounds of a figure that a design must keep."""
+    """Bounds that the figure of a design must keep."""
 
     figure: Text
     least: float | None = None
@@ -55,7 +55,7 @@ class Limit(Section):
         return self
 
     def violation(self, value: float) -> float:
-        """How far the figure is beyond a bound, 0 within them [of the bound]."""
+        """Distance from the nearest bound, over that bound; zero within bounds."""
         beyond = 0.0
         if self.most is not None:
             beyond = max(beyond, (value - self.most) / (abs(self.most) or 1.0))
@@ -65,27 +65,28 @@ class Limit(Section):
 
 
 class Confirmation(Section):
-    """How designs of the front are computed again, with more care."""
+    """More accurate computation of designs of the Pareto front."""
 
     designs: Annotated[int, Field(ge=1, le=1_000)] = 5
-    """Of the front: the best of every objective first, then those farthest apart."""
+    """Number of designs of the front to confirm: the best of every objective first,
+    then those farthest apart."""
     positions: Annotated[int, Field(ge=1, le=10_000)] | None = None
-    """Of the wave generator in the simulation of meshing."""
+    """Number of positions of the wave generator in the simulation of meshing."""
     refinement: Annotated[float, Field(gt=0, le=100)] | None = None
-    """Of the mesh."""
+    """Refinement of the mesh."""
     model: Literal["2d", "3d"] | None = None
-    """Of the meshing and of the map."""
+    """Fidelity of the meshing and of the map."""
 
 
 class OptimisationFile(AskedFile):
-    """What is computed of a design, which figures count, and what may change."""
+    """Figures to compute, objectives, limits, and parameters that may change."""
 
     objectives: Annotated[tuple[Objective, ...], Field(strict=False, min_length=1)]
     limits: Annotated[tuple[Limit, ...], Field(strict=False)] = ()
     plan: SearchPlan
     confirm: Confirmation | None = None
     beside: Annotated[tuple[Reference, ...], Field(strict=False)] = ()
-    """Designs to hold against the front; the search does not see them."""
+    """Designs to compare with the front; the search does not use them."""
 
     @model_validator(mode="after")
     def _fits(self) -> OptimisationFile:
@@ -121,7 +122,10 @@ class OptimisationFile(AskedFile):
     def load(cls, reference: str | Path) -> OptimisationFile:
         """Read a file, given as a path or as the name of a bundled one.
 
-        Files that it names by a path lie relative to it.
+        Paths in the file are relative to it.
+
+        Args:
+            reference: Path or name.
 
         Raises:
             InputError: With one line per fault of the file.
@@ -133,7 +137,7 @@ class OptimisationFile(AskedFile):
         return file.model_copy(update={"beside": beside})
 
     def violations(self, figures: Mapping[str, float | None]) -> dict[str, float]:
-        """By how much each limit is missed; what cannot be told misses it by all."""
+        """Violation of each limit; an unknown figure counts as the largest one."""
         found = {}
         for limit in self.limits:
             value = figures.get(limit.figure)
@@ -141,12 +145,11 @@ class OptimisationFile(AskedFile):
         return found
 
     def sweep(self, columns: Mapping[str, list[Any]], *, confirm: bool) -> SweepFile:
-        """The sweep over some designs.
+        """The sweep that computes some designs.
 
         Args:
-            columns: Values of the parameters of this file by their column, or of other
-                keys.
-            confirm: Whether they are computed with the care of the confirmation.
+            columns: Values of the parameters of this file by column, or of other keys.
+            confirm: Whether they are computed with the accuracy of the confirmation.
         """
         keys = {p.column: p.keys for p in self.plan.parameters}
         tasks = {name: getattr(self, name) for name in ("meshing", "spec", "run")}

@@ -1,4 +1,4 @@
-"""Which designs of a search no other one beats, and which of them are far apart."""
+"""The Pareto front of a search, and a well-spread selection from it."""
 
 from __future__ import annotations
 
@@ -16,19 +16,24 @@ from swgjoint.typing import Array
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Candidate:
-    """A design and what came of it."""
+    """A design and its results."""
 
     values: Values
     """Values of the parameters by column, or the name of a compared design."""
     design: Design | None
-    """None where the values make none."""
+    """None if the values give no valid design."""
     record: Record
     confirmed: Record | None = None
-    """With the care of the confirmation; None where that was not asked for."""
+    """Results of the confirmation; None if it was not requested."""
 
 
 def objectives_of(file: OptimisationFile, candidates: Sequence[Candidate]) -> Array:
-    """What is to be small, of designs with figures (n, m)."""
+    """Objectives to minimise, shape (n, m).
+
+    Args:
+        file: File with the objectives.
+        candidates: Designs with figures, n of them.
+    """
     return np.array([[_signed(c, o) for o in file.objectives] for c in candidates])
 
 
@@ -39,9 +44,13 @@ def _signed(candidate: Candidate, objective: Objective) -> float:
 
 
 def front_of(file: OptimisationFile, candidates: Sequence[Candidate]) -> list[int]:
-    """Numbers of the designs that no other one beats, by the first objective.
+    """Indices of the Pareto-optimal designs, sorted by the first objective.
 
-    Of designs with figures within the limits; of equal values the first counts.
+    Only designs with figures within the limits count; of equal values the first one.
+
+    Args:
+        file: File with objectives and limits.
+        candidates: Designs.
     """
     names = [o.figure for o in file.objectives]
     known = [
@@ -61,13 +70,18 @@ def front_of(file: OptimisationFile, candidates: Sequence[Candidate]) -> list[in
 
 
 def _beaten(values: Array, k: int) -> bool:
-    """Whether a row is nowhere better and somewhere worse than another one."""
+    """Whether another row is nowhere worse and somewhere better."""
     no_worse = np.all(values <= values[k], axis=1)
     return bool(np.any(no_worse & np.any(values < values[k], axis=1)))
 
 
 def pick_spread(values: Array, count: int) -> list[int]:
-    """Rows that are the best of every column, then those farthest from the chosen."""
+    """Select the best row of every column, then those farthest from the selected.
+
+    Args:
+        values: Objectives (n, m).
+        count: Number of rows to select.
+    """
     width = np.ptp(values, axis=0)
     scaled = values / np.where(width > 0.0, width, 1.0)
     chosen = list(dict.fromkeys(np.argmin(values, axis=0).tolist()))[:count]
@@ -79,9 +93,14 @@ def pick_spread(values: Array, count: int) -> list[int]:
 
 
 def not_worse(file: OptimisationFile, one: Candidate, other: Candidate) -> bool:
-    """Whether a design is as good as another in every objective, as far as is known.
+    """Whether a design is at least as good as another in every known objective.
 
-    By the confirmation where both have one, else by the search.
+    Confirmed figures are compared if both have them, else those of the search.
+
+    Args:
+        file: File with the objectives.
+        one: The design.
+        other: Design to compare with.
     """
     records = [one.record, other.record]
     confirmed = [one.confirmed, other.confirmed]

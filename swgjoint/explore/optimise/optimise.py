@@ -1,7 +1,7 @@
 """Search for designs that are good in several figures at once.
 
-Every generation of the search is a sweep: it runs where sweeps run, keeps every design
-as soon as it is computed, and finds it again when the same file is run once more.
+Every generation of the search is a sweep: it runs where sweeps run, stores every design
+as soon as it is computed, and finds it again when the same file is run again.
 """
 
 from __future__ import annotations
@@ -33,18 +33,18 @@ from swgjoint.pool import Executor
 from swgjoint.progress import Progress, silent
 
 NAME = 80
-"""Characters of the start's name in those of the front."""
+"""Longest part of the start's name in the names of front designs [characters]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Optimum:
-    """What a search found."""
+    """Result of a search."""
 
     file: OptimisationFile
     tried: tuple[Candidate, ...]
-    """In the order in which the search asked for them."""
+    """All computed designs, in the order in which the search requested them."""
     front: tuple[Candidate, ...]
-    """Those of them that no other one beats, by the first objective."""
+    """Pareto-optimal designs, sorted by the first objective."""
     start: Candidate
     beside: tuple[Candidate, ...]
     generations: int
@@ -86,7 +86,7 @@ class Optimum:
         }
 
     def designs(self, source: str) -> list[Design]:
-        """Designs of the front, named after the one to start from."""
+        """Designs of the front, named after the start design."""
         assert self.start.design is not None
         base = self.start.design.drive.name[:NAME]
         found = []
@@ -130,22 +130,22 @@ def optimise(
     place: ResultStore | None = None,
     progress: Progress = silent,
 ) -> Optimum:
-    """Search, then compute some of the front again with more care.
+    """Search, then compute some designs of the front again with more accuracy.
 
     Without ``minutes`` in its plan the same file gives the same designs, wherever they
-    are computed and however often the search was stopped and begun again: designs that
-    the place keeps are not computed twice.
+    are computed and however often the search is stopped and resumed: stored designs are
+    not computed twice.
 
     Args:
-        file: What is sought.
+        file: Objectives, limits and parameters.
         executor: Where designs are computed.
-        place: Where records are kept; None keeps none.
-        progress: Called with the stage, the designs done and their number.
+        place: Where records are stored; None stores none.
+        progress: Called with the stage, the number of finished designs and their total.
 
     Raises:
         InputError: If a design cannot be read.
-        ComputationError: If the design to start from has no figures, or none of the
-            search has, or the executor cannot go on.
+        ComputationError: If the start design or every design of the search has no
+            figures, or the executor cannot go on.
         MissingExtraError: If the optimiser is not installed.
     """
     begin = time.perf_counter()

@@ -17,21 +17,21 @@ from swgjoint.gear.design.design import Design
 Evaluate = Callable[[list[Values]], list[Candidate]]
 
 DIGITS = 5
-"""Significant ones of the numbers that the search draws, as on a drawing."""
+"""Significant digits of the values that the search draws, as on a drawing."""
 FAILED = 1e6
-"""Violation that the search sees of a design without figures: beyond any other."""
+"""Violation of a design without figures, larger than any other."""
 NO_FIGURES = "no figures"
 
 
 def search(
     file: OptimisationFile, start: Design, evaluate: Evaluate
 ) -> Iterator[list[Candidate]]:
-    """Generations of NSGA-II, the first with the start where its values allow it.
+    """Generations of NSGA-II; the first one contains the start where possible.
 
     Args:
         file: Objectives, limits and parameters.
-        start: The design whose values the first generation holds.
-        evaluate: Designs of values, in their order.
+        start: Design whose values are in the first generation.
+        evaluate: Computes the designs of some values, in their order.
     """
     try:
         import optuna
@@ -74,7 +74,7 @@ def search(
 def _told(
     file: OptimisationFile, record: Record
 ) -> tuple[list[float], dict[str, float]]:
-    """What is to be small, and by how much limits are missed, as the search sees it."""
+    """Objectives to minimise, and violations of the limits, as the search sees them."""
     figures = [record.figures.get(o.figure) for o in file.objectives]
     if not record.ok or None in figures:
         return [0.0] * len(figures), {NO_FIGURES: FAILED}
@@ -97,7 +97,7 @@ def _distribution(parameter: Parameter, kinds: tuple[str, ...]) -> Any:
 
 
 def _values(parameters: Sequence[Parameter], drawn: Mapping[str, Any]) -> Values:
-    """Values of the file for what the search has drawn."""
+    """Values for the file from the values that the search has drawn."""
     found: Values = {}
     for parameter in parameters:
         value = drawn[parameter.column]
@@ -114,7 +114,7 @@ def _values(parameters: Sequence[Parameter], drawn: Mapping[str, Any]) -> Values
 def _start_values(
     parameters: Sequence[Parameter], start: Design
 ) -> dict[str, Any] | None:
-    """What the search would draw for the start; None where it never would."""
+    """Values that the search would draw for the start; None if it cannot draw them."""
     content, found = start.model_dump(), {}
     for parameter in parameters:
         values = [_at(content, key) for key in parameter.keys]
