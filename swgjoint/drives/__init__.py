@@ -1,1 +1,1 @@
-"""Drives by name, file or design: the one door to their maps."""
+"""Drives by name, file or design, and the functions that return their maps."""

@@ -26,7 +26,7 @@ DriveSource = DriveMap | Design | str | Path
 
 
 class AttachOptions(TypedDict, total=False):
-    """Options of :func:`attach`, which says what they mean."""
+    """Options of :func:`attach`, which documents them."""
 
     level: str
     rotor_inertia: float | None
@@ -81,55 +81,59 @@ def attach(
 ) -> JointDrive | dict[str, JointDrive]:
     """Turn hinges of a model into outputs of strain wave gears.
 
-    One joint, or many with one compilation::
+    One call drives a single joint, or many joints with one compilation::
 
         swgjoint.attach(spec, joint="elbow", drive="CSG-25-100")
         swgjoint.attach(spec, {"shoulder_*": "CSG-32-100", "*": "CSG-17-100"})
 
     A drive is a catalogue name, the path of a ``.swg`` map or of a design, the name of
     a bundled design, a :class:`~swgjoint.gear.design.design.Design`, whose map is built
-    (and cached), or a :class:`~swgjoint.maps.drive_map.DriveMap`. What the model gets
-    and keeps: :func:`swgjoint.joint.attach.attach`.
+    (and cached), or a :class:`~swgjoint.maps.drive_map.DriveMap`.
+    :func:`swgjoint.joint.attach.attach` describes what changes in the model.
 
-    A step outside the integrator's region gives a warning: here if it is outside at
-    rest, and by the engine when the model leaves the region while it runs, see
-    :mod:`swgjoint.joint.watch`.
+    A time step outside the stability region of the integrator gives a warning: from
+    this function if the model is outside at rest, from the engine if it leaves the
+    region while it runs; see :mod:`swgjoint.joint.watch`.
 
     Args:
-        spec: Model to edit, as whole or not at all.
+        spec: Model to edit; it remains unchanged if anything fails.
         drives: Drive by joint name or pattern (``*``, ``?``, ``[...]``). The first key
-            that matches a joint counts. Hinges that a pattern matches and that cannot
-            take a drive are left out, with one warning that lists them.
-        joint: Name of one hinge, in place of ``drives``.
-        drive: Its drive.
+            that matches a joint applies. Hinges that match a pattern but cannot take a
+            drive are skipped, with one warning that lists them.
+        joint: Name of a single hinge, instead of ``drives``.
+        drive: Drive of that hinge.
         level: ``rigid``, ``kinematic``, ``linear``, ``native`` or ``full``.
-        rotor_inertia: Rotor and wave generator about their axis [kg·m²]. None for
-            catalogue drives: twice the inertia of the wave generator.
-        damping_ratio: Share of critical damping of rotor against link with the link
-            inertia at qpos0, the other joints held; that of the map if None [-].
-        friction: Whether the model has the friction of the map, where it has any.
+        rotor_inertia: Inertia of rotor and wave generator about their axis [kg·m²].
+            None is accepted for catalogue drives: twice the inertia of the wave
+            generator.
+        damping_ratio: Damping ratio of the torsional vibration between rotor and link
+            [-], with the link inertia at qpos0 and the other joints locked; None takes
+            the value of the map.
+        friction: Whether the model includes the friction of the map, if it has any.
         rotor: ``gyroscopic`` or ``lumped``.
-        variable: At ``full``, let one specimen deviate from its map, see
+        variable: At ``full``, let individual drives deviate from their map, see
             :mod:`swgjoint.joint.variation`.
-        max_input_speed: Largest speed of the rotor [rad/s]; harmonics that the step
-            cannot carry at it are left out. None keeps all.
-        max_phase_step: Largest phase step h n |theta rate| that is kept [rad].
-        integrator: ``discrete`` replaces Euler, ``implicit`` and ``implicitfast``, the
-            latter two with a warning, and too few or too coarse iterations of the
-            solver; ``keep`` keeps them.
-        model: Fidelity of the map of a design: ``ring``, ``2d`` or ``3d``; its default
-            if None.
-        kinematic_error_arcmin: Peak to peak over one output turn of the error that a
-            catalogue drive, or a map without any, is assumed to have, see
-            :mod:`swgjoint.maps.fit.error_spectrum`. None: what the catalogue states.
-        seed: Of that error; joints differ by their names.
+        max_input_speed: Largest speed of the rotor [rad/s]; harmonics that the time
+            step cannot resolve at this speed are omitted. None keeps all harmonics.
+        max_phase_step: Largest phase step h n |theta rate| of a harmonic that is kept
+            [rad].
+        integrator: ``discrete`` replaces Euler, ``implicit`` and ``implicitfast`` (the
+            last two with a warning) and raises solver settings that are too coarse;
+            ``keep`` changes neither.
+        model: Fidelity of the map of a design: ``ring``, ``2d`` or ``3d``; None takes
+            the default of the design.
+        kinematic_error_arcmin: Assumed kinematic error, peak to peak over one output
+            turn [arcmin], of a catalogue drive or of a map without kinematic error; see
+            :mod:`swgjoint.maps.fit.error_spectrum`. None takes the catalogue value.
+        seed: Seed of the assumed error; joints differ by their names.
 
     Returns:
-        What the joint has, or by joint in the order of the model.
+        The drive of the joint; with ``drives``, all drives by joint name in the order
+        of the model.
 
     Raises:
-        InputError: If a joint, a drive or a value cannot be used, a line for each; the
-            spec is then unchanged.
+        InputError: If a joint, a drive or a value cannot be used, with one line for
+            each; the spec is then unchanged.
         ComputationError: If the plugin cannot be loaded.
     """
     check_spec(spec)
@@ -152,10 +156,10 @@ def attach(
     known: dict[str, DriveMap] = {}
     fittings = {}
     for name, key in chosen.items():
-        found = _map(sources[key], name, known, model, kinematic_error_arcmin, seed)
+        drive_map = _map(sources[key], name, known, model, kinematic_error_arcmin, seed)
         fittings[name] = Fitting(
-            drive=found,
-            rotor_inertia=_rotor(name, found, rotor_inertia),
+            drive=drive_map,
+            rotor_inertia=_rotor(name, drive_map, rotor_inertia),
             level=level,
             damping_ratio=damping_ratio,
             friction=friction,
@@ -164,8 +168,8 @@ def attach(
             max_input_speed=max_input_speed,
             max_phase_step=max_phase_step,
         )
-    got = attach_all(spec, fittings, integrator=integrator, watch=True)
-    return got if joint is None else got[joint]
+    attached = attach_all(spec, fittings, integrator=integrator, watch=True)
+    return attached if joint is None else attached[joint]
 
 
 def _map(
@@ -176,7 +180,7 @@ def _map(
     error: float | None,
     seed: int,
 ) -> DriveMap:
-    """The map of one joint; ``known`` keeps what several joints share."""
+    """The map of one joint; ``known`` keeps the maps that several joints share."""
     if isinstance(source, Design):
         key = f"{id(source)}"
         if key not in known:
@@ -201,10 +205,10 @@ def _map(
     )
 
 
-def _rotor(joint: str, drive: DriveMap, given: float | None) -> float:
-    """Inertia of the rotor [kg·m²]."""
-    if given is not None:
-        return given
+def _rotor(joint: str, drive: DriveMap, rotor_inertia: float | None) -> float:
+    """Inertia of the rotor [kg·m²]: the caller's value or the catalogue's."""
+    if rotor_inertia is not None:
+        return rotor_inertia
     assumed = (
         catalogue_rotor_inertia(drive.name) if drive.level == "catalogue" else None
     )

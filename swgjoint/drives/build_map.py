@@ -30,27 +30,31 @@ def build_map(
     progress: Progress = silent,
     cache: bool = True,
 ) -> DriveMap:
-    """Drive map of a design.
+    """Compute the drive map of a design with finite elements.
 
-    Its potential is that of the drive without friction; where the teeth have a friction
-    coefficient, elements of hysteresis follow their torque loop, and
+    The potential is that of the drive without friction. If the teeth have a friction
+    coefficient, hysteresis elements are fitted to the torque loop with friction, and
     ``info["friction_loop"]`` compares the two.
 
     Args:
         design: The drive.
         model: Fidelity, ``ring``, ``2d`` or ``3d``; by default ``3d`` for a design with
-            a cup, else ``2d``.
-        angles: Wave-generator positions over one pitch of the fixed member, with
-            ``ring`` positions of the balls over one passage; the default of
-            :func:`swgjoint.fe.common.sampling.sample_map` or
-            :func:`swgjoint.fe.rings.sampling.sample_rings` if None.
-        progress: Called with the stage, the solves done and their number.
-        cache: Whether to look in the cache of maps, and to store there. With it a map
-            that was interrupted goes on where it was, and is the same bit for bit.
+            a cup, otherwise ``2d``.
+        angles: Number of wave-generator positions over one pitch of the fixed member
+            (for ``ring``: of ball positions over one ball passage); None takes the
+            default of :func:`swgjoint.fe.common.sampling.sample_map` or
+            :func:`swgjoint.fe.rings.sampling.sample_rings`.
+        progress: Called with the stage, the number of finished solves and their total.
+        cache: Whether to read and write the map cache. With the cache, an interrupted
+            computation resumes where it stopped, with bit-identical results.
+
+    Returns:
+        The fitted map of the drive.
 
     Raises:
-        DesignError: If the design cannot be built or holds what is not modelled.
-        ComputationError: If no torque at all can be solved.
+        DesignError: If the design cannot be built or contains something that the model
+            does not cover.
+        ComputationError: If the solver converges at no torque at all.
     """
     model = model or default_model(design)
     if model == "3d":
@@ -85,14 +89,14 @@ def build_map(
         return build()
     drive = cache_map(parts, build, name=design.drive.name)
     if keep is not None:
-        keep.clear()  # not before the map itself is in the cache
+        keep.clear()  # only once the map itself is in the cache
     return drive
 
 
 def _with_friction(
     design: Design, drive: DriveMap, progress: Progress, keep: Unfinished | None
 ) -> DriveMap:
-    """The map with the hysteresis of the teeth; where it cannot be had it says so."""
+    """The map with the hysteresis of the teeth, or with the reason why it has none."""
     top = min(drive.ratings.repeated_peak, *(abs(t) for t in drive.torque_range))
     try:
         loops = friction_loops(design, top=top, progress=progress, keep=keep)

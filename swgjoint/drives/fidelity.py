@@ -1,4 +1,4 @@
-"""Default fidelity of the finite elements of a design."""
+"""Default fidelity of the finite element model of a design."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from swgjoint.gear.design.design import Design
 
 
 def default_model(design: Design) -> Literal["2d", "3d"]:
-    """``3d`` for a design with a cup, else ``2d``.
+    """Return ``3d`` for a design with a cup, otherwise ``2d``.
 
     >>> from swgjoint import Design
     >>> [default_model(Design.load(name)) for name in ("reference-2d", "reference-3d")]

@@ -1,4 +1,4 @@
-"""Drives that a scene names, as maps."""
+"""Find, load or build the maps of the drives that a scene refers to."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from swgjoint.gear.design.design import Design
 
 WITHOUT_HARMONICS = ("rigid", "linear", "native")
-"""Levels that use of a map its mean alone."""
+"""Levels that use only the mean of a map, without its harmonics."""
 
 
 def drive_of(
@@ -37,23 +37,26 @@ def drive_of(
     joint: str = "",
     progress: Progress = silent,
 ) -> DriveMap:
-    """The map of a joint's drive; what was loaded or built is kept in ``known``.
+    """The map of a joint's drive; maps that are loaded or built are kept in ``known``.
 
-    Hysteresis that the section switches off is not in it, nor are harmonics below its
-    tolerance at the levels that have any. A catalogue drive has the kinematic error
-    that its tables state or the section asks for, other phases at every joint; what is
-    in ``known`` is taken as it is.
+    The map omits hysteresis that the section switches off and, at levels that use
+    harmonics, the harmonics below the tolerance. A catalogue drive gets the kinematic
+    error of its tables or of the section, with different phases at every joint. Maps
+    in ``known`` are used unchanged.
 
     Args:
-        section: Settings of the joint with a drive.
-        known: Maps by reference, with ``--model MODEL`` behind it where the section
-            asks for a fidelity; extended.
+        section: Settings of the joint, which must have a drive.
+        known: Maps by reference, followed by ``--model MODEL`` if the section sets a
+            fidelity. New maps are added.
         joint: Name of the joint.
         progress: Called while a map is built.
 
+    Returns:
+        The map with the options of the section applied.
+
     Raises:
-        InputError: If the reference is no design, map file or catalogue drive, or does
-            not take what the section asks for.
+        InputError: If the reference is not a design, map file or catalogue drive, or
+            does not support the options of the section.
     """
     drive = _without_options(section, known=known, joint=joint, progress=progress)
     if section.hysteresis is False and drive.hysteresis:
@@ -72,15 +75,15 @@ def _without_options(
     joint: str,
     progress: Progress,
 ) -> DriveMap:
-    """The map with its kinematic error, whole."""
+    """The map with its kinematic error, hysteresis and all harmonics."""
     reference, model = section.drive, section.model
     wanted, seed = section.kinematic_error_arcmin, section.seed or 0
     where = f"joints.{joint}: " if joint else ""
     if model is not None and (reference is None or not _may_be_built(reference)):
-        what = "linear" if reference is None else f"drive {reference!r}"
+        drive_name = "linear" if reference is None else f"drive {reference!r}"
         raise InputError(
-            f"{where}model {model!r} with {what}, which is no design; accepted: a"
-            " design, or no model"
+            f"{where}model {model!r} with {drive_name}, which is not a design;"
+            " accepted: a design, or no model"
         )
     if section.linear is not None:
         drive = linear_map(section.linear)
@@ -103,10 +106,10 @@ def _without_options(
 def _loaded(
     reference: str, model: str | None, known: dict[str, DriveMap], progress: Progress
 ) -> DriveMap:
-    """The map of a file or a design, from ``known`` where it is there."""
-    there = known.get(reference)
-    if there is not None and model in (None, there.level):
-        return there
+    """The map of a file or a design, taken from ``known`` if present."""
+    loaded = known.get(reference)
+    if loaded is not None and model in (None, loaded.level):
+        return loaded
     key = reference if model is None else f"{reference} --model {model}"
     if key not in known:
         known[key] = load_drive(reference, model=model, progress=progress)
@@ -115,20 +118,20 @@ def _loaded(
 
 @lru_cache(maxsize=64)
 def _catalogue_drive(reference: str) -> DriveMap:
-    """A catalogue drive without error; an arm asks for one several times."""
+    """A catalogue drive without kinematic error; arms often use one repeatedly."""
     return DriveMap.from_catalogue(reference, kinematic_error_arcmin=0.0)
 
 
 def given_drives(drives: Mapping[str, DriveMap]) -> dict[str, DriveMap]:
-    """Those of some loaded drives that a scene need not load again.
+    """Select the loaded drives that a scene need not load again.
 
-    Catalogue drives are left out: a scene gives each of its joints one of its own.
+    Catalogue drives are omitted because each joint gets its own specimen.
     """
     return {name: one for name, one in drives.items() if not names_catalogue(name)}
 
 
 def linear_map(section: LinearDrive) -> DriveMap:
-    """A map of constant stiffness from the scene's own numbers."""
+    """A map of constant stiffness from the ``linear`` table of a scene."""
     return DriveMap.linear(
         section.stiffness_Nm_rad,
         teeth_flexspline=section.teeth_flexspline,
@@ -150,18 +153,22 @@ def load_drive(
 
     Args:
         reference: See :func:`find_drive`.
-        model: Fidelity for a design; None for its default.
-        angles: Wave-generator positions for a design; None for the default.
-        errors: Whether a design keeps its manufacturing errors, whose superposition
-            over the cycle of the teeth takes minutes.
-        kinematic_error_arcmin: Peak to peak of the error that a catalogue drive is
-            assumed to have, or another one without error; None: what the catalogue
-            states, of others nothing.
+        model: Fidelity for a design; None takes its default.
+        angles: Number of wave-generator positions for a design; None takes the default.
+        errors: Whether a design keeps its manufacturing errors. Superposing them over
+            the meshing cycle of the teeth takes minutes.
+        kinematic_error_arcmin: Assumed kinematic error, peak to peak [arcmin], of a
+            catalogue drive or of another drive without kinematic error. None takes the
+            value of the catalogue; other drives then get no error.
         progress: Called while a map is built.
 
+    Returns:
+        The map, loaded or built.
+
     Raises:
-        InputError: If the reference is none of these, a fidelity is given for what is
-            no design, or a kinematic error for what has its own.
+        InputError: If the reference is none of these, if ``model`` is given for
+            something other than a design, or if a kinematic error is given for a drive
+            that has its own.
     """
     wanted = kinematic_error_arcmin
     named = isinstance(reference, str) and names_catalogue(reference)
@@ -190,11 +197,11 @@ def _from_source(
     from swgjoint.drives.build_map import build_map
     from swgjoint.gear.design.tolerances import has_errors, without_errors
 
-    flawless = not errors and has_errors(source)
-    if flawless:
+    omit_errors = not errors and has_errors(source)
+    if omit_errors:
         source = without_errors(source)
     drive = build_map(source, model=model, angles=angles, progress=progress)
-    if not flawless:
+    if not omit_errors:
         return drive
     return replace(drive, info={**drive.info, "manufacturing_errors": "left out"})
 
@@ -204,14 +211,14 @@ def _named(reference: str | Path | Design | DriveMap) -> str:
 
 
 def find_drive(reference: str | Path | Design | DriveMap) -> DriveMap | Design:
-    """What a drive reference names; nothing is built.
+    """Resolve a drive reference to a map or a design without building anything.
 
-    A name ending ``.swg`` is a map; an existing file or a bundled name is a design; a
-    name that begins with a catalogue series (``CSG-25-100``) is a catalogue drive. A
-    design or a map that is given as an object is returned as it is.
+    A name that ends with ``.swg`` is a map; an existing file or a bundled name is a
+    design; a name that begins with a catalogue series (``CSG-25-100``) is a catalogue
+    drive. A design or map object is returned unchanged.
 
     Raises:
-        InputError: If it is none of these.
+        InputError: If the reference is none of these.
 
     >>> find_drive("CSG-25-100").level
     'catalogue'
@@ -257,7 +264,7 @@ def _unknown(reference: str) -> str:
 
 
 def names_catalogue(reference: str) -> bool:
-    """Whether a reference is a catalogue drive, and neither a file nor a design."""
+    """Whether a reference is a catalogue drive, not a file or a design."""
     return (
         is_catalogue_name(reference)
         and not reference.endswith(".swg")
@@ -274,13 +281,16 @@ def _may_be_built(reference: str) -> bool:
 def check_joint_names(
     named: Mapping[str, set[str]], joints: tuple[str, ...], *, where: str, arm: str
 ) -> None:
-    """Refuse keys that name a joint which the arm does not have, all at once.
+    """Reject keys that name joints which the arm does not have, all in one message.
 
     Args:
         named: Joint names by the key that uses them.
         joints: Joints of the arm.
-        where: File that is named in messages.
+        where: File name for messages.
         arm: Name of the arm.
+
+    Raises:
+        InputError: If a name is not a joint of the arm, with one line for each.
     """
     lines = [
         f"{where}: {key}.{name}: no such joint in arm {arm!r}"
@@ -293,7 +303,7 @@ def check_joint_names(
 
 
 def _meant(key: str, name: str, joints: tuple[str, ...]) -> str:
-    """What a name that no joint has may have meant."""
+    """Suggestion for a name that matches no joint."""
     if key == "joints" and name == "*":
         return "; keys of all joints are under 'defaults', e.g. defaults.friction"
     near = near_names(name, joints)

@@ -1,4 +1,4 @@
-"""Tables of a scene file, and options of ``attach``, for the drive of one joint."""
+"""Scene-file tables and ``attach`` options that describe the drive of one joint."""
 
 from __future__ import annotations
 
@@ -16,15 +16,18 @@ Positive = Annotated[float, Field(gt=0)]
 
 
 class MotorLimits(Section):
-    """What a motor can do, all at the motor shaft; each limit is optional."""
+    """Limits of a motor, all at the motor shaft; each limit is optional."""
 
     torque_limit_Nm: Positive | None = None
+    """Largest torque at any speed."""
     stall_torque_Nm: Positive | None = None
-    """Torque-speed line: at most this at rest, nothing at the no-load speed."""
+    """Largest torque at rest; it falls linearly to zero at the no-load speed."""
     no_load_speed_rpm: Positive | None = None
+    """Speed at which the torque-speed line reaches zero torque."""
     torque_constant_Nm_A: Positive | None = None
-    """With it the metrics state the current."""
+    """Torque per current; if given, the metrics include the motor current."""
     current_limit_A: Positive | None = None
+    """Largest current; requires the torque constant."""
 
     @model_validator(mode="after")
     def _pairs(self) -> Self:
@@ -33,18 +36,18 @@ class MotorLimits(Section):
             faults.append(
                 (
                     "stall_torque_Nm",
-                    "accepted: stall_torque_Nm and no_load_speed_rpm together",
+                    "expected stall_torque_Nm and no_load_speed_rpm together",
                 )
             )
         if self.current_limit_A is not None and self.torque_constant_Nm_A is None:
-            faults.append(("current_limit_A", "needed with it: torque_constant_Nm_A"))
+            faults.append(("current_limit_A", "also needs torque_constant_Nm_A"))
         if faults:
             raise Fault(*faults)
         return self
 
     @property
     def torque(self) -> float | None:
-        """Largest torque at any speed, of torque and current [N·m]; None: any."""
+        """Smaller of torque limit and current limit [N·m]; None if there is neither."""
         bounds = [] if self.torque_limit_Nm is None else [self.torque_limit_Nm]
         if self.current_limit_A is not None and self.torque_constant_Nm_A is not None:
             bounds.append(self.current_limit_A * self.torque_constant_Nm_A)
@@ -55,58 +58,64 @@ class LinearDrive(Section):
     """A drive of constant stiffness without kinematic error."""
 
     stiffness_Nm_rad: Positive
+    """Torsional stiffness at the output."""
     teeth_flexspline: Annotated[int, Field(ge=40, le=400)] = 200
+    """Number of teeth of the flexspline."""
     teeth_circular_spline: Annotated[int, Field(ge=42, le=412)] = 202
+    """Number of teeth of the circular spline."""
     rated_torque_Nm: Positive = 100.0
+    """Rated torque at the output."""
 
 
 class JointSection(Section):
-    """Drive of one joint; what is absent comes from ``[defaults]``."""
+    """Drive of one joint; absent keys take their values from ``[defaults]``."""
 
     drive: str | None = None
     """Design (path or bundled name), ``.swg`` file or catalogue name."""
     linear: LinearDrive | None = None
+    """Drive of constant stiffness, instead of ``drive``."""
     model: Literal["ring", "2d", "3d"] | None = None
-    """Fidelity of the finite elements of a design; None: 3d with a cup, else 2d."""
+    """Finite element model of a design; None: 3d for one with a cup, otherwise 2d."""
     kinematic_error_arcmin: Annotated[float, Field(ge=0, le=LARGEST)] | None = None
-    """Peak to peak over one output turn of the error that a catalogue drive is assumed
-    to have, see :mod:`swgjoint.maps.fit.error_spectrum`, or another drive without
-    error. None: the transmission accuracy that the catalogue states. A drive with an
-    error of
-    its own keeps it, and takes no other value than 0."""
+    """Assumed kinematic error, peak to peak over one output turn, of a catalogue drive
+    or of another drive without kinematic error; see
+    :mod:`swgjoint.maps.fit.error_spectrum`. None takes the transmission accuracy of the
+    catalogue. A drive that has its own kinematic error keeps it and accepts only 0."""
     seed: Annotated[int, Field(ge=0, lt=2**32)] | None = None
-    """Of that error; the joints of one seed differ by their names. None: 0."""
+    """Seed of the assumed error, 0 if None; joints with one seed differ by name."""
     level: Level | None = None
+    """Level of detail of the joint model."""
     rotor_inertia_kgm2: Annotated[float, Field(gt=0, le=1)] | None = None
-    """Rotor with wave generator about the motor axis."""
+    """Inertia of rotor and wave generator about the motor axis."""
     damping_ratio: Annotated[float, Field(ge=0, le=1)] | None = None
-    """Of the torsional vibration; None takes that of the drive."""
+    """Damping ratio of the torsional vibration; None takes that of the drive."""
     hysteresis: bool | None = None
-    """False leaves the hysteresis of the drive out; native and full have it else."""
+    """False omits the hysteresis of the drive, which native and full include."""
     friction: bool | None = None
-    """False leaves the friction of the drive out; native and full have it else."""
+    """False omits the friction of the drive, which native and full include."""
     harmonics_tolerance_arcmin: Positive | None = None
-    """Drops harmonics of the drive that together turn the output by less at a given
-    torque, see :mod:`swgjoint.maps.fit.pruning`; None keeps all. Without effect at the
-    levels rigid, linear and native, which have no harmonics. At the others a map is
-    refused where the swing of its stiffness, summed over the harmonics, exceeds the
-    mean: no torque then bounds an angle."""
+    """Drops harmonics of the drive that together turn the output by less than this at
+    constant torque, see :mod:`swgjoint.maps.fit.pruning`; None keeps all. The
+    tolerance has no effect at the levels rigid, linear and native, which have no
+    harmonics. At the other levels, a map is rejected if the variation of its stiffness,
+    summed over the harmonics, exceeds the mean stiffness, because a given torque then
+    does not bound the angle."""
     rotor: Literal["gyroscopic", "lumped"] | None = None
-    """Whether the rotor is a body that its link carries along, the default."""
+    """``gyroscopic`` (default): a body carried by its link; ``lumped``: an inertia."""
     motor: MotorLimits | None = None
-    """Limits of the motor; None: it gives what the controller asks for."""
+    """Limits of the motor; None: it delivers whatever the controller commands."""
 
     @model_validator(mode="after")
     def _one_drive(self) -> Self:
         if self.drive is not None and self.linear is not None:
-            raise Fault(("drive", "given beside linear; accepted: one of the two"))
+            raise Fault(("drive", "given together with linear; accepted: one of them"))
         return self
 
     def fill_from(self, base: JointSection) -> JointSection:
-        """These settings, completed by others."""
-        own = self.model_dump(exclude_none=True)
-        values = {key: getattr(self, key) for key in own}
+        """Complete these settings with those of ``base``, which have lower priority."""
+        present = self.model_dump(exclude_none=True)
+        values = {key: getattr(self, key) for key in present}
         rest = base.model_dump(exclude_none=True)
-        if "drive" in own or "linear" in own:
+        if "drive" in present or "linear" in present:
             rest = {k: v for k, v in rest.items() if k not in ("drive", "linear")}
         return JointSection(**{key: getattr(base, key) for key in rest} | values)

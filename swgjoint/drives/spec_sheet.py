@@ -1,8 +1,8 @@
 """The spec sheet of any drive: a design, a map or a catalogue name.
 
-Of a map alone :mod:`swgjoint.maps.sheet.spec_sheet` measures the figures. A design has
-more to tell: radial stiffness and fatigue of the 3D model, the ratcheting torque, and
-lower bounds of the running torque.
+:mod:`swgjoint.maps.sheet.spec_sheet` measures the figures of a map. A design provides
+further figures: radial stiffness and fatigue of the 3D model, the ratcheting torque,
+and lower bounds of the running torque.
 """
 
 from __future__ import annotations
@@ -39,21 +39,22 @@ if TYPE_CHECKING:
     from swgjoint.maps.fit.overlay import Overlay
 
 FEW_ANGLES = 3
-"""Wave-generator positions of a design's map where every wanted figure is read with the
-input locked at the first one, without manufacturing errors."""
+"""Number of wave-generator positions in the map of a design if every requested figure
+is measured with the input locked at the first one, without manufacturing errors."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DriveSheet:
-    """A spec sheet and what stands behind its figures."""
+    """A spec sheet with the data behind its figures."""
 
     design: str
     """Name of the drive."""
     sheet: SpecSheet
+    """The figures of the drive."""
     result: dict[str, Any]
     """The sheet under the keys of ``swgjoint spec --json``."""
     overlay: Overlay | None
-    """A measured loop over the prediction."""
+    """Comparison of a measured loop with the prediction; None without measurement."""
 
 
 def spec_sheet(
@@ -67,26 +68,27 @@ def spec_sheet(
     """Catalogue-style sheet of a drive, as ``swgjoint spec --json`` prints it.
 
     Args:
-        drive: A design, a map, or what names one: a file, a bundled name, a catalogue
-            drive such as ``CSG-25-100``.
-        model: Fidelity of the finite elements of a design, ``ring``, ``2d`` or ``3d``;
-            by default ``3d`` for a design with a cup, else ``2d``.
-        only: Keys of :data:`swgjoint.maps.sheet.spec_sheet.KEYS` that are wanted, and
-            no more is computed than they need; all if empty. The ratcheting torque is
-            computed only where it is named.
-        measured: CSV file of a measured torque-torsion loop, input locked, that is
-            laid over the prediction: ``torque_Nm`` with ``torsion_arcmin`` or
-            ``torsion_rad``.
+        drive: A design, a map, or the name of one: a file, a bundled name, or a
+            catalogue drive such as ``CSG-25-100``.
+        model: Finite element model of a design, ``ring``, ``2d`` or ``3d``; by default
+            ``3d`` for a design with a cup, otherwise ``2d``.
+        only: Requested keys of :data:`swgjoint.maps.sheet.spec_sheet.KEYS`, all if
+            empty; only what they need is computed. The ratcheting torque is computed
+            only if it is listed.
+        measured: CSV file of a measured torque-torsion loop with locked input, which is
+            compared with the prediction; columns ``torque_Nm`` and ``torsion_arcmin``
+            or ``torsion_rad``.
         progress: Called while finite elements are solved.
 
     Returns:
-        The figures, None where the source cannot tell, with the reason in ``missing``;
-        ``design``; ``validity`` (level, torque range, what was left out);
-        ``uncertain`` (by key, what the map misses); ``validation`` of the map against
-        unseen solves (None with ``validation_reason``) and ``validation_notes``;
-        ``stated`` by the catalogue; what stands behind figures of a design
-        (``radial_stiffness``, ``fatigue``, ``ratcheting``, ``running``); ``measured``,
-        see :meth:`swgjoint.maps.fit.overlay.Overlay.as_dict`; ``wall_s``.
+        The figures, or None with the reason in ``missing`` where the source does not
+        provide one; ``design``; ``validity`` (level, torque range, omitted effects);
+        ``uncertain`` (by key, what the map does not cover); ``validation`` of the map
+        against solves that were not used in the fit (None with
+        ``validation_reason``) and ``validation_notes``; ``stated`` by the catalogue;
+        the data behind figures of a design (``radial_stiffness``, ``fatigue``,
+        ``ratcheting``, ``running``); ``measured``, see
+        :meth:`swgjoint.maps.fit.overlay.Overlay.as_dict`; ``wall_s``.
 
     Raises:
         InputError: If the drive, a key, the fidelity or the file cannot be used.
@@ -109,7 +111,15 @@ def measure_drive(
     measured: str | Path | None = None,
     progress: Progress = silent,
 ) -> DriveSheet:
-    """The sheet of a drive with the objects that pictures need; see `spec_sheet`."""
+    """Spec sheet of a drive together with the objects that figures are drawn from.
+
+    Args:
+        drive: See :func:`spec_sheet`.
+        model: See :func:`spec_sheet`.
+        only: See :func:`spec_sheet`.
+        measured: See :func:`spec_sheet`.
+        progress: See :func:`spec_sheet`.
+    """
     start = time.perf_counter()
     keys, loop = check_keys(only), None
     if measured is not None:
@@ -117,10 +127,10 @@ def measure_drive(
 
         loop = read_loop(measured)
     source = find_drive(drive)
-    found = _map(source, model, keys, always=loop is not None, progress=progress)
+    drive_map = _map(source, model, keys, always=loop is not None, progress=progress)
     ratings = ratings_of(source) if isinstance(source, Design) else source.ratings
-    if found is not None:
-        ratings = found.ratings
+    if drive_map is not None:
+        ratings = drive_map.ratings
     more = _Figures()
     if isinstance(source, Design):
         more.add_solid(source, model, keys, ratings, progress)
@@ -128,19 +138,19 @@ def measure_drive(
             more.add_ratcheting(source, keys, progress)
         more.add_running(source, keys)
     sheet = measure_spec(
-        found, ratings=ratings, only=keys, known=more.values, unknown=more.reasons
+        drive_map, ratings=ratings, only=keys, known=more.values, unknown=more.reasons
     )
     name = source.drive.name if isinstance(source, Design) else source.name
     result: dict[str, Any] = {"design": name, **sheet.as_dict(), **more.details}
-    result |= _validity(found, ratings, keys)
+    result |= _validity(drive_map, ratings, keys)
     overlay = None
     if loop is not None:
-        assert found is not None
+        assert drive_map is not None
         from swgjoint.maps.fit.loop_units import check_units
-        from swgjoint.maps.fit.overlay import overlay as laid_over
+        from swgjoint.maps.fit.overlay import overlay as compare
 
-        doubts = check_units(str(measured), loop, found.ratings.rated_torque)
-        overlay = laid_over(found, loop)
+        doubts = check_units(str(measured), loop, drive_map.ratings.rated_torque)
+        overlay = compare(drive_map, loop)
         content = overlay.as_dict()
         content["warnings"] = [*doubts, *content["warnings"]]
         result["measured"] = {"file": str(measured), **content}
@@ -156,7 +166,7 @@ def _map(
     always: bool,
     progress: Progress,
 ) -> DriveMap | None:
-    """The map; None where the ratings of a design suffice, unless always."""
+    """The map; None if the ratings of a design suffice, unless ``always`` is set."""
     if not needs_map(keys) and not always:
         if isinstance(source, Design):
             return None
@@ -175,19 +185,19 @@ def _map(
 def _validity(
     drive: DriveMap | None, ratings: Ratings, keys: tuple[str, ...]
 ) -> dict[str, Any]:
-    """What the figures stand for."""
+    """Model, range and validation of the figures."""
     if drive is None:
-        found: dict[str, Any] = {"level": "design", "ratings": ratings.source}
-        return {"validity": found, **validation_of_sheet(None, keys)}
-    found = validity(drive)
+        valid_for: dict[str, Any] = {"level": "design", "ratings": ratings.source}
+        return {"validity": valid_for, **validation_of_sheet(None, keys)}
+    valid_for = validity(drive)
     if "manufacturing_errors" in drive.info:
-        found["manufacturing_errors"] = drive.info["manufacturing_errors"]
+        valid_for["manufacturing_errors"] = drive.info["manufacturing_errors"]
     label = drive.info.get("label")
     if isinstance(label, dict) and label.get("stress_state"):
-        found["stress_state"] = label["stress_state"]
+        valid_for["stress_state"] = label["stress_state"]
     stated = drive.info.get("stated")
     return {
-        "validity": found,
+        "validity": valid_for,
         **validation_of_sheet(drive, keys),
         "stated": stated if isinstance(stated, dict) else None,
     }
@@ -195,13 +205,13 @@ def _validity(
 
 @dataclass(kw_only=True)
 class _Figures:
-    """Figures of a design that no map holds."""
+    """Figures of a design that a map does not contain."""
 
     values: dict[str, float] = field(default_factory=dict)
     reasons: dict[str, str] = field(default_factory=dict)
-    """Why a figure is missing."""
+    """Reason why a figure is missing, by key."""
     details: dict[str, Any] = field(default_factory=dict)
-    """What stands behind the figures."""
+    """Data behind the figures."""
 
     def add_solid(
         self,
@@ -211,7 +221,7 @@ class _Figures:
         ratings: Ratings,
         progress: Progress,
     ) -> None:
-        """Radial stiffness and fatigue of the 3D model."""
+        """Add radial stiffness and fatigue of the 3D model."""
         wanted = [key for key in SOLID_KEYS if key in keys]
         if not wanted:
             return
@@ -221,15 +231,15 @@ class _Figures:
             return
         from swgjoint.fe.solid.figures.spec_figures import solid_figures
 
-        found = solid_figures(design, wanted, ratings.rated_torque, progress=progress)
-        self.values |= found.values
-        self.reasons |= found.missing
-        self.details |= found.details
+        solid = solid_figures(design, wanted, ratings.rated_torque, progress=progress)
+        self.values |= solid.values
+        self.reasons |= solid.missing
+        self.details |= solid.details
 
     def add_ratcheting(
         self, design: Design, keys: tuple[str, ...], progress: Progress
     ) -> None:
-        """Ratcheting torque, or the lower bound at which the search ended."""
+        """Add the ratcheting torque, or the lower bound at which the search ended."""
         if RATCHETING_KEY not in keys:
             return
         from swgjoint.fe.plane.ratcheting import ratcheting_path
@@ -246,16 +256,16 @@ class _Figures:
         else:
             rim = design.circular_spline.outer_rim
             self.reasons[RATCHETING_KEY] = (
-                f"more than {path['limit_Nm']:.4g} N·m (a lower bound, where the search"
-                f" ended: {path['outcome']}): the plane has a rigid wave generator, and"
-                f" the outside of the circular spline is {rim}"
+                f"more than {path['limit_Nm']:.4g} N·m (lower bound; the search ended"
+                f" with: {path['outcome']}): the 2D model has a rigid wave generator"
+                f" and a circular spline whose outside is {rim}"
             )
 
     def add_running(self, design: Design, keys: tuple[str, ...]) -> None:
-        """What friction of teeth and race takes of the unloaded input.
+        """Add the no-load torque of the friction of teeth and race as a reason.
 
-        A lower bound, a small part of what a drive takes: no figure, but the reason
-        why there is none.
+        It is a lower bound and only a small part of the no-load torque of a drive, so
+        it explains the missing figure instead of replacing it.
         """
         wanted = [key for key in SLOW_KEYS if key in keys]
         if not wanted:
@@ -263,17 +273,17 @@ class _Figures:
         from swgjoint.fe.rings.running import LEFT_OUT, running_friction
 
         mu = design.friction.tooth_coefficient
-        found, why = None, "nothing rubs with friction.tooth_coefficient = 0"
+        running, why = None, "no friction with friction.tooth_coefficient = 0"
         if mu:
             try:
-                found = running_friction(design)
+                running = running_friction(design)
             except (ComputationError, DesignError) as error:
                 why = "; ".join(str(error).splitlines())
-        if found is None:
+        if running is None:
             self.reasons |= dict.fromkeys(wanted, f"{why}; {without_friction(design)}")
             return
-        self.details["running"] = found.as_dict(mu)
-        figures = (found.running_torque(mu), found.starting_torque(mu))
+        self.details["running"] = running.as_dict(mu)
+        figures = (running.running_torque(mu), running.starting_torque(mu))
         for key, figure in zip(SLOW_KEYS, figures, strict=True):
             if key in wanted:
                 self.reasons[key] = (

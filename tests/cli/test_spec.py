@@ -336,7 +336,7 @@ def test_reasons_of_slow_running(built, turning, capsys, tmp_path):
     """No coefficient, no bearing, a map without friction: null with the reason."""
     key = "no_load_running_torque_Nm"
     for argument, reason in (
-        ("size-25-100", "nothing rubs with friction.tooth_coefficient = 0"),
+        ("size-25-100", "no friction with friction.tooth_coefficient = 0"),
         (rubbing_file(tmp_path, "reference-2d"), "no bearing; no cam"),
         ("CSG-25-50", "ratio 100"),
     ):
@@ -346,7 +346,7 @@ def test_reasons_of_slow_running(built, turning, capsys, tmp_path):
         assert "running" not in found
     assert len(turning) == 1
     found = spec(capsys, "reference-2d", "--only", f"{key},K1_Nm_rad")
-    assert "nothing rubs" in found["missing"][key]
+    assert "no friction with" in found["missing"][key]
 
 
 @pytest.mark.parametrize(
