@@ -1,4 +1,4 @@
-"""Catalogue tables, and default ratings of a design from them."""
+"""Catalogue tables, and default ratings of designs that do not state their own."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from swgjoint.units import mm
 SIZE = 2.54 * mm
 """Pitch diameter per unit of catalogue size: a tenth of an inch [m]."""
 FITS_WITHIN = 2.0
-"""A row applies to a design if pitch diameter and ratio are within this factor."""
+"""A row applies to designs whose pitch diameter and ratio are within this factor."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,18 +24,27 @@ class CatalogueRow:
     """Torques of one component set [N·m], from ``models/catalogue``."""
 
     size: int
+    """Size: pitch diameter in tenths of an inch."""
     ratio: int
+    """Reduction ratio, without sign."""
     rated_torque: float
+    """Rated torque at the output."""
     repeated_peak: float
+    """Limit for repeated peak torque."""
     momentary_peak: float
+    """Limit for momentary peak torque."""
     ratcheting_torque: float
+    """Torque at which teeth ratchet."""
     T1: float
+    """End of the first line of the torsion curve."""
     T2: float
+    """End of the second line of the torsion curve."""
     series: str = "CSG"
+    """Catalogue series."""
 
     @property
     def name(self) -> str:
-        """Name as in catalogues, e.g. ``CSG-25-100``."""
+        """Name in the form of the catalogues, such as ``CSG-25-100``."""
         return f"{self.series}-{self.size}-{self.ratio}"
 
     @property
@@ -48,10 +57,7 @@ class CatalogueRow:
 def table(name: str) -> tuple[dict[str, float | str | None], ...]:
     """Rows of a bundled catalogue table; empty cells are None, numbers are floats.
 
-    Units are in the column names, sources in the comment lines of the file.
-
-    Args:
-        name: Name of the table, without ``.csv``.
+    The column names contain the units, the comment lines of the file the sources.
 
     Raises:
         InputError: If there is no such table.
@@ -73,7 +79,7 @@ def _cell(text: str) -> float | str | None:
 
 @lru_cache
 def catalogue_rows() -> tuple[CatalogueRow, ...]:
-    """Component sets with their ratings and the torque limits T1 and T2 of the size."""
+    """Every component set with its ratings and the torques T1 and T2 of its size."""
     limits = {row["size"]: (row["T1_Nm"], row["T2_Nm"]) for row in table("stiffness")}
     rows = []
     for row in table("ratings"):
@@ -97,11 +103,11 @@ def catalogue_rows() -> tuple[CatalogueRow, ...]:
 
 
 def named_rows() -> tuple[CatalogueRow, ...]:
-    """All drives of the catalogue: the component sets, then the other series.
+    """Every drive that can be referred to by name: component sets, then other series.
 
-    Another series has a drive of a size if ``accuracy.csv`` states its accuracy. Its
-    ratings are those of the component set of the same size and ratio, because the
-    tables contain no ratings of other series.
+    Another series has a drive of a size if ``accuracy.csv`` states its accuracy for
+    that size. The tables contain no ratings of these series, so the drive takes those
+    of the component set of the same size and ratio.
     """
     rows = catalogue_rows()
     others = dict.fromkeys((row["series"], row["size"]) for row in table("accuracy"))
@@ -114,16 +120,13 @@ def named_rows() -> tuple[CatalogueRow, ...]:
 
 
 def nearest_row(pitch_diameter: float, ratio: float) -> CatalogueRow:
-    """Row with the nearest pitch diameter and, among these, the nearest ratio.
+    """Row with the nearest pitch diameter and, among those, the nearest ratio.
 
-    Both distances are factors (logarithmic).
+    Nearness is measured by the factor between the values.
 
     Args:
         pitch_diameter: Pitch diameter of the flexspline [m].
-        ratio: Unsigned ratio with the circular spline fixed [-].
-
-    >>> nearest_row(62e-3, 105).name
-    'CSG-25-100'
+        ratio: Reduction ratio, positive [-].
     """
     return min(
         catalogue_rows(),
@@ -135,22 +138,21 @@ def nearest_row(pitch_diameter: float, ratio: float) -> CatalogueRow:
 
 
 def ratings_of(design: Design) -> Ratings:
-    """Ratings of a design: its own keys, and defaults from the nearest catalogue row.
+    """Ratings of a design: its own values, completed from the nearest catalogue row.
 
-    The row is scaled to the rated torque of the design or, if the design states none,
-    with the cube of the pitch diameter. If no row is within a factor of
-    :data:`FITS_WITHIN`, T1 and T2 are 0.2 and 0.6 of the rated torque, and the
-    ratcheting torque is unknown. The field ``source`` names the rule that was used.
-    Defaults are adjusted to the values of the design so that rated torque <= repeated
-    peak <= momentary peak.
+    The row is scaled to the rated torque of the design or, without one, by the cube of
+    the ratio of pitch diameters. If no row applies, T1 and T2 are 0.2 and 0.6 of the
+    rated torque and the ratcheting torque is None. ``source`` names the rule. Default
+    values are adjusted to the design's own values where necessary, so that the torques
+    remain in increasing order.
     """
-    given = design.ratings
+    stated = design.ratings
     ratio = design.drive.teeth_flexspline / design.tooth_difference
     row = nearest_row(design.pitch_diameter, ratio)
     size_factor = design.pitch_diameter / row.pitch_diameter
-    if given.rated_torque_Nm is not None:
-        scale = given.rated_torque_Nm / row.rated_torque
-        rule = f"scaled to the rated torque {given.rated_torque_Nm:g} N·m"
+    if stated.rated_torque_Nm is not None:
+        scale = stated.rated_torque_Nm / row.rated_torque
+        rule = f"scaled to the rated torque {stated.rated_torque_Nm:g} N·m"
     else:
         scale = size_factor**3
         rule = f"scaled by {scale:.4g}, the cube of the pitch diameters"
@@ -158,28 +160,28 @@ def ratings_of(design: Design) -> Ratings:
         size_factor, 1.0 / size_factor, ratio / row.ratio, row.ratio / ratio
     ) <= FITS_WITHIN * (1.0 + 1e-12)
 
-    rated = given.rated_torque_Nm or row.rated_torque * scale
-    repeated = given.repeated_peak_Nm or row.repeated_peak * scale
-    momentary = given.momentary_peak_Nm or row.momentary_peak * scale
-    if given.repeated_peak_Nm is None:
+    rated = stated.rated_torque_Nm or row.rated_torque * scale
+    repeated = stated.repeated_peak_Nm or row.repeated_peak * scale
+    momentary = stated.momentary_peak_Nm or row.momentary_peak * scale
+    if stated.repeated_peak_Nm is None:
         repeated = min(repeated, momentary)
     momentary = max(momentary, repeated)
-    if given.rated_torque_Nm is None:
+    if stated.rated_torque_Nm is None:
         rated = min(rated, repeated)
     repeated = max(repeated, rated)
     momentary = max(momentary, repeated)
-    skips = max(row.ratcheting_torque * scale, momentary) if fits else None
+    ratcheting = max(row.ratcheting_torque * scale, momentary) if fits else None
     low, high = (row.T1 * scale, row.T2 * scale) if fits else (0.2 * rated, 0.6 * rated)
     spread = high / low
-    if given.T1_Nm is not None:
-        low, high = given.T1_Nm, max(high, spread * given.T1_Nm)
-    if given.T2_Nm is not None:
-        high = given.T2_Nm
-        low = low if given.T1_Nm is not None else min(low, high / spread)
+    if stated.T1_Nm is not None:
+        low, high = stated.T1_Nm, max(high, spread * stated.T1_Nm)
+    if stated.T2_Nm is not None:
+        high = stated.T2_Nm
+        low = low if stated.T1_Nm is not None else min(low, high / spread)
 
-    keys = type(given).model_fields
-    absent = [key for key in keys if getattr(given, key) is None]
-    if skips is not None:
+    keys = type(stated).model_fields
+    absent = [key for key in keys if getattr(stated, key) is None]
+    if ratcheting is not None:
         absent.append("ratcheting_torque_Nm")
     source = "given"
     if absent:
@@ -197,5 +199,5 @@ def ratings_of(design: Design) -> Ratings:
         T1=low,
         T2=high,
         source=source,
-        ratcheting_torque=skips,
+        ratcheting_torque=ratcheting,
     )

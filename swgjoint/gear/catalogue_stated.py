@@ -1,7 +1,4 @@
-"""Figures that the bundled catalogue tables state for a drive, with consistency checks.
-
-The tables are ``models/catalogue/*.csv``.
-"""
+"""Figures that the bundled catalogue tables state for a drive, and their checks."""
 
 from __future__ import annotations
 
@@ -12,8 +9,10 @@ from swgjoint.errors import InputError
 from swgjoint.gear.catalogue import CatalogueRow, table
 
 SIMILAR = 1.6
-"""Largest factor between the torsion T1/K1 of a row and the median of its ratio class.
-T1 and K1 both grow with the cube of the size, so a misplaced digit is detected."""
+"""Largest factor between the torsion T1/K1 of a size and the median of its ratio class.
+
+T1 and K1 both grow with the cube of the size, so their quotient is nearly constant and
+a misplaced digit is conspicuous."""
 
 _PER_TABLE = 1e4  # K1 to K3 are in 1e4 N·m/rad
 _STATED = (
@@ -31,9 +30,9 @@ class StatedLosses:
     rated_torque: float
     """Rated torque at the output [N·m]."""
     efficiency: float
-    """Efficiency at rated torque and 2000 rpm [-]."""
+    """Efficiency at rated torque and 2000 rpm input speed [-]."""
     no_load_running: float
-    """No-load running torque at the input at 2000 rpm [N·m]."""
+    """No-load running torque at the input, 2000 rpm [N·m]."""
     starting: float
     """Starting torque at the input [N·m]."""
     back_driving: float
@@ -46,48 +45,47 @@ LOSS_KEYS = (
     "back_driving_torque_Nm",
     "efficiency_percent",
 )
-"""Keys of the losses in the output of ``swgjoint spec``."""
+"""Keys of the losses in ``swgjoint spec``."""
 _LOSS_RATIO = 100
 """Ratio of every row of ``losses.csv``."""
 _MILLI = 1e-3
 LOSS_CONDITIONS = "+20 C, grease, RT1-H-CS of the same rated torque, second-hand"
-"""Conditions of all figures in ``losses.csv``; running torque and efficiency are those
-at 2000 rpm."""
+"""Test conditions of ``losses.csv``; running torque and efficiency are at 2000 rpm."""
 
 
 def stated_losses(row: CatalogueRow) -> StatedLosses | None:
-    """Losses of a component set from ``losses.csv``; None if the table has no such row.
+    """Losses from ``losses.csv`` for a drive of the same ratio and rated torque.
 
-    The table describes drives of another manufacturer (RT1-H-CS) with the sizes and
-    rated torques of the CSG series at a ratio of 100. Its source is second-hand.
+    The table describes drives of another manufacturer (RT1-H-CS) that have the sizes
+    and rated torques of CSG drives at a ratio of 100. Its figures are second-hand.
+
+    Returns:
+        The losses; None for another series or ratio, or without a matching row.
     """
     if row.series != "CSG" or row.ratio != _LOSS_RATIO:
         return None
-    for found in table("losses"):
-        if (found["size"], found["rated_Nm"]) == (row.size, row.rated_torque):
+    for losses in table("losses"):
+        if (losses["size"], losses["rated_Nm"]) == (row.size, row.rated_torque):
             return StatedLosses(
-                rated_torque=_number(found, "rated_Nm"),
-                efficiency=0.01 * _number(found, "efficiency_percent"),
-                no_load_running=_MILLI * _number(found, "no_load_running_mNm"),
-                starting=_MILLI * _number(found, "starting_mNm"),
-                back_driving=_number(found, "back_driving_Nm"),
+                rated_torque=_number(losses, "rated_Nm"),
+                efficiency=0.01 * _number(losses, "efficiency_percent"),
+                no_load_running=_MILLI * _number(losses, "no_load_running_mNm"),
+                starting=_MILLI * _number(losses, "starting_mNm"),
+                back_driving=_number(losses, "back_driving_Nm"),
             )
     return None
 
 
 def stiffness_of(size: int, ratio: int) -> dict[str, float]:
-    """Stiffness figures of a size and ratio: T1, T2 [N·m] and K1 to K3 [N·m/rad].
+    """Torsion curve from ``stiffness.csv``: T1, T2 [N·m] and K1 to K3 [N·m/rad].
 
     Args:
-        size: Catalogue size, the pitch diameter in tenths of an inch.
-        ratio: Ratio; the row of the largest ratio class not above it applies.
+        size: Catalogue size.
+        ratio: Reduction ratio, without sign.
 
     Raises:
-        InputError: If ``stiffness.csv`` has no such row or the row is inconsistent.
-
-    >>> figures = stiffness_of(25, 100)
-    >>> figures["T1"], round(figures["K1"])
-    (14.0, 31000)
+        InputError: If the table has no such row, or if the values of the row are
+            inconsistent.
     """
     row = _of_class("stiffness", size, ratio)
     if row is None:
@@ -105,11 +103,14 @@ def stiffness_of(size: int, ratio: int) -> dict[str, float]:
 
 
 def stated_figures(row: CatalogueRow) -> dict[str, float | None]:
-    """What the tables state of one drive besides stiffness and ratings; else None.
+    """Stated figures of one drive, other than stiffness and ratings.
 
-    A ratio class applies from its own ratio up to the next class of the series.
-    Ratcheting torque, buckling torque and inertia are stated for the CSG series only;
-    the losses are those of :func:`stated_losses`.
+    A ratio class applies from its own ratio up to the next class of the series. The
+    tables state ratcheting torque, buckling torque and inertia only for CSG; the losses
+    come from :func:`stated_losses`.
+
+    Returns:
+        Figures by key; None for those that the tables do not state.
     """
     accuracy = _of_class("accuracy", row.size, row.ratio, series=row.series) or {}
     figures: dict[str, float | None] = dict.fromkeys(LOSS_KEYS)
@@ -140,7 +141,7 @@ def stated_figures(row: CatalogueRow) -> dict[str, float | None]:
 
 
 def _faults(row: dict[str, float | str | None]) -> list[str]:
-    """Contradictions in one row of ``stiffness.csv``."""
+    """Inconsistencies in one row of ``stiffness.csv``, one message each."""
     where = (
         f"models/catalogue/stiffness.csv, size {row['size']:g}, class"
         f" {row['ratio_class']:g}"
@@ -149,15 +150,17 @@ def _faults(row: dict[str, float | str | None]) -> list[str]:
     T1, T2 = _number(row, "T1_Nm"), _number(row, "T2_Nm")
     faults = []
     if not 0.0 < K1 < K2 < K3:
-        faults.append(f"{where}: needed 0 < K1 < K2 < K3, has {K1:g}, {K2:g}, {K3:g}")
+        faults.append(
+            f"{where}: expected 0 < K1 < K2 < K3, found {K1:g}, {K2:g}, {K3:g}"
+        )
     if not 0.0 < T1 < T2:
-        faults.append(f"{where}: needed 0 < T1 < T2, has {T1:g}, {T2:g} N·m")
-    alike = [
+        faults.append(f"{where}: expected 0 < T1 < T2, found {T1:g}, {T2:g} N·m")
+    torsions = [
         _number(other, "T1_Nm") / _number(other, "K1_1e4Nm_rad")
         for other in table("stiffness")
         if other["ratio_class"] == row["ratio_class"]
     ]
-    factor = T1 / K1 / median(alike)
+    factor = T1 / K1 / median(torsions)
     if not 1.0 / SIMILAR < factor < SIMILAR:
         faults.append(
             f"{where}: torsion T1/K1 is {factor:.3g} times the median of its class;"

@@ -1,9 +1,4 @@
-"""Layouts, signed ratios, and the two relative angles of the periodic quantities.
-
-"The thesis" is Yague-Spaude (2021), "Computational Design, Simulation of Meshing, and
-Stress Analysis of Strain Wave Gear Drives", doctoral dissertation, Rochester Institute
-of Technology.
-"""
+"""Layouts, signed ratios and the two gear angles in which a drive is periodic."""
 
 from __future__ import annotations
 
@@ -24,14 +19,18 @@ _ANGLES: dict[str, tuple[tuple[int, int], tuple[int, int]]] = {
 def ratio(layout: str, teeth_flexspline: int, teeth_circular_spline: int) -> float:
     """Signed ratio i of input to output rotation.
 
-    With the wave generator as input, :math:`i = z_D/(z_D - z_F)`, D driven, F fixed:
-    -60 with the circular spline fixed and +61 with the flexspline fixed for 120/122
-    teeth. With the wave generator fixed the flexspline is the input.
+    With the wave generator as input, :math:`i = z_D/(z_D - z_F)`, where D is the driven
+    and F the fixed member: for 120/122 teeth, -60 with the circular spline fixed and
+    +61 with the flexspline fixed. With the wave generator fixed, the flexspline is the
+    input and the circular spline the output.
 
     Args:
-        layout: Which member is fixed.
+        layout: Which member is fixed, one of :data:`LAYOUTS`.
         teeth_flexspline: Number of teeth of the flexspline.
         teeth_circular_spline: Number of teeth of the circular spline.
+
+    Raises:
+        ValueError: If the layout is unknown.
 
     Source:
         Thesis eq. (2.2), after Musser.
@@ -51,13 +50,10 @@ def ratio(layout: str, teeth_flexspline: int, teeth_circular_spline: int) -> flo
 
 
 def angle_coefficients(layout: str) -> tuple[tuple[int, int], tuple[int, int]]:
-    """Derivatives of alpha and of beta with respect to (theta, psi).
+    """Derivatives of the gear angles alpha and beta with respect to theta and psi.
 
-    Alpha is the angle of the wave generator relative to the circular spline, beta that
-    relative to the flexspline.
-
-    >>> angle_coefficients("circular_spline_fixed")
-    ((1, 0), (1, -1))
+    Alpha is the angle of the wave generator relative to the circular spline, beta
+    relative to the flexspline; theta is the input angle and psi the output angle.
     """
     return _ANGLES[layout]
 
@@ -65,8 +61,7 @@ def angle_coefficients(layout: str) -> tuple[tuple[int, int], tuple[int, int]]:
 def member_angles(layout: str, theta: float, psi: float) -> tuple[float, float, float]:
     """Rotation of wave generator, flexspline and circular spline [rad].
 
-    The rotations are relative to the fixed member; theta is the input angle and psi the
-    output angle.
+    All angles are relative to the fixed member.
 
     Args:
         layout: Which member is fixed.
@@ -82,9 +77,9 @@ def member_angles(layout: str, theta: float, psi: float) -> tuple[float, float, 
 
 
 def periodicity(layout: str, teeth_flexspline: int, teeth_circular_spline: int) -> int:
-    """Number of identical cycles of a perfect gear per turn of the input.
+    """Number of identical cycles of a perfect gear per input turn.
 
-    It is the tooth count of the fixed member or, with the wave generator fixed, that of
+    This is the tooth count of the fixed member or, with the wave generator fixed, of
     the input member, the flexspline.
 
     Args:

@@ -1,19 +1,22 @@
-r"""Elastic parts in series with the teeth: the cup and the mounting springs.
+r"""Compliance in series with the teeth: the cup and the springs of the mounting.
 
 A boss spring connects the flexspline to its shaft or frame, a housing spring connects
-the circular spline, and a coupling connects the wave generator. Each spring carries a
-share s of the output torque T: s = 1 for the output member, :math:`s = 1/i` for the
-input member, and :math:`s = 1 - 1/i` for the fixed member (:math:`z_{cs}/z_{fs}` with
-the circular spline fixed).
+the circular spline to its frame or shaft, and a coupling connects the wave generator to
+its shaft. Each carries the torque of its member, a share s of the output torque T:
 
-If a member twists by :math:`s T/k`, the output turns by s times that angle. For
-example, a fixed member that turns by :math:`\varphi` also turns the teeth relative to
-the wave generator: :math:`\psi = \varphi + (\theta - \varphi)/i`. The compliance at
-the output is therefore :math:`\sum s^2/k` and the stored energy
-:math:`T^2 \sum s^2/2k`, so that :math:`T_{wg}\,d\theta - T\,d\psi = dU` is satisfied.
+* s = 1 for the output member;
+* :math:`s = 1 - 1/i` for the fixed member, because the wave generator takes the rest
+  (:math:`z_{cs}/z_{fs}` with the circular spline fixed);
+* :math:`s = 1/i` for the input member.
 
-The shares are mean values over a tooth pitch. The ripple of the input torque on a
-spring, and the small phase shift that it causes, are neglected.
+If the spring of a member twists by :math:`s T/k`, the output turns by s times that
+angle. For example, a fixed member that turns by :math:`\varphi` also turns the teeth
+relative to the wave generator, :math:`\psi = \varphi + (\theta - \varphi)/i`. The
+compliance at the output is therefore :math:`\sum s^2/k` and the stored energy
+:math:`T^2 \sum s^2/2k`, so that :math:`T_{wg}\,d\theta - T\,d\psi = dU` remains exact.
+
+The shares are means over a pitch. The model neglects the ripple of the input torque on
+a spring and the small rotation by which this ripple shifts the pattern over theta.
 """
 
 from __future__ import annotations
@@ -23,7 +26,7 @@ from swgjoint.gear.design.design import Design, MemberName
 
 
 def torque_shares(design: Design) -> dict[MemberName, float]:
-    """Torque in the mounting of each member, divided by the output torque [-]."""
+    """Torque on the mounting of each member, as a fraction of the output torque [-]."""
     rest = 1.0 - 1.0 / design.ratio
     flexspline, circular_spline = {
         "circular_spline_fixed": (1.0, rest),
@@ -34,20 +37,19 @@ def torque_shares(design: Design) -> dict[MemberName, float]:
 
 
 def coupling_share(design: Design) -> float:
-    """Torque in the coupling, divided by the output torque [-]."""
+    """Torque on the coupling, as a fraction of the output torque [-]."""
     if design.drive.layout == "wave_generator_fixed":
         return 1.0 - 1.0 / design.ratio
     return 1.0 / design.ratio
 
 
 def series_compliance(design: Design, *, cup: bool) -> float:
-    """Compliance, at the output, of the parts in series with the teeth.
+    """Compliance of all parts in series with the toothed members, at the output.
 
     Args:
-        design: The drive; without ``[boss]``, ``[housing]`` or ``[coupling]`` that part
-            is rigid.
-        cup: Whether to include the closed-form compliance of the cup, for models that
-            do not contain the cup.
+        design: The drive; absent ``[boss]``, ``[housing]`` and ``[coupling]`` tables
+            mean rigid connections.
+        cup: Whether to add the closed-form cup, for models that do not contain the cup.
 
     Returns:
         Compliance [rad/(N·m)].
@@ -72,18 +74,15 @@ def series_compliance(design: Design, *, cup: bool) -> float:
 
 
 def springs_of(design: Design) -> dict[str, float] | None:
-    """Torsional stiffness of the mounting springs by name [N·m/rad]; None without any.
-
-    The validity label of a map lists them.
-    """
+    """Torsional stiffness of the springs by name [N·m/rad]; None without springs."""
     parts = {
         "boss": design.boss,
         "housing": design.housing,
         "coupling": design.coupling,
     }
-    found = {
+    springs = {
         name: part.torsional_stiffness_Nm_rad
         for name, part in parts.items()
         if part is not None
     }
-    return found or None
+    return springs or None

@@ -1,4 +1,4 @@
-"""Thin rings pulled apart by two opposite forces: closed form and elastica."""
+"""Thin ring under two opposite outward forces: closed form and elastica."""
 
 from __future__ import annotations
 
@@ -14,7 +14,9 @@ from swgjoint.typing import Array
 
 
 def small_deflection(angle: ArrayLike) -> Array:
-    r"""Small outward deflection of an inextensional ring over that at the force.
+    r"""Outward deflection, relative to the deflection under the force [-].
+
+    Small deflections of an inextensional ring:
 
     .. math:: w = \frac{F R^3}{4 E I}
         \left(\cos\psi + \psi\sin\psi - \frac4\pi\right), \quad
@@ -22,9 +24,6 @@ def small_deflection(angle: ArrayLike) -> Array:
 
     Args:
         angle: Angle from the axis of the forces, 0 to pi/2 [rad].
-
-    Returns:
-        Deflection ratio [-], 1 at the force.
 
     Source:
         Timoshenko, "Strength of Materials", part II, thin ring under two opposite
@@ -40,14 +39,14 @@ def small_deflection(angle: ArrayLike) -> Array:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Elastica:
-    """Large deflection of an inextensional ring pulled by two opposite forces."""
+    """One quarter of an inextensional ring with large rotations."""
 
     deflection: Array
-    """Outward deflection in the requested directions, fixed in space [m]."""
+    """Outward deflection in the requested directions, which are fixed in space [m]."""
     force: float
-    """Dimensionless force F R^2/(E I)."""
+    """Dimensionless force F R^2/(E I) [-]."""
     curvature: float
-    """Curvature at the force times R; 1 in the undeformed ring."""
+    """Curvature under the force times R [-]; 1 in the undeformed ring."""
 
 
 def elastica(radius: float, crown: float, angle: ArrayLike) -> Elastica:
@@ -56,16 +55,17 @@ def elastica(radius: float, crown: float, angle: ArrayLike) -> Elastica:
     .. math:: \theta' = \kappa, \quad \kappa' = \frac{F}{2EI}\cos\theta, \quad
         x' = \cos\theta, \quad y' = \sin\theta
 
-    The equations describe a quarter of the ring from the crown (s = 0) to the side; by
-    symmetry no force acts along x there.
+    along the quarter from the crown (s = 0) to the side. By symmetry no force acts
+    along x.
 
     Args:
         radius: Radius R of the undeformed ring [m].
         crown: Outward displacement of each crown [m].
-        angle: Directions from the axis of the forces [rad].
+        angle: Directions from the axis of the forces at which the deflection is
+            returned [rad].
 
     Raises:
-        ComputationError: If the boundary value problem is not solved.
+        ComputationError: If the boundary value problem does not converge.
     """
     rise = 1.0 + crown / radius
 
@@ -83,13 +83,13 @@ def elastica(radius: float, crown: float, angle: ArrayLike) -> Elastica:
 
     s = np.linspace(0.0, 0.5 * np.pi, 201)
     start = np.stack([np.sin(s), np.cos(s), -s, np.full_like(s, -1.0)])
-    found = solve_bvp(slope, ends, s, start, p=[0.0], tol=1e-10, max_nodes=20000)
-    if not found.success:
-        raise ComputationError(f"elastica at {crown:g} m: {found.message}")
-    x, y = found.sol(np.linspace(0.0, 0.5 * np.pi, 801))[:2]
+    solution = solve_bvp(slope, ends, s, start, p=[0.0], tol=1e-10, max_nodes=20000)
+    if not solution.success:
+        raise ComputationError(f"elastica at {crown:g} m: {solution.message}")
+    x, y = solution.sol(np.linspace(0.0, 0.5 * np.pi, 801))[:2]
     shape = CubicSpline(np.arctan2(x, y), np.hypot(x, y))
     return Elastica(
         deflection=radius * (shape(np.asarray(angle, dtype=float)) - 1.0),
-        force=float(found.p[0]),
-        curvature=-float(found.y[3, 0]),
+        force=float(solution.p[0]),
+        curvature=-float(solution.y[3, 0]),
     )

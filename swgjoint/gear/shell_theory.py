@@ -1,8 +1,8 @@
 r"""Closed-form force, stress and fatigue strength of the flexspline as a thin shell.
 
-The formulas are from two articles whose equations are not numbered: "deformation
-force" (force that deforms the flexspline XB1-100-80) and "stress and fatigue" (stress
-and fatigue strength of the flexible gear). Sources below name the quantity instead.
+The formulas come from two articles without equation numbers, so the equations are
+cited by their result: "deformation force" (the force that deforms the flexspline
+XB1-100-80) and "stress and fatigue" (stress and fatigue strength of the flexible gear).
 
 The wall is inextensional. Its radial deflection at the open end is
 :math:`w = w_0\cos 2\varphi` on a wave generator and a Fourier series under point loads.
@@ -21,8 +21,10 @@ from swgjoint.units import mm
 SERIES_SUM = (pi**2 - 8.0) / 16.0
 """Sum of 1/(n^2 - 1)^2 over even n."""
 PRINTED_SUM = 0.1141
-"""Value printed in the article on the deformation force. It is too small: the first
-three terms, 1/9 + 1/225 + 1/1225, already sum to 0.1164."""
+"""Value of this sum as printed in the article on the deformation force.
+
+The printed value is too small: the first three terms, 1/9 + 1/225 + 1/1225, already sum
+to 0.1164."""
 
 
 def ring_stiffness(
@@ -32,20 +34,20 @@ def ring_stiffness(
     *,
     series_sum: float = SERIES_SUM,
 ) -> float:
-    r"""Radial stiffness of a ring, or of a tube with free ends, per length [N/m/m].
+    r"""Radial stiffness per length of a ring, or of a tube with free ends [N/m/m].
 
     .. math:: \frac{P}{w_0} = \frac{\pi E \delta^3}{24 R^3 S}
 
-    P is each of two opposite point loads and w_0 the deflection under the load. With
-    the dimensions of XB1 and the printed sum the stiffness is 1161 N/mm per metre, or
-    81 N/mm for the length of 70 mm. The article states about 1625 N/mm, twenty times
-    as much.
+    The stiffness is the force of each of two opposite point loads divided by the
+    deflection under it. With the numbers of XB1 and the printed sum it is 1161 N/mm per
+    metre, or 81 N/mm for the length of 70 mm. The article prints a slope of about
+    1625 N/mm, twenty times as much.
 
     Args:
         youngs_modulus: Young's modulus E [Pa].
         wall: Wall thickness delta [m].
         radius: Radius R of the middle of the wall [m].
-        series_sum: Sum S; :data:`PRINTED_SUM` reproduces the article.
+        series_sum: Sum S of the series [-]; :data:`PRINTED_SUM` reproduces the article.
 
     Source:
         "Deformation force", P_theory.
@@ -61,7 +63,7 @@ def cup_stiffness(
     length: float,
     place: float,
 ) -> float:
-    r"""Radial stiffness of a smooth cup whose wall stays straight and does not stretch.
+    r"""Radial stiffness of a smooth cup with a straight, inextensional wall [N/m].
 
     Two opposite point loads act at the distance x from the closed end, where w = 0:
 
@@ -69,10 +71,9 @@ def cup_stiffness(
         \frac{1}{(n^2-1)^2\left(\frac L3 + \frac{2(1-\nu)R^2}{n^2L}\right)},
         \quad D = \frac{E\delta^3}{12(1-\nu^2)}
 
-    This follows from the energy of :math:`w_n = b_n\frac xL\cos n\varphi` with the
-    circumferential curvature :math:`(n^2-1)w/R^2` and the twist
-    :math:`(n^2-1)b_n/(nRL)`. The bending of the diaphragm, whose edge moves along the
-    axis, is neglected.
+    from the energy of :math:`w_n = b_n\frac xL\cos n\varphi` with the circumferential
+    curvature change :math:`(n^2-1)w/R^2` and the twist :math:`(n^2-1)b_n/(nRL)`. The
+    formula neglects the bending of the diaphragm, whose edge moves along the axis.
 
     Args:
         youngs_modulus: Young's modulus E [Pa].
@@ -96,11 +97,12 @@ def cup_stiffness(
 
 @dataclass(frozen=True, kw_only=True)
 class ShellDimensions:
-    """Dimensions and elastic constants that determine the stresses of the shell."""
+    """Dimensions and material of the shell that determine its stresses."""
 
     youngs_modulus: float
     """Young's modulus E [Pa]."""
     poisson_ratio: float
+    """Poisson's ratio nu [-]."""
     wall: float
     """Wall thickness s_1 of the tooth ring [m]."""
     radius: float
@@ -112,7 +114,7 @@ class ShellDimensions:
 
     @classmethod
     def from_design(cls, design: Design) -> ShellDimensions:
-        """Shell dimensions of a design with a cup.
+        """Dimensions of the flexspline of a design.
 
         Raises:
             ValueError: If the design has no cup.
@@ -135,7 +137,7 @@ class ShellDimensions:
         .. math:: \sigma_\varphi = \frac{E s_1}{2r_m^2}(w'' + w)
             = C_\sigma\frac{w_0 E s_1}{r_m^2}, \quad C_\sigma = \tfrac32
 
-        With the dimensions of the article this is 163.3 MPa, or 164.4 MPa with its
+        The numbers of the article give 163.3 MPa, or 164.4 MPa with its
         C_sigma = 1.510 for four forces at 25 deg; the article prints 166.98 MPa.
         """
         return (
@@ -147,13 +149,13 @@ class ShellDimensions:
         return self.poisson_ratio * self.bending_stress(factor)
 
     def deformation_shear(self, factor: float) -> float:
-        r"""Shear stress of a deflection that decreases to zero along the cylinder [Pa].
+        r"""Shear stress from a deflection that falls to zero over the length [Pa].
 
         .. math:: \tau_\varphi = C_\tau\frac{w_0 E s_1}{r_m L}
 
-        The article's formula :math:`\frac{Es_1}{2r_mL}w'` corresponds to C_tau = 1, but
-        its section on fatigue uses 0.506. The twist of an inextensional wall that
-        stays straight gives 3/(4 (1 + nu)) = 0.577.
+        The formula :math:`\frac{Es_1}{2r_mL}w'` of the article means C_tau = 1, but its
+        fatigue assessment uses 0.506. The twist of a straight, inextensional wall gives
+        3/(4 (1 + nu)) = 0.577.
         """
         return (
             factor
@@ -164,7 +166,7 @@ class ShellDimensions:
         )
 
     def torque_shear(self, torque: float) -> float:
-        r"""Shear stress of a torque [N·m], uniform over the wall [Pa].
+        r"""Shear stress from a torque that is distributed uniformly over the wall [Pa].
 
         .. math:: \tau_T = \frac{T}{2\pi r_m^2 s_1}
         """
@@ -176,19 +178,19 @@ class FatigueFactors:
     """Constants of the fatigue assessment in the article."""
 
     bending: float = 2.4
-    """Stress concentration factor K_sigma in bending."""
+    """K_sigma, stress concentration factor in bending."""
     torsion: float = 1.92
-    """Stress concentration factor in torsion, K_tau = 0.8 K_sigma."""
+    """K_tau = 0.8 K_sigma, stress concentration factor in torsion."""
     mean_shear: float = 0.2
     """Weight of the mean shear stress."""
     biaxial: float = 0.7
-    """Factor K_z for an axial stress of about 0.3 times the circumferential stress; the
-    von Mises criterion would give 1 - 0.3 + 0.3^2 = 0.79."""
+    """K_z for an axial stress of about 0.3 times the circumferential stress; the
+    von Mises criterion gives 1 - 0.3 + 0.3^2 = 0.79."""
     bending_shape: float = 1.510
-    """Coefficient C_sigma for four forces at 25 deg from the major axis; the series
-    gives 1.519, at the minor axis."""
+    """C_sigma for four forces at 25 deg from the major axis; the series gives 1.519, at
+    the minor axis."""
     shear_shape: float = 0.506
-    """Coefficient C_tau for the same forces."""
+    """C_tau for the same four forces."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -196,11 +198,11 @@ class SafetyFactor:
     """Fatigue safety factors at one point."""
 
     normal: float
-    """Safety factor S_sigma of the normal stress alone."""
+    """S_sigma for normal stress alone [-]."""
     shear: float
-    """Safety factor S_tau of the shear stress alone."""
+    """S_tau for shear stress alone [-]."""
     combined: float
-    """Combined safety factor S."""
+    """S for both stresses together [-]."""
 
 
 def safety_factor(
@@ -218,16 +220,16 @@ def safety_factor(
         S_\tau = \frac{\tau_{-1}}{K_\tau\tau_a + 0.2\tau_m}, \quad
         S = \frac{S_\sigma S_\tau}{\sqrt{S_\sigma^2 + K_z S_\tau^2}}
 
-    If the shear stress is small, K_z < 1 makes S larger than S_sigma, because axial
-    tension reduces the equivalent stress of circumferential tension.
+    If K_z is less than one, S exceeds S_sigma where the shear is small, because the
+    axial tension reduces the equivalent stress of the circumferential tension.
 
     Args:
-        bending_limit: Endurance limit sigma_-1 in reversed bending [Pa].
-        torsion_limit: Endurance limit tau_-1 in reversed torsion [Pa].
-        normal_amplitude: Amplitude sigma_a of the normal stress [Pa].
-        shear_amplitude: Amplitude tau_a of the shear stress [Pa].
+        bending_limit: Endurance limit in reversed bending sigma_-1 [Pa].
+        torsion_limit: Endurance limit in reversed torsion tau_-1 [Pa].
+        normal_amplitude: Amplitude of the normal stress sigma_a [Pa].
+        shear_amplitude: Amplitude of the shear stress tau_a [Pa].
         shear_mean: Mean shear stress tau_m [Pa].
-        factors: Constants; None for those of the article.
+        factors: Constants of the assessment; None takes those of the article.
 
     Source:
         "Stress and fatigue", S_sigma, S_tau, S.
@@ -235,7 +237,7 @@ def safety_factor(
     k = factors or FatigueFactors()
     normal = bending_limit / (k.bending * normal_amplitude)
     weighted = k.torsion * shear_amplitude + k.mean_shear * abs(shear_mean)
-    # equal to S above, and also valid if one of the stresses vanishes
+    # equal to S above, but also defined if one of the stresses is zero
     one, two = 1.0 / normal, weighted / torsion_limit
     return SafetyFactor(
         normal=normal,
@@ -257,14 +259,14 @@ def shell_safety_factor(
     .. math:: \sigma_a = C_\sigma\frac{w_0Es_1}{r_m^2}, \quad
         \tau_a = \tau_m = \tfrac12(\tau_T + \tau_\varphi)
 
-    With the dimensions of the article the factor is 2.17 at 100 N·m.
+    The numbers of the article give 2.17 at 100 N·m.
 
     Args:
-        shell: Dimensions of the flexspline.
-        torque: Output torque [N·m].
+        shell: Dimensions and material of the flexspline.
+        torque: Torque on the flexspline [N·m]; its sign does not matter.
         bending_limit: Endurance limit in reversed bending [Pa].
         torsion_limit: Endurance limit in reversed torsion [Pa].
-        factors: Constants; None for those of the article.
+        factors: Constants of the assessment; None takes those of the article.
 
     Source:
         "Stress and fatigue", sigma_a, tau_a.

@@ -1,16 +1,17 @@
-r"""State of a toothed rim of finite width between plane stress and plane strain.
+r"""State between plane stress and plane strain of a toothed rim of finite width.
 
-A rim that is bent circumferentially tends to bend in the opposite sense across its
-width (anticlastic bending). Three effects limit this:
+A rim that is bent circumferentially tends to bend in the opposite direction across its
+width (anticlastic bending). Three effects determine how far this bending develops:
 
-* The teeth are ribs across the width. They hardly stiffen the rim circumferentially but
-  stiffen it across the width, which suppresses most of the anticlastic bending.
-* The ring is curved. Bending across the width stretches it circumferentially, which
-  acts like an elastic foundation of a beam.
-* The axial stress vanishes at both edges of the face.
+* the teeth act as ribs along the width. The rim remains flexible in circumferential
+  bending but becomes stiff across the width, which suppresses most of the anticlastic
+  bending;
+* the ring is curved: bending across the width stretches it circumferentially, which
+  acts like an elastic foundation under a beam;
+* the axial stress is zero at both edges of the face.
 
-A smooth ring of the same width has no ribs. It is close to plane stress up to widths of
-several :math:`\sqrt{rt}`, even if it is much wider than thick.
+A smooth ring of the same width has no ribs. It remains close to plane stress up to
+widths of several :math:`\sqrt{rt}`, even if these are many times its thickness.
 """
 
 from __future__ import annotations
@@ -19,35 +20,35 @@ from dataclasses import dataclass
 from math import cos, cosh, sin, sinh, sqrt, tanh
 
 EDGE_LAYER = 1.5
-"""Width over which both edges together release the axial stress, divided by the square
-root of module times rim thickness. It was calibrated with 3D models of the rings of
-eleven drives in CalculiX (C3D20R elements, quarter rings loaded by a traction
-cos 2 phi on the bore; rims of 0.4 to 2 mm, modules of 0.2 to 1 mm, widths of 1 to 40
-rim thicknesses). The two-lobe stiffness is within 0.8 % of every 3D model, and within
-0.5 % for widths of at least four rim thicknesses."""
+"""Width over which both edges together relieve the axial stress, divided by the square
+root of module times rim thickness. The value is calibrated with solid models of the
+rings of eleven drives in CalculiX (C3D20R, quarter models bent by a traction cos 2 phi
+on the bore; rims of 0.4 to 2 mm, modules of 0.2 to 1 mm, widths of 1 to 40 rim
+thicknesses). With it, the two-lobe stiffness is within 0.8 % of every solid model, and
+within 0.5 % for widths of at least four rim thicknesses."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class RimAcross:
-    """Stiffness of a rim around and across, per metre of width or circumference."""
+    """Stiffness of a toothed rim, per length of face width or of circumference."""
 
     radius: float
     """Radius of the neutral line [m]."""
     bending: float
-    """Circumferential bending stiffness E I over the width, in plane stress [N·m]."""
+    """Circumferential bending stiffness in plane stress [N·m]: E I over the width."""
     stretching: float
-    """Circumferential stiffness E A over the width [N/m]."""
+    """Circumferential stretching stiffness [N/m]: E A over the width."""
     across: float
-    """Bending stiffness across the width: E I of the rim and tooth of one pitch over
-    the pitch [N·m]."""
+    """Bending stiffness across the width [N·m]: E I of rim and tooth of one pitch,
+    divided by the pitch."""
 
 
 def edge_confinement(width: float, module: float, rim: float) -> float:
-    r"""Mean confinement over the width, reduced by the two free edges [-].
+    r"""Mean confinement over the width between the two free edges [-].
 
     .. math:: g = 1 - \frac{\tanh x}{x}, \quad x = \frac{b}{1.5\sqrt{mt}}
 
-    This is the mean of a stress that increases from zero at the edges, as in shear lag.
+    This is the mean of a stress that grows from zero at the edges as in shear lag.
 
     Args:
         width: Face width b [m].
@@ -55,15 +56,15 @@ def edge_confinement(width: float, module: float, rim: float) -> float:
         rim: Thickness t of the rim below the teeth [m].
     """
     x = width / (EDGE_LAYER * sqrt(module * rim))
-    # series for narrow faces, where 1 - tanh(x)/x would cancel
+    # the series avoids the difference of nearly equal numbers for narrow faces
     return x**2 / 3.0 if x < 1e-4 else 1.0 - tanh(x) / x
 
 
 def anticlastic_share(width: float, rim: RimAcross) -> float:
-    r"""Fraction of the free anticlastic bending that occurs in a curved ring [-].
+    r"""Fraction of the anticlastic bending that develops in a curved ring [-].
 
-    It is the end rotation of a beam on an elastic foundation under equal end moments,
-    divided by that of a free beam:
+    It is the ratio of the end rotations of a beam on an elastic foundation to those of
+    a free beam, both under equal end moments:
 
     .. math:: f = \frac{2}{x}\,\frac{\cosh x - \cos x}{\sinh x + \sin x}, \quad
         x = \beta b, \quad \beta^4 = \frac{EA}{4 r^2 D_z}
@@ -93,21 +94,21 @@ def rim_confinement(
 ) -> float:
     r"""Confinement c of a toothed rim, 0 in plane stress and 1 in plane strain [-].
 
-    Plane strain requires a moment :math:`\nu M` across the width. Releasing it against
-    the stiffness :math:`D_z` adds :math:`f\nu^2/D_z` to the plane-strain compliance
-    :math:`(1-\nu^2)/D_\varphi`:
+    Plane strain requires the moment :math:`\nu M` across the width. Where this moment
+    is released, the rim bends with the stiffness :math:`D_z`, which adds
+    :math:`f\nu^2/D_z` to the compliance :math:`(1-\nu^2)/D_\varphi` of plane strain:
 
     .. math:: \frac{1}{D} = \frac{1 - c\nu^2}{D_\varphi}, \quad
         c = g\Bigl(1 - f\,\frac{D_\varphi}{D_z}\Bigr)
 
-    Here :math:`D_\varphi` is that of plane stress, f is :func:`anticlastic_share` and g
-    is :func:`edge_confinement`. For a smooth ring :math:`D_z = D_\varphi`.
+    with :math:`D_\varphi` for plane stress, f from :func:`anticlastic_share` and g from
+    :func:`edge_confinement`. For a smooth ring :math:`D_z = D_\varphi`.
 
     Args:
         width: Face width [m].
         module: Module [m].
-        thickness: Thickness of the rim [m].
-        rim: Stiffness of the rim around and across.
+        thickness: Thickness of the rim below the teeth [m].
+        rim: Stiffness of the rim.
     """
     released = anticlastic_share(width, rim) * rim.bending / rim.across
     return edge_confinement(width, module, thickness) * max(0.0, 1.0 - released)

@@ -1,9 +1,9 @@
 r"""The thin-race ball bearing between wave generator and flexspline.
 
 The parts follow each other inwards from the bore of the rim: half the fit clearance,
-the outer race, half the internal clearance, the balls, and the rigid cam with the inner
+the outer race, half the clearance, the balls, and the rigid cam that carries the inner
 raceway. The outline of the wave generator describes the bore, so half of each clearance
-is subtracted from the deflection at the lobes.
+reduces the deflection at the lobes.
 """
 
 from __future__ import annotations
@@ -16,33 +16,33 @@ from swgjoint.gear.design.material import Material
 from swgjoint.units import GPa, mm, um
 
 GROOVE_CONFORMITY = 0.52
-"""Default ratio of groove radius to ball diameter: the middle of the customary range
-0.515 to 0.53 of deep groove ball bearings (textbook value, not verified). The stiffness
-of a ball contact varies by about 10 % over that range."""
+"""Default groove radius over ball diameter: the middle of the usual range of 0.515 to
+0.53 for deep groove bearings (textbook, not checked). The contact stiffness of a ball
+varies by about 10 % over that range."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class BallBearing:
-    """Undeformed, round ball bearing of a design in SI units."""
+    """Undeformed, round bearing of a design in SI units."""
 
     balls: int
     """Number of balls."""
     ball_diameter: float
-    """Ball diameter [m]."""
+    """Diameter of a ball [m]."""
     race_thickness: float
     """Thickness of the outer race [m]."""
     race_width: float
-    """Width of the outer race [m]."""
+    """Width of the outer race along the axis [m]."""
     groove_inertia_factor: float
-    """Second moment of area of the grooved race over that of its rectangle [-]."""
+    """Second moment of area of the race section over that of its rectangle [-]."""
     groove_conformity: float
-    """Groove radius over ball diameter of both races [-]."""
+    """Groove radius over ball diameter in both races [-]."""
     clearance: float
-    """Radial internal clearance as stated in catalogues, on the diameter [m]."""
+    """Radial internal clearance as in catalogues, measured on the diameter [m]."""
     fit_clearance: float
-    """Fit clearance of the outer race in the bore of the rim, on the diameter [m]."""
+    """Clearance of the outer race in the bore of the rim, on the diameter [m]."""
     bore_radius: float
-    """Bore radius of the rim that the race sits in [m]."""
+    """Radius of the rim bore that contains the race [m]."""
     material: Material
     """Material of balls and races."""
 
@@ -50,16 +50,11 @@ class BallBearing:
     def from_design(cls, design: Design) -> BallBearing:
         """Bearing of a design.
 
-        The defaults are a rectangular race as wide as the teeth, no clearance in the
-        bore, and the material of the flexspline.
+        Defaults of absent keys: a race of rectangular section as wide as the teeth,
+        without clearance in the bore, made of the material of the flexspline.
 
         Raises:
             ValueError: If the design has no bearing.
-
-        >>> from swgjoint import Design
-        >>> bearing = BallBearing.from_design(Design.load("size-25-100"))
-        >>> bearing.balls, round(bearing.ball_diameter * 1e3, 2)
-        (23, 5.27)
         """
         spec = design.wave_generator.bearing
         if spec is None:
@@ -95,25 +90,24 @@ class BallBearing:
 
     @property
     def raceways(self) -> tuple[float, float]:
-        """Radii of the inner and outer raceway, from the axis [m]."""
+        """Radii of the inner and the outer raceway about the axis [m]."""
         outer = self.race_radius - 0.5 * self.race_thickness
         return outer - self.ball_diameter - 0.5 * self.clearance, outer
 
     @property
     def cage_share(self) -> float:
-        r"""Rotation of the cage per rotation of the outer race, relative to the cam.
+        r"""Rotation of the cage relative to the cam, per rotation of the outer race.
 
         .. math:: \tfrac12 (1 + D/d_m)
 
-        The formula applies to balls that roll without slip between round raceways
-        (textbook).
+        for balls that roll without slip between round raceways (textbook).
         """
         inner, outer = self.raceways
         return 0.5 * (1.0 + self.ball_diameter / (inner + outer))
 
     @property
     def race_stretching(self) -> float:
-        """Axial stiffness E A of the outer race without its groove [N]."""
+        """Stretching stiffness E A of the outer race without its groove [N]."""
         section = self.race_width * self.race_thickness
         return self.material.youngs_modulus * section
 
@@ -124,10 +118,10 @@ class BallBearing:
         return self.material.youngs_modulus * self.groove_inertia_factor * plain
 
     def hertz_constant(self) -> float:
-        r"""Hertz constant K of a ball between both raceways [N/m^1.5].
+        r"""Hertz constant K of one ball between both raceways [N/m^1.5].
 
-        The force of a ball is :math:`Q = K\delta^{3/2}` with the total approach delta
-        of both races:
+        The ball force is :math:`Q = K\delta^{3/2}` with the approach of the raceways
+        :math:`\delta` and
 
         .. math:: K = \bigl(K_i^{-2/3} + K_o^{-2/3}\bigr)^{-3/2}
         """
@@ -142,7 +136,7 @@ class BallBearing:
 
 
 def effective_modulus(bearing: BallBearing) -> float:
-    """Effective modulus E / (2 (1 - nu^2)) of two bodies of equal material [Pa]."""
+    """Effective modulus E / (1 - nu^2) / 2 of two bodies of one material [Pa]."""
     steel = bearing.material
     return 0.5 * steel.youngs_modulus / (1.0 - steel.poisson_ratio**2)
 
@@ -150,8 +144,8 @@ def effective_modulus(bearing: BallBearing) -> float:
 def point_contact(curvature: float, across: float, modulus: float) -> float:
     r"""Constant K of a Hertz point contact, :math:`Q = K\delta^{3/2}` [N/m^1.5].
 
-    With relative curvatures :math:`2B \ge 2A` in the two principal planes, semi-axes
-    :math:`a = \kappa b`, and complete elliptic integrals of the parameter
+    With the relative curvatures :math:`2B \ge 2A` in the two principal planes,
+    semi-axes :math:`a = \kappa b`, and complete elliptic integrals of the parameter
     :math:`m = 1 - 1/\kappa^2`,
 
     .. math:: \frac BA = \frac{\kappa^2 E(m) - K(m)}{K(m) - E(m)}, \quad
@@ -160,29 +154,26 @@ def point_contact(curvature: float, across: float, modulus: float) -> float:
 
     Args:
         curvature: Sum of the curvatures of both bodies in one principal plane [1/m].
-        across: The same sum in the other principal plane [1/m].
+        across: Sum of the curvatures in the other principal plane [1/m].
         modulus: Effective modulus E* of both bodies [Pa].
 
     Raises:
-        ValueError: If one of the curvature sums is not positive.
+        ValueError: If one of the curvatures is not positive.
 
     Source:
-        Johnson (1985), "Contact Mechanics", Cambridge University Press, section 4.2,
-        eqs (4.26). The equations were not compared with the printed text; tests check
-        the limit of a sphere and the approximation of Hamrock and Brewe.
-
-    A steel ball of 10 mm on a plane, :math:`K = \tfrac43 E^* \sqrt R`:
-
-    >>> k = point_contact(200.0, 200.0, 115e9)
-    >>> round(k / (4 / 3 * 115e9 * 0.005**0.5), 6)
-    1.0
+        Johnson (1985), "Contact Mechanics", section 4.2, eqs (4.26). The text was not
+        compared literally; tests check the limit of a sphere and the fit of Hamrock and
+        Brewe.
     """
     from scipy.optimize import brentq
     from scipy.special import ellipe, ellipk
 
     larger, smaller = max(curvature, across), min(curvature, across)
     if smaller <= 0.0:
-        raise ValueError(f"{smaller:g} 1/m: no point contact; accepted: above 0 1/m")
+        raise ValueError(
+            f"curvature = {smaller:g} 1/m: expected a value above 0 1/m for a point"
+            " contact"
+        )
 
     def missed(kappa: float) -> float:
         m = 1.0 - kappa**-2
@@ -191,7 +182,7 @@ def point_contact(curvature: float, across: float, modulus: float) -> float:
             - larger / smaller
         )
 
-    # K - E vanishes with m: below this ratio the contact is treated as circular
+    # K - E vanishes with m, so contacts of almost equal curvatures count as circular
     kappa = 1.0
     if larger / smaller > 1.0 + 1e-6:
         kappa = brentq(missed, 1.0 + 1e-7, 10.0 * larger / smaller, xtol=1e-13)

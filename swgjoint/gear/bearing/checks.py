@@ -14,20 +14,17 @@ from swgjoint.gear.wave_generators.wave_generator import lobe_height, with_check
 from swgjoint.units import mm, um
 
 THINNEST_RACE = 0.08
-"""Smallest race thickness over ball diameter. Grooves are customarily 0.1 to 0.2 ball
-diameters deep and flexible races about 0.25 thick (not verified). At 0.02 the search
-for the equilibrium fails."""
+"""Smallest thickness of the outer race over the ball diameter.
+
+Grooves are usually 0.1 to 0.2 ball diameters deep (not checked) and flexible races
+about 0.25 thick. At 0.02 the solver finds no equilibrium."""
 WIDEST_RACE = 2.0
-"""Largest race width over face width. The model assumes pressure over the whole race
-width, but the rim ends near the teeth."""
+"""Largest width of the race over the face width. The models load the race over its
+whole width, but the rim ends near the teeth."""
 
 
 def bearing_checks(design: Design) -> list[Check]:
-    """Check that the bearing fits inside the outline and leaves a deflection.
-
-    The balls must fit on their pitch circle, all parts must fit inside the outline of
-    the wave generator, and the clearances must not use up the height of the lobes.
-    """
+    """Check deflection left by the clearances, race, balls and cam of a bearing."""
     bearing = design.wave_generator.bearing
     assert bearing is not None
     bore = design.flexspline_inner_radius / mm
@@ -50,25 +47,26 @@ def bearing_checks(design: Design) -> list[Check]:
             0.0,
             "mm",
             f"{where}: clearance_um = {bearing.clearance_um:g} and"
-            f" fit_clearance_um = {fit_um:g}: half of both takes up the lobes of"
-            f" {lobes:.4g} mm; accepted: below {2.0 * lobes * mm / um:.4g} um together",
+            f" fit_clearance_um = {fit_um:g}: half of their sum takes up the whole"
+            f" deflection of {lobes:.4g} mm; accepted: a sum below"
+            f" {2.0 * lobes * mm / um:.4g} um",
         ),
         Check.lower_limit(
             "bearing: thickness of the race",
             bearing.race_thickness_mm,
             thinnest,
             "mm",
-            f"{where}.race_thickness_mm = {bearing.race_thickness_mm:g}: the groove of"
-            f" balls of {bearing.ball_diameter_mm:g} mm would cut through; accepted: at"
-            f" least {thinnest:.4g} mm",
+            f"{where}.race_thickness_mm = {bearing.race_thickness_mm:g}: the groove for"
+            f" balls of {bearing.ball_diameter_mm:g} mm would cut through the race;"
+            f" accepted: at least {thinnest:.4g} mm",
         ),
         Check.upper_limit(
             "bearing: width of the race",
             width,
             widest,
             "mm",
-            f"{where}.race_width_mm = {width:g}: far wider than the teeth; accepted: at"
-            f" most {widest:.4g} mm",
+            f"{where}.race_width_mm = {width:g}: much wider than the teeth; accepted:"
+            f" at most {widest:.4g} mm",
         ),
         Check.strict_lower_limit(
             "bearing: clearance between balls",
@@ -83,7 +81,7 @@ def bearing_checks(design: Design) -> list[Check]:
 
 
 def _cam(design: Design) -> list[Check]:
-    """Check that the outline of the cam has a positive radius of curvature."""
+    """Check that the cam below race and balls is a smooth curve."""
     bearing = BallBearing.from_design(design)
     try:
         outline = with_checks(design)[0]
