@@ -42,7 +42,7 @@ def bearing_checks(design: Design) -> list[Check]:
     return [
         *_cam(design),
         Check.strict_lower_limit(
-            "bearing: deflection that its clearances leave",
+            "bearing: deflection left by its clearances",
             lobes_left,
             0.0,
             "mm",
@@ -94,7 +94,7 @@ def _cam(design: Design) -> list[Check]:
     value = (sharpest - depth) / mm
     return [
         Check.strict_lower_limit(
-            "bearing: sharpest radius of the cam below it",
+            "bearing: smallest radius of curvature of the cam",
             value,
             0.0,
             "mm",

@@ -1,1 +1,1 @@
-"""The design file: its tables, defaults, feasibility, families and outlines."""
+"""Design files: tables, defaults, feasibility checks, families and outlines."""

@@ -1,4 +1,4 @@
-"""The value nearest to a rejected one that is accepted."""
+"""Search for the accepted value nearest to a rejected one."""
 
 from __future__ import annotations
 
@@ -7,29 +7,30 @@ from dataclasses import dataclass
 from math import floor, isfinite, log, log10
 
 STEP = 1.05
-"""Factor between values that are tried."""
+"""Factor between successive trial values."""
 REACH = 20.0
-"""Largest factor from the rejected value."""
+"""Largest factor between a trial value and the rejected value."""
 DIGITS = 4
-"""Of a bound, rounded to the accepted side."""
+"""Significant digits of a bound, which is rounded to the accepted side."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class AcceptedBound:
-    """How far a value must go until it is accepted."""
+    """A rejected value and the nearest accepted one."""
 
     rejected: float
+    """Value that was rejected."""
     accepted: float
     """Nearest accepted value, rounded to :data:`DIGITS` digits."""
 
     @property
     def sign(self) -> str:
-        """``<=`` or ``>=``."""
+        """Relation of accepted values to the bound, ``<=`` or ``>=``."""
         return "<=" if self.accepted < self.rejected else ">="
 
     @property
     def change(self) -> float:
-        """Size of the change as a logarithm, to rank several keys by [-]."""
+        """Absolute logarithm of the change, for ranking several keys [-]."""
         return abs(log(self.accepted / self.rejected))
 
 
@@ -40,20 +41,20 @@ def nearest_bound(
     low: float = 0.0,
     high: float = float("inf"),
 ) -> AcceptedBound | None:
-    """Nearest accepted value on either side of a rejected positive one.
+    """Nearest accepted value above or below a rejected positive value.
 
-    Values are tried in steps of 5 % up to a factor of 20, the smallest change first;
-    between the last rejected and the first accepted one the bound is bisected. An
-    accepted range narrower than a step may be missed.
+    The search tries values in steps of 5 % up to a factor of 20, smallest change first,
+    and then bisects between the last rejected and the first accepted value. It may miss
+    an accepted range that is narrower than one step.
 
     Args:
-        value: The rejected value; None is found for one that is not positive.
-        accepts: Whether a value is accepted.
-        low: Values are above this.
-        high: Values are at most this.
+        value: The rejected value, positive and finite.
+        accepts: Returns whether a value is accepted.
+        low: Trial values are greater than this.
+        high: Trial values are at most this.
 
     Returns:
-        The bound, or None where nothing within reach is accepted.
+        The bound; None if the search accepts no value, or if ``value`` is not positive.
     """
     if not (value > 0.0 and isfinite(value)):
         return None
@@ -71,7 +72,7 @@ def nearest_bound(
 def _bisected(
     rejected: float, accepted: float, accepts: Callable[[float], bool]
 ) -> float:
-    """Accepted value within 1e-5 of the bound, rounded where the round one is too."""
+    """Accepted value within 1e-5 of the bound, rounded if the result is accepted."""
     while abs(accepted / rejected - 1.0) > 1e-5:
         middle = 0.5 * (rejected + accepted)
         if accepts(middle):

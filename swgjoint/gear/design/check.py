@@ -1,4 +1,4 @@
-"""One finding about a design."""
+"""Result of one check of a design."""
 
 from __future__ import annotations
 
@@ -10,23 +10,36 @@ from swgjoint.errors import DesignError
 
 @dataclass(frozen=True, kw_only=True)
 class Check:
-    """A figure of a design against its limit, in the unit of the report."""
+    """A figure of a design compared with its limit."""
 
     name: str
+    """Name of the figure, with the direction of the limit."""
     ok: bool
+    """Whether the design passes."""
     value: float | None
+    """Value of the figure in ``unit``; None if it could not be computed."""
     unit: str = ""
+    """Unit of value and limit in reports."""
     limit: float | None = None
+    """Limit of the value, in ``unit``."""
     fault: str = ""
     """One line for a failed check: the key, its value, what is accepted."""
     numerical: bool = False
-    """Whether the value is round-off that says nothing of a design which passes."""
+    """Whether the value is mere round-off if the check passes."""
 
     @classmethod
     def upper_limit(
         cls, name: str, value: float, limit: float, unit: str, fault: str
     ) -> Check:
-        """Passes where value <= limit."""
+        """Check that passes if value <= limit.
+
+        Args:
+            name: Name of the figure; ", at most" is appended.
+            value: Value of the figure.
+            limit: Largest accepted value.
+            unit: Unit of value and limit.
+            fault: Message if the check fails.
+        """
         return cls(
             name=f"{name}, at most",
             ok=value <= limit,
@@ -40,7 +53,15 @@ class Check:
     def lower_limit(
         cls, name: str, value: float, limit: float, unit: str, fault: str
     ) -> Check:
-        """Passes where value >= limit."""
+        """Check that passes if value >= limit.
+
+        Args:
+            name: Name of the figure; ", at least" is appended.
+            value: Value of the figure.
+            limit: Smallest accepted value.
+            unit: Unit of value and limit.
+            fault: Message if the check fails.
+        """
         return cls(
             name=f"{name}, at least",
             ok=value >= limit,
@@ -54,7 +75,15 @@ class Check:
     def strict_lower_limit(
         cls, name: str, value: float, limit: float, unit: str, fault: str
     ) -> Check:
-        """Passes where value > limit."""
+        """Check that passes if value > limit.
+
+        Args:
+            name: Name of the figure; ", above" is appended.
+            value: Value of the figure.
+            limit: Accepted values are greater than this.
+            unit: Unit of value and limit.
+            fault: Message if the check fails.
+        """
         return cls(
             name=f"{name}, above",
             ok=value > limit,
@@ -66,7 +95,7 @@ class Check:
 
 
 def raise_faults(checks: Iterable[Check]) -> None:
-    """Refuse a design with a failed check.
+    """Reject a design with failed checks.
 
     Raises:
         DesignError: With one line per failed check.

@@ -1,4 +1,4 @@
-"""Values that a design file leaves to their default."""
+"""Values of a design that are defaults because its file does not state them."""
 
 from __future__ import annotations
 
@@ -16,29 +16,32 @@ ASSUMED = (
     "wave_generator",
     "cup",
 )
-"""Tables whose values every result depends on; an absent one among the others means
-that there is no such part, error or friction."""
+"""Tables whose values affect every result. If another table is absent, the drive does
+not have the corresponding part, error or friction."""
 
 
 def defaults_taken(design: Design) -> dict[str, Any]:
-    """Numbers and choices by dotted key that the file does not state.
+    """Default values of numbers and choices that the file does not state.
 
-    Those that are zero or absent by default are left out: they add nothing.
+    Defaults that are zero or absent are omitted because they have no effect.
+
+    Returns:
+        Default values by dotted key.
     """
-    found: dict[str, Any] = {}
+    defaults: dict[str, Any] = {}
     for name in ASSUMED:
         table = getattr(design, name)
         if table is not None:
-            found |= _unset(table, f"{name}.")
-    return found
+            defaults |= _unset(table, f"{name}.")
+    return defaults
 
 
 def _unset(table: BaseModel, above: str) -> dict[str, Any]:
-    found: dict[str, Any] = {}
+    defaults: dict[str, Any] = {}
     for name in type(table).model_fields:
         value = getattr(table, name)
         if isinstance(value, BaseModel):
-            found |= _unset(value, f"{above}{name}.")
+            defaults |= _unset(value, f"{above}{name}.")
         elif name not in table.model_fields_set and value not in (None, 0.0, ""):
-            found[f"{above}{name}"] = value
-    return found
+            defaults[f"{above}{name}"] = value
+    return defaults

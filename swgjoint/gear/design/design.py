@@ -44,8 +44,9 @@ MemberName = Literal["flexspline", "circular_spline"]
 class Design(Section):
     """One drive: attributes mirror the tables and keys of the file, units included.
 
-    ``design.flexspline.profile.tip_radius_mm`` is the file's key; the properties of
-    this class are in SI. Immutable; :meth:`with_changes` gives a changed copy.
+    ``design.flexspline.profile.tip_radius_mm`` is the value of that key in the file,
+    whereas the properties of this class are in SI units. A design is immutable;
+    :meth:`with_changes` returns a changed copy.
     """
 
     drive: DriveSection
@@ -81,8 +82,9 @@ class Design(Section):
             faults.append(
                 (
                     "wave_generator.kind",
-                    f"{self.wave_generator.kind!r} has two lobes, a tooth difference of"
-                    f" {self.tooth_difference} needs three; accepted: cosine, table",
+                    f"{self.wave_generator.kind!r} has two lobes, but a tooth"
+                    f" difference of {self.tooth_difference} requires three; accepted:"
+                    " cosine, table",
                 )
             )
         if self.cup is not None and radius > 0:
@@ -107,7 +109,7 @@ class Design(Section):
             faults.append(
                 (
                     "circular_spline.profile.kind",
-                    "'conjugate' in both members; accepted: in one of them",
+                    "'conjugate' for both members; accepted: for one of them",
                 )
             )
         if faults:
@@ -118,13 +120,14 @@ class Design(Section):
 
     @classmethod
     def load(cls, reference: str | Path) -> Self:
-        """Read a design file, given as a path or as the name of a bundled one.
+        """Read a design file, given by its path or by the name of a bundled design.
 
-        ``size-NN-RRR`` names a drive of the family by rule, shipped file or not; see
+        ``size-NN-RRR`` names a drive of the family, with or without a bundled file; see
         :mod:`swgjoint.gear.design.family`.
 
         Raises:
-            DesignError: With one line per fault of the file.
+            DesignError: If there is no such design, or with one line per fault of the
+                file.
 
         >>> from swgjoint import Design
         >>> design = Design.load("reference-2d")
@@ -143,7 +146,11 @@ class Design(Section):
 
     @classmethod
     def preset(cls, name: str) -> Self:
-        """A bundled design by its name, whatever files lie in the current folder."""
+        """A bundled design by its name, regardless of files in the current folder.
+
+        Raises:
+            DesignError: If there is no bundled design of that name.
+        """
         names = bundled_names("drives", ".toml")
         if name not in names:
             if (member := family_member(name)) is not None:
@@ -157,19 +164,27 @@ class Design(Section):
 
     @classmethod
     def from_toml(cls, text: str, where: str = "design") -> Self:
-        """A design from the text of a design file; ``where`` names it in messages."""
+        """A design from the text of a design file.
+
+        Args:
+            text: Content of the file.
+            where: Name of the source in messages.
+
+        Raises:
+            DesignError: With one line per fault of the text.
+        """
         data = parse_toml(text, where=where, error=DesignError)
         return validate(cls, data, where=where, error=DesignError)
 
     def with_changes(
         self, changes: Mapping[str, Any] | None = None, /, **dotted: Any
     ) -> Self:
-        """A checked copy with other values for some keys.
+        """A checked copy with new values for some keys.
 
         Args:
-            changes: Dotted keys of the file, e.g. ``{"flexspline.rim_mm": 0.5}``; a
-                table is replaced whole, ``None`` removes a key.
-            **dotted: The same with two underscores for the dot,
+            changes: Values by dotted key, e.g. ``{"flexspline.rim_mm": 0.5}``. A table
+                is replaced as a whole, and ``None`` removes a key.
+            **dotted: Values by key with two underscores instead of each dot, e.g.
                 ``flexspline__rim_mm=0.5``.
 
         Raises:
@@ -202,14 +217,14 @@ class Design(Section):
     # -- text and identity ------------------------------------------------------
 
     def to_toml(self) -> str:
-        """The design as the text of a design file, defaults written out."""
+        """The design as the text of a design file, including default values."""
         return toml_text(self.model_dump(exclude_none=True))
 
     def content_hash(self) -> str:
-        """SHA-256 of everything that a result depends on: all but name and source.
+        """SHA-256 of everything that affects results: all keys except name and source.
 
-        Keys that are younger than kept results are left out where these results hold:
-        without a coupling, and in plane stress.
+        Two keys that were added later are omitted where cached results remain valid: an
+        absent coupling, and the stress state if it is plane stress.
         """
         data = self.model_dump(exclude={"drive": {"name", "source"}})
         if self.coupling is None:
@@ -232,7 +247,7 @@ class Design(Section):
 
     @property
     def periodicity(self) -> int:
-        """Pitches in a turn of the input; see :mod:`swgjoint.gear.kinematics`."""
+        """Pitches per input turn; see :func:`swgjoint.gear.kinematics.periodicity`."""
         return kinematics.periodicity(
             self.drive.layout,
             self.drive.teeth_flexspline,
@@ -246,12 +261,12 @@ class Design(Section):
 
     @property
     def lobes(self) -> int:
-        """Lobes of the wave generator: two wherever the tooth difference is even."""
+        """Lobes of the wave generator: two for an even tooth difference, else three."""
         return 2 if self.tooth_difference % 2 == 0 else 3
 
     @property
     def pitch_diameter(self) -> float:
-        """Pitch diameter of the flexspline, m z_fs [m]."""
+        """Pitch diameter m z_fs of the flexspline [m]."""
         return self.drive.module_mm * mm * self.drive.teeth_flexspline
 
     @property
@@ -265,11 +280,11 @@ class Design(Section):
         )
 
     def material_of(self, member: MemberName) -> Material:
-        """Material of one member in SI: its own keys over those of ``[material]``."""
-        base, own = self.material, getattr(self.material, member)
+        """Material of one member in SI; its keys override those of ``[material]``."""
+        base, override = self.material, getattr(self.material, member)
 
         def value(key: str, unit: float = 1.0) -> Any:
-            chosen = getattr(own, key)
+            chosen = getattr(override, key)
             chosen = getattr(base, key) if chosen is None else chosen
             return None if chosen is None else chosen * unit
 

@@ -1,4 +1,4 @@
-"""Outlines of a drive as plain text: DXF (R12 polylines) and CSV, both in mm."""
+"""Outlines of a drive as text: DXF (R12 polylines) and CSV, both in mm."""
 
 from __future__ import annotations
 
@@ -22,15 +22,21 @@ class Curve:
     """One polyline."""
 
     points: Array
-    """Shape (n, 2) [m]; a closed curve does not repeat its first point."""
+    """Points of shape (n, 2) [m]; a closed curve does not repeat its first point."""
     closed: bool
+    """Whether the last point is connected to the first."""
 
 
 def tooth_curve(profile: ToothProfile, per_segment: int = 48) -> Curve:
-    """One tooth from the middle of one gap to that of the next, every junction in it.
+    """One tooth from the middle of one gap to the middle of the next.
 
-    In the frame of the profile: the tooth on +y, the gear axis at the origin; from the
-    right flank's root over the tip to the left one's.
+    The curve is in the frame of the profile, with the tooth on +y and the gear axis at
+    the origin. It runs from the root of the right flank over the tip to the root of the
+    left flank and contains every junction of segments.
+
+    Args:
+        profile: Profile of the tooth.
+        per_segment: Number of points per segment of the profile.
     """
     stations = profile.stations
     parts = [
@@ -42,9 +48,13 @@ def tooth_curve(profile: ToothProfile, per_segment: int = 48) -> Curve:
 
 
 def wave_generator_curves(outline: WaveGenerator, count: int = 2880) -> list[Curve]:
-    """The closed outlines, counter-clockwise from +y; one per roller.
+    """Closed outlines of a wave generator, counter-clockwise from +y; one per roller.
 
-    2880 points of an outline of 60 mm radius leave chord errors of 0.04 um.
+    With 2880 points, an outline of 60 mm radius has chord errors of 0.04 um.
+
+    Args:
+        outline: The wave generator.
+        count: Number of points per outline.
     """
     return [
         Curve(points=points[:-1], closed=True) for points in outline.outlines(count + 1)
@@ -52,7 +62,7 @@ def wave_generator_curves(outline: WaveGenerator, count: int = 2880) -> list[Cur
 
 
 def dxf_text(curves: Curves) -> str:
-    """AutoCAD R12 text with one POLYLINE per curve, one layer per key, in mm."""
+    """AutoCAD R12 text in mm with one layer per key and one POLYLINE per curve."""
     lines = ["0", "SECTION", "2", "HEADER", "9", "$ACADVER", "1", "AC1009"]
     lines += ["9", "$INSUNITS", "70", "4", "0", "ENDSEC"]
     lines += ["0", "SECTION", "2", "TABLES", "0", "TABLE", "2", "LAYER"]
@@ -75,8 +85,11 @@ def dxf_text(curves: Curves) -> str:
     return "\n".join(lines) + "\n"
 
 
-def curves_csv(curves: Sequence[Curve]) -> str:
-    """Columns curve (counted from 0), x_mm, y_mm; a closed curve is not repeated."""
+def csv_text(curves: Sequence[Curve]) -> str:
+    """CSV text with the columns curve (from 0), x_mm and y_mm.
+
+    Closed curves do not repeat their first point.
+    """
     lines = ["curve,x_mm,y_mm"]
     for index, curve in enumerate(curves):
         lines += [
@@ -87,5 +100,5 @@ def curves_csv(curves: Sequence[Curve]) -> str:
 
 
 def _figure(value: float) -> str:
-    """A picometre in 12 decimals of a mm is below any rounding of the geometry."""
+    """Format with 12 decimals; 1e-12 mm is below the rounding of the geometry."""
     return f"{value + 0.0:.12f}"

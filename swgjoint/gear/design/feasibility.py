@@ -1,4 +1,4 @@
-"""Whether a design can be built, as a list of figures against their limits."""
+"""Feasibility of a design, as a list of figures compared with their limits."""
 
 from __future__ import annotations
 
@@ -22,36 +22,37 @@ if TYPE_CHECKING:
 
 MEMBERS = ("flexspline", "circular_spline")
 CLOSED = 1e-12
-"""Largest gap between two segments of a flank that counts as closed [m]."""
+"""Largest gap between two segments of a closed flank [m]."""
 OVERLAP = 0.01
-"""Largest overlap of rigid flanks over the module that elasticity is left to take up.
+"""Largest accepted overlap of rigid flanks, as a fraction of the module.
 
-A rule: teeth without backlash overlap by 0.05 to 0.32 % of the module in all bundled
-designs, whose stresses and torques finite elements confirm.
+Elastic deformation must take up this overlap. The limit is a rule of thumb: in all
+bundled designs, teeth without backlash overlap by 0.05 to 0.32 % of the module, and
+finite elements confirm the stresses and torques of these designs.
 """
 
 
 PARTS = ("flexspline", "circular_spline", "teeth", "wave_generator", "cup", "bearing")
-"""What the checks of a design are about."""
+"""Parts of a design that are checked."""
 
 
 def design_checks(design: Design) -> list[Check]:
-    """Checks of both teeth, of the wave generator and of their fit.
+    """Checks of both teeth, of their fit, and of the other parts of a design.
 
-    Parts that cannot be built at all appear as a failed check without a value.
+    A part that cannot be built at all appears as a failed check without a value.
     """
     built = {member: _built(design, member) for member in MEMBERS}
     return [check for part in PARTS for check in _part(design, part, built)]
 
 
 def part_checks(design: Design, part: str, *, bounds: bool = True) -> list[Check]:
-    """Checks of one part, none of a part that the design does not have.
+    """Checks of one part; none if the design does not have that part.
 
     Args:
         design: The drive.
-        part: One of :data:`PARTS`; ``teeth`` is the fit of both members, which is not
-            checked where one of them cannot be built.
-        bounds: Whether faults of a tooth say which values would be accepted.
+        part: One of :data:`PARTS`. ``teeth`` is the fit of both members, which is
+            checked only if both can be built.
+        bounds: Whether faults of a tooth state which values would be accepted.
     """
     needed = MEMBERS if part == "teeth" else (part,) if part in MEMBERS else ()
     built = {member: _built(design, member, bounds=bounds) for member in needed}
@@ -71,10 +72,10 @@ def _part(
     design: Design, part: str, built: Mapping[str, ToothProfile | DesignError]
 ) -> list[Check]:
     if part in MEMBERS:
-        found = built[part]
-        if isinstance(found, DesignError):
-            return [_not_built(f"{_name(part)}: tooth", found)]
-        return _tooth(design, part, found)
+        profile = built[part]
+        if isinstance(profile, DesignError):
+            return [_not_built(f"{_name(part)}: tooth", profile)]
+        return _tooth(design, part, profile)
     if part == "teeth":
         profiles = {m: p for m, p in built.items() if isinstance(p, ToothProfile)}
         return _fit(design, profiles) if len(profiles) == len(MEMBERS) else []
@@ -97,14 +98,14 @@ def _not_built(name: str, error: DesignError) -> Check:
 
 
 def _tooth(design: Design, member: str, profile: ToothProfile) -> list[Check]:
-    """Closed, tangent, of positive lengths, ending in the middle of the gap."""
+    """Check junctions, segment lengths and end point of a flank."""
     where = f"{design.drive.name}: {member}.profile"
     junctions = profile.junctions()
     gap = max(junction.gap for junction in junctions)
     corner = max((j.corner for j in junctions if not j.edge), default=0.0)
     shortest = min(part.length for part in profile.segments) / mm
     (last,), _, _ = profile.evaluate(profile.stations[-1:])
-    beside = abs(float(np.arctan2(last[0], last[1])) - profile.half_pitch)
+    offset = abs(float(np.arctan2(last[0], last[1])) - profile.half_pitch)
     name = _name(member)
     return [
         _round_off(
@@ -136,11 +137,11 @@ def _tooth(design: Design, member: str, profile: ToothProfile) -> list[Check]:
         ),
         _round_off(
             Check.upper_limit(
-                f"{name}: end of the flank beside the middle of the gap",
-                beside / deg,
+                f"{name}: angle between the end of the flank and the middle of the gap",
+                offset / deg,
                 1e-10,
                 "deg",
-                f"{where}: the flank ends {beside / deg:.3g} deg beside the middle of"
+                f"{where}: the flank ends {offset / deg:.3g} deg from the middle of"
                 " the gap; accepted: 1e-10 deg",
             )
         ),
@@ -152,17 +153,17 @@ def _round_off(check: Check) -> Check:
 
 
 def engagement_checks(design: Design, path: ToothPath) -> list[Check]:
-    """Clearance of the rigid flanks over the engagement, and how long that is.
+    """Check the clearance of the rigid flanks and the length of their engagement.
 
     Args:
         design: The drive.
-        path: Passage of its tooth through a space.
+        path: Passage of a flexspline tooth of the drive through a tooth space.
     """
     limit = -OVERLAP * design.drive.module_mm * mm
     least = path.smallest_clearance
     where = path.where[path.worst].replace("_", " ")
     theta = float(path.theta[path.worst]) / deg
-    # half a tooth pitch of thickness coefficient opens either flank by this
+    # clearance of each flank per unit of the thickness coefficient
     opened = 0.25 * np.pi * design.drive.module_mm * mm
     opened *= np.cos(design.circular_spline.pressure_angle_deg * deg)
     value = design.circular_spline.thickness_coefficient
@@ -174,25 +175,25 @@ def engagement_checks(design: Design, path: ToothPath) -> list[Check]:
             limit / um,
             "µm",
             f"{design.drive.name}: circular_spline.thickness_coefficient = {value:g}:"
-            f" the rigid flanks overlap by {-least / um:.4g} µm {theta:.3g} deg from"
+            f" the rigid flanks overlap by {-least / um:.4g} µm at {theta:.3g} deg from"
             f" the lobe ({where}); accepted: at most {-limit / um:.4g} µm, 1 % of the"
-            f" module, about {value - (limit - least) / opened:.4g} without other"
-            " changes",
+            " module, which needs a coefficient of about"
+            f" {value - (limit - least) / opened:.4g} if nothing else changes",
         ),
         Check.strict_lower_limit(
-            "teeth: engaged over",
+            "teeth: angle of engagement",
             path.engaged / deg,
             0.0,
             "deg",
             f"{design.drive.name}: flexspline.addendum_coefficient ="
-            f" {design.flexspline.addendum_coefficient:g}: the teeth never reach into"
-            " each other; accepted: a larger one",
+            f" {design.flexspline.addendum_coefficient:g}: the teeth never engage;"
+            " accepted: a larger value",
         ),
     ]
 
 
 def _fit(design: Design, profiles: Mapping[str, ToothProfile]) -> list[Check]:
-    """Tips clear of the roots at the major axis, and of each other at the minor."""
+    """Check tip clearance at the major axis and disengagement at the minor axis."""
     drive, w0 = design.drive, lobe_height(design)
     fs, cs = profiles["flexspline"], profiles["circular_spline"]
     checks = []
@@ -205,17 +206,17 @@ def _fit(design: Design, profiles: Mapping[str, ToothProfile]) -> list[Check]:
         checks.append(
             Check.lower_limit(
                 f"{_name(member)}: tip clearance at the major axis",
-                # tip and root on the same circle by rounding is no overlap
+                # round-off of tip and root on the same circle does not count as overlap
                 clearance if abs(clearance) > 1e-12 else 0.0,
                 0.0,
                 "mm",
                 f"{drive.name}: {member}.addendum_coefficient = {value:g}: the tip"
-                f" runs {-clearance:.4g} mm into the root at the major axis; accepted:"
-                f" at most {value + clearance / drive.module_mm:.4g}, or a"
+                f" overlaps the root by {-clearance:.4g} mm at the major axis;"
+                f" accepted: at most {value + clearance / drive.module_mm:.4g}, or a"
                 f" larger {key}.dedendum_coefficient",
             )
         )
-    # at the minor axis the flexspline of the same length has moved in by about w0
+    # the flexspline keeps its length, so it moves inwards by about w0 at the minor axis
     apart = (cs.addendum_radius - (fs.addendum_radius - w0)) / mm
     value = design.flexspline.addendum_coefficient
     other = design.circular_spline.addendum_coefficient
@@ -225,8 +226,8 @@ def _fit(design: Design, profiles: Mapping[str, ToothProfile]) -> list[Check]:
             apart,
             0.0,
             "mm",
-            f"{drive.name}: flexspline.addendum_coefficient = {value:g}: the"
-            f" teeth stay {-apart:.4g} mm in mesh at the minor axis; accepted: below"
+            f"{drive.name}: flexspline.addendum_coefficient = {value:g}: the teeth"
+            f" still overlap by {-apart:.4g} mm at the minor axis; accepted: below"
             f" {2 * w0 / mm / drive.module_mm - other:.4g} with"
             f" circular_spline.addendum_coefficient = {other:g}",
         )
@@ -235,7 +236,7 @@ def _fit(design: Design, profiles: Mapping[str, ToothProfile]) -> list[Check]:
 
 
 def _cup(design: Design) -> list[Check]:
-    """The fillet fits between cylinder and bore."""
+    """Check that the fillet fits between cylinder and bore."""
     cup = design.cup
     assert cup is not None
     wall = cup.thickness_coefficient * design.flexspline.rim_mm
@@ -252,6 +253,6 @@ def _cup(design: Design) -> list[Check]:
             room,
             "mm",
             f"{design.drive.name}: cup.fillet_mm = {cup.fillet_mm:g} mm; accepted: at"
-            f" most {room:.4g} mm, the room between cylinder and bore",
+            f" most {room:.4g} mm, the space between cylinder and bore",
         )
     ]

@@ -1,4 +1,4 @@
-"""Material of a member, in SI."""
+"""Material of a member in SI units."""
 
 from __future__ import annotations
 
@@ -10,16 +10,17 @@ class Material:
     """Isotropic linear elastic material of one member."""
 
     youngs_modulus: float
-    """E [Pa]."""
+    """Young's modulus E [Pa]."""
     poisson_ratio: float
+    """Poisson's ratio nu [-]."""
     density: float
-    """[kg/m³]."""
+    """Mass density [kg/m³]."""
     fatigue_limit_bending: float | None
-    """Endurance limit in reversed bending [Pa], where known."""
+    """Endurance limit in reversed bending [Pa]; None if unknown."""
     fatigue_limit_torsion: float | None
-    """Endurance limit in reversed torsion [Pa], where known."""
+    """Endurance limit in reversed torsion [Pa]; None if unknown."""
 
     @property
     def shear_modulus(self) -> float:
-        """G = E / (2 (1 + nu)) [Pa]."""
+        """Shear modulus G = E / (2 (1 + nu)) [Pa]."""
         return self.youngs_modulus / (2.0 * (1.0 + self.poisson_ratio))

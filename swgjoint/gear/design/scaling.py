@@ -1,10 +1,10 @@
-"""A design of another tooth count or module, scaled from one and made feasible.
+"""Scale a design to another tooth count or module and make the result feasible.
 
-Lengths of the teeth grow with the module, all others with the pitch diameter, the
-shape of the wave generator with its axes, micro-geometry with the deflection, torques
-and stiffnesses with the cube of the pitch diameter. Manufacturing errors, clearances
-of the bearing, coefficients and angles stay. Where the scaled design cannot be built,
-single values are moved to the nearest ones with which it can, with a margin.
+Tooth dimensions are scaled with the module, all other lengths with the pitch diameter,
+the shape of the wave generator with its axes, the micro-geometry with the deflection,
+and torques and stiffnesses with the cube of the pitch diameter. Manufacturing errors,
+bearing clearances, coefficients and angles do not change. If the scaled design is not
+feasible, single values are moved to the nearest feasible ones, with a margin.
 """
 
 from __future__ import annotations
@@ -32,17 +32,17 @@ from swgjoint.gear.wave_generators.wave_generator import lobe_height
 from swgjoint.units import mm
 
 MARGIN = 0.02
-"""By which a value that is moved goes beyond its bound, where that is accepted too."""
+"""Relative margin of a moved value beyond its bound, used if the result is accepted."""
 DIGITS = 6
-"""Of a scaled value."""
+"""Significant digits of a scaled value."""
 ROUNDS = 8
-"""Values that are moved at most."""
+"""Largest number of moved values."""
 ENGAGEMENT = "engagement"
-"""Of rigid flanks: the part that is checked last, for it takes longest."""
+"""Check of the rigid flanks in engagement, which is last because it is slowest."""
 COARSE: dict[str, int] = {"positions": 241, "points": 101}
-"""Fineness of the passage of a tooth while a bound is sought."""
+"""Resolution of the passage of a tooth during the search for a bound."""
 _KEPT = ("material", "tolerances", "friction", "joint", "mesh")
-"""Tables without a value that scales."""
+"""Tables that are not scaled."""
 _KEPT_KEYS = ("module_mm", "clearance_um", "fit_clearance_um")
 _LARGEST = {
     **MEMBER_KEYS,
@@ -50,19 +50,21 @@ _LARGEST = {
     "parabola_length_coefficient": 1.0,
     "aperture_deg": 44.0,
 }
-"""Largest value of a key that is tried."""
+"""Largest trial value by key."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class MovedValue:
-    """A value with which the scaled design could not be built."""
+    """A value that was moved because the scaled design was not feasible with it."""
 
     key: str
+    """Dotted key of the value."""
     value: float
-    """What it is now."""
+    """New value."""
     bound: AcceptedBound
-    """What it was, and the nearest accepted value."""
+    """Scaled value and the nearest accepted value."""
     fault: str
+    """Reason why the scaled value was rejected."""
 
     def __str__(self) -> str:
         """The change, its bound and its reason in one line."""
@@ -76,12 +78,14 @@ class MovedValue:
 
 @dataclass(frozen=True, kw_only=True)
 class Scaled:
-    """A feasible design and how it came about."""
+    """A feasible scaled design with its scale factors and moved values."""
 
     design: Design
+    """The scaled design."""
     factors: dict[str, float]
-    """By what was multiplied: ``module``, ``pitch_diameter``, ``deflection``."""
+    """Scale factors of ``module``, ``pitch_diameter`` and ``deflection`` [-]."""
     moved: tuple[MovedValue, ...]
+    """Values that had to be moved."""
 
 
 def scaled_design(
@@ -92,31 +96,37 @@ def scaled_design(
     module: float | None = None,
     changes: Mapping[str, Any] | None = None,
 ) -> Scaled:
-    """A design with other teeth or another module, all lengths scaled, feasible.
+    """Scale a design to other tooth counts or another module and make it feasible.
 
     Args:
         design: The template.
         name: Name of the new design.
-        teeth: Of flexspline and circular spline; those of the template if None.
-        module: Module [mm]; that of the template if None.
-        changes: Dotted keys set after scaling; they are not moved.
+        teeth: Tooth counts of flexspline and circular spline; None keeps those of the
+            template.
+        module: Module [mm]; None keeps that of the template.
+        changes: Values by dotted key that are set after scaling and are not moved.
+
+    Returns:
+        The scaled design with its scale factors and moved values.
 
     Raises:
-        DesignError: If a value is not accepted, or no single change of one makes a
-            part feasible; one line per fault.
+        DesignError: If a value is not accepted, or if no change of a single value makes
+            a part feasible; one line per fault.
     """
     old = design.drive
-    own: dict[str, Any] = {
+    new_keys: dict[str, Any] = {
         "name": name,
         "source": f"scaled by swgjoint from {old.name}: {old.source or 'no source'}",
     }
     if teeth is not None:
-        own["teeth_flexspline"], own["teeth_circular_spline"] = teeth
+        new_keys["teeth_flexspline"], new_keys["teeth_circular_spline"] = teeth
     if module is not None:
-        own["module_mm"] = module
-    asked = {**old.model_dump(), **own}
+        new_keys["module_mm"] = module
     new = validate(
-        DriveSection, asked, where=f"design {name!r}: drive", error=DesignError
+        DriveSection,
+        {**old.model_dump(), **new_keys},
+        where=f"design {name!r}: drive",
+        error=DesignError,
     )
     by_module = new.module_mm / old.module_mm
     difference = new.teeth_circular_spline - new.teeth_flexspline
@@ -125,20 +135,20 @@ def scaled_design(
         "pitch_diameter": by_module * new.teeth_flexspline / old.teeth_flexspline,
         "deflection": by_module * difference / design.tooth_difference,
     }
-    values: dict[str, Any] = {f"drive.{key}": value for key, value in own.items()}
+    values: dict[str, Any] = {f"drive.{key}": value for key, value in new_keys.items()}
     for key, value in _numbers(design.model_dump(exclude_unset=True)):
         if (factor := _factor(key, factors)) is not None:
             values[key] = _rounded(value * factor)
-    found = design.with_changes(values)
-    found = found.with_changes(_outline_to_scale(design, found))
+    scaled = design.with_changes(values)
+    scaled = scaled.with_changes(_outline_to_scale(design, scaled))
     if changes:
-        found = found.with_changes(changes)
-    found, moved = _made_feasible(found, frozenset(changes or ()))
-    return Scaled(design=found, factors=factors, moved=moved)
+        scaled = scaled.with_changes(changes)
+    scaled, moved = _made_feasible(scaled, frozenset(changes or ()))
+    return Scaled(design=scaled, factors=factors, moved=moved)
 
 
 def _numbers(table: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, float]]:
-    """Dotted keys with a number that is not zero, lists left out."""
+    """Dotted keys with non-zero numbers, without lists."""
     for key, value in table.items():
         if isinstance(value, Mapping):
             yield from _numbers(value, f"{above}{key}.")
@@ -147,12 +157,12 @@ def _numbers(table: Mapping[str, Any], above: str = "") -> Iterator[tuple[str, f
 
 
 def _factor(key: str, factors: Mapping[str, float]) -> float | None:
-    """By what a value is multiplied; None for one that stays."""
+    """Scale factor of a value; None if it does not change."""
     table, _, last = key.rpartition(".")
     if table.partition(".")[0] in _KEPT or last in _KEPT_KEYS:
         return None
     if last.endswith("per_mm"):
-        return None  # with the axes of the wave generator
+        return None  # scaled with the axes of the wave generator
     if last.endswith("_mm"):
         tooth = table.endswith(".profile")
         return factors["module" if tooth else "pitch_diameter"]
@@ -168,9 +178,9 @@ def _rounded(value: float) -> float:
 
 
 def _outline_to_scale(old: Design, new: Design) -> dict[str, Any]:
-    """Keys of the wave generator that give the outline of the old one on new axes.
+    """Keys of the wave generator that give the old outline on the new axes.
 
-    A parabola y = a - c x² is scaled along both axes, a table in its distance from the
+    A parabola y = a - c x² is scaled along both axes, a table by its distance from the
     bore.
     """
     spec = old.wave_generator
@@ -194,15 +204,15 @@ def _outline_to_scale(old: Design, new: Design) -> dict[str, Any]:
 def _made_feasible(
     design: Design, fixed: frozenset[str]
 ) -> tuple[Design, tuple[MovedValue, ...]]:
-    """The design with as few values moved as make every check pass."""
+    """The design with single values moved, one by one, until every check passes."""
     moved: list[MovedValue] = []
     while (failed := _first_failed(design)) is not None and len(moved) < ROUNDS:
         part, faults = failed
         settled = fixed | {one.key for one in moved}
-        found = _nearest(design, part, settled)
-        if found is None:
+        nearest = _nearest(design, part, settled)
+        if nearest is None:
             break
-        key, bound = found
+        key, bound = nearest
         beyond = bound.accepted * (1 + MARGIN if bound.sign == ">=" else 1 - MARGIN)
         with_margin = _with(design, key, _rounded(beyond))
         if with_margin is not None and _passes(with_margin, part):
@@ -217,7 +227,7 @@ def _made_feasible(
 
 
 def _first_failed(design: Design) -> tuple[str, list[str]] | None:
-    """The first part with a failed check, and its faults; None of a feasible design."""
+    """The first part with a failed check and its faults; None if all checks pass."""
     for part in (*PARTS, ENGAGEMENT):
         faults = [c.fault for c in _checks(design, part) if not c.ok]
         if faults:
@@ -232,7 +242,7 @@ def _checks(
         return part_checks(design, part, bounds=bounds)
     try:
         return engagement_checks(design, tooth_path(design, **fineness))
-    except DesignError:  # a rim on rollers has no outline to follow
+    except DesignError:  # with rollers, the rim does not follow an outline
         return []
 
 
@@ -250,7 +260,7 @@ def _with(design: Design, key: str, value: float) -> Design | None:
 def _nearest(
     design: Design, part: str, fixed: frozenset[str]
 ) -> tuple[str, AcceptedBound] | None:
-    """The key whose smallest change alone makes a part feasible."""
+    """The key for which the smallest change makes a part feasible, with its bound."""
     best: tuple[str, AcceptedBound] | None = None
     for key, value in _candidates(design, part):
         if key in fixed:
@@ -268,7 +278,7 @@ def _nearest(
 
 
 def _candidates(design: Design, part: str) -> Iterator[tuple[str, float]]:
-    """Numbers that shape a part, by dotted key."""
+    """Numbers that determine the shape of a part, by dotted key."""
     members = MEMBERS if part == "teeth" else (part,) if part in MEMBERS else ()
     for member in members:
         spec = getattr(design, member)

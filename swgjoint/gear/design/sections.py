@@ -1,8 +1,8 @@
 """The tables of a design file, with the same names as in the file.
 
-Keys carry their unit; coefficients are multiples of the module, as in the thesis.
-Every kind that the format knows is declared here; the geometry refuses those that it
-cannot build yet.
+Keys end with their unit; coefficients are multiples of the module, as in the thesis.
+This module declares every kind of the file format; the geometry rejects kinds that it
+cannot build.
 """
 
 from __future__ import annotations
@@ -23,7 +23,8 @@ Coefficient = Annotated[float, Field(gt=0, le=5)]
 Reduction = Annotated[float, Field(gt=0, le=1)]
 
 SMALLEST_MODULE = 0.005
-"""[mm]; micro strain wave gears with pitch diameters of 6 mm have 0.03 mm."""
+"""Smallest accepted module [mm]; micro strain wave gears with a pitch diameter of 6 mm
+have modules of 0.03 mm."""
 
 
 class DriveSection(Section):
@@ -32,15 +33,16 @@ class DriveSection(Section):
     name: Annotated[str, Field(min_length=1, max_length=100)]
     """Name in results and files."""
     source: str = ""
-    """Where the numbers come from."""
+    """Source of the numbers."""
     layout: Layout = "circular_spline_fixed"
-    """Member that is fixed; another one is the output."""
+    """Which member is fixed."""
     teeth_flexspline: Annotated[int, Field(ge=40, le=400)]
-    """Teeth of the flexspline."""
+    """Number of teeth of the flexspline."""
     teeth_circular_spline: Annotated[int, Field(ge=42, le=412)]
-    """More than those of the flexspline by a multiple of the lobes, 2 or 3."""
+    """Number of teeth of the circular spline; it exceeds that of the flexspline by a
+    multiple of the number of lobes, 2 or 3."""
     module_mm: Annotated[float, Field(gt=0, le=50)]
-    """Pitch diameter over teeth."""
+    """Module: pitch diameter divided by the number of teeth."""
     face_width_mm: Millimetre
     """Width of the teeth along the axis."""
 
@@ -50,7 +52,7 @@ class DriveSection(Section):
             raise Fault(
                 (
                     "module_mm",
-                    f"{self.module_mm:g} mm: is it in metres? accepted:"
+                    f"{self.module_mm:g} mm: is this value in metres? accepted:"
                     f" {SMALLEST_MODULE:g} to 50 mm ({self.module_mm:g} m are"
                     f" {1e3 * self.module_mm:g} mm)",
                 )
@@ -73,21 +75,22 @@ class DriveSection(Section):
                 (
                     "teeth_circular_spline",
                     f"{difference} teeth more than the flexspline; accepted: a multiple"
-                    " of the lobes of the wave generator (2 or 3), at most 12",
+                    " of the number of lobes of the wave generator (2 or 3), at most"
+                    " 12",
                 )
             )
         return self
 
 
 class MaterialOverride(Section):
-    """Material keys of one member; absent ones come from ``[material]``."""
+    """Material keys of one member; absent keys come from ``[material]``."""
 
     youngs_modulus_GPa: Annotated[float, Field(gt=0, le=2_000)] | None = None
-    """Modulus of elasticity of this member."""
+    """Young's modulus of this member."""
     poisson_ratio: Annotated[float, Field(ge=0, lt=0.5)] | None = None
-    """Of this member."""
+    """Poisson's ratio of this member."""
     density_kg_m3: Annotated[float, Field(gt=0, le=30_000)] | None = None
-    """Of this member."""
+    """Mass density of this member."""
     fatigue_limit_bending_MPa: Positive | None = None
     """Endurance limit in reversed bending."""
     fatigue_limit_torsion_MPa: Positive | None = None
@@ -95,31 +98,31 @@ class MaterialOverride(Section):
 
 
 class MaterialSection(Section):
-    """Material of both members; default: steel as in thesis Table 4.1."""
+    """Material of both members; the default is steel as in thesis Table 4.1."""
 
     youngs_modulus_GPa: Annotated[float, Field(gt=0, le=2_000)] = 210.0
-    """Modulus of elasticity; default that of steel."""
+    """Young's modulus; the default is that of steel."""
     poisson_ratio: Annotated[float, Field(ge=0, lt=0.5)] = 0.29
-    """Default that of steel."""
-    # density of the steels of such drives, e.g. 34CrNiMo6 after EN 10083-3 practice
+    """Poisson's ratio; the default is that of steel."""
+    # density of steels used in such drives, e.g. 34CrNiMo6 (EN 10083-3)
     density_kg_m3: Annotated[float, Field(gt=0, le=30_000)] = 7850.0
-    """Default that of steel."""
+    """Mass density; the default is that of steel."""
     fatigue_limit_bending_MPa: Positive | None = None
     """Endurance limit in reversed bending."""
     fatigue_limit_torsion_MPa: Positive | None = None
     """Endurance limit in reversed torsion."""
     flexspline: MaterialOverride = MaterialOverride()
-    """Values of the flexspline alone."""
+    """Values that apply only to the flexspline."""
     circular_spline: MaterialOverride = MaterialOverride()
-    """Values of the circular spline alone."""
+    """Values that apply only to the circular spline."""
 
 
 class QuadrupleCircularArc(Section):
-    """Four arcs and a straight segment, thesis 3.3.3."""
+    """Quadruple circular arc: four arcs and a straight segment, thesis 3.3.3."""
 
     kind: Literal["qca"] = "qca"
     tip_radius_mm: Millimetre
-    """Radius that rounds the tip; below that of the addendum."""
+    """Radius of the tip rounding; smaller than the addendum radius."""
     addendum_radius_mm: Millimetre
     """Radius of the convex arc above the pitch point."""
     straight_mm: Annotated[float, Field(ge=0, le=1_000)]
@@ -127,13 +130,13 @@ class QuadrupleCircularArc(Section):
     dedendum_radius_mm: Millimetre
     """Radius of the concave arc below the pitch point."""
     root_radius_mm: Millimetre
-    """Radius of the root fillet; below that of the dedendum."""
+    """Radius of the root fillet; smaller than the dedendum radius."""
     straight_split: Annotated[float, Field(ge=0, le=1)] = 0.5
-    """Share of the straight segment above the pitch point."""
+    """Fraction of the straight segment above the pitch point."""
 
     @model_validator(mode="after")
     def _straight_is_none_or_real(self) -> QuadrupleCircularArc:
-        # shorter ones leave no direction in double precision
+        # the direction of a shorter segment is lost in double precision
         if 0.0 < self.straight_mm < 1e-6:
             raise Fault(
                 (
@@ -145,59 +148,60 @@ class QuadrupleCircularArc(Section):
 
 
 class DoubleCircularArc(Section):
-    """Two arcs and the straight segment that results, thesis 3.3.2."""
+    """Double circular arc: two arcs and a resulting straight segment, thesis 3.3.2."""
 
     kind: Literal["dca"] = "dca"
     addendum_radius_mm: Millimetre
-    """Radius of the convex arc; it ends in an edge at the tip."""
+    """Radius of the convex arc, which ends in an edge at the tip."""
     dedendum_radius_mm: Millimetre
-    """Radius of the concave arc, tangent to the root circle."""
+    """Radius of the concave arc, which is tangent to the root circle."""
     straight_split: Annotated[float, Field(ge=0, le=1)] = 0.5
-    """Share of the straight segment above the pitch point."""
+    """Fraction of the straight segment above the pitch point."""
 
 
 class Involute(Section):
     """Involute generated by a rack (external) or a shaper cutter (internal).
 
-    Without the optional keys the cutter tip is rounded by a quarter of the module where
-    that fits, and the shaper cutter has half the teeth of the circular spline.
+    By default, the tip radius of the cutter is a quarter of the module if this fits,
+    and the shaper cutter has half as many teeth as the circular spline.
     """
 
     kind: Literal["involute"] = "involute"
     cutter_tip_radius_mm: Millimetre | None = None
-    """Rounding of the cutter's tip."""
+    """Tip radius of the cutter."""
     cutter_teeth: Annotated[int, Field(ge=10, le=400)] | None = None
-    """Teeth of the shaper cutter of the circular spline."""
+    """Number of teeth of the shaper cutter for the circular spline."""
 
 
 class TwoArc(Section):
-    """Convex and concave arc with a common tangent, 80:1 article.
+    """Convex and concave arc with a common tangent, as in the 80:1 article.
 
-    Centres lie ``offset`` across the tooth and ``shift`` along the radius from the
-    pitch point on the tooth axis. Absent keys take the proportions of the article.
+    The centre of each arc has a distance ``offset`` across the tooth and ``shift``
+    along the radius from the pitch point on the tooth axis. Absent keys take the
+    proportions of the article.
     """
 
     kind: Literal["two_arc"] = "two_arc"
     addendum_radius_mm: Millimetre | None = None
     """Radius of the convex arc."""
     addendum_offset_mm: Millimetre | None = None
-    """Centre of the convex arc beyond the tooth axis."""
+    """Distance of the centre of the convex arc beyond the tooth axis."""
     addendum_shift_mm: Millimetre | None = None
-    """Centre of the convex arc below the pitch circle."""
+    """Distance of the centre of the convex arc below the pitch circle."""
     dedendum_radius_mm: Millimetre | None = None
     """Radius of the concave arc."""
     dedendum_offset_mm: Millimetre | None = None
-    """Centre of the concave arc beside the tooth axis."""
+    """Distance of the centre of the concave arc from the tooth axis."""
     dedendum_shift_mm: Millimetre | None = None
-    """Centre of the concave arc above the pitch circle."""
+    """Distance of the centre of the concave arc above the pitch circle."""
     root_radius_mm: Millimetre | None = None
     """Radius of the root fillet."""
 
 
 class Conjugate(Section):
-    """Envelope of the other member's profile under the wave generator.
+    """Envelope of the profile of the other member under the wave generator.
 
-    Without ``root_radius_mm`` the fillet is the largest that fits below the flank.
+    Without ``root_radius_mm``, the fillet is the largest that fits below the flank.
     """
 
     kind: Literal["conjugate"] = "conjugate"
@@ -217,69 +221,71 @@ class Member(Section):
     rim_mm: Millimetre
     """Thickness of the rim below the teeth."""
     addendum_coefficient: Coefficient = 0.6
-    """Height of the tip above the pitch circle over the module."""
+    """Height of the tip above the pitch circle, divided by the module."""
     dedendum_coefficient: Coefficient = 0.8
-    """Depth of the root below the pitch circle over the module."""
+    """Depth of the root below the pitch circle, divided by the module."""
     pressure_angle_deg: Annotated[float, Field(gt=0, lt=60)] = 20.0
-    """Inclination of the flank to the radius at the pitch circle."""
+    """Angle between flank and radius at the pitch circle."""
     thickness_coefficient: Annotated[float, Field(gt=0, le=1.5)] = 1.0
-    """Thickness at the pitch circle over half the pitch; below 1: backlash."""
+    """Tooth thickness at the pitch circle, divided by half the pitch; values below 1
+    give backlash."""
     profile: Profile
     """Shape of the flank, by kind."""
 
 
 class CircularSplineMember(Member):
-    """The member whose outer diameter sits in a housing."""
+    """Circular spline, whose outside may be fixed in a housing."""
 
     outer_rim: Literal["fixed", "free"] = "fixed"
-    """Whether a housing holds the outside, or it is free to deform."""
+    """Whether a housing fixes the outside, or the outside is free to deform."""
 
 
 class Cup(Section):
     """Cup or hat behind the teeth of the flexspline."""
 
     kind: Literal["cup", "hat"] = "cup"
-    """Diaphragm inwards (cup) or flange outwards (hat)."""
+    """Diaphragm directed inwards (cup) or flange directed outwards (hat)."""
     length_mm: Millimetre
-    """Of the wall behind the teeth."""
+    """Length of the wall behind the teeth."""
     thickness_coefficient: Coefficient = 0.8
-    """Thickness of the wall over that of the rim."""
+    """Thickness of the wall, divided by that of the rim."""
     fillet_mm: Annotated[float, Field(ge=0, le=1_000)]
-    """Radius between wall and diaphragm."""
+    """Fillet radius between wall and diaphragm."""
     bore_radius_mm: Millimetre
-    """Of the bore in the diaphragm, of a hat the outer radius of the flange."""
+    """Radius of the bore in the diaphragm; for a hat, outer radius of the flange."""
 
 
 class Boss(Section):
-    """Spring between the flexspline's bore and its shaft or frame."""
+    """Spring between the bore of the flexspline and its shaft or frame."""
 
     torsional_stiffness_Nm_rad: Annotated[float, Field(gt=0, le=1e12)]
-    """About the axis."""
+    """Torsional stiffness about the axis."""
 
 
 class Housing(Section):
     """Spring between the circular spline and its frame or shaft."""
 
     torsional_stiffness_Nm_rad: Annotated[float, Field(gt=0, le=1e12)]
-    """About the axis."""
+    """Torsional stiffness about the axis."""
 
 
 class Coupling(Section):
     """Spring between the wave generator and its shaft: Oldham coupling, hub, cam."""
 
     torsional_stiffness_Nm_rad: Annotated[float, Field(gt=0, le=1e12)]
-    """About the axis, at the input."""
+    """Torsional stiffness about the axis, at the input."""
 
 
 class MicroGeometry(Section):
     """Crowning and slope; all zero by default."""
 
     wave_generator_crowning_um: Micrometre = 0.0
-    """How much lower its surface is at both edges of the face."""
+    """Drop of the wave-generator surface at both edges of the face."""
     wave_generator_slope_um: Annotated[float, Field(ge=-2_000, le=2_000)] = 0.0
-    """At the open edge: up at the major axis, down at the minor; follows the coning."""
+    """Rise of the surface at the open edge at the major axis, and drop at the minor
+    axis; positive values follow the coning of the flexspline."""
     flexspline_crowning_um: Micrometre = 0.0
-    """How much the flanks are relieved at both edges of the face."""
+    """Relief of the flanks at both edges of the face."""
     crowning_kind: Literal["parabolic", "circular"] = "parabolic"
     """Shape of both crownings along the face."""
 
@@ -294,17 +300,17 @@ class TolerancesSection(Section):
     random_pitch_um: Micrometre = 0.0
     """Standard deviation of the pitch error of single teeth, both members."""
     wave_generator_ovality_um: Micrometre = 0.0
-    """Out-of-roundness of its outline."""
+    """Largest minus smallest deviation of the wave-generator outline, along normals."""
     wave_generator_eccentricity_um: Micrometre = 0.0
-    """Shift of its outline."""
+    """Offset of the wave-generator outline from the axis of rotation."""
     circular_spline_eccentricity_um: Micrometre = 0.0
-    """Shift of all its teeth."""
+    """Offset of all teeth of the circular spline."""
     circular_spline_ovality_um: Micrometre = 0.0
-    """Largest less smallest radius of its teeth."""
+    """Largest minus smallest radial position of the teeth of the circular spline."""
     misalignment_arcmin: Annotated[float, Field(ge=0, le=600)] = 0.0
-    """Tilt of the axes to each other; models in space alone."""
+    """Angle between the axes of circular spline and flexspline; 3D models only."""
     seed: Annotated[int, Field(ge=0, le=2**31 - 1)] = 1
-    """Of all random parts."""
+    """Seed of all random errors."""
 
 
 class FrictionSection(Section):
@@ -315,7 +321,7 @@ class FrictionSection(Section):
 
 
 class RatingsSection(Section):
-    """Catalogue torques at the output; absent ones follow the default rule."""
+    """Catalogue torques at the output; absent keys get default values by rule."""
 
     rated_torque_Nm: Positive | None = None
     """Rated torque at the output."""
@@ -335,8 +341,8 @@ class RatingsSection(Section):
             ("rated_torque_Nm", "repeated_peak_Nm", "momentary_peak_Nm"),
             ("T1_Nm", "T2_Nm"),
         ):
-            given = [(k, v) for k in keys if (v := getattr(self, k)) is not None]
-            for (low_key, low), (key, value) in pairwise(given):
+            present = [(k, v) for k in keys if (v := getattr(self, k)) is not None]
+            for (low_key, low), (key, value) in pairwise(present):
                 if value < low or (key == "T2_Nm" and value == low):
                     faults.append(
                         (key, f"{value:g} N·m; accepted: above {low_key} = {low:g} N·m")
@@ -350,13 +356,15 @@ class JointDampingSection(Section):
     """Damping of the drive in a robot joint."""
 
     damping_ratio: Annotated[float, Field(ge=0, le=2)] = 0.02
-    """Share of critical damping of rotor against link."""
+    """Damping ratio of the torsional vibration between rotor and link."""
 
 
 class MeshSection(Section):
-    """Mesh of the finite elements; 1 is the mesh of the thesis, 0.5 a coarse one."""
+    """Mesh and stress state of the finite element models."""
 
     refinement: Annotated[float, Field(ge=0.5, le=16)] = 1.0
-    """Multiplies the elements in every direction."""
+    """Factor on the number of elements in every direction; 1 is the mesh of the thesis,
+    0.5 a coarse mesh."""
     stress_state: Literal["auto", "plane_stress", "plane_strain"] = "auto"
-    """Across the face width, 2d and ring models; auto: between, by the face width."""
+    """Stress state across the face width in 2d and ring models; auto interpolates
+    between plane stress and plane strain according to the face width."""

@@ -1,7 +1,7 @@
-"""Manufacturing errors of one drive: where its teeth and its wave generator really are.
+"""Manufacturing errors of one drive: actual positions of teeth and wave generator.
 
-Every error is drawn from the seed of the design, each in its own stream, so that a key
-that is added does not change what the others are.
+All errors are drawn from the seed of the design. Each has its own random stream, so
+that adding one error does not change the others.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from swgjoint.typing import Array
 from swgjoint.units import arcmin, um
 
 HARMONICS = (1, 2, 3, 4)
-"""Of the cumulative pitch error, with amplitudes 1/k."""
+"""Harmonics k of the cumulative pitch error, with amplitudes proportional to 1/k."""
 
 TEETH = (
     "flexspline_cumulative_pitch_um",
@@ -26,9 +26,9 @@ TEETH = (
     "circular_spline_eccentricity_um",
     "circular_spline_ovality_um",
 )
-"""Keys of errors that shift teeth."""
+"""Keys of errors that displace teeth."""
 
-# streams of the random parts
+# random streams of the errors
 _PITCH = {"flexspline": 1, "circular_spline": 2}
 _RANDOM = {"flexspline": 3, "circular_spline": 4}
 _OVALITY, _ECCENTRICITY, _WAVE_GENERATOR, _OUTLINE, _TILT = 5, 6, 7, 8, 9
@@ -36,30 +36,32 @@ _OVALITY, _ECCENTRICITY, _WAVE_GENERATOR, _OUTLINE, _TILT = 5, 6, 7, 8, 9
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ToothErrors:
-    """Displacement of the teeth of one member from their nominal places."""
+    """Displacement of the teeth of one member from their nominal positions."""
 
     tangential: Array
-    """Counter-clockwise, along the pitch circle (n_teeth,) [m]."""
+    """Displacement along the pitch circle, counter-clockwise (n_teeth,) [m]."""
     radial: Array
-    """Outwards (n_teeth,) [m]."""
+    """Radial displacement, positive outwards (n_teeth,) [m]."""
 
     @property
     def shift(self) -> Array:
-        """In the frames of the teeth, +y outwards (n_teeth, 2) [m]."""
+        """Displacement in the frames of the teeth, +y outwards (n_teeth, 2) [m]."""
         return np.stack([-self.tangential, self.radial], axis=-1)
 
 
 def tooth_errors(design: Design, member: MemberName) -> ToothErrors:
     r"""Errors of the teeth of a member.
 
-    Cumulative pitch error: :math:`\sum_{k=1}^4 \cos(k\varphi - \varphi_k)/k` scaled to
-    the given peak to peak; random pitch error: normal, the key is its standard
-    deviation; ovality of the circular spline: radial, the key is the largest minus the
-    smallest radius; eccentricity: a translation of all teeth.
+    * Cumulative pitch error: :math:`\sum_{k=1}^4 \cos(k\varphi - \varphi_k)/k`, scaled
+      to the peak-to-peak value of the key.
+    * Random pitch error: normally distributed; the key is its standard deviation.
+    * Ovality of the circular spline: radial; the key is the largest minus the smallest
+      radius.
+    * Eccentricity of the circular spline: a translation of all teeth.
 
     Args:
         design: The drive.
-        member: Whose teeth.
+        member: Member whose teeth are displaced.
     """
     spec = design.tolerances
     count = getattr(design.drive, f"teeth_{member}")
@@ -89,9 +91,9 @@ def tooth_errors(design: Design, member: MemberName) -> ToothErrors:
 
 
 def wave_generator_offset(design: Design) -> Array:
-    """Centre of the wave generator's outline in the frame that turns with it (2,) [m].
+    """Centre of the outline in the rotating frame of the wave generator (2,) [m].
 
-    It turns about the gear axis, not about its centre.
+    The wave generator rotates about the gear axis, not about this centre.
     """
     turn = _stream(design.tolerances.seed, _WAVE_GENERATOR).uniform(0.0, 2.0 * np.pi)
     size = design.tolerances.wave_generator_eccentricity_um * um
@@ -99,12 +101,13 @@ def wave_generator_offset(design: Design) -> Array:
 
 
 def axis_tilt(design: Design) -> Array:
-    """Slope in x and y, over z, of the axis of the circular spline (2,) [rad].
+    """Slopes dx/dz and dy/dz of the axis of the circular spline (2,) [rad].
 
-    The axis meets that of flexspline and wave generator in the middle of the face width
-    and leans from it by the key, towards a direction that the seed gives; it stands
-    still with the bearings, also where the circular spline turns about it. At z from
-    the middle its teeth stand off by z times that.
+    The axis intersects that of flexspline and wave generator in the middle of the face
+    width. The key is the angle between them, and the seed determines the direction of
+    the tilt. The axis is fixed to the bearings, even if the circular spline rotates
+    about it. At the distance z from the middle, the teeth are displaced by z times the
+    slopes.
     """
     turn = _stream(design.tolerances.seed, _TILT).uniform(0.0, 2.0 * np.pi)
     size = design.tolerances.misalignment_arcmin * arcmin
@@ -112,10 +115,10 @@ def axis_tilt(design: Design) -> Array:
 
 
 def flawed_wave_generator(design: Design) -> WaveGenerator:
-    """Outline of the wave generator with its ovality, about its centre.
+    """Outline of the wave generator with its ovality, about its own centre.
 
-    The key is the largest minus the smallest deviation along the normal; the seed turns
-    it against the major axis.
+    The key is the largest minus the smallest deviation along the normal; the seed
+    determines the angle between the ovality and the major axis.
     """
     outline = wave_generator(design)
     ovality = design.tolerances.wave_generator_ovality_um * um
@@ -126,16 +129,13 @@ def flawed_wave_generator(design: Design) -> WaveGenerator:
 
 
 def with_perfect_teeth(design: Design) -> Design:
-    """The same drive without errors of its teeth and of its axis.
-
-    Those of the wave generator stay.
-    """
+    """The same drive, with errors of the wave generator only."""
     keys = (*TEETH, "misalignment_arcmin")
     return design.with_changes({f"tolerances.{key}": 0.0 for key in keys})
 
 
 def without_errors(design: Design) -> Design:
-    """The same drive as drawn."""
+    """The same drive without any manufacturing error."""
     keys = set(type(design.tolerances).model_fields) - {"seed"}
     return design.with_changes({f"tolerances.{key}": 0.0 for key in keys})
 
