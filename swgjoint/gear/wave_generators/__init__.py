@@ -1,1 +1,1 @@
-"""Outlines of wave generators, one kind per module."""
+"""Outlines of wave generators, with one module per kind."""

@@ -15,9 +15,10 @@ from swgjoint.typing import Array
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Chain(ClosedCurve):
-    """Closed convex chain of pieces, the first one starting on the +y axis."""
+    """Closed convex chain of pieces; the first piece starts on the +y axis."""
 
     pieces: tuple[OutlinePiece, ...]
+    """Pieces in counter-clockwise order."""
     major: float = field(init=False)
     """Largest radius [m]."""
 
@@ -37,7 +38,7 @@ class Chain(ClosedCurve):
         return float(self.stations[-1])
 
     def evaluate(self, s: ArrayLike) -> tuple[Array, Array, Array]:
-        """Every piece at its share of the arc length; a junction is the next piece."""
+        """Evaluate the piece at each arc length; junctions belong to the next piece."""
         along = self._within(s)
         last = len(self.pieces) - 1
         owner = np.clip(
@@ -54,20 +55,20 @@ class Chain(ClosedCurve):
 
     @cached_property
     def _starts(self) -> tuple[Array, Array]:
-        """Points and tangents at the starts of the pieces. Shapes (n_pieces, 2)."""
+        """Points [m] and unit tangents at the starts of the pieces (n_pieces, 2)."""
         at = [piece.evaluate_at(np.zeros(1)) for piece in self.pieces]
         normals = np.concatenate([normal for _, normal, _ in at])
         tangents = np.stack([-normals[:, 1], normals[:, 0]], axis=-1)
         return np.concatenate([point for point, _, _ in at]), tangents
 
     def signed_distance(self, points: Array) -> tuple[Array, Array, Array]:
-        """The nearest foot over all pieces between whose end normals a point lies."""
+        """Nearest foot on the pieces whose end normals enclose the point."""
         starts, tangents = self._starts
-        # a junction's normal divides the plane into before and after, (n_pieces, n)
+        # the normal at a junction separates points before and after it, (n_pieces, n)
         after = np.einsum("kj,nj->kn", tangents, points)
         after = after >= np.einsum("kj,kj->k", tangents, starts)[:, None]
         strip = after & ~np.roll(after, -1, axis=0)
-        # deep inside, the normals of a parabola cross: look everywhere
+        # deep inside, the normals of a parabola intersect, so all pieces are searched
         strip |= ~strip.any(axis=0)
         n = len(points)
         nearest = np.full(n, np.inf)
@@ -88,7 +89,7 @@ class Chain(ClosedCurve):
         return distance, normals, curvature
 
     def corners(self) -> Array:
-        """Turn of the tangent at the junctions, zero where smooth (n_pieces,) [rad]."""
+        """Corner angles at the junctions, zero where smooth (n_pieces,) [rad]."""
         _, after = self._starts
         ends = [
             piece.evaluate_at(np.array([piece.length]))[1][0] for piece in self.pieces

@@ -1,4 +1,4 @@
-"""What every outline of a wave generator offers."""
+"""Interface of wave-generator outlines."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from swgjoint.typing import Array
 
 
 class ClosedCurve(ABC):
-    """Closed convex outline about the axis, major axis along +y, SI.
+    """Closed convex outline about the axis, with the major axis along +y, in SI units.
 
-    Arc length runs counter-clockwise from the point on the +y axis.
+    The arc length is counted counter-clockwise from the point on the +y axis.
     """
 
     major: float
@@ -26,12 +26,15 @@ class ClosedCurve(ABC):
 
     @property
     def folds(self) -> int:
-        """Turns by 2 pi/folds map the outline onto itself."""
+        """Order of rotational symmetry: a turn by 2 pi/folds preserves the outline."""
         return 2
 
     @abstractmethod
     def evaluate(self, s: ArrayLike) -> tuple[Array, Array, Array]:
-        """Outline at arc length s from +y, counter-clockwise, any s (periodic) [m].
+        """Outline at arc length s, counter-clockwise from +y; periodic in s.
+
+        Args:
+            s: Arc lengths (n,) [m].
 
         Returns:
             Points (n, 2) [m]; outward unit normals (n, 2); curvatures (n,) [1/m],
@@ -40,10 +43,10 @@ class ClosedCurve(ABC):
 
     @abstractmethod
     def signed_distance(self, points: Array) -> tuple[Array, Array, Array]:
-        """Distance, outward unit normal and outline curvature.
+        """Signed distance of points from the outline, with normal and curvature.
 
         Args:
-            points: Shape (n, 2) [m].
+            points: Points of shape (n, 2) [m].
 
         Returns:
             Distances (n,) [m], positive outside; normals (n, 2); curvatures of the
@@ -51,13 +54,13 @@ class ClosedCurve(ABC):
         """
 
     def _within(self, s: ArrayLike) -> Array:
-        """The same arc length within the first turn."""
+        """Arc length reduced to the first turn."""
         return np.asarray(np.mod(np.asarray(s, dtype=float), self.perimeter))
 
     def outline(self, count: int) -> Array:
-        """Closed outline at equal steps of arc length. Shape (count, 2) [m]."""
+        """Points of the closed outline at equal steps of arc length (count, 2) [m]."""
         return self.evaluate(np.linspace(0.0, self.perimeter, count))[0]
 
     def outlines(self, count: int) -> list[Array]:
-        """Closed curves to draw or to cut, ``count`` points each."""
+        """Closed curves for drawing or cutting, with ``count`` points each [m]."""
         return [self.outline(count)]

@@ -14,13 +14,15 @@ from swgjoint.typing import Array
 
 @dataclass(frozen=True, kw_only=True)
 class Elliptical(ClosedCurve):
-    """Ellipse with major semi-axis a along y (thesis eqs 3.3 and 3.4).
+    """Ellipse with the semi-major axis a along y (thesis eqs 3.3 and 3.4).
 
-    The eccentric angle t counts from +y: the point is (-b sin t, a cos t).
+    The eccentric angle t is counted from +y: its point is (-b sin t, a cos t).
     """
 
     major: float
+    """Semi-major axis a [m]."""
     minor: float
+    """Semi-minor axis b [m]."""
 
     @cached_property
     def perimeter(self) -> float:
@@ -35,7 +37,7 @@ class Elliptical(ClosedCurve):
         return 1.0 - (self.major / self.minor) ** 2
 
     def evaluate(self, s: ArrayLike) -> tuple[Array, Array, Array]:
-        """Arc length inverted by Newton's method on the elliptic integral."""
+        """Evaluate the outline; Newton's method inverts the elliptic integral."""
         from scipy.special import ellipeinc
 
         a, b = self.major, self.minor
@@ -54,10 +56,10 @@ class Elliptical(ClosedCurve):
         return points, normals, a * b / size**3
 
     def signed_distance(self, points: Array) -> tuple[Array, Array, Array]:
-        """Foot of the perpendicular by Newton's method on the eccentric angle.
+        """Signed distance by Newton's method for the eccentric angle of the foot.
 
-        In one quadrant, mirrored back at the end; a step that leaves the bracket is
-        replaced by bisection.
+        The iteration works in one quadrant and mirrors the result back. A step that
+        leaves the bracket is replaced by bisection.
         """
         a, b = self.major, self.minor
         x, y = np.abs(points[:, 0]), np.abs(points[:, 1])  # x = b sin t, y = a cos t

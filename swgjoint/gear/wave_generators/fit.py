@@ -1,4 +1,4 @@
-"""Whether a wave generator fits the bore that it deflects."""
+"""Checks that a wave generator fits the bore that it deflects."""
 
 from __future__ import annotations
 
@@ -16,19 +16,26 @@ from swgjoint.gear.wave_generators.rollers import FourRoller
 from swgjoint.units import mm
 
 MAX_STRETCH = 2e-3
-"""Largest excess of the perimeter over that of the undeformed bore.
+"""Largest relative excess of the perimeter over that of the undeformed bore.
 
-The rim is that much longer when it follows the whole outline: 0.2 % is 420 MPa of hoop
-stress in steel. An ellipse with C = 1 needs (w_0/2r)^2, 7e-5 in thesis Table 4.1.
+A rim that follows the whole outline is stretched by this amount; 0.2 % corresponds to a
+hoop stress of 420 MPa in steel. An ellipse with C = 1 needs (w_0/2r)^2, which is 7e-5
+in thesis Table 4.1.
 """
 TANGENT = 1e-10
-"""Largest corner at a joint that counts as tangent [rad]."""
+"""Largest corner angle at a junction that counts as tangent [rad]."""
 
 
 def wave_generator_checks(
     design: Design, outline: ClosedCurve, w0: float
 ) -> list[Check]:
-    """Checks of an outline against the flexspline that it deflects by w0 [m]."""
+    """Checks of an outline against the flexspline that it deflects.
+
+    Args:
+        design: The drive.
+        outline: Outline of its wave generator.
+        w0: Radial deflection at the lobe [m].
+    """
     drive, spec = design.drive, design.wave_generator
     where = f"{drive.name}: wave_generator"
     bore = design.flexspline_inner_radius
@@ -39,11 +46,11 @@ def wave_generator_checks(
         Check.upper_limit(
             "wave generator: largest radius",
             shown,
-            # the axis a itself, rounded in another way, is no fault
+            # the half axis itself, with other round-off, must pass
             limit * (1.0 + 1e-12),
             "mm",
             f"{where}.{_radius_key(design)}: the largest radius is {shown:.6g} mm;"
-            f" accepted: at most {limit:.6g} mm, the half major axis"
+            f" accepted: at most {limit:.6g} mm, the sum of the semi-major axis"
             f" {(bore + w0) / mm:.6g} mm and the tip clearance {room / mm:.4g} mm"
             " of the teeth",
         )
@@ -51,7 +58,7 @@ def wave_generator_checks(
     stretch = outline.perimeter / (2.0 * pi * bore) - 1.0
     checks.append(
         Check.upper_limit(
-            "wave generator: stretch of the bore around it",
+            "wave generator: stretch of the bore",
             100.0 * stretch,
             100.0 * MAX_STRETCH,
             "%",
@@ -64,7 +71,7 @@ def wave_generator_checks(
         checks.append(
             replace(
                 Check.upper_limit(
-                    "wave generator: corner at its joints",
+                    "wave generator: corner at junctions",
                     corner,
                     TANGENT,
                     "rad",
@@ -84,7 +91,7 @@ def wave_generator_checks(
 
 
 def _tip_clearance(design: Design) -> float:
-    """Radial clearance of the tips at the major axis [m], by the coefficients."""
+    """Radial tip clearance at the major axis from the coefficients [m]."""
     fs, cs = design.flexspline, design.circular_spline
     coefficient = min(
         cs.dedendum_coefficient - fs.addendum_coefficient,
@@ -94,7 +101,7 @@ def _tip_clearance(design: Design) -> float:
 
 
 def _radius_key(design: Design) -> str:
-    """The key, with its value, that moves the largest radius."""
+    """The key that determines the largest radius, with its value."""
     spec = design.wave_generator
     key = "parabola_coefficient_per_mm"
     if spec.kind == "parabolic":
@@ -113,7 +120,7 @@ def _radius_key(design: Design) -> str:
 
 
 def _length_key(design: Design) -> str:
-    """The key, with its value, that moves the length of the outline."""
+    """The key that determines the length of the outline, with its value."""
     spec = design.wave_generator
     if spec.kind in ("parabolic", "asymmetric_parabolic"):
         return _radius_key(design)
@@ -138,7 +145,7 @@ def _rollers_clear(design: Design, outline: FourRoller) -> Check:
         unit="mm",
         limit=0.0,
         fault=f"{design.drive.name}: wave_generator.roller_radius_mm ="
-        f" {spec.roller_radius_mm:g} mm: rollers {spec.aperture_deg:g} deg from the"
+        f" {spec.roller_radius_mm:g} mm: rollers at {spec.aperture_deg:g} deg from the"
         f" major axis overlap by {-clearance / mm:.4g} mm; accepted: below"
         f" {limit / mm:.5g} mm, or a larger aperture_deg",
     )
@@ -157,13 +164,13 @@ def _convex(design: Design, outline: Radial) -> Check:
         least,
         0.0,
         "1/mm",
-        f"{design.drive.name}: wave_generator.{key}: the outline is hollow, its"
-        f" smallest curvature {least:.4g} 1/mm; accepted: at least 0 1/mm",
+        f"{design.drive.name}: wave_generator.{key}: the outline is concave, with a"
+        f" smallest curvature of {least:.4g} 1/mm; accepted: at least 0 1/mm",
     )
 
 
 def _lobes_reach(design: Design, outline: TableOutline) -> Check:
-    """Every lobe of a table deflects the bore."""
+    """Check that every lobe of a table deflects the bore."""
     lobes = 2.0 * pi * np.arange(design.lobes) / design.lobes
     least = float(outline.radius(lobes).min()) / mm
     bore = design.flexspline_inner_radius / mm
@@ -174,6 +181,6 @@ def _lobes_reach(design: Design, outline: TableOutline) -> Check:
         unit="mm",
         limit=bore,
         fault=f"{design.drive.name}: wave_generator.radius_mm: {least:.6g} mm at one of"
-        f" {design.lobes} lobes, counted from angle 0; accepted: more than the inner"
+        f" {design.lobes} lobes, the first at angle 0; accepted: more than the inner"
         f" radius of the flexspline, {bore:.6g} mm",
     )

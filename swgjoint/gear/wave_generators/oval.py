@@ -1,4 +1,4 @@
-"""An outline with an error of roundness."""
+"""An outline with a roundness error."""
 
 from __future__ import annotations
 
@@ -16,15 +16,17 @@ from swgjoint.typing import Array
 class Oval(ClosedCurve):
     r"""An outline moved along its normal by :math:`\delta = \frac o2\cos 2(\varphi-a)`.
 
-    phi is the polar angle of the nominal outline, counter-clockwise from +y; delta is
-    micrometres, its square is left out.
+    phi is the polar angle of the nominal outline, counter-clockwise from +y. The
+    deviation delta is of the order of micrometres, so terms in its square are
+    neglected.
     """
 
     nominal: ClosedCurve
+    """Outline without the error."""
     ovality: float
-    """o, largest minus smallest deviation [m]."""
+    """Ovality o, largest minus smallest deviation [m]."""
     angle: float
-    """a [rad]."""
+    """Polar angle a of the largest deviation [rad]."""
 
     @property
     def major(self) -> float:  # type: ignore[override]
@@ -33,30 +35,30 @@ class Oval(ClosedCurve):
 
     @property
     def perimeter(self) -> float:
-        """Perimeter of the nominal outline, by which the arc length is counted [m]."""
+        """Perimeter of the nominal outline, which defines the arc length [m]."""
         return self.nominal.perimeter
 
     @property
     def folds(self) -> int:
-        """Two turns at most."""
+        """Order of rotational symmetry, at most two."""
         return gcd(self.nominal.folds, 2)
 
     def evaluate(self, s: ArrayLike) -> tuple[Array, Array, Array]:
-        """Outline at an arc length of the nominal one."""
+        """Outline at arc lengths of the nominal outline."""
         points, normals, curvature = self.nominal.evaluate(s)
         delta, slope, bend = self._deviation(points, normals)
         tilted, curvature = _moved(normals, curvature, delta, slope, bend)
         return points + delta[:, None] * normals, tilted, curvature
 
     def outlines(self, count: int) -> list[Array]:
-        """Those of the nominal wave generator: micrometres do not show."""
+        """Outlines of the nominal wave generator; the deviation is invisible."""
         return self.nominal.outlines(count)
 
     def signed_distance(self, points: Array) -> tuple[Array, Array, Array]:
-        """Distance to the nominal outline less the deviation at its foot.
+        """Distance to the nominal outline minus the deviation at the foot.
 
-        The normal is the gradient of that distance: forces along it do the work that
-        the distance says.
+        The normal is the gradient of this distance, so that the work of contact forces
+        is consistent with the change of the distance.
         """
         distance, normals, curvature = self.nominal.signed_distance(points)
         foot = points - distance[:, None] * normals
@@ -66,10 +68,10 @@ class Oval(ClosedCurve):
         return distance - delta, tilted, curvature
 
     def _deviation(self, foot: Array, normals: Array) -> tuple[Array, Array, Array]:
-        """Deviation and its first and second derivative by the arc length."""
+        """Deviation and its first two derivatives with respect to the arc length."""
         square = np.einsum("ni,ni->n", foot, foot)
         phase = 2.0 * (np.arctan2(-foot[:, 0], foot[:, 1]) - self.angle)
-        # d phi/ds: the tangent, J n, across the radius
+        # d phi/ds: component of the tangent J n perpendicular to the radius
         per_length = np.einsum("ni,ni->n", foot, normals) / square
         half = 0.5 * self.ovality
         return (

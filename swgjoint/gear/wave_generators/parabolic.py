@@ -15,15 +15,15 @@ class Side:
     """Half of a lobe: the parabola from the apex outwards and its connector arc."""
 
     coefficient: float
-    """a_p [1/m]."""
+    """Coefficient a_p of the parabola [1/m]."""
     length_coefficient: float
-    """C_p: the parabola ends at x = C_p b."""
+    """Length coefficient C_p [-]; the parabola ends at x = C_p b."""
     connector_radius: float
-    """r_c [m]."""
+    """Radius r_c of the connector arc [m]."""
 
 
 class OutlineFault(ValueError):
-    """Parameters without an outline: (key below the wave generator, message)."""
+    """Parameters that give no outline, with the key below ``wave_generator``."""
 
     def __init__(self, key: str, text: str) -> None:
         super().__init__(f"{key}{text}")
@@ -42,9 +42,9 @@ def parabolic(
 ) -> Chain:
     """Parabolic lobes joined by connector, lateral and connector arc.
 
-    ``left`` and ``right`` are the sides of the upper lobe; the lower lobe is the upper
-    one turned by half a turn, so that both lobes deflect the flexspline alike, in
-    whichever direction they lead. With equal sides and no turn this is thesis 3.2.3.
+    ``left`` and ``right`` are the sides of the upper lobe. The lower lobe is the upper
+    lobe rotated by half a turn, so that both deflect the flexspline identically for
+    either direction of rotation. Equal sides and no turn give thesis 3.2.3.
 
     Args:
         major: Height a of the apex on the +y axis [m].
@@ -53,10 +53,10 @@ def parabolic(
         right: Side x > 0 of the upper lobe.
         turn: Rotation of each lobe's parabola about its apex, counter-clockwise [rad]
             (lambda of thesis 5.7.1).
-        prefixes: Tables of the left and right keys, for messages.
+        prefixes: Prefixes of the keys of the left and right side in messages.
 
     Raises:
-        OutlineFault: If the connectors do not join the parabolas to lateral arcs.
+        OutlineFault: If the connector arcs cannot join the parabolas to lateral arcs.
     """
     apex = (0.0, major)
     x_l, x_r = left.length_coefficient * minor, right.length_coefficient * minor
@@ -92,7 +92,7 @@ def parabolic(
                 f"{prefix}parabola_coefficient_per_mm",
                 f" = {side.coefficient * mm:g} 1/mm: the connector arc would turn back"
                 f" by {-aperture / deg:.4g} deg to meet the minor axis; accepted: a"
-                " smaller one",
+                " smaller value",
             )
     half: list[OutlinePiece] = [
         wing_l,
@@ -116,29 +116,29 @@ def _connector(wing: Parabola, x: float, side: Side, angle: float) -> Point:
 def _check_connector(
     centre: Point, side: Side, prefix: str, angle: float, minor: float
 ) -> None:
-    """The connector lies inside x = b and its centre above the minor axis."""
+    """Check that the connector is inside x = b and its centre above the minor axis."""
     reach = abs(centre[0]) + side.connector_radius
     if reach >= minor:
-        # the end point stays, the arc grows from it by 1 - cos of its normal
+        # from its fixed end point, the arc extends by r_c (1 - cos of the end normal)
         end = abs(centre[0]) + side.connector_radius * abs(cos(angle))
         limit = (minor - end) / (1.0 - abs(cos(angle)))
         accepted = (
             f"below {limit / mm:.4g} mm"
             if limit > 0.0
-            else "a smaller parabola_length_coefficient, which is"
+            else "a parabola_length_coefficient smaller than"
             f" {side.length_coefficient:g}"
         )
         raise OutlineFault(
             f"{prefix}connector_radius_mm",
             f" = {side.connector_radius / mm:g} mm: the connector arc reaches"
-            f" {reach / mm:.4g} mm, beyond the half minor axis {minor / mm:.4g} mm;"
+            f" {reach / mm:.4g} mm, beyond the semi-minor axis {minor / mm:.4g} mm;"
             f" accepted: {accepted}",
         )
     if centre[1] <= 0.0:
         raise OutlineFault(
             f"{prefix}parabola_coefficient_per_mm",
-            f" = {side.coefficient * mm:g} 1/mm: the connector arc's centre lies"
-            f" {-centre[1] / mm:.4g} mm below the minor axis; accepted: a smaller one,"
+            f" = {side.coefficient * mm:g} 1/mm: the centre of the connector arc is"
+            f" {-centre[1] / mm:.4g} mm below the minor axis; accepted: a smaller value"
             " or a smaller connector_radius_mm",
         )
 
@@ -146,11 +146,12 @@ def _check_connector(
 def _lateral(
     upper: Point, r_upper: float, lower: Point, r_lower: float, minor: float
 ) -> tuple[Point, float]:
-    """Circle that touches x = -b and, from outside, both connector circles.
+    """Circle that touches x = -b and encloses both connector circles tangentially.
 
-    With centre (R - b, y) internal tangency gives for each connector (-u, v), r the
-    condition 2 R (b - u - r) = (b - u)^2 - r^2 + (v - y)^2. R is eliminated; the root
-    between the connectors is taken. Equal connectors give y = 0 and thesis (3.11).
+    With the centre (R - b, y), internal tangency gives for each connector with centre
+    (-u, v) and radius r the condition
+    2 R (b - u - r) = (b - u)^2 - r^2 + (v - y)^2. R is eliminated, and the root between
+    the connectors is used. Equal connectors give y = 0 and thesis (3.11).
     """
     gap, rest, height = [], [], []
     for (x, v), r in ((upper, r_upper), (lower, r_lower)):
@@ -164,13 +165,13 @@ def _lateral(
     y = 2.0 * c / (-b + sqrt(max(b * b - 4.0 * a * c, 0.0)))
     centre_to_line = (rest[0] - 2.0 * height[0] * y + y * y) / (2.0 * gap[0])
     centre = (centre_to_line - minor, y)
-    # from the tangency, one rounding better at the junction than from the line
+    # computed from the tangency, which has less round-off at the junction
     radius = r_upper + hypot(upper[0] - centre[0], upper[1] - centre[1])
     return centre, radius
 
 
 def _turned(piece: OutlinePiece) -> OutlinePiece:
-    """The piece turned by half a turn about the axis."""
+    """The piece rotated by half a turn about the axis."""
     if isinstance(piece, Arc):
         x, y = piece.centre
         return Arc(

@@ -1,7 +1,7 @@
-"""Arcs, straight lines and parabolas that outlines are composed of.
+"""Arcs, straight lines and parabolas from which outlines are composed.
 
-Every piece is traversed counter-clockwise about the axis and bulges outwards (a line
-does not); its parameter is the arc length from its start.
+Every piece is traversed counter-clockwise about the axis and is convex or straight. Its
+parameter is the arc length from its start.
 """
 
 from __future__ import annotations
@@ -33,7 +33,8 @@ class OutlinePiece(Protocol):
     def foot(self, points: Array) -> Array:
         """Arc length of the nearest point of the piece (n,) [m].
 
-        For points outside, or inside by less than the radius of curvature.
+        The points are outside the outline, or inside by less than its radius of
+        curvature.
         """
         ...
 
@@ -44,12 +45,16 @@ class OutlinePiece(Protocol):
 
 @dataclass(frozen=True, kw_only=True)
 class Arc:
-    """Circular arc from the normal direction ``start`` to ``end`` > start [rad]."""
+    """Circular arc from the normal direction ``start`` to ``end`` > ``start``."""
 
     centre: Point
+    """Centre [m]."""
     radius: float
+    """Radius [m]."""
     start: float
+    """Direction of the normal at the start [rad]."""
     end: float
+    """Direction of the normal at the end [rad]."""
 
     @property
     def length(self) -> float:
@@ -67,14 +72,14 @@ class Arc:
         """See :class:`OutlinePiece`."""
         middle, half = 0.5 * (self.start + self.end), 0.5 * (self.end - self.start)
         rel = points - np.asarray(self.centre)
-        c, d = cos(middle), sin(middle)  # angle from the middle: no branch cut near
+        c, d = cos(middle), sin(middle)  # angle from the middle, away from branch cuts
         angle = np.arctan2(rel[:, 1] * c - rel[:, 0] * d, rel[:, 0] * c + rel[:, 1] * d)
         return np.asarray(self.radius * (np.clip(angle, -half, half) + half))
 
     def largest_radius(self) -> float:
         """See :class:`OutlinePiece`."""
         ends, normals, _ = self.evaluate_at(np.array([0.0, self.length]))
-        # the far point from the axis lies beyond the centre, if the arc reaches there
+        # the farthest point of the circle is beyond its centre; is it on the arc?
         ox, oy = self.centre
         side = normals[:, 0] * oy - normals[:, 1] * ox
         if side[0] >= 0.0 >= side[1]:
@@ -87,7 +92,9 @@ class Line:
     """Straight line."""
 
     start: Point
+    """First point [m]."""
     end: Point
+    """Last point [m]."""
 
     @cached_property
     def length(self) -> float:
@@ -120,15 +127,18 @@ class Line:
 class Parabola:
     r"""Part of the parabola apex + R(turn) (x, -a_p x^2) from x = start down to end.
 
-    Arc length from the apex :math:`(u\sqrt{1 + u^2} + \sinh^{-1} u)/(4 a_p)` with
-    u = 2 a_p x.
+    The arc length from the apex is :math:`(u\sqrt{1 + u^2} + \sinh^{-1} u)/(4 a_p)`
+    with u = 2 a_p x.
     """
 
     apex: Point
+    """Apex [m]."""
     coefficient: float
-    """a_p [1/m]."""
+    """Coefficient a_p [1/m]."""
     start: float
+    """Local coordinate x of the first point [m]."""
     end: float
+    """Local coordinate x of the last point [m], smaller than ``start``."""
     turn: float = 0.0
     """Rotation about the apex, counter-clockwise [rad]."""
 
@@ -143,12 +153,12 @@ class Parabola:
 
     @cached_property
     def _rotation(self) -> Array:
-        """Rows are the directions of the local axes."""
+        """Matrix whose rows are the directions of the local axes."""
         c, d = cos(self.turn), sin(self.turn)
         return np.array([[c, d], [-d, c]])
 
     def evaluate_at(self, s: Array) -> tuple[Array, Array, Array]:
-        """See :class:`OutlinePiece`; the arc length is inverted by Newton's method."""
+        """See :class:`OutlinePiece`; Newton's method inverts the arc length."""
         a = self.coefficient
         wanted = self._from_apex(self.start) - np.asarray(s, dtype=float)
         u = 2.0 * a * wanted
@@ -170,7 +180,8 @@ class Parabola:
 
         The perpendicular through (p, q) meets the parabola at the largest root of
         x^3 + c x = h with c = (1 + 2 a q)/(2 a^2), h = |p|/(2 a^2). Newton's method
-        from above, where the cubic is convex, goes down to it monotonically.
+        starts above this root, where the cubic is convex, and converges to it
+        monotonically.
         """
         a = self.coefficient
         p, q = ((points - np.asarray(self.apex)) @ self._rotation.T).T

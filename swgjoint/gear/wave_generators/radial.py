@@ -1,4 +1,4 @@
-"""Outlines given as radius over the angle from the major axis."""
+"""Outlines defined by their radius as a function of the angle from the major axis."""
 
 from __future__ import annotations
 
@@ -23,22 +23,27 @@ class Radial(ClosedCurve):
 
     @abstractmethod
     def radius(self, phi: Array, derivative: int = 0) -> Array:
-        """Radius [m] or its derivative by the angle [m/rad^n]."""
+        """Radius [m], or its derivative of order n by the angle [m/rad^n].
+
+        Args:
+            phi: Polar angles, counter-clockwise from +y [rad].
+            derivative: Order n of the derivative, 0 to 2.
+        """
 
     def _breaks(self) -> Array:
-        """Angles of one turn between which the radius is smooth [rad]."""
+        """Angles within one turn between which the radius is smooth [rad]."""
         return np.array([0.0, 2.0 * np.pi])
 
     @cached_property
     def _panels(self) -> tuple[Array, Array]:
-        """Ends of the panels of the quadrature [rad] and arc length there [m]."""
+        """Ends of the quadrature panels: polar angles [rad] and arc lengths [m]."""
         turn = np.linspace(0.0, 2.0 * np.pi, _PANELS + 1)
         ends = np.unique(np.concatenate([turn, self._breaks()]))
         lengths = self._length(ends[:-1], ends[1:])
         return ends, np.concatenate([[0.0], np.cumsum(lengths)])
 
     def _length(self, start: Array, end: Array) -> Array:
-        """Arc length within panels by Gauss-Legendre quadrature [m]."""
+        """Arc length of panels by Gauss-Legendre quadrature [m]."""
         half = 0.5 * (end - start)
         phi = 0.5 * (start + end)[..., None] + half[..., None] * _NODES
         speed = np.hypot(self.radius(phi), self.radius(phi, 1))
@@ -50,7 +55,7 @@ class Radial(ClosedCurve):
         return float(self._panels[1][-1])
 
     def evaluate_at(self, phi: Array) -> tuple[Array, Array, Array]:
-        """Points, normals and curvatures at the angles phi [rad]."""
+        """Points [m], unit normals and curvatures [1/m] at polar angles phi [rad]."""
         r, dr, ddr = (self.radius(phi, k) for k in range(3))
         radial = np.stack([-np.sin(phi), np.cos(phi)], axis=-1)
         across = np.stack([-np.cos(phi), -np.sin(phi)], axis=-1)
@@ -60,7 +65,7 @@ class Radial(ClosedCurve):
         return r[..., None] * radial, normals, curvature
 
     def evaluate(self, s: ArrayLike) -> tuple[Array, Array, Array]:
-        """Arc length inverted by Newton's method within the panels."""
+        """Evaluate the outline; Newton's method inverts the arc length per panel."""
         ends, lengths = self._panels
         along = self._within(s)
         panel = np.clip(np.searchsorted(lengths, along, "right") - 1, 0, len(ends) - 2)
@@ -83,10 +88,11 @@ class Radial(ClosedCurve):
         return phi, cKDTree(self.evaluate_at(phi)[0])
 
     def signed_distance(self, points: Array) -> tuple[Array, Array, Array]:
-        """Newton's method on the angle from the nearest of many outline points.
+        """Signed distance by Newton's method for the polar angle of the foot.
 
-        A step is held within four of their spacings; where the distance is not convex
-        in the angle (deep inside) the second derivative is kept positive.
+        The iteration starts at the nearest of many sampled outline points. Steps are
+        limited to four sample spacings. Deep inside, where the distance is not a convex
+        function of the angle, the second derivative is kept positive.
         """
         start, tree = self._nearest
         phi = start[tree.query(points)[1]]
@@ -113,19 +119,27 @@ class Radial(ClosedCurve):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Cosine(Radial):
-    """Radius (a + b)/2 + (a - b)/2 cos(lobes phi)."""
+    """Outline with the radius (a + b)/2 + (a - b)/2 cos(lobes phi)."""
 
     major: float
+    """Largest radius a [m]."""
     minor: float
+    """Smallest radius b [m]."""
     lobes: int = 2
+    """Number of lobes."""
 
     @property
     def folds(self) -> int:
-        """As many as lobes."""
+        """Order of rotational symmetry, equal to the number of lobes."""
         return self.lobes
 
     def radius(self, phi: Array, derivative: int = 0) -> Array:
-        """See :class:`Radial`."""
+        """Radius [m] or its derivative of order n [m/rad^n].
+
+        Args:
+            phi: Polar angles, counter-clockwise from +y [rad].
+            derivative: Order n of the derivative, 0 to 2.
+        """
         mean, swing = 0.5 * (self.major + self.minor), 0.5 * (self.major - self.minor)
         n, angle = self.lobes, self.lobes * phi
         if derivative == 0:
@@ -142,8 +156,8 @@ class TableOutline(Radial):
         """Fit the spline.
 
         Args:
-            angle: Increasing within one turn [rad].
-            radius: One per angle [m].
+            angle: Polar angles, increasing within one turn [rad].
+            radius: Radius at each angle [m].
         """
         from scipy.interpolate import CubicSpline
 
@@ -163,7 +177,7 @@ class TableOutline(Radial):
 
     @cached_property
     def folds(self) -> int:
-        """Largest of 6 to 1 that maps the spline onto itself within 1e-12 of it."""
+        """Order of rotational symmetry, at most 6, within 1e-12 of the radius."""
         phi = np.linspace(0.0, 2.0 * np.pi, 997)
         here = self.radius(phi)
         for n in range(6, 1, -1):
@@ -173,6 +187,11 @@ class TableOutline(Radial):
         return 1
 
     def radius(self, phi: Array, derivative: int = 0) -> Array:
-        """See :class:`Radial`."""
+        """Radius [m] or its derivative of order n [m/rad^n].
+
+        Args:
+            phi: Polar angles, counter-clockwise from +y [rad].
+            derivative: Order n of the derivative, 0 to 2.
+        """
         inside = self._first + np.mod(phi - self._first, 2.0 * np.pi)
         return np.asarray(self._spline(inside, derivative))

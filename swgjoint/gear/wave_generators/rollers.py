@@ -19,18 +19,20 @@ from swgjoint.typing import Array
 class FourRoller(ClosedCurve):
     """Two opposite pairs of rollers that touch the circle of radius a (thesis 3.2.4).
 
-    Contact is with the nearest roller. Arc length runs along the taut band around the
-    rollers, whose straight parts no roller touches.
+    Contact occurs at the nearest roller. The arc length is measured along the taut band
+    around the rollers, whose straight parts are not in contact with a roller.
     """
 
     major: float
+    """Radius a of the circle that encloses the rollers [m]."""
     aperture: float
     """Angle beta of the roller axes from the major axis [rad]."""
     roller_radius: float
+    """Radius of a roller [m]."""
 
     @property
     def centre(self) -> tuple[float, float]:
-        """Axis of the roller in the first quadrant [m]."""
+        """Position of the roller axis in the first quadrant [m]."""
         reach = self.major - self.roller_radius
         return reach * sin(self.aperture), reach * cos(self.aperture)
 
@@ -38,7 +40,7 @@ class FourRoller(ClosedCurve):
     def band(self) -> Chain:
         """Taut band around the four rollers."""
         (x, y), r = self.centre, self.roller_radius
-        # from the +y axis: half a top line, roller, side line, roller, half a line
+        # from +y: half of the top line, roller, side line, roller, half a line, twice
         half: list[OutlinePiece] = [
             Line(start=(0.0, y + r), end=(-x, y + r)),
             Arc(centre=(-x, y), radius=r, start=0.5 * pi, end=pi),
@@ -59,11 +61,11 @@ class FourRoller(ClosedCurve):
         return self.band.perimeter
 
     def evaluate(self, s: ArrayLike) -> tuple[Array, Array, Array]:
-        """The taut band at arc length s."""
+        """Evaluate the taut band at arc length s."""
         return self.band.evaluate(s)
 
     def signed_distance(self, points: Array) -> tuple[Array, Array, Array]:
-        """Distance to the nearest roller, mirrored from the first quadrant."""
+        """Distance to the nearest roller, computed in the first quadrant."""
         rel = np.abs(points) - np.asarray(self.centre)
         r = np.hypot(rel[:, 0], rel[:, 1])
         normals = rel / np.maximum(r, 1e-300)[:, None]
@@ -75,7 +77,7 @@ class FourRoller(ClosedCurve):
         )
 
     def outlines(self, count: int) -> list[Array]:
-        """The four rollers, counter-clockwise from the first quadrant."""
+        """Outlines of the four rollers, counter-clockwise from the first quadrant."""
         angle = np.linspace(0.0, 2.0 * np.pi, count)
         circle = np.stack([np.cos(angle), np.sin(angle)], axis=-1)
         x, y = self.centre

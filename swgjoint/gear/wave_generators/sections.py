@@ -14,8 +14,8 @@ from swgjoint.gear.design.sections import Micrometre, Millimetre, Positive, Redu
 class Bearing(Section):
     """Thin-race ball bearing between wave generator and flexspline.
 
-    Absent optional keys take what
-    :class:`swgjoint.gear.bearing.ball_bearing.BallBearing` says.
+    :meth:`swgjoint.gear.bearing.ball_bearing.BallBearing.from_design` describes the
+    defaults of absent keys.
     """
 
     balls: Annotated[int, Field(ge=3, le=200)]
@@ -25,26 +25,27 @@ class Bearing(Section):
     race_thickness_mm: Millimetre
     """Thickness of the outer race over its grooves."""
     clearance_um: Micrometre = 0.0
-    """Radial clearance, on the diameter."""
+    """Radial internal clearance, measured on the diameter."""
     race_width_mm: Millimetre | None = None
-    """Width along the axis."""
+    """Width of the outer race along the axis."""
     groove_inertia_factor: Reduction | None = None
-    """Second moment of the race's section over that of its rectangle."""
+    """Second moment of area of the race section over that of its rectangle."""
     groove_conformity: Annotated[float, Field(gt=0.5, le=1)] | None = None
-    """Radius of the groove over the diameter of the ball."""
+    """Radius of the groove, divided by the diameter of the ball."""
     fit_clearance_um: Micrometre | None = None
-    """Clearance between race and flexspline, on the diameter."""
+    """Clearance between race and flexspline, measured on the diameter."""
     youngs_modulus_GPa: Annotated[float, Field(gt=0, le=2_000)] | None = None
-    """Of the races."""
+    """Young's modulus of balls and races."""
     poisson_ratio: Annotated[float, Field(ge=0, lt=0.5)] | None = None
-    """Of the races."""
+    """Poisson's ratio of balls and races."""
 
 
 class WaveGeneratorBase(Section):
-    """What every wave generator may carry."""
+    """Keys of every kind of wave generator."""
 
     bearing: Bearing | None = None
-    """Ball bearing below the flexspline; without one the cam slides."""
+    """Ball bearing below the flexspline; without a bearing the flexspline slides on the
+    cam."""
 
 
 class EllipticalSection(WaveGeneratorBase):
@@ -52,7 +53,7 @@ class EllipticalSection(WaveGeneratorBase):
 
     kind: Literal["elliptical"] = "elliptical"
     minor_axis_coefficient: Reduction = 1.0
-    """C: half minor axis over bore radius less deflection."""
+    """C: semi-minor axis divided by (bore radius minus deflection)."""
 
 
 class SimplifiedSection(WaveGeneratorBase):
@@ -60,7 +61,7 @@ class SimplifiedSection(WaveGeneratorBase):
 
     kind: Literal["simplified"] = "simplified"
     minor_axis_coefficient: Reduction
-    """C: half minor axis over bore radius less deflection."""
+    """C: semi-minor axis divided by (bore radius minus deflection)."""
 
 
 class Parabolic(WaveGeneratorBase):
@@ -68,42 +69,42 @@ class Parabolic(WaveGeneratorBase):
 
     kind: Literal["parabolic"] = "parabolic"
     minor_axis_coefficient: Reduction = 1.0
-    """C: half minor axis over bore radius less deflection."""
+    """C: semi-minor axis divided by (bore radius minus deflection)."""
     parabola_coefficient_per_mm: Positive
-    """c of the parabola y = a - c x² at the lobe."""
+    """Coefficient c of the parabola y = a - c x² at the lobe."""
     parabola_length_coefficient: Reduction
-    """Half width of the parabola over the half minor axis."""
+    """Half width of the parabola, divided by the semi-minor axis."""
     connector_radius_mm: Millimetre
-    """Radius of the arc that joins it to the lateral arc."""
+    """Radius of the arc that joins the parabola to the lateral arc."""
 
 
 class ParabolaSide(Section):
     """One side of a bilateral asymmetric parabolic wave generator."""
 
     parabola_coefficient_per_mm: Positive
-    """c of the parabola y = a - c x² at the lobe."""
+    """Coefficient c of the parabola y = a - c x² at the lobe."""
     parabola_length_coefficient: Reduction
-    """Half width of the parabola over the half minor axis."""
+    """Half width of the parabola, divided by the semi-minor axis."""
     connector_radius_mm: Millimetre
-    """Radius of the arc that joins it to the lateral arc."""
+    """Radius of the arc that joins the parabola to the lateral arc."""
 
 
 class AsymmetricParabolic(WaveGeneratorBase):
-    """Parabolic with turned lobes (``rotation_deg``) or with two different sides."""
+    """Parabolic with rotated lobes (``rotation_deg``) or with two different sides."""
 
     kind: Literal["asymmetric_parabolic"] = "asymmetric_parabolic"
     minor_axis_coefficient: Reduction = 1.0
-    """C: half minor axis over bore radius less deflection."""
+    """C: semi-minor axis divided by (bore radius minus deflection)."""
     rotation_deg: Annotated[float, Field(gt=-45, lt=45)] | None = None
-    """By which each lobe is turned about its apex."""
+    """Rotation of each lobe about its apex."""
     parabola_coefficient_per_mm: Positive | None = None
-    """c of the parabola y = a - c x², with rotation_deg."""
+    """Coefficient c of the parabola y = a - c x², together with rotation_deg."""
     parabola_length_coefficient: Reduction | None = None
-    """Half width of the parabola over the half minor axis."""
+    """Half width of the parabola, divided by the semi-minor axis."""
     connector_radius_mm: Millimetre | None = None
-    """Radius of the arc that joins it to the lateral arc."""
+    """Radius of the arc that joins the parabola to the lateral arc."""
     left: ParabolaSide | None = None
-    """Side at x < 0 of the upper lobe, in place of rotation_deg."""
+    """Side at x < 0 of the upper lobe, instead of rotation_deg."""
     right: ParabolaSide | None = None
     """Side at x > 0 of the upper lobe."""
 
@@ -116,8 +117,8 @@ class AsymmetricParabolic(WaveGeneratorBase):
         )
         turned = ("rotation_deg", *keys)
         sides = ("left", "right")
-        given = {key for key in (*turned, *sides) if getattr(self, key) is not None}
-        if given not in (set(turned), set(sides)):
+        present = {key for key in (*turned, *sides) if getattr(self, key) is not None}
+        if present not in (set(turned), set(sides)):
             raise Fault(
                 (
                     "kind",
@@ -139,15 +140,15 @@ class FourRollerSection(WaveGeneratorBase):
 
 
 class CosineSection(WaveGeneratorBase):
-    """Cosine of the lobes about the neutral circle."""
+    """Radius that varies with the cosine of the number of lobes times the angle."""
 
     kind: Literal["cosine"] = "cosine"
     minor_axis_coefficient: Reduction = 1.0
-    """C: half minor axis over bore radius less deflection."""
+    """C: smallest radius divided by (bore radius minus deflection)."""
 
 
 class TableSection(WaveGeneratorBase):
-    """Radius over the angle from the major axis, one turn."""
+    """Table of the radius against the angle from the major axis over one turn."""
 
     kind: Literal["table"] = "table"
     angle_deg: Annotated[tuple[float, ...], Field(strict=False)]
@@ -165,14 +166,14 @@ class TableSection(WaveGeneratorBase):
             raise Fault(
                 (
                     "radius_mm",
-                    f"{len(self.radius_mm)} values; accepted: as many as angle_deg,"
+                    f"{len(self.radius_mm)} values; accepted: as many as in angle_deg,"
                     f" {len(self.angle_deg)}",
                 )
             )
         steps = [b - a for a, b in pairwise(self.angle_deg)]
         if min(steps) <= 0 or self.angle_deg[-1] - self.angle_deg[0] >= 360:
             raise Fault(
-                ("angle_deg", "accepted: increasing angles within one turn, 360 deg")
+                ("angle_deg", "expected increasing angles within one turn of 360 deg")
             )
         return self
 

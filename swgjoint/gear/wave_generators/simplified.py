@@ -16,20 +16,22 @@ class Simplified(ClosedCurve):
     """Two semicircles joined by straight lines (thesis eqs 3.2 and 3.3)."""
 
     major: float
+    """Semi-major axis a [m]."""
     pin_radius: float
+    """Radius of the semicircles [m]."""
 
     @property
     def perimeter(self) -> float:
-        """Two semicircles and two straight lines [m]."""
+        """Length of two semicircles and two straight lines [m]."""
         straight = 2.0 * (self.major - self.pin_radius)
         return 2.0 * (np.pi * self.pin_radius + straight)
 
     def evaluate(self, s: ArrayLike) -> tuple[Array, Array, Array]:
-        """Quarter circle, line, semicircle, line, quarter circle."""
+        """Evaluate quarter circle, line, semicircle, line and quarter circle."""
         r, half = self.pin_radius, self.major - self.pin_radius
         quarter, straight = 0.5 * np.pi * r, 2.0 * half
         along = self._within(s)
-        # the second half of the outline is the first one turned by pi
+        # the second half of the outline is the first half rotated by pi
         turned = along > 0.5 * self.perimeter
         along = np.where(turned, along - 0.5 * self.perimeter, along)
         down = np.clip(along - quarter, 0.0, straight)
@@ -42,7 +44,7 @@ class Simplified(ClosedCurve):
         return sign * points, sign * normals, np.where(line, 0.0, 1.0 / r)
 
     def signed_distance(self, points: Array) -> tuple[Array, Array, Array]:
-        """Distance to the segment that joins the two centres, less the radius."""
+        """Distance to the segment between the two centres, minus the radius."""
         half = self.major - self.pin_radius
         foot = np.clip(points[:, 1], -half, half)
         rel = np.stack([points[:, 0], points[:, 1] - foot], axis=-1)

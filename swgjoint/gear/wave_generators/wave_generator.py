@@ -1,7 +1,7 @@
 """Wave generator of a design.
 
-The major axis lies along +y at wave-generator angle zero; everything is in the frame of
-the wave generator, in metres.
+All quantities are in the frame of the wave generator, in metres. The major axis is
+along +y at wave-generator angle zero.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ from swgjoint.units import deg, mm
 __all__ = ["WaveGenerator", "lobe_height", "wave_generator", "with_checks"]
 
 WaveGenerator = ClosedCurve
-"""What contact and kinematics need to know of a wave generator."""
+"""Interface of wave generators for contact and kinematics."""
 
 
 def lobe_height(design: Design) -> float:
-    """Radial deflection at the lobe, half of m (z_cs - z_fs) [m]."""
+    """Radial deflection at the lobe, m (z_cs - z_fs)/2 [m]."""
     return 0.5 * design.drive.module_mm * design.tooth_difference * mm
 
 
@@ -40,8 +40,8 @@ def wave_generator(design: Design) -> WaveGenerator:
     """Wave generator of a design.
 
     Raises:
-        DesignError: If it cannot be built or does not fit; one line per fault, with
-            the key, its value and what is accepted.
+        DesignError: If the wave generator cannot be built or does not fit; one line per
+            fault, with the key, its value and what is accepted.
     """
     outline, checks = with_checks(design)
     raise_faults(checks)
@@ -49,10 +49,10 @@ def wave_generator(design: Design) -> WaveGenerator:
 
 
 def with_checks(design: Design) -> tuple[WaveGenerator, list[Check]]:
-    """Wave generator of a design and whether it fits.
+    """Wave generator of a design with the checks of its fit.
 
     Raises:
-        DesignError: If there is no such outline.
+        DesignError: If the parameters give no outline.
     """
     r, w0 = design.flexspline_inner_radius, lobe_height(design)  # (3.1)
     if r <= w0:
@@ -70,7 +70,7 @@ def with_checks(design: Design) -> tuple[WaveGenerator, list[Check]]:
 
 
 def _outline(design: Design, r: float, w0: float) -> ClosedCurve:
-    """Outline for the inner radius r and the deflection w0 [m]."""
+    """Outline for the inner radius r [m] and the deflection w0 [m]."""
     spec = design.wave_generator
     major = r + w0  # (3.3), half of the axis
     if spec.kind == "four_roller":
@@ -116,7 +116,8 @@ def _outline(design: Design, r: float, w0: float) -> ClosedCurve:
     except OutlineFault as fault:
         raise OutlineFault(
             "rotation_deg",
-            f" = {spec.rotation_deg:g} deg: with it {fault}, or an angle nearer 0 deg",
+            f" = {spec.rotation_deg:g} deg: with this angle, {fault}, or an angle"
+            " closer to 0 deg",
         ) from None
 
 
