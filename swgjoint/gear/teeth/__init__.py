@@ -1,1 +1,1 @@
-"""Tooth profiles, how they are generated, and the paths of rigid teeth."""
+"""Tooth profiles, their generation, and the paths of rigid teeth."""

@@ -1,7 +1,7 @@
 """Directly defined profiles: double and quadruple circular arc, two-arc.
 
-Angles named like alpha count from the +x axis of the tooth frame, towards the tip: for
-external teeth counter-clockwise, for internal ones clockwise (mirrored radially).
+Angles such as alpha are counted from the +x axis of the tooth frame towards the tip:
+counter-clockwise for external teeth, clockwise (mirrored radially) for internal teeth.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from swgjoint.gear.teeth.tooth_bounds import with_bounds
 from swgjoint.units import deg, mm
 
 LARGEST_CORRECTED_ANGLE = 0.5 * pi
+"""Limit of the corrected pressure angle, at which the flank is tangential [rad]."""
 TWO_ARC = {
     "addendum_radius_mm": 1.09,  # R_1
     "addendum_offset_mm": 0.71,  # L_1
@@ -28,15 +29,20 @@ TWO_ARC = {
     "dedendum_radius_mm": 1.2,  # R_2
     "dedendum_offset_mm": 1.54,  # L_2
     "dedendum_shift_mm": 0.26,  # X_2
-    "root_radius_mm": 0.6,  # ours, half of R_2; the article gives none
+    "root_radius_mm": 0.6,  # our choice, half of R_2; the article states no radius
 }
 """Proportions of the 80:1 article, multiples of the module."""
 SHORTEST = 1e-9
-"""A straight segment is at least that long [m]: shorter ones leave no direction."""
+"""Smallest length of a straight segment [m]; the direction of shorter ones is lost."""
 
 
 def arc_profile(design: Design, member: str, *, bounds: bool = True) -> ToothProfile:
     """Profile of a member whose kind is ``qca``, ``dca`` or ``two_arc``.
+
+    Args:
+        design: The drive.
+        member: ``flexspline`` or ``circular_spline``.
+        bounds: Whether an error states which values would be accepted.
 
     Raises:
         DesignError: If the tooth cannot be built, in one line that names the key.
@@ -58,7 +64,7 @@ def _built(start: Blank) -> ToothProfile:
         return _double_arc(start, spec)
     if isinstance(spec, TwoArc):
         return _two_arc(start, spec)
-    raise AssertionError(f"{spec.kind} is no arc profile")
+    raise AssertionError(f"{spec.kind} is not an arc profile")
 
 
 def _along(origin: Point, step: float, direction: Point) -> Point:
@@ -70,8 +76,8 @@ def _reach(
 ) -> float | None:
     """Angle >= first at which origin + step (cos a, mirror sin a) has a given radius.
 
-    The equation |o|^2 + step^2 + 2 step o.(cos a, mirror sin a) = radius^2 in a; None
-    without a solution.
+    Solves |o|^2 + step^2 + 2 step o.(cos a, mirror sin a) = radius^2 for a; None if
+    there is no solution.
     """
     ox, oy = origin[0], mirror * origin[1]
     size = hypot(ox, oy)
@@ -87,9 +93,9 @@ def _reach(
 class _Flank:
     """Pitch point, straight segment and arc centres, thesis eqs 3.23 to 3.33.
 
-    External teeth follow the thesis; for internal teeth the corrected pressure angle is
-    alpha + alpha_P and tangents and normals are mirrored radially (the printed formula
-    holds for external teeth only).
+    External teeth follow the thesis. For internal teeth, the corrected pressure angle
+    is alpha + alpha_P, and tangents and normals are mirrored radially, because the
+    printed formula applies only to external teeth.
     """
 
     def __init__(self, start: Blank) -> None:
@@ -98,15 +104,15 @@ class _Flank:
         if not alpha < LARGEST_CORRECTED_ANGLE:
             raise start.fault(
                 "pressure_angle_deg",
-                f"with alpha_P = {half / deg:.3f} deg the flank lies along the circle; "
-                "accepted: a smaller angle or thickness_coefficient",
+                f"with alpha_P = {half / deg:.3f} deg the flank is tangential to the "
+                "pitch circle; accepted: a smaller angle or thickness_coefficient",
             )
         self.pitch_point = (start.pitch * sin(half), start.pitch * cos(half))  # (3.23)
         self.n = (cos(alpha), side * sin(alpha))  # (3.28)
         self.t = (-sin(alpha), side * cos(alpha))  # (3.29), towards the tip
 
     def split(self, length: float, share: float) -> tuple[Point, Point]:
-        """End points of the straight segment at the tip and at the root side."""
+        """End points of the straight segment on the tip side and on the root side."""
         p_a = _along(self.pitch_point, share * length, self.t)  # (3.30)
         p_d = _along(self.pitch_point, -(1.0 - share) * length, self.t)  # (3.31)
         return p_a, p_d
@@ -118,19 +124,19 @@ def _angle_of(point: Point) -> float:
 
 
 def _check_straight(start: Blank, p_a: Point, p_d: Point, key: str) -> None:
-    """The straight segment must end between the tip and the root circle."""
+    """Check that the straight segment ends between the tip and the root circle."""
     if start.side * (start.tip - hypot(*p_a)) <= 0.0:
         raise start.fault(
-            key, "the straight segment reaches beyond the tip; accepted: a shorter one"
+            key, "the straight segment extends beyond the tip; accepted: a shorter one"
         )
     if start.side * (hypot(*p_d) - start.root) <= 0.0:
         raise start.fault(
-            key, "the straight segment reaches beyond the root; accepted: a shorter one"
+            key, "the straight segment extends beyond the root; accepted: a shorter one"
         )
 
 
 def _check_root_end(start: Blank, gamma: float, key: str) -> None:
-    """The arc at the root must end before the middle of the tooth space."""
+    """Check that the arc at the root ends before the middle of the tooth space."""
     if gamma > start.half_pitch:
         raise start.fault(
             key,
@@ -153,12 +159,12 @@ def _quadruple_arc(start: Blank, p: QuadrupleCircularArc) -> ToothProfile:
     if not 0.0 < r_t < r_a:
         raise start.fault(
             "profile.tip_radius_mm",
-            f"must lie between 0 and addendum_radius_mm = {p.addendum_radius_mm} mm",
+            f"expected a value below addendum_radius_mm = {p.addendum_radius_mm} mm",
         )
     if not 0.0 < r_r < r_d:
         raise start.fault(
             "profile.root_radius_mm",
-            f"must lie between 0 and dedendum_radius_mm = {p.dedendum_radius_mm} mm",
+            f"expected a value below dedendum_radius_mm = {p.dedendum_radius_mm} mm",
         )
     p_a, p_d = flank.split(length, p.straight_split)
     _check_straight(start, p_a, p_d, "profile.straight_mm")
@@ -183,18 +189,18 @@ def _quadruple_arc(start: Blank, p: QuadrupleCircularArc) -> ToothProfile:
     # (3.42), (3.43)
     o_t = _along(o_a, r_a - r_t, (cos(end_a), side * sin(end_a)))
     o_r = _along(o_d, -(r_d - r_r), (cos(end_d), side * sin(end_d)))
-    # (3.44): common normals with the top and the root land, as angles like alpha;
-    # those of an internal tooth point to the axis
+    # (3.44): common normals with top and root land, as angles defined like alpha;
+    # normals of an internal tooth point to the axis
     end_t = atan2(o_t[1], side * o_t[0])
     end_r = atan2(o_r[1], side * o_r[0])
     gamma_t, gamma_r = _angle_of(o_t), _angle_of(o_r)
-    other = "; accepted: smaller radii or a smaller thickness_coefficient"
+    advice = "; accepted: smaller radii or a smaller thickness_coefficient"
     if end_t < end_a:
-        raise start.fault("profile.tip_radius_mm", "the tip arc turns back" + other)
+        raise start.fault("profile.tip_radius_mm", "the tip arc turns back" + advice)
     if end_r < end_d:
-        raise start.fault("profile.root_radius_mm", "the root arc turns back" + other)
+        raise start.fault("profile.root_radius_mm", "the root arc turns back" + advice)
     if gamma_t < 0.0:
-        raise start.fault("profile.tip_radius_mm", "the tooth is pointed" + other)
+        raise start.fault("profile.tip_radius_mm", "the tooth is pointed" + advice)
     _check_root_end(start, gamma_r, "profile.dedendum_radius_mm")
 
     pieces: list[Piece] = [
@@ -213,10 +219,11 @@ def _quadruple_arc(start: Blank, p: QuadrupleCircularArc) -> ToothProfile:
 def _double_arc(start: Blank, p: DoubleCircularArc) -> ToothProfile:
     r"""Double circular arc profile, thesis section 3.3.2 (eqs 3.21-3.39).
 
-    The dedendum arc is tangent to the root circle where its centre lies at
-    :math:`|O_d| = r_D \pm r_d`; with :math:`O_d = P_P + r_d n_l - (1 - c_l) l\, t_l`
-    that is a quadratic equation in the straight length l. The third condition (3.39)
-    is the same collinearity, and the addendum arc meets the tip circle at an edge.
+    The dedendum arc is tangent to the root circle if its centre is at the distance
+    :math:`|O_d| = r_D \pm r_d` from the axis. With
+    :math:`O_d = P_P + r_d n_l - (1 - c_l) l\, t_l` this is a quadratic equation for the
+    straight length l. The third condition (3.39) is the same collinearity, and the
+    addendum arc meets the tip circle at an edge.
     """
     flank, side = _Flank(start), start.side
     alpha = flank.alpha
@@ -225,12 +232,12 @@ def _double_arc(start: Blank, p: DoubleCircularArc) -> ToothProfile:
     if share >= 1.0:
         raise start.fault(
             "profile.straight_split",
-            "no straight length brings the dedendum arc to the root; accepted: < 1",
+            "the dedendum arc reaches the root for no straight length; accepted: < 1",
         )
     centre = start.root + side * r_d
     if centre <= 0.0:
         raise start.fault(
-            "profile.dedendum_radius_mm", "larger than the root circle itself"
+            "profile.dedendum_radius_mm", "larger than the radius of the root circle"
         )
     q = _along(flank.pitch_point, r_d, flank.n)
     along = q[0] * flank.t[0] + q[1] * flank.t[1]
@@ -240,13 +247,13 @@ def _double_arc(start: Blank, p: DoubleCircularArc) -> ToothProfile:
         raise start.fault(
             "profile.dedendum_radius_mm", "the arc does not reach the root" + smaller
         )
-    # of the two crossings of the circle the one near the tooth
+    # the solution near the tooth
     reach = along - side * sqrt(square)
     length = reach / (1.0 - share)
     if length < SHORTEST:
         raise start.fault(
             "profile.dedendum_radius_mm",
-            f"straight length {length / mm:.4g} mm" + smaller,
+            f"the straight length would be {length / mm:.4g} mm" + smaller,
         )
     p_a, p_d = flank.split(length, share)
     _check_straight(start, p_a, p_d, "profile.straight_split")
@@ -256,7 +263,7 @@ def _double_arc(start: Blank, p: DoubleCircularArc) -> ToothProfile:
     if end_a is None:
         raise start.fault(
             "profile.addendum_radius_mm",
-            "the addendum arc does not reach the tip; accepted: a larger one",
+            "the addendum arc does not reach the tip; accepted: a larger radius",
         )
     end_d = atan2(o_d[1], side * o_d[0])
     p_t = _along(o_a, r_a, (cos(end_a), side * sin(end_a)))  # (3.36)
@@ -264,7 +271,7 @@ def _double_arc(start: Blank, p: DoubleCircularArc) -> ToothProfile:
     if gamma_t < 0.0:
         raise start.fault(
             "profile.addendum_radius_mm",
-            "the tooth is pointed; accepted: a larger one or a larger "
+            "the tooth is pointed; accepted: a larger radius or a larger "
             "thickness_coefficient",
         )
     if end_d <= alpha:
@@ -289,18 +296,19 @@ def _double_arc(start: Blank, p: DoubleCircularArc) -> ToothProfile:
 def _two_arc(start: Blank, p: TwoArc) -> ToothProfile:
     """Convex and concave arc joined by their common tangent, 80:1 article.
 
-    The centres are (-L_1, r_P - X_1) and (L_2, r_P + X_2) in the tooth frame (of an
-    internal tooth with X mirrored radially), as the article's coordinates say; its
-    expressions for X_1 and L_1 contradict its own table and are not used. Its table
-    leaves the arcs 0.005 m apart, which the common tangent bridges. Thickness and
-    inclination at the pitch circle follow from the centres; the thickness coefficient
-    turns the flank by (c_P - 1) alpha_T / 2, so that backlash is as in (6.3).
+    In the tooth frame the centres are (-L_1, r_P - X_1) and (L_2, r_P + X_2), as in the
+    coordinates of the article; for an internal tooth, X is mirrored radially. The
+    expressions of the article for X_1 and L_1 contradict its table and are not used.
+    With the values of the table, the arcs are 0.005 m apart, and the common tangent
+    bridges this gap. Thickness and inclination at the pitch circle follow from the
+    centres. The thickness coefficient rotates the flank by (c_P - 1) alpha_T / 2, so
+    that the backlash is that of (6.3).
     """
     side = start.side
 
     def size(key: str) -> float:
-        given = getattr(p, key)
-        return TWO_ARC[key] * start.module if given is None else float(given) * mm
+        stated = getattr(p, key)
+        return TWO_ARC[key] * start.module if stated is None else float(stated) * mm
 
     r_1, r_2 = size("addendum_radius_mm"), size("dedendum_radius_mm")
     r_r = size("root_radius_mm")
@@ -320,8 +328,9 @@ def _two_arc(start: Blank, p: TwoArc) -> ToothProfile:
     if distance < r_1 + r_2:
         raise start.fault(
             "profile.dedendum_offset_mm",
-            f"the arcs cross, their centres are {distance / mm:.4g} mm apart; accepted:"
-            f" an offset that puts them {(r_1 + r_2) / mm:.4g} mm apart or more",
+            f"the arcs intersect: their centres are {distance / mm:.4g} mm apart;"
+            " accepted: an offset for a distance of at least"
+            f" {(r_1 + r_2) / mm:.4g} mm",
         )
     alpha = atan2(apart[1], apart[0]) + acos((r_1 + r_2) / distance)
     length = sqrt(max(distance**2 - (r_1 + r_2) ** 2, 0.0))
@@ -329,7 +338,7 @@ def _two_arc(start: Blank, p: TwoArc) -> ToothProfile:
         length = 0.0
     if not alpha < LARGEST_CORRECTED_ANGLE:
         raise start.fault(
-            "profile.dedendum_shift_mm", "the flank lies along the circle"
+            "profile.dedendum_shift_mm", "the flank is tangential to the circle"
         )
     n = (cos(alpha), side * sin(alpha))
     p_a, p_d = _along(o_1, r_1, n), _along(o_2, -r_2, n)
@@ -337,7 +346,7 @@ def _two_arc(start: Blank, p: TwoArc) -> ToothProfile:
     if not r_r < r_2:
         raise start.fault(
             "profile.root_radius_mm",
-            f"must be smaller than dedendum_radius_mm = {r_2 / mm:g} mm",
+            f"expected a value below dedendum_radius_mm = {r_2 / mm:g} mm",
         )
     end_a = _reach(o_1, r_1, start.tip, side, alpha)
     gamma_t = -1.0
@@ -345,7 +354,7 @@ def _two_arc(start: Blank, p: TwoArc) -> ToothProfile:
         p_t = _along(o_1, r_1, (cos(end_a), side * sin(end_a)))
         gamma_t = _angle_of(p_t)
     if end_a is None or gamma_t < 0.0:
-        # where the arc meets the tooth axis
+        # intersection of the arc with the tooth axis
         height = o_1[1] + side * sqrt(max(r_1**2 - o_1[0] ** 2, 0.0))
         limit = side * (height - start.pitch) / start.module
         raise start.fault(
@@ -364,7 +373,8 @@ def _two_arc(start: Blank, p: TwoArc) -> ToothProfile:
     end_r = atan2(o_r[1], side * o_r[0])
     if end_r < end_d:
         raise start.fault(
-            "profile.root_radius_mm", "the root arc turns back; accepted: a smaller one"
+            "profile.root_radius_mm",
+            "the root arc turns back; accepted: a smaller radius",
         )
     gamma_r = _angle_of(o_r)
     _check_root_end(start, gamma_r, "profile.dedendum_offset_mm")

@@ -1,4 +1,4 @@
-"""What every tooth profile starts from: circles, pitch and thickness of a member."""
+"""Blank of a tooth profile: circles, pitch and thickness of a member."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from swgjoint.units import deg, mm
 
 
 class ToothFault(DesignError):
-    """A tooth that cannot be built, and the key of the member that shows it."""
+    """A tooth that cannot be built, with the key of the member that causes it."""
 
     def __init__(self, where: str, key: str, shown: str, what: str) -> None:
         super().__init__(f"{where}.{key} = {shown}: {what}")
         self.where, self.key, self.shown, self.what = where, key, shown, what
 
     def __reduce__(self) -> tuple[type[DesignError], tuple[str]]:
-        """What other processes get: the line."""
+        """Pickle as a plain design error with the message."""
         return DesignError, (str(self),)
 
     def with_bounds(self, accepted: str) -> ToothFault:
-        """The same with what is accepted as values."""
+        """The same fault with the accepted values in its message."""
         cause = self.what.partition("; accepted")[0]
         return ToothFault(
             self.where, self.key, self.shown, f"{cause}; accepted: {accepted}"
@@ -36,41 +36,54 @@ class ToothFault(DesignError):
 
 @dataclass(frozen=True, kw_only=True)
 class Blank:
-    """Figures of one member in SI, thesis eqs 3.13, 3.16, 3.17, 3.21, 3.22."""
+    """Dimensions of one member in SI, thesis eqs 3.13, 3.16, 3.17, 3.21, 3.22."""
 
     member: str
+    """``flexspline`` or ``circular_spline``."""
     where: str
     """Design and member, for messages."""
     spec: Member
+    """Table of the member in the design file."""
     teeth: int
+    """Number of teeth."""
     internal: bool
+    """Whether the teeth are internal."""
     module: float
+    """Module [m]."""
     pitch: float
+    """Pitch radius [m]."""
     tip: float
+    """Tip radius [m]."""
     root: float
+    """Root radius [m]."""
 
     @property
     def side(self) -> float:
-        """+1 for external teeth, -1 for internal ones."""
+        """+1 for external teeth, -1 for internal teeth."""
         return -1.0 if self.internal else 1.0
 
     @property
     def half_pitch(self) -> float:
-        """Half the angular pitch, alpha_T [rad]."""
+        """Half the angular pitch alpha_T [rad]."""
         return pi / self.teeth  # (3.21)
 
     @property
     def half_thickness(self) -> float:
-        """Half the angular thickness at the pitch circle, alpha_P [rad]."""
+        """Half the angular thickness alpha_P at the pitch circle [rad]."""
         return self.spec.thickness_coefficient * self.half_pitch / 2.0  # (3.22)
 
     @property
     def pressure_angle(self) -> float:
-        """Inclination of the flank to the radius at the pitch circle [rad]."""
+        """Angle between flank and radius at the pitch circle [rad]."""
         return self.spec.pressure_angle_deg * deg
 
     def fault(self, key: str, what: str) -> ToothFault:
-        """Error that names a key of the member, its value and unit."""
+        """Error that names a key of the member with its value and unit.
+
+        Args:
+            key: Dotted key of the member.
+            what: What is wrong, then ``; accepted:`` and the accepted values.
+        """
         value = self.value(key)
         unit = f" {unit_of(key)}".rstrip()
         shown = "its default" if value is None else f"{value}{unit}"
@@ -84,7 +97,12 @@ class Blank:
         return value
 
     def with_change(self, key: str, value: float) -> Blank:
-        """The blank of a member with another value for a dotted key, not checked."""
+        """The blank with a new value for a dotted key, without checks.
+
+        Args:
+            key: Dotted key of the member.
+            value: New value, in the unit of the key.
+        """
         table, _, last = key.rpartition(".")
         update = {last: value}
         if table:
@@ -94,7 +112,12 @@ class Blank:
         return replace(self, spec=spec, tip=tip, root=root)
 
     def lands(self, top: float, bottom: float) -> tuple[list[Piece], list[Piece]]:
-        """Top land out to the angle ``top`` and root land from ``bottom`` [rad]."""
+        """Half of the top land and of the root land, empty if they have no length.
+
+        Args:
+            top: Angle of the end of the top land from the tooth axis [rad].
+            bottom: Angle of the start of the root land from the tooth axis [rad].
+        """
         convex = not self.internal
         first: list[Piece] = []
         last: list[Piece] = []
@@ -116,12 +139,19 @@ class Blank:
         bottom: float,
         straight_length: float = 0.0,
     ) -> ToothProfile:
-        """Chain of the lands and the pieces between them, empty pieces left out."""
+        """Profile from the lands and the pieces between them, without empty pieces.
+
+        Args:
+            top: Angle of the end of the top land from the tooth axis [rad].
+            pieces: Pieces of the flank from tip to root.
+            bottom: Angle of the start of the root land from the tooth axis [rad].
+            straight_length: Length of the straight segment, for reports [m].
+        """
         first, last = self.lands(top, bottom)
         kept = [
             piece
             for piece in [*first, *pieces, *last]
-            # a land or an arc that vanishes has no direction of its own
+            # a land or an arc of zero length has no direction
             if piece.length > 0.0 or not isinstance(piece, Segment)
         ]
         return ToothProfile(
@@ -137,10 +167,11 @@ class Blank:
 
 
 def blank(design: Design, member: str) -> Blank:
-    """Blank of ``flexspline`` or ``circular_spline``.
+    """Blank of a member.
 
-    Raises:
-        DesignError: If the dedendum reaches the axis.
+    Args:
+        design: The drive.
+        member: ``flexspline`` or ``circular_spline``.
     """
     internal = member == "circular_spline"
     drive = design.drive
@@ -165,7 +196,14 @@ def blank(design: Design, member: str) -> Blank:
 def circles(
     spec: Member, pitch: float, module: float, side: float
 ) -> tuple[float, float]:
-    """Radii of tip and root circle of a member [m]."""
+    """Radii of tip and root circle of a member [m].
+
+    Args:
+        spec: Table of the member in the design file.
+        pitch: Pitch radius [m].
+        module: Module [m].
+        side: +1 for external teeth, -1 for internal teeth.
+    """
     return (
         pitch + side * spec.addendum_coefficient * module,  # (3.16)
         pitch - side * spec.dedendum_coefficient * module,  # (3.17)

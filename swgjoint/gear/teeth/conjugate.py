@@ -1,10 +1,11 @@
-"""Conjugate tooth profiles by the envelope method, in both directions.
+"""Conjugate tooth profiles by the envelope method, for either member.
 
-Given the flexspline the circular spline is generated, or the reverse: the flank is the
-boundary that the other member's moving flank leaves (80:1 article, "Derivation of the
-conjugate circular spline profile"; there with w = w_0 cos 2 theta, here with the
-kinematics of :mod:`swgjoint.gear.teeth.neutral_line`). Below it a straight line leaves
-the envelope, and a round fillet ends on the root circle: clear of the mating tip.
+The circular spline is generated from the flexspline or vice versa. Its flank is the
+envelope of the moving flank of the other member (80:1 article, "Derivation of the
+conjugate circular spline profile"; the article uses w = w_0 cos 2 theta, this module
+the kinematics of :mod:`swgjoint.gear.teeth.neutral_line`). Below the flank, a straight
+line leaves the envelope, and a circular fillet ends on the root circle, with clearance
+to the mating tip.
 """
 
 from __future__ import annotations
@@ -31,16 +32,18 @@ from swgjoint.units import deg
 DEPARTURES = (45.0 * deg, 30.0 * deg, 20.0 * deg, 12.0 * deg)
 """Inclinations at which the flank may leave the envelope towards the root [rad].
 
-The first with a good fillet, else that with the largest: narrow spaces need a steep
-departure.
+The first one that permits a fillet of :data:`WANTED_FILLET` is used, otherwise the one
+with the largest fillet. Narrow tooth spaces need a steep departure.
 """
 WANTED_FILLET = 0.1
-"""Radius of a good fillet, multiple of the module."""
+"""Desired radius of the fillet, multiple of the module."""
 SHARPEST = 0.1
-"""Smallest radius of curvature of an edge's path that is followed, of the module."""
+"""Smallest usable radius of curvature of an edge path, multiple of the module."""
 OVERLAP = 1e-9
-"""Largest overlap of the pair that is accepted [m]."""
+"""Largest accepted overlap of the pair [m]."""
 NODES, EDGE_NODES, DENSE, SAMPLES = 41, 121, 161, 33
+"""Nodes of a flank curve and of an edge path, points that place the nodes, and samples
+of the inclination."""
 
 
 def conjugate_profile(
@@ -50,19 +53,19 @@ def conjugate_profile(
     *,
     motions: tuple[ToothMotion, ...] | None = None,
 ) -> ToothProfile:
-    """Profile of ``member`` conjugate to the other one under the wave generator.
+    """Profile of ``member`` conjugate to the other member under the wave generator.
 
-    Without backlash at c_P = 1 of this member; a smaller thickness coefficient turns
-    the flank back by (1 - c_P) alpha_T / 2 as for other profiles (6.3).
+    The pair has no backlash if c_P = 1 for this member. A smaller thickness coefficient
+    rotates the flank back by (1 - c_P) alpha_T / 2 as for other profiles (6.3).
 
     Args:
-        design: The drive; the profile key of ``member`` counts for its root only.
+        design: The drive; the profile table of ``member`` affects only its root.
         member: ``flexspline`` or ``circular_spline``.
         given: Profile of the other member.
-        motions: Of the teeth; by default those of the neutral line.
+        motions: Motions of the teeth; None takes those of the neutral line.
 
     Raises:
-        DesignError: If there is no such tooth, in one line that names the key.
+        DesignError: If there is no conjugate tooth, in one line that names the key.
     """
     start = blank(design, member)
     receiver: Receiver = "circular_spline" if start.internal else "flexspline"
@@ -76,7 +79,7 @@ def conjugate_profile(
 
 
 class _Builder(RootBuilder):
-    """From the branches of an envelope to a closed flank."""
+    """Builds a closed flank from the branches of an envelope."""
 
     def build(self) -> ToothProfile:
         start, envelope = self.start, self.envelope
@@ -85,7 +88,7 @@ class _Builder(RootBuilder):
             limit = start.side * (start.pitch - reach) / start.module
             raise start.fault(
                 "dedendum_coefficient",
-                f"the other member's tip reaches the root; accepted: > {limit:.4g}",
+                f"the other member reaches the root; accepted: > {limit:.4g}",
             )
         if start.side * (start.tip - floor) >= 0.0:
             limit = start.side * (floor - start.pitch) / start.module
@@ -98,19 +101,20 @@ class _Builder(RootBuilder):
         if not runs:
             raise start.fault(
                 "addendum_coefficient",
-                "the other member's flank does not reach the tip; accepted: more",
+                "the flank of the other member does not reach the tip; accepted: a "
+                "larger value",
             )
         runs = self._with_edge(runs)
         best: tuple[list[Piece], list[Piece], float] | None = None
         largest = 0.0
         for departure in DEPARTURES:
-            found = self._flank(runs, departure)
-            root = None if found is None else self._root(found[1])
-            if found is None or root is None:
+            flank = self._flank(runs, departure)
+            root = None if flank is None else self._root(flank[1])
+            if flank is None or root is None:
                 continue
             radius = root[0][-1].radius
             if radius > largest:
-                best, largest = (found[0], *root), radius
+                best, largest = (flank[0], *root), radius
             if largest >= WANTED_FILLET * start.module:
                 break
         if best is None:
@@ -118,8 +122,8 @@ class _Builder(RootBuilder):
             if start.spec.profile.root_radius_mm is not None:
                 raise start.fault(
                     "profile.root_radius_mm",
-                    "the fillet does not fit below the flank or cuts into the other "
-                    "member's path; accepted: a smaller one",
+                    "the fillet does not fit below the flank or interferes with the "
+                    "path of the other member; accepted: a smaller radius",
                 )
             raise start.fault(
                 "dedendum_coefficient",
@@ -132,7 +136,7 @@ class _Builder(RootBuilder):
         if top <= 0.0:
             raise start.fault(
                 "addendum_coefficient",
-                "the conjugate tooth is pointed; accepted: a smaller one",
+                "the conjugate tooth is pointed; accepted: a smaller value",
             )
         pieces[0] = replace(pieces[0], edge=True)  # type: ignore[type-var]
         profile = start.profile(top, [*pieces, *below], end)
@@ -141,10 +145,10 @@ class _Builder(RootBuilder):
         return profile
 
     def _sound(self, profile: ToothProfile) -> bool:
-        """Whether the chain is a flank, and the other member overlaps it nowhere.
+        """Whether the chain is a regular flank that the other member does not overlap.
 
-        Branches of the envelope may end or cross inside a piece where the curvature of
-        the wave generator jumps; such a chain is not handed out.
+        Branches of the envelope may end or intersect inside a piece where the curvature
+        of the wave generator is discontinuous; such a chain is rejected.
         """
         for junction in profile.junctions():
             tangent = junction.edge or junction.corner < TANGENCY_RAD
@@ -163,7 +167,7 @@ class _Builder(RootBuilder):
     # -- the flank ----------------------------------------------------------------
 
     def _with_edge(self, runs: list[EnvelopeRun]) -> list[EnvelopeRun]:
-        """The runs, closed by the path of the edge where the flank begins at one."""
+        """The runs, with the path of the edge added if the flank starts at one."""
         low, last = self.envelope.given.contact_range[0], runs[-1]
         close = last.station[-1] - low < 0.05 * (runs[0].station[0] - low)
         if last.edge or not self.envelope.starts_at_edge or not close:
@@ -174,7 +178,7 @@ class _Builder(RootBuilder):
         return [*runs, edge]
 
     def _trace(self, run: EnvelopeRun) -> Callable[[Array], tuple[Array, Array]]:
-        """Points and normals of the thinned tooth, at stations or edge positions."""
+        """Points and normals of the thinned tooth by station or edge position."""
 
         def trace(t: Array) -> tuple[Array, Array]:
             if run.edge:
@@ -192,9 +196,9 @@ class _Builder(RootBuilder):
     def _flank(
         self, runs: list[EnvelopeRun], departure: float
     ) -> tuple[list[Piece], tuple[Point, Array]] | None:
-        """Pieces from the tip circle to the departure, and where that is.
+        """Pieces from the tip circle to the departure, with its point and normal.
 
-        None where the flank is nowhere as steep as the departure.
+        None if the flank is nowhere as steep as the departure.
         """
         from scipy.optimize import brentq
 
@@ -206,7 +210,7 @@ class _Builder(RootBuilder):
         for k, run in enumerate(runs):
             trace = self._trace(run)
             values = run.theta if run.edge else run.station
-            if first is None:  # where the flank crosses the tip circle
+            if first is None:  # intersection of the flank with the tip circle
                 first = _crossing(
                     lambda t, trace=trace: self._radius(trace, t) - start.tip,  # type: ignore[misc]
                     float(values[0]),
@@ -218,7 +222,7 @@ class _Builder(RootBuilder):
             smooth = following is not None and self._runs_on(run, following, low)
             if following is None:
                 if run.edge:
-                    # its path ends at the summit, or before, where it turns sharply
+                    # the path ends at its summit, or earlier where it turns sharply
                     last = self._round_part(trace, first, self._summit(run, first))
             elif smooth:
                 last = low
@@ -227,7 +231,8 @@ class _Builder(RootBuilder):
             else:
                 last, next_first = self._meet(run, following)
                 next_edge = True
-            # leave where the flank inclines too much, below its steepest part
+            # leave the envelope where the inclination exceeds the departure angle,
+            # below the steepest part of the flank
 
             def inclined(t: Array | float, trace=trace) -> Array:  # type: ignore[no-untyped-def]
                 _, normals = trace(np.atleast_1d(t))
@@ -260,14 +265,15 @@ class _Builder(RootBuilder):
     def _split_fault(self) -> DesignError:
         return self.start.fault(
             "profile.kind",
-            "the envelope breaks up under this wave generator; accepted: other "
-            "profiles or thickness_coefficient there, or a smoother wave generator",
+            "the envelope is not continuous under this wave generator; accepted: "
+            "another profile or thickness_coefficient of the other member, or a "
+            "smoother wave generator",
         )
 
     def _round_part(
         self, trace: Callable[[Array], tuple[Array, Array]], first: float, last: float
     ) -> float:
-        """Where the path of an edge begins to turn too sharply, or its end."""
+        """Position at which the path of an edge turns too sharply, or its end."""
         t = np.linspace(first, last, 401)
         points, normals = trace(t)
         turn = np.unwrap(np.arctan2(normals[:, 1], normals[:, 0]))
@@ -276,21 +282,21 @@ class _Builder(RootBuilder):
         return float(t[np.argmax(sharp)]) if sharp.any() else last
 
     def _summit(self, run: EnvelopeRun, first: float) -> float:
-        """Position at which the path of the edge is farthest into the receiver."""
+        """Position at which the path of the edge is deepest in the receiver."""
         from scipy.optimize import minimize_scalar
 
         trace, side = self._trace(run), self.start.side
         near = 0.2 * run.motion.half_range
-        found = minimize_scalar(
+        deepest = minimize_scalar(
             lambda t: side * self._radius(trace, t),
             bounds=(min(-near, first), max(near, first)),
             method="bounded",
             options={"xatol": 1e-9},
         )
-        return float(found.x)
+        return float(deepest.x)
 
     def _runs_on(self, run: EnvelopeRun, following: EnvelopeRun, low: float) -> bool:
-        """Whether a branch goes over into the path of the edge at its own end."""
+        """Whether a branch continues smoothly into the path of the edge at its end."""
         near = abs(run.station[-1] - low) < 0.05 * abs(run.station[0] - low)
         step = abs(following.theta[0] - run.theta[-1])
         return (
@@ -302,7 +308,7 @@ class _Builder(RootBuilder):
         )
 
     def _meet(self, one: EnvelopeRun, two: EnvelopeRun) -> tuple[float, float]:
-        """Parameters (stations, positions of an edge) at which two branches cross."""
+        """Parameters (stations or edge positions) at which two branches intersect."""
         from scipy.optimize import root
 
         first, second = self._trace(one), self._trace(two)
@@ -318,14 +324,14 @@ class _Builder(RootBuilder):
             (one.theta if one.edge else one.station)[-1],
             (two.theta if two.edge else two.station)[0],
         )
-        found = root(apart, np.array(ends) / scale, tol=1e-13)
-        values = found.x * scale
+        solution = root(apart, np.array(ends) / scale, tol=1e-13)
+        values = solution.x * scale
         low, high = self.envelope.given.contact_range
         inside = [
             run.edge or low <= x <= high
             for run, x in zip((one, two), values, strict=True)
         ]
-        if not np.abs(apart(found.x)).max() < 1e-10 or not all(inside):
+        if not np.abs(apart(solution.x)).max() < 1e-10 or not all(inside):
             raise self._split_fault()
         return float(values[0]), float(values[1])
 
@@ -337,7 +343,7 @@ class _Builder(RootBuilder):
         last: float,
         edge: bool,
     ) -> list[Piece]:
-        """Smooth curves, divided where the given flank changes its curvature."""
+        """Smooth curves, divided at the junctions of the given flank."""
         given = self.envelope.given
         names = [part.name for part in given.segments]
         cuts: list[float] = []
@@ -367,11 +373,9 @@ class _Builder(RootBuilder):
             )
         return pieces
 
-    # -- the root -----------------------------------------------------------------
-
 
 def _crossing(f: Callable[[float], float], guess: float, step: float) -> float:
-    """Root of a monotone function near a guess."""
+    """Root of a monotonic function near a guess; the guess if there is none nearby."""
     from scipy.optimize import brentq
 
     low, high = guess - abs(step), guess + abs(step)

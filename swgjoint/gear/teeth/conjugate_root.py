@@ -15,22 +15,23 @@ from swgjoint.typing import Array
 from swgjoint.units import mm
 
 ROOT_END = 0.98
-"""A fillet of our choice leaves that much of half the pitch, and a short root land."""
+"""Largest angle to the end of an automatically chosen fillet, as a fraction of half the
+angular pitch; the rest is a short root land."""
 SHORTEST = 4e-6
-"""Pieces shorter than that are left out, the chain goes on tangentially [m]."""
+"""Shorter pieces are omitted, and the chain continues tangentially [m]."""
 
 
 class RootBuilder:
-    """Straight line and fillet that leave the envelope, clear of the mating tip."""
+    """Builds the straight line and the fillet that join the envelope to the root."""
 
     def __init__(self, start: Blank, envelope: Envelope) -> None:
         self.start, self.envelope = start, envelope
         if start.spec.thickness_coefficient > 1.0:
             raise start.fault(
                 "thickness_coefficient",
-                "thicker than the conjugate tooth; accepted: <= 1",
+                "the tooth would be thicker than the conjugate tooth; accepted: <= 1",
             )
-        # clockwise turn of the envelope: backlash makes the tooth thinner
+        # clockwise rotation of the envelope: backlash makes the tooth thinner
         turn = start.half_thickness - 0.5 * start.half_pitch
         c, d = np.cos(turn), np.sin(turn)
         self.turn = np.array([[c, -d], [d, c]])
@@ -40,8 +41,9 @@ class RootBuilder:
     ) -> tuple[float, Point] | None:
         """Length of the line and centre of the arc for a fillet radius, if it fits.
 
-        The line starts at the departure P with tangent t, normal n: the centre
-        P + l t + r n lies at the distance r_D +- r from the axis, quadratic in l.
+        The line starts at the departure P with tangent t and normal n. The centre
+        P + l t + r n is at the distance r_D +- r from the axis, which is a quadratic
+        equation for the length l.
         """
         start = self.start
         (px, py), n = leave
@@ -59,7 +61,7 @@ class RootBuilder:
         return length, (float(centre[0]), float(centre[1]))
 
     def _root(self, leave: tuple[Point, Array]) -> tuple[list[Piece], float] | None:
-        """Line and fillet: as asked, or the largest that clears the mating tip."""
+        """Line and fillet with the radius of the design or the largest that fits."""
         spec = self.start.spec.profile
         assert isinstance(spec, Conjugate)
         if spec.root_radius_mm is not None:
@@ -80,20 +82,20 @@ class RootBuilder:
     def _root_with(
         self, leave: tuple[Point, Array], radius: float, limit: float
     ) -> tuple[list[Piece], float] | None:
-        """Pieces of the root for one fillet radius, None where they do not fit.
+        """Pieces of the root for one fillet radius; None if they do not fit.
 
         The arc must end within the angle ``limit`` from the tooth axis [rad].
         """
         start = self.start
-        found = self._fillet(leave, radius, limit)
-        if found is None:
+        fillet = self._fillet(leave, radius, limit)
+        if fillet is None:
             return None
-        length, centre = found
+        length, centre = fillet
         (px, py), n = leave
         side = start.side
         t = side * np.array([n[1], -n[0]])
         first = atan2(-n[1], -n[0])
-        # the arc ends on the ray from the axis through its centre
+        # the arc ends on the ray from the gear axis through its centre
         last = atan2(-side * centre[1], -side * centre[0])
         turn = (last - first + np.pi) % (2.0 * np.pi) - np.pi
         if side * turn <= 0.0:
@@ -106,7 +108,7 @@ class RootBuilder:
         return (pieces, polar_angle(centre)) if self._clear(pieces) else None
 
     def _clear(self, pieces: list[Piece]) -> bool:
-        """Whether the mating tip keeps off the line and the fillet."""
+        """Whether the mating tip does not touch the line and the fillet."""
         points = self._tips
         for piece in pieces:
             distance, _, _, inside = piece.project(points, self.start.side)
@@ -116,7 +118,7 @@ class RootBuilder:
 
     @cached_property
     def _tips(self) -> Array:
-        """Points of the given flank at all positions near the lobe (n, 2) [m]."""
+        """Points of the mating flank at all positions near the lobe (n, 2) [m]."""
         envelope = self.envelope
         points, _, _ = envelope.given.evaluate(
             np.linspace(*envelope.given.contact_range, 150)
