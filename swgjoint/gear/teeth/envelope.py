@@ -1,9 +1,9 @@
-"""Outermost positions of a moving flank: the boundary that a mating tooth must keep.
+"""Envelope of a moving flank: the boundary that a mating tooth must not cross.
 
-In the frame of the receiving tooth, at each radius, the other member's flank comes
-closest at one position of the motion. There the velocity has no part along the common
-normal, which is the meshing equation of the envelope; where the flank ends at an edge,
-the path of the edge takes over.
+In the frame of the receiving tooth, the flank of the other member is closest at one
+position of the motion for each radius. The velocity at that position has no component
+along the common normal, which is the meshing equation of the envelope. Where the flank
+ends at an edge, the path of the edge forms the boundary.
 """
 
 from __future__ import annotations
@@ -18,24 +18,27 @@ from swgjoint.gear.teeth.tooth_motion import Receiver, ToothMotion
 from swgjoint.typing import Array
 
 POSITIONS, RADII, PER_PIECE = 601, 241, 48
+"""Number of motion positions, of radii, and of samples per piece of the flank."""
 STEEPEST = np.deg2rad(75.0)
-"""Flanks more inclined than that are tip and root roundings that never mate."""
+"""Largest inclination of a mating flank; steeper parts are roundings of tip or root."""
 SAME_BRANCH = 0.1
-"""Share of the flank beyond which a step from radius to radius is a jump."""
+"""Largest step between neighbouring radii on one branch, as a fraction of the flank."""
 ITERATIONS = 100
+"""Largest number of iterations for the meshing equation."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class EnvelopeRun:
-    """Part of the boundary that one branch of the envelope, or one edge, makes."""
+    """Part of the boundary formed by one branch of the envelope or by an edge."""
 
     motion: ToothMotion
+    """Motion of the moving tooth."""
     station: Array
-    """Arc length on the moving flank, tip to root of the receiver (n,) [m]."""
+    """Arc length on the moving flank, from tip to root of the receiver (n,) [m]."""
     theta: Array
     """Position of the motion (n,) [rad]."""
     edge: bool
-    """Whether the edge at the tip of the moving flank makes it."""
+    """Whether the edge at the tip of the moving flank forms this part."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -43,19 +46,22 @@ class Envelope:
     """Envelope of a given flank in the frame of the receiving tooth's right flank."""
 
     given: ToothProfile
+    """Profile of the moving member."""
     receiver: Receiver
+    """Member whose flank is generated."""
     motions: tuple[ToothMotion, ...]
+    """Different motions of the teeth."""
     tip: float
     """Tip radius of the receiving member [m]."""
 
     @property
     def side(self) -> float:
-        """+1 where the receiver has external teeth, -1 where internal."""
+        """+1 if the receiver has external teeth, -1 for internal teeth."""
         return -self.given.side
 
     @cached_property
     def _stations(self) -> Array:
-        """Samples of the given flank, leaving out what never mates (n,) [m]."""
+        """Arc lengths on the mating part of the given flank (n,) [m]."""
         low, high = self.given.contact_range
         ends = self.given.stations
         ends = np.unique(np.concatenate([[low, high], ends]))
@@ -69,14 +75,20 @@ class Envelope:
 
     @property
     def starts_at_edge(self) -> bool:
-        """Whether the flank that mates begins at an edge of the given tooth."""
+        """Whether the mating flank starts at an edge of the given tooth."""
         low = self.given.contact_range[0]
         return bool(self._stations[0] == low) and any(
             part.edge for part in self.given.segments[:2]
         )
 
     def slip(self, motion: ToothMotion, s: Array, theta: Array) -> Array:
-        """Speed towards the receiver along the common normal, n . v (n,) [m/rad]."""
+        """Speed n . v towards the receiver along the common normal (n,) [m/rad].
+
+        Args:
+            motion: Motion of the moving tooth.
+            s: Arc lengths on the given flank (n,) [m].
+            theta: Positions of the motion (n,) [rad].
+        """
         points, normals, _ = self.given.evaluate(s)
         moved = motion.map_to(self.receiver, theta)
         return np.asarray(
@@ -86,9 +98,15 @@ class Envelope:
     def contact(self, motion: ToothMotion, s: Array, guess: Array) -> Array:
         """Positions theta at which flank points s touch the envelope (n,) [rad].
 
-        The meshing equation ``slip`` = 0, from positive to negative slip, bracketed
-        about the guess and closed in by the Illinois method. Where the speed of the
-        motion jumps (curvature of the wave generator) the jump itself is found.
+        The meshing equation ``slip`` = 0 is solved for a change from positive to
+        negative slip. The root is bracketed about the guess and refined by the Illinois
+        method. If the speed of the motion is discontinuous there (at a step in the
+        curvature of the wave generator), the result is the position of the step.
+
+        Args:
+            motion: Motion of the moving tooth.
+            s: Arc lengths on the given flank (n,) [m].
+            guess: Approximate positions (n,) [rad].
         """
         step = 4.0 * motion.half_range / POSITIONS
         low, high = guess - step, guess + step
@@ -105,12 +123,12 @@ class Envelope:
             with np.errstate(divide="ignore", invalid="ignore"):
                 theta = high - f_high * (high - low) / (f_high - f_low)
             inside = (theta > low) & (theta < high)
-            # every fourth step halves the bracket: it closes on a jump as well
+            # every fourth step bisects, so that the bracket also closes on a step
             halve = ~inside if k % 4 < 3 else np.ones_like(inside)
             theta = np.where(halve, 0.5 * (low + high), theta)
             f = self.slip(motion, s, theta)
             up = f > 0.0
-            # Illinois: an end that stays twice counts half
+            # Illinois method: halve the value of an end that is retained twice
             f_high = np.where(up & (last > 0.0), 0.5 * f_high, f_high)
             f_low = np.where(~up & (last < 0.0), 0.5 * f_low, f_low)
             low, f_low = np.where(up, theta, low), np.where(up, f, f_low)
@@ -121,7 +139,16 @@ class Envelope:
         return np.asarray(theta)
 
     def trace(self, run: EnvelopeRun, s: Array) -> tuple[Array, Array, Array]:
-        """Points and outward normals of the receiver, and theta, at flank points s."""
+        """Envelope at flank points s.
+
+        Args:
+            run: Branch of the envelope.
+            s: Arc lengths on the given flank (n,) [m].
+
+        Returns:
+            Points (n, 2) [m] and outward normals (n, 2) of the receiver, and positions
+            theta (n,) [rad].
+        """
         order = np.argsort(run.station)
         guess = np.interp(s, run.station[order], run.theta[order])
         theta = self.contact(run.motion, s, guess)
@@ -130,22 +157,30 @@ class Envelope:
         return moved.points(points), -moved.vectors(normals), theta
 
     def trace_edge(self, run: EnvelopeRun, theta: Array) -> tuple[Array, Array]:
-        """Path of the edge of the given flank, with the receiver's outward normals."""
+        """Path of the edge of the given flank.
+
+        Args:
+            run: Part of the boundary that the edge forms.
+            theta: Positions of the motion (n,) [rad].
+
+        Returns:
+            Points (n, 2) [m] and outward normals (n, 2) of the receiver.
+        """
         low = np.full(theta.shape, self.given.contact_range[0])
         points, normals, _ = self.given.evaluate(low)
         moved = run.motion.map_to(self.receiver, theta)
         velocity = moved.velocities(points)
         normal = np.stack([-velocity[:, 1], velocity[:, 0]], axis=-1)
         normal /= np.hypot(normal[:, 0], normal[:, 1])[:, None]
-        # away from the receiver's steel, as the flank beside the edge
+        # out of the steel of the receiver, like the normals of the flank at the edge
         sign = np.sign(np.sum(normal * -moved.vectors(normals), axis=-1))
         return moved.points(points), normal * sign[:, None]
 
     @cached_property
     def _table(self) -> tuple[Array, Array, Array]:
-        """Radii and angles of the flank samples at every position, (motion, theta, s).
+        """Radii [m] and angles [rad] of the flank samples (motion, theta, s).
 
-        The third value is the grid of positions.
+        The third value is the grid of positions theta [rad].
         """
         s = self._stations
         points, _, _ = self.given.evaluate(s)
@@ -159,17 +194,17 @@ class Envelope:
         return np.array(radii), np.array(angles), theta
 
     def _deepest(self, radii: Array) -> float:
-        """The radius nearest to the receiver's root [m]."""
+        """The radius nearest to the root of the receiver [m]."""
         return float(radii.min() if self.side > 0.0 else radii.max())
 
     @property
     def reach(self) -> float:
-        """Radius in the receiver up to which the flank that mates comes [m]."""
+        """Deepest radius that the mating flank reaches in the receiver [m]."""
         return self._deepest(self._table[0])
 
     @property
     def summit(self) -> float:
-        """Radius in the receiver up to which the given tooth comes [m]."""
+        """Deepest radius that the given tooth reaches in the receiver [m]."""
         top = np.array([0.0, self.given.addendum_radius])
         theta = self._table[2]
         wide = np.broadcast_to(top, (len(theta), 2))
@@ -178,13 +213,13 @@ class Envelope:
 
     @property
     def floor(self) -> float:
-        """Radius that the given root comes to; the receiving tip keeps off [m]."""
+        """Radius that the given root reaches; the receiving tip must avoid it [m]."""
         return self._deepest(self._table[0][..., -1])
 
     def runs(self) -> list[EnvelopeRun]:
-        """Branches of the boundary from the receiver's tip towards its root.
+        """Branches of the boundary from the tip of the receiver towards its root.
 
-        Empty where the given flank does not reach the tip circle.
+        The list is empty if the given flank does not reach the tip circle.
         """
         radii, angles, theta = self._table
         s = self._stations
@@ -194,21 +229,21 @@ class Envelope:
         station = np.zeros(RADII - 1)
         for m in range(len(self.motions)):
             angle = np.full((POSITIONS, RADII - 1), np.inf)
-            found = np.zeros((POSITIONS, RADII - 1))
+            arc_length = np.zeros((POSITIONS, RADII - 1))
             for i in range(POSITIONS):
                 # radii of the given flank in increasing order
                 order = slice(None) if self.side > 0.0 else slice(None, None, -1)
                 r = radii[m, i, order]
                 ok = (wanted >= r[0]) & (wanted <= r[-1])
                 angle[i, ok] = np.interp(wanted[ok], r, angles[m, i, order])
-                found[i, ok] = np.interp(wanted[ok], r, s[order])
+                arc_length[i, ok] = np.interp(wanted[ok], r, s[order])
             i = np.argmin(angle, axis=0)
             k = np.arange(RADII - 1)
             better = angle[i, k] < best
             around = np.pad(angle, ((1, 1), (0, 0)), constant_values=np.inf)
             end = np.isinf(around[i, k]) | np.isinf(around[i + 2, k])
             best = np.where(better, angle[i, k], best)
-            station = np.where(better, found[i, k], station)
+            station = np.where(better, arc_length[i, k], station)
             where = np.where(better, np.stack([np.full_like(i, m), i, end]), where)
         if not np.isfinite(best[0]):
             return []

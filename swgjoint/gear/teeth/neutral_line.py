@@ -1,8 +1,8 @@
-"""Kinematics of the deflected neutral line: where rigid flexspline teeth go.
+"""Motion of rigid flexspline teeth on the deflected neutral line of the rim.
 
 The rim follows the wave generator: its neutral line is the outline offset by half the
-rim, and a tooth stands normal to it. The undeflected neutral line is a circle of radius
-r_m; points keep their arc length from the lobe.
+rim thickness, and the teeth are normal to it. The undeflected neutral line is a circle
+of radius r_m; points keep their arc length from the lobe.
 """
 
 from __future__ import annotations
@@ -22,19 +22,19 @@ from swgjoint.units import mm
 
 @dataclass(frozen=True, kw_only=True)
 class Pose:
-    """Rigid motion from the tooth frame, with its derivative by the motion parameter.
+    """Rigid motion of the tooth frame with its derivative by the motion parameter.
 
-    A point p of the tooth frame goes to R(angle) (p - (0, r_m)) + point.
+    A point p of the tooth frame moves to R(angle) (p - (0, r_m)) + point.
     """
 
     point: Array
-    """Where the tooth's point of the neutral line is (n, 2) [m]."""
+    """Position of the point of the tooth on the neutral line (n, 2) [m]."""
     angle: Array
     """Rotation of the tooth, counter-clockwise (n,) [rad]."""
     d_point: Array
     """Derivative of ``point`` by the parameter (n, 2) [m/rad]."""
     d_angle: Array
-    """Derivative of ``angle`` by the parameter (n,)."""
+    """Derivative of ``angle`` by the parameter (n,) [-]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -42,24 +42,28 @@ class NeutralLine:
     r"""Neutral line of the rim on a wave generator, as a motion of one tooth.
 
     A tooth at the angle :math:`\theta` of the undeflected rim (counter-clockwise from
-    a lobe) stands at the arc length :math:`\sigma(\theta)` of the deflected line. The
-    offset outline is longer or shorter than the circle by a small amount, which no
-    inextensible rim could take; it is put where teeth do not touch:
+    a lobe) is at the arc length :math:`\sigma(\theta)` of the deflected line. The
+    offset outline is slightly longer or shorter than the circle. An inextensible rim
+    could not accommodate this difference :math:`\delta`, so it is distributed to where
+    teeth do not touch:
 
     .. math:: \sigma = r_m\theta + \delta\,\bigl(u - \tfrac{\sin 2\pi u}{2\pi}\bigr)
 
-    between neighbouring lobes (u from 0 to 1), so the line is inextensible at the
-    lobes, to second order, and stretched most half-way between them. Outlines that the
-    rim leaves (minor axis reduced, rollers) are followed as a string would: the teeth
-    near a lobe are right, those half-way between lobes are not.
+    between neighbouring lobes (u from 0 to 1). The line is therefore inextensible to
+    second order at the lobes, and its stretch is largest half-way between them. If the
+    rim does not follow the outline everywhere (reduced minor axis, rollers), the model
+    still follows the outline like a taut string. The positions of teeth near a lobe are
+    then correct, but those half-way between lobes are not.
     """
 
     outline: WaveGenerator
+    """Outline of the wave generator."""
     lobes: int
+    """Number of lobes."""
     radius: float
     """Radius r_m of the undeflected neutral line [m]."""
     offset: float
-    """Half the rim: from the outline to the neutral line [m]."""
+    """Distance from the outline to the neutral line, half the rim thickness [m]."""
 
     @property
     def length(self) -> float:
@@ -68,7 +72,7 @@ class NeutralLine:
 
     @cached_property
     def _lobe_stations(self) -> Array:
-        """Arc length of the deflected line at the polar angles of the lobes [m]."""
+        """Arc lengths of the deflected line at the polar angles of the lobes [m]."""
         wanted = 2.0 * np.pi * np.arange(self.lobes + 1) / self.lobes
         perimeter = self.outline.perimeter
         low = np.full(self.lobes + 1, -0.25 * perimeter)
@@ -84,13 +88,13 @@ class NeutralLine:
 
     @property
     def extension(self) -> float:
-        """Largest stretch that closes the line, half-way between the lobes."""
+        """Largest stretch of the line, which occurs half-way between the lobes [-]."""
         gaps = np.diff(self._lobe_stations)
         arc = 2.0 * np.pi * self.radius / self.lobes
         return float(np.max(np.abs(2.0 * (gaps - arc) / arc)))
 
     def _arc_length(self, theta: Array) -> tuple[Array, Array]:
-        """Arc length sigma of the deflected line, and its derivative by theta."""
+        """Arc length sigma of the deflected line [m] and its derivative by theta."""
         pitch = 2.0 * np.pi / self.lobes
         turns = np.floor(theta / pitch)
         u = theta / pitch - turns
@@ -104,11 +108,11 @@ class NeutralLine:
         return sigma, rate
 
     def pose(self, theta: ArrayLike) -> Pose:
-        """Pose of the tooth at the rim angle theta, frame of the wave generator.
+        """Pose of the tooth at the rim angle theta, in the frame of the wave generator.
 
         Args:
-            theta: Angles of the undeflected rim from the first lobe, counter-clockwise,
-                any number of turns (n,) [rad].
+            theta: Angles on the undeflected rim from the first lobe, counter-clockwise
+                and over any number of turns (n,) [rad].
         """
         theta = np.asarray(theta, dtype=float)
         sigma, rate = self._arc_length(theta)
@@ -119,7 +123,7 @@ class NeutralLine:
             points, normals, curvature = self.outline.evaluate(s)
             step = (s + d * _turn(normals, s, perimeter) - sigma) / (1 + d * curvature)
             s = s - step
-            # Newton's method: the next step is below the last digit
+            # Newton's method: after such a step, the next one is below round-off
             if np.max(np.abs(step), initial=0.0) < 1e-9 * self.radius:
                 break
         points, normals, curvature = self.outline.evaluate(s)
@@ -133,17 +137,18 @@ class NeutralLine:
 
 
 def _turn(vectors: Array, s: Array, perimeter: float) -> Array:
-    """Angle of vectors from +y, on the branch that goes with the arc length."""
+    """Angle of vectors from +y, on the branch that belongs to the arc length [rad]."""
     angle = np.arctan2(-vectors[:, 0], vectors[:, 1])
     near = 2.0 * np.pi * s / perimeter
     return np.asarray(angle + 2.0 * np.pi * np.round((near - angle) / (2.0 * np.pi)))
 
 
 def neutral_line(design: Design) -> NeutralLine:
-    """Neutral line of a design's rim on its wave generator.
+    """Neutral line of the rim of a design on its wave generator.
 
     Raises:
-        DesignError: If the wave generator cannot be built.
+        DesignError: If the wave generator cannot be built, if the rim is not in contact
+            at a lobe, or if outline and bore differ too much in length.
     """
     half = 0.5 * design.flexspline.rim_mm * mm
     outline = wave_generator(design)
@@ -157,14 +162,14 @@ def neutral_line(design: Design) -> NeutralLine:
     if not (at_lobe.d_angle > 0.1).all():
         raise DesignError(
             f"{design.drive.name}: wave_generator.kind = "
-            f"{design.wave_generator.kind!r}: the rim bridges the lobe, where it does "
-            "not follow the outline; accepted for rigid tooth kinematics: a kind that "
-            "carries the rim at the lobe"
+            f"{design.wave_generator.kind!r}: the rim bridges the lobe without "
+            "following the outline; accepted for rigid tooth kinematics: a kind that "
+            "supports the rim at the lobe"
         )
     if line.extension >= 0.5:
         raise DesignError(
-            f"{design.drive.name}: wave_generator: its outline of "
-            f"{outline.perimeter / mm:.4g} mm is too far from the bore of "
+            f"{design.drive.name}: wave_generator: the length of its outline, "
+            f"{outline.perimeter / mm:.4g} mm, differs too much from that of the bore, "
             f"{2 * np.pi * design.flexspline_inner_radius / mm:.4g} mm"
         )
     return line

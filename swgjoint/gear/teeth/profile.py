@@ -1,7 +1,7 @@
 """Tooth flanks as chains of circular arcs, straight lines and smooth curves.
 
-A flank lies in the frame of its tooth: the tooth is centred on the +y axis, the origin
-is the gear axis, and the right flank (x > 0) is described. The chain runs from the
+Flanks are described in the frame of their tooth, which is centred on the +y axis with
+the gear axis at the origin. The chain is the right flank (x > 0) and runs from the
 middle of the top land to the middle of the root land; normals point out of the steel.
 """
 
@@ -19,47 +19,55 @@ from swgjoint.gear.teeth.segments import Piece, Segment
 from swgjoint.typing import Array
 
 TANGENCY_RAD = 1e-10
-"""Largest corner at a junction of two segments that counts as tangent [rad]."""
+"""Largest corner angle at a tangent junction of two segments [rad]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Junction:
-    """Where two segments meet, seen from both."""
+    """Junction of two segments, evaluated on both sides."""
 
     gap: float
-    """Distance between the end of one and the start of the next [m]."""
+    """Distance between the end of a segment and the start of the next [m]."""
     corner: float
-    """Angle between their normals [rad]."""
+    """Angle between the normals of both segments [rad]."""
     edge: bool
-    """Whether the source puts an edge there (tip of an involute, for one)."""
+    """Whether the profile has an edge there by definition, such as an involute tip."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class ToothProfile:
-    """Right flank of one tooth of a member, from top-land to root-land middle [m]."""
+    """Right flank of one tooth, from the middle of the top land to that of the root."""
 
     member: str
+    """``flexspline`` or ``circular_spline``."""
     teeth: int
+    """Number of teeth."""
     internal: bool
+    """Whether the teeth are internal."""
     pitch_radius: float
+    """Pitch radius [m]."""
     addendum_radius: float
+    """Radius of the tip circle [m]."""
     dedendum_radius: float
+    """Radius of the root circle [m]."""
     segments: tuple[Piece, ...]
+    """Segments from tip to root."""
     straight_length: float
+    """Length of the straight segment [m]; zero if there is none."""
 
     @property
     def half_pitch(self) -> float:
-        """Half the angular pitch, pi/N [rad]."""
+        """Half the angular pitch pi/N [rad]."""
         return pi / self.teeth
 
     @property
     def side(self) -> float:
-        """+1 for external teeth, -1 for internal ones."""
+        """+1 for external teeth, -1 for internal teeth."""
         return -1.0 if self.internal else 1.0
 
     @cached_property
     def stations(self) -> Array:
-        """Arc length at the ends of the segments [m]. Shape (n_segments + 1,)."""
+        """Arc length at the ends of the segments (n_segments + 1,) [m]."""
         stations = np.concatenate([[0.0], np.cumsum([p.length for p in self.segments])])
         stations.setflags(write=False)
         return stations
@@ -73,25 +81,33 @@ class ToothProfile:
         return float(low), float(high)
 
     def range_of(self, first: str, last: str) -> tuple[float, float]:
-        """Arc length at the start of one segment and the end of another [m]."""
+        """Arc length at the start of one segment and at the end of another [m].
+
+        Args:
+            first: Name of the first segment.
+            last: Name of the last segment.
+        """
         names = [p.name for p in self.segments]
         s = self.stations
         return float(s[names.index(first)]), float(s[names.index(last) + 1])
 
     def junctions(self) -> tuple[Junction, ...]:
-        """Gap and corner at every junction, each segment evaluated at its very end."""
-        found = []
+        """Gap and corner at every junction, from the ends of both segments."""
+        junctions = []
         for left, right in pairwise(self.segments):
             (end,), (before,), _ = left.evaluate_at(np.array([left.length]), self.side)
             (start,), (after,), _ = right.evaluate_at(np.array([0.0]), self.side)
             cross = before[0] * after[1] - before[1] * after[0]
             corner = abs(float(np.arctan2(cross, before @ after)))
             gap = float(np.hypot(*(end - start)))
-            found.append(Junction(gap=gap, corner=corner, edge=right.edge))
-        return tuple(found)
+            junctions.append(Junction(gap=gap, corner=corner, edge=right.edge))
+        return tuple(junctions)
 
     def evaluate(self, s: ArrayLike) -> tuple[Array, Array, Array]:
         """Point, outward normal and signed curvature at arc length s.
+
+        Args:
+            s: Arc lengths from the middle of the top land (n,) [m].
 
         Returns:
             Points (n, 2) [m], unit normals (n, 2), curvatures (n,) [1/m].
@@ -110,17 +126,18 @@ class ToothProfile:
             here = index == k
             if not here.any():
                 continue
-            found = part.evaluate_at(s[here] - stations[k], self.side)
-            points[here], normals[here], curvature[here] = found
+            points[here], normals[here], curvature[here] = part.evaluate_at(
+                s[here] - stations[k], self.side
+            )
         return points, normals, curvature
 
     @cached_property
     def _arcs(self) -> Array | None:
-        """Arcs and lines as numbers; None if there is a piece of another kind.
+        """Parameters of arcs and lines; None if there is a piece of another kind.
 
-        Point = base + s way + radius (cos, sin) and normal = sign (cos, sin) of an
-        angle that begins at ``first`` and grows by ``rate`` s, which is 0 on a line.
-        Rows base x, y, way x, y, radius, first, rate, sign, curvature (9, n_segments).
+        The point is base + s way + radius (cos, sin) and the normal sign (cos, sin) of
+        the angle ``first`` + ``rate`` s, where ``rate`` is zero for a line. Rows: base
+        x, y, way x, y, radius, first, rate, sign, curvature (9, n_segments).
         """
         columns = []
         for part in self.segments:
@@ -140,7 +157,7 @@ class ToothProfile:
     def _at_once(
         self, along: Array, index: NDArray[np.int64]
     ) -> tuple[Array, Array, Array]:
-        """:meth:`evaluate` by number and arc length of the segments, without a loop."""
+        """:meth:`evaluate` without a loop, by segment index and arc length therein."""
         assert self._arcs is not None
         x, y, way_x, way_y, radius, first, rate, sign, bend = self._arcs[:, index]
         angle = first + rate * along
@@ -155,15 +172,15 @@ class ToothProfile:
     def signed_distance(self, points: Array) -> tuple[Array, Array, Array]:
         """Distance of points near the flank, positive outside the steel.
 
-        The closest foot over all segments on which the point projects, and over the
-        edges; a point that projects on none (beyond the ends of the chain) gets
-        infinity.
+        The result refers to the closest foot on any segment or edge. The distance of
+        points that project on neither (beyond the ends of the chain) is infinite.
 
         Args:
-            points: Shape (n, 2) [m].
+            points: Points of shape (n, 2) [m].
 
         Returns:
-            Distances (n,) [m], outward normals at the foot (n, 2), curvatures (n,).
+            Distances (n,) [m]; outward normals (n, 2) and curvatures (n,) [1/m] at the
+            foot.
         """
         n = len(points)
         best = np.full(n, np.inf)
@@ -176,7 +193,7 @@ class ToothProfile:
             normals[take] = normal[take]
             curvature[take] = bend if isinstance(bend, float) else bend[take]
         for vertex, before, after in self._edges:
-            # outside an edge lies a wedge from which the edge itself is closest
+            # in a wedge outside an edge, the edge itself is the closest point
             rel = points - vertex
             r = np.hypot(rel[:, 0], rel[:, 1])
             wedge = (rel @ before >= 0.0) & (rel @ after <= 0.0)
@@ -188,12 +205,12 @@ class ToothProfile:
 
     @cached_property
     def _edges(self) -> tuple[tuple[Array, Array, Array], ...]:
-        """Edge points with the directions of travel before and after them."""
-        found = []
+        """Edge points with the directions of the chain before and after them."""
+        edges = []
         for left, right in pairwise(self.segments):
             if right.edge:
                 (vertex,), (after,), _ = right.evaluate_at(np.array([0.0]), self.side)
                 _, (before,), _ = left.evaluate_at(np.array([left.length]), self.side)
                 travel = [self.side * np.array([n[1], -n[0]]) for n in (before, after)]
-                found.append((vertex, travel[0], travel[1]))
-        return tuple(found)
+                edges.append((vertex, travel[0], travel[1]))
+        return tuple(edges)

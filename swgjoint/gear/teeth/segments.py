@@ -16,10 +16,10 @@ Point = tuple[float, float]
 
 
 class Piece(Protocol):
-    """What a flank needs to know of a segment.
+    """Interface of the segments of a flank.
 
-    ``side`` is +1 for an external tooth and -1 for an internal one: from tip to root
-    along the right flank the steel of an external tooth lies on the right hand.
+    ``side`` is +1 for an external tooth and -1 for an internal tooth: on the way from
+    tip to root along the right flank, the steel of an external tooth is on the right.
     """
 
     @property
@@ -44,22 +44,36 @@ class Piece(Protocol):
 
     @property
     def radius(self) -> float:
-        """Radius of an arc, zero for anything else [m]."""
+        """Radius of an arc; zero for other segments [m]."""
         ...
 
     @property
     def edge(self) -> bool:
-        """Whether the segment starts at an edge, not tangent to the one before."""
+        """Whether the segment starts at an edge instead of a tangent junction."""
         ...
 
     def evaluate_at(self, s: Array, side: float) -> tuple[Array, Array, Array]:
-        """Points (n, 2) [m], outward normals (n, 2), curvatures (n,) [1/m]."""
+        """Points (n, 2) [m], outward normals (n, 2), curvatures (n,) [1/m].
+
+        Args:
+            s: Arc lengths from the start of the segment (n,) [m].
+            side: +1 for an external tooth, -1 for an internal tooth.
+        """
         ...
 
     def project(
         self, points: Array, side: float
     ) -> tuple[Array, Array, Array | float, Bools]:
-        """Signed distance, normal and curvature at the foot, whether there is one."""
+        """Foot of the perpendicular from points to the segment.
+
+        Args:
+            points: Points of shape (n, 2) [m].
+            side: +1 for an external tooth, -1 for an internal tooth.
+
+        Returns:
+            Signed distance (n,) [m], positive outside the steel; outward normal (n, 2)
+            and curvature [1/m] at the foot; whether the foot is on the segment (n,).
+        """
         ...
 
 
@@ -68,23 +82,29 @@ class Segment:
     """One circular arc or straight line of a flank, traversed from tip to root."""
 
     name: str
+    """Name within the chain, e.g. ``addendum``."""
     start: Point
+    """First point [m]."""
     end: Point
+    """Last point [m]."""
     length: float
+    """Arc length [m]."""
     centre: Point = (0.0, 0.0)
+    """Centre of an arc [m]."""
     radius: float = 0.0
-    """Zero for a straight line [m]."""
+    """Radius of an arc; zero for a straight line [m]."""
     convex: bool = True
-    """Whether the centre of the arc lies on the side of the steel."""
+    """Whether the centre of the arc is on the side of the steel."""
     angle_start: float = 0.0
+    """Direction of the first point from the centre [rad]."""
     angle_end: float = 0.0
-    """Directions of the end points from the centre [rad]."""
+    """Direction of the last point from the centre [rad]."""
     edge: bool = False
-    """Whether it starts at an edge of the steel, not tangent to the one before."""
+    """Whether the segment starts at an edge instead of a tangent junction."""
 
     @property
     def curvature(self) -> float:
-        """Signed curvature, positive where the steel bulges out [1/m]."""
+        """Signed curvature, positive where the steel is convex [1/m]."""
         if self.radius == 0.0:
             return 0.0
         return (1.0 if self.convex else -1.0) / self.radius
@@ -95,7 +115,12 @@ class Segment:
         return direction, side * np.array([-direction[1], direction[0]])
 
     def evaluate_at(self, s: Array, side: float) -> tuple[Array, Array, Array]:
-        """Points, outward normals and curvatures at arc length s from the start."""
+        """Points, outward normals and curvatures; see :class:`Piece`.
+
+        Args:
+            s: Arc lengths from the start of the segment (n,) [m].
+            side: +1 for an external tooth, -1 for an internal tooth.
+        """
         t = s / self.length
         if self.radius == 0.0:
             start, end = np.array(self.start), np.array(self.end)
@@ -110,7 +135,12 @@ class Segment:
         return points, normals, np.full(t.shape, self.curvature)
 
     def project(self, points: Array, side: float) -> tuple[Array, Array, float, Bools]:
-        """Foot of the perpendicular on the line or the arc."""
+        """Foot of the perpendicular on the line or the arc; see :class:`Piece`.
+
+        Args:
+            points: Points of shape (n, 2) [m].
+            side: +1 for an external tooth, -1 for an internal tooth.
+        """
         if self.radius == 0.0:
             direction, normal = self._normal_of_line(side)
             rel = points - np.array(self.start)
@@ -121,7 +151,7 @@ class Segment:
         r = np.hypot(rel[:, 0], rel[:, 1])
         middle = 0.5 * (self.angle_start + self.angle_end)
         half = 0.5 * abs(self.angle_end - self.angle_start)
-        # angle from the middle of the arc, free of branch cuts
+        # angle from the middle of the arc, away from branch cuts
         c, d = cos(middle), sin(middle)
         angle = np.arctan2(rel[:, 1] * c - rel[:, 0] * d, rel[:, 0] * c + rel[:, 1] * d)
         inside = np.abs(angle) <= half * (1.0 + 1e-9)
@@ -140,7 +170,17 @@ def arc(
     *,
     edge: bool = False,
 ) -> Segment:
-    """Arc between two directions from its centre [rad]."""
+    """Arc between two directions from its centre.
+
+    Args:
+        name: Name within the chain.
+        centre: Centre [m].
+        radius: Radius [m].
+        start: Direction of the first point from the centre [rad].
+        end: Direction of the last point from the centre [rad].
+        convex: Whether the centre is on the side of the steel.
+        edge: Whether the arc starts at an edge instead of a tangent junction.
+    """
 
     def at(angle: float) -> Point:
         return centre[0] + radius * cos(angle), centre[1] + radius * sin(angle)
@@ -160,6 +200,12 @@ def arc(
 
 
 def line(name: str, start: Point, end: Point) -> Segment:
-    """Straight line between two points."""
+    """Straight line between two points.
+
+    Args:
+        name: Name within the chain.
+        start: First point [m].
+        end: Last point [m].
+    """
     length = hypot(end[0] - start[0], end[1] - start[1])
     return Segment(name=name, start=start, end=end, length=length)

@@ -1,4 +1,4 @@
-"""Pieces of a flank that are smooth curves: generated and conjugate profiles."""
+"""Smooth curves as pieces of a flank, for generated and conjugate profiles."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from swgjoint.gear.teeth.segments import Bools, Point
 from swgjoint.typing import Array
 
 NODES = 33
-"""Nodes of a generated curve; involutes and fillets then err below 1e-13 m."""
+"""Default number of nodes; involutes and fillets then have errors below 1e-13 m."""
 CLOSEST = 1e-6
-"""Nodes nearer than that lose their tangent in the rounding of coordinates [m]."""
+"""Smallest distance of nodes [m]; tangents of closer nodes are lost in round-off."""
 DENSE = 1025
-"""Points that lay out the nodes."""
+"""Default number of points that place the nodes."""
 STEPS = 8
-"""Newton steps to a foot; they start near it and converge in four."""
+"""Largest number of Newton steps to a foot; four are usually sufficient."""
 
-# nodes and weights of Gauss and Legendre on [0, 1]
+# nodes and weights of Gauss-Legendre quadrature on [0, 1]
 _GAUSS = np.polynomial.legendre.leggauss(6)
 _GAUSS_X, _GAUSS_W = 0.5 * (_GAUSS[0] + 1.0), 0.5 * _GAUSS[1]
 
@@ -30,17 +30,19 @@ _GAUSS_X, _GAUSS_W = 0.5 * (_GAUSS[0] + 1.0), 0.5 * _GAUSS[1]
 class SmoothCurve:
     """Quintic curve by arc length, exact in point, normal and curvature at its nodes.
 
-    Twice continuously differentiable, as the Newton iterations of contact want it.
+    The curve is twice continuously differentiable, as required by the Newton iterations
+    of contact.
     """
 
     name: str
+    """Name within the chain."""
     stations: Array
-    """Arc length at the nodes, from zero [m]. Shape (n,)."""
+    """Arc length at the nodes, starting at zero (n,) [m]."""
     coefficients: Array
-    """Power coefficients per interval, of the arc length since its node, in units of
-    its length. Shape (n - 1, 6, 2)."""
+    """Power coefficients per interval (n - 1, 6, 2) [m], for the arc length from the
+    start of the interval divided by its length."""
     edge: bool = False
-    """Whether it starts at an edge of the steel, not tangent to the piece before."""
+    """Whether the curve starts at an edge instead of a tangent junction."""
 
     def __post_init__(self) -> None:
         for key in ("stations", "coefficients"):
@@ -48,7 +50,7 @@ class SmoothCurve:
 
     @property
     def radius(self) -> float:
-        """A smooth curve has no radius: zero."""
+        """Zero, because a smooth curve has no single radius [m]."""
         return 0.0
 
     @property
@@ -69,12 +71,12 @@ class SmoothCurve:
         return float(x), float(y)
 
     def _derivatives(self, s: Array) -> tuple[Array, Array, Array]:
-        """Points and their first two derivatives by arc length, each (n, 2)."""
+        """Points and their first two derivatives by the arc length, each (n, 2)."""
         k = np.searchsorted(self.stations[1:-1], s, side="right")
         h = self._steps[k]
         t = (s - self.stations[k]) / h
-        # Horner's scheme with its derivatives in place, coordinates as rows; the first
-        # steps, in which the derivatives are still zero, are left out
+        # Horner's scheme with derivatives, in place and with coordinates as rows; the
+        # first steps, in which the derivatives are still zero, are omitted
         c = self._rows.take(k, axis=2)
         first = c[5]
         value = first * t + c[4]
@@ -91,7 +93,12 @@ class SmoothCurve:
         return value.T, (first / h).T, (second / h**2).T
 
     def evaluate_at(self, s: Array, side: float) -> tuple[Array, Array, Array]:
-        """Points, outward normals and curvatures at arc length s from the start."""
+        """Points, outward normals and curvatures; see :class:`.segments.Piece`.
+
+        Args:
+            s: Arc lengths from the start of the curve (n,) [m].
+            side: +1 for an external tooth, -1 for an internal tooth.
+        """
         points, tangent, bend = self._derivatives(s)
         size = np.hypot(tangent[:, 0], tangent[:, 1])
         normal = side * np.stack([-tangent[:, 1], tangent[:, 0]], -1) / size[:, None]
@@ -108,15 +115,23 @@ class SmoothCurve:
 
     @cached_property
     def _coarse(self) -> tuple[Array, Array]:
-        """Every fourth node and its point, where the search for a foot starts."""
+        """Arc length and point of every fourth node, as starts of foot searches."""
         index = np.unique(np.append(np.arange(0, len(self.stations), 4), -1))
         s = self.stations[index % len(self.stations)]
         return np.sort(s), self._derivatives(np.sort(s))[0]
 
     def project(self, points: Array, side: float) -> tuple[Array, Array, Array, Bools]:
-        """Foot of the perpendicular by Newton's method from the nearest coarse node."""
+        """Foot of the perpendicular by Newton's method from the nearest coarse node.
+
+        Args:
+            points: Points of shape (n, 2) [m].
+            side: +1 for an external tooth, -1 for an internal tooth.
+
+        Returns:
+            See :meth:`.segments.Piece.project`.
+        """
         coarse_s, coarse = self._coarse
-        # square distances but for a term common to all nodes
+        # squared distances except for a term common to all nodes
         near = np.sum(coarse**2, axis=-1) - 2.0 * points @ coarse.T
         s = coarse_s[np.argmin(near, axis=1)]
         moving = np.arange(len(s))
@@ -124,19 +139,19 @@ class SmoothCurve:
             foot, tangent, bend = self._derivatives(s[moving])
             rel = foot - points[moving]
             slope = rel[:, 0] * tangent[:, 0] + rel[:, 1] * tangent[:, 1]
-            # beyond the centre of curvature the distance has no minimum
+            # beyond the centre of curvature, the distance has no minimum
             gain = 1.0 + rel[:, 0] * bend[:, 0] + rel[:, 1] * bend[:, 1]
             old = s[moving]
             new = np.clip(old - slope / np.maximum(gain, 0.2), 0.0, self.length)
             s[moving] = new
-            # the step after one of a nanometre is below the last digit
+            # after a step of a nanometre, the next one is below round-off
             moving = moving[np.abs(new - old) > 1e-9]
             if not moving.size:
                 break
         foot, normal, curvature = self.evaluate_at(s, side)
         rel = points - foot
         distance = np.sum(rel * normal, axis=-1)
-        # beyond the ends the rest of the step points outwards
+        # beyond the ends, the remaining vector has a tangential component
         tangent = side * np.stack([normal[:, 1], -normal[:, 0]], axis=-1)
         along = np.abs(np.sum(rel * tangent, axis=-1))
         inside = along <= 1e-9 * self.length
@@ -154,35 +169,35 @@ def smooth_curve(
     dense: int = DENSE,
     edge: bool = False,
 ) -> SmoothCurve:
-    """Curve through points and outward normals given by a smooth parameter.
+    """Curve through points and outward normals as functions of a smooth parameter.
 
     Args:
         name: Name of the piece.
         trace: Points (n, 2) [m] and outward unit normals (n, 2) at parameters (n,).
         first: Parameter at the tip end.
         last: Parameter at the root end.
-        side: +1 for an external tooth, -1 for an internal one.
+        side: +1 for an external tooth, -1 for an internal tooth.
         nodes: Largest number of nodes, equally spaced along the curve.
-        dense: Number of points that lay out the nodes.
-        edge: Whether the piece starts at an edge.
+        dense: Number of points that place the nodes.
+        edge: Whether the curve starts at an edge instead of a tangent junction.
     """
     from scipy.interpolate import make_interp_spline
 
-    # nodes at equal arc lengths, whatever the parameter does
+    # nodes at equal arc lengths, independently of the parameter
     steps = np.linspace(first, last, dense)
     chord = np.hypot(*np.diff(trace(steps)[0], axis=0).T)
     walked = np.concatenate([[0.0], np.cumsum(chord)])
     nodes = max(9, min(nodes, int(walked[-1] / CLOSEST)))
     share = np.linspace(0.0, walked[-1], nodes)
     points, normals = trace(np.interp(share, walked, steps))
-    # arc length: the speed of a quintic spline over the chords, by quadrature
+    # arc length by quadrature of the speed of a quintic spline over the chord length
     chord = np.hypot(*np.diff(points, axis=0).T)
     u = np.concatenate([[0.0], np.cumsum(chord)])
     spline = make_interp_spline(u, points, k=5)
     inner = (u[:-1, None] + chord[:, None] * _GAUSS_X).ravel()
     speed = np.linalg.norm(spline(inner, 1), axis=-1).reshape(-1, _GAUSS_X.size)
     stations = np.concatenate([[0.0], np.cumsum(speed @ _GAUSS_W * chord)])
-    # the normal turns by -curvature per arc length, seen from the side of the steel
+    # the normal rotates by -curvature per arc length, as seen from the steel
     turn = np.unwrap(np.arctan2(normals[:, 1], normals[:, 0]))
     rate = make_interp_spline(u, turn, k=5)(u, 1)
     curvature = -side * rate / np.linalg.norm(spline(u, 1), axis=-1)
@@ -199,7 +214,18 @@ def from_nodes(
     *,
     edge: bool = False,
 ) -> SmoothCurve:
-    """Quintic Hermite curve through points, outward normals and curvatures."""
+    """Quintic Hermite curve through points, outward normals and curvatures.
+
+    Args:
+        name: Name of the piece.
+        stations: Arc length at the nodes, starting at zero (n,) [m].
+        points: Nodes (n, 2) [m].
+        normals: Outward unit normals at the nodes (n, 2).
+        curvature: Curvatures at the nodes, positive where the steel is convex (n,)
+            [1/m].
+        side: +1 for an external tooth, -1 for an internal tooth.
+        edge: Whether the curve starts at an edge instead of a tangent junction.
+    """
     h = np.diff(stations)[:, None]
     tangent = side * np.stack([normals[:, 1], -normals[:, 0]], axis=-1)
     bend = -curvature[:, None] * normals

@@ -1,4 +1,4 @@
-"""Which values make a tooth possible that cannot be built."""
+"""Values with which an infeasible tooth becomes feasible."""
 
 from __future__ import annotations
 
@@ -16,22 +16,24 @@ MEMBER_KEYS = {
     "thickness_coefficient": 1.5,
     "pressure_angle_deg": 59.0,
 }
-"""Keys besides the profile that shape a tooth, and the largest value tried."""
+"""Keys outside the profile that shape a tooth, with their largest trial value."""
 SHOWN = 2
+"""Number of bounds in a message."""
 
 
 def with_bounds(
     fault: ToothFault, start: Blank, build: Callable[[Blank], ToothProfile]
 ) -> ToothFault:
-    """The fault with what is accepted as values, unchanged where nothing is found.
+    """The fault with the accepted values; unchanged if the search finds none.
 
-    Bounds of the keys that alone make the tooth possible, its own first, then the one
-    that changes least; else the factor by which all lengths of the profile must change.
+    The message states bounds of single keys that make the tooth feasible: first that of
+    the key in the fault, then that of the smallest change. If there is none, it states
+    the factor by which all lengths of the profile must change.
 
     Args:
-        fault: Why the tooth cannot be built.
-        start: Its blank.
-        build: What builds a tooth from a blank.
+        fault: Reason why the tooth cannot be built.
+        start: Blank of the tooth.
+        build: Function that builds a tooth from a blank.
     """
 
     def builds(blank: Blank) -> bool:
@@ -46,7 +48,7 @@ def with_bounds(
         for name, value in start.spec.profile.model_dump().items()
         if name.endswith("_mm") and value
     ]
-    found: dict[str, AcceptedBound] = {}
+    bounds: dict[str, AcceptedBound] = {}
     for key in (*lengths, *MEMBER_KEYS):
         bound = nearest_bound(
             start.value(key),
@@ -54,24 +56,24 @@ def with_bounds(
             high=MEMBER_KEYS.get(key, float("inf")),
         )
         if bound is not None:
-            found[key] = bound
-    nearest = sorted(found, key=lambda key: (key != fault.key, found[key].change))
-    told = [
-        f"{'' if key == fault.key else f'{key} '}{_told(key, found[key])}"
+            bounds[key] = bound
+    nearest = sorted(bounds, key=lambda key: (key != fault.key, bounds[key].change))
+    texts = [
+        f"{'' if key == fault.key else f'{key} '}{_text(key, bounds[key])}"
         for key in nearest[:SHOWN]
     ]
-    if not told and (all_of_them := _common(start, lengths, builds)) is not None:
-        told = [f"all lengths of the profile times {_told('', all_of_them)}"]
+    if not texts and (common := _common(start, lengths, builds)) is not None:
+        texts = [f"all lengths of the profile times {_text('', common)}"]
         if fault.key in lengths:
-            size = start.value(fault.key) * all_of_them.accepted
-            told[0] += f", this one {size:.4g}{_unit(fault.key)}"
-    return fault.with_bounds(" or ".join(told)) if told else fault
+            size = start.value(fault.key) * common.accepted
+            texts[0] += f", this one {size:.4g}{_unit(fault.key)}"
+    return fault.with_bounds(" or ".join(texts)) if texts else fault
 
 
 def _common(
     start: Blank, lengths: list[str], builds: Callable[[Blank], bool]
 ) -> AcceptedBound | None:
-    """Bound of a factor of all lengths, one that alone changes nothing rejected."""
+    """Bound of a common factor of all lengths, starting from the rejected factor 1."""
 
     def builds_with(factor: float) -> bool:
         changed = start
@@ -82,7 +84,7 @@ def _common(
     return nearest_bound(1.0, builds_with)
 
 
-def _told(key: str, bound: AcceptedBound) -> str:
+def _text(key: str, bound: AcceptedBound) -> str:
     return f"{bound.sign} {bound.accepted:.6g}{_unit(key)}"
 
 

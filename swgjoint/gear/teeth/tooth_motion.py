@@ -1,8 +1,8 @@
 """Motion of one flexspline tooth relative to the circular spline, and its inverse.
 
-Rigid teeth on the deflected neutral line. The parameter theta is the angle of the tooth
-on the undeflected rim, counter-clockwise from the lobe of the wave generator; at zero
-the tooth stands in the middle of its tooth space, whatever the layout.
+The teeth are rigid and move with the deflected neutral line. The parameter theta is the
+angle of the tooth on the undeflected rim, counter-clockwise from the lobe of the wave
+generator. At zero, the tooth is in the middle of its tooth space for every layout.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from swgjoint.typing import Array
 Receiver = Literal["flexspline", "circular_spline"]
 
 SAME = 1e-9
-"""Motions closer than that, relative to the radius, are one."""
+"""Largest difference of identical motions, relative to the radius."""
 
 _MIRROR = np.array([-1.0, 1.0])
 
@@ -32,14 +32,14 @@ class MovedFlank:
     turn: Array
     """Rotation or reflection matrices (n, 2, 2)."""
     shift: Array
-    """(n, 2) [m]."""
+    """Translations (n, 2) [m]."""
     d_turn: Array
     """Derivative of ``turn`` by theta (n, 2, 2)."""
     d_shift: Array
     """Derivative of ``shift`` by theta (n, 2) [m/rad]."""
 
     def points(self, p: Array) -> Array:
-        """Images of points p (n, ..., 2), the first axis going with the motions."""
+        """Images of points p (n, ..., 2) [m]; the first axis matches the motions."""
         return _apply(self.turn, p) + _wide(self.shift, p)
 
     def vectors(self, v: Array) -> Array:
@@ -67,18 +67,18 @@ def _rotation(angle: Array) -> tuple[Array, Array]:
 
 
 class TeethOnRim(Protocol):
-    """Where teeth of the deflected rim go: the neutral line, or finite elements."""
+    """Motion of the teeth on the deflected rim: neutral line or finite elements."""
 
     @property
     def lobes(self) -> int:
-        """Lobes of the wave generator."""
+        """Number of lobes of the wave generator."""
 
     @property
     def radius(self) -> float:
-        """Radius of the point of the tooth that is followed [m]."""
+        """Radius of the reference point of the tooth [m]."""
 
     def pose(self, theta: ArrayLike) -> Pose:
-        """Pose of a tooth at an angle of the undeflected rim from a lobe [rad]."""
+        """Pose of a tooth at the angle theta [rad] from a lobe on the rim."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -86,11 +86,15 @@ class ToothMotion:
     """Relative motion of the teeth at one lobe of the wave generator."""
 
     line: TeethOnRim
+    """Motion of the teeth on the rim."""
     teeth_flexspline: int
+    """Number of teeth of the flexspline."""
     teeth_circular_spline: int
+    """Number of teeth of the circular spline."""
     lobe: int = 0
+    """Index of the lobe."""
     mirrored: bool = False
-    """Whether left and right are exchanged: what the other flanks do."""
+    """Whether left and right are exchanged, which gives the motion of left flanks."""
 
     @property
     def half_range(self) -> float:
@@ -98,9 +102,10 @@ class ToothMotion:
         return np.pi / self.line.lobes
 
     def in_space(self, theta: Array) -> MovedFlank:
-        """From the flexspline tooth frame to the frame of the tooth space.
+        """Map from the frame of the flexspline tooth to the frame of the tooth space.
 
-        The space of the circular spline is centred on +y, the gear axis is the origin.
+        The space of the circular spline is centred on +y with the gear axis at the
+        origin.
         """
         sign = -1.0 if self.mirrored else 1.0
         at_lobe = 2.0 * np.pi * self.lobe / self.line.lobes
@@ -129,10 +134,10 @@ class ToothMotion:
         )
 
     def to_circular_spline(self, theta: Array) -> MovedFlank:
-        """From a right flexspline flank to the right flank of the tooth it faces.
+        """Map from a right flank of the flexspline to the right flank of the mate.
 
-        The tooth of the circular spline half a pitch clockwise, mirrored so that its
-        left flank becomes the right one.
+        The mate is the tooth of the circular spline half a pitch clockwise, mirrored so
+        that its left flank becomes the right flank.
         """
         space = self.in_space(theta)
         matrix = _facing(self.teeth_circular_spline)
@@ -144,19 +149,24 @@ class ToothMotion:
         )
 
     def to_flexspline(self, theta: Array) -> MovedFlank:
-        """The inverse: from a right flank of the circular spline to the flexspline."""
-        there = self.to_circular_spline(theta)
-        turn = np.swapaxes(there.turn, -1, -2)
-        d_turn = np.swapaxes(there.d_turn, -1, -2)
+        """Inverse map, from a right flank of the circular spline to the flexspline."""
+        forward = self.to_circular_spline(theta)
+        turn = np.swapaxes(forward.turn, -1, -2)
+        d_turn = np.swapaxes(forward.d_turn, -1, -2)
         return MovedFlank(
             turn=turn,
-            shift=-_apply(turn, there.shift),
+            shift=-_apply(turn, forward.shift),
             d_turn=d_turn,
-            d_shift=-_apply(d_turn, there.shift) - _apply(turn, there.d_shift),
+            d_shift=-_apply(d_turn, forward.shift) - _apply(turn, forward.d_shift),
         )
 
     def map_to(self, receiver: Receiver, theta: Array) -> MovedFlank:
-        """From the other member's right flank to that of the receiver."""
+        """Map from the right flank of the other member to that of the receiver.
+
+        Args:
+            receiver: Member in whose tooth frame the result is.
+            theta: Positions of the motion (n,) [rad].
+        """
         if receiver == "flexspline":
             return self.to_flexspline(theta)
         return self.to_circular_spline(theta)
@@ -167,7 +177,7 @@ def _like(vector: Array, matrix: Array) -> Array:
 
 
 def _facing(teeth: int) -> Array:
-    """From the frame of a tooth space to that of its right wall's mirrored tooth."""
+    """Map from the frame of a tooth space to that of its mirrored right tooth."""
     c, d = np.cos(np.pi / teeth), np.sin(np.pi / teeth)
     return np.array([[-c, d], [d, c]])
 
@@ -175,11 +185,11 @@ def _facing(teeth: int) -> Array:
 def tooth_motions(
     design: Design, line: TeethOnRim | None = None
 ) -> tuple[ToothMotion, ...]:
-    """Motions that differ: every lobe, and both flanks where these are not alike.
+    """Distinct motions of the teeth at all lobes, and of both flanks if they differ.
 
     Args:
         design: The drive.
-        line: Where the teeth go; by default the neutral line of the design.
+        line: Motion of the teeth on the rim; None takes the neutral line of the design.
 
     Raises:
         DesignError: If the wave generator cannot be built.
@@ -196,7 +206,7 @@ def tooth_motions(
         moved = motion.in_space(theta)
         return np.concatenate([moved.turn.ravel(), moved.shift.ravel() / line.radius])
 
-    found: list[tuple[ToothMotion, Array]] = []
+    distinct: list[tuple[ToothMotion, Array]] = []
     for lobe in range(line.lobes):
         for mirrored in (False, True):
             motion = ToothMotion(
@@ -207,6 +217,6 @@ def tooth_motions(
                 mirrored=mirrored,
             )
             new = path(motion)
-            if all(np.abs(new - old).max() > SAME for _, old in found):
-                found.append((motion, new))
-    return tuple(motion for motion, _ in found)
+            if all(np.abs(new - old).max() > SAME for _, old in distinct):
+                distinct.append((motion, new))
+    return tuple(motion for motion, _ in distinct)

@@ -1,8 +1,8 @@
 """Rigid flexspline teeth passing through the tooth spaces: path, clearance, overlap.
 
-Teeth and rim do not deform beyond the neutral line's shape, so overlap is a measure of
-what elasticity must take up, not a stress. One tooth over half the angle to the next
-lobe on either side stands for all teeth at all times.
+Teeth and rim deform no further than the shape of the neutral line, so overlap measures
+what elastic deformation must take up and is not a stress. One tooth, followed to half
+the angle to the next lobe on either side, represents all teeth at all times.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from swgjoint.typing import Array
 Where = Literal["flank", "flexspline_tip", "circular_spline_tip"]
 
 POSITIONS, POINTS = 721, 401
+"""Default number of positions of the tooth and of points on either flank."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -35,14 +36,14 @@ class ToothPath:
     angle: Array
     """Inclination of the tooth to the axis of the space (n,) [rad]."""
     clearance: Array
-    """Smallest distance of the flanks, negative where they overlap; infinite where the
-    tooth is out of the space (n,) [m]."""
+    """Smallest distance of the flanks, negative where they overlap and infinite where
+    the tooth is outside the space (n,) [m]."""
     station: Array
-    """Arc length on the flexspline profile of the closest point (n,) [m]."""
+    """Arc length of the closest point on the flexspline profile (n,) [m]."""
     point: Array
-    """Where that is, in the frame of the right half of the space (n, 2) [m]."""
+    """Position of that point in the frame of the right half of the space (n, 2) [m]."""
     where: tuple[Where, ...]
-    """What is closest: the flanks, or the edge or rounding at a tip."""
+    """Closest features: the flanks, or the edge or rounding at a tip."""
     flank: Array
     """Right flank of the tooth at every position, in the frame of the space, for
     drawing (n, m, 2) [m]."""
@@ -61,7 +62,7 @@ class ToothPath:
 
     @property
     def interference(self) -> float:
-        """Largest overlap over the passage, zero without any [m]."""
+        """Largest overlap over the passage; zero if there is none [m]."""
         return max(0.0, -self.smallest_clearance)
 
     @property
@@ -79,12 +80,13 @@ class ToothPath:
 def tooth_path(
     design: Design, *, positions: int = POSITIONS, points: int = POINTS
 ) -> ToothPath:
-    """Passage of the flexspline tooth through the space, worst lobe and flank.
+    """Passage of the flexspline tooth through the space, for the worst lobe and flank.
 
     Args:
         design: Drive with both profiles and a wave generator.
-        positions: Steps from half-way between lobes to the next half-way.
-        points: Points on either flank that are tested against the other one.
+        positions: Number of positions from half-way before the lobe to half-way after.
+        points: Number of points on either flank that are tested against the other
+            flank.
 
     Raises:
         DesignError: If a profile or the wave generator cannot be built.
@@ -118,9 +120,10 @@ def tooth_path(
 
 
 def _tip_end(profile: ToothProfile) -> float:
-    """Arc length where the tip of a flank ends: a tip arc, or a hair past an edge [m].
+    """Arc length at which the tip of a flank ends [m].
 
-    An edge that touches is found at the end of the flank itself.
+    The tip is a tip arc, or 0.1 % of the flank after an edge, because a touching edge
+    is found at the end of the flank itself.
     """
     low, high = profile.contact_range
     names = [part.name for part in profile.segments]
@@ -138,8 +141,8 @@ def _passage(
 ) -> tuple[Array, Array, Array, Array]:
     """Clearance, station, point and kind of the closest point per position.
 
-    Points of the flexspline flank against the circular spline, and the reverse: an edge
-    is found as a point of its own flank.
+    Points of the flexspline flank are tested against the circular spline and vice
+    versa, so that an edge is found as a point of its own flank.
     """
     n = len(theta)
     low, high = flexspline.contact_range
@@ -167,7 +170,7 @@ def _passage(
     gap[inside] = flexspline.signed_distance(there[inside])[0]
     k = np.argmin(gap, axis=1)
     better = gap[index, k] < clearance
-    # the foot on the flexspline flank: the sample nearest to the point
+    # foot on the flexspline flank: the sample nearest to the point
     foot = np.array([s[np.argmin(np.hypot(*(points - p).T))] for p in there[index, k]])
     station = np.where(better, foot, station)
     point = np.where(better[:, None], points_c[k], point)

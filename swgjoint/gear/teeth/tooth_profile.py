@@ -1,4 +1,4 @@
-"""The tooth profile of a member, of whatever kind the design asks for."""
+"""The tooth profile of a member, of the kind that the design specifies."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ def tooth_profile(design: Design, member: str, *, bounds: bool = True) -> ToothP
 
     Args:
         design: The drive.
-        member: Which of both.
-        bounds: Whether a refusal says which values would be accepted, which takes as
-            long as a thousand profiles of arcs.
+        member: ``flexspline`` or ``circular_spline``.
+        bounds: Whether an error for an arc profile states which values would be
+            accepted, which takes as long as building a thousand arc profiles.
 
     Raises:
-        DesignError: If the tooth cannot be built; one line that names the key.
+        DesignError: If the tooth cannot be built, in one line that names the key.
     """
     spec = design.flexspline if member == "flexspline" else design.circular_spline
     if spec.profile.kind == "involute":
         return involute_profile(design, member)
     if spec.profile.kind == "conjugate":
         other = "circular_spline" if member == "flexspline" else "flexspline"
-        given = tooth_profile(design, other)
-        return conjugate_profile(design, member, given)
+        mate = tooth_profile(design, other)
+        return conjugate_profile(design, member, mate)
     return arc_profile(design, member, bounds=bounds)
