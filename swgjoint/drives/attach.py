@@ -118,8 +118,8 @@ def attach(
         max_phase_step: Largest phase step h n |theta rate| of a harmonic that is kept
             [rad].
         integrator: ``discrete`` replaces Euler, ``implicit`` and ``implicitfast`` (the
-            last two with a warning) and raises solver settings that are too coarse;
-            ``keep`` changes neither.
+            last two with a warning) and resets iterations and tolerances of the solver
+            that are too coarse; ``keep`` changes neither.
         model: Fidelity of the map of a design: ``ring``, ``2d`` or ``3d``; None takes
             the default of the design.
         kinematic_error_arcmin: Assumed kinematic error, peak to peak over one output

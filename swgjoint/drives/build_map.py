@@ -70,7 +70,7 @@ def build_map(
 
     def build() -> DriveMap:
         if model == "3d":
-            hint = "takes some 20 min; 2d and ring are quicker"
+            hint = "takes about 20 min; 2d and ring are faster"
             progress(f"map of {design.drive.name} in 3D, {hint}", 0, 1)
         if model == "ring":
             samples = thin_ring.sample_rings(
