@@ -216,7 +216,7 @@ Profile = Annotated[
 
 
 class Member(Section):
-    """Flexspline or circular spline."""
+    """Toothed member: flexspline or circular spline."""
 
     rim_mm: Millimetre
     """Thickness of the rim below the teeth."""
