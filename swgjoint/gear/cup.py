@@ -28,14 +28,8 @@ def cup_torsional_stiffness(design: Design) -> float:
     Raises:
         ValueError: If the design has no cup.
 
-    Raises:
-        ValueError: If the design has no cup.
-
     Source:
-        Bredt's formula for a thin closed section, and pure shear of an annular plate.
-        Yague-Spaude (2021), "Computational Design, Simulation of Meshing, and Stress
-        Analysis of Strain Wave Gear Drives", doctoral dissertation, Rochester Institute
-        of Technology.
+        Bredt's formula for a closed thin section; pure shear of an annular plate.
 
     >>> from swgjoint import Design
     >>> round(cup_torsional_stiffness(Design.load("reference-3d")) / 1e3)
