@@ -85,7 +85,7 @@ def dxf_text(curves: Curves) -> str:
     return "\n".join(lines) + "\n"
 
 
-def csv_text(curves: Sequence[Curve]) -> str:
+def curves_csv(curves: Sequence[Curve]) -> str:
     """CSV text with the columns curve (from 0), x_mm and y_mm.
 
     Closed curves do not repeat their first point.
