@@ -1,4 +1,4 @@
-"""The map of a drive: where it comes from, its file and its spec sheet."""
+"""The map of a drive: constructors, file and spec sheet."""
 
 from __future__ import annotations
 
@@ -15,9 +15,10 @@ from swgjoint.maps.potential import Potential
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DriveMap(Potential):
-    """The reduced drive: torque over torsion and angles, with its sources and files.
+    """The reduced drive: torque over torsion and angles.
 
-    The data and the equations are those of :class:`Potential`.
+    Data and equations are inherited from :class:`Potential`; this class adds
+    constructors, files and the spec sheet.
     """
 
     # -- constructors ---------------------------------------------------------
@@ -78,23 +79,24 @@ class DriveMap(Potential):
     ) -> Self:
         """The map of a catalogue drive such as ``CSG-25-100``: series, size, ratio.
 
-        Stiffness K1, K2, K3 and ratings of the shipped tables, and the hysteresis loss
-        where a row states one (CHA), at the upper bound that it is; friction where
+        Stiffness K1, K2, K3 and ratings come from the shipped tables. The hysteresis
+        loss is the stated upper bound if a row has one (CHA). Friction is included if
         losses are stated (CSG, ratio 100, sizes 14 to 25). The kinematic error is that
-        of an assumed specimen, 2 and 4 cycles per turn of the input, whose peak to peak
-        is the transmission accuracy that the tables state: a bound that says nothing of
-        orders and phases. ``info["kinematic_error"]`` says what was assumed,
-        ``info["stated"]`` what the tables state.
+        of an assumed specimen with 2 and 4 cycles per input turn, whose peak to peak is
+        the stated transmission accuracy; that bound says nothing about orders and
+        phases. ``info["kinematic_error"]`` records the assumption and
+        ``info["stated"]`` the figures of the tables.
 
         Args:
-            name: Of the row.
-            kinematic_error_arcmin: Peak to peak over one output turn; None: the stated
-                transmission accuracy, no error where none is stated; 0: no error.
-            seed: Of the share of both orders and of their phases.
+            name: Name of the row.
+            kinematic_error_arcmin: Peak to peak over one output turn [arcmin]. None
+                takes the stated transmission accuracy, or no error if none is stated;
+                0 means no error.
+            seed: Seed of the amplitude ratio of both orders and of their phases.
 
         Raises:
-            InputError: With the nearest names, if there is no such row, or if an option
-                is out of range.
+            InputError: If there is no such row (the message lists the nearest names) or
+                an option is out of range.
 
         >>> from swgjoint import DriveMap
         >>> drive = DriveMap.from_catalogue("CSG-25-100")
@@ -123,11 +125,11 @@ class DriveMap(Potential):
         Args:
             path: CSV file of a torque-torsion loop, input locked, both signs of the
                 torque: ``torque_Nm`` and ``torsion_arcmin`` or ``torsion_rad``.
-            teeth_flexspline: z_fs.
-            teeth_circular_spline: z_cs.
-            ratings: Torques, or the rated torque alone [N·m].
+            teeth_flexspline: Number of teeth of the flexspline, z_fs.
+            teeth_circular_spline: Number of teeth of the circular spline, z_cs.
+            ratings: All catalogue torques, or only the rated torque [N·m].
             kinematic_error: CSV file of one output turn without load: ``output_deg``
-                and ``error_arcmin``, output minus ideal output (also ``_rad``).
+                and ``error_arcmin`` (or ``_rad``), output minus ideal output.
             **options: ``layout``, ``orders``, ``intervals``, ``damping_ratio``,
                 ``name``; see :mod:`swgjoint.maps.fit.measurement`.
 
@@ -154,7 +156,7 @@ class DriveMap(Potential):
         return read_map(path, cls)
 
     def save(self, path: str | Path) -> None:
-        """Write a ``.swg`` file, whole or not at all."""
+        """Write a ``.swg`` file atomically."""
         from swgjoint.maps.file import write_map
 
         write_map(self, path)
@@ -162,11 +164,11 @@ class DriveMap(Potential):
     def spec_sheet(self, only: Collection[str] = ()) -> dict[str, Any]:
         """Catalogue-style figures, measured on the map by the standard procedures.
 
-        Keys as ``swgjoint spec`` has them; None where the source cannot tell, with the
-        reason in ``missing``.
+        The keys are those of ``swgjoint spec``. A figure that the map does not provide
+        is None, and ``missing`` gives the reason.
 
         Args:
-            only: Keys that are wanted, all for none.
+            only: Keys to compute; all if empty.
 
         >>> from swgjoint import DriveMap
         >>> drive = DriveMap.from_catalogue("CSG-25-100")

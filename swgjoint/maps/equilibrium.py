@@ -1,4 +1,4 @@
-"""Where the output of a map stands at a given input angle and torque."""
+"""Output angle of a map at a given input angle and torque."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from swgjoint.maps.potential import Potential
 from swgjoint.typing import Array
 
 CHUNK = 2**14
-"""Angles times harmonics that are evaluated at once: they stay in the cache."""
+"""Angles times harmonics evaluated at once; the arrays then fit in the CPU cache."""
 _NEWTON = 12
 _BISECTIONS = 400
 
@@ -24,24 +24,24 @@ def output_angle(
 ) -> Array:
     """Output angle psi [rad] at which the drive exerts a torque on the output.
 
-    Newton steps from the mean curve; what they do not settle is bisected. Where
-    clearance leaves the output free at zero torque, the middle (e0) is taken.
+    Newton's method starts from the mean curve; points where it does not converge are
+    bisected. If the unloaded output has clearance, its middle (e0) is returned.
 
     Args:
         drive: The map.
         theta: Input angles [rad].
         torque: T on the output [N·m], broadcast with the angles.
-        sliders: Hysteresis, each point reached on a path of one direction from there;
-            none: the conservative part alone.
+        sliders: State of the hysteresis; each point is reached from it on a monotone
+            path of the torsion. None takes the conservative part alone.
 
     Raises:
-        ComputationError: If a torque is not reached by the map.
+        ComputationError: If the map does not reach a torque.
     """
     theta, torque = np.broadcast_arrays(
         np.asarray(theta, float), np.asarray(torque, float)
     )
     flat_theta, flat_torque = theta.ravel(), torque.ravel()
-    # torsion of the mean curve over torque, for the start
+    # torsion of the mean curve over torque, for the initial guess
     knots = drive.torsion_knots
     x = np.linspace(2.0 * knots[0], 2.0 * knots[-1], 801)
     curve = drive.coefficients(x, 1)[:, 0, 0], x
@@ -67,7 +67,7 @@ def _solve(
     twist = np.where(torque == 0.0, 0.0, np.interp(torque, *curve))
     psi = ideal + e0 - twist
     span = float(drive.torsion_knots[-1] - drive.torsion_knots[0])
-    # the round-off of psi itself, many times finer than any sensor
+    # round-off of psi, far below the resolution of any sensor
     settled = 8.0 * np.finfo(float).eps * np.maximum(np.abs(ideal), span)
     open_ = np.arange(theta.size)
     for _ in range(_NEWTON):
@@ -92,7 +92,7 @@ def _solve(
 def _torque(
     drive: Potential, theta: Array, psi: Array, sliders: Sliders | None
 ) -> tuple[Array, Array]:
-    """T on the output, -dV/dpsi, and the stiffness at fixed angles."""
+    """T on the output, -dV/dpsi, and the stiffness at fixed phases."""
     phases = drive.phases(theta, psi)
     cos, sin = np.cos(phases), np.sin(phases)
     e0, _, e_psi = drive.error_at(phases)
@@ -119,7 +119,7 @@ def _bisect(
     width: float,
     sliders: Sliders | None,
 ) -> Array:
-    """The same to round-off where stiffness vanishes or jumps."""
+    """Output angle to round-off by bisection, for stiffness that vanishes or jumps."""
 
     def excess(psi: Array) -> Array:
         return _torque(drive, theta, psi, sliders)[0] - torque

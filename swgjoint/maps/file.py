@@ -2,9 +2,9 @@
 
 Members: ``header.npy`` (JSON text as bytes), the arrays of
 :class:`~swgjoint.maps.drive_map.DriveMap` and, where the map has them, those of its
-:class:`~swgjoint.maps.fields.DriveFields`. The reader trusts nothing: no member is
-compressed or pickled, sizes are checked against the bytes that are there before
-anything is allocated, and the map must be finite, increasing and continuous.
+:class:`~swgjoint.maps.fields.DriveFields`. The reader trusts no file: it refuses
+compressed and pickled members, checks sizes against the number of bytes before it
+allocates memory, and accepts only a finite, increasing and continuous map.
 """
 
 from __future__ import annotations
@@ -39,14 +39,14 @@ from swgjoint.maps.info import check_texts, sound_info
 from swgjoint.maps.potential import Potential
 
 SCHEMA_VERSION = 4
-"""2 added ``hysteresis``, 3 ``friction`` and the ratcheting torque, 4 fields to be
-shown; an older map is read as one without."""
+"""Version 2 added ``hysteresis``, 3 ``friction`` and the ratcheting torque, 4 the
+fields for display. Older maps are read as maps without these parts."""
 _READABLE = (1, 2, 3, SCHEMA_VERSION)
 MAX_BYTES = 64_000_000
-"""A map with a thousand harmonics and a hundred knots is below 10 MB."""
+"""Largest file that is read; a thousand harmonics and a hundred knots take 10 MB."""
 
 MAX_NAME = 300
-"""Characters of a map's name, and of a path that a message repeats whole."""
+"""Longest name of a map, and longest path that a message repeats in full."""
 
 _ARRAYS: dict[str, tuple[str, int, str]] = {
     "torsion_knots": ("<f8", 1, "rad"),
@@ -62,7 +62,7 @@ _FIELDS: dict[str, tuple[str, int, str]] = {
         ("first_place", "<f8", "rad"),
         ("points", "<f8", "m"),
         ("triangles", "<i8", "nodes"),
-        # to be looked at: seven digits are enough
+        # for display: single precision suffices
         ("displacement", "<f4", "m"),
         ("von_mises", "<f4", "Pa"),
         ("tooth_force", "<f4", "N"),
@@ -82,7 +82,7 @@ Map = TypeVar("Map", bound=Potential)
 
 
 class RatingsHeader(Section):
-    """Torques of the catalogue [N·m]."""
+    """Catalogue torques [N·m]."""
 
     rated_torque: float
     repeated_peak: float
@@ -94,7 +94,7 @@ class RatingsHeader(Section):
 
 
 class JenkinHeader(Section):
-    """One element of the hysteresis."""
+    """One Jenkin element of the hysteresis."""
 
     stiffness_Nm_rad: float
     yield_torque_Nm: float
@@ -125,7 +125,7 @@ _FRICTION = {
     "damping_Nms_rad": "damping",
     "source": "source",
 }
-"""Keys of the file and fields of the friction."""
+"""Fields of :class:`Friction` by their keys in the file."""
 
 
 class Header(Section):
@@ -149,7 +149,7 @@ class Header(Section):
 
 
 def map_bytes(drive: Potential) -> bytes:
-    """The content of a ``.swg`` file; the same map gives the same bytes."""
+    """Content of a ``.swg`` file; equal maps give equal bytes."""
     header = {
         "format": "swgjoint drive map",
         "schema_version": SCHEMA_VERSION,
@@ -200,7 +200,7 @@ def map_bytes(drive: Potential) -> bytes:
         for key, array in members.items():
             member = io.BytesIO()
             np.lib.format.write_array(member, array, version=(1, 0), allow_pickle=False)
-            # ZipInfo's own date, 1980, keeps the bytes independent of the clock
+            # the default date of ZipInfo keeps the bytes independent of the clock
             archive.writestr(zipfile.ZipInfo(f"{key}.npy"), member.getvalue())
     return out.getvalue()
 
@@ -210,14 +210,15 @@ def _plain(value: object) -> object:
 
 
 def write_map(drive: Potential, path: str | Path) -> None:
-    """Write a ``.swg`` file, whole or not at all.
+    """Write a ``.swg`` file atomically.
 
     Args:
         drive: The map.
         path: File to write, ``.swg``.
 
     Raises:
-        InputError: If the file cannot be written, or the reader would refuse the map.
+        InputError: If the file cannot be written.
+        MapFileError: If the reader would refuse the map.
     """
     try:
         check_map(drive)
@@ -229,16 +230,20 @@ def write_map(drive: Potential, path: str | Path) -> None:
 def read_map(path: str | Path, cls: type[Map]) -> Map:
     """Read a ``.swg`` file.
 
+    Args:
+        path: File to read, ``.swg``.
+        cls: Class of the map to return.
+
     Raises:
-        MapFileError: In one line, if the file is missing, damaged, hostile or of
-            another schema version.
+        MapFileError: With a message of one line, if the file is missing, damaged,
+            malicious or of an unknown schema version.
     """
     where = str(path) if len(str(path)) <= MAX_NAME else f"{str(path)[:57]}..."
     try:
         return map_from_bytes(_content(Path(path)), cls)
     except OSError as exc:
         raise MapFileError(f"map {where}: cannot be read: {exc.strerror}") from None
-    # zipfile knows some kinds of compression and encryption by name only
+    # zipfile recognises compression and encryption that it does not implement
     except (ValueError, zipfile.BadZipFile, NotImplementedError, EOFError) as exc:
         lines = str(exc).splitlines() or [type(exc).__name__]
         more = f" (and {len(lines) - 1} more)" if len(lines) > 1 else ""
@@ -248,8 +253,12 @@ def read_map(path: str | Path, cls: type[Map]) -> Map:
 def map_from_bytes(data: bytes, cls: type[Map]) -> Map:
     """A map from the content of a ``.swg`` file.
 
+    Args:
+        data: Bytes of the file.
+        cls: Class of the map to return.
+
     Raises:
-        ValueError: If the content is not a sound map.
+        ValueError: If the content is not a valid map.
     """
     members = _members(data)
     header = _header(members.pop("header"))
@@ -300,7 +309,7 @@ def _friction(header: FrictionHeader | None) -> Friction | None:
 
 
 def _content(path: Path) -> bytes:
-    """The bytes of a regular file that is not too long."""
+    """The bytes of a regular file of at most :data:`MAX_BYTES`."""
     status = path.stat()
     if not stat.S_ISREG(status.st_mode):
         raise MapFileError("not a file")
@@ -342,9 +351,9 @@ def _members(data: bytes) -> dict[str, bytes]:
 
 
 def _array(data: bytes, name: str, dtype: str, ndim: int) -> NDArray[Any]:
-    """One array; shape and dtype must agree with the number of bytes.
+    """One array, whose shape and dtype must agree with its number of bytes.
 
-    The header of the member is matched as text: nothing of it is evaluated.
+    The header of the member is matched as text and never evaluated.
     """
     head = _NPY.match(data)
     if head is None or int.from_bytes(head["length"], "little") != head.end() - 10:

@@ -2,11 +2,11 @@
 
 Torque against torsion has the slopes K1, K2, K3 on 0..T1, T1..T2 and above. The two
 corners are rounded by parabolas that end on the catalogue's lines (:data:`CORNER`), so
-torque and stiffness are continuous. Two figures that a catalogue states as upper bounds
-are in the map at the bound, with a label that a drive may have less: the hysteresis
-loss and, as the kinematic error of an assumed specimen, the transmission accuracy; see
-:mod:`swgjoint.maps.fit.error_spectrum`. Where losses at speed are stated the map has
-friction.
+torque and stiffness are continuous. A catalogue states two figures as upper bounds: the
+hysteresis loss and the transmission accuracy. The map takes both at the bound, with a
+label that a drive may have less. The transmission accuracy becomes the kinematic error
+of an assumed specimen; see :mod:`swgjoint.maps.fit.error_spectrum`. The map has
+friction if the catalogue states running losses.
 """
 
 from __future__ import annotations
@@ -37,15 +37,15 @@ from swgjoint.maps.torsion_law import potential_of_stiffness
 from swgjoint.units import arcmin
 
 SHARED_SERIES = ("CSF", "CSG", "SHG", "HFUC", "HFUS", "CHA")
-"""Series with the stiffness of ``stiffness.csv``; only CSG has ratings of its own."""
+"""Series that share ``stiffness.csv``; only CSG has its own ratings there."""
 CORNER = 0.04
-"""Half width of a rounded corner, as part of the shorter line beside it. The chord
-over a line of slope K beside one of slope K' changes by CORNER |K'/K - 1|/4: less
+"""Half width of a rounded corner, as a fraction of the shorter adjacent line. The chord
+over a line of slope K next to one of slope K' changes by CORNER |K'/K - 1|/4: less
 than 1 % for every shipped row."""
 LOBES = 2
 SLOPES = ("K1", "K2", "K3")
 CLOSE = 1e-4
-"""Part by which slopes and hysteresis loss of the loop may miss the row."""
+"""Relative tolerance of the slopes and the hysteresis loss of the loop."""
 ROUNDS = 50
 
 _NAME = re.compile(r"([A-Z]+)-(\d{1,4})-(\d{1,4})")
@@ -63,7 +63,7 @@ def catalogue_names() -> list[str]:
 
 
 def is_catalogue_name(text: str) -> bool:
-    """Whether a reference means the catalogue: it begins with a series."""
+    """Whether a reference begins with a catalogue series."""
     series = "|".join(SHARED_SERIES)
     name = re.match(rf"(?:{series})(?:[-\s\d]|$)", text, re.IGNORECASE)
     return name is not None and not text.endswith(".toml")
@@ -86,7 +86,7 @@ def find_row(name: str) -> CatalogueRow:
         why = f"has no ratings in models/catalogue; series that have: {', '.join(has)}"
     else:
         why = "is not in models/catalogue/ratings.csv"
-    # nearest by factor in size, then in ratio; 100 where the name says none
+    # nearest by the factors of size and ratio; a ratio of 100 if the name has none
     digits = [max(1, int(text)) for text in re.findall(r"\d{1,4}", wanted)]
     size, ratio = ([*digits, 100] if digits else [25, 100])[:2]
     near = sorted(
@@ -110,8 +110,15 @@ def map_from_catalogue(
 
     Two-lobe gearing with the circular spline fixed: z_fs = 2 ratio, z_cs = z_fs + 2.
 
+    Args:
+        name: Name of the row, such as ``CSG-25-100``.
+        cls: Class of the map to return.
+        kinematic_error_arcmin: Peak to peak over one output turn [arcmin]; the stated
+            transmission accuracy if None.
+        seed: Seed of the assumed kinematic error.
+
     Raises:
-        InputError: If the name is unknown, the tables contradict themselves or an
+        InputError: If the name is unknown, the tables contradict each other or an
             option is out of range.
     """
     drive = _without_error(find_row(name), cls)
@@ -129,10 +136,10 @@ def with_stated_error(
 
     Args:
         drive: Map of a catalogue row.
-        kinematic_error_arcmin: Peak to peak over one output turn; None: the stated
-            transmission accuracy.
-        seed: Of the assumed error.
-        joint: That the drive is for, see
+        kinematic_error_arcmin: Peak to peak over one output turn [arcmin]; the stated
+            transmission accuracy if None.
+        seed: Seed of the assumed error.
+        joint: Name of the joint that the drive is for, see
             :func:`~swgjoint.maps.fit.error_spectrum.with_assumed_error`.
 
     Raises:
@@ -206,11 +213,12 @@ def _spring(row: CatalogueRow, s: dict[str, float]) -> dict[str, Any]:
 def _with_hysteresis(
     drive: Map, row: CatalogueRow, s: dict[str, float], loss: float
 ) -> Map:
-    """The map whose loop shows the slopes of the row and a hysteresis loss [rad].
+    """The map whose loop has the slopes of the row and a hysteresis loss [rad].
 
-    The mid-line of a loop is not its spring: it mixes the slopes beside T1 and T2, and
-    at the tip, where both branches meet, the elements carry load too. So the slopes of
-    the spring are set such that those measured on the loop are the catalogue's.
+    The mid-line of a loop differs from the spring: it mixes the slopes around T1 and
+    T2, and the elements also carry load at the tip, where both branches meet. The
+    slopes of the spring are therefore chosen so that the slopes measured on the loop
+    equal those of the catalogue.
     """
     r = drive.ratings
     limits = (0.0, r.T1, r.T2, largest_torque(r))
@@ -242,9 +250,9 @@ def three_lines(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Knots [rad] and stiffness there [N·m/rad] of three lines with rounded corners.
 
-    Slopes K1 to T1, K2 to T2 and K3 beyond, odd in the torsion. Between the two ends of
-    a corner the stiffness is linear; by the trapezoid the torque then ends on the next
-    line exactly.
+    The slope is K1 up to T1, K2 up to T2 and K3 beyond; the curve is odd in the
+    torsion. Within a corner the stiffness is linear, so that by the trapezoidal rule
+    the torque ends exactly on the next line.
 
     Args:
         T1: End of the first line [N·m].
@@ -267,7 +275,7 @@ def three_lines(
 
 
 def _missing(stated: dict[str, float | None]) -> dict[str, str]:
-    """Why the map cannot tell a figure, with what the catalogue says instead."""
+    """Why the map does not provide a figure, and what the catalogue states instead."""
 
     def says(key: str) -> str:
         value = stated[key]

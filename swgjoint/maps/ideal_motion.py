@@ -1,12 +1,13 @@
 r"""A map near its ideal motion: cheap torques for many positions and harmonics.
 
-The output stays within a milliradian of theta/i, over which the phases of the harmonics
-hardly move: to second order in that distance s, at each theta,
+The output stays within a milliradian of theta/i, and over this distance the phases of
+the harmonics change very little. To second order in the distance s, at each theta,
 
 .. math:: V = V_0(\Delta) + s V_1(\Delta), \quad e_0 = a + s b, \quad
     \Delta = e_0 - s, \quad T = -\frac{dV}{ds} .
 
-The sums over the harmonics are matrix products, once per position, not per iteration.
+The sums over the harmonics are matrix products, computed once per position instead of
+once per iteration.
 """
 
 from __future__ import annotations
@@ -21,30 +22,35 @@ from swgjoint.typing import Array
 
 _NEWTON = 12
 _BEND = 1e-3
-"""Largest second order term, (q s)^2/2, that may be left out."""
+"""Largest second-order term, (q s)^2/2, that may be neglected."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class IdealMotion:
-    """Polynomials of the torsion at given input angles, n of them."""
+    """Polynomials of the torsion at n given input angles."""
 
     drive: Potential
     theta: Array
     """Input angles [rad]. Shape (n,)."""
     error: Array
-    """e0 at psi = theta/i and its derivative by psi. Shape (2, n)."""
+    """e0 at psi = theta/i [rad] and its derivative by psi [-]. Shape (2, n)."""
     potential: Array
-    """V_0 and V_1 as the coefficients of a map. Shape (2, n, n_knots - 1, 5)."""
+    """Coefficients of V_0 and V_1, as in a map. Shape (2, n, n_knots - 1, 5)."""
     ends: Array
-    """Their V'' below and above the knots. Shape (2, n, 2)."""
+    """V_0'' and V_1'' below and above the knots. Shape (2, n, 2)."""
 
     @classmethod
     def from_map(cls, drive: Potential, theta: Array) -> IdealMotion:
-        """Sum the harmonics at psi = theta/i."""
+        """Sum the harmonics at psi = theta/i.
+
+        Args:
+            drive: The map.
+            theta: Input angles [rad]. Shape (n,).
+        """
         phases = drive.phases(theta, theta / drive.ratio)
         cos, sin = np.cos(phases), np.sin(phases)
         n_psi = drive.angle_orders[:, 1]
-        # by cosine and sine amplitudes: the value, and the derivative by psi
+        # factors of the cosine and sine amplitudes: in the value, in its psi derivative
         value = np.stack([cos, sin], axis=-1).reshape(theta.size, -1)
         slope = np.stack([-n_psi * sin, n_psi * cos], axis=-1).reshape(theta.size, -1)
         both = np.stack([value, slope])
@@ -59,7 +65,10 @@ class IdealMotion:
         )
 
     def torque(self, shift: Array) -> tuple[Array, Array]:
-        """T on the output at psi = theta/i + shift, and -dT/dpsi [N·m, N·m/rad]."""
+        """T on the output at psi = theta/i + shift, and -dT/dpsi [N·m, N·m/rad].
+
+        ``shift`` has the shape (n,) [rad].
+        """
         knots = self.drive.torsion_knots
         a, b = self.error
         x = a + (b - 1.0) * shift
@@ -80,7 +89,7 @@ class IdealMotion:
     def output_angle(self, torque: float) -> Array:
         """Psi at which the drive exerts a torque on the output [rad].
 
-        Newton steps; positions that they do not settle, and those far from the ideal
+        Positions where Newton's method does not converge, and those far from the ideal
         motion, are solved on the map itself.
         """
         drive = self.drive
@@ -88,8 +97,8 @@ class IdealMotion:
         settled = 1e-12 * float(np.ptp(drive.torsion_knots))
         step = np.full(shift.shape, np.inf)
         for _ in range(_NEWTON):
-            found, stiffness = self.torque(shift)
-            missing = found - torque
+            exerted, stiffness = self.torque(shift)
+            missing = exerted - torque
             soft = np.where(stiffness > 0.0, stiffness, np.nan)
             step = np.where(missing == 0.0, 0.0, missing / soft)
             if not (np.abs(step) > settled).any():

@@ -9,9 +9,10 @@ with :math:`\Delta = \theta/i + e_0(\alpha, \beta) - \psi`. The coefficients are
 piecewise polynomials of degree four, so torque is piecewise cubic. Outside the
 sampled torsion every coefficient continues as a parabola, the torque linearly.
 
-Beside the potential a map may have hysteresis, Jenkin elements along the torsion (see
-:mod:`swgjoint.maps.hysteresis`), and friction of the wave generator at speed (see
-:mod:`swgjoint.maps.friction`). Everything below but these two is conservative.
+In addition to the potential, a map may have hysteresis (Jenkin elements along the
+torsion, see :mod:`swgjoint.maps.hysteresis`) and friction of the wave generator (see
+:mod:`swgjoint.maps.friction`). Everything in this module except these two is
+conservative.
 """
 
 from __future__ import annotations
@@ -37,31 +38,31 @@ from swgjoint.units import arcmin
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Law:
-    """Torsion and generalised forces of the potential at some angles, one shape."""
+    """Torsion and generalised forces at given angles; all arrays have their shape."""
 
     torsion: Array
-    """[rad]."""
+    """Torsion [rad]."""
     by_theta: Array
     """Derivative of the torsion by the input angle [-]."""
     by_psi: Array
-    """The same by the output angle [-]."""
+    """Derivative of the torsion by the output angle [-]."""
     input_force: Array
-    """-dV/dtheta [N·m]."""
+    """Generalised force on the input, -dV/dtheta [N·m]."""
     output_force: Array
-    """-dV/dpsi, the torque on the output [N·m]."""
+    """Torque on the output, -dV/dpsi [N·m]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Potential:
     """Potential, hysteresis and friction of one drive; immutable.
 
-    Users have a :class:`~swgjoint.maps.drive_map.DriveMap`, which adds constructors,
-    files and the spec sheet.
+    Users work with a :class:`~swgjoint.maps.drive_map.DriveMap`, which adds
+    constructors, files and the spec sheet.
     """
 
     name: str
     level: str
-    """Source: ``ring``, ``2d``, ``3d``, ``catalogue``, ``measurement``, ``linear``."""
+    """Origin: ``ring``, ``2d``, ``3d``, ``catalogue``, ``measurement``, ``linear``."""
     layout: str
     teeth_flexspline: int
     teeth_circular_spline: int
@@ -84,11 +85,11 @@ class Potential:
     ratings: Ratings
     damping_ratio: float = 0.02
     hysteresis: tuple[Jenkin, ...] = ()
-    """Parallel elements that add to the torque along the torsion; none by default."""
+    """Jenkin elements whose torque adds to that of the potential; none by default."""
     friction: Friction | None = None
     """Friction of the wave generator against the flexspline; None by default."""
     fields: DriveFields | None = None
-    """Shape and stress of the flexspline, to be shown; none without finite elements."""
+    """Shape and stress of the flexspline for display; None without finite elements."""
     info: Mapping[str, Any] = field(default_factory=dict)
     """Provenance and residuals, JSON values only."""
 
@@ -142,7 +143,7 @@ class Potential:
 
     @property
     def friction_direction(self) -> tuple[int, int]:
-        """(d beta/d theta, d beta/d psi), the rotation against which friction acts."""
+        """(d beta/d theta, d beta/d psi) of the rotation that friction opposes."""
         return angle_coefficients(self.layout)[1]
 
     def phases(self, theta: ArrayLike, psi: ArrayLike) -> Array:
@@ -158,7 +159,7 @@ class Potential:
         return np.asarray(angles @ self.angle_orders.T.astype(float))
 
     def error_at(self, phases: Array) -> tuple[Array, Array, Array]:
-        """e0 and its derivatives by theta and psi, [rad] and [-]."""
+        """Kinematic error e0 [rad] and its derivatives by theta and psi [-]."""
         cos, sin = np.cos(phases), np.sin(phases)
         a, b = self.kinematic_error.T
         slope = b * cos - a * sin
@@ -221,7 +222,7 @@ class Potential:
         )
 
     def energy(self, torsion: ArrayLike, theta: ArrayLike, psi: ArrayLike) -> Array:
-        """V [J].
+        """Potential V at given torsion and angles [J].
 
         Args:
             torsion: Torsion [rad].
@@ -231,7 +232,7 @@ class Potential:
         return self._sum(torsion, self.phases(theta, psi), 0)
 
     def torque(self, torsion: ArrayLike, theta: ArrayLike, psi: ArrayLike) -> Array:
-        """dV/d(torsion) at fixed angles [N·m].
+        """Torque dV/d(torsion) at fixed angles [N·m].
 
         Args:
             torsion: Torsion [rad].
@@ -264,7 +265,7 @@ class Potential:
         return law.input_force, law.output_force
 
     def law(self, theta: ArrayLike, psi: ArrayLike) -> Law:
-        """All that the potential says at given angles; shapes of the angles.
+        """Torsion, its derivatives and both generalised forces at given angles.
 
         Args:
             theta: Motor angle of the input [rad].
@@ -291,7 +292,7 @@ class Potential:
             output_force=-torque * g_psi - np.sum(by_phase * n_psi, axis=-1),
         )
 
-    # -- figures that a joint needs -------------------------------------------
+    # -- figures used by joints -----------------------------------------------
 
     @property
     def mean_stiffness(self) -> float:
@@ -303,7 +304,10 @@ class Potential:
 
     @property
     def max_stiffness(self) -> float:
-        """Bound of the stiffness over torsion and angles, continuation included."""
+        """Upper bound of the stiffness at any torsion and angles [N·m/rad].
+
+        It includes the continuation beyond the sampled torsion.
+        """
         x = np.concatenate(
             [
                 np.linspace(a, b, 9)
@@ -333,7 +337,7 @@ class Potential:
         """
         from scipy.optimize import brentq
 
-        # a search asks one after the other: plain numbers make it five times as fast
+        # the root search evaluates single points: plain floats are five times as fast
         knots, pieces = self.torsion_knots.tolist(), self.potential[0, 0].tolist()
         before, after = self.end_stiffness[0, 0].tolist()
 
@@ -354,7 +358,7 @@ class Potential:
         raise ValueError(f"torque {torque} N·m is not reached by this map")
 
     def with_harmonics(self, keep: ArrayLike) -> Self:
-        """A copy with the harmonics for which ``keep`` is true; the mean stays."""
+        """A copy with the mean and the harmonics for which ``keep`` is true."""
         mask = np.array(keep, dtype=bool)
         mask[0] = True
         return replace(
@@ -366,16 +370,17 @@ class Potential:
         )
 
     def pruned(self, tolerance_arcmin: float) -> Self:
-        """A copy without the harmonics that a tolerance does not need.
+        """A copy without the weakest harmonics, within a tolerance.
 
-        ``info["pruned"]`` lists what was dropped and bounds its effect on output angle,
-        kinematic error and torque; see :mod:`swgjoint.maps.fit.pruning`.
+        ``info["pruned"]`` lists the dropped harmonics and bounds their effect on output
+        angle, kinematic error and torque; see :mod:`swgjoint.maps.fit.pruning`.
 
         Args:
-            tolerance_arcmin: Of the output angle at a given torque and input angle.
+            tolerance_arcmin: Largest change of the output angle at a given torque and
+                input angle [arcmin].
 
         Raises:
-            InputError: If it is not positive, or no bound follows from the map.
+            InputError: If the tolerance is not positive or the map gives no bound.
         """
         from swgjoint.maps.fit.pruning import pruned_map
 

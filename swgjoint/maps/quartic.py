@@ -1,4 +1,4 @@
-"""Piecewise quartics through value, slope and second derivative."""
+"""Piecewise quartics with given value, slope and second derivative at their knots."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from swgjoint.typing import Array
 def quartic_chain(knots: Array, values: Array) -> tuple[Array, Array]:
     """Piecewise quartics with given value, slope and second derivative at the knots.
 
-    Every interval is cut in half; the two quartics share value and three derivatives
-    in the middle.
+    Every interval is cut in half; at the midpoint the two quartics agree in value and
+    three derivatives.
 
     Args:
-        knots: Shape (n,).
+        knots: Increasing knots. Shape (n,).
         values: V, V' and V'' at the knots. Shape (3, n).
 
     Returns:
         Breakpoints (2 n - 1,) and ascending coefficients (2 n - 2, 5).
     """
-    # on [0, 2] with the cut at 1: left a0..a4, right in powers of (x - 1); the right
-    # one follows from the left by continuity of order three, up to its b4
+    # on [0, 2] with the cut at 1: the left quartic a0..a4, the right one in powers of
+    # (x - 1); continuity of order three gives the right one up to its b4
     condition = np.zeros((3, 3))
     known = np.zeros((3, 3))
     for row in range(3):  # derivative at x = 2
@@ -31,7 +31,7 @@ def quartic_chain(knots: Array, values: Array) -> tuple[Array, Array]:
         for k in range(3):
             known[row, k] = fall[k] * 2.0 ** (k - row) if k >= row else 0.0
         for column, k in enumerate((3, 4)):
-            # (x)^k continued to order three beyond the cut
+            # x^k continued to order three beyond the cut
             taylor = [comb(k, j) for j in range(4)]
             condition[row, column] = sum(
                 t * np.prod(np.arange(j, j - row, -1))
@@ -55,15 +55,15 @@ def quartic_chain(knots: Array, values: Array) -> tuple[Array, Array]:
 
 
 def evaluate(breaks: Array, pieces: Array, at: Array) -> Array:
-    """Value and two derivatives of a chain at places inside it.
+    """Value and two derivatives of a chain at points inside it.
 
     Args:
-        breaks: As of :func:`quartic_chain` (m + 1,).
-        pieces: The same (m, 5).
-        at: Places (n,).
+        breaks: Breakpoints from :func:`quartic_chain`. Shape (m + 1,).
+        pieces: Coefficients from :func:`quartic_chain`. Shape (m, 5).
+        at: Points. Shape (n,).
 
     Returns:
-        Shape (3, n).
+        Value, slope and second derivative. Shape (3, n).
     """
     k = np.clip(np.searchsorted(breaks, at, side="right") - 1, 0, len(pieces) - 1)
     a, x = pieces[k].T, at - breaks[k]

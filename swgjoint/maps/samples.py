@@ -1,4 +1,4 @@
-"""What a simulation hands to the map: equilibria over torque and angle."""
+"""Input of a map fit: simulated equilibria over torque and angle."""
 
 from __future__ import annotations
 
@@ -16,42 +16,42 @@ from swgjoint.typing import Array
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FullSolves:
-    """Single equilibria that judge a map and take no part in its fit. Shapes (n,)."""
+    """Equilibria that validate a map and are not used in its fit. Shapes (n,)."""
 
     input_angle: Array
-    """theta [rad]."""
+    """Input angle theta [rad]."""
     torque: Array
-    """T [N·m]."""
+    """Output torque T [N·m]."""
     output_error: Array
-    """psi - theta/i [rad]."""
+    """Output error psi - theta/i [rad]."""
     input_torque: Array
     """External torque on the input [N·m]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ToleranceSamples:
-    """Equilibria of a drive with errors of its teeth over a whole cycle of them.
+    """Equilibria of a drive with tooth errors over a whole cycle of its teeth.
 
-    The cycle has so many pitches that the teeth that mesh return; after each of them
-    the perfect drive would be the same. Quantities of a table, its first axis: output
-    error psi - theta/i [rad], strain energy [J], compliance [rad/(N·m)].
+    After one cycle the same teeth mesh again; a drive with perfect teeth repeats after
+    every pitch. The first axis of a table selects the quantity: output error
+    psi - theta/i [rad], strain energy [J], compliance [rad/(N·m)].
     """
 
     pitches: int
     """Number of pitches of the cycle."""
     phases: int
-    """Positions in a pitch."""
+    """Number of positions per pitch."""
     torque: Array
-    """T, increasing, zero included [N·m]. Shape (n_torques,)."""
+    """Output torques T, increasing, zero included [N·m]. Shape (n_torques,)."""
     table: Array
-    """At equal steps of theta over the cycle, its end excluded. Shape (3, n_torques,
-    pitches * phases)."""
+    """Quantities at equal steps of theta over the cycle, its end excluded. Shape (3,
+    n_torques, pitches * phases)."""
     perfect: Array
-    """The same without the errors, by the same means. Shape (3, n_torques, phases)."""
+    """The same quantities without tooth errors. Shape (3, n_torques, phases)."""
     free: int = 0
-    """Positions at which the unloaded output is free; it stands in the middle."""
+    """Number of positions where the unloaded output has clearance."""
     solved: FullSolves | None = None
-    """Solves of the same drive without linearisation, errors as in the table."""
+    """Solves of the same drive and errors without linearisation."""
 
     def __post_init__(self) -> None:
         torque = frozen_array(self.torque, "torque [N·m]", ndim=1)
@@ -67,7 +67,7 @@ class ToleranceSamples:
             object.__setattr__(self, key, table)
 
     def in_series(self, compliance: float) -> ToleranceSamples:
-        """The same drive behind a spring at its output [rad/(N·m)]."""
+        """The same drive with a spring of this compliance at its output [rad/(N·m)]."""
         t = self.torque[:, None]
         spring = np.stack([-t, 0.5 * t**2, np.ones_like(t)]) * compliance
         solved = self.solved
@@ -97,33 +97,34 @@ class MapSamples:
     ratings: Ratings
     damping_ratio: float
     order: tuple[int, int]
-    """(p, q): the pattern is a function of p alpha + q beta, with period 2 pi."""
+    """(p, q): the pattern is a function of p alpha + q beta with period 2 pi."""
     input_angle: Array
-    """theta, equally spaced over one period, its end excluded [rad]."""
+    """Input angles theta, equally spaced over one period, its end excluded [rad]."""
     torque: Array
-    """T, increasing, zero included [N·m]."""
+    """Output torques T, increasing, zero included [N·m]."""
     output_error: Array
-    """psi - theta/i [rad]."""
+    """Output error psi - theta/i [rad]."""
     energy: Array
     """Strain energy [J]."""
     compliance: Array
-    """Tangent d(torsion)/dT at fixed input [rad/(N·m)]."""
+    """Tangent compliance d(torsion)/dT at a fixed input [rad/(N·m)]."""
     input_torque: Array
-    """External torque on the input; not used by the fit, only to judge it [N·m]."""
+    """External torque on the input [N·m]; used to check the fit, not in it."""
     tolerances: ToleranceSamples | None = None
-    """The drive with errors of its teeth; None without."""
+    """Samples of the drive with tooth errors; None if its teeth are perfect."""
     free: bool = False
-    """Whether clearance leaves the output free without torque. The torques next to zero
-    are then no equilibria: they stand at the ends of the clearance."""
+    """Whether the unloaded output has clearance. The entries next to zero torque are
+    then the ends of the clearance instead of equilibria."""
     solved: NDArray[np.bool_] | None = None
-    """Torques at which all angles were solved; between them the tables follow the load
-    paths, and the input torque a straight line. None: all. Shape (n_torques,)."""
+    """Whether all angles were solved at a torque; None means at all torques. At the
+    others the tables follow the load paths, and the input torque is interpolated
+    linearly. Shape (n_torques,)."""
     unseen: FullSolves | None = None
-    """Equilibria at other angles and torques, those without torque included."""
+    """Equilibria at other angles and torques, including unloaded ones."""
     shortfall: str = ""
-    """What the solves did not suffice for; empty if they did."""
+    """Sampling goal that was not reached, with the reason; empty if it was."""
     fields: DriveFields | None = None
-    """Fields of the flexspline with perfect teeth, to be shown."""
+    """Fields of the flexspline with perfect teeth, for display."""
     info: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

@@ -2,8 +2,9 @@ r"""Potential of a torsional stiffness that is piecewise linear in the torsion.
 
 .. math:: T(\Delta) = \int_0^\Delta k(s)\,ds, \quad V(\Delta) = \int_0^\Delta T(s)\,ds
 
-with k linear between knots and constant beyond them: torque continuous with its slope,
-odd corners rounded by parabolas, monotone wherever every k is positive.
+with k linear between the knots and constant beyond them. Torque and its slope are
+continuous, corners are rounded by parabolas, and the torque increases wherever every k
+is positive.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ def torque_at_knots(knots: Array, stiffness: Array) -> Array:
 
     Args:
         knots: Increasing torsions, zero inside their range [rad]. Shape (n,).
-        stiffness: At the knots [N·m/rad]. Shape (n,).
+        stiffness: Stiffness at the knots [N·m/rad]. Shape (n,).
     """
     steps = 0.5 * np.diff(knots) * (stiffness[1:] + stiffness[:-1])
     torque = np.concatenate([[0.0], np.cumsum(steps)])
@@ -29,12 +30,12 @@ def torque_at_knots(knots: Array, stiffness: Array) -> Array:
 def potential_of_stiffness(
     knots: Array, stiffness: Array, *, n_harmonics: int = 1
 ) -> tuple[Array, Array]:
-    """Coefficients as :class:`~swgjoint.maps.drive_map.DriveMap` holds them.
+    """Coefficients of :class:`~swgjoint.maps.drive_map.DriveMap` for a stiffness.
 
     Args:
-        knots: As for :func:`torque_at_knots`.
-        stiffness: As for :func:`torque_at_knots`.
-        n_harmonics: Harmonics of the map; all but the mean get a zero potential.
+        knots: Increasing torsions, zero inside their range [rad]. Shape (n,).
+        stiffness: Stiffness at the knots [N·m/rad]. Shape (n,).
+        n_harmonics: Harmonics of the map; all except the mean get a zero potential.
 
     Returns:
         ``potential`` (n_harmonics, 2, n - 1, 5), V(0) = 0, and ``end_stiffness``
@@ -58,7 +59,7 @@ def potential_of_stiffness(
 
 
 def _zero(knots: Array, stiffness: Array) -> tuple[int, float, float]:
-    """Interval that holds zero torsion, the way to it, and dk/dx there."""
+    """Interval that contains zero torsion, the distance to it, and dk/dx there."""
     j = int(np.clip(np.searchsorted(knots, 0.0) - 1, 0, knots.size - 2))
     bend = (stiffness[j + 1] - stiffness[j]) / (knots[j + 1] - knots[j])
     return j, -float(knots[j]), float(bend)
