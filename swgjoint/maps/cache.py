@@ -26,23 +26,23 @@ Found = TypeVar("Found")
 _log = logging.getLogger(__name__)
 
 _CODE = ("arrays.py", "units.py", "gear", "fe", "maps")
-"""Parts of the package whose code decides the content of a map."""
+"""Parts of the package whose code determines the content of a map."""
 _PACKAGES = ("numpy", "scipy", "scikit-fem")
-"""Others that compute it."""
+"""Packages whose versions determine it as well."""
 
 
 @lru_cache
 def code_version() -> str:
-    """Hash of the code that decides the content of a map, and of its file schema.
+    """Hash of the code that determines the content of a map, and of its file schema.
 
-    With it no map computed by other code is ever taken from the cache, also while the
-    package is being changed or after another version of numpy, scipy or scikit-fem was
-    installed. Comments and docstrings do not count.
+    It keeps the cache from returning a map that other code computed, for example after
+    an edit of the package or an update of numpy, scipy or scikit-fem. Comments and
+    docstrings do not count.
     """
     used = [f"{name} {version(name)}" for name in _PACKAGES]
     digest = hashlib.sha256(f"{__version__} {SCHEMA_VERSION} {used}".encode())
     digest.update(code_hash(*_CODE).encode())
-    # the catalogue gives a design the ratings that it does not state
+    # the catalogue provides the ratings that a design does not state
     for file in sorted((models_path() / "catalogue").glob("*.csv")):
         digest.update(file.name.encode() + b"\0" + file.read_bytes())
     return digest.hexdigest()
@@ -63,16 +63,16 @@ def cache_map(
 ) -> DriveMap:
     """The map of the given parts, from the cache or built and then kept.
 
-    Safe under concurrent writers: an entry appears whole, under a name that only its
-    content decides. A damaged entry, or one of another design, is built again; a cache
-    that cannot be written is reported to the log and not used.
+    Concurrent writers are safe: an entry is written atomically, under a name that
+    depends only on its content. A damaged entry, or one of another design, is built
+    again. If the cache cannot be written, the log says so and the cache is not used.
 
     Args:
-        parts: Everything that decides the result: content hash of the ``design``,
+        parts: Everything that determines the result: content hash of the ``design``,
             level, options. JSON values.
-        build: Called when there is no sound entry; its map has the hash of the design
-            as ``info["design_hash"]``.
-        name: Name that the map shall carry; it is no part of the content.
+        build: Called if there is no valid entry; its map has the hash of the design as
+            ``info["design_hash"]``.
+        name: Name of the returned map; it does not enter the hash.
     """
     folder = cache_folder()
     if folder is None:
@@ -90,43 +90,43 @@ def recall(
     kind: type[Found],
     compute: Callable[[], Found],
 ) -> Found:
-    """What was computed of the given parts, from the cache or computed and then kept.
+    """The result for the given parts, from the cache or computed and then kept.
 
-    An entry appears whole, under a name that only its content decides, so that work
-    that was interrupted goes on where it stopped; a damaged entry is computed again.
+    An entry is written atomically, under a name that depends only on its content, so
+    that interrupted work resumes where it stopped. A damaged entry is computed again.
 
     Args:
         store: Folder in the cache.
-        parts: Everything that decides the result, code outside of gear, fe and maps
-            included. JSON values.
+        parts: Everything that determines the result, including code outside of gear,
+            fe and maps. JSON values.
         kind: Type of the result, with fields of JSON values.
-        compute: Called when there is no sound entry.
+        compute: Called if there is no valid entry.
     """
     path = entry_of(store, parts)
-    found = recall_kept(path, kind)
-    if found is None:
-        found = compute()
+    result = recall_kept(path, kind)
+    if result is None:
+        result = compute()
         if path is not None:
-            keep(path, json_file(found))
-    return found
+            keep(path, json_file(result))
+    return result
 
 
 def entry_of(store: str, parts: Mapping[str, Any]) -> Path | None:
-    """File of a result in the cache, see :func:`recall`; None if that is off.
+    """File of a result in the cache, see :func:`recall`; None if the cache is off.
 
     Args:
-        store: Name of the part of the cache.
-        parts: Everything that the result depends on.
+        store: Folder in the cache.
+        parts: Everything that determines the result. JSON values.
     """
     folder = cache_folder()
     return None if folder is None else folder / store / f"{key_of(parts)}.json"
 
 
 def recall_kept(path: Path | None, kind: type[Found]) -> Found | None:
-    """What an entry holds; None if there is none or it is damaged.
+    """Content of an entry; None if there is none or it is damaged.
 
     Args:
-        path: The file; None if there is no cache.
+        path: File of the entry; None if the cache is off.
         kind: Type that the content must have.
     """
     if path is None:
@@ -135,13 +135,13 @@ def recall_kept(path: Path | None, kind: type[Found]) -> Found | None:
 
 
 def _sound(path: Path, design: str) -> DriveMap | None:
-    """The map of a design; None if there is none or it is that of another one."""
+    """The cached map of a design; None if absent, damaged or of another design."""
     if not path.exists():
         return None
     try:
         drive = DriveMap.load(path)
         if drive.info.get("design_hash") != design:
-            raise MapFileError(f"map {path} is that of another design")
+            raise MapFileError(f"map {path} belongs to another design")
     except MapFileError as exc:
         _log.warning("cache entry ignored and built again: %s", exc)
         return None

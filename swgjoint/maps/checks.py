@@ -1,4 +1,4 @@
-"""What every sound map fulfils, beyond shapes and finiteness."""
+"""Conditions that every valid map meets in addition to shapes and finiteness."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ import numpy as np
 from swgjoint.maps.potential import Potential
 
 JUMP = 1e-6
-"""Largest jump of a coefficient or its slope at a knot, of its largest value."""
+"""Largest jump of a coefficient or its slope at a knot, relative to its maximum."""
 
 
 def check_map(drive: Potential) -> None:
     """Refuse a map that no drive can have.
 
-    Teeth and ratings must make sense, the mean torque must not fall with the torsion,
+    Teeth and ratings must be plausible, the mean torque must not fall with the torsion,
     and the potential and the torque must be continuous at the knots.
 
     Raises:
-        ValueError: Naming the first fault.
+        ValueError: If the map fails a check; the message names the first fault.
     """
     z_fs, z_cs = drive.teeth_flexspline, drive.teeth_circular_spline
     if not 0 < z_fs < z_cs <= 100_000:
@@ -56,7 +56,7 @@ def check_map(drive: Potential) -> None:
         scale = np.abs(start).max() + np.abs(end).max()
         if (np.abs(end[..., :-1] - start[..., 1:]) > JUMP * scale).any():
             raise ValueError(f"{name} jumps at a knot of the torsion")
-    # flat where clearance leaves the output free, never falling but for round-off
+    # flat within the clearance; it may fall by no more than round-off
     torque = np.append(c[0, 0, :, 1], slope[0, 0, -1])
     if (np.diff(torque) < -1e-9 * np.abs(torque).max()).any() or (
         drive.end_stiffness[0, 0] <= 0

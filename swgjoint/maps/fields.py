@@ -1,12 +1,12 @@
-r"""Shape, stress and contact forces of the flexspline, to be shown at any angle.
+r"""Shape, stress and contact forces of the flexspline for display at any angle.
 
-Without errors of the teeth every tooth goes through the same states as the wave
-generator passes: what it is subject to depends on its place
+Without tooth errors every tooth goes through the same states as the wave generator
+passes it. Its state depends on the torque and on its place
 
-.. math:: u_k = 2\pi k/z_F + \varphi_F - \varphi_{WG}
+.. math:: u_k = 2\pi k/z_F + \varphi_F - \varphi_{WG},
 
-counter-clockwise from the first lobe, and on the torque. So equilibria at a few
-positions within one pitch, all teeth together, sample these functions densely.
+counted counter-clockwise from the first lobe. Equilibria at a few positions within one
+pitch therefore sample these functions densely, since they contain all teeth.
 """
 
 from __future__ import annotations
@@ -26,48 +26,48 @@ Table = NDArray[np.float32]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FlexsplineShape:
-    """The flexspline at one position or several (...), in the frame of the drive."""
+    """The flexspline at one or more positions (...), in the frame of the drive."""
 
     points: Table
-    """Points of the surface by tooth (..., N, n_nodes, 3) [m]."""
+    """Surface points by tooth (..., N, n_nodes, 3) [m]."""
     von_mises: Table
-    """There (..., N, n_nodes) [Pa]."""
+    """Von Mises stress at the points (..., N, n_nodes) [Pa]."""
     tooth_force: Table
-    """On each tooth by the circular spline (..., N, 3) [N]."""
+    """Force of the circular spline on each tooth (..., N, 3) [N]."""
     wave_generator_force: Table
-    """On the bore below each tooth by the wave generator (..., N, 3) [N]."""
+    """Force of the wave generator on the bore below each tooth (..., N, 3) [N]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DriveFields:
-    """What happens to a tooth sector of the flexspline by torque and place.
+    """State of a tooth sector of the flexspline over torque and place.
 
-    In the frame of the tooth, which points along +y where it stands undeformed and
-    turned with its member; z along the axis, away from the open end.
+    Vectors are in the frame of the tooth: +y points along the undeformed tooth, which
+    turns with its member, and z along the axis, away from the open end.
     """
 
     torque: Array
-    """T, increasing [N·m]. Shape (n_torques,)."""
+    """Output torques T, increasing [N·m]. Shape (n_torques,)."""
     period: float
-    """Period of the place: a turn, or half of one where both lobes are alike [rad]."""
+    """Period of the place [rad]: a turn, or half a turn if both lobes are equal."""
     first_place: Array
-    """Of the stored places by torque: the torsion shifts them (n_torques,) [rad]."""
+    """First stored place at each torque; torsion shifts it (n_torques,) [rad]."""
     points: Array
-    """Undeformed nodes of the surface (n_nodes, 3) [m]."""
+    """Undeformed surface nodes (n_nodes, 3) [m]."""
     triangles: NDArray[np.int64]
-    """Triangles of the surface between them (n_triangles, 3)."""
+    """Surface triangles as node indices (n_triangles, 3)."""
     displacement: Table
-    """At equally spaced places over a period (n_torques, n_places, n_nodes, 3) [m]."""
+    """Displacement at equally spaced places (n_torques, n_places, n_nodes, 3) [m]."""
     von_mises: Table
-    """(n_torques, n_places, n_nodes) [Pa]."""
+    """Von Mises stress (n_torques, n_places, n_nodes) [Pa]."""
     tooth_force: Table
-    """On the tooth by the circular spline (n_torques, n_places, 3) [N]."""
+    """Force of the circular spline on the tooth (n_torques, n_places, 3) [N]."""
     wave_generator_force: Table
-    """On the bore by the wave generator (n_torques, n_places, 3) [N]."""
+    """Force of the wave generator on the bore (n_torques, n_places, 3) [N]."""
     wave_generator: Array
-    """Outline, its first lobe on +y (n_wave_generator, 2) [m]."""
+    """Outline of the wave generator, first lobe on +y (n_wave_generator, 2) [m]."""
     circular_spline: Array
-    """Outline of a tooth on +y, root to root (n_circular_spline, 2) [m]."""
+    """Outline of a tooth on +y, from root to root (n_circular_spline, 2) [m]."""
 
     SHAPES: ClassVar[dict[str, tuple[str | int, ...]]] = {
         "torque": ("torques",),
@@ -81,11 +81,13 @@ class DriveFields:
         "wave_generator": ("wave generator", 2),
         "circular_spline": ("circular spline", 2),
     }
-    """Axes of the arrays by name, or their length."""
+    """Axes of each array, given by name or by length."""
 
     def __post_init__(self) -> None:
         if not 0.0 < self.period <= 2.0 * pi * (1.0 + 1e-12):
-            raise ValueError(f"period {self.period} rad; accepted: above 0, to a turn")
+            raise ValueError(
+                f"period {self.period} rad; accepted: above 0, up to a turn"
+            )
         sizes: dict[str, int] = {}
         for key, axes in self.SHAPES.items():
             values = frozen_array(getattr(self, key), f"fields: {key}", ndim=len(axes))
@@ -96,13 +98,15 @@ class DriveFields:
                         f"fields: {key} has shape {values.shape}, needs {wanted} {axis}"
                     )
             if axes[:2] == ("torques", "places"):
-                # to be looked at: seven digits are enough
+                # for display: single precision suffices
                 values = values.astype(np.float32)
                 values.setflags(write=False)
             if key == "triangles":
                 values = values.astype(np.int64)
                 if values.min() < 0 or values.max() >= sizes["nodes"]:
-                    raise ValueError("fields: triangles name nodes that are not there")
+                    raise ValueError(
+                        "fields: triangles refer to nodes that do not exist"
+                    )
                 values.setflags(write=False)
             object.__setattr__(self, key, values)
         if (np.diff(self.torque) <= 0.0).any():
@@ -113,15 +117,16 @@ class DriveFields:
     ) -> tuple[Table, Table, Table, Table]:
         """Displacement, von Mises stress, tooth and wave-generator force at places.
 
-        Linear between the stored ones; beyond the largest torques theirs.
+        Values are interpolated linearly; beyond the stored torques those of the
+        outermost torque are returned.
 
         Args:
-            place: Of teeth (...) [rad].
-            torque: T, of a shape that broadcasts to these [N·m].
+            place: Places of teeth (...) [rad].
+            torque: Output torque T, of a shape that broadcasts to the places [N·m].
 
         Returns:
-            Shapes (..., n_nodes, 3), (..., n_nodes), (..., 3), (..., 3), in the frames
-            of the teeth.
+            Displacement (..., n_nodes, 3) [m], stress (..., n_nodes) [Pa] and both
+            forces (..., 3) [N], in the frames of the teeth.
         """
         t = np.broadcast_to(np.asarray(torque, dtype=float), np.shape(place))
         j = np.clip(
@@ -141,14 +146,14 @@ class DriveFields:
 
         def between(table: Table) -> Table:
             samples = table.reshape(len(self.torque) * count, -1)
-            # fresh memory costs more than the sums: one more array for all corners
-            found = np.zeros((*t.shape, samples.shape[1]), dtype=np.float32)
-            one = np.empty_like(found)
+            # allocation costs more than the sums: all corners share one more array
+            total = np.zeros((*t.shape, samples.shape[1]), dtype=np.float32)
+            one = np.empty_like(total)
             for at, w in corners:
                 np.take(samples, at, axis=0, out=one, mode="clip")
                 one *= w[..., None]
-                found += one
-            return found.reshape(*t.shape, *table.shape[2:])
+                total += one
+            return total.reshape(*t.shape, *table.shape[2:])
 
         return (
             between(self.displacement),
@@ -158,7 +163,7 @@ class DriveFields:
         )
 
     def repeats(self, teeth: int) -> int:
-        """Equal parts of a turn in which a flexspline of so many teeth looks alike."""
+        """Number of equal parts of a turn in which a flexspline looks the same."""
         parts = round(2.0 * pi / self.period)
         whole = abs(parts * self.period - 2.0 * pi) < 1e-9
         return parts if whole and teeth % parts == 0 else 1
@@ -172,14 +177,15 @@ class DriveFields:
         *,
         parts: int = 1,
     ) -> FlexsplineShape:
-        """The flexspline at one position or several, of any shape (...).
+        """The flexspline at one or more positions of any shape (...).
 
         Args:
-            teeth: Of the flexspline.
-            rotation: Of the flexspline (...) [rad].
-            wave_generator_angle: (...) [rad].
-            torque: T (...) [N·m].
-            parts: Only the first of so many equal parts, see :meth:`repeats`.
+            teeth: Number of teeth of the flexspline.
+            rotation: Rotation of the flexspline (...) [rad].
+            wave_generator_angle: Angle of the wave generator (...) [rad].
+            torque: Output torque T (...) [N·m].
+            parts: Returns only the first of this number of equal parts; see
+                :meth:`repeats`.
         """
         turn, passed, load = (
             np.asarray(value, dtype=float)[..., None]

@@ -1,25 +1,28 @@
-r"""Friction of a drive at speed: bearing, seals and bending between two members.
+r"""Friction of a drive in motion: wave-generator bearing, seals and rim bending.
 
-It acts on the rotation of the wave generator relative to the flexspline, beta (theta -
-psi with the circular spline fixed, theta with the flexspline fixed): there the bearing
-runs and the rim is bent. An elasto-plastic element, a bristle of stiffness sigma and
-damping sigma_1 in series with a slider, and a viscous part, with nu the relative speed:
+It acts on beta, the rotation of the wave generator relative to the flexspline (theta -
+psi with the circular spline fixed, theta with the flexspline fixed), in which the
+bearing turns and the rim is bent. The model is an elasto-plastic element (a bristle of
+stiffness sigma and damping sigma_1 in series with a slider) and a viscous term. With
+the relative speed nu:
 
 .. math::
     F = \sigma z + \sigma_1 \dot z + \eta\,\nu, \quad |z| \le f/\sigma, \quad
     f = f_b + f_c + (f_s - f_c)\,e^{-(\nu/\nu_s)^2} + c\,|T/i|
 
-f_b bending, f_c Coulomb, f_s static, c the part that grows with the output torque. The
-bristle moves with beta where that keeps it within its reach, else it slips.
+f_b is the bending, f_c the Coulomb and f_s the static friction, and c the part that
+grows with the output torque. The bristle follows beta within its reach f/sigma; beyond
+it slips.
 
-Why not LuGre: its bristle yields a little at any stretch, so it drifts under a load
-that swings below f_s, and it is passive only for :math:`\eta \ge \sigma_1 (f_s -
-f_c)/f_c` (Barabanov and Ortega 2000), at constant load. Here the power
-:math:`F\nu` is the change of :math:`\sigma z^2/2` plus :math:`\sigma z (\nu - \dot z)
-+ \sigma_1 \dot z \nu + \eta\nu^2`, and no term is negative whatever f >= 0 does: a
-slider moves, and a reach shrinks, only against the bristle's pull (sigma_1 acts where
-the bristle is stretched on, not where its reach shrinks). Passive without any
-condition, and at rest below f it is a spring, without creep.
+The LuGre model is not used because its bristle yields slightly at any stretch: it
+drifts under a load that oscillates below f_s, and it is passive only for
+:math:`\eta \ge \sigma_1 (f_s - f_c)/f_c` at constant load (Barabanov and Ortega 2000).
+Here the power :math:`F\nu` is the rate of :math:`\sigma z^2/2` plus :math:`\sigma z
+(\nu - \dot z) + \sigma_1 \dot z \nu + \eta\nu^2`. No term is negative, however f >= 0
+varies: the slider moves, and the reach shrinks, only against the pull of the bristle
+(sigma_1 acts while the bristle is stretched further, not while its reach shrinks). The
+model is therefore passive without any condition. At rest below f it is a spring without
+creep.
 
 Source:
     Dupont, Hayward, Armstrong, Altpeter (2002), "Single state elastoplastic friction
@@ -60,23 +63,23 @@ class Friction:
     """Friction of the wave generator against the flexspline, at the input."""
 
     stiffness: float
-    """sigma of the bristle, before it slips [N·m/rad], > 0."""
+    """Bristle stiffness sigma before slip [N·m/rad], > 0."""
     coulomb: float = 0.0
-    """f_c, slipping, without load [N·m]."""
+    """Coulomb friction f_c without load [N·m]."""
     static: float = 0.0
-    """f_s, at rest, without load [N·m]; not below f_c."""
+    """Static friction f_s without load [N·m], at least f_c."""
     stribeck_speed: float = 1.0
-    """nu_s, relative speed over which f_s gives way to f_c [rad/s]."""
+    """Stribeck speed nu_s, at which friction falls from f_s towards f_c [rad/s]."""
     viscous: float = 0.0
-    """eta [N·m·s/rad]."""
+    """Viscous friction eta [N·m·s/rad]."""
     load: float = 0.0
-    """c, friction per |T/i|; from about 1 on the output cannot drive the input [-]."""
+    """Load factor c, friction per |T/i| [-]; above about 1 nothing can back-drive."""
     bending: float = 0.0
-    """f_b, loss of the turning elastic rim over one radian [N·m]."""
+    """Bending friction f_b, loss of the turning rim per radian [N·m]."""
     damping: float = 0.0
-    """sigma_1 of the bristle [N·m·s/rad]."""
+    """Bristle damping sigma_1 [N·m·s/rad]."""
     source: str = "given"
-    """Where the figures come from, and which of them are assumed."""
+    """Source of the values, and which of them are assumed."""
 
     def __post_init__(self) -> None:
         for key, unit in _UNITS.items():
@@ -96,11 +99,11 @@ class Friction:
             )
 
     def yield_torque(self, speed: ArrayLike, input_torque: ArrayLike) -> Array:
-        """f, at which the bristle slips [N·m].
+        """Friction torque f at which the bristle slips [N·m].
 
         Args:
-            speed: nu [rad/s].
-            input_torque: T/i, the elastic torque on the input [N·m].
+            speed: Relative speed nu [rad/s].
+            input_torque: Elastic torque on the input, T/i [N·m].
         """
         x = np.asarray(speed, float) / self.stribeck_speed
         more = (self.static - self.coulomb) * np.exp(-(x**2))
@@ -109,26 +112,26 @@ class Friction:
         )
 
     def torque(self, rotation: float, speed: float, input_torque: float) -> float:
-        """F where the bristle was relaxed a rotation ago, on a way of one direction.
+        """Friction torque F after a monotone rotation from the relaxed bristle [N·m].
 
         Args:
-            rotation: beta since then [rad].
-            speed: nu [rad/s].
-            input_torque: T/i [N·m].
+            rotation: Rotation beta since the bristle was relaxed [rad].
+            speed: Relative speed nu [rad/s].
+            input_torque: Elastic torque on the input, T/i [N·m].
         """
         reach = float(self.yield_torque(speed, input_torque)) / self.stiffness
         stretch = min(max(rotation, -reach), reach)
-        # at its reach it slips onward, also where round-off leaves it just inside
+        # at its reach the bristle slips, even if round-off leaves it just inside
         slips = abs(rotation) >= (1.0 - _ROUND_OFF) * reach and rotation * speed > 0.0
         creep = 0.0 if slips else self.damping * speed
         return self.stiffness * stretch + creep + self.viscous * speed
 
     def steady(self, speed: float, input_torque: float) -> float:
-        """F at constant speed nu, never zero [N·m].
+        """Friction torque F at a constant speed nu that is not zero [N·m].
 
         Args:
-            speed: Speed nu between the members that rub [rad/s].
-            input_torque: Torque on the input [N·m].
+            speed: Relative speed nu [rad/s].
+            input_torque: Elastic torque on the input, T/i [N·m].
         """
         slip = float(self.yield_torque(speed, input_torque))
         return float(np.copysign(slip, speed)) + self.viscous * speed
@@ -137,13 +140,13 @@ class Friction:
 def play_friction(
     friction: Friction, rotation: Array, speed: Array, input_torque: Array
 ) -> Array:
-    """F along a history of the relative rotation, from a relaxed bristle [N·m].
+    """Friction torque F along a history that begins with a relaxed bristle [N·m].
 
     Args:
-        friction: The parameters.
-        rotation: beta [rad]. Shape (n,).
-        speed: nu [rad/s]. Shape (n,).
-        input_torque: T/i [N·m]. Shape (n,).
+        friction: Friction parameters.
+        rotation: Relative rotation beta [rad]. Shape (n,).
+        speed: Relative speed nu [rad/s]. Shape (n,).
+        input_torque: Elastic torque on the input, T/i [N·m]. Shape (n,).
     """
     reach = friction.yield_torque(speed, input_torque) / friction.stiffness
     stretch, slips = play_bristle(rotation, reach)
@@ -152,10 +155,11 @@ def play_friction(
 
 
 def play_bristle(rotation: Array, reach: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Stretch z along a history [rad], and whether it slips there. Shapes (n,).
+    """Bristle stretch z along a history [rad], and whether it slips. Shapes (n,).
 
     Args:
-        rotation: beta, relaxed at the first [rad]. Shape (n,).
+        rotation: Relative rotation beta; the bristle is relaxed at the first sample
+            [rad]. Shape (n,).
         reach: Largest stretch at each sample [rad]. Shape (n,).
     """
     stretch, slips = np.empty(len(rotation)), np.zeros(len(rotation), dtype=bool)

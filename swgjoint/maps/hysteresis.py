@@ -5,14 +5,15 @@ torsion at which its spring is relaxed,
 
 .. math:: q = k (\Delta - r), \qquad r \in [\Delta - f/k, \Delta + f/k],
 
-and r moves only when pushed by an end of that interval. The same in increments:
-:math:`q \leftarrow \mathrm{clip}(q + k\,d\Delta, \pm f)`. Along a path of one direction
-the last torsion alone counts, so r of the end follows from r of the start.
+and r moves only if an end of that interval pushes it. In increments:
+:math:`q \leftarrow \mathrm{clip}(q + k\,d\Delta, \pm f)`. Along a monotone path only
+the last torsion matters, so the final r follows from the initial r.
 
-Passive: the work :math:`q\,d\Delta` is the change of :math:`q^2/2k` plus f times the
-slip :math:`|dr|`, which is never negative. A cycle of amplitude X > f/k, once the start
-is forgotten, loses :math:`4 f (X - f/k)`; in parallel with a spring K it is
-:math:`2 f/K` wide at zero torque where the way back from the tip exceeds 2 f/k.
+The element is passive: the work :math:`q\,d\Delta` is the change of :math:`q^2/2k` plus
+f times the slip :math:`|dr|`, which is never negative. A steady cycle of amplitude
+X > f/k dissipates :math:`4 f (X - f/k)`. In parallel with a spring K the loop is
+:math:`2 f/K` wide at zero torque if the torsion between the tip and zero torque exceeds
+2 f/k.
 
 Source:
     Iwan (1966), "A distributed-element model for hysteresis and its steady-state
@@ -32,7 +33,7 @@ from swgjoint.errors import InputError
 from swgjoint.typing import Array
 
 MAX_ELEMENTS = 64
-"""More elements than a measured loop can tell apart."""
+"""Largest number of elements; a measured loop cannot distinguish that many."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,9 +41,9 @@ class Jenkin:
     """A spring in series with a slider: hysteresis that dissipates."""
 
     stiffness: float
-    """While it sticks [N·m/rad]."""
+    """Stiffness while the element sticks [N·m/rad]."""
     yield_torque: float
-    """At which it slips [N·m]."""
+    """Torque at which the element slips [N·m]."""
 
     def __post_init__(self) -> None:
         for key, unit in (("stiffness", "N·m/rad"), ("yield_torque", "N·m")):
@@ -63,18 +64,18 @@ class Jenkin:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Sliders:
-    """Jenkin elements and where each of them is relaxed; immutable."""
+    """Parameters and relaxed torsions of Jenkin elements; immutable."""
 
     stiffness: Array
-    """k [N·m/rad]. Shape (n,)."""
+    """Stiffness k [N·m/rad]. Shape (n,)."""
     reach: Array
-    """f/k [rad]. Shape (n,)."""
+    """Yield torsion f/k [rad]. Shape (n,)."""
     rest: Array
-    """r, the torsion without torque [rad]. Shape (n,)."""
+    """Torsion r at which an element is relaxed [rad]. Shape (n,)."""
 
     @classmethod
     def relax(cls, elements: Sequence[Jenkin], torsion: float = 0.0) -> Sliders:
-        """Elements without torque at a torsion [rad].
+        """Elements that are relaxed at a torsion.
 
         Args:
             elements: Jenkin elements of the drive.
@@ -87,21 +88,21 @@ class Sliders:
         )
 
     def move_to(self, torsion: float) -> Sliders:
-        """After a path of one direction to a torsion [rad]."""
+        """State after a monotone path to a torsion [rad]."""
         rest = np.clip(self.rest, torsion - self.reach, torsion + self.reach)
         return Sliders(stiffness=self.stiffness, reach=self.reach, rest=rest)
 
     def torque(self, torsion: ArrayLike) -> Array:
-        """Torque after a path of one direction to each torsion [N·m]."""
+        """Torque after a monotone path to each torsion [N·m]."""
         return np.asarray(self._stretch(torsion) @ self.stiffness)
 
     def tangent(self, torsion: ArrayLike) -> Array:
-        """Stiffness of the elements that stick there [N·m/rad]."""
+        """Stiffness of the elements that stick at each torsion [N·m/rad]."""
         sticks = np.abs(self._stretch(torsion)) < self.reach
         return np.asarray(sticks @ self.stiffness)
 
     def energy(self, torsion: ArrayLike) -> Array:
-        """Strain energy in the springs after such a path [J]."""
+        """Strain energy of the springs after a monotone path to each torsion [J]."""
         return np.asarray(0.5 * self._stretch(torsion) ** 2 @ self.stiffness)
 
     def _stretch(self, torsion: ArrayLike) -> Array:
@@ -112,7 +113,8 @@ class Sliders:
 def play_hysteresis(elements: Sequence[Jenkin], torsion: Array) -> Array:
     """Torque of the elements along a history of torsion [N·m]. Shapes (n,).
 
-    The sliders start relaxed at zero torsion, as the engine resets them.
+    The elements start relaxed at zero torsion, as after a reset of the simulation
+    engine.
 
     Args:
         elements: Jenkin elements of the drive.
@@ -125,14 +127,14 @@ def play_hysteresis(elements: Sequence[Jenkin], torsion: Array) -> Array:
 
 
 def stretches(torsion: Array, reach: float) -> Array:
-    """Stretch x - r of one spring along a history, from rest at zero torsion [rad].
+    """Stretch x - r of one spring along a history, relaxed at zero torsion [rad].
 
     Args:
         torsion: History of the torsion [rad]. Shape (n,).
         reach: Stretch at which the spring slips [rad].
     """
-    found, rest = np.empty(len(torsion)), 0.0
+    stretch, rest = np.empty(len(torsion)), 0.0
     for k, x in enumerate(np.asarray(torsion, float).tolist()):
         rest = min(max(rest, x - reach), x + reach)
-        found[k] = x - rest
-    return found
+        stretch[k] = x - rest
+    return stretch

@@ -1,9 +1,9 @@
-"""The record ``info`` of a map that comes from a file: what is read of it is checked.
+"""Checks of the record ``info`` of a map that comes from a file.
 
-A map is sound without its record. So a known key of another kind than this package
-writes is left out with a warning instead of refusing the map, and whoever reads a key
-may rely on its kind. ``validation`` has a reader of its own, see
-:mod:`swgjoint.maps.sheet.map_validity`; unknown keys are kept as they are.
+A map is usable without its record. A known key whose type differs from what this
+package writes is therefore dropped with a warning, so that code which reads a key can
+rely on its type. ``validation`` has its own reader, see
+:mod:`swgjoint.maps.sheet.map_validity`; unknown keys are kept unchanged.
 """
 
 from __future__ import annotations
@@ -16,13 +16,13 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 from swgjoint.errors import MapFileError
 
 MOST_DEPTH = 30
-"""Tables and lists inside each other; a validation record has five."""
+"""Deepest nesting of tables and lists; a validation record has five levels."""
 Number = Annotated[float, Field(ge=-1e60, le=1e60, allow_inf_nan=False, strict=True)]
 Text = Annotated[str, Field(strict=True)]
 
 
 class Pruned(BaseModel):
-    """What was dropped, and bounds of the effect."""
+    """Dropped harmonics and bounds of their effect."""
 
     model_config = ConfigDict(extra="allow")
 
@@ -35,7 +35,7 @@ class Pruned(BaseModel):
 
 
 class Label(BaseModel):
-    """What the elements model; other entries are shown as they are."""
+    """What the finite elements model; other entries are shown unchanged."""
 
     model_config = ConfigDict(extra="allow")
 
@@ -61,23 +61,23 @@ KINDS: dict[str, TypeAdapter[Any]] = {
     "perfect_teeth": TypeAdapter(dict[str, Any]),
     "stiffness_range_Nm_rad": TypeAdapter(tuple[Number, Number]),
 }
-"""Keys that are read anywhere, and of what kind they are."""
+"""Type of every key that the package reads."""
 
 
 def sound_info(info: dict[str, Any], *, name: str) -> dict[str, Any]:
-    """The record without keys of a wrong kind, of which one warning tells.
+    """The record without the keys of a wrong type, which one warning lists.
 
     Args:
-        info: As the file has it.
-        name: Of the map, for the warning.
+        info: Record as read from the file.
+        name: Name of the map for the warning.
     """
     wrong = [
         key for key, kind in KINDS.items() if key in info and not _fits(kind, info[key])
     ]
     if wrong:
         warnings.warn(
-            f"map {name[:60]!r}: info {', '.join(wrong)} left out: of another kind than"
-            " swgjoint writes; the drive is the same without",
+            f"map {name[:60]!r}: info {', '.join(wrong)} ignored: not of the type that"
+            " swgjoint writes; the drive itself is not affected",
             stacklevel=2,
         )
     return {key: value for key, value in info.items() if key not in wrong}
@@ -95,14 +95,14 @@ def check_texts(content: Any) -> None:
     """Refuse a header that could not be written again.
 
     Raises:
-        MapFileError: If it is nested too deep, or a text has half a character.
+        MapFileError: If it is nested too deeply or a text is not valid Unicode.
     """
     todo = [(content, 0)]
     while todo:
         value, depth = todo.pop()
         if depth > MOST_DEPTH:
             raise MapFileError(
-                f"header nested too deep; accepted: {MOST_DEPTH} tables and lists"
+                f"header nested too deeply; accepted: {MOST_DEPTH} tables and lists"
             )
         if isinstance(value, dict):
             todo += [(one, depth + 1) for pair in value.items() for one in pair]

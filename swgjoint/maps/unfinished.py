@@ -1,9 +1,8 @@
-"""What a map that is being built has solved so far, in the cache folder.
+"""Intermediate results of a map that is being built, in the cache folder.
 
-An interrupted build, by a key or by the machine, goes on from there: the parts have the
-key of the map itself, the hash of design, fidelity and code, so that nothing solved by
-other code or for another design is ever taken up. They are removed once the map is
-complete.
+An interrupted build resumes from them. The parts have the key of the map itself, which
+is the hash of design, fidelity and code, so that results of other code or of another
+design are never used. They are removed once the map is complete.
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ from swgjoint.maps.cache import key_of
 from swgjoint.store import arrays_content, arrays_file, cache_folder, keep, read_kept
 
 FORGOTTEN = 14 * 24 * 3600.0
-"""Parts of a map that was not resumed are removed after this time [s]."""
+"""Parts of a map that is not resumed are removed after this time [s]."""
 
 Part = TypeVar("Part")
 
@@ -35,7 +34,7 @@ class Unfinished:
         """The parts of a map; None if there is no cache.
 
         Args:
-            parts: Everything that decides the map, as for
+            parts: Everything that determines the map, as for
                 :func:`swgjoint.maps.cache.cache_map`.
         """
         cache = cache_folder()
@@ -48,13 +47,18 @@ class Unfinished:
         """A part; None if it was not kept or is damaged.
 
         Args:
-            name: Of the part.
-            take: Makes the part of its arrays; what it raises means damage.
+            name: Name of the part.
+            take: Builds the part from its arrays; an exception means damage.
         """
         return read_kept(self._path(name), lambda data: take(arrays_content(data)))
 
     def write(self, name: str, arrays: Mapping[str, Any]) -> None:
-        """Keep a part, whole or not at all; a full disk is no reason to stop."""
+        """Write a part atomically; a full disk does not stop the build.
+
+        Args:
+            name: Name of the part.
+            arrays: Arrays of the part by name.
+        """
         keep(self._path(name), arrays_file(arrays))
 
     def _path(self, name: str) -> Path:

@@ -562,7 +562,7 @@ def test_a_record_of_another_kind_is_left_out(synthetic_map, tmp_path, key, valu
     """One warning names the key; the drive, its other keys and its figures stay."""
     file = tmp_path / "map.swg"
     replace(synthetic_map, info={"note": [1, "x"], key: value}).save(file)
-    with pytest.warns(UserWarning, match=f"info {key} left out") as told:
+    with pytest.warns(UserWarning, match=f"info {key} ignored") as told:
         drive = DriveMap.load(file)
     assert len(told) == 1
     assert drive.info == {"note": [1, "x"]}
