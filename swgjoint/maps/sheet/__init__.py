@@ -1,1 +1,1 @@
-"""The catalogue-style sheet of a map and how far its figures hold."""
+"""Catalogue-style spec sheet of a map and the validity of its figures."""

@@ -1,15 +1,15 @@
-r"""What friction asks of the motor and of the load: the running tests of a catalogue.
+r"""Running tests of a catalogue: torques that friction demands of motor and load.
 
-At constant speed the potential gives back what it takes, so over one period of the
-pattern the mean torque at the input is that of load and friction. In slow motion
-through the input angle theta, output torque T,
+At constant speed the potential returns the work that it takes, so over one period of
+the pattern the mean input torque is due to load and friction alone. In slow motion at
+the input angle theta and the output torque T,
 
 .. math::
     \tau(\theta) = \partial_\theta V + b_\theta F, \qquad
     -\partial_\psi V = T + b_\psi F,
 
-with F the friction that slips, b the direction of the relative rotation and
-:math:`\partial_\theta, \partial_\psi` total derivatives of the potential.
+with the slipping friction F, the direction b of the relative rotation and the total
+derivatives :math:`\partial_\theta, \partial_\psi` of the potential.
 """
 
 from __future__ import annotations
@@ -27,7 +27,8 @@ from swgjoint.units import rpm
 RUNNING_SPEED = 2000.0 * rpm
 """Input speed at which catalogues state running torque and efficiency [rad/s]."""
 _ROUNDS = 4
-"""Friction and the torque that it adds at the output: each round gains the ratio."""
+"""Iterations between friction and the torque that it adds at the output; each one
+reduces the error by the ratio."""
 _BALANCES = 30
 _SETTLED = 1e-9
 
@@ -42,13 +43,17 @@ def _period(drive: Potential, at_most: int | None = None) -> Array:
 def running_torque(
     drive: Potential, theta: Array, torque: ArrayLike, speed: float
 ) -> Array:
-    """Torque on the input that keeps it turning forward [N·m]. Shape (n,).
+    """Torque on the input that keeps it turning forwards [N·m]. Shape (n,).
 
     Args:
         drive: A map with friction.
         theta: Input angles [rad]. Shape (n,).
         torque: T that the drive exerts on the output [N·m], broadcast with them.
-        speed: Of the input, >= 0 [rad/s]; at 0 it is about to move: static friction.
+        speed: Input speed, >= 0 [rad/s]; at zero, static friction acts as the input is
+            about to move.
+
+    Raises:
+        ValueError: If the map has no friction.
     """
     law = drive.friction
     if law is None:
@@ -56,41 +61,46 @@ def running_torque(
     by_theta, by_psi = drive.friction_direction
     along = by_theta + by_psi / drive.ratio  # relative rotation per input rotation
     elastic = np.broadcast_to(np.asarray(torque, float), theta.shape)
-    rubs = np.zeros_like(theta)
+    friction = np.zeros_like(theta)
     for _ in range(_ROUNDS):
-        psi = output_angle(drive, theta, elastic + by_psi * rubs)
+        psi = output_angle(drive, theta, elastic + by_psi * friction)
         along_torsion = drive.torque(drive.torsion(theta, psi), theta, psi)
         slip = law.yield_torque(along * speed, along_torsion / drive.ratio)
-        rubs = np.copysign(slip, along) + law.viscous * along * speed
-    return np.asarray(by_theta * rubs - drive.forces(theta, psi)[0])
+        friction = np.copysign(slip, along) + law.viscous * along * speed
+    return np.asarray(by_theta * friction - drive.forces(theta, psi)[0])
 
 
 def no_load_running_torque(drive: Potential, speed: float = RUNNING_SPEED) -> float:
-    """Mean torque on the input at constant speed, output free [N·m]."""
+    """Mean torque on the input at constant speed with a free output [N·m].
+
+    Args:
+        drive: A map with friction.
+        speed: Input speed [rad/s].
+    """
     return float(running_torque(drive, _period(drive), 0.0, speed).mean())
 
 
 def starting_torque(drive: Potential) -> float:
-    """Torque on the input from which it keeps turning, output free [N·m].
+    """Torque on the input above which it keeps turning with a free output [N·m].
 
-    A torque that rises slowly turns the input along its positions of balance; it stands
-    until the torque is above that of every position to come. The worst of a period.
+    A slowly rising torque moves the input through positions of equilibrium. It turns
+    continuously once the torque exceeds the largest one of a period.
     """
     return float(running_torque(drive, _period(drive), 0.0, 0.0).max())
 
 
 def back_driving_torque(drive: Potential) -> float | None:
-    """Torque on the output from which it turns the free input [N·m].
+    """Torque on the output that turns the free input [N·m].
 
-    At every position of a period the load at which the input needs no torque; the worst
-    counts. None where even the momentary peak torque does not turn it.
+    It is the largest load over one period at which the input needs no torque. None if
+    even the momentary peak torque does not turn the input.
 
     Raises:
-        ComputationError: If no balance is found.
+        ComputationError: If the iteration for this load does not converge.
     """
     theta, most = _period(drive), drive.ratings.momentary_peak
-    sign = -np.sign(drive.ratio)  # the load drives an input that turns forward
-    keeps = drive.friction.load if drive.friction else 0.0  # part of |T/i| that rubs
+    sign = -np.sign(drive.ratio)  # the load drives an input that turns forwards
+    keeps = drive.friction.load if drive.friction else 0.0  # friction per |T/i|
     if keeps >= 1.0:
         return None
     load = np.zeros_like(theta)
@@ -105,8 +115,8 @@ def back_driving_torque(drive: Potential) -> float | None:
             worst = float(load.max())
             return worst if worst <= most else None
     raise ComputationError(
-        f"map {drive.name!r}: no load found at which its input turns by itself; leave"
-        " out the strongest harmonics"
+        f"map {drive.name!r}: found no load that back-drives its input; remove the"
+        " strongest harmonics"
     )
 
 
@@ -117,13 +127,13 @@ def efficiency(
     *,
     at_most: int | None = None,
 ) -> float:
-    """Work at the output over work at the input, of one period at constant speed [-].
+    """Output work over input work during one period at constant speed [-].
 
     Args:
         drive: A map with friction.
-        torque: At the output, against its motion [N·m], > 0.
-        speed: Of the input [rad/s].
-        at_most: Samples of the period, for a rough figure.
+        torque: Load torque that opposes the motion of the output [N·m], > 0.
+        speed: Input speed [rad/s].
+        at_most: Largest number of samples of the period, for a rough value.
     """
     load = np.sign(drive.ratio) * torque
     taken = running_torque(drive, _period(drive, at_most), load, speed).mean()

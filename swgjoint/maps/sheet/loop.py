@@ -1,7 +1,7 @@
-"""The torque-torsion loop and what a catalogue reads from it.
+"""The torque-torsion loop and the catalogue figures read from it.
 
-Works on any loop, computed or measured, with hysteresis or without: the mid-line is
-the mean of the branch of rising torque and the branch of falling torque.
+The module works on any loop, computed or measured, with or without hysteresis. The
+mid-line is the mean of the branches of rising and of falling torque.
 """
 
 from __future__ import annotations
@@ -21,25 +21,27 @@ from swgjoint.maps.potential import Potential
 from swgjoint.typing import Array
 
 POINTS = 80
-"""Torques on each of the four legs of a computed loop."""
+"""Number of torques on each of the four legs of a computed loop."""
 LOST_MOTION_TORQUE = 0.04
-"""Part of the rated torque at which lost motion is read."""
+"""Fraction of the rated torque at which lost motion is read."""
 _TURNS_AT = 0.02
-"""A torque path turns where it comes back by this part of its range: not for noise."""
+"""Fraction of its range by which a torque path must return to count as a reversal;
+smaller changes are noise."""
 REST = 1e-9
-"""Torque left at zero, of rated: a free output rests where the load left it."""
+"""Remaining torque at a zero of the path, as a fraction of the rated torque: a free
+output rests where the load has left it."""
 NO_WIDTH = 1e-7
-"""A loop narrower than this part of its travel has no hysteresis [-]."""
+"""Ratio of width to travel below which a loop has no hysteresis [-]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class TorqueLoop:
-    """Torsion along a path of the output torque, input locked."""
+    """Torsion along a path of the output torque with a locked input."""
 
     torque: Array
-    """T along the path [N·m]. Shape (n,)."""
+    """Output torque T along the path [N·m]. Shape (n,)."""
     torsion: Array
-    """Same sign as the torque [rad]. Shape (n,)."""
+    """Torsion with the sign of the torque [rad]. Shape (n,)."""
 
     def __post_init__(self) -> None:
         torque = frozen_array(self.torque, "torque [N·m]", ndim=1)
@@ -50,7 +52,7 @@ class TorqueLoop:
         object.__setattr__(self, "torsion", torsion)
 
     def turns(self) -> list[tuple[int, int]]:
-        """First and last sample of every part of one direction of the torque."""
+        """First and last sample of every part with one direction of the torque."""
         band = _TURNS_AT * float(np.ptp(self.torque))
         turns, extreme, rising = [0], 0, None
         for k, value in enumerate(self.torque):
@@ -67,25 +69,29 @@ class TorqueLoop:
         return list(pairwise(turns))
 
     def legs(self) -> list[tuple[bool, Array, Array]]:
-        """Parts of one direction of the torque: rising, torque and torsion.
+        """Parts with one direction of the torque: whether it rises, torque, torsion.
 
-        Torque increases strictly in every part, also in a falling one; samples of the
-        same torque are averaged.
+        The arrays are sorted by strictly increasing torque, also for a falling part;
+        samples of equal torque are averaged.
         """
-        found = []
+        legs = []
         for a, b in self.turns():
             part = slice(a, b + 1)
             torque, place = np.unique(self.torque[part], return_inverse=True)
             counts = np.bincount(place)
             torsion = np.bincount(place, self.torsion[part]) / counts
-            found.append((bool(self.torque[b] > self.torque[a]), torque, torsion))
-        return found
+            legs.append((bool(self.torque[b] > self.torque[a]), torque, torsion))
+        return legs
 
     def branch(self, torque: ArrayLike, *, rising: bool) -> Array:
-        """Torsion while the torque rises or falls [rad], NaN where it never did.
+        """Torsion while the torque rises or falls [rad]; NaN where the loop has none.
 
-        A later part of the loop goes before an earlier one, so that a first loading
-        from rest counts only where nothing else does.
+        Later parts of the loop take precedence, so that a first loading from rest is
+        used only where no other part exists.
+
+        Args:
+            torque: Torques at which to read the branch, any shape [N·m].
+            rising: Whether to read the branch of rising or of falling torque.
         """
         wanted = np.asarray(torque, float)
         values = np.full(wanted.shape, np.nan)
@@ -96,7 +102,7 @@ class TorqueLoop:
         return values
 
     def mid_line(self, torque: ArrayLike) -> Array:
-        """Mean of both branches [rad], one branch where the other never was.
+        """Mean of both branches [rad], or the only branch that exists at a torque.
 
         NaN outside the torques of the loop.
         """
@@ -107,15 +113,19 @@ class TorqueLoop:
         return np.asarray(np.where(count, total / np.maximum(count, 1), np.nan))
 
     def hysteresis_loss(self) -> float:
-        """Full width of the loop at zero torque [rad], NaN if a branch is absent."""
+        """Full width of the loop at zero torque [rad]; NaN if a branch is absent."""
         falling, rising = (self.branch(0.0, rising=r) for r in (False, True))
         return float(falling - rising)
 
     def stiffness(self, low: float, high: float) -> float:
         """Slope of the mid-line over low..high and -high..-low [N·m/rad].
 
-        The chord over both signs of the torque; over the one that was measured where
-        the other is absent; NaN if neither reaches.
+        This is the chord over both signs of the torque, or over one sign if only that
+        was measured; NaN if neither side covers the range.
+
+        Args:
+            low: Lower torque of the chord [N·m].
+            high: Upper torque of the chord [N·m].
         """
         x = self.mid_line([low, high, -low, -high])
         travel = [x[1] - x[0], x[2] - x[3]]
@@ -131,27 +141,27 @@ class TorqueLoop:
 
 
 def largest_torque(ratings: Ratings | CatalogueRow) -> float:
-    """Torque of the standard loop: repeated peak, at least 1.5 T2 [N·m]."""
+    """Largest torque of the standard loop [N·m]: repeated peak, at least 1.5 T2."""
     return max(ratings.repeated_peak, 1.5 * ratings.T2)
 
 
 def torque_loop(drive: Potential, *, theta: float = 0.0) -> TorqueLoop:
     """The standard loop 0 -> Tmax -> 0 -> -Tmax -> 0 with the input locked.
 
-    T1, T2 and the torques of the lost motion are among the points. Torsion is counted
-    from the unloaded position (e0), as an angle sensor at the output sees it. With
-    hysteresis the loop is played twice and the second time counts: it is closed, and a
-    first loading from rest is no branch of it.
+    The points include T1, T2 and the torques of the lost motion. Torsion is counted
+    from the unloaded position (e0), as an angle sensor at the output measures it. With
+    hysteresis the loop is run twice and the second pass is returned: it is closed and
+    does not contain the first loading from rest.
 
     Args:
         drive: The map.
-        theta: Where the input is locked [rad].
+        theta: Angle at which the input is locked [rad].
     """
     r = drive.ratings
     top = largest_torque(r)
     named = [r.T1, r.T2, LOST_MOTION_TORQUE * r.rated_torque]
     up = np.unique(np.concatenate([np.linspace(0.0, top, POINTS), named]))
-    # at rest on the side from which the load left; the start is the middle
+    # unloaded, the output rests on the side of the last load; it starts in the middle
     side = REST * r.rated_torque
     legs = [
         up,

@@ -1,13 +1,13 @@
-"""How far the ripple of a map may be believed: its validation against unseen solves.
+"""Validity of the ripple of a map: its validation against unseen solves.
 
-A map of finite elements carries the record ``info["validation"]``: equilibria at
-torques and angles that the map was not sampled at, set against what it predicts there.
-Differences of input torque and loaded output error are parts of the peak to peak that
-the finite elements have at the same torque. Above :data:`WARNING` figures that depend
-on them are marked, above :data:`LIMIT` the ripple is not valid.
+A map of finite elements carries the record ``info["validation"]``. It compares the map
+with equilibria at torques and angles at which the map was not sampled. Differences of
+input torque and loaded output error are given relative to the peak to peak of the
+finite elements at the same torque. Above :data:`WARNING` the dependent figures are
+marked as uncertain; above :data:`LIMIT` the ripple is not valid.
 
-A record may come from a file that somebody else wrote: what is not sound is ignored
-with a reason, and the map counts as not validated.
+A record may come from a file of unknown origin. An invalid record is ignored with a
+reason, and the map counts as not validated.
 """
 
 from __future__ import annotations
@@ -23,19 +23,19 @@ if TYPE_CHECKING:
     from swgjoint.maps.potential import Potential
 
 WARNING = 0.1
-"""Difference over the peak to peak from which a figure is marked as uncertain."""
+"""Ratio of difference to peak to peak above which a figure is marked as uncertain."""
 LIMIT = 0.3
-"""The same from which ripple figures are not valid."""
+"""Ratio of difference to peak to peak above which ripple figures are not valid."""
 NOT_VALIDATED = "not validated against unseen solves"
 QUANTITIES = {
     "input_torque": "input torque",
     "output_error": "loaded output error",
 }
-"""Quantities of the ripple and their names."""
+"""Names of the ripple quantities by key."""
 STIFFNESS = "secant_stiffness"
 UNITS = {"input_torque": "Nm", "output_error": "rad"}
 MAX_ROWS = 1000
-"""Of a record; a thorough one has some tens."""
+"""Largest number of rows of a record; a thorough one has a few tens."""
 
 Rows = tuple[tuple[float, float, float], ...]
 
@@ -47,17 +47,20 @@ class Difference:
     quantity: str
     """Key of :data:`QUANTITIES` or :data:`STIFFNESS`."""
     largest: float
-    """Over the peak to peak of the solves at that torque; of a stiffness relative."""
+    """Difference over the peak to peak of the solves at that torque [-]; relative
+    difference for a stiffness."""
     torque: float
-    """Where it is [N·m]."""
+    """Torque at which the difference occurs [N·m]."""
     rms: float | None = None
-    """Over the same peak to peak; None where it is not known."""
+    """Root mean square over the same peak to peak [-]; None if unknown."""
     expected: float | None = None
-    """Estimate of the largest one at more angles, over the same; None where unknown."""
+    """Estimate of the largest difference at more angles, in the same unit; None if
+    unknown."""
     peak_to_peak: float | None = None
-    """Of the solves at that torque [N·m] or [rad]; None where it is not known."""
+    """Peak to peak of the solves at that torque [N·m] or [rad]; None if unknown."""
     from_rows: tuple[float, ...] = ()
-    """Two torques of unseen solves, if the difference is on the line through them."""
+    """Two torques of unseen solves between which the difference was interpolated; empty
+    otherwise."""
 
     @property
     def name(self) -> str:
@@ -76,7 +79,7 @@ class Difference:
 
     @classmethod
     def from_json(cls, given: Mapping[str, Any]) -> Difference:
-        """That of :meth:`to_json`."""
+        """The difference that :meth:`to_json` wrote."""
         return cls(
             quantity=given["quantity"],
             largest=given["largest"],
@@ -93,7 +96,7 @@ class Difference:
         )
 
     def _line(self) -> str:
-        """What an interpolated difference comes from."""
+        """Torques between which a difference was interpolated, as text."""
         if not self.from_rows:
             return ""
         first, second = self.from_rows
@@ -102,18 +105,18 @@ class Difference:
 
 @dataclass(frozen=True, kw_only=True)
 class MapValidation:
-    """The record of a map, checked."""
+    """The checked validation record of a map."""
 
     solves: int
     torques: tuple[float, ...]
-    """None of them sampled, increasing [N·m]."""
+    """Torques at which the map was not sampled, increasing [N·m]."""
     totals: dict[str, Difference]
-    """The worst of each quantity, by key."""
+    """Largest difference of each quantity, by key."""
     rows: dict[str, Rows]
-    """By quantity increasing torques [N·m], largest differences [-], peak to peak of
-    the solves [N·m] or [rad], nan where it is not known."""
+    """Rows by quantity: torque, increasing [N·m], largest difference [-], and peak to
+    peak of the solves [N·m] or [rad], NaN if unknown."""
     reason: str
-    """Why sampling ended before its goal; empty where it was reached."""
+    """Why sampling ended before its goal; empty if it reached the goal."""
 
     @property
     def worst(self) -> Difference:
@@ -121,23 +124,23 @@ class MapValidation:
         return max((self.totals[key] for key in QUANTITIES), key=lambda d: d.largest)
 
     def bad_torques(self, limit: float) -> tuple[float, ...]:
-        """Torques of the record at which the ripple is off by more than that [N·m]."""
+        """Torques of the record whose ripple difference exceeds a limit [N·m]."""
         rows = [row for key in QUANTITIES for row in self.rows[key]]
         return tuple(sorted({row[0] for row in rows if row[1] > limit}))
 
     def worst_between(self, low: float, high: float) -> dict[str, Difference]:
         """Largest differences over a range of torques.
 
-        Rows inside the range count as they are; its ends lie between two rows and get
-        the straight line through them, beyond the record its last row. A record of one
-        sign holds for the other one, too.
+        Rows inside the range count directly. At the ends of the range the differences
+        are interpolated linearly between two rows; beyond the record they equal its
+        last row. A record of one sign also applies to the other sign.
 
         Args:
             low: Smallest torque [N·m].
             high: Largest torque [N·m], equal to ``low`` for a constant load.
 
         Returns:
-            By quantity of :data:`QUANTITIES`.
+            Largest difference by key of :data:`QUANTITIES`.
         """
         ends = sorted((low, high))
         if not any(torque < 0.0 for torque in self.torques):
@@ -164,13 +167,13 @@ class MapValidation:
 
 
 def percent(share: float) -> str:
-    """A share as text, two digits."""
+    """A fraction as a percentage with two significant digits."""
     value = 100.0 * share
     return f"{value:.0f} %" if value >= 99.5 else f"{value:.2g} %"
 
 
 def map_validation(drive: Potential) -> tuple[MapValidation | None, str | None]:
-    """The record of a map, or why there is none to be used.
+    """The validation record of a map, or the reason why it has no usable one.
 
     Returns:
         The record and None, or None and the reason.
@@ -186,14 +189,14 @@ def map_validation(drive: Potential) -> tuple[MapValidation | None, str | None]:
 
 
 def validation_json(drive: Potential) -> dict[str, Any]:
-    """``validation``: the record, None where it is not to be used; and the reason."""
+    """``validation`` (None if unusable) and ``validation_reason`` of a map."""
     found, reason = map_validation(drive)
     record = None if found is None else drive.info["validation"]
     return {"validation": record, "validation_reason": reason}
 
 
 def validation_lines(found: MapValidation) -> list[str]:
-    """Warnings about the figures of a map, none where it is good."""
+    """Warnings about the figures of a map; empty if the map is accurate."""
     worst, lines = found.worst, []
     if worst.largest > LIMIT:
         lines.append(
@@ -215,8 +218,8 @@ def validation_lines(found: MapValidation) -> list[str]:
 
 
 def validation_summary(found: MapValidation) -> str:
-    """Solves and largest differences in one line."""
-    told = [
+    """Number of solves and largest differences in one line."""
+    parts = [
         f"{one.name} within {percent(one.largest)}"
         + _spread(one)
         + f" at {one.torque:.4g} N·m"
@@ -224,28 +227,28 @@ def validation_summary(found: MapValidation) -> str:
     ]
     return (
         f"validated against {found.solves} unseen solves at {len(found.torques)}"
-        f" torques, worst torque of each, ripple in parts of its peak to peak:"
-        f" {', '.join(told)}"
+        f" torques; largest differences, ripple relative to its peak to peak:"
+        f" {', '.join(parts)}"
     )
 
 
 def _spread(one: Difference) -> str:
-    """Root mean square and what more angles would show, where they are known."""
-    told = [] if one.rms is None else [f"rms {percent(one.rms)}"]
+    """Root mean square and the estimate for more angles, if known, as text."""
+    parts = [] if one.rms is None else [f"rms {percent(one.rms)}"]
     if one.expected is not None:
-        told.append(f"expected at more angles {percent(one.expected)}")
-    return f" ({', '.join(told)})" if told else ""
+        parts.append(f"expected at more angles {percent(one.expected)}")
+    return f" ({', '.join(parts)})" if parts else ""
 
 
 def _torques(found: MapValidation, limit: float) -> str:
-    """Torques above a limit in words, that of the worst row at least."""
+    """Torques above a limit as text, at least that of the worst row."""
     torques = found.bad_torques(limit) or (found.worst.torque,)
     shown = ", ".join(f"{torque:.4g}" for torque in torques[:6])
     return f"{shown}{', ...' if len(torques) > 6 else ''} N·m"
 
 
 def _no_record(drive: Potential) -> str:
-    """Why a map has no record."""
+    """Reason why a map has no validation record."""
     if "kinematic_error" in drive.info:
         return "its kinematic error is assumed"
     sources = {
@@ -263,7 +266,7 @@ class _Fault(Exception):
 
 
 def _read(record: Any) -> MapValidation:
-    """A record, checked; unknown keys are left alone."""
+    """The record after checks; unknown keys are ignored."""
     given = _table(record, "")
     rows = given.get("rows")
     if not isinstance(rows, Sequence) or isinstance(rows, str | bytes):
@@ -286,7 +289,7 @@ def _read(record: Any) -> MapValidation:
         torque = _number(table, "torque_Nm", where)
         torques.add(torque)
         for key, of in found.items():
-            # where the solves have no ripple there is no part of it
+            # without ripple in the solves there is no relative difference
             if table.get(f"{key}_largest") is None:
                 continue
             value, height = _share(table, f"{key}_largest", where), nan
@@ -351,7 +354,7 @@ def _text(value: Any) -> str:
 
 
 def _short(value: Any) -> str:
-    """A value of a hostile file in some characters."""
+    """A value of an untrusted file in a few characters."""
     if isinstance(value, int) and abs(value) > 10**12:
         return "a very large integer"
     if isinstance(value, list | tuple | Mapping):

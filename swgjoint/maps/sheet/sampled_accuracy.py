@@ -13,27 +13,27 @@ from swgjoint.typing import Array
 from swgjoint.units import arcmin
 
 ORDERS = tuple(pq for k in range(2, 13, 2) for pq in ((k, 0), (0, k)))
-"""(p, q) of p alpha + q beta that are told from the rest of the error: two lobes leave
-the even orders of the errors of either member."""
+"""Orders (p, q) of p alpha + q beta that are separated from the rest of the error. Two
+lobes cancel the odd orders of the errors of either member."""
 HIGHEST = 12
-"""Of them."""
+"""Highest of these orders."""
 REST = 2.0
-"""What the rest adds to either peak at most, in its rms. In trials with a rest of 30
-orders as strong as the rings show the middle of the bracket is 0.95 of the dense peak
-to peak, with a standard deviation of 0.07; the largest difference of as many samples is
-0.77 of it."""
+"""Largest contribution of the rest to either peak, in multiples of its rms. In trials
+with a rest of 30 orders, as strong as in ring computations, the middle of the bracket
+is 0.95 times the dense peak to peak, with a standard deviation of 0.07. The largest
+difference of the same samples is 0.77 times it."""
 
 
 def peaks(theta: Array, error: Array, design: Design) -> tuple[float, float]:
     """Peak to peak of the low orders over an output turn, and rms of the rest [rad].
 
-    Few angles meet no peak of an error that repeats after an output turn only: the low
-    orders are fitted by least squares and looked at densely. No order dominates the
-    rest, so of it the rms is told.
+    A few angles miss the peaks of an error that repeats only after an output turn. The
+    low orders are therefore fitted by least squares and evaluated densely. No order
+    dominates the rest, so its rms is returned.
 
     Args:
         theta: Random input angles over one output turn [rad]. Shape (n,).
-        error: There (n,) [rad].
+        error: Error at these angles [rad]. Shape (n,).
         design: The drive.
     """
     n = np.array(ORDERS) @ np.array(angle_coefficients(design.drive.layout))
@@ -53,9 +53,14 @@ def peaks(theta: Array, error: Array, design: Design) -> tuple[float, float]:
 
 
 def accuracy_bracket(found: Mapping[str, Any], design: Design) -> tuple[float, float]:
-    """Peak to peak that is sure, and with all that the rest may add [arcmin].
+    """Lower and upper estimate of the peak to peak over an output turn [arcmin].
 
-    Sure is that of the low orders, or what the samples themselves show.
+    The lower one is the peak to peak of the low orders, or that of the samples if it is
+    larger. The upper one adds the largest contribution of the rest.
+
+    Args:
+        found: Samples with ``input_angles_rad`` and ``error_rad``.
+        design: The drive.
     """
     theta, error = (np.array(found[key]) for key in ("input_angles_rad", "error_rad"))
     low, rest = peaks(theta, error, design)

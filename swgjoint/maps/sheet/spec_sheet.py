@@ -1,4 +1,4 @@
-"""The catalogue-style sheet of a map, measured on it by the standard procedures."""
+"""Catalogue-style spec sheet of a map, measured by the standard procedures."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ RATING_KEYS = (
     "repeated_peak_Nm",
     "momentary_peak_Nm",
 )
-"""From the ratings alone."""
+"""Figures from the ratings alone."""
 LOOP_KEYS = (
     "K1_Nm_rad",
     "K2_Nm_rad",
@@ -44,7 +44,7 @@ LOOP_KEYS = (
     "hysteresis_loss_arcmin",
     "lost_motion_arcmin",
 )
-"""From the torque loop with the input locked."""
+"""Figures from the torque loop with the input locked."""
 TURN_KEYS = (
     "transmission_accuracy_arcmin",
     "transmission_accuracy_rated_arcmin",
@@ -52,17 +52,17 @@ TURN_KEYS = (
     "ripple_pp_percent",
     "orders",
 )
-"""From one output turn."""
+"""Figures from one output turn."""
 _NO_FRICTION = "the map has no friction of bearing, seals and teeth at speed"
 SOLID_KEYS = ("fatigue_safety_factor", "radial_stiffness_N_mm")
 """Figures of the 3D finite elements of a design, which no map contains."""
 RATCHETING_KEY = "ratcheting_torque_Nm"
 """Figure of the 2D finite elements of a design."""
 SLOW_KEYS = ("no_load_running_torque_Nm", "starting_torque_Nm")
-"""From the friction of teeth and race of a design that turns slowly."""
+"""Figures from tooth and bearing-race friction of a slowly turning design."""
 ABSENT_KEYS = {
-    RATCHETING_KEY: "needs the finite elements of a design in the plane, a minute or"
-    " more: name it in --only",
+    RATCHETING_KEY: "needs the 2D finite elements of a design, which take a minute or"
+    " more: request it with --only",
     "repeatability_arcmin": "the map has no random part: a repeated approach ends"
     " at the same position",
     "fatigue_safety_factor": "needs the stresses of the finite elements; a map holds"
@@ -70,21 +70,21 @@ ABSENT_KEYS = {
     "radial_stiffness_N_mm": "needs the finite elements of the flexspline; a map holds"
     " torque and torsion only",
 }
-"""What no map tells, with the reason."""
+"""Figures that no map provides, with the reason."""
 KEYS = (*RATING_KEYS, *LOOP_KEYS, *TURN_KEYS, *LOSS_KEYS, *ABSENT_KEYS)
 
 _CURVE = 64
-"""Samples of the period for a point of the efficiency curve."""
+"""Samples per period for a point of the efficiency curve."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LossCurve:
-    """Efficiency over the load at constant speeds."""
+    """Efficiency over the load at several constant speeds."""
 
     load: Array
     """Output torque [N·m]. Shape (n,)."""
     efficiency: dict[float, Array]
-    """By speed of the input [rad/s]: work out over work in [-]. Shapes (n,)."""
+    """Output work over input work [-], by input speed [rad/s]. Shapes (n,)."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -92,16 +92,16 @@ class SpecSheet:
     """Figures of one drive and the curves from which they were read."""
 
     figures: dict[str, Any]
-    """Value of every key that was asked for, None where the source cannot tell."""
+    """Value of every requested key; None if the source does not provide it."""
     missing: dict[str, str]
-    """Reason of every None."""
+    """Reason for every None."""
     loop: TorqueLoop | None = None
     turns: dict[str, Turn] = field(default_factory=dict)
-    """``no_load`` and ``rated``: transmission error [rad]; ``ripple``: torque [N·m]."""
+    """Error [rad] for ``no_load`` and ``rated``, torque [N·m] for ``ripple``."""
     losses: LossCurve | None = None
-    """Efficiency over the load; None without friction, or where it is not asked for."""
+    """Efficiency over the load; None without friction or if it was not requested."""
     uncertain: dict[str, Difference] = field(default_factory=dict)
-    """What makes a figure uncertain, by key; see :mod:`.map_validity`."""
+    """Differences that make figures uncertain, by key; see :mod:`.map_validity`."""
 
     def as_dict(self) -> dict[str, Any]:
         """Figures, then ``missing`` and ``uncertain``."""
@@ -110,10 +110,10 @@ class SpecSheet:
 
 
 def check_keys(only: Collection[str]) -> tuple[str, ...]:
-    """The wanted keys in the order of the sheet; all of them for none.
+    """The requested keys in the order of the sheet; all keys if empty.
 
     Raises:
-        InputError: One line per key that the sheet does not have.
+        InputError: If the sheet lacks a key; the message has one line per unknown key.
     """
     wanted = set(only) - {"wall_s"}
     lines = []
@@ -128,12 +128,12 @@ def check_keys(only: Collection[str]) -> tuple[str, ...]:
 
 
 def needs_map(only: Collection[str]) -> bool:
-    """Whether any of the keys is read from a map, not from ratings alone."""
+    """Whether any key is read from a map instead of the ratings alone."""
     return any(key in (*LOOP_KEYS, *TURN_KEYS) for key in check_keys(only))
 
 
 def needs_turn(only: Collection[str]) -> bool:
-    """Whether any of the keys depends on more than one input angle."""
+    """Whether any key depends on more than one input angle."""
     return any(key in TURN_KEYS for key in check_keys(only))
 
 
@@ -145,26 +145,28 @@ def measure_spec(
     known: Mapping[str, float] | None = None,
     unknown: Mapping[str, str] | None = None,
 ) -> SpecSheet:
-    """Run the test procedures that the wanted keys need, and no others.
+    """Run the test procedures that the requested keys need, and no others.
 
-    Stiffness, hysteresis loss and lost motion: torque loop to the repeated peak torque
-    (at least 1.5 T2), input locked at zero. Transmission accuracy: peak to peak of the
-    transmission error over one output turn, one direction, without load and at rated
-    torque. Ripple: output held on its ideal motion at rated torque, percent of rated.
-    Orders per input turn, amplitudes zero to peak. Losses: see
-    :mod:`swgjoint.maps.sheet.friction_running`; running torque and efficiency at 2000
-    rpm of the input, efficiency at rated torque.
+    Stiffness, hysteresis loss and lost motion come from a torque loop to the repeated
+    peak torque (at least 1.5 T2) with the input locked at zero. Transmission accuracy
+    is the peak to peak of the transmission error over one output turn in one direction,
+    without load and at rated torque. Ripple is the torque with the output held on its
+    ideal motion at rated torque, in percent of rated. Orders are per input turn, their
+    amplitudes zero to peak. For the losses see
+    :mod:`swgjoint.maps.sheet.friction_running`; running torque and efficiency apply to
+    2000 rpm of the input, efficiency to rated torque.
 
     Args:
-        drive: The map; None where :func:`needs_map` says so.
-        ratings: Needed without a map, else those of the map.
-        only: Keys of the sheet; all for none.
-        known: Values that were found elsewhere, of :data:`SOLID_KEYS` and
+        drive: The map; may be None if :func:`needs_map` is false.
+        ratings: Ratings; those of the map if None, required without a map.
+        only: Keys of the sheet; all if empty.
+        known: Values from other computations, for :data:`SOLID_KEYS` and
             :data:`RATCHETING_KEY`.
-        unknown: Reasons why they were not, of :data:`SLOW_KEYS`, too.
+        unknown: Reasons why such values are missing, also for :data:`SLOW_KEYS`.
 
     Raises:
         InputError: If a key is unknown.
+        ValueError: If a required map or required ratings are missing.
     """
     keys = check_keys(only)
     if ratings is None:
@@ -195,10 +197,10 @@ def measure_spec(
             _loss_figures(drive, keys, values, missing)
             if "efficiency_percent" in keys:
                 losses = _loss_curve(drive)
-        # the source knows best why it cannot tell
-        own = drive.info.get("missing")
-        if isinstance(own, dict):
-            missing |= {k: str(own[k]) for k in missing if k in own}
+        # the reason stated by the source is the most specific one
+        stated = drive.info.get("missing")
+        if isinstance(stated, dict):
+            missing |= {k: str(stated[k]) for k in missing if k in stated}
         uncertain = judge_figures(drive, values, missing)
     missing |= dict(unknown or {})
     return SpecSheet(
@@ -264,7 +266,7 @@ def _turn_figures(
     missing: dict[str, str],
 ) -> None:
     if not turns:
-        reason = "the map holds no harmonic of the gear angles"
+        reason = "the map has no harmonics of the gear angles"
         missing |= dict.fromkeys(TURN_KEYS, reason)
         return
     percent = 100.0 / drive.ratings.rated_torque
@@ -333,7 +335,7 @@ def spec_sheet(drive: Potential, only: Collection[str] = ()) -> dict[str, Any]:
 
     Args:
         drive: The map.
-        only: Keys of the sheet; all for none.
+        only: Keys of the sheet; all if empty.
     """
     start = time.perf_counter()
     sheet = measure_spec(drive, only=only)
@@ -347,10 +349,10 @@ def spec_sheet(drive: Potential, only: Collection[str] = ()) -> dict[str, Any]:
 
 
 def validity(drive: Potential) -> dict[str, Any]:
-    """Level of the source, its range of torque, whether the loop leaves it.
+    """Level of the map, its torque range, and whether the loop exceeds this range.
 
-    ``kinematic_error``, ``hysteresis`` and ``friction`` tell where they come from; one
-    output turn (accuracy, ripple) is taken without the last two, the loop without
+    ``kinematic_error``, ``hysteresis`` and ``friction`` state their sources. Figures of
+    an output turn (accuracy, ripple) exclude hysteresis and friction; the loop excludes
     friction.
     """
     low, high = drive.torque_range

@@ -1,4 +1,4 @@
-"""Figures of a spec sheet that the validation of a map puts in doubt."""
+"""Figures of a spec sheet that are uncertain by the validation of the map."""
 
 from __future__ import annotations
 
@@ -25,22 +25,22 @@ def judge_figures(
 ) -> dict[str, Difference]:
     """Judge figures by the validation of the map at the torque where they are read.
 
-    A ripple above :data:`~swgjoint.maps.sheet.map_validity.LIMIT` is taken out of
-    ``values`` and gets its reason in ``missing``.
+    A ripple above :data:`~swgjoint.maps.sheet.map_validity.LIMIT` is removed from
+    ``values``, and ``missing`` gives the reason.
 
     Args:
         drive: The map.
-        values: Figures by key, changed.
-        missing: Reasons by key, changed.
+        values: Figures by key, modified in place.
+        missing: Reasons by key, modified in place.
 
     Returns:
-        By key the difference that makes a figure uncertain.
+        Differences that make figures uncertain, by key.
     """
-    found, _ = map_validation(drive)
-    if found is None:
+    record, _ = map_validation(drive)
+    if record is None:
         return {}
     rated = drive.ratings.rated_torque
-    no_load, loaded = (found.worst_between(load, load) for load in (0.0, rated))
+    no_load, loaded = (record.worst_between(load, load) for load in (0.0, rated))
     worst = max(loaded.values(), key=lambda one: one.largest)
     if worst.largest > LIMIT:
         for key in RIPPLE_KEYS:
@@ -56,6 +56,6 @@ def judge_figures(
         "transmission_accuracy_arcmin": no_load["output_error"],
         "transmission_accuracy_rated_arcmin": loaded["output_error"],
     }
-    if STIFFNESS in found.totals:
-        of |= dict.fromkeys(STIFFNESS_KEYS, found.totals[STIFFNESS])
+    if STIFFNESS in record.totals:
+        of |= dict.fromkeys(STIFFNESS_KEYS, record.totals[STIFFNESS])
     return {key: one for key, one in of.items() if one.largest > WARNING}

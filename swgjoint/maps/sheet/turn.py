@@ -16,30 +16,31 @@ from swgjoint.maps.potential import Potential
 from swgjoint.typing import Array
 
 PER_WAVE = 16
-"""Samples of the shortest strong wave; with the parabola through each extreme the
-peak-to-peak value is within 0.1 %."""
+"""Samples per shortest strong wave. With a parabola through each extreme the
+peak-to-peak value is then accurate to 0.1 %."""
 STRONG = 0.1
-"""A wave is strong from this part of the largest one; a weaker one needs fewer samples,
-by the square root of its size, for the same error of the peak to peak."""
+"""A wave is strong if it reaches this fraction of the largest one. A weaker wave needs
+fewer samples, by the square root of its size, for the same peak-to-peak error."""
 AT_LEAST_PER_WAVE = 4
-"""Samples of the shortest wave of all, so that none is aliased."""
+"""Samples per shortest wave of all, so that none is aliased."""
 AT_LEAST = 64
-"""Samples of one period."""
+"""Smallest number of samples per period."""
 CHUNK = 4096
-"""Positions that are evaluated at once."""
+"""Number of positions evaluated at once."""
 MAX_SAMPLES = 10_000_000
 LINES = 12
-"""Orders that a sheet lists."""
+"""Number of orders that a sheet lists."""
 FLOOR = 1e-3
-"""Lines below this part of the strongest one are left out."""
+"""Lines below this fraction of the strongest one are omitted."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Turn:
     """A periodic signal of the gear over its period, known for the whole output turn.
 
-    The period is one cycle of the pattern where the pattern depends on the input angle
-    alone, else the number of turns after which all members are back together.
+    The period is one cycle of the pattern if the pattern depends on the input angle
+    alone; otherwise it is the number of turns after which all members return to their
+    initial position.
     """
 
     period_turns: Fraction
@@ -47,7 +48,7 @@ class Turn:
     turns: float
     """Input turns of one output turn."""
     signal: Array
-    """Equally spaced over the period, end excluded. Shape (n,)."""
+    """Signal at equal steps over the period, its end excluded. Shape (n,)."""
 
     def __post_init__(self) -> None:
         signal = frozen_array(self.signal, "signal", ndim=1)
@@ -61,11 +62,11 @@ class Turn:
         return np.asarray(index * step, dtype=np.float64), self.signal[index % n]
 
     def peak_to_peak(self) -> float:
-        """Largest minus smallest over one output turn, between the samples too."""
+        """Largest minus smallest value over one output turn, also between samples."""
         n = self.signal.size
         step = float(self.period_turns) / n
         turn = self.signal[: min(n, round(self.turns / step) + 1)]
-        # one more sample at each end, so that extremes there have both neighbours
+        # one more sample at each end, so that extremes at the ends have two neighbours
         closed = np.concatenate([self.signal[-1:], turn, [self.signal[turn.size % n]]])
         return _peak(closed) + _peak(-closed)
 
@@ -74,7 +75,7 @@ class Turn:
         return float(np.std(self.signal))
 
     def lines(self) -> tuple[Array, Array]:
-        """Orders per input turn and amplitudes (zero to peak), the mean left out."""
+        """Orders per input turn and amplitudes (zero to peak), without the mean."""
         amplitude = 2.0 * np.abs(np.fft.rfft(self.signal)) / self.signal.size
         order = np.arange(amplitude.size) / float(self.period_turns)
         return order[1:], amplitude[1:]
@@ -89,9 +90,13 @@ def _peak(values: Array) -> float:
 
 
 def period_of(drive: Potential) -> tuple[Fraction, int]:
-    """Period of a map's pattern [input turns] and samples that carry its orders."""
+    """Period of a map's pattern [input turns] and the samples that resolve its orders.
+
+    Raises:
+        ComputationError: If more than :data:`MAX_SAMPLES` would be needed.
+    """
     n_theta, n_psi = drive.angle_orders.T
-    # an exact ratio: input turns for whole output turns
+    # an exact ratio gives the input turns of whole output turns
     ratio = Fraction(drive.ratio).limit_denominator(drive.teeth_circular_spline)
     if not n_psi.any():
         period = Fraction(1, gcd(*(int(n) for n in n_theta)) or 1)
@@ -107,20 +112,20 @@ def period_of(drive: Potential) -> tuple[Fraction, int]:
     if samples > MAX_SAMPLES:
         raise ComputationError(
             f"map {drive.name!r}: orders to {orders.max():g} per input turn over"
-            f" {float(period):g} turns need {samples} samples; at most {MAX_SAMPLES}:"
-            " leave out the highest harmonics"
+            f" {float(period):g} turns need {samples} samples; accepted: up to"
+            f" {MAX_SAMPLES}; remove the highest harmonics"
         )
     return period, samples
 
 
 def _strengths(drive: Potential) -> Array:
-    """Error of each harmonic, and of its torque as torsion [rad]. (n_harmonics,)."""
+    """Error of each harmonic plus the torsion of its torque [rad]. (n_harmonics,)."""
     size = np.hypot(*drive.kinematic_error.T)
     torsions = [drive.mean_torsion(s * drive.ratings.rated_torque) for s in (-1, 0, 1)]
     torque = np.hypot(*np.moveaxis(drive.coefficients(torsions, 1), -1, 0))
     energy = np.hypot(*np.moveaxis(drive.coefficients(torsions), -1, 0))
     torque = torque + np.abs(drive.angle_orders[:, 1]) * energy
-    torque[:, 0] = 0.0  # the mean is no wave
+    torque[:, 0] = 0.0  # the mean is not a wave
     return np.asarray(size + torque.max(axis=0) / drive.mean_stiffness)
 
 
@@ -132,8 +137,12 @@ def _input_angles(drive: Potential) -> tuple[Fraction, Array]:
 def error_turn(drive: Potential, torque: float = 0.0) -> Turn:
     """Transmission error psi - theta/i [rad] at constant output torque [N·m].
 
-    Slow motion in one direction; at no load it is the kinematic error, with the shift
-    that the cogging of the unloaded drive gives.
+    The motion is slow and in one direction. Without load this is the kinematic error,
+    shifted by the cogging of the unloaded drive.
+
+    Args:
+        drive: The map.
+        torque: Output torque [N·m].
     """
     period, theta = _input_angles(drive)
     error = _along(drive, theta, lambda at: at.output_angle(torque))
@@ -144,8 +153,12 @@ def error_turn(drive: Potential, torque: float = 0.0) -> Turn:
 def ripple_turn(drive: Potential, torque: float) -> Turn:
     """Output torque with the output held on its ideal motion [N·m].
 
-    psi = theta/i less the mean torsion at the given torque: the output follows the
-    ratio exactly, as if a stiff load turned at constant speed.
+    psi = theta/i minus the mean torsion at the given torque: the output follows the
+    ratio exactly, like a stiff load that turns at constant speed.
+
+    Args:
+        drive: The map.
+        torque: Output torque that sets the mean torsion [N·m].
     """
     period, theta = _input_angles(drive)
     back = -drive.mean_torsion(torque)
@@ -156,7 +169,7 @@ def ripple_turn(drive: Potential, torque: float) -> Turn:
 
 
 def _along(drive: Potential, theta: Array, of: Callable[[IdealMotion], Array]) -> Array:
-    """A quantity at many input angles, some at a time."""
+    """A quantity at many input angles, evaluated in chunks."""
     parts = [
         of(IdealMotion.from_map(drive, theta[k : k + CHUNK]))
         for k in range(0, theta.size, CHUNK)
@@ -165,25 +178,25 @@ def _along(drive: Potential, theta: Array, of: Callable[[IdealMotion], Array]) -
 
 
 def strongest_orders(turns: dict[str, Turn]) -> list[dict[str, float]]:
-    """Lines of several signals of one drive, the strongest of the first signal first.
+    """Spectral lines of several signals of one drive, strongest of the first one first.
 
     Args:
-        turns: Signals by key, in the units wanted in the result.
+        turns: Signals by key, in the units of the result.
 
     Returns:
-        At most :data:`LINES` of each signal: ``order`` per input turn and the
-        amplitude (zero to peak) of every signal there.
+        At most :data:`LINES` lines per signal: ``order`` per input turn and the
+        amplitude (zero to peak) of every signal at that order.
     """
     spectra = {key: turn.lines() for key, turn in turns.items()}
-    found: dict[int, None] = {}
+    lines: dict[int, None] = {}
     for _, amplitude in spectra.values():
         largest = float(amplitude.max(initial=0.0))
         for k in np.argsort(amplitude)[::-1][:LINES]:
             if amplitude[k] > FLOOR * largest and largest > 0.0:
-                found[int(k)] = None
+                lines[int(k)] = None
     order = next(iter(spectra.values()))[0]
     return [
         {"order": float(order[k])}
         | {key: float(amplitude[k]) for key, (_, amplitude) in spectra.items()}
-        for k in found
+        for k in lines
     ]

@@ -1,4 +1,4 @@
-"""What a result says of the validation of its map."""
+"""Entries of a result on the validation of its map."""
 
 from __future__ import annotations
 
@@ -17,16 +17,16 @@ from swgjoint.maps.sheet.spec_sheet import needs_turn
 
 def validation_of_map(drive: Potential) -> dict[str, Any]:
     """``validation``, ``validation_reason`` and ``validation_notes`` of a map."""
-    found, _ = map_validation(drive)
-    notes = [] if found is None else validation_lines(found)
+    record, _ = map_validation(drive)
+    notes = [] if record is None else validation_lines(record)
     return {**validation_json(drive), "validation_notes": notes}
 
 
 def validation_of_sheet(drive: Potential | None, keys: Sequence[str]) -> dict[str, Any]:
-    """The same of a spec sheet; notes only where a key depends on the ripple.
+    """The same entries for a spec sheet, with notes only if a key depends on ripple.
 
     Args:
-        drive: The map; None where no key needs one.
+        drive: The map; None if no key needs one.
         keys: Keys of the sheet.
     """
     if drive is None:

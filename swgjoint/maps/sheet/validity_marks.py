@@ -1,8 +1,8 @@
-"""Signs of figures that depend on a map which differs from unseen solves.
+"""Marks of figures that depend on a map which differs from unseen solves.
 
-Figures of a joint, see :func:`swgjoint.sim.figures.metrics.joint_metrics`, carry what
-its map misses under ``map_difference`` and ``ripple_valid``; so do rows of a
-comparison.
+The figures of a joint (see :func:`swgjoint.sim.figures.metrics.joint_metrics`) and the
+rows of a comparison contain the differences of the map under ``map_difference`` and
+``ripple_valid``.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ UNCERTAIN, NOT_VALID = "~", "!"
 
 
 def mark(largest: float | None) -> str:
-    """The sign of a figure that depends on a quantity which is off by that much."""
+    """Mark of a figure that depends on a quantity with this relative difference."""
     if largest is None or largest <= WARNING:
         return ""
     return UNCERTAIN if largest <= LIMIT else NOT_VALID
@@ -34,13 +34,13 @@ def mark(largest: float | None) -> str:
 def joint_doubt(
     joint: Mapping[str, Any], quantities: Sequence[str] = tuple(QUANTITIES)
 ) -> Difference | None:
-    """The worst difference of a joint's map where it exceeds :data:`WARNING`.
+    """The largest difference of a joint's map if it exceeds :data:`WARNING`.
 
-    None where the run tells no ripple of the joint.
+    None also if the run does not report the ripple of the joint.
 
     Args:
-        joint: Figures of a joint, as ``joint_metrics`` makes them.
-        quantities: Keys of :data:`QUANTITIES` that count.
+        joint: Figures of a joint from ``joint_metrics``.
+        quantities: Keys of :data:`QUANTITIES` to consider.
     """
     found = joint["map_difference"]
     if found is None or joint["ripple_valid"] is None:
@@ -53,14 +53,14 @@ def joint_doubt(
 
 
 def error_mark(joint: Mapping[str, Any], value: float) -> str:
-    """The sign of a peak to peak of the transmission error.
+    """Mark of a peak to peak of the transmission error.
 
-    Torsion that follows the load adds to it, so that the difference counts over the
-    figure that is shown.
+    The torsion under a varying load adds to this figure, so the difference is taken
+    relative to the displayed figure.
 
     Args:
-        joint: Figures of a joint.
-        value: The figure [arcmin].
+        joint: Figures of a joint from ``joint_metrics``.
+        value: Displayed peak to peak [arcmin].
     """
     doubt = joint_doubt(joint, ("output_error",))
     if doubt is None:
@@ -71,7 +71,7 @@ def error_mark(joint: Mapping[str, Any], value: float) -> str:
 
 
 def joints_judged(joints: Iterable[Mapping[str, Any]]) -> dict[str, Any]:
-    """``ripple_valid`` and ``map_difference`` of several joints: the worst of them."""
+    """``ripple_valid`` and ``map_difference`` of the worst of several joints."""
     judged = [joint for joint in joints if joint["ripple_valid"] is not None]
     if not judged:
         return {"ripple_valid": None, "map_difference": None}
@@ -90,24 +90,29 @@ def joints_judged(joints: Iterable[Mapping[str, Any]]) -> dict[str, Any]:
 def joint_mark(
     joint: Mapping[str, Any], quantities: Sequence[str] = tuple(QUANTITIES)
 ) -> str:
-    """The sign of a figure of a joint that depends on some quantities, or nothing."""
+    """Mark of a figure of a joint; empty if the figure is certain.
+
+    Args:
+        joint: Figures of a joint from ``joint_metrics``.
+        quantities: Keys of :data:`QUANTITIES` on which the figure depends.
+    """
     doubt = joint_doubt(joint, quantities)
     return "" if doubt is None else mark(doubt.largest)
 
 
 def worst(marks: Collection[str]) -> str:
-    """The gravest of several signs."""
+    """The most severe of several marks."""
     return next((sign for sign in (NOT_VALID, UNCERTAIN) if sign in marks), "")
 
 
 def mark_legend(marks: Collection[str]) -> str:
-    """What the signs of figures mean, those that are there."""
+    """Legend of the marks that occur."""
     meaning = {
         UNCERTAIN: f"uncertain, the map differs by more than {percent(WARNING)}",
         NOT_VALID: f"not valid, the map differs by more than {percent(LIMIT)}",
     }
-    told = [f"{sign} {text}" for sign, text in meaning.items() if sign in marks]
+    shown = [f"{sign} {text}" for sign, text in meaning.items() if sign in marks]
     return (
-        f"{'; '.join(told)} of the peak to peak from finite-element solves that it has"
-        " not seen"
+        f"{'; '.join(shown)} of the peak to peak from finite-element solves that were"
+        " not used to build it"
     )
