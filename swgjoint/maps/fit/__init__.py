@@ -1,1 +1,1 @@
-"""From sampled equilibria and stated figures to the coefficients of a map."""
+"""Map coefficients from sampled equilibria, measurements and stated figures."""

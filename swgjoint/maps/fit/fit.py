@@ -1,15 +1,15 @@
-r"""From sampled equilibria to a potential.
+r"""Fit of the potential to sampled equilibria.
 
 At every angle the samples give the potential and its first two derivatives by the
-torsion at the sampled torques: strain energy, torque, tangent stiffness,
+torsion at the sampled torques (strain energy, torque and tangent stiffness):
 
 .. math:: V = U(T, \varphi) - \overline{U(0, \varphi)}, \quad
     V' = T, \quad V'' = \left(\frac{d\Delta}{dT}\right)^{-1} .
 
-They are carried to common knots by quintic Hermite interpolation, a Fourier transform
-over the angle gives the harmonics, and each harmonic becomes a chain of quartics with
-these values at the knots. The input torque of the simulation takes no part and must
-come out as the derivative of V.
+Quintic Hermite interpolation transfers them to common knots, a Fourier transform over
+the angle gives the harmonics, and each harmonic becomes a chain of quartics with these
+values at the knots. The fit does not use the simulated input torque, which must follow
+as the derivative of V.
 """
 
 from __future__ import annotations
@@ -31,25 +31,25 @@ from swgjoint.maps.samples import FullSolves, MapSamples, ToleranceSamples
 from swgjoint.typing import Array
 
 KEEP = 0.005
-"""Harmonics are kept whose kinematic error, or input-torque ripple at some load,
-reaches this part of the largest one."""
+"""A harmonic is kept if its kinematic error, or its input-torque ripple at any load,
+reaches this fraction of the largest one."""
 
 BETWEEN = (0.05, 0.15, 0.35, 0.65)
-"""Parts of the repeated peak torque at which harmonics are weighed, too: contact that
-moves with the torque has other harmonics at each."""
+"""Additional fractions of the repeated peak torque at which harmonics are weighed;
+contact moves with the torque, so each torque has other harmonics."""
 
 END_STEPS = 6
-"""Newton steps to the torsion at which the mean torque is the largest one."""
+"""Newton steps to the torsion at which the mean torque equals the largest one."""
 LADDER = 12
-"""Most knots across the end of a clearance."""
+"""Largest number of knots across the end of a clearance."""
 
 
 def fit_map(samples: MapSamples, *, keep: float = KEEP) -> DriveMap:
-    """Fit the potential map; its ``info`` holds residuals and the energy check.
+    """Fit the potential map; its ``info`` contains residuals and the energy check.
 
     Args:
         samples: Equilibria over one period.
-        keep: Threshold for harmonics, see :data:`KEEP`; 0 keeps all.
+        keep: Threshold for harmonics, see :data:`KEEP`; zero keeps all.
     """
     zero = int(np.flatnonzero(samples.torque == 0.0)[0])
     unloaded = samples.output_error[zero]
@@ -142,15 +142,15 @@ def _knots(samples: MapSamples, torsion: Array) -> Array:
         # the mean torsions, ends inside the sampled range of every angle
         knots = torsion.mean(axis=1)
         knots[0], knots[-1] = torsion[0].max(), torsion[-1].min()
-        # the ends of stiff angles may lie before the mean of torques close to the last
+        # stiff angles may end before the mean torsion of a torque close to the last one
         least = 0.3 * np.abs(np.diff(torsion.mean(axis=1))[[0, -1]])
         inside = (knots > knots[0] + least[0]) & (knots < knots[-1] - least[1])
         inside[[0, -1]] = True
         at -= int((~inside[:zero]).sum())
         knots = knots[inside]
     else:
-        # with errors of the teeth stiffness varies so much that stiff places would end
-        # the range far below the largest torque: there the curves are continued
+        # with tooth errors the stiffness varies so much that stiff positions would end
+        # the range far below the largest torque: their curves are continued instead
         error = found.table[0]
         rest = error[int(np.flatnonzero(found.torque == 0.0)[0])]
         mean = PchipInterpolator(found.torque, (rest - error).mean(axis=1))
@@ -168,7 +168,7 @@ def _knots(samples: MapSamples, torsion: Array) -> Array:
 def _end_at_largest_torque(
     knots: Array, found: ToleranceSamples, torsion: Array
 ) -> None:
-    """Scale the knots of each sign to end where the mean torque is the largest sampled.
+    """Scale the knots of each sign to end at the largest sampled mean torque.
 
     Stiff positions are continued up to there and raise the mean at the mean torsion.
     """
@@ -184,7 +184,7 @@ def _end_at_largest_torque(
 
 
 def _coarse(samples: MapSamples) -> NDArray[np.bool_]:
-    """Knots at which errors of the teeth are compared: they have few torques."""
+    """Mask of the knots at which tooth errors, sampled at few torques, are compared."""
     assert samples.solved is not None
     coarse = np.array(samples.solved)
     if samples.free:  # the ends of the clearance
@@ -197,14 +197,15 @@ def _coarse(samples: MapSamples) -> NDArray[np.bool_]:
 def _clearance_knots(beyond: Array, ends: Array) -> Array:
     """Knots of one side with a ladder across the end of the clearance.
 
-    Its place varies with the angle, more than the teeth of a stiff drive give: from
-    where no angle has left the clearance to where all have, in steps of one angle.
+    The end varies with the angle by more than the elastic torsion of a stiff drive. The
+    ladder spans from the torsion where no angle has left the clearance to the one where
+    all have left it, in steps of the transition of a single angle.
 
     Args:
         beyond: Usual knots, from the first torque after the one that takes up the
-            clearance (n,).
-        ends: Torsion at the end of the clearance and where it is taken up
-            (2, n_angles).
+            clearance [rad]. Shape (n,).
+        ends: Torsion at the end of the clearance and where the clearance is taken up
+            [rad]. Shape (2, n_angles).
     """
     first, last = float(ends[0].min()), float(ends[1].max())
     step = float((ends[1] - ends[0]).mean())
@@ -217,7 +218,7 @@ def _clearance_knots(beyond: Array, ends: Array) -> Array:
 def _modes(values: Array) -> Array:
     """Cosine and sine amplitudes over the first axis. (n_modes, 2, ...).
 
-    The highest mode of an even count is left out: its phase is not determined.
+    The highest mode of an even count is omitted because its phase is not determined.
     """
     n = len(values)
     spectrum = np.fft.rfft(values, axis=0)[: (n + 1) // 2] / n
@@ -238,7 +239,8 @@ def harmonic_strength(drive: DriveMap) -> Array:
     """Kinematic error [rad] and input-torque ripple [N·m] of each harmonic.
 
     The ripple is the amplitude of T de0/dtheta + dV/dtheta, at zero, rated and repeated
-    peak torque and :data:`BETWEEN` of it, of either sign. Shape (n_harmonics, 14).
+    peak torque and the fractions :data:`BETWEEN` of the peak, with both signs. Shape
+    (n_harmonics, 14).
     """
     columns = [np.hypot(*drive.kinematic_error.T)]
     n_theta = np.abs(drive.angle_orders[:, 0])
@@ -252,7 +254,11 @@ def harmonic_strength(drive: DriveMap) -> Array:
 
 
 def residual(drive: DriveMap, samples: MapSamples) -> dict[str, float]:
-    """What the map misses of its own samples.
+    """Deviations of the map from the samples it was fitted to.
+
+    Args:
+        drive: The fitted map.
+        samples: Its samples.
 
     Returns:
         Largest deviation of e0 [rad] and of the torque at the sampled positions [N·m],
@@ -277,12 +283,17 @@ def residual(drive: DriveMap, samples: MapSamples) -> dict[str, float]:
 def against_solves(
     drive: DriveMap, samples: MapSamples, solved: FullSolves
 ) -> dict[str, dict[str, float]]:
-    """The map of a toleranced drive against equilibria that it has not seen.
+    """Deviations of the map of a toleranced drive from unseen equilibria.
+
+    Args:
+        drive: The fitted map.
+        samples: Its samples, with tolerances.
+        solved: Equilibria that the fit did not use.
 
     Returns:
-        ``residual``: largest deviation of the output error [rad] and its part of the
-        peak to peak of the superposition over the cycle; ``energy_check``: as
-        :func:`energy_check`, at the torques that were solved.
+        ``residual``: largest deviation of the output error [rad], and the same relative
+        to the peak to peak of the superposition over the cycle. ``energy_check``: as
+        :func:`energy_check`, at the solved torques.
     """
     theta = solved.input_angle
     zero = solved.torque == 0.0
@@ -315,7 +326,7 @@ def against_solves(
 def stiffness_range(drive: DriveMap) -> list[float]:
     """Smallest and largest stiffness over torsion and angle [N·m/rad].
 
-    A smallest one that is not positive would make an equilibrium unstable.
+    A stiffness that is not positive would make an equilibrium unstable.
     """
     knots = drive.torsion_knots
     x = np.linspace(knots[0], knots[-1], 12 * knots.size)[:, None]
@@ -325,13 +336,17 @@ def stiffness_range(drive: DriveMap) -> list[float]:
 
 
 def energy_check(drive: DriveMap, samples: MapSamples) -> dict[str, float]:
-    """The map's input torque against that of the simulation, which it has not seen.
+    """Deviation of the map's input torque from the simulated one, unused in the fit.
+
+    Args:
+        drive: The fitted map.
+        samples: Its samples.
 
     Returns:
         ``input_torque_pp_Nm``: largest peak-to-peak of the simulated ripple over the
         torques; ``input_torque_error_Nm``: largest deviation of the map from it;
         ``relative``: their ratio; ``strain_energy_relative``: largest deviation of the
-        energy difference against no load, relative to its largest value.
+        energy gain over no load, relative to the largest gain.
     """
     theta = np.broadcast_to(samples.input_angle, samples.output_error.shape)
     zero = int(np.flatnonzero(samples.torque == 0.0)[0])

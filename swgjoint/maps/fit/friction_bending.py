@@ -1,20 +1,20 @@
-r"""Loss of the rim that is bent all around as the wave generator turns.
+r"""Loss of the rim, which is bent along its circumference as the wave generator turns.
 
-The rim of radius r, bent to :math:`w_0 \cos n\varphi` without stretching, has the
+A rim of radius r that is bent to :math:`w_0 \cos n\varphi` without stretching has the
 strain energy
 
 .. math:: U = \tfrac12 E I \oint \kappa^2\,ds
         = \frac{\pi E I w_0^2 (n^2 - 1)^2}{2 r^3}, \qquad I = b t^3/12.
 
-Every point goes through n cycles of bending per turn of the wave generator relative to
-the flexspline. The peaks of its energy sum to 2 U, and a cycle loses 2 pi times the
-loss factor of its peak: a torque of :math:`2 n \eta\,U`, at any speed. Teeth and cup
-are left out: the finite elements of the reference drive, with teeth and on an ellipse,
-hold 24.1 mJ where this is 12.2.
+Every point goes through n bending cycles per turn of the wave generator relative to the
+flexspline. The energy peaks of all points sum to 2 U, and a cycle loses 2 pi times the
+loss factor times its peak. The resulting torque is :math:`2 n \eta\,U` at any speed.
+Teeth and cup are neglected: the finite elements of the reference drive, with teeth and
+on an ellipse, store 24.1 mJ, and this model 12.2 mJ.
 
 Source:
-    Thesis, appendix A: efficiency losses of a constantly deflected turning body (what
-    was measured there is the deflection, not the torque). Ring: Timoshenko,
+    Thesis, appendix A: efficiency losses of a constantly deflected turning body (the
+    deflection was measured there, not the torque). Ring: Timoshenko,
     Young, "Vibration Problems in Engineering", inextensional flexure.
 """
 
@@ -29,8 +29,9 @@ from swgjoint.maps.friction import Friction
 from swgjoint.units import mm
 
 STEEL_LOSS_FACTOR = 1e-3
-"""eta of steel, by order of magnitude: tables state 1e-4 at small and 1e-3 at large
-stress. Assumed: it depends on alloy, hardness and stress, and must be measured."""
+"""Order of magnitude of the loss factor eta of steel; tables state 1e-4 at small and
+1e-3 at large stress. Assumed: it depends on alloy, hardness and stress and must be
+measured."""
 
 
 def rim_bending_energy(design: Design) -> float:
@@ -44,14 +45,24 @@ def rim_bending_energy(design: Design) -> float:
 
 
 def bending_torque(design: Design, loss_factor: float = STEEL_LOSS_FACTOR) -> float:
-    """Torque that bending the rim takes at the input [N·m]."""
+    """Input torque that bends the rim [N·m].
+
+    Args:
+        design: The drive.
+        loss_factor: Loss factor eta of the flexspline [-].
+    """
     return 2.0 * design.lobes * loss_factor * rim_bending_energy(design)
 
 
 def bending_friction(
     design: Design, loss_factor: float = STEEL_LOSS_FACTOR
 ) -> Friction:
-    """Friction of the bent rim alone, for a map without bearing, seals and grease."""
+    """Friction of the bent rim alone, for a map without bearing, seals and grease.
+
+    Args:
+        design: The drive.
+        loss_factor: Loss factor eta of the flexspline [-].
+    """
     torque = bending_torque(design, loss_factor)
     return Friction(
         stiffness=torque / PRESLIDING,
@@ -62,7 +73,7 @@ def bending_friction(
 
 
 def without_friction(design: Design) -> str:
-    """Why a map of finite elements tells no losses, and what bending alone takes."""
+    """Why a map of finite elements has no losses, with the share of rim bending."""
     return (
         "the finite elements have no friction of bearing, seals and grease; bending of"
         f" the plain rim alone takes about {1e3 * bending_torque(design):.2g} mN·m"

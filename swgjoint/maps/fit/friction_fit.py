@@ -1,17 +1,18 @@
-r"""Friction of a catalogue drive, from the losses that a table states.
+r"""Friction of a catalogue drive from its stated losses.
 
-Three figures give three parameters, in closed form: starting torque the friction at
-rest, no-load running torque at 2000 rpm the rise with the speed, efficiency at rated
-torque the part that grows with the load. A load at the output asks, with i the ratio
-and F the friction on the relative rotation, for
+Three figures determine three parameters in closed form: the starting torque gives the
+friction at rest, the no-load running torque at 2000 rpm its rise with the speed, and
+the efficiency at rated torque its rise with the load. With the ratio i and the friction
+F on the relative rotation, a load T at the output requires the input torque
 
 .. math:: \tau = |T/i| + F (1 + 1/|i|), \qquad F = F_0 + c\,(|T| + F)/|i|
 
-with the circular spline fixed (the flexspline carries the friction, too). The
-back-driving torque is not used: what the map makes of it is a prediction.
+with the circular spline fixed (the flexspline also carries the friction). The
+back-driving torque is not used, so the map predicts it.
 
-Where static and slipping friction part is not stated, nor how friction rises between
-rest and 2000 rpm: no Stribeck part, and a straight line.
+The tables state neither the difference between static and slipping friction nor the
+friction between rest and 2000 rpm. The model therefore has no Stribeck part and a
+straight line.
 """
 
 from __future__ import annotations
@@ -21,19 +22,19 @@ from swgjoint.maps.friction import Friction
 from swgjoint.maps.sheet.friction_running import RUNNING_SPEED
 
 PRESLIDING = 1e-3
-"""Rotation before the bearing slips [rad]: some ten micrometres at a race of a few
+"""Rotation before the bearing slips [rad], a few tens of micrometres at a race of a few
 centimetres. Assumed."""
 RELAXATION = 1e-3
-"""sigma_1/sigma, the time in which the bristle comes to rest [s]. Assumed."""
+"""Relaxation time of the bristle, sigma_1/sigma [s]. Assumed."""
 
 
 def friction_of_losses(losses: StatedLosses, ratio: float, *, source: str) -> Friction:
     """Friction with the stated starting torque, running torque and efficiency.
 
     Args:
-        losses: The stated figures; the back-driving torque is not used.
-        ratio: i, circular spline fixed: negative.
-        source: Where they come from.
+        losses: Stated losses; the back-driving torque is not used.
+        ratio: Ratio i, negative because the circular spline is fixed.
+        source: Source of the figures.
 
     Raises:
         InputError: If the figures contradict each other.
@@ -44,7 +45,7 @@ def friction_of_losses(losses: StatedLosses, ratio: float, *, source: str) -> Fr
     running = losses.no_load_running / along
     loaded = T / i * (1.0 / losses.efficiency - 1.0) / along
     load = i * (loaded - running) / (T + loaded - running)
-    # without load the friction itself pulls the torsion: c F/i of it
+    # without load the friction itself causes torsion, which adds c F/i
     rest = losses.starting / along * (1.0 - load / i)
     running *= 1.0 - load / i
     return Friction(

@@ -1,11 +1,12 @@
-"""Spring and elements whose loop shows what a sheet reads from a measured loop.
+"""Spring and elements whose loop reproduces the sheet figures of a measured loop.
 
-Least squares follow a loop as a whole. Parallel elements have one width in torque; a
-loop of one width in torsion is wider in torque where the drive is stiffer, and the mean
-of these widths is too much at zero torque, where the drive is softest. So the yield
-torques are scaled until the loop of the map is as wide at zero torque as the measured
-one, the spring is fitted anew, and its stiffness about zero torque is scaled until the
-lost motion is that of the loop. What is left is under load, and the report has it.
+Least squares fit a loop as a whole. Parallel elements have a constant width in torque,
+whereas a loop of constant width in torsion is wider in torque where the drive is
+stiffer. The mean of these widths is too large at zero torque, where the drive is
+softest. The yield torques are therefore scaled until the loop of the map is as wide at
+zero torque as the measured one. The spring is then fitted again, and its stiffness
+around zero torque is scaled until the lost motion matches. The remaining differences
+occur under load, and the report states them.
 """
 
 from __future__ import annotations
@@ -21,36 +22,36 @@ from swgjoint.maps.sheet.loop import LOST_MOTION_TORQUE, TorqueLoop, torque_loop
 from swgjoint.typing import Array
 
 CLOSE = 0.002
-"""Part by which hysteresis loss and lost motion may miss those of the loop."""
+"""Relative tolerance of hysteresis loss and lost motion."""
 ROUNDS = 20
 LARGEST = 3.0
-"""Factor of a correction; who asks for more has no loop of spring and elements."""
+"""Largest factor of a correction; a loop of spring and elements needs no more."""
 DAMPED = 0.7
-"""Exponent of a correction: width and stiffness act on both readings."""
+"""Exponent that damps a correction, since width and stiffness affect both readings."""
 SAMPLES = 8
-"""Next to a torque, from which a branch is read along a line if they are close; else
-between the two next to it."""
+"""Number of samples around a torque through which a line is fitted to read a branch. If
+they are not close, the branch is interpolated between the two nearest samples."""
 COMPENSATED = 2.5
-"""Torsion up to which the torque of a changed stiffness is given back, of the torsion
-of the lost motion."""
+"""Torsion up to which a change of stiffness is compensated in torque, as a multiple of
+the torsion of the lost motion."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class LoopReadings:
-    """What a sheet reads about zero torque."""
+    """Figures of a loop around zero torque."""
 
     hysteresis_loss: float
-    """[rad], NaN where the loop does not come to zero in both directions."""
+    """Width at zero torque [rad]; NaN unless both branches reach zero torque."""
     lost_motion: float
-    """[rad], NaN where it does not pass zero in both."""
+    """Lost motion [rad]; NaN unless both branches pass through zero torque."""
 
 
 def readings(loop: TorqueLoop, rated_torque: float) -> LoopReadings:
-    """Hysteresis loss and lost motion, noise averaged where there are samples.
+    """Hysteresis loss and lost motion, with noise averaged over neighbouring samples.
 
     Args:
-        loop: Measured or computed.
-        rated_torque: Of the lost motion [N·m].
+        loop: Measured or computed loop.
+        rated_torque: Rated torque that defines the lost motion [N·m].
     """
     at = LOST_MOTION_TORQUE * rated_torque
     wanted = np.array([-at, 0.0, at])
@@ -63,10 +64,10 @@ def readings(loop: TorqueLoop, rated_torque: float) -> LoopReadings:
 
 
 def _branch(loop: TorqueLoop, wanted: Array, *, rising: bool) -> Array:
-    """Torsion at torques about zero on one branch; NaN where no leg comes by."""
+    """Torsion at torques around zero on one branch; NaN if no leg reaches them."""
     near = 2.0 * np.abs(wanted).max()
     legs = [leg for leg in reversed(loop.legs()) if leg[0] == rising]
-    # past zero if there is such a leg, else up to it; a first loading from rest is none
+    # prefer a leg through zero, then one up to zero; a first loading from rest is none
     for least in (near, 0.0):
         for _, torque, torsion in legs:
             ways = -torque[0], torque[-1]
@@ -78,7 +79,7 @@ def _branch(loop: TorqueLoop, wanted: Array, *, rising: bool) -> Array:
 
 
 def _read(torque: Array, torsion: Array, at: float, near: float) -> float:
-    """Torsion of a leg at a torque; NaN where the leg does not reach."""
+    """Torsion of a leg at a torque; NaN if the leg does not reach it."""
     if not torque[0] <= at <= torque[-1]:
         return np.nan
     apart = np.abs(torque - at)
@@ -89,7 +90,7 @@ def _read(torque: Array, torsion: Array, at: float, near: float) -> float:
 
 
 def _shown(drive: Potential, rated_torque: float) -> LoopReadings:
-    """Readings of the standard loop of a map, as a sheet has them; no noise."""
+    """Readings of the standard loop of a map, which has no noise."""
     loop = torque_loop(drive)
     return LoopReadings(
         hysteresis_loss=loop.hysteresis_loss(),
@@ -102,14 +103,14 @@ def match_loop(
     play: Callable[[TorsionFit], Potential],
     rated_torque: float,
 ) -> TorsionFit:
-    """The fit whose standard loop shows the readings of the measured one.
+    """The fit whose standard loop has the readings of the measured loop.
 
-    Where no such spring and elements are found, those that come closest.
+    If no spring and elements achieve this, the closest ones are returned.
 
     Args:
-        fit: By least squares alone.
-        play: The map of a fit.
-        rated_torque: Of the lost motion [N·m].
+        fit: Fit by least squares alone.
+        play: Builds the map of a fit.
+        rated_torque: Rated torque that defines the lost motion [N·m].
     """
     wanted = readings(fit.record.loop, rated_torque)
     with_loss = bool(fit.hysteresis) and wanted.hysteresis_loss > 0.0
@@ -122,37 +123,37 @@ def match_loop(
     for _ in range(ROUNDS):
         scaled = fit.with_yields(wider * fit.yields) if with_loss else fit
         tried = _stiffened(scaled, stiffer, reach)
-        found = _shown(play(tried), rated_torque)
-        apart = [
-            (with_loss, found.hysteresis_loss, wanted.hysteresis_loss),
-            (with_motion, found.lost_motion, wanted.lost_motion),
+        shown = _shown(play(tried), rated_torque)
+        pairs = [
+            (with_loss, shown.hysteresis_loss, wanted.hysteresis_loss),
+            (with_motion, shown.lost_motion, wanted.lost_motion),
         ]
-        miss = max(abs(got / aim - 1.0) for asked, got, aim in apart if asked)
+        miss = max(abs(got / aim - 1.0) for used, got, aim in pairs if used)
         if miss < least:
             best, least = tried, miss
         if not miss > CLOSE:
             break
         if with_loss:
-            wider = _next(wider, wanted.hysteresis_loss / found.hysteresis_loss)
+            wider = _next(wider, wanted.hysteresis_loss / shown.hysteresis_loss)
         if with_motion:
-            stiffer = _next(stiffer, found.lost_motion / wanted.lost_motion)
+            stiffer = _next(stiffer, shown.lost_motion / wanted.lost_motion)
     return best
 
 
 def _next(factor: float, change: float) -> float:
-    """Factor of the next round, less changed than asked so that both settle."""
+    """Factor of the next round, damped so that both readings converge."""
     if not (np.isfinite(change) and change > 0.0):
         return factor
     return float(np.clip(factor * change**DAMPED, 1.0 / LARGEST, LARGEST))
 
 
 def _stiffened(fit: TorsionFit, factor: float, reach: float) -> TorsionFit:
-    """Stiffness scaled about zero torsion, torque farther out as it was.
+    """The fit with its stiffness scaled around zero torsion and its outer torque kept.
 
     Args:
         fit: Spring and elements.
-        factor: Of the stiffness.
-        reach: Torsion on either side that is scaled [rad].
+        factor: Factor of the stiffness.
+        reach: Torsion on either side within which the stiffness is scaled [rad].
     """
     if factor == 1.0 or not reach > 0.0:
         return fit

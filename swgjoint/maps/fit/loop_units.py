@@ -1,4 +1,4 @@
-"""Whether a measured loop has the units that its head says."""
+"""Checks that a measured loop has the units of its column names."""
 
 from __future__ import annotations
 
@@ -12,29 +12,34 @@ from swgjoint.maps.sheet.loop import TorqueLoop
 from swgjoint.units import arcmin
 
 TORSION_AT_RATED = (0.3, 60.0)
-"""Torsion at rated torque of a strain wave gear [arcmin], else a warning.
+"""Plausible torsion of a strain wave gear at rated torque [arcmin].
 
-models/catalogue: 4.9 to 7.4 arcmin for the 22 sets of CSG with rating and stiffness
-(sizes 14 to 32); the range reaches about ten times beyond on both sides.
+In models/catalogue the torsion is 4.9 to 7.4 arcmin for the 22 sets of CSG with rating
+and stiffness (sizes 14 to 32). The range extends about ten times further on both sides;
+outside it the reader warns.
 """
 IMPOSSIBLE = (0.02, 1200.0)
-"""The same, beyond which the record is refused: no gear is so stiff, and 20 degrees
-are several teeth."""
+"""Torsion at rated torque outside of which a record is refused [arcmin]: no gear is so
+stiff, and 20 degrees are several teeth."""
 TORQUE = (0.005, 200.0)
-"""Largest torque of a loop over the rated one. Lost motion is read at 0.04 and teeth
-ratchet below 20; a factor of a thousand is far beyond on both sides."""
+"""Accepted ratio of the largest torque of a loop to the rated torque. Lost motion is
+read at 0.04 and teeth ratchet below 20; a unit error of a factor of a thousand is far
+outside on both sides."""
 
 
 def check_units(path: str | Path, loop: TorqueLoop, rated_torque: float) -> list[str]:
-    """Refuse a loop in other units than its head says; warnings where one may doubt.
+    """Refuse a loop whose units differ from its column names; warn about doubtful ones.
 
     Args:
-        path: For the message.
-        loop: As read.
-        rated_torque: Of the drive [N·m].
+        path: Path of the file, for messages.
+        loop: The loop as read.
+        rated_torque: Rated torque of the drive [N·m].
+
+    Returns:
+        Warnings, one line each.
 
     Raises:
-        InputError: If torque or torsion are far from any drive of that rated torque.
+        InputError: If torque or torsion are far from any drive of this rated torque.
     """
     largest = float(np.abs(loop.torque).max())
     times, (least, most) = largest / rated_torque, TORQUE
@@ -65,17 +70,21 @@ def check_units(path: str | Path, loop: TorqueLoop, rated_torque: float) -> list
         )
     if not low <= torsion <= high:
         return [
-            f"{where}; plausible: {low:g} to {high:g} arcmin (the catalogue's are 5 to"
-            " 7): see the units of the torsion and the rated torque"
+            f"{where}; plausible: {low:g} to {high:g} arcmin (catalogue drives have 5"
+            " to 7): check the units of the torsion and the rated torque"
         ]
     return []
 
 
 def check_direction(path: str | Path, loop: TorqueLoop) -> None:
-    """Refuse a loop that runs the wrong way round, beyond its noise.
+    """Refuse a loop whose direction is reversed by more than its noise.
+
+    Args:
+        path: Path of the file, for messages.
+        loop: The loop as read.
 
     Raises:
-        InputError: If the torsion lags behind the torque backwards in time.
+        InputError: If the loop generates energy, as one in reversed time does.
     """
     width = loop.hysteresis_loss()
     if not width < 0.0:
@@ -85,7 +94,7 @@ def check_direction(path: str | Path, loop: TorqueLoop) -> None:
         return
     raise InputError(
         f"{path}: the loop runs the wrong way round: its hysteresis loss is"
-        f" {width / arcmin:.4g} arcmin, a drive that gives energy; accepted: >= 0, with"
-        " torque and torsion of one sign, rows in order of time and both columns of one"
-        " instant (reversed rows or a late torque turn the sign)"
+        f" {width / arcmin:.4g} arcmin, as if the drive generated energy; accepted:"
+        " >= 0, with torque and torsion of the same sign, rows in order of time and"
+        " simultaneous columns (reversed rows or a delayed torque reverse the sign)"
     )

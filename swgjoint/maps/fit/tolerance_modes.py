@@ -1,8 +1,9 @@
 """Harmonics that manufacturing errors of the teeth add to a map.
 
-Along the motion the phases of the teeth of both members go together, z_cs alpha and
-z_fs beta by 2 pi a pitch, so that one record over the cycle of the teeth holds all
-harmonics (p, q); those that differ by a multiple of the tooth order are the same there.
+Along the motion the tooth phases of both members advance together: z_cs alpha and
+z_fs beta change by 2 pi per pitch. One record over the cycle of the teeth therefore
+contains all harmonics (p, q); harmonics that differ by a multiple of the tooth order
+coincide in it.
 """
 
 from __future__ import annotations
@@ -19,19 +20,19 @@ from swgjoint.maps.samples import MapSamples
 from swgjoint.typing import Array, Index
 
 KEEP_TORQUE = 0.05
-"""Harmonics of toleranced drives are kept whose input torque reaches this part of the
-largest one. Random errors of the teeth spread it over thousands of orders: at 1 % ten
-times as many would be kept, of orders that hardly any step of a simulation carries."""
+"""A harmonic of a toleranced drive is kept if its input torque reaches this fraction of
+the largest one. Random tooth errors spread the torque over thousands of orders: at 1 %
+ten times as many would be kept, at orders too high for most simulation steps."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ToleranceModes:
-    """Amplitudes over the cycle: with errors minus without."""
+    """Amplitudes over the cycle, with tooth errors minus without."""
 
     waves: Index
-    """Waves in the cycle of each harmonic (n,)."""
+    """Number of waves of each harmonic in the cycle. Shape (n,)."""
     orders: Index
-    """(p, q) (n, 2)."""
+    """Orders (p, q). Shape (n, 2)."""
     potential: Array
     """Cosine and sine of V, V', V'' at the knots. Shape (n, 2, 3, n_knots)."""
     error: Array
@@ -42,8 +43,8 @@ def tolerance_modes(samples: MapSamples, knots: Array) -> ToleranceModes:
     """All harmonics of the record.
 
     Args:
-        samples: With tolerances.
-        knots: Torsions [rad].
+        samples: Samples with tolerances.
+        knots: Torsion of the knots [rad]. Shape (n_knots,).
     """
     found = samples.tolerances
     assert found is not None
@@ -56,7 +57,7 @@ def tolerance_modes(samples: MapSamples, knots: Array) -> ToleranceModes:
         curve = interpolate_on_knots(
             torsion, np.stack([energy, torque, 1.0 / compliance]), knots
         )
-        # (n_angles, 3, n_knots), the error at rest as one more column
+        # (n_angles, 3 n_knots), the error at rest as one more column
         return np.concatenate(
             [curve.reshape(len(curve), -1), error[zero][:, None]], axis=1
         )
@@ -76,11 +77,15 @@ def tolerance_modes(samples: MapSamples, knots: Array) -> ToleranceModes:
 
 
 def orders_of(waves: Index, samples: MapSamples) -> Index:
-    """(p, q) of harmonics with so many waves in the cycle (n, 2).
+    """Orders (p, q) of harmonics from their number of waves in the cycle. Shape (n, 2).
 
-    The tooth order of the perfect pattern where one is near, plus a low order of alpha
-    and beta; of the pairs that go together along the motion the one with the smallest
-    sum of magnitudes.
+    The result is the nearest multiple of the tooth order of the perfect pattern plus a
+    low order of alpha and beta. Among the pairs that coincide along the motion, the one
+    with the smallest sum of magnitudes is taken.
+
+    Args:
+        waves: Number of waves in the cycle. Shape (n,).
+        samples: Samples with tolerances.
     """
     found = samples.tolerances
     assert found is not None
@@ -111,15 +116,16 @@ def orders_of(waves: Index, samples: MapSamples) -> Index:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Combined:
-    """Harmonics of the perfect pattern and of the errors that are worth keeping."""
+    """Harmonics of the perfect pattern and of the tooth errors that are kept."""
 
     orders: Index
-    """(p, q), the mean first (n, 2)."""
+    """Orders (p, q), the mean first. Shape (n, 2)."""
     potential: Array
-    """Shape (n, 2, 3, n_knots)."""
+    """Cosine and sine of V, V', V'' at the knots. Shape (n, 2, 3, n_knots)."""
     error: Array
-    """Shape (n, 2)."""
+    """Cosine and sine of e0 [rad]. Shape (n, 2)."""
     record: dict[str, Any]
+    """Figures on the kept and dropped harmonics, JSON values."""
 
 
 def combine_modes(
@@ -134,19 +140,20 @@ def combine_modes(
     """Add the harmonics of the errors to those of the perfect pattern.
 
     Args:
-        samples: With tolerances.
-        knots: Torsions [rad].
-        potential: Of the perfect pattern, as in :class:`Combined`.
-        error: The same of e0.
-        coarse: Knots at which the errors are compared, both ends among them (n_knots,).
-        keep: Harmonics are kept whose e0 reaches this part of the largest one, or
-            whose input torque reaches :data:`KEEP_TORQUE`, if ``keep`` is not zero.
+        samples: Samples with tolerances.
+        knots: Torsion of the knots [rad]. Shape (n_knots,).
+        potential: Potential of the perfect pattern, as in :class:`Combined`.
+        error: Kinematic error of the perfect pattern, as in :class:`Combined`.
+        coarse: Mask of the knots at which the errors are compared, including both ends.
+            Shape (n_knots,).
+        keep: A harmonic is kept if its e0 reaches this fraction of the largest one or
+            its input torque reaches :data:`KEEP_TORQUE`; zero keeps all.
     """
     found, count = samples.tolerances, len(potential)
     assert found is not None
     modes = tolerance_modes(samples, knots[coarse])
     cycle = found.pitches
-    # what repeats with every pitch belongs to the perfect pattern
+    # harmonics that repeat with every pitch belong to the perfect pattern
     whole = modes.waves[: count * cycle : cycle]
     potential, error = potential.copy(), error.copy()
     potential[: whole.size] += _refined(modes.potential[whole], knots, coarse)
@@ -159,7 +166,7 @@ def combine_modes(
     orders = np.concatenate(
         [pattern[:, None] * np.array([samples.order]), modes.orders[others]]
     )
-    # at the coarse knots: there are thousands of harmonics before most are dropped
+    # weighed at the coarse knots, as there are thousands before the selection
     weighed = np.concatenate([potential[..., coarse], modes.potential[others]])
     error = np.concatenate([error, modes.error[others]])
 
@@ -172,8 +179,8 @@ def combine_modes(
     middle = int(np.argmin(np.abs(knots[coarse])))
     if keep:
         large = ripple > KEEP_TORQUE * ripple.max(axis=0)
-        # between the torques that were solved, which all positions share at rest
-        # only, interpolation leaves noise in the high orders of the pattern
+        # only at rest do all positions share a solved torque; elsewhere interpolation
+        # leaves noise in the high orders of the pattern
         large[:count] = large[:count, middle][:, None]
         kept |= large.any(axis=1)
     kept[0] = True
@@ -183,7 +190,7 @@ def combine_modes(
     )
 
     def left(power: Array) -> float:
-        """Root mean square of what is dropped, in that of everything."""
+        """Root mean square of the dropped harmonics relative to that of all."""
         return float(np.sqrt(power[~kept].sum() / max(power.sum(), 1e-300)))
 
     return Combined(
@@ -207,13 +214,13 @@ def combine_modes(
 
 
 def _refined(potential: Array, knots: Array, coarse: NDArray[np.bool_]) -> Array:
-    """V, V', V'' of harmonics at all knots, from the coarse ones (n, 2, 3, n_knots)."""
-    found = np.empty((*potential.shape[:3], knots.size))
-    for one, given in zip(
-        found.reshape(-1, 3, knots.size),
+    """V, V', V'' at all knots from the coarse ones. Shape (n, 2, 3, n_knots)."""
+    refined = np.empty((*potential.shape[:3], knots.size))
+    for fine, values in zip(
+        refined.reshape(-1, 3, knots.size),
         potential.reshape(-1, *potential.shape[2:]),
         strict=True,
     ):
-        one[:] = evaluate(*quartic_chain(knots[coarse], given), knots)
-        one[:, coarse] = given
-    return found
+        fine[:] = evaluate(*quartic_chain(knots[coarse], values), knots)
+        fine[:, coarse] = values
+    return refined

@@ -15,32 +15,36 @@ from swgjoint.units import arcmin
 
 INTERVALS = 48
 SOFTEST = 0.02
-"""Smallest stiffness of the fit, of the mean one: the curve stays monotone."""
+"""Smallest stiffness of the fit relative to the mean one; it keeps the curve
+monotone."""
 REACHES = 0.25 * 2.0 ** -np.arange(0.0, 8.5, 0.5)
-"""Yield torsions of the elements that are tried, parts of the travel: from a quarter,
-above which an element sticks too long to be told from the spring, to 0.1 %."""
+"""Yield torsions of the candidate elements, as fractions of the travel, from a quarter
+to 0.1 %. Above a quarter an element sticks too long to be distinguished from the
+spring."""
 FAINT = 1e-3
-"""Hysteresis below this part of the largest torque is none."""
+"""Hysteresis below this fraction of the largest torque is neglected."""
 
-_SMOOTH = 1e-4  # weight of the bend of the stiffness: decides only where data is absent
-_SIGNIFICANT = 20.0  # of an F test: far beyond what noise does
+_SMOOTH = (
+    1e-4  # weight of the second difference of the stiffness: matters only without data
+)
+_SIGNIFICANT = 20.0  # threshold of an F test, far above the effect of noise
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LoopRecord:
-    """What of a loop the least squares see."""
+    """Samples and candidate elements that enter the least squares."""
 
     loop: TorqueLoop
     torque: Array
     """Torque of the samples that count [N·m]. Shape (n,)."""
     torsion: Array
-    """[rad]. Shape (n,)."""
+    """Torsion of the samples that count [rad]. Shape (n,)."""
     knots: Array
-    """[rad]. Shape (n_knots,)."""
+    """Torsion of the knots [rad]. Shape (n_knots,)."""
     reaches: Array
-    """Yield torsions that are tried [rad]. Shape (n_elements,)."""
+    """Yield torsions of the candidate elements [rad]. Shape (n_elements,)."""
     signals: Array
-    """Torque of each of these elements over its yield torque (n, n_elements)."""
+    """Torque of each candidate over its yield torque [-]. Shape (n, n_elements)."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -48,17 +52,17 @@ class TorsionFit:
     """Monotone spring and hysteresis of a measured loop."""
 
     knots: Array
-    """Torsion from the position of zero torque [rad]."""
+    """Torsion of the knots, zero at zero torque [rad]. Shape (n_knots,)."""
     stiffness: Array
-    """At the knots, positive [N·m/rad]."""
+    """Stiffness at the knots, positive [N·m/rad]. Shape (n_knots,)."""
     hysteresis: tuple[Jenkin, ...]
     report: dict[str, Any]
     record: LoopRecord
     yields: Array
-    """Yield torques of the elements that were tried [N·m]."""
+    """Yield torques of the candidate elements [N·m]. Shape (n_elements,)."""
 
     def with_yields(self, yields: Array) -> TorsionFit:
-        """The spring that follows the loop best with these yield torques [N·m]."""
+        """The fit whose spring follows the loop best with given yield torques [N·m]."""
         record = self.record
         rest = record.torque - record.signals @ yields
         found = _solve(record.torsion, rest, record.knots, record.signals[:, :0])
@@ -72,7 +76,7 @@ class _Solution:
     error: Array
     """Torque of the model minus that of the samples [N·m]."""
     bounded: Array
-    """-1 where a value is at its lower bound."""
+    """-1 for a value at its lower bound, zero for a free one."""
 
     @property
     def rms(self) -> float:
@@ -80,19 +84,19 @@ class _Solution:
 
 
 def fit_torsion(loop: TorqueLoop, *, intervals: int = INTERVALS) -> TorsionFit:
-    """Spring with piecewise linear, positive stiffness, and Jenkin elements.
+    """Fit a spring with piecewise linear, positive stiffness, and Jenkin elements.
 
-    Bounded linear least squares on the torque of the samples: with its yield torsion
-    given, the torque of an element along the record is its yield torque times a known
-    signal. Samples count once the torsion has moved twice the largest yield torsion,
-    when no element remembers how the record began. Elements are kept where they take
-    away more of the residual than noise could; a record of one direction has none.
-    A loop of another kind, such as one whose width in torque is smallest in the middle,
-    leaves a residual; the report has it.
+    The fit is a bounded linear least-squares problem in the torque of the samples: for
+    a given yield torsion, the torque of an element along the record is its yield torque
+    times a known signal. Samples count once the torsion has moved by twice the largest
+    yield torsion, when the elements have forgotten the start of the record. Elements
+    are kept if they reduce the residual by more than noise could; a record with one
+    direction of the torque has none. A loop of another kind, such as one whose width in
+    torque is smallest in the middle, leaves a residual, which the report states.
 
     Args:
-        loop: Both signs of the torque.
-        intervals: Equal pieces of the torsion, fewer for few samples.
+        loop: Measured loop with both signs of the torque.
+        intervals: Number of equal intervals of the torsion; fewer for few samples.
     """
     travel = np.maximum.accumulate(loop.torsion) - np.minimum.accumulate(loop.torsion)
     reaches = REACHES * travel[-1]
@@ -131,7 +135,7 @@ def fit_torsion(loop: TorqueLoop, *, intervals: int = INTERVALS) -> TorsionFit:
 def _fit_of(
     record: LoopRecord, found: _Solution, yields: Array, report: dict[str, Any]
 ) -> TorsionFit:
-    """Spring and elements of a solution, and how well they follow the loop."""
+    """Spring and elements of a solution, with a report of their residuals."""
     loop, knots, x = record.loop, record.knots, record.torsion
     stiffness = found.values[1 : knots.size + 1]
     elements = tuple(
@@ -179,14 +183,14 @@ def _solve(x: Array, torque: Array, knots: Array, signals: Array) -> _Solution:
 
     count, elements = knots.size - 1, signals.shape[1]
     h, secant = float(knots[1] - knots[0]), float(np.ptp(torque) / np.ptp(x))
-    # unknowns: torques over h secant, stiffness over the secant
+    # unknowns: torques relative to h secant, stiffness relative to the secant
     basis = np.column_stack([np.ones_like(x), _integrals(x, knots) / h, signals])
     bend = np.zeros((max(0, count - 1), basis.shape[1]))
     for row in range(len(bend)):
         bend[row, row + 1 : row + 4] = (1.0, -2.0, 1.0)
     matrix = np.vstack([basis, _SMOOTH * np.sqrt(torque.size) * bend])
     wanted = np.concatenate([torque / (h * secant), np.zeros(len(bend))])
-    # the triangle has the same least squares and as many rows as unknowns
+    # R has the same least-squares solution with as many rows as unknowns
     q, r = np.linalg.qr(matrix)
     lowest = np.r_[-np.inf, np.full(count + 1, SOFTEST), np.zeros(elements)]
     solution = lsq_linear(r, q.T @ wanted, bounds=(lowest, np.inf), method="bvls")
@@ -201,7 +205,7 @@ def _solve(x: Array, torque: Array, knots: Array, signals: Array) -> _Solution:
 def _integrals(x: Array, knots: Array) -> Array:
     """Integral of every hat function from the first knot to x. (n, n_knots)."""
     h = float(knots[1] - knots[0])
-    s = np.clip((x[:, None] - knots[:-1]) / h, 0.0, 1.0)  # way through each interval
+    s = np.clip((x[:, None] - knots[:-1]) / h, 0.0, 1.0)  # fraction of each interval
     table = np.zeros((x.size, knots.size))
     table[:, :-1] += h * (s - 0.5 * s**2)  # the falling half
     table[:, 1:] += h * 0.5 * s**2  # the rising half
@@ -213,6 +217,6 @@ def _inverse(torque: float, knots: Array, stiffness: Array, at: Array) -> float:
     j = int(np.clip(np.searchsorted(at, torque) - 1, 0, knots.size - 2))
     bend = 0.5 * (stiffness[j + 1] - stiffness[j]) / (knots[j + 1] - knots[j])
     rest = torque - at[j]
-    # the root in the form that does not cancel for a small bend
+    # form of the root without cancellation for a small bend
     root = np.sqrt(max(0.0, stiffness[j] ** 2 + 4.0 * bend * rest))
     return float(knots[j] + 2.0 * rest / (stiffness[j] + root))

@@ -1,4 +1,4 @@
-"""Curves of potential over torsion, from samples to common knots."""
+"""Interpolation of potential curves over the torsion on common knots."""
 
 from __future__ import annotations
 
@@ -10,13 +10,14 @@ from swgjoint.typing import Array
 def interpolate_on_knots(torsion: Array, curve: Array, knots: Array) -> Array:
     """Quintic Hermite interpolation of many curves, with a parabola beyond the ends.
 
-    V'' is there the mean of all curves: the tangents of single ones jump with the
-    contacts of single teeth.
+    Beyond the ends V'' is the mean of all curves, because the tangents of single curves
+    jump with the contacts of single teeth.
 
     Args:
-        torsion: Increasing along the first axis [rad]. Shape (n, n_curves).
-        curve: V, V' and V'' there. Shape (3, n, n_curves).
-        knots: Where they are wanted [rad]. Shape (n_knots,).
+        torsion: Torsion of the samples, increasing along the first axis [rad]. Shape
+            (n, n_curves).
+        curve: V [J], V' [N·m] and V'' [N·m/rad] at the samples. Shape (3, n, n_curves).
+        knots: Torsion of the knots [rad]. Shape (n_knots,).
 
     Returns:
         V, V' and V'' at the knots. Shape (n_curves, 3, n_knots).
@@ -34,7 +35,7 @@ def interpolate_on_knots(torsion: Array, curve: Array, knots: Array) -> Array:
     h = x1 - x0
     (v0, v1), (s0, s1), (c0, c1) = (ends(values) for values in curve)
     s0, s1, c0, c1 = s0 * h, s1 * h, c0 * h**2, c1 * h**2
-    # what the end asks for beyond the parabola of the start
+    # difference of the end values from the parabola of the start
     dv, ds, dc = v1 - v0 - s0 - 0.5 * c0, s1 - s0 - c0, c1 - c0
     a3, a4, a5 = (
         10 * dv - 4 * ds + 0.5 * dc,
