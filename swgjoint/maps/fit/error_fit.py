@@ -21,15 +21,15 @@ ORDERS: tuple[tuple[int, int], ...] = (
     (1, -1),
     (2, -2),
 )
-"""(p, q) of p alpha + q beta that a record is searched for: low orders of either
-member, and the output turn itself."""
+"""Orders (p, q) of p alpha + q beta that are fitted to a record: low orders of either
+member and the output turn itself."""
 KEEP = 0.01
-"""Harmonics are kept from this part of the largest one."""
+"""A harmonic is kept if it reaches this fraction of the largest one."""
 
-_PER_WAVE = 2.5  # samples that tell a wave
-_TURN = 0.98  # of a turn that a record must cover
-_REZERO = 4  # passes that settle the constant of a record
-_CONDITION = 1e4  # beyond, two orders of the record cannot be told apart
+_PER_WAVE = 2.5  # samples needed per wave
+_TURN = 0.98  # part of a turn that a record must cover
+_REZERO = 4  # iterations for the constant of a record
+_CONDITION = 1e4  # beyond it, two orders of the record cannot be distinguished
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -37,9 +37,9 @@ class ErrorFit:
     """Harmonics of a measured kinematic error."""
 
     orders: NDArray[np.int64]
-    """(p, q). Shape (n, 2)."""
+    """Orders (p, q). Shape (n, 2)."""
     amplitudes: Array
-    """Cosine and sine [rad]. Shape (n, 2)."""
+    """Cosine and sine amplitudes [rad]. Shape (n, 2)."""
     report: dict[str, Any]
 
 
@@ -53,19 +53,19 @@ def fit_error(
     orders: Sequence[tuple[int, int]] = ORDERS,
     where: str = "record",
 ) -> ErrorFit:
-    """Harmonics of alpha and beta in a record of one output turn, by least squares.
+    """Fit harmonics of alpha and beta to a record of one output turn.
 
     Args:
         output: Output angle psi [rad]. Shape (n,).
-        error: psi - theta/i, unloaded [rad]. Shape (n,).
+        error: Unloaded error psi - theta/i [rad]. Shape (n,).
         layout: Which member is fixed.
-        teeth_flexspline: z_fs.
-        teeth_circular_spline: z_cs.
-        orders: (p, q) to look for; those that the samples cannot tell are listed.
+        teeth_flexspline: Number of teeth of the flexspline, z_fs.
+        teeth_circular_spline: Number of teeth of the circular spline, z_cs.
+        orders: (p, q) to fit; the report lists those that the samples cannot resolve.
         where: Name of the record for messages.
 
     Raises:
-        InputError: If the record is shorter than a turn or cannot tell the orders.
+        InputError: If the record is shorter than a turn or cannot resolve the orders.
     """
     span = float(np.ptp(output)) if output.size else 0.0
     if span < _TURN * 2.0 * np.pi or output.size < 16:
@@ -84,12 +84,12 @@ def fit_error(
     wanted, n = wanted[fits], n[fits]
     if not len(wanted):
         raise InputError(
-            f"{where}: {output.size} samples tell none of the orders; accepted: at"
+            f"{where}: {output.size} samples resolve none of the orders; accepted: at"
             f" least {_PER_WAVE * per_turn.min():.0f} a turn"
         )
 
     def solve(n: NDArray[np.int64]) -> tuple[Array, Array]:
-        # the error is zeroed anywhere; its mean over the gear's angles turns the input
+        # the zero of the error is arbitrary; its constant part shifts the input angle
         constant = 0.0
         for _ in range(_REZERO):
             theta = i * (output - error + constant)
@@ -103,8 +103,8 @@ def fit_error(
         weights, _, rank, sizes = np.linalg.lstsq(basis, error, rcond=None)
         if rank < basis.shape[1] or sizes[0] > _CONDITION * sizes[-1]:
             raise InputError(
-                f"{where}: its orders cannot be told apart; give fewer 'orders' or a"
-                " record of equal steps over the whole turn"
+                f"{where}: its orders cannot be distinguished; use fewer 'orders' or a"
+                " record with equal steps over the whole turn"
             )
         count = columns.shape[1]
         pairs = np.stack([weights[1 : 1 + count], weights[1 + count :]], axis=-1)

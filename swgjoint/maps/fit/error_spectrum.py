@@ -1,18 +1,17 @@
-r"""Kinematic error of a drive whose source states a bound alone: an assumed specimen.
+r"""Assumed kinematic error of a drive whose source states only an upper bound.
 
-A catalogue bounds the error of a drive, peak to peak over one turn of the output, and
-says nothing about its orders. Where position errors of teeth show when two opposite
-lobes average them is at 2 and 4 cycles per turn of the wave generator; so the specimen
-has
+A catalogue bounds the error of a drive, peak to peak over one output turn, and does not
+state its orders. After averaging by two opposite lobes, tooth position errors appear at
+2 and 4 cycles per turn of the wave generator. The assumed specimen therefore has
 
 .. math:: e_0 = a\left[\cos(2x + \phi_2) + r\cos(4x + \phi_4)\right]
 
-with x the angle of the wave generator against the fixed member, r and both phases
-drawn from a seed, and a such that the peak to peak is what is stated. It repeats with
-every turn of the input: each of them shows the whole error. The error of a real drive
-also swells and fades over the turn of the output, and stays below the bound.
+with the angle x of the wave generator relative to the fixed member, r and both phases
+drawn from a seed, and a such that the peak to peak equals the stated value. The error
+repeats with every input turn, so that each input turn contains all of it. The error of
+a real drive is also modulated over the output turn and stays below the bound.
 
-Studies of specimens take more orders, :data:`AMPLITUDES`: those of finite elements of
+Studies of specimens use more orders (:data:`AMPLITUDES`), taken from finite elements of
 one drive at the limits of its tolerances.
 """
 
@@ -46,16 +45,16 @@ AMPLITUDES: dict[tuple[int, int], float] = {
     (1, 0): 0.15,
     (0, 1): 0.07,
 }
-"""By (p, q) of p alpha + q beta, over that of 2 alpha: low orders of e0 in the map of
-``reference-2d-tolerances`` (model 2d), whose teeth have errors of ISO 1328-1 class 4
-and whose members are as round and centred as ISO 286-1 IT3 and IT4 ask for. It is
-0.138 arcmin there."""
+"""Amplitudes by (p, q) of p alpha + q beta, relative to that of 2 alpha: low orders of
+e0 in the map of ``reference-2d-tolerances`` (model 2d). Its teeth have errors of
+ISO 1328-1 class 4, and the roundness and concentricity of its members follow ISO 286-1
+IT3 and IT4. The amplitude of 2 alpha is 0.138 arcmin there."""
 SHARE = (0.25, 0.75)
-"""Range of r, the amplitude of 4 over that of 2 cycles per turn: about the 0.46 and
-0.48 of :data:`AMPLITUDES`."""
+"""Range of r, the ratio of the amplitudes at 4 and at 2 cycles per turn; it includes
+the 0.46 and 0.48 of :data:`AMPLITUDES`."""
 LARGEST = 60.0
-"""Of an assumed error [arcmin]: forty times the bound of any catalogue row."""
-_SAMPLES = 2**16  # of a period; the peak to peak then errs by less than 1e-8 of it
+"""Largest assumed error [arcmin], forty times the bound of any catalogue row."""
+_SAMPLES = 2**16  # per period; relative error of the peak to peak below 1e-8
 
 
 def peak_to_peak(drive: Potential) -> float:
@@ -66,18 +65,18 @@ def peak_to_peak(drive: Potential) -> float:
 
 
 def with_error(drive: Map, orders: ArrayLike, amplitudes: ArrayLike) -> Map:
-    """The drive with another kinematic error in place of its own.
+    """The drive with another kinematic error in place of its original one.
 
     Args:
-        drive: Map; its potential stays, a label of its error and a validation of its
-            ripple go.
+        drive: The map. Its potential is kept; the label of its error and the validation
+            of its ripple are removed.
         orders: (p, q) of p alpha + q beta. Shape (n, 2).
-        amplitudes: Cosine and sine [rad]. Same shape.
+        amplitudes: Cosine and sine amplitudes [rad]. Shape (n, 2).
     """
     wanted = np.array(orders, dtype=np.int64).reshape(-1, 2).tolist()
-    own = drive.orders.tolist()
-    every = own + [row for row in wanted if row not in own]
-    count, old = len(every), len(own)
+    present = drive.orders.tolist()
+    every = present + [row for row in wanted if row not in present]
+    count, old = len(every), len(present)
     error = np.zeros((count, 2))
     error[[every.index(row) for row in wanted]] = amplitudes
     potential = np.zeros((count, *drive.potential.shape[1:]))
@@ -97,21 +96,21 @@ def with_error(drive: Map, orders: ArrayLike, amplitudes: ArrayLike) -> Map:
 def with_assumed_error(
     drive: Map, peak_to_peak: float, *, seed: int = 0, joint: str = ""
 ) -> Map:
-    """A drive without kinematic error, given that of one specimen.
+    """A drive without kinematic error, given the assumed error of one specimen.
 
-    ``info["kinematic_error"]`` says that it is assumed, how large it is and from which
-    seed; reasons in ``info["missing"]`` why there is none are taken out.
+    ``info["kinematic_error"]`` states the assumption with its size and seed. Reasons in
+    ``info["missing"]`` for the absence of an error are removed.
 
     Args:
         drive: Map without kinematic error.
-        peak_to_peak: Of the error over one output turn [rad]; 0 leaves the map as it
-            is.
-        seed: Of the share of both orders and of their phases, >= 0.
-        joint: Name of the joint that the drive is for: drives of several joints differ
-            by it, all of one seed.
+        peak_to_peak: Peak to peak of the error over one output turn [rad]; zero leaves
+            the map unchanged.
+        seed: Seed of the amplitude ratio of both orders and of their phases, >= 0.
+        joint: Name of the joint that the drive is for; drives of several joints with
+            the same seed differ by it.
 
     Raises:
-        InputError: If the map has an error of its own, or a value is out of range.
+        InputError: If the map already has an error, or a value is out of range.
     """
     wanted = peak_to_peak / arcmin
     if not (np.isfinite(wanted) and 0.0 <= wanted <= LARGEST):
@@ -125,8 +124,8 @@ def with_assumed_error(
         return drive
     if drive.kinematic_error[1:].any():
         raise InputError(
-            f"kinematic_error_arcmin {wanted:g} for map {drive.name!r}, which has its"
-            " own; accepted: none given, or 0"
+            f"kinematic_error_arcmin {wanted:g} for map {drive.name!r}, which already"
+            " has one; accepted: 0, or leave it out"
         )
     rng = np.random.default_rng([seed, crc32(joint.encode())] if joint else seed)
     share = float(rng.uniform(*SHARE))
@@ -135,7 +134,7 @@ def with_assumed_error(
     angle = 2.0 * np.pi * np.arange(_SAMPLES) / _SAMPLES
     wave = np.cos(angle + phase[0]) + share * np.cos(2.0 * angle + phase[1])
     size = size * peak_to_peak / float(np.ptp(wave))
-    # a cos(n x + phase) as cosine and sine
+    # a cos(n x + phase) as cosine and sine amplitudes
     pairs = size[:, None] * np.stack([np.cos(phase), -np.sin(phase)], axis=-1)
     label = f"assumed: {wanted:g} arcmin at 2 and 4 per turn, seed {seed}"
     label += f", joint {joint}" if joint else ""
@@ -156,6 +155,6 @@ _ABSENT = (
 
 
 def _orders(layout: str) -> Sequence[tuple[int, int]]:
-    """(p, q) of 2 and 4 cycles per turn of the input, whatever the output does."""
+    """(p, q) of 2 and 4 cycles per input turn, independent of the output."""
     _, (_, by_psi) = angle_coefficients(layout)
     return ((0, 2), (0, 4)) if by_psi == 0 else ((2, 0), (4, 0))

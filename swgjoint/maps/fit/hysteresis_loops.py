@@ -1,20 +1,20 @@
 r"""Hysteresis from computed loops with and without friction.
 
-At every input position the loop with friction gives the torsion x(T), the drive without
-friction the torsion :math:`x_0(T)`, whose inverse is the torque :math:`T_0(x)` of the
-potential. What friction adds at the same torsion,
+At every input position the loop with friction gives the torsion x(T). The drive without
+friction gives the torsion :math:`x_0(T)`, whose inverse is the torque :math:`T_0(x)` of
+the potential. The torque that friction adds at the same torsion,
 
 .. math:: R = T - T_0(x), \qquad \oint R\,dx = \oint T\,dx = \text{work of friction},
 
-is what Jenkin elements have to follow. With its yield torsion given, an element is its
-yield torque times a known signal, so that the yield torques are a least-squares problem
-with bounds. It is weighted with the torsion travelled: an element that slips all the
-way then takes the mean of R, and with it the work of a round.
+is the target of the Jenkin elements. For a given yield torsion, the torque of an
+element is its yield torque times a known signal, so that the yield torques follow from
+a bounded least-squares problem. It is weighted with the torsion travelled: an element
+that slips throughout then takes the mean of R and thereby the work of a round.
 
-Elements yield at a constant torque; friction of the teeth changes with their loads and
-with how they slide. Where its loop is narrower in the middle than under load, which
-no parallel elements can be, they come out too wide there and too narrow elsewhere. The
-report says by how much.
+Elements yield at a constant torque, whereas tooth friction varies with the load and the
+sliding of the teeth. Its loop may be narrower in the middle than under load, which
+parallel elements cannot reproduce: they are then too wide in the middle and too narrow
+elsewhere. The report states the differences.
 """
 
 from __future__ import annotations
@@ -38,32 +38,33 @@ from swgjoint.units import arcmin
 Map = TypeVar("Map", bound=Potential)
 
 REACHES = 2.0 ** -np.arange(0.0, 10.5, 0.5)
-"""Yield torsions of the elements that are tried, parts of the travel: from that of an
-element that sticks all the way, as teeth that do not slide stiffen a drive, to 0.1 %.
+"""Yield torsions of the candidate elements, as fractions of the travel: from that of an
+element that always sticks, like teeth that do not slide and stiffen a drive, to 0.1 %.
 """
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FrictionLoop:
-    """Torque loop at a locked input: from zero, in the end T -> 0 -> -T -> 0 -> T.
+    """Torque loop with a locked input that starts at zero and ends with a full round.
 
-    The drive has forgotten its first loading when the last round begins.
+    The last round is T -> 0 -> -T -> 0 -> T. When it begins, the drive has forgotten
+    its first loading.
     """
 
     input_angle: float
-    """theta [rad]."""
+    """Locked input angle theta [rad]."""
     quarter: int
-    """Steps n of each quarter of the last round."""
+    """Number of steps n in each quarter of the last round."""
     torque: Array
-    """T along the path (n_points,), at least 4 n + 1 [N·m]."""
+    """Torque T along the path, at least 4 n + 1 values [N·m]. Shape (n_points,)."""
     torsion: Array
-    """theta/i - psi with friction (n_points,) [rad]."""
+    """Torsion theta/i - psi with friction [rad]. Shape (n_points,)."""
     elastic_torsion: Array
-    """The same without friction, at the same torques (n_points,) [rad]."""
+    """Torsion without friction at the same torques [rad]. Shape (n_points,)."""
     stiffness: Array
-    """Tangent dT/dx without friction (n_points,) [N·m/rad]."""
+    """Tangent stiffness dT/dx without friction [N·m/rad]. Shape (n_points,)."""
     work: Array
-    """Work of friction since the start (n_points,) [J]."""
+    """Work of friction since the start [J]. Shape (n_points,)."""
 
     def __post_init__(self) -> None:
         torque = frozen_array(self.torque, "torque [N·m]", ndim=1)
@@ -98,13 +99,13 @@ class FrictionLoop:
 
     @property
     def width(self) -> Array:
-        """Torsion while the torque falls less that while it rises (2 n + 1,) [rad]."""
+        """Torsion of the falling minus that of the rising branch (2 n + 1,) [rad]."""
         falling, rising = self.branches(self.torsion)
         return np.asarray(falling - rising)
 
     @property
     def shift(self) -> Array:
-        """Mid-line less the torsion without friction (2 n + 1,) [rad]."""
+        """Mid-line minus the torsion without friction (2 n + 1,) [rad]."""
         falling, rising = self.branches(self.torsion - self.elastic_torsion)
         return np.asarray(0.5 * (falling + rising))
 
@@ -115,7 +116,7 @@ class FrictionLoop:
 
     @property
     def area(self) -> float:
-        """Work that the round takes, of T dx [J]."""
+        """Work of the round, the integral of T dx [J]."""
         return float(np.trapezoid(self.torque[self.round], self.torsion[self.round]))
 
     @property
@@ -125,14 +126,14 @@ class FrictionLoop:
 
     @property
     def gap(self) -> float:
-        """By how much the round does not close [rad]."""
+        """Gap between the ends of the round [rad]."""
         return float(self.torsion[-1] - self.torsion[self.round][0])
 
     @property
     def friction_torque(self) -> Array:
         """R = T - T_0(x) along the path (n_points,) [N·m]."""
         torque, place = np.unique(self.torque, return_index=True)
-        # between the samples by their values and slopes: friction moves x a little
+        # interpolate by values and slopes, since friction shifts x slightly
         elastic = CubicHermiteSpline(
             self.elastic_torsion[place], torque, self.stiffness[place]
         )
@@ -140,7 +141,7 @@ class FrictionLoop:
 
 
 def fit_elements(loops: Sequence[FrictionLoop]) -> tuple[Jenkin, ...]:
-    """Jenkin elements that follow what friction adds, one set for all positions."""
+    """Jenkin elements that follow the friction torque, one set for all positions."""
     from scipy.optimize import nnls
 
     travel = max(float(np.ptp(loop.torsion)) for loop in loops)
@@ -166,28 +167,28 @@ def fit_elements(loops: Sequence[FrictionLoop]) -> tuple[Jenkin, ...]:
 
 
 def with_hysteresis(drive: Map, loops: Sequence[FrictionLoop]) -> Map:
-    """The map with elements fitted to the loops, compared with them in its info.
+    """The map with elements fitted to the loops; its info compares both.
 
     Args:
         drive: The map of the drive without friction.
-        loops: With friction, at input positions that stand for all.
+        loops: Loops with friction, at representative input positions.
     """
-    found = replace(drive, hysteresis=fit_elements(loops))
+    fitted = replace(drive, hysteresis=fit_elements(loops))
     width = np.array([loop.width for loop in loops])
     shift = np.array([loop.shift for loop in loops])
-    played = [played_loop(found, loop) for loop in loops]
+    played = [played_loop(fitted, loop) for loop in loops]
     widths = np.array([loop.width for loop in played])
     shifts = np.array([loop.shift for loop in played])
     grid = loops[0].branches(loops[0].torque)[1]
     at = int(width.mean(axis=0).argmax())
-    loss, own = (np.array([one.loss for one in some]) for some in (loops, played))
+    loss, loss_map = (np.array([one.loss for one in some]) for some in (loops, played))
     work = np.array([loop.friction_work for loop in loops])
     taken = np.array([one.area for one in played])
     report: dict[str, Any] = {
         "torque_Nm": float(grid[-1]),
         "input_angles_rad": [loop.input_angle for loop in loops],
         "hysteresis_loss_arcmin": (loss / arcmin).tolist(),
-        "hysteresis_loss_map_arcmin": (own / arcmin).tolist(),
+        "hysteresis_loss_map_arcmin": (loss_map / arcmin).tolist(),
         "widest_arcmin": float(width.mean(axis=0)[at] / arcmin),
         "widest_map_arcmin": float(widths.mean(axis=0)[at] / arcmin),
         "widest_at_Nm": float(grid[at]),
@@ -201,8 +202,8 @@ def with_hysteresis(drive: Map, loops: Sequence[FrictionLoop]) -> Map:
         "round_area_J": [loop.area for loop in loops],
         "round_area_map_J": taken.tolist(),
         "not_closed_arcmin": float(max(abs(loop.gap) for loop in loops) / arcmin),
-        "elements": len(found.hysteresis),
-        "yield_torque_Nm": float(sum(e.yield_torque for e in found.hysteresis)),
+        "elements": len(fitted.hysteresis),
+        "yield_torque_Nm": float(sum(e.yield_torque for e in fitted.hysteresis)),
     }
     mean, low, high = loss.mean(), loss.min(), loss.max()
     label = (
@@ -210,15 +211,20 @@ def with_hysteresis(drive: Map, loops: Sequence[FrictionLoop]) -> Map:
         f" {grid[-1]:.4g} N·m: loop {mean / arcmin:.3g} arcmin wide at zero torque"
         f" ({low / arcmin:.3g} to {high / arcmin:.3g}), at most"
         f" {report['widest_arcmin']:.3g} at {grid[at]:.3g} N·m; that of the map"
-        f" {own.mean() / arcmin:.3g} and {report['widest_map_arcmin']:.3g} arcmin; work"
+        f" {loss_map.mean() / arcmin:.3g} and {report['widest_map_arcmin']:.3g} arcmin; work"
         f" of a round {taken.mean() / work.mean():.2f} of theirs"
     )
     info = {**drive.info, "friction_loop": report, "hysteresis": label}
-    return replace(found, info=info)
+    return replace(fitted, info=info)
 
 
 def played_loop(drive: Potential, loop: FrictionLoop) -> FrictionLoop:
-    """What the map does along the torques of a loop."""
+    """The loop of the map along the torques of a computed loop.
+
+    Args:
+        drive: The map.
+        loop: Loop whose torques and input angle are used.
+    """
     theta = loop.input_angle
     free = float(output_angle(drive, theta, 0.0))
     sliders = Sliders.relax(drive.hysteresis, float(drive.torsion(theta, free)))

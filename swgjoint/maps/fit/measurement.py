@@ -25,8 +25,8 @@ from swgjoint.maps.torsion_law import potential_of_stiffness
 from swgjoint.units import arcmin, deg
 
 LEG_STEPS = 2.0
-"""Steps of a record from turn to turn of the torque, at least: rows in disorder have
-1.5 (of random numbers every third is no turn; textbook), rows in order many."""
+"""Smallest mean number of steps between reversals of the torque. Rows in random order
+have 1.5 (two of three random numbers are extremes; textbook), rows in order many."""
 TORQUE = {"torque_Nm": 1.0}
 TORSION = {"torsion_arcmin": arcmin, "torsion_rad": 1.0}
 OUTPUT = {"output_deg": deg, "output_rad": 1.0}
@@ -39,7 +39,7 @@ def read_loop(path: str | Path) -> TorqueLoop:
     """Loop from a CSV file: ``torque_Nm`` and ``torsion_arcmin`` or ``torsion_rad``.
 
     Raises:
-        InputError: If the file is no loop over both signs of the torque.
+        InputError: If the file is not a loop over both signs of the torque.
     """
     data = read_columns(path, {"torque": TORQUE, "torsion": TORSION})
     torque, torsion = data["torque"], data["torsion"]
@@ -60,7 +60,8 @@ def read_loop(path: str | Path) -> TorqueLoop:
     ends = loop.mid_line(np.array([0.9 * low, 0.9 * high]))
     if not ends[1] > ends[0]:
         raise InputError(
-            f"{path}: torsion does not grow with the torque; accepted: both of one sign"
+            f"{path}: torsion does not grow with the torque; accepted: both of the same"
+            " sign"
         )
     check_direction(path, loop)
     return loop
@@ -133,7 +134,7 @@ def map_from_measurement(
         if largest > np.pi:
             raise InputError(
                 f"{kinematic_error}: kinematic error of {largest:.4g} rad; accepted:"
-                " less than half a turn, so is the unit that of the column's name?"
+                " less than half a turn; check the unit in the column name"
             )
         found = fit_error(
             record["output"],
@@ -199,7 +200,7 @@ def map_from_measurement(
 
 
 def _ratings(given: Ratings | float, largest: float) -> Ratings:
-    """Ratings as given, or around a rated torque and the largest of the loop."""
+    """The given ratings, or ratings from a rated torque and the largest loop torque."""
     if isinstance(given, Ratings):
         return given
     rated = float(given)

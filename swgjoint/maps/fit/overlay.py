@@ -1,9 +1,9 @@
-"""A measured torque-torsion loop over the one that a map predicts.
+"""Comparison of a measured torque-torsion loop with the prediction of a map.
 
-The map is led along the torques of the record, input locked, so that both loops have
-the same path and are read by the same rules. The zero of a torsion sensor says nothing:
-the measured loop is shifted onto the prediction where both load directions agree best
-below T1.
+The map follows the torques of the record with a locked input, so that both loops have
+the same path and are read by the same rules. The zero of a torsion sensor is arbitrary.
+The measured loop is therefore shifted onto the prediction so that the mid-lines agree
+on average below T1, with both load directions.
 """
 
 from __future__ import annotations
@@ -23,41 +23,41 @@ from swgjoint.typing import Array
 from swgjoint.units import arcmin
 
 COMPARED = ("hysteresis_loss_arcmin", "lost_motion_arcmin")
-"""What is read about zero torque from both loops."""
+"""Figures read around zero torque from both loops."""
 APART = 0.1
-"""Part by which such a reading may be off without a warning."""
+"""Relative difference of such a figure above which a warning is given."""
 _GRID = 9
-"""Torques from zero to T1 over which the zeros of the loops are compared."""
+"""Number of torques from zero to T1 at which the zeros of the loops are compared."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Overlay:
-    """Two loops along the same torques."""
+    """A measured and a predicted loop along the same torques."""
 
     measured: TorqueLoop
-    """As measured, its zero moved onto that of the prediction."""
+    """Measured loop, with its zero shifted onto that of the prediction."""
     predicted: TorqueLoop
     shift: float
-    """By which the measured torsion was moved [rad]."""
+    """Shift that was added to the measured torsion [rad]."""
     history: str
-    """What the drive did before the record: ``at rest`` or ``run before``."""
+    """State of the drive before the record: ``at rest`` or ``run before``."""
     edges: tuple[float, float, float]
     """T1, T2 and the largest torque of the record [N·m]."""
     rated_torque: float
     """Rated torque that defines the lost motion [N·m]."""
     beyond_range: bool
-    """Whether the record leaves the torques for which the map was made."""
+    """Whether the record exceeds the torque range of the map."""
 
     @property
     def residual(self) -> Array:
-        """Measured less predicted torsion [rad]. Shape (n,)."""
+        """Measured minus predicted torsion [rad]. Shape (n,)."""
         return self.measured.torsion - self.predicted.torsion
 
     def segments(self) -> list[dict[str, Any]]:
-        """Residual and stiffness on 0..T1, T1..T2, T2..Tmax, both signs together.
+        """Residual and stiffness on 0..T1, T1..T2 and T2..Tmax, both signs together.
 
-        Stiffness is None where the record does not reach or jumps across, residuals
-        without samples.
+        The stiffness of a segment is None if the record does not cover it or has no
+        samples in it. The residuals are None without samples.
         """
         size = np.abs(self.measured.torque)
         rows = []
@@ -82,7 +82,7 @@ class Overlay:
         return rows
 
     def _stiffness(self, loop: TorqueLoop, low: float, high: float) -> float | None:
-        """Chord of the mid-line; at the end of the record up to where both signs go."""
+        """Chord of the mid-line; the last segment ends at the smaller of both peaks."""
         torque = self.measured.torque
         both = min(float(torque.max()), -float(torque.min()))
         if high == self.edges[2] and both > low:
@@ -93,7 +93,7 @@ class Overlay:
         return value if np.isfinite(value) else None
 
     def _sampled(self, low: float, high: float) -> bool:
-        """Whether samples lie between two torques on every side that reaches them."""
+        """Whether every sign that reaches ``high`` has samples between two torques."""
         sides = [sign * self.measured.torque for sign in (1.0, -1.0)]
         return all(
             bool(((side > low) & (side <= high)).any())
@@ -102,30 +102,30 @@ class Overlay:
         )
 
     def warnings(self) -> list[str]:
-        """Readings of the prediction that are more than a tenth off; a line each.
+        """Figures of the prediction that differ by more than :data:`APART`, one per line.
 
-        A prediction without hysteresis has no loss that could be off.
+        The loss of a prediction without hysteresis is not compared.
         """
-        ours, theirs = (
+        predicted, measured = (
             readings(loop, self.rated_torque)
             for loop in (self.predicted, self.measured)
         )
         pairs = {
-            "hysteresis loss": (ours.hysteresis_loss, theirs.hysteresis_loss),
-            "lost motion": (ours.lost_motion, theirs.lost_motion),
+            "hysteresis loss": (predicted.hysteresis_loss, measured.hysteresis_loss),
+            "lost motion": (predicted.lost_motion, measured.lost_motion),
         }
         least = NO_WIDTH * float(np.ptp(self.predicted.torsion))
         return [
-            f"{name} predicted {own / arcmin:.4g} arcmin, measured"
-            f" {value / arcmin:.4g} arcmin: {abs(own / value - 1.0):.0%} apart"
-            for name, (own, value) in pairs.items()
-            if own > least and value > 0.0 and abs(own / value - 1.0) > APART
+            f"{name} predicted {ours / arcmin:.4g} arcmin, measured"
+            f" {theirs / arcmin:.4g} arcmin: {abs(ours / theirs - 1.0):.0%} apart"
+            for name, (ours, theirs) in pairs.items()
+            if ours > least and theirs > 0.0 and abs(ours / theirs - 1.0) > APART
         ]
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain values: figures of both loops, residuals in all and by segment.
+        """Figures of both loops and residuals, in total and by segment, as JSON values.
 
-        What is read about zero is None without samples within T1 on either side.
+        Figures around zero torque are None unless both signs have samples within T1.
         """
         rest = self.residual / arcmin
         pair = {"measured": self.measured, "predicted": self.predicted}
@@ -163,27 +163,28 @@ class Overlay:
 
 
 def overlay(drive: Potential, measured: TorqueLoop, *, theta: float = 0.0) -> Overlay:
-    """Lay a measured loop over the prediction of a map.
+    """Compare a measured loop with the prediction of a map.
 
-    With hysteresis the prediction starts at rest, or has been along the path once
-    before; which of the two the record shows, its residual tells.
+    With hysteresis the prediction is computed twice: from rest, and after a first pass
+    along the path. The one with the smaller residual is returned.
 
     Args:
         drive: The map.
-        measured: Torque and torsion of one sign, any zero of the torsion.
-        theta: Where the input is locked in the prediction [rad].
+        measured: Torque and torsion with the same sign; the zero of the torsion is
+            arbitrary.
+        theta: Angle at which the input is locked in the prediction [rad].
     """
     ratings = drive.ratings
     first, again = _played(drive, measured, theta)
     choices = [("at rest", first)]
     if drive.hysteresis:
         choices.append(("run before", again))
-    found = []
+    overlays = []
     for history, torsion in choices:
         predicted = TorqueLoop(torque=measured.torque, torsion=torsion)
         shift = _shift(measured, predicted, ratings.T1)
         moved = TorqueLoop(torque=measured.torque, torsion=measured.torsion + shift)
-        found.append(
+        overlays.append(
             Overlay(
                 measured=moved,
                 predicted=predicted,
@@ -194,15 +195,15 @@ def overlay(drive: Potential, measured: TorqueLoop, *, theta: float = 0.0) -> Ov
                 beyond_range=_beyond(drive, measured),
             )
         )
-    return min(found, key=lambda one: float(np.sum(one.residual**2)))
+    return min(overlays, key=lambda one: float(np.sum(one.residual**2)))
 
 
 def _played(
     drive: Potential, measured: TorqueLoop, theta: float
 ) -> tuple[Array, Array]:
-    """Torsion of the map along a path of the torque, from rest and once more [rad].
+    """Torsion of the map along a torque path, from rest and on a second pass [rad].
 
-    Between two turns of the path the direction is one, also where samples jitter.
+    Between two reversals the path counts as monotone, even if samples jitter.
     """
     free = float(output_angle(drive, theta, 0.0))
     sliders = Sliders.relax(drive.hysteresis, float(drive.torsion(theta, free)))
@@ -219,17 +220,19 @@ def _played(
 
 
 def _width(loop: TorqueLoop) -> float:
-    """Hysteresis loss [rad], zero where only the torque left at zero shows."""
+    """Hysteresis loss [rad]; zero if only the remaining torque :data:`REST` causes it."""
     width, travel = loop.hysteresis_loss(), float(np.ptp(loop.torsion))
     return 0.0 if abs(width) < NO_WIDTH * travel else width
 
 
 def from_its_side(torque: Array, rest: float) -> Array:
-    """Zeros of a path as the rest of the torque before them: a free output stays.
+    """Torque path whose zeros are replaced by a small torque of the preceding sign.
+
+    A free output stays where the last load left it.
 
     Args:
-        torque: Along the path (n,) [N·m].
-        rest: What is left of it at zero [N·m].
+        torque: Torque along the path [N·m]. Shape (n,).
+        rest: Magnitude of the torque that replaces a zero [N·m].
     """
     known = np.where(torque == 0.0, 0, np.arange(torque.size))
     before = np.sign(torque[np.maximum.accumulate(known)])
@@ -237,10 +240,10 @@ def from_its_side(torque: Array, rest: float) -> Array:
 
 
 def _shift(measured: TorqueLoop, predicted: TorqueLoop, top: float) -> float:
-    """By which to move the measured torsion [rad].
+    """Shift of the measured torsion onto the prediction [rad].
 
-    Mid-lines at +T and -T together, so that a wrong stiffness moves nothing; a grid
-    of torques up to T1, so that noise is averaged.
+    The shift averages the mid-lines at +T and -T, so that a stiffness error has no
+    effect, over a grid of torques up to T1, so that noise is reduced.
     """
     torque = np.linspace(0.0, top, _GRID)
     apart = np.stack(

@@ -1,17 +1,17 @@
-r"""Harmonics that a tolerance does not need, and what their loss can do at most.
+r"""Removal of the weakest harmonics of a map, with bounds of the effect.
 
-A harmonic k with kinematic error :math:`e_k` and potential :math:`A_k, B_k` changes, at
-given phases and inside the sampled torsion,
+At given phases and inside the sampled torsion, a harmonic k with kinematic error
+:math:`e_k` and potential :math:`A_k, B_k` changes the results by at most
 
 .. math::
     |\delta e_0| \le |e_k|, \quad
     |\delta \partial_\Delta V| \le t_k = \max_\Delta |(A_k', B_k')|, \quad
     |\delta\psi|_T \le |e_k| + t_k / c,
 
-the last at a given torque and input angle, with c the lowest stiffness that any phases
-leave: a torque that differs by t is met by torsions that differ by t/c at most. Sums of
-these bound what several harmonics do. Maxima are taken over Bernstein coefficients,
-which enclose a polynomial.
+where the last bound applies at a given torque and input angle and c is the lowest
+stiffness at any phases: a torque change t changes the torsion by at most t/c. The sum
+of these bounds applies to several harmonics. Maxima are taken over Bernstein
+coefficients, which enclose a polynomial.
 """
 
 from __future__ import annotations
@@ -35,13 +35,14 @@ if TYPE_CHECKING:
 def pruned_map(drive: Map, tolerance: float) -> Map:
     """A copy without the weakest harmonics; ``info["pruned"]`` states the bounds.
 
-    Of a map that was pruned before, lists are joined, and tolerances and bounds added:
-    the distance from the first map to the last is at most the sum of both.
+    For a map that was pruned before, lists are joined and tolerances and bounds added:
+    the deviation of the last map from the first is at most the sum of both.
 
     Args:
         drive: The map.
-        tolerance: Of the output angle at a given torque and input angle [rad]. As many
-            harmonics are dropped, the weakest first, as their sum stays below it.
+        tolerance: Tolerance of the output angle at a given torque and input angle
+            [rad]. Harmonics are dropped, the weakest first, while the sum of their
+            bounds does not exceed it.
 
     Raises:
         InputError: If the tolerance is not positive, or if the harmonics of the
@@ -53,14 +54,14 @@ def pruned_map(drive: Map, tolerance: float) -> Map:
     lowest, highest = stiffness_range(drive)
     if lowest <= 0.0:
         raise InputError(
-            f"map {drive.name!r}: the stiffness that its harmonics leave may be as low"
-            f" as {lowest:.3g} N·m/rad, so that no bound of an angle follows; accepted:"
-            " a map whose harmonics together swing the stiffness by less than its mean"
+            f"map {drive.name!r}: its harmonics may reduce the stiffness to"
+            f" {lowest:.3g} N·m/rad, so that no bound of the angle exists; accepted:"
+            " a map whose harmonics together change the stiffness by less than its mean"
             " at every torsion; use it without a tolerance, or at a level without"
             " harmonics (rigid, linear, native)"
         )
     angle = error + torque / lowest
-    angle[0] = np.inf  # the mean stays
+    angle[0] = np.inf  # the mean is kept
     weakest = np.argsort(angle, kind="stable")
     gone = weakest[np.cumsum(angle[weakest]) <= tolerance]
     keep = np.ones(angle.size, dtype=bool)
@@ -71,7 +72,7 @@ def pruned_map(drive: Map, tolerance: float) -> Map:
         "dropped": [[int(p), int(q)] for p, q in drive.orders[~keep]],
         "output_angle_bound_arcmin": float(angle[gone].sum()) / arcmin,
         "kinematic_error_bound_arcmin": of_error / arcmin,
-        # at given angles of input and output the torsion shifts, too
+        # at given angles of input and output the torsion changes as well
         "torque_bound_Nm": of_torque + highest * of_error,
     }
     before = drive.info.get("pruned", {})

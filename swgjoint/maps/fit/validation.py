@@ -1,4 +1,4 @@
-"""A map against equilibria that it was not fitted to: the record that it carries.
+"""Validation record of a map: its differences from equilibria unused in the fit.
 
 :mod:`swgjoint.maps.sheet.map_validity` reads the record.
 """
@@ -16,31 +16,33 @@ from swgjoint.maps.sheet.map_validity import QUANTITIES, STIFFNESS, UNITS
 from swgjoint.typing import Array
 
 POSITIONS = 500
-"""Of the cycle of a drive with errors of its teeth, at which its map is evaluated."""
+"""Number of positions in the cycle of a drive with tooth errors at which its map is
+evaluated."""
 GOLDEN = 0.618034
 EXTREME = 2.5
-"""Largest of many differences over their root mean square: sqrt(2 ln n) of n = 24
-independent normal ones, the order of the positions in a pitch at which a map may be
-off. Of 22 records of six designs 14 are then within 0.7 to 1.5 times the largest
-difference at other equilibria; with the largest difference of the record itself 12."""
+"""Ratio of the largest of many differences to their root mean square: sqrt(2 ln n) for
+n = 24 independent normal differences, about the number of positions in a pitch at which
+a map may deviate. With it, 14 of 22 records of six designs are within 0.7 to 1.5 times
+the largest difference at other equilibria; with the largest difference of the record
+itself, 12 are."""
 
 
 def validation(drive: Potential, samples: MapSamples) -> dict[str, Any] | None:
     """Record of the differences between a map and its unseen equilibria.
 
-    Differences of input torque and output error are parts of the peak to peak of the
+    Differences of input torque and output error are relative to the peak to peak of the
     finite elements at the same torque, taken over the samples and the unseen equilibria
-    together. With errors of the teeth the unseen equilibria are a few full solves of
-    the toleranced drive; the peak to peak then includes the map over the whole cycle.
+    together. With tooth errors the unseen equilibria are a few full solves of the
+    toleranced drive, and the peak to peak includes the map over the whole cycle.
 
-    ``largest`` is the largest difference seen, at a few angles of each torque.
-    ``expected`` estimates what more angles would show: :data:`EXTREME` times the root
-    mean square of the worst torque, which varies less than its largest difference.
-    Neither covers what happens between the torques of the record.
+    ``largest`` is the largest observed difference, at a few angles of each torque.
+    ``expected`` estimates the largest difference at more angles: :data:`EXTREME` times
+    the root mean square at the worst torque, which varies less than the largest
+    difference. Neither covers the range between the torques of the record.
 
     Args:
         drive: The map.
-        samples: What it was fitted to, with unseen equilibria.
+        samples: Samples of the fit, with unseen equilibria.
 
     Returns:
         The record; None if there are no unseen equilibria inside the map.
@@ -59,7 +61,7 @@ def validation(drive: Potential, samples: MapSamples) -> dict[str, Any] | None:
     rows = []
     low, high = drive.torque_range
     for torque in np.unique(solved.torque):
-        # angles alone are unseen without torque, unless the drive has errors
+        # without tooth errors the unloaded equilibria are unseen in their angles only
         if not low < torque < high or (torque == 0.0 and toleranced is None):
             continue
         at = solved.torque == torque
@@ -135,7 +137,7 @@ def _over_cycle(drive: Potential, samples: MapSamples, torque: float) -> list[Ar
     assert samples.tolerances is not None
     step = samples.input_angle[1] - samples.input_angle[0]
     cycle = step * samples.input_angle.size * samples.tolerances.pitches
-    # the golden section spreads them over pitches and phases of a pitch alike
+    # the golden section spreads the positions evenly over pitches and their phases
     theta = cycle * (GOLDEN * np.arange(POSITIONS) % 1.0)
     none = np.zeros(POSITIONS)
     there = FullSolves(
@@ -164,7 +166,7 @@ def _stiffness(
             continue
         torsion = solved.output_error[rest[theta]] - solved.output_error[k]
         of_map = torsion - wrong[rest[theta]] + wrong[k]
-        # T over either torsion: their ratio is that of the stiffnesses turned over
+        # stiffness is T over torsion: the stiffness ratio is the inverse torsion ratio
         part = float(abs(torsion / of_map - 1.0))
         if worst is None or part > worst["largest"]:
             worst = {"largest": part, "at_Nm": float(torque)}
