@@ -1,1 +1,1 @@
-"""From measurements to a map: bench logs and measured torque-torsion loops."""
+"""Identification of a map from measurements: bench logs and torque-torsion loops."""

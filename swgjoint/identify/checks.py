@@ -1,4 +1,4 @@
-"""What makes one doubt an identification: ratio, clocks, signs, what is left."""
+"""Checks of an identification: ratio, clocks, signs and residuals."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ if TYPE_CHECKING:
 
 
 MOVES = 0.05
-"""Motion of the link beyond what torsion alone can be [rad]: three times 60 arcmin."""
+"""Link motion that torsion alone cannot cause [rad], three times 60 arcmin."""
 TOGETHER = 0.99
-"""Correlation of both angles from which the gear moves the link."""
+"""Correlation of both angles above which the gear moves the link."""
 RATIO_OFF = 0.05
-"""Part by which the ratio of a log may be off: torsion over the travel of the link."""
+"""Relative tolerance of the ratio of a log; torsion over link travel shifts it."""
 SHARE_LEFT = 0.05
-"""Of the rms of a torque, beyond which the model is not that of the drive.
+"""Residual relative to the rms of a torque above which the model does not fit.
 
-Simulated benches of drives within the model leave 0.3 %, of Bouc-Wen hysteresis 0.8 %;
-link angles that are 0.5 ms late left 20 % before their clock was found.
+Simulated benches of drives within the model leave 0.3 %, those with Bouc-Wen hysteresis
+0.8 %. Link angles with a delay of 0.5 ms leave 20 % if it is not corrected.
 """
 SURE = 3.0
-"""Standard deviations by which a value must be on the wrong side."""
+"""Number of standard deviations by which a value must be implausible."""
 POSITIVE = (
     "damping",
     "hardening",
@@ -44,23 +44,29 @@ POSITIVE = (
     "friction_viscous",
     "rotor_inertia",
 )
-"""Parameters that no drive has below zero."""
+"""Parameters that are not negative for any drive."""
 
 PHASE_STEP = 1.0
-"""Of a harmonic per window, beyond which a note says so [rad].
+"""Phase change of a harmonic per window above which a note is given [rad].
 
-Torques of mean angles are then no longer mean torques: on a simulated bench without
-noise hysteresis and viscous friction were 0.4 % off at 0.9 rad, 2 % at 2.1 rad.
+The torques at mean angles then differ from the mean torques: on a simulated bench
+without noise, hysteresis and viscous friction were 0.4 % off at 0.9 rad and 2 % at
+2.1 rad.
 """
 
 
 def check_ratio(log: BenchLog, layout: str, teeth: tuple[int, int]) -> None:
-    """Refuse a layout or signs whose ratio is not that of the log.
+    """Refuse a layout or signs whose ratio differs from that of the log.
 
-    Only where the gear moves the link: a locked one says nothing.
+    The check applies only if the gear moves the link.
+
+    Args:
+        log: Log of the bench.
+        layout: Which member is fixed.
+        teeth: Number of teeth of flexspline and circular spline.
 
     Raises:
-        InputError: With the layout or the sign that fits.
+        InputError: If the ratio differs; the message names a layout or sign that fits.
     """
     theta, psi = log.motor_angle, log.link_angle
     if np.ptp(psi) < MOVES or np.ptp(theta) == 0.0:
@@ -79,27 +85,27 @@ def check_ratio(log: BenchLog, layout: str, teeth: tuple[int, int]) -> None:
     ]
     if abs(slope * ratio + 1.0) <= RATIO_OFF:
         fitting.append(
-            f"{layout} with the other sign of motor_angle or link_angle, and of its"
+            f"{layout} with the opposite sign of motor_angle or link_angle, and of its"
             " torque"
         )
-    accepted = " or ".join(fitting) or "other teeth, or angles in their unit"
+    accepted = " or ".join(fitting) or "other teeth, or other units of the angles"
     raise InputError(
-        f"{log.where}: the link turns {slope:.4g} of the motor, a ratio of"
+        f"{log.where}: the link turns by {slope:.4g} times the motor angle, a ratio of"
         f" {1.0 / slope:.4g}; {layout} with {teeth[0]}/{teeth[1]} teeth has"
         f" {ratio:g}; accepted: {accepted}"
     )
 
 
 def without_skew(log: BenchLog, skew: float) -> BenchLog:
-    """The log with the link angles of the instants of all other channels.
+    """The log with link angles at the instants of the other channels.
 
     Args:
-        log: As recorded.
-        skew: By which the link angles are late [s].
+        log: Recorded log.
+        skew: Delay of the link angles [s].
     """
     from scipy.interpolate import CubicSpline
 
-    # a straight line between samples would take fast motion out of one channel alone
+    # linear interpolation would damp fast motion in this channel alone
     link = CubicSpline(log.time, log.link_angle)
     there = log.time + skew
     known = (there >= log.time[0]) & (there <= log.time[-1])
@@ -120,12 +126,12 @@ def without_skew(log: BenchLog, skew: float) -> BenchLog:
 def doubts_of(
     estimates: Mapping[str, Estimate], left: Mapping[str, float], window: float
 ) -> list[str]:
-    """Lines on parameters that no drive has, and on torques that are not explained.
+    """Lines on implausible parameters and on torques that the model does not explain.
 
     Args:
-        estimates: Of all parameters.
-        left: Part of the rms of each torque that the model leaves.
-        window: Of the averages [s].
+        estimates: Estimates of all parameters by name.
+        left: Residual of each torque relative to its rms [-].
+        window: Duration of an averaging window [s].
     """
     lines = []
     for name in POSITIVE:
@@ -146,11 +152,11 @@ def doubts_of(
     for name, share in left.items():
         if share > SHARE_LEFT:
             lines.append(
-                f"{name}: {share:.1%} of its rms is not explained; plausible: at most"
+                f"{name}: the model leaves {share:.1%} of its rms; plausible: at most"
                 f" {SHARE_LEFT:.0%}"
             )
     if lines:
-        lines[-1] += "; see the clocks of the channels, their signs and the teeth"
+        lines[-1] += "; check the clocks of the channels, their signs and the teeth"
     skew = estimates.get("link_skew")
     if skew is not None and abs(skew.value) > window:
         lines.append(
@@ -161,7 +167,13 @@ def doubts_of(
 
 
 def remarks(model: Model, drive: DriveMap, residuals: Mapping[str, Array]) -> list[str]:
-    """What makes one doubt the figures: offsets of sensors, window, units."""
+    """Notes on sensor offsets, the averaging window and units.
+
+    Args:
+        model: The fitted model.
+        drive: The identified map.
+        residuals: Measured minus modelled torque by channel [N·m].
+    """
     offset = [
         f"{key} {r.mean():.3g} N·m (deviation {r.std():.3g} N·m)"
         for key, r in residuals.items()
@@ -170,26 +182,26 @@ def remarks(model: Model, drive: DriveMap, residuals: Mapping[str, Array]) -> li
     notes = []
     if offset:
         notes.append(
-            f"measured less modelled in the mean: {', '.join(offset)}; offset of a"
-            " sensor? The intervals do not tell it"
+            f"mean of measured minus modelled torque: {', '.join(offset)}; offset of a"
+            " sensor? The intervals do not include it"
         )
     phase = model.phase_step
     if phase > PHASE_STEP:
         notes.append(
             f"kinematic error turns by up to {phase:.2g} rad in a window of"
-            f" {model.step:.3g} s, which the intervals do not tell; better: at most"
+            f" {model.step:.3g} s, which the intervals do not include; better: at most"
             f" {PHASE_STEP:g} rad, --window {model.step * PHASE_STEP / phase:.2g}"
         )
     rated = drive.ratings.rated_torque
     low, high = TORSION_AT_RATED
     try:
         torsion = drive.mean_torsion(rated) / arcmin
-    except ValueError:  # the spring softens before
+    except ValueError:  # the spring softens below the rated torque
         return notes
     if not low <= torsion <= high:
         notes.append(
             f"torsion at the rated {rated:g} N·m is {torsion:.3g} arcmin; plausible:"
-            f" {low:g} to {high:g} arcmin (the catalogue's are 5 to 7): see the units"
-            " of the angles and the rated torque"
+            f" {low:g} to {high:g} arcmin (catalogue drives have 5 to 7): check the"
+            " units of the angles and the rated torque"
         )
     return notes

@@ -1,7 +1,7 @@
 r"""Parameters of a drive from a log of its motion and torques, with intervals.
 
-A bench logs angles of motor and link, and the torque of the motor, that behind the
-drive, or both. With the map's own words, :math:`g` the slopes of the torsion,
+A bench logs the angles of motor and link and the motor torque, the output torque or
+both. In the notation of the map, with the slopes :math:`g` of the torsion,
 
 .. math::
     T &= T_s(\Delta) + q + C\dot\Delta, \quad
@@ -9,28 +9,30 @@ drive, or both. With the map's own words, :math:`g` the slopes of the torsion,
     \tau_{out} &= -g_\psi T - b_\psi F, \qquad
     \tau_{motor} = J\ddot\theta + g_\theta T + b_\theta F
 
-with the spring :math:`T_s` (three lines as in a catalogue, or linear and cubic), one
+with the spring :math:`T_s` (three lines as in a catalogue, or linear plus cubic), one
 Jenkin element q, and friction :math:`F = (f_c + c\,|T/i|)\,\mathrm{sign}\,\nu +
-\eta\nu`; samples at which the wave generator may stick are left out. All parameters,
-harmonics of :math:`e_0` and zero of the motor angle are found at once by least
-squares of the torques; every channel is weighted with the root mean square of its own
-residual, mean included, so that one with an offset does not count as precise.
+\eta\nu`. Samples at which the wave generator may stick are excluded. One least-squares
+fit of the torques estimates all parameters, the harmonics of :math:`e_0` and the zero
+of the motor angle. Each channel is weighted with the root mean square of its own
+residual including the mean, so that a channel with an offset gets a low weight.
 
-Clocks of encoders are apart: the link angles may be late by a time s, found as the
-other parameters are where the torque behind the drive was logged,
-:math:`\Delta = \theta/i + e_0 - \psi - s\dot\psi`; the log is then moved by it and
-fitted again. With the motor torque alone s cannot be told from viscous friction, and
-ends as a doubt where that comes out below zero. A late torque passes for damping.
+The clocks of the encoders may differ, so that the link angles are delayed by a time s.
+If the output torque was logged, s is estimated with the other parameters,
+:math:`\Delta = \theta/i + e_0 - \psi - s\dot\psi`; the log is then corrected by s and
+fitted again. With the motor torque alone s cannot be separated from viscous friction;
+a negative viscous friction is then reported as a doubt. A delayed torque appears as
+damping.
 
-Samples are averaged over a window first: noise of the encoders would else push the
-slider of the element, and acceleration is a difference of averages. Intervals are those
-of Gauss and Newton,
+Samples are first averaged over a window, because encoder noise would otherwise push the
+slider of the element, and acceleration is a difference of averages. Intervals follow
+from the Gauss-Newton covariance
 
 .. math:: \mathrm{cov} = \kappa\,(J^T J)^{-1}, \qquad \kappa = 1 + 2\sum_k \rho_k,
 
-J weighted with the residuals' deviation, :math:`\kappa` what their correlation from
-sample to sample takes of the information (ripple that the model does not have, mostly).
-They hold where the model does; the residuals' share of each torque says how well.
+with J weighted by the deviation of the residuals. :math:`\kappa` accounts for the
+information lost by correlation between samples, which is mostly ripple outside the
+model. The intervals are valid if the model is; the share of each torque that remains as
+residual indicates how well it fits.
 
 Source:
     Ljung (1999), "System identification: theory for the user", 2nd ed., ch. 9.
@@ -56,29 +58,29 @@ from swgjoint.maps.drive_map import DriveMap
 from swgjoint.typing import Array
 
 WINDOW = 0.005
-"""Samples are averaged over this time [s]."""
+"""Duration of an averaging window [s]."""
 ORDERS: tuple[tuple[int, int], ...] = ((1, 0), (2, 0), (4, 0), (0, 2), (0, 4), (1, -1))
-"""(p, q) of p alpha + q beta that a log over a whole output turn is searched for."""
+"""Orders (p, q) of p alpha + q beta that are fitted to a log over an output turn."""
 ORDERS_OF_PART: tuple[tuple[int, int], ...] = ((1, 0), (2, 0), (4, 0))
-"""The same for less than one turn, where both gear angles look alike."""
+"""Orders for less than one output turn, which cannot separate both gear angles."""
 DEVIATIONS = 1.96
 """Half width of an interval in standard deviations: 95 % of a normal distribution."""
-_TURN = 0.95  # of an output turn
-_ROUNDS = 2  # of weights
-_CORRELATED = 200  # samples over which residuals may be alike
-_SINGULAR = 1e-10
+_TURN = 0.95  # fraction of an output turn that counts as a whole one
+_ROUNDS = 2  # fits, each with updated weights
+_CORRELATED = 200  # largest lag of the correlation [samples]
+_SINGULAR = 1e-10  # least reciprocal condition of the information
 _SKEW_LEAST = 1e-6  # s, below which a skew moves no torque
 
 
 @dataclass(frozen=True, kw_only=True)
 class Estimate:
-    """One parameter with its interval of 95 %."""
+    """One parameter with its 95 % interval."""
 
     name: str
     unit: str
     value: float
     deviation: float
-    """Standard deviation, in the unit."""
+    """Standard deviation in the unit of the parameter."""
 
     @property
     def low(self) -> float:
@@ -93,24 +95,25 @@ class Estimate:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Identified:
-    """What a log tells of a drive."""
+    """Result of the identification of a drive from a log."""
 
     estimates: Mapping[str, Estimate]
     drive: DriveMap
-    """The map with these parameters; motor angles count from zero torsion."""
+    """Map with these parameters; motor angles are counted from zero torsion."""
     samples: Averaged
-    """What the fit saw."""
+    """Averaged samples of the fit."""
     model: Model
     residuals: Mapping[str, Array]
     """Measured minus modelled torque of each channel [N·m]. Shape (n,)."""
     correlation: float
-    """kappa of the covariance [-]."""
+    """Correlation factor kappa of the covariance [-]."""
     skew: float = 0.0
-    """By which the link angles were moved before this fit [s]; the samples are those
-    after it."""
+    """Delay by which the link angles were corrected before this fit [s]; ``samples``
+    contain the corrected angles."""
     notes: tuple[str, ...] = field(default_factory=tuple)
+    """Remarks on the result, one line each."""
     doubts: tuple[str, ...] = field(default_factory=tuple)
-    """Why the parameters may not be those of the drive; empty where nothing says so."""
+    """Reasons to doubt the parameters, one line each; empty if there are none."""
 
 
 def identify(
@@ -128,28 +131,29 @@ def identify(
     window: float = WINDOW,
     name: str = "identified",
 ) -> Identified:
-    """Find the parameters of a drive.
+    """Identify the parameters of a drive.
 
     Args:
-        log: Both directions of the torque; for the kinematic error motion over a turn
-            of the input, better of the output; for friction several speeds.
-        teeth_flexspline: z_fs.
-        teeth_circular_spline: z_cs.
-        ratings: Torques, or the rated torque alone [N·m].
-        corners: T1 and T2 where the rated torque alone is given; 0.2 and 0.6 of it if
-            None [N·m].
+        log: Log with both signs of the torque. The kinematic error needs motion over an
+            input turn, preferably an output turn, and friction needs several speeds.
+        teeth_flexspline: Number of teeth of the flexspline, z_fs.
+        teeth_circular_spline: Number of teeth of the circular spline, z_cs.
+        ratings: All catalogue torques, or only the rated torque [N·m].
+        corners: T1 and T2 if only the rated torque is given [N·m]; None takes 0.2 and
+            0.6 of it.
         layout: Which member is fixed.
         spring: ``three_lines`` with the corners of the ratings, or ``cubic``.
-        rotor_inertia: Of motor and wave generator [kg·m²], found if None; needed, as
-            friction, only where the torque of the motor was logged.
-        orders: (p, q) of the kinematic error; by the length of the log if None.
-        hysteresis: Whether to look for an element.
-        window: Samples are averaged over this time [s].
-        name: Of the map.
+        rotor_inertia: Inertia of motor and wave generator [kg·m²]; estimated if None.
+            Like friction, it matters only if the motor torque was logged.
+        orders: (p, q) of the kinematic error; None chooses them by the travel of the
+            log.
+        hysteresis: Whether to fit a Jenkin element.
+        window: Duration of an averaging window [s].
+        name: Name of the map.
 
     Raises:
-        InputError: If the log cannot tell the parameters.
-        ComputationError: If the least squares do not settle.
+        InputError: If the log does not determine the parameters.
+        ComputationError: If the least squares diverge.
     """
     if layout not in LAYOUTS:
         raise InputError(f"layout {layout!r}; accepted: {', '.join(LAYOUTS)}")
@@ -178,7 +182,7 @@ def identify(
     late = found.estimates.get("link_skew")
     if late is None or abs(late.value) < max(SURE * late.deviation, _SKEW_LEAST):
         return found
-    # once more with the angles of one instant: harmonics and rates are theirs, too
+    # fit again with simultaneous angles, which also changes harmonics and rates
     again = without_skew(log, late.value)
     found = _identified(again, hysteresis=hysteresis, skew=True, **options)
     rest = found.estimates.get("link_skew")
@@ -187,7 +191,7 @@ def identify(
     whole = replace(rest, value=late.value + rest.value)
     note = (
         f"link_angle was {1e3 * whole.value:.4g} ms behind the other channels"
-        f" ({1e3 * whole.low:.4g} to {1e3 * whole.high:.4g}); corrected"
+        f" ({1e3 * whole.low:.4g} to {1e3 * whole.high:.4g} ms); corrected"
     )
     estimates = {**found.estimates, "link_skew": whole}
     return replace(
@@ -222,7 +226,7 @@ def _identified(
     name: str,
     skew: bool,
 ) -> Identified:
-    """Find the parameters from a log as it is."""
+    """Identify the parameters from a log without correcting its delay."""
     samples = log.average(window)
     whole_turn = np.ptp(samples.link_angle) >= _TURN * 2.0 * np.pi
     if orders is None:
@@ -284,10 +288,10 @@ def _identified(
         if worst == "link_skew":
             return without(element=False, link_skew=True)
         if worst.startswith("hysteresis"):
-            return without_element(f"the log does not tell {worst}")
+            return without_element(f"the log does not determine {worst}")
         raise InputError(
-            f"{log.where}: the log cannot tell {worst} from the others; accepted: a"
-            " log with both signs of torque and speed, or fewer orders"
+            f"{log.where}: the log does not determine {worst}; accepted: a log with"
+            " both signs of torque and speed, or fewer orders"
         )
     covariance = kappa * np.linalg.inv(normal) / np.outer(scale, scale)
     estimates = {
@@ -315,12 +319,12 @@ def _identified(
 
 
 def rms(x: Array) -> float:
-    """Root mean square, mean included."""
+    """Root mean square including the mean."""
     return float(np.sqrt(np.mean(x**2)))
 
 
 def _solve(model: Model) -> tuple[Array, dict[str, Array], Array]:
-    """Parameters, residuals per channel, and the weighted Jacobian."""
+    """Parameter values, residuals by channel, and the weighted Jacobian."""
     from scipy.optimize import least_squares
 
     unknowns = model.unknowns
@@ -347,18 +351,18 @@ def _solve(model: Model) -> tuple[Array, dict[str, Array], Array]:
         )
         if not np.isfinite(found.x).all():
             raise ComputationError(
-                "identification diverged: see that the torques and angles of the log"
-                " have the signs of their heads"
+                "identification diverged: check that torques and angles of the log"
+                " have the signs of the drive"
             )
         values = found.x
         got = model.torques(values)
         off = {key: measured[key] - got[key] for key in measured}
-        # by each channel's own residual with its mean; a perfect log has none
+        # weight by each channel's own residual; a perfect log has none
         weight = {
             key: 1.0 / max(rms(r), 1e-9 * rms(measured[key]), 1e-12)
             for key, r in off.items()
         }
-    # the last weights are those of the covariance
+    # rescale the Jacobian to the final weights for the covariance
     rows = [len(r) for r in off.values()]
     old = np.sqrt([np.mean(r**2) for r in np.split(found.fun, rows[:-1])])
     jacobian = found.jac / np.repeat(np.maximum(old, 1e-9), rows)[:, None]
@@ -366,7 +370,7 @@ def _solve(model: Model) -> tuple[Array, dict[str, Array], Array]:
 
 
 def _correlation(residual: Array) -> float:
-    """1 + 2 sum of the autocorrelation, to where it first is within its noise."""
+    """1 + 2 times the sum of the autocorrelation, up to where noise hides it."""
     x = residual - residual.mean()
     n = len(x)
     power = float(x @ x)

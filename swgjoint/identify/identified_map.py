@@ -17,19 +17,19 @@ from swgjoint.maps.hysteresis import Jenkin
 from swgjoint.maps.torsion_law import potential_of_stiffness
 from swgjoint.typing import Array
 
-_PIECES = 16  # of the cubic spring
+_PIECES = 16  # intervals of the cubic spring
 
 
 def map_of(
     model: Model, values: Array, *, name: str, source: str
 ) -> tuple[DriveMap, tuple[str, ...]]:
-    """The map with found parameters, and what of them it cannot hold.
+    """The map with identified parameters, and notes on parameters it cannot contain.
 
     Args:
-        model: What was fitted.
-        values: In the order of ``model.unknowns``.
-        name: Of the map.
-        source: The log, for its record.
+        model: The fitted model.
+        values: Parameter values in the order of ``model.unknowns``.
+        name: Name of the map.
+        source: Name of the log, for the record of the map.
     """
     names = [x.name for x in model.unknowns]
     p = {name: float(v) for name, v in zip(names, values, strict=True)}
@@ -65,7 +65,7 @@ def map_of(
 def _error(
     model: Model, orders: NDArray[np.int64], values: Array, zero: float
 ) -> Array:
-    """Amplitudes in the frame of the map, whose motor counts from zero torsion."""
+    """Amplitudes in the frame of the map, whose motor angle is zero at zero torsion."""
     a, b = np.vstack([np.zeros((1, 2)), model.amplitudes(values)]).T
     ahead = (orders @ np.array(angle_coefficients(model.layout)))[:, 0]
     cos, sin = (f(ahead * model.ratio * zero) for f in (np.cos, np.sin))
@@ -79,14 +79,16 @@ def _elements(p: Mapping[str, float]) -> tuple[tuple[Jenkin, ...], list[str]]:
         return (Jenkin(stiffness=k, yield_torque=f),), []
     if "hysteresis_stiffness" not in p:
         return (), []
-    return (), [f"the map has no hysteresis: found {f:.3g} N·m at {k:.3g} N·m/rad"]
+    return (), [
+        f"the map has no hysteresis: the fit gave {f:.3g} N·m at {k:.3g} N·m/rad"
+    ]
 
 
 def _friction(p: Mapping[str, float], source: str) -> tuple[Friction | None, list[str]]:
     if "friction_coulomb" not in p:
         return None, []
     notes = [
-        f"friction_{key} {p[f'friction_{key}']:.3g} is below zero: none in the map"
+        f"friction_{key} {p[f'friction_{key}']:.3g} is below zero: the map has none"
         for key in ("coulomb", "load", "viscous")
         if p[f"friction_{key}"] < 0.0
     ]
@@ -108,7 +110,7 @@ def _friction(p: Mapping[str, float], source: str) -> tuple[Friction | None, lis
 def _cubic(
     model: Model, p: Mapping[str, Any], n_harmonics: int
 ) -> tuple[Array, Array, Array]:
-    """Knots over the log's torsions and the exact quartic between them."""
+    """Knots over the torsion of the log and the exact quartics between them."""
     reach = float(np.abs(model.torsion + p["zero"]).max())
     knots = np.linspace(-reach, reach, _PIECES + 1)
     energy = np.polynomial.Polynomial(

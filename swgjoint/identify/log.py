@@ -1,4 +1,4 @@
-"""Logs of a test bench: angles of motor and link, torque of motor and output."""
+"""Test-bench logs: motor and link angles, motor and output torques."""
 
 from __future__ import annotations
 
@@ -27,23 +27,28 @@ TORQUES = {
     "motor_torque": {"motor_torque_Nm": 1.0},
 }
 FEWEST = 200
-"""Averaged samples that a fit needs."""
+"""Smallest number of averaged samples for a fit."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Averaged:
-    """Means over windows of equal time; arrays of shape (n,)."""
+    """Means over windows of equal duration; arrays of shape (n,)."""
 
     time: Array
+    """Mean time of the samples in a window [s]."""
     motor_angle: Array
+    """Input angle theta [rad]."""
     link_angle: Array
+    """Output angle psi [rad]."""
     output_torque: Array | None
+    """Torque of the drive on the output [N·m]; None if it was not logged."""
     motor_torque: Array | None
+    """Torque of the motor on the input [N·m]; None if it was not logged."""
     window: NDArray[np.intp]
-    """That holds each sample of the log. Shape (n_samples,)."""
+    """Index of the window that contains each sample of the log. Shape (n_samples,)."""
 
     def mean(self, values: Array) -> Array:
-        """Means of what belongs to the samples of the log, (n_samples, ...)."""
+        """Window means of values at the samples of the log. Shape (n, ...)."""
         total = np.zeros((len(self.time), *values.shape[1:]))
         np.add.at(total, self.window, values)
         counts = np.bincount(self.window)
@@ -52,25 +57,25 @@ class Averaged:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class BenchLog:
-    """Samples of a bench; arrays of shape (n,). At least one torque is there."""
+    """Samples of a bench; arrays of shape (n,). At least one torque is required."""
 
     time: Array
-    """Increasing [s]."""
+    """Time, increasing [s]."""
     motor_angle: Array
-    """theta, of the input member [rad]."""
+    """Angle theta of the input member [rad]."""
     link_angle: Array
-    """psi, of the output member [rad]."""
+    """Angle psi of the output member [rad]."""
     output_torque: Array | None = None
-    """That the drive exerts on the output [N·m]."""
+    """Torque of the drive on the output [N·m]."""
     motor_torque: Array | None = None
-    """That the motor exerts on the input [N·m]."""
+    """Torque of the motor on the input [N·m]."""
     where: str = "log"
-    """Name for messages."""
+    """Name of the log for messages."""
 
     def __post_init__(self) -> None:
         if self.output_torque is None and self.motor_torque is None:
             raise InputError(
-                f"{self.where}: no torque; needed: output_torque_Nm, motor_torque_Nm"
+                f"{self.where}: no torque; accepted: output_torque_Nm, motor_torque_Nm"
                 " or both"
             )
         n = len(self.time)
@@ -78,7 +83,8 @@ class BenchLog:
             values = getattr(self, key)
             if values is not None and len(values) != n:
                 raise InputError(
-                    f"{self.where}: {len(values)} values of {key}, {n} times"
+                    f"{self.where}: {len(values)} values of {key}; accepted: {n}, one"
+                    " for each time"
                 )
         back = np.flatnonzero(np.diff(self.time) <= 0.0)
         if back.size:
@@ -88,14 +94,17 @@ class BenchLog:
             )
 
     def average(self, window: float) -> Averaged:
-        """Means over windows [s]; a window with no sample is left out.
+        """Means over windows of equal duration.
+
+        Args:
+            window: Duration of a window [s].
 
         Raises:
-            InputError: If too few are left.
+            InputError: If a window is invalid or empty, or there are too few windows.
         """
         if not (np.isfinite(window) and window > 0.0):
             raise InputError(f"window {window:g} s; accepted: > 0 s")
-        # a little early, so that round-off of the time moves no sample
+        # half a step early, so that round-off of the time moves no sample
         step = float(np.median(np.diff(self.time))) if len(self.time) > 1 else 1.0
         if window < 0.5 * step:
             raise InputError(
@@ -138,11 +147,12 @@ class BenchLog:
 def read_log(path: str | Path) -> BenchLog:
     """A log from a CSV file.
 
-    Columns ``time_s``, ``motor_angle_deg`` and ``link_angle_deg`` (or ``_rad``), and
-    ``output_torque_Nm``, ``motor_torque_Nm`` or both; others are not read.
+    The columns are ``time_s``, ``motor_angle_deg`` and ``link_angle_deg`` (or
+    ``_rad``), and ``output_torque_Nm``, ``motor_torque_Nm`` or both. Other columns are
+    ignored.
 
     Raises:
-        InputError: If the file cannot be used; names file, line and column.
+        InputError: If the file cannot be used; the message names file, line and column.
     """
     has = {*header_of(path)}
     torques = {key: names for key, names in TORQUES.items() if has & set(names)}
@@ -151,9 +161,17 @@ def read_log(path: str | Path) -> BenchLog:
 
 
 def mean_rate(means: Array, step: float) -> Array:
-    """Mean rate over windows from the means of a signal, of fourth order. (n,).
+    """Mean rate over windows from the means of a signal, of fourth order.
 
-    The values between two windows from the four around them.
+    The value at each border between windows is interpolated from the four means around
+    it.
+
+    Args:
+        means: Window means of the signal. Shape (n,).
+        step: Duration of a window [s].
+
+    Returns:
+        Mean rate in each window, per second. Shape (n,).
     """
     out = np.gradient(means, step)
     x = means
@@ -163,7 +181,15 @@ def mean_rate(means: Array, step: float) -> Array:
 
 
 def mean_acceleration(means: Array, step: float) -> Array:
-    """Mean second derivative over windows, of fourth order. (n,)."""
+    """Mean second derivative over windows from the means of a signal, of fourth order.
+
+    Args:
+        means: Window means of the signal. Shape (n,).
+        step: Duration of a window [s].
+
+    Returns:
+        Mean second derivative in each window, per second squared. Shape (n,).
+    """
     out = np.gradient(np.gradient(means, step), step)
     x = means
     faces = (15.0 * (x[2:-1] - x[1:-2]) - (x[3:] - x[:-3])) / (12.0 * step)

@@ -1,4 +1,4 @@
-"""Torques of a drive along a log as a function of its parameters."""
+"""Torques of a drive along a log as functions of its parameters."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from swgjoint.gear.kinematics import angle_coefficients
 from swgjoint.gear.kinematics import ratio as signed_ratio
 from swgjoint.gear.ratings import Ratings
 from swgjoint.identify.log import Averaged, BenchLog, mean_acceleration, mean_rate
+from swgjoint.identify.unknowns import SPRINGS, ModelParameter, spread, unknowns_of
 from swgjoint.maps.fit.friction_fit import PRESLIDING
 from swgjoint.maps.friction import play_bristle
 from swgjoint.maps.from_catalogue import three_lines
@@ -21,36 +22,17 @@ from swgjoint.maps.hysteresis import stretches
 from swgjoint.maps.torsion_law import torque_at_knots
 from swgjoint.typing import Array
 
-SPRINGS = {
-    "three_lines": ("K1", "K2", "K3"),
-    "cubic": ("stiffness", "hardening"),
-}
 SLIDES = 10.0 * PRESLIDING
-"""Rotation since rest or reversal from which friction is taken to slip [rad]."""
-_MOVES = 0.05  # of the largest speed, below which the wave generator may stick
-_ROUND_OFF = 1e-12  # of the largest
-_LEAST = 1e-6  # of the scales, stiffness and yield torque of an element
-_TOLD, _SHOWS = 1e-4, 1e-3  # a skew [s] that matters, its part of the torsion
-_SOFTEST = 1e-3  # of the mean stiffness: slopes stay positive on the way to the fit
-
-
-@dataclass(frozen=True, kw_only=True)
-class ModelParameter:
-    """One unknown."""
-
-    name: str
-    unit: str
-    start: float
-    """Where the search begins."""
-    scale: float
-    """A change of it that changes the torques about as much as others do."""
-    least: float = -np.inf
-    """Lower bound."""
+"""Rotation since rest or reversal beyond which friction is assumed to slip [rad]."""
+_MOVES = 0.05  # fraction of the largest speed below which the wave generator may stick
+_ROUND_OFF = 1e-12  # relative to the largest value
+_TOLD, _SHOWS = 1e-4, 1e-3  # relevant skew [s] and its least share of the torsion
+_SOFTEST = 1e-3  # of the mean stiffness: keeps slopes positive during the search
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Model:
-    """A log, what of it is known, and the torques that parameters give along it."""
+    """A log with its known quantities, and the torques of given parameters along it."""
 
     samples: Averaged
     layout: str
@@ -59,31 +41,33 @@ class Model:
     spring: str
     rotor_inertia: float | None
     orders: NDArray[np.int64]
-    """(p, q). Shape (n_harmonics, 2)."""
+    """Orders (p, q) of the kinematic error. Shape (n_harmonics, 2)."""
     hysteresis: bool
+    """Whether the model has a Jenkin element."""
     skew: bool
-    """Whether the link angles may be of other instants than the rest."""
+    """Whether a time offset of the link angles is estimated."""
     first_skew: float
-    """Skew of a straight line through the log [s]."""
+    """Time offset of the link angles from a linear fit of the log [s]."""
     link_rate: Array
-    """[rad/s]."""
+    """Link speed [rad/s]."""
     link_acceleration: Array
-    """[rad/s²]."""
+    """Link acceleration [rad/s²]."""
     torsion: Array
-    """theta/i - psi of the log [rad]."""
+    """Torsion theta/i - psi of the log [rad]."""
     mean_stiffness: float
-    """Stiffness of a straight line through the log [N·m/rad]."""
+    """Stiffness from a linear fit of the log [N·m/rad]."""
     step: float
-    """Window of the averages [s]."""
+    """Duration of an averaging window [s]."""
     motor_acceleration: Array
-    """[rad/s²]."""
+    """Motor acceleration [rad/s²]."""
     relative_rate: Array
-    """nu, of the wave generator against the flexspline [rad/s]."""
+    """Speed nu of the wave generator relative to the flexspline [rad/s]."""
     slipping: Array
-    """s, direction in which the friction slips; 0 where it may stick."""
+    """Direction of slip s, 1 or -1; zero where the friction may stick."""
     cos: Array
-    """Cosine of the phase of every harmonic, mean over a window. (n, n_harmonics)."""
+    """Window mean of the cosine of every harmonic's phase. Shape (n, n_harmonics)."""
     sin: Array
+    """Window mean of the sine of every harmonic's phase. Shape (n, n_harmonics)."""
 
     @classmethod
     def from_log(
@@ -101,7 +85,25 @@ class Model:
         hysteresis: bool,
         skew: bool,
     ) -> Model:
-        """Prepare what does not depend on the parameters."""
+        """Compute everything that does not depend on the parameters.
+
+        Args:
+            log: Log of the bench.
+            samples: Window means of the log.
+            layout: Which member is fixed.
+            teeth: Number of teeth of flexspline and circular spline.
+            ratings: All catalogue torques, or only the rated torque [N·m].
+            corners: T1 and T2 [N·m]; None takes 0.2 and 0.6 of the rated torque.
+            spring: Key of :data:`SPRINGS`.
+            rotor_inertia: Inertia of the rotor [kg·m²]; estimated if None.
+            orders: (p, q) of the kinematic error.
+            hysteresis: Whether the model has a Jenkin element.
+            skew: Whether to estimate a time offset of the link angles.
+
+        Raises:
+            InputError: If an option is invalid or a channel of the log is constant or
+                has the wrong sign.
+        """
         if spring not in SPRINGS:
             raise InputError(f"spring {spring!r}; accepted: {', '.join(SPRINGS)}")
         pairs = np.array(list(orders), dtype=np.int64).reshape(-1, 2)
@@ -110,7 +112,7 @@ class Model:
         rate, link_rate = mean_rate(theta, step), mean_rate(psi, step)
         alpha, b = angle_coefficients(layout)
         n = (pairs @ np.array([alpha, b])).astype(float)
-        # many waves may pass in a window: the mean of a wave is not that of its phase
+        # a window may contain many waves: average the waves instead of their phases
         phase = np.stack([log.motor_angle, log.link_angle], axis=-1) @ n.T
         stretch, _ = play_bristle(b[0] * theta + b[1] * psi, np.full(len(t), SLIDES))
         slips = np.abs(stretch) >= (1.0 - 1e-9) * SLIDES
@@ -120,7 +122,7 @@ class Model:
             assert samples.motor_torque is not None
             torque = i * samples.motor_torque
         torsion = theta / i - psi
-        for what, x, unit in (
+        for channel, x, unit in (
             ("torsion theta/i - psi", torsion, "rad"),
             ("output torque", samples.output_torque, "N·m"),
             ("motor torque", samples.motor_torque, "N·m"),
@@ -130,10 +132,10 @@ class Model:
             largest = np.abs(psi if x is torsion else x).max()
             if np.ptp(x) <= _ROUND_OFF * largest:
                 raise InputError(
-                    f"{log.where}: the {what} is {x[0] + 0.0:.3g} {unit} all along;"
+                    f"{log.where}: the {channel} is constant, {x[0] + 0.0:.3g} {unit};"
                     " accepted: one that changes"
                 )
-        # with the torque of the motor alone a skew looks as viscous friction does
+        # with the motor torque alone a skew cannot be separated from viscous friction
         skew = skew and samples.output_torque is not None
         skew = skew and _tells_skew(torsion, link_rate)
         late = _line_skew(torsion, torque, link_rate) if skew else 0.0
@@ -142,7 +144,7 @@ class Model:
             raise InputError(
                 f"torque falls by {-slope:.3g} N·m/rad as the torsion theta/i - psi"
                 f" grows, i = {i:g}; accepted: a log whose torques and angles have the"
-                " signs of the drive, see its layout and teeth"
+                " signs of the drive; check its layout and teeth"
             )
         return cls(
             samples=samples,
@@ -175,7 +177,7 @@ class Model:
         return signed_ratio(self.layout, *self.teeth)
 
     def measured_torques(self) -> dict[str, Array]:
-        """Torques of the log by channel [N·m]."""
+        """Torques of the log by channel [N·m], at the :attr:`kept` samples."""
         both = {
             "output_torque": self.samples.output_torque,
             "motor_torque": self.samples.motor_torque,
@@ -184,12 +186,13 @@ class Model:
 
     @cached_property
     def kept(self) -> NDArray[np.bool_]:
-        """Samples that count.
+        """Mask of the samples that enter the fit.
 
-        Once the torsion has covered half its range, when the element remembers nothing
-        of how the log began; not at the end, where the acceleration is one-sided; with
-        friction those at which the wave generator surely slips: at rest its torque is
-        any below the limit.
+        Samples count once the torsion has covered half its range, when the element has
+        forgotten the start of the log. The last two are excluded because their
+        acceleration is one-sided. With friction only samples count at which the wave
+        generator certainly slips, since static friction may have any value below its
+        limit.
         """
         x = self.torsion
         travel = np.maximum.accumulate(x) - np.minimum.accumulate(x)
@@ -201,7 +204,7 @@ class Model:
         return np.asarray(keep)
 
     def torques(self, values: Array) -> dict[str, Array]:
-        """Torques of output and motor along the log [N·m]."""
+        """Output and motor torques along the log by channel, for given values [N·m]."""
         p = {x.name: v for x, v in zip(self.unknowns, values, strict=True)}
         i, s = self.ratio, self.samples
         alpha, b = angle_coefficients(self.layout)
@@ -220,25 +223,25 @@ class Model:
             k, f = p["hysteresis_stiffness"], p["hysteresis_yield_torque"]
             elastic = elastic + k * stretches(torsion - torsion[0], f / k)
         elastic = elastic + p["damping"] * mean_rate(torsion, self.step)
-        rubs = 0.0
+        friction = 0.0
         if s.motor_torque is not None:
             slip = p["friction_coulomb"] + p["friction_load"] * np.abs(elastic / i)
-            rubs = slip * self.slipping + p["friction_viscous"] * self.relative_rate
-        found = {}
+            friction = slip * self.slipping + p["friction_viscous"] * self.relative_rate
+        torques = {}
         if s.output_torque is not None:
-            found["output_torque"] = (-by_psi * elastic - b[1] * rubs)[self.kept]
+            torques["output_torque"] = (-by_psi * elastic - b[1] * friction)[self.kept]
         if s.motor_torque is not None:
             inertia = self.rotor_inertia
             if inertia is None:
                 inertia = p["rotor_inertia"]
-            found["motor_torque"] = (
-                inertia * self.motor_acceleration + by_theta * elastic + b[0] * rubs
+            torques["motor_torque"] = (
+                inertia * self.motor_acceleration + by_theta * elastic + b[0] * friction
             )[self.kept]
-        return found
+        return torques
 
     @property
     def phase_step(self) -> float:
-        """Largest change of a harmonic's phase from window to window [rad]."""
+        """Largest phase change of a harmonic between two windows [rad]."""
         alpha, b = angle_coefficients(self.layout)
         n = self.orders @ np.array([alpha, b])
         angles = np.stack([self.samples.motor_angle, self.samples.link_angle])
@@ -247,10 +250,10 @@ class Model:
     @cached_property
     def unknowns(self) -> tuple[ModelParameter, ...]:
         """Parameters in the order of all arrays of values."""
-        return tuple(_unknowns(self))
+        return tuple(unknowns_of(self))
 
     def amplitudes(self, values: Array) -> Array:
-        """Cosine and sine of the kinematic error [rad]. Shape (n_harmonics, 2)."""
+        """Cosine and sine amplitudes of the kinematic error [rad]. (n_harmonics, 2)."""
         first = len(SPRINGS[self.spring]) + 2 + 2 * self.hysteresis
         return values[first : first + 2 * len(self.orders)].reshape(-1, 2)
 
@@ -267,105 +270,44 @@ class Model:
 
 
 def lines_of(model: Model, p: Mapping[str, float]) -> tuple[Array, Array]:
-    """Torsions and stiffness there, of three lines."""
+    """Knots [rad] and stiffness at the knots [N·m/rad] of the three-line spring.
+
+    Args:
+        model: Model with a three-line spring.
+        p: Parameter values by name.
+    """
     r, least = model.ratings, _SOFTEST * model.mean_stiffness
     K1, K2, K3 = (max(float(p[k]), least) for k in SPRINGS["three_lines"])
     top = max(r.momentary_peak, 1.5 * r.T2)
     return three_lines(r.T1, r.T2, K1, K2, K3, largest=top)
 
 
-def _unknowns(model: Model) -> list[ModelParameter]:
-    """The unknowns in their order: the straight line to start with, little else."""
-    K, i = model.mean_stiffness, abs(model.ratio)
-    x = 0.5 * float(np.ptp(model.torsion))
-    T = K * x
-    rate = _spread(mean_rate(model.torsion, model.step))
-
-    def slope(name: str) -> ModelParameter:
-        return ModelParameter(name=name, unit="N·m/rad", start=K, scale=K)
-
-    found = [slope(name) for name in SPRINGS[model.spring]]
-    if model.spring == "cubic":
-        cubic = ModelParameter(
-            name="hardening", unit="N·m/rad³", start=0.0, scale=K / x**2
-        )
-        found[1] = cubic
-    zero = -float(np.mean(model.torsion))
-    found += [
-        ModelParameter(name="zero", unit="rad", start=zero, scale=x),
-        ModelParameter(name="damping", unit="N·m·s/rad", start=0.0, scale=T / rate),
-    ]
-    if model.hysteresis:
-        # an element is f/k wide: -k and -f would do as well as k and f
-        found += [
-            ModelParameter(
-                name="hysteresis_stiffness",
-                unit="N·m/rad",
-                start=0.5 * K,
-                scale=K,
-                least=_LEAST * K,
-            ),
-            ModelParameter(
-                name="hysteresis_yield_torque",
-                unit="N·m",
-                start=0.02 * T,
-                scale=T,
-                least=_LEAST * T,
-            ),
-        ]
-    found += [
-        ModelParameter(name=f"error_{p}_{q}_{part}", unit="rad", start=0.0, scale=x)
-        for p, q in model.orders
-        for part in ("cos", "sin")
-    ]
-    if model.skew:
-        skew = ModelParameter(
-            name="link_skew",
-            unit="s",
-            start=model.first_skew,
-            scale=x / _spread(model.link_rate),
-        )
-    if model.samples.motor_torque is None:
-        return [*found, skew] if model.skew else found
-    at_motor, speed = T / i, _spread(model.relative_rate)
-    found += [
-        ModelParameter(
-            name="friction_coulomb", unit="N·m", start=0.01 * at_motor, scale=at_motor
-        ),
-        ModelParameter(name="friction_load", unit="-", start=0.0, scale=1.0),
-        ModelParameter(
-            name="friction_viscous", unit="N·m·s/rad", start=0.0, scale=at_motor / speed
-        ),
-    ]
-    if model.rotor_inertia is None:
-        inertia = at_motor / _spread(model.motor_acceleration)
-        found.append(
-            ModelParameter(name="rotor_inertia", unit="kg·m²", start=0.0, scale=inertia)
-        )
-    return [*found, skew] if model.skew else found
-
-
 def _tells_skew(torsion: Array, link_rate: Array) -> bool:
-    """Whether a skew of :data:`_TOLD` would show in the torsion."""
-    return _TOLD * _spread(link_rate) > _SHOWS * _spread(torsion)
+    """Whether a skew of :data:`_TOLD` would have a visible effect on the torsion."""
+    return _TOLD * spread(link_rate) > _SHOWS * spread(torsion)
 
 
 def _line_skew(torsion: Array, torque: Array, link_rate: Array) -> float:
-    """By which the link is late, the drive taken as a straight line [s]."""
+    """Delay of the link angles from a linear fit of the drive [s]."""
     columns = np.column_stack([torque, link_rate, np.ones_like(torque)])
     scale = np.abs(columns).max(axis=0)
     found = np.linalg.lstsq(columns / scale, torsion, rcond=None)[0] / scale
     return float(found[1])
 
 
-def _spread(values: Array) -> float:
-    return max(float(np.std(values)), 1e-12)
-
-
 def ratings_of(
     rated: float, largest: float, corners: tuple[float, float] | None = None
 ) -> Ratings:
-    """Ratings around a rated torque and the largest of a log [N·m]."""
+    """Ratings from a rated torque and the largest torque of a log.
+
+    Args:
+        rated: Rated torque [N·m].
+        largest: Largest torque of the log [N·m].
+        corners: T1 and T2 [N·m]; None takes 0.2 and 0.6 of the rated torque.
+
+    Raises:
+        InputError: If a torque is invalid.
+    """
     if not (np.isfinite(rated) and rated > 0.0):
         raise InputError(f"rated torque {rated:g} N·m; accepted: > 0 N·m")
     T1, T2 = corners or (0.2 * rated, 0.6 * rated)

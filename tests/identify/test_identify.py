@@ -299,7 +299,7 @@ def test_angles_in_a_wrong_unit_are_doubted(bench, factor):
     rows = rows * np.array([1.0, factor, factor, 1.0, 1.0])
     found = identify(log_of(rows), **settings(drive))
     assert any(
-        "arcmin; plausible: 0.3 to 60 arcmin" in note and "see the units" in note
+        "arcmin; plausible: 0.3 to 60 arcmin" in note and "check the units" in note
         for note in found.notes
     )
 

@@ -206,13 +206,14 @@ def with_hysteresis(drive: Map, loops: Sequence[FrictionLoop]) -> Map:
         "yield_torque_Nm": float(sum(e.yield_torque for e in fitted.hysteresis)),
     }
     mean, low, high = loss.mean(), loss.min(), loss.max()
+    widest = report["widest_arcmin"]
     label = (
         f"tooth friction of the finite elements at {len(loops)} input positions to"
         f" {grid[-1]:.4g} N·m: loop {mean / arcmin:.3g} arcmin wide at zero torque"
-        f" ({low / arcmin:.3g} to {high / arcmin:.3g}), at most"
-        f" {report['widest_arcmin']:.3g} at {grid[at]:.3g} N·m; that of the map"
-        f" {loss_map.mean() / arcmin:.3g} and {report['widest_map_arcmin']:.3g} arcmin; work"
-        f" of a round {taken.mean() / work.mean():.2f} of theirs"
+        f" ({low / arcmin:.3g} to {high / arcmin:.3g}), at most {widest:.3g} arcmin at"
+        f" {grid[at]:.3g} N·m; loop of the map {loss_map.mean() / arcmin:.3g} and"
+        f" {report['widest_map_arcmin']:.3g} arcmin wide, work of a round"
+        f" {taken.mean() / work.mean():.2f} times that of the finite elements"
     )
     info = {**drive.info, "friction_loop": report, "hysteresis": label}
     return replace(fitted, info=info)

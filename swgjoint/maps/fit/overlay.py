@@ -102,7 +102,7 @@ class Overlay:
         )
 
     def warnings(self) -> list[str]:
-        """Figures of the prediction that differ by more than :data:`APART`, one per line.
+        """One line for each figure that differs by more than :data:`APART`.
 
         The loss of a prediction without hysteresis is not compared.
         """
@@ -220,7 +220,7 @@ def _played(
 
 
 def _width(loop: TorqueLoop) -> float:
-    """Hysteresis loss [rad]; zero if only the remaining torque :data:`REST` causes it."""
+    """Hysteresis loss [rad]; zero if only the torque :data:`REST` causes it."""
     width, travel = loop.hysteresis_loss(), float(np.ptp(loop.torsion))
     return 0.0 if abs(width) < NO_WIDTH * travel else width
 
