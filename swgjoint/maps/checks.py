@@ -40,7 +40,7 @@ def check_map(drive: Potential) -> None:
     # far beyond any drive, far below overflow of the products below
     for key in ("torsion_knots", "potential", "end_stiffness", "kinematic_error"):
         if np.abs(getattr(drive, key)).max() > 1e60:
-            raise ValueError(f"{key} holds a value above 1e60")
+            raise ValueError(f"{key} has a value above 1e60")
     if np.abs(drive.kinematic_error).max() > np.pi or np.abs(knots).max() > np.pi:
         raise ValueError("torsion or kinematic error above half a turn")
 

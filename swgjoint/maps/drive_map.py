@@ -120,7 +120,7 @@ class DriveMap(Potential):
         kinematic_error: str | Path | None = None,
         **options: Any,
     ) -> Self:
-        """The map of a measured drive; ``info["fit"]`` holds residuals.
+        """The map of a measured drive; ``info["fit"]`` contains the residuals.
 
         Args:
             path: CSV file of a torque-torsion loop, input locked, both signs of the

@@ -223,7 +223,7 @@ def write_map(drive: Potential, path: str | Path) -> None:
     try:
         check_map(drive)
     except ValueError as exc:
-        raise MapFileError(f"map {drive.name!r} is no drive: {exc}") from None
+        raise MapFileError(f"map {drive.name!r} is not valid: {exc}") from None
     write_whole(path, map_bytes(drive))
 
 
@@ -329,7 +329,7 @@ def _members(data: bytes) -> dict[str, bytes]:
         data[-_END.size :]
     )
     if signature != b"PK\x05\x06" or comment or disk or first or here != entries:
-        raise MapFileError("truncated or damaged: no end of the archive")
+        raise MapFileError("truncated or damaged: end of the archive not found")
     zip64 = data[-_END.size - 20 : -_END.size].startswith(b"PK\x06\x07")
     if entries not in (len(names), len(more)) or size > 4096 or zip64:
         raise MapFileError(f"{entries} members; accepted: {', '.join(sorted(names))}")
@@ -342,7 +342,7 @@ def _members(data: bytes) -> dict[str, bytes]:
             if info.compress_type != zipfile.ZIP_STORED or info.flag_bits & 1:
                 raise MapFileError(f"member {info.filename} is compressed or encrypted")
             if info.compress_size != info.file_size:
-                raise MapFileError(f"member {info.filename} has two sizes")
+                raise MapFileError(f"member {info.filename} has two different sizes")
         claimed = sum(info.file_size for info in infos)
         if claimed > len(data):
             raise MapFileError(f"members claim {claimed} bytes of {len(data)}")

@@ -50,8 +50,8 @@ ROUNDS = 50
 
 _NAME = re.compile(r"([A-Z]+)-(\d{1,4})-(\d{1,4})")
 _NO_ERROR = (
-    "a catalogue states transmission accuracy as an upper bound only: the map has no"
-    " kinematic error"
+    "a catalogue states only an upper bound of the transmission accuracy: the map has"
+    " no kinematic error"
 )
 
 Map = TypeVar("Map", bound=Potential)
@@ -73,7 +73,8 @@ def find_row(name: str) -> CatalogueRow:
     """The row of a name such as ``CSG-25-100``: series, size, ratio.
 
     Raises:
-        InputError: With the nearest names, if no row with ratings has that name.
+        InputError: If no row with ratings has this name; the message lists the nearest
+            names.
     """
     rows = {row.name: row for row in named_rows()}
     wanted = name.strip().upper()
@@ -81,9 +82,11 @@ def find_row(name: str) -> CatalogueRow:
         return rows[wanted]
     parts = _NAME.fullmatch(wanted)
     if parts is None:
-        why = "is no catalogue name; accepted: SERIES-SIZE-RATIO"
-    elif parts[1] not in (has := sorted({row.series for row in rows.values()})):
-        why = f"has no ratings in models/catalogue; series that have: {', '.join(has)}"
+        why = "is not a catalogue name; accepted: SERIES-SIZE-RATIO"
+    elif parts[1] not in (series := sorted({row.series for row in rows.values()})):
+        why = (
+            f"has no ratings in models/catalogue; accepted series: {', '.join(series)}"
+        )
     else:
         why = "is not in models/catalogue/ratings.csv"
     # nearest by the factors of size and ratio; a ratio of 100 if the name has none
@@ -158,7 +161,7 @@ def _without_error(row: CatalogueRow, cls: type[Map]) -> Map:
     """The map of a row without kinematic error."""
     s = stiffness_of(row.size, row.ratio)
     stated = stated_figures(row)
-    own = "" if row.series == "CSG" else f", the tables hold none of {row.series}"
+    origin = "" if row.series == "CSG" else f", as the tables have none of {row.series}"
     teeth = LOBES * row.ratio
     drive = cls(
         name=row.name,
@@ -175,7 +178,7 @@ def _without_error(row: CatalogueRow, cls: type[Map]) -> Map:
             momentary_peak=row.momentary_peak,
             T1=s["T1"],
             T2=s["T2"],
-            source=f"catalogue CSG-{row.size}-{row.ratio}{own}",
+            source=f"catalogue CSG-{row.size}-{row.ratio}{origin}",
             ratcheting_torque=row.ratcheting_torque,
         ),
         info={
@@ -224,24 +227,24 @@ def _with_hysteresis(
     limits = (0.0, r.T1, r.T2, largest_torque(r))
     wanted = np.array([*(s[k] for k in SLOPES), loss])
     # yield torque of one element in parallel with K1
-    given = wanted * [1.0, 1.0, 1.0, 0.5 * s["K1"]]
+    trial = wanted * [1.0, 1.0, 1.0, 0.5 * s["K1"]]
     for _ in range(ROUNDS):
-        slopes = dict(zip(SLOPES, map(float, given), strict=False))
-        element = Jenkin(stiffness=s["K1"], yield_torque=float(given[3]))
+        slopes = dict(zip(SLOPES, map(float, trial), strict=False))
+        element = Jenkin(stiffness=s["K1"], yield_torque=float(trial[3]))
         drive = replace(drive, **_spring(row, s | slopes), hysteresis=(element,))
         loop = torque_loop(drive)
-        found = [loop.stiffness(a, b) for a, b in pairwise(limits)]
-        change = wanted / np.array([*found, loop.hysteresis_loss()])
+        measured = [loop.stiffness(a, b) for a, b in pairwise(limits)]
+        change = wanted / np.array([*measured, loop.hysteresis_loss()])
         if np.abs(change - 1.0).max() < CLOSE:
             label = (
                 f"catalogue {row.name}: {loss / arcmin:g} arcmin, an upper bound; a"
                 " drive may have less"
             )
             return replace(drive, info={**drive.info, "hysteresis": label})
-        given = given * change
+        trial = trial * change
     raise InputError(
-        f"catalogue drive {row.name}: no map has its stiffness and a hysteresis loss of"
-        f" {loss / arcmin:g} arcmin"
+        f"catalogue drive {row.name}: found no map with its stiffness and a hysteresis"
+        f" loss of {loss / arcmin:g} arcmin"
     )
 
 
@@ -277,10 +280,10 @@ def three_lines(
 def _missing(stated: dict[str, float | None]) -> dict[str, str]:
     """Why the map does not provide a figure, and what the catalogue states instead."""
 
-    def says(key: str) -> str:
+    def stated_as(key: str) -> str:
         value = stated[key]
         return (
-            "the catalogue tables state none for it"
+            "the catalogue tables do not state it"
             if value is None
             else f"the catalogue states {value:g} arcmin"
         )
@@ -289,7 +292,7 @@ def _missing(stated: dict[str, float | None]) -> dict[str, str]:
         "the map has no friction: the catalogue tables state losses for component sets"
         " of ratio 100, sizes 14 to 25"
     )
-    bound = f"{_NO_ERROR}; {says('transmission_accuracy_arcmin')}"
+    bound = f"{_NO_ERROR}; {stated_as('transmission_accuracy_arcmin')}"
     return {
         "transmission_accuracy_arcmin": bound,
         "transmission_accuracy_rated_arcmin": bound,
@@ -297,8 +300,8 @@ def _missing(stated: dict[str, float | None]) -> dict[str, str]:
         "ripple_rms_percent": _NO_ERROR,
         "ripple_pp_percent": _NO_ERROR,
         "hysteresis_loss_arcmin": "the torque loop is conservative: the map has no"
-        f" hysteresis; {says('hysteresis_loss_arcmin')}",
+        f" hysteresis; {stated_as('hysteresis_loss_arcmin')}",
         "repeatability_arcmin": "the map has no random part;"
-        f" {says('repeatability_arcmin')}",
+        f" {stated_as('repeatability_arcmin')}",
         **dict.fromkeys(LOSS_KEYS, no_losses),
     }

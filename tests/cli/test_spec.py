@@ -227,7 +227,7 @@ def test_reasons_of_the_solid_model(built, capsys):
     for arguments, reason in (
         (["reference-2d"], "needs a design with a [cup]"),
         (["xb1-100-80", "--model", "2d"], "needs the 3d model, not --model 2d"),
-        (["CSG-25-100"], "a map holds torque and torsion only"),
+        (["CSG-25-100"], "a map contains torque and torsion only"),
     ):
         found = spec(capsys, *arguments, "--only", keys)
         for key in keys.split(","):

@@ -181,8 +181,8 @@ def map_from_measurement(
     )
     try:
         check_map(drive)
-    except ValueError as exc:  # a fit through samples that say too little
-        raise InputError(f"{path}: the fitted map is no drive: {exc}") from None
+    except ValueError as exc:  # the samples do not determine the fit
+        raise InputError(f"{path}: the fitted map is not valid: {exc}") from None
     laid = overlay(replace(drive, kinematic_error=0.0 * amplitudes), loop).as_dict()
     compared = {key: laid[key] for key in ("rms_arcmin", *COMPARED)}
     compared["warnings"] = [*doubts, *laid["warnings"]]

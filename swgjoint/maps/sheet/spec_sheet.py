@@ -65,10 +65,10 @@ ABSENT_KEYS = {
     " more: request it with --only",
     "repeatability_arcmin": "the map has no random part: a repeated approach ends"
     " at the same position",
-    "fatigue_safety_factor": "needs the stresses of the finite elements; a map holds"
+    "fatigue_safety_factor": "needs the stresses of the finite elements; a map contains"
     " torque and torsion only",
-    "radial_stiffness_N_mm": "needs the finite elements of the flexspline; a map holds"
-    " torque and torsion only",
+    "radial_stiffness_N_mm": "needs the finite elements of the flexspline; a map"
+    " contains torque and torsion only",
 }
 """Figures that no map provides, with the reason."""
 KEYS = (*RATING_KEYS, *LOOP_KEYS, *TURN_KEYS, *LOSS_KEYS, *ABSENT_KEYS)
