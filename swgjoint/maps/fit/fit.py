@@ -22,12 +22,17 @@ from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
 from swgjoint.maps.drive_map import DriveMap
-from swgjoint.maps.equilibrium import output_angle
-from swgjoint.maps.fit.tolerance_modes import combine_modes
+from swgjoint.maps.fit.fit_checks import (
+    against_solves,
+    energy_check,
+    residual,
+    stiffness_range,
+)
+from swgjoint.maps.fit.tolerance_modes import Combined, combine_modes
 from swgjoint.maps.fit.torsion_table import interpolate_on_knots
 from swgjoint.maps.fit.validation import validation
 from swgjoint.maps.quartic import quartic_chain
-from swgjoint.maps.samples import FullSolves, MapSamples, ToleranceSamples
+from swgjoint.maps.samples import MapSamples, ToleranceSamples
 from swgjoint.typing import Array
 
 KEEP = 0.005
@@ -51,6 +56,30 @@ def fit_map(samples: MapSamples, *, keep: float = KEEP) -> DriveMap:
         samples: Equilibria over one period.
         keep: Threshold for harmonics, see :data:`KEEP`; zero keeps all.
     """
+    knots, pattern = _pattern_harmonics(samples)
+    if samples.tolerances is None:
+        full = _map_of(samples, knots, pattern)
+        fitted, record = _select_harmonics(full, samples, keep)
+    else:
+        combined = combine_modes(
+            samples,
+            knots,
+            pattern.potential,
+            pattern.error,
+            coarse=_coarse(samples),
+            keep=keep,
+        )
+        fitted = _map_of(samples, knots, combined)
+        record = _tolerance_record(fitted, samples, combined.record, keep)
+    info = {**samples.info, **record, **_ranges(fitted, samples)}
+    unseen = validation(fitted, samples)
+    if unseen is not None:
+        info["validation"] = unseen
+    return replace(fitted, info=info)
+
+
+def _pattern_harmonics(samples: MapSamples) -> tuple[Array, Combined]:
+    """Knots [rad] and all harmonics of the perfect pattern, with an empty record."""
     zero = int(np.flatnonzero(samples.torque == 0.0)[0])
     unloaded = samples.output_error[zero]
     e0 = unloaded - unloaded.mean()
@@ -60,78 +89,81 @@ def fit_map(samples: MapSamples, *, keep: float = KEEP) -> DriveMap:
     knots = _knots(samples, torsion)
     torque = np.broadcast_to(samples.torque[:, None], torsion.shape)
     curve = np.stack([energy, torque, 1.0 / samples.compliance])
-    modes = _modes(
-        interpolate_on_knots(torsion, curve, knots)
-    )  # (n_modes, 2, 3, n_knots)
-    error_modes = np.concatenate([np.zeros((1, 2)), _modes(e0)[1:]])
-    orders = np.arange(len(modes))[:, None] * np.array([samples.order])
-    toleranced = None
-    if samples.tolerances is not None:
-        toleranced = combine_modes(
-            samples, knots, modes, error_modes, coarse=_coarse(samples), keep=keep
-        )
-        orders, modes = toleranced.orders, toleranced.potential
-        error_modes = toleranced.error
-    count = len(modes)
-    chains = [
-        [quartic_chain(knots, modes[k, c]) for c in range(2)] for k in range(count)
-    ]
-    breaks = chains[0][0][0]
-    potential = np.array([[chain[1] for chain in pair] for pair in chains])
+    modes = _modes(interpolate_on_knots(torsion, curve, knots))
+    return (
+        knots,
+        Combined(
+            orders=np.arange(len(modes))[:, None] * np.array([samples.order]),
+            potential=modes,  # (n_modes, 2, 3, n_knots)
+            error=np.concatenate([np.zeros((1, 2)), _modes(e0)[1:]]),
+            record={},
+        ),
+    )
+
+
+def _map_of(samples: MapSamples, knots: Array, harmonics: Combined) -> DriveMap:
+    """The map with these harmonics, as chains of quartics and stable ends."""
+    modes = harmonics.potential
+    chains = [[quartic_chain(knots, part) for part in mode] for mode in modes]
     ends = modes[:, :, 2][:, :, [0, -1]]
     _clip_ends(ends, knots, modes[0, 0, 1])
-
-    full = DriveMap(
+    return DriveMap(
         name=samples.name,
         level=samples.level,
         layout=samples.layout,
         teeth_flexspline=samples.teeth_flexspline,
         teeth_circular_spline=samples.teeth_circular_spline,
-        torsion_knots=breaks,
-        orders=orders,
-        potential=potential,
+        torsion_knots=chains[0][0][0],
+        orders=harmonics.orders,
+        potential=np.array([[pieces for _, pieces in pair] for pair in chains]),
         end_stiffness=ends,
-        kinematic_error=error_modes,
+        kinematic_error=harmonics.error,
         ratings=samples.ratings,
         damping_ratio=samples.damping_ratio,
         fields=samples.fields,
     )
-    info = dict(samples.info)
-    if toleranced is not None:
-        perfect = fit_map(replace(samples, tolerances=None), keep=keep).info
-        strength = harmonic_strength(full)
-        checks: dict[str, dict[str, float]] = {}
-        if samples.tolerances is not None and samples.tolerances.solved is not None:
-            checks = against_solves(full, samples, samples.tolerances.solved)
-        info |= checks | {
-            "harmonics": _describe(full, strength, np.ones(count, dtype=bool)),
-            "tolerances": toleranced.record,
-            "perfect_teeth": {
-                key: perfect[key] for key in ("residual", "energy_check")
-            },
-        }
-        fitted = full
-    else:
-        strength = harmonic_strength(full)
-        kept = np.ones(count, dtype=bool)
-        largest = strength[1:].max(axis=0, initial=0.0)
-        kept[1:] = (strength[1:] > keep * np.maximum(largest, 1e-300)).any(axis=1)
-        fitted = full.with_harmonics(kept)
-        info |= {
-            "harmonics": _describe(full, strength, kept),
-            "residual": residual(fitted, samples) | {"threshold": keep},
-            "energy_check": energy_check(fitted, samples)
-            | {"relative_all_harmonics": energy_check(full, samples)["relative"]},
-        }
-    info |= {
-        "stiffness_range_Nm_rad": stiffness_range(fitted),
-        "torque_range_Nm": [float(v) for v in fitted.torque_range],
+
+
+def _select_harmonics(
+    full: DriveMap, samples: MapSamples, keep: float
+) -> tuple[DriveMap, dict[str, Any]]:
+    """The map without its weak harmonics, and the record of the fit."""
+    strength = harmonic_strength(full)
+    kept = np.ones(len(strength), dtype=bool)
+    largest = strength[1:].max(axis=0, initial=0.0)
+    kept[1:] = (strength[1:] > keep * np.maximum(largest, 1e-300)).any(axis=1)
+    fitted = full.with_harmonics(kept)
+    return fitted, {
+        "harmonics": _describe(full, strength, kept),
+        "residual": residual(fitted, samples) | {"threshold": keep},
+        "energy_check": energy_check(fitted, samples)
+        | {"relative_all_harmonics": energy_check(full, samples)["relative"]},
+    }
+
+
+def _tolerance_record(
+    drive: DriveMap, samples: MapSamples, tolerances: dict[str, Any], keep: float
+) -> dict[str, Any]:
+    """Record of the fit of a toleranced drive, with that of its perfect teeth."""
+    perfect = fit_map(replace(samples, tolerances=None), keep=keep).info
+    strength = harmonic_strength(drive)
+    checks: dict[str, dict[str, float]] = {}
+    if samples.tolerances is not None and samples.tolerances.solved is not None:
+        checks = against_solves(drive, samples, samples.tolerances.solved)
+    return checks | {
+        "harmonics": _describe(drive, strength, np.ones(len(strength), dtype=bool)),
+        "tolerances": tolerances,
+        "perfect_teeth": {key: perfect[key] for key in ("residual", "energy_check")},
+    }
+
+
+def _ranges(drive: DriveMap, samples: MapSamples) -> dict[str, list[float]]:
+    """Ranges of stiffness and torque of a fitted map, for its record."""
+    return {
+        "stiffness_range_Nm_rad": stiffness_range(drive),
+        "torque_range_Nm": [float(v) for v in drive.torque_range],
         "sampled_torque_Nm": [float(v) for v in samples.torque[[0, -1]]],
     }
-    record = validation(fitted, samples)
-    if record is not None:
-        info["validation"] = record
-    return replace(fitted, info=info)
 
 
 def _knots(samples: MapSamples, torsion: Array) -> Array:
@@ -251,128 +283,6 @@ def harmonic_strength(drive: DriveMap) -> Array:
         both = load * drive.kinematic_error + drive.coefficients(x)
         columns.append(n_theta * np.hypot(*both.T))
     return np.stack(columns, axis=-1)
-
-
-def residual(drive: DriveMap, samples: MapSamples) -> dict[str, float]:
-    """Deviations of the map from the samples it was fitted to.
-
-    Args:
-        drive: The fitted map.
-        samples: Its samples.
-
-    Returns:
-        Largest deviation of e0 [rad] and of the torque at the sampled positions [N·m],
-        inside the range of the map.
-    """
-    theta = np.broadcast_to(samples.input_angle, samples.output_error.shape)
-    zero = int(np.flatnonzero(samples.torque == 0.0)[0])
-    offset = samples.output_error[zero].mean()
-    psi = theta / drive.ratio + samples.output_error - offset
-    e0, _, _ = drive.error_at(drive.phases(theta, psi))
-    x = drive.torsion(theta, psi)
-    torque = drive.torque(x, theta, psi)
-    inside = (x >= drive.torsion_knots[0]) & (x <= drive.torsion_knots[-1])
-    wanted = np.broadcast_to(samples.torque[:, None], x.shape)
-    error = samples.output_error[zero] - offset
-    return {
-        "kinematic_error_rad": float(np.abs(e0[zero] - error).max()),
-        "torque_Nm": float(np.abs(torque - wanted)[inside].max()),
-    }
-
-
-def against_solves(
-    drive: DriveMap, samples: MapSamples, solved: FullSolves
-) -> dict[str, dict[str, float]]:
-    """Deviations of the map of a toleranced drive from unseen equilibria.
-
-    Args:
-        drive: The fitted map.
-        samples: Its samples, with tolerances.
-        solved: Equilibria that the fit did not use.
-
-    Returns:
-        ``residual``: largest deviation of the output error [rad], and the same relative
-        to the peak to peak of the superposition over the cycle. ``energy_check``: as
-        :func:`energy_check`, at the solved torques.
-    """
-    theta = solved.input_angle
-    zero = solved.torque == 0.0
-    error = output_angle(drive, theta, solved.torque) - theta / drive.ratio
-    wrong = solved.output_error - error
-    # the map has its zero at the mean of the unloaded error
-    wrong -= wrong[zero].mean()
-    found = samples.tolerances
-    assert found is not None
-    turn = float(np.ptp(found.table[0, np.flatnonzero(found.torque == 0.0)[0]]))
-    psi = theta / drive.ratio + error
-    on_input, on_output = drive.forces(theta, psi)
-    simulated = solved.input_torque - solved.torque / drive.ratio
-    ripple = -on_input - on_output / drive.ratio
-    missed = float(np.abs(ripple - simulated).max())
-    spread = float(np.ptp(simulated))
-    return {
-        "residual": {
-            "output_error_rad": float(np.abs(wrong).max()),
-            "relative_to_turn": float(np.abs(wrong).max() / turn),
-        },
-        "energy_check": {
-            "input_torque_pp_Nm": spread,
-            "input_torque_error_Nm": missed,
-            "relative": missed / spread,
-        },
-    }
-
-
-def stiffness_range(drive: DriveMap) -> list[float]:
-    """Smallest and largest stiffness over torsion and angle [N·m/rad].
-
-    A stiffness that is not positive would make an equilibrium unstable.
-    """
-    knots = drive.torsion_knots
-    x = np.linspace(knots[0], knots[-1], 12 * knots.size)[:, None]
-    theta = np.linspace(0.0, 2.0 * np.pi / max(1, drive.orders.max()), 97)
-    stiffness = drive.stiffness(x, theta, theta / drive.ratio)
-    return [float(stiffness.min()), float(stiffness.max())]
-
-
-def energy_check(drive: DriveMap, samples: MapSamples) -> dict[str, float]:
-    """Deviation of the map's input torque from the simulated one, unused in the fit.
-
-    Args:
-        drive: The fitted map.
-        samples: Its samples.
-
-    Returns:
-        ``input_torque_pp_Nm``: largest peak-to-peak of the simulated ripple over the
-        torques; ``input_torque_error_Nm``: largest deviation of the map from it;
-        ``relative``: their ratio; ``strain_energy_relative``: largest deviation of the
-        energy gain over no load, relative to the largest gain.
-    """
-    theta = np.broadcast_to(samples.input_angle, samples.output_error.shape)
-    zero = int(np.flatnonzero(samples.torque == 0.0)[0])
-    psi = theta / drive.ratio + samples.output_error - samples.output_error[zero].mean()
-    on_input, on_output = drive.forces(theta, psi)
-    # the ripple is what the input feels beyond the output's torque over the ratio
-    simulated = samples.input_torque - samples.torque[:, None] / drive.ratio
-    error = np.abs(-on_input - on_output / drive.ratio - simulated)
-    inside = (samples.torque > drive.torque_range[0]) & (
-        samples.torque < drive.torque_range[1]
-    )
-    if samples.solved is not None:
-        inside &= samples.solved
-    if samples.free:  # the corner at the end of the clearance
-        inside[[zero - 2, zero - 1, zero + 1, zero + 2]] = False
-    ripple = np.ptp(samples.input_torque, axis=1)
-    inside &= ripple > 0.0
-    energy = drive.energy(drive.torsion(theta, psi), theta, psi)
-    gain = samples.energy - samples.energy[zero]
-    wrong = (energy - energy[zero]) - gain
-    return {
-        "input_torque_pp_Nm": float(ripple[inside].max()),
-        "input_torque_error_Nm": float(error[inside].max()),
-        "relative": float((error[inside].max(axis=1) / ripple[inside]).max()),
-        "strain_energy_relative": float(np.abs(wrong).max() / np.abs(gain).max()),
-    }
 
 
 def _describe(

@@ -1,0 +1,131 @@
+"""Deviations of a fitted map from its samples and from unseen equilibria."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from swgjoint.maps.drive_map import DriveMap
+from swgjoint.maps.equilibrium import output_angle
+from swgjoint.maps.samples import FullSolves, MapSamples
+
+
+def residual(drive: DriveMap, samples: MapSamples) -> dict[str, float]:
+    """Deviations of the map from the samples it was fitted to.
+
+    Args:
+        drive: The fitted map.
+        samples: Its samples.
+
+    Returns:
+        Largest deviation of e0 [rad] and of the torque at the sampled positions [N·m],
+        inside the range of the map.
+    """
+    theta = np.broadcast_to(samples.input_angle, samples.output_error.shape)
+    zero = int(np.flatnonzero(samples.torque == 0.0)[0])
+    offset = samples.output_error[zero].mean()
+    psi = theta / drive.ratio + samples.output_error - offset
+    e0, _, _ = drive.error_at(drive.phases(theta, psi))
+    x = drive.torsion(theta, psi)
+    torque = drive.torque(x, theta, psi)
+    inside = (x >= drive.torsion_knots[0]) & (x <= drive.torsion_knots[-1])
+    wanted = np.broadcast_to(samples.torque[:, None], x.shape)
+    error = samples.output_error[zero] - offset
+    return {
+        "kinematic_error_rad": float(np.abs(e0[zero] - error).max()),
+        "torque_Nm": float(np.abs(torque - wanted)[inside].max()),
+    }
+
+
+def against_solves(
+    drive: DriveMap, samples: MapSamples, solved: FullSolves
+) -> dict[str, dict[str, float]]:
+    """Deviations of the map of a toleranced drive from unseen equilibria.
+
+    Args:
+        drive: The fitted map.
+        samples: Its samples, with tolerances.
+        solved: Equilibria that the fit did not use.
+
+    Returns:
+        ``residual``: largest deviation of the output error [rad], and the same relative
+        to the peak to peak of the superposition over the cycle. ``energy_check``: as
+        :func:`energy_check`, at the solved torques.
+    """
+    theta = solved.input_angle
+    zero = solved.torque == 0.0
+    error = output_angle(drive, theta, solved.torque) - theta / drive.ratio
+    wrong = solved.output_error - error
+    # the map has its zero at the mean of the unloaded error
+    wrong -= wrong[zero].mean()
+    found = samples.tolerances
+    assert found is not None
+    turn = float(np.ptp(found.table[0, np.flatnonzero(found.torque == 0.0)[0]]))
+    psi = theta / drive.ratio + error
+    on_input, on_output = drive.forces(theta, psi)
+    simulated = solved.input_torque - solved.torque / drive.ratio
+    ripple = -on_input - on_output / drive.ratio
+    missed = float(np.abs(ripple - simulated).max())
+    spread = float(np.ptp(simulated))
+    return {
+        "residual": {
+            "output_error_rad": float(np.abs(wrong).max()),
+            "relative_to_turn": float(np.abs(wrong).max() / turn),
+        },
+        "energy_check": {
+            "input_torque_pp_Nm": spread,
+            "input_torque_error_Nm": missed,
+            "relative": missed / spread,
+        },
+    }
+
+
+def stiffness_range(drive: DriveMap) -> list[float]:
+    """Smallest and largest stiffness over torsion and angle [N·m/rad].
+
+    A stiffness that is not positive would make an equilibrium unstable.
+    """
+    knots = drive.torsion_knots
+    x = np.linspace(knots[0], knots[-1], 12 * knots.size)[:, None]
+    theta = np.linspace(0.0, 2.0 * np.pi / max(1, drive.orders.max()), 97)
+    stiffness = drive.stiffness(x, theta, theta / drive.ratio)
+    return [float(stiffness.min()), float(stiffness.max())]
+
+
+def energy_check(drive: DriveMap, samples: MapSamples) -> dict[str, float]:
+    """Deviation of the map's input torque from the simulated one, unused in the fit.
+
+    Args:
+        drive: The fitted map.
+        samples: Its samples.
+
+    Returns:
+        ``input_torque_pp_Nm``: largest peak-to-peak of the simulated ripple over the
+        torques; ``input_torque_error_Nm``: largest deviation of the map from it;
+        ``relative``: their ratio; ``strain_energy_relative``: largest deviation of the
+        energy gain over no load, relative to the largest gain.
+    """
+    theta = np.broadcast_to(samples.input_angle, samples.output_error.shape)
+    zero = int(np.flatnonzero(samples.torque == 0.0)[0])
+    psi = theta / drive.ratio + samples.output_error - samples.output_error[zero].mean()
+    on_input, on_output = drive.forces(theta, psi)
+    # the ripple is what the input feels beyond the output's torque over the ratio
+    simulated = samples.input_torque - samples.torque[:, None] / drive.ratio
+    error = np.abs(-on_input - on_output / drive.ratio - simulated)
+    inside = (samples.torque > drive.torque_range[0]) & (
+        samples.torque < drive.torque_range[1]
+    )
+    if samples.solved is not None:
+        inside &= samples.solved
+    if samples.free:  # the corner at the end of the clearance
+        inside[[zero - 2, zero - 1, zero + 1, zero + 2]] = False
+    ripple = np.ptp(samples.input_torque, axis=1)
+    inside &= ripple > 0.0
+    energy = drive.energy(drive.torsion(theta, psi), theta, psi)
+    gain = samples.energy - samples.energy[zero]
+    wrong = (energy - energy[zero]) - gain
+    return {
+        "input_torque_pp_Nm": float(ripple[inside].max()),
+        "input_torque_error_Nm": float(error[inside].max()),
+        "relative": float((error[inside].max(axis=1) / ripple[inside]).max()),
+        "strain_energy_relative": float(np.abs(wrong).max() / np.abs(gain).max()),
+    }
