@@ -14,7 +14,7 @@ from swgjoint.errors import InputError
 from swgjoint.gear.kinematics import LAYOUTS
 from swgjoint.gear.ratings import Ratings
 from swgjoint.maps.checks import check_map
-from swgjoint.maps.fit.error_fit import ORDERS, fit_error
+from swgjoint.maps.fit.error_fit import ORDERS, ErrorFit, fit_error
 from swgjoint.maps.fit.loop_match import match_loop
 from swgjoint.maps.fit.loop_units import check_direction, check_units
 from swgjoint.maps.fit.overlay import COMPARED, overlay
@@ -31,6 +31,13 @@ TORQUE = {"torque_Nm": 1.0}
 TORSION = {"torsion_arcmin": arcmin, "torsion_rad": 1.0}
 OUTPUT = {"output_deg": deg, "output_rad": 1.0}
 ERROR = {"error_arcmin": arcmin, "error_rad": 1.0}
+_ERROR_FIGURES = (
+    "transmission_accuracy_arcmin",
+    "transmission_accuracy_rated_arcmin",
+    "ripple_rms_percent",
+    "ripple_pp_percent",
+    "orders",
+)
 
 Map = TypeVar("Map", bound=Potential)
 
@@ -81,122 +88,162 @@ def map_from_measurement(
     damping_ratio: float = 0.02,
     name: str | None = None,
 ) -> Map:
-    """The map of a measured drive; see :meth:`DriveMap.from_measurement`."""
-    if layout not in LAYOUTS:
-        raise InputError(f"layout {layout!r}; accepted: {', '.join(LAYOUTS)}")
-    if not 0 < teeth_flexspline < teeth_circular_spline:
-        raise InputError(
-            f"teeth {teeth_flexspline} and {teeth_circular_spline}; accepted: 0 <"
-            " flexspline < circular spline"
-        )
-    if intervals < 1:
-        raise InputError(f"intervals {intervals}; accepted: 1 and more")
+    """The map of a measured drive; see :meth:`DriveMap.from_measurement`.
+
+    Args:
+        path: CSV file of the torque-torsion loop, see :func:`read_loop`.
+        cls: Class of the map to return.
+        teeth_flexspline: Number of teeth of the flexspline, z_fs.
+        teeth_circular_spline: Number of teeth of the circular spline, z_cs.
+        ratings: All catalogue torques, or only the rated torque [N·m].
+        kinematic_error: CSV file of the kinematic error over one output turn; the map
+            has no kinematic error if None.
+        layout: Which member is fixed.
+        orders: (p, q) of the kinematic error to fit.
+        intervals: Number of equal intervals of the torsion curve.
+        damping_ratio: Damping ratio of the map [-].
+        name: Name of the map; that of the file if None.
+
+    Raises:
+        InputError: If a file or an option cannot be used.
+    """
+    _check_options(layout, (teeth_flexspline, teeth_circular_spline), intervals)
     loop = read_loop(path)
     rated = _ratings(ratings, float(np.abs(loop.torque).max()))
     doubts = check_units(path, loop, rated.rated_torque)
-
-    def play(tried: TorsionFit) -> Potential:
-        """The map of a spring and elements alone."""
-        potential, ends = potential_of_stiffness(tried.knots, tried.stiffness)
-        return Potential(
-            name=name or Path(path).stem,
-            level="measurement",
-            layout=layout,
-            teeth_flexspline=teeth_flexspline,
-            teeth_circular_spline=teeth_circular_spline,
-            torsion_knots=tried.knots,
-            orders=np.zeros((1, 2), dtype=np.int64),
-            potential=potential,
-            end_stiffness=ends,
-            kinematic_error=np.zeros((1, 2)),
-            ratings=rated,
-            hysteresis=tried.hysteresis,
-        )
-
-    fit = match_loop(fit_torsion(loop, intervals=intervals), play, rated.rated_torque)
-    info: dict[str, Any] = {
-        "source": f"measurement {Path(path).name}",
-        "fit": {"torsion": fit.report},
-        "missing": {},
+    gear: dict[str, Any] = {
+        "layout": layout,
+        "teeth_flexspline": teeth_flexspline,
+        "teeth_circular_spline": teeth_circular_spline,
     }
-    width = fit.report["hysteresis_loss_arcmin"]
-    if not fit.hysteresis:
-        info["missing"]["hysteresis_loss_arcmin"] = (
-            "the record has one direction of the torque only"
-            if width is None
-            else f"the measured loop is {width:.4g} arcmin wide, no more than its noise"
-        )
-    harmonics = np.zeros((1, 2), dtype=np.int64)
-    amplitudes = np.zeros((1, 2))
+    head = gear | {
+        "name": name or Path(path).stem,
+        "level": "measurement",
+        "ratings": rated,
+    }
+    torsion = match_loop(
+        fit_torsion(loop, intervals=intervals),
+        lambda tried: _map_of(Potential, head, tried),
+        rated.rated_torque,
+    )
+    error = None
     if kinematic_error is not None:
-        record = read_columns(kinematic_error, {"output": OUTPUT, "error": ERROR})
-        largest = float(np.abs(record["error"]).max())
-        if largest > np.pi:
-            raise InputError(
-                f"{kinematic_error}: kinematic error of {largest:.4g} rad; accepted:"
-                " less than half a turn; check the unit in the column name"
-            )
-        found = fit_error(
-            record["output"],
-            record["error"],
-            layout=layout,
-            teeth_flexspline=teeth_flexspline,
-            teeth_circular_spline=teeth_circular_spline,
-            orders=orders,
-            where=str(kinematic_error),
-        )
-        info["source"] += f", {Path(kinematic_error).name}"
-        info["fit"]["kinematic_error"] = found.report
-        harmonics = np.concatenate([harmonics, found.orders])
-        amplitudes = np.concatenate([amplitudes, found.amplitudes])
-    else:
-        info["missing"] |= dict.fromkeys(
-            (
-                "transmission_accuracy_arcmin",
-                "transmission_accuracy_rated_arcmin",
-                "ripple_rms_percent",
-                "ripple_pp_percent",
-                "orders",
-            ),
-            "no record of the kinematic error was given",
-        )
-    potential, ends = potential_of_stiffness(
-        fit.knots, fit.stiffness, n_harmonics=len(harmonics)
-    )
-    drive = cls(
-        name=name or Path(path).stem,
-        level="measurement",
-        layout=layout,
-        teeth_flexspline=teeth_flexspline,
-        teeth_circular_spline=teeth_circular_spline,
-        torsion_knots=fit.knots,
-        orders=harmonics,
-        potential=potential,
-        end_stiffness=ends,
-        kinematic_error=amplitudes,
-        ratings=rated,
-        damping_ratio=damping_ratio,
-        hysteresis=fit.hysteresis,
-        info=info,
-    )
+        error = _read_error(kinematic_error, orders, gear)
+    drive = _map_of(cls, head | {"damping_ratio": damping_ratio}, torsion, error)
     try:
         check_map(drive)
     except ValueError as exc:  # the samples do not determine the fit
         raise InputError(f"{path}: the fitted map is not valid: {exc}") from None
-    laid = overlay(replace(drive, kinematic_error=0.0 * amplitudes), loop).as_dict()
-    compared = {key: laid[key] for key in ("rms_arcmin", *COMPARED)}
-    compared["warnings"] = [*doubts, *laid["warnings"]]
-    info["fit"] = {**info["fit"], "loop": compared}
-    if fit.hysteresis:
-        # a loop that is no Maxwell slip is followed as a whole, not under every load
-        played = torque_loop(drive).hysteresis_loss() / arcmin
-        report = {**fit.report, "hysteresis_loss_map_arcmin": played}
-        info["fit"] = {**info["fit"], "torsion": report}
-        info["hysteresis"] = (
-            f"measured loop {Path(path).name}, {width:.4g} arcmin wide; that of the map"
-            f" {played:.4g} arcmin"
-        )
+    files = [Path(file).name for file in (path, kinematic_error) if file is not None]
+    info: dict[str, Any] = {
+        "source": f"measurement {', '.join(files)}",
+        "fit": _fit_report(drive, loop, torsion, error, doubts),
+        "missing": _missing(torsion, error),
+    }
+    if torsion.hysteresis:
+        info["hysteresis"] = _hysteresis_label(files[0], info["fit"]["torsion"])
     return replace(drive, info=info)
+
+
+def _check_options(layout: str, teeth: tuple[int, int], intervals: int) -> None:
+    """Refuse a layout, numbers of teeth or intervals that are out of range."""
+    if layout not in LAYOUTS:
+        raise InputError(f"layout {layout!r}; accepted: {', '.join(LAYOUTS)}")
+    if not 0 < teeth[0] < teeth[1]:
+        raise InputError(
+            f"teeth {teeth[0]} and {teeth[1]}; accepted: 0 < flexspline < circular"
+            " spline"
+        )
+    if intervals < 1:
+        raise InputError(f"intervals {intervals}; accepted: 1 and more")
+
+
+def _read_error(
+    path: str | Path, orders: Sequence[tuple[int, int]], gear: dict[str, Any]
+) -> ErrorFit:
+    """Harmonics of a record of the kinematic error in a CSV file."""
+    record = read_columns(path, {"output": OUTPUT, "error": ERROR})
+    largest = float(np.abs(record["error"]).max())
+    if largest > np.pi:
+        raise InputError(
+            f"{path}: kinematic error of {largest:.4g} rad; accepted: less than half a"
+            " turn; check the unit in the column name"
+        )
+    return fit_error(
+        record["output"], record["error"], **gear, orders=orders, where=str(path)
+    )
+
+
+def _map_of(
+    cls: type[Map],
+    head: dict[str, Any],
+    torsion: TorsionFit,
+    error: ErrorFit | None = None,
+) -> Map:
+    """The map of a spring and elements, with a kinematic error if there is one."""
+    orders, amplitudes = np.zeros((1, 2), dtype=np.int64), np.zeros((1, 2))
+    if error is not None:
+        orders = np.concatenate([orders, error.orders])
+        amplitudes = np.concatenate([amplitudes, error.amplitudes])
+    potential, ends = potential_of_stiffness(
+        torsion.knots, torsion.stiffness, n_harmonics=len(orders)
+    )
+    return cls(
+        **head,
+        torsion_knots=torsion.knots,
+        orders=orders,
+        potential=potential,
+        end_stiffness=ends,
+        kinematic_error=amplitudes,
+        hysteresis=torsion.hysteresis,
+    )
+
+
+def _fit_report(
+    drive: Potential,
+    loop: TorqueLoop,
+    torsion: TorsionFit,
+    error: ErrorFit | None,
+    doubts: list[str],
+) -> dict[str, Any]:
+    """Residuals of the fits, and the loop of the map compared with the measured one."""
+    report: dict[str, Any] = {"torsion": torsion.report}
+    if torsion.hysteresis:
+        # a loop other than Maxwell slip is fitted as a whole, not under every load
+        width = torque_loop(drive).hysteresis_loss() / arcmin
+        report["torsion"] = {**torsion.report, "hysteresis_loss_map_arcmin": width}
+    if error is not None:
+        report["kinematic_error"] = error.report
+    smooth = replace(drive, kinematic_error=0.0 * drive.kinematic_error)
+    compared = overlay(smooth, loop).as_dict()
+    return report | {
+        "loop": {key: compared[key] for key in ("rms_arcmin", *COMPARED)}
+        | {"warnings": [*doubts, *compared["warnings"]]}
+    }
+
+
+def _missing(torsion: TorsionFit, error: ErrorFit | None) -> dict[str, str]:
+    """Reasons for figures that the measurement does not provide, by key."""
+    missing = {}
+    if not torsion.hysteresis:
+        width = torsion.report["hysteresis_loss_arcmin"]
+        missing["hysteresis_loss_arcmin"] = (
+            "the record has one direction of the torque only"
+            if width is None
+            else f"the measured loop is {width:.4g} arcmin wide, no more than its noise"
+        )
+    if error is None:
+        reason = "no record of the kinematic error was given"
+        missing |= dict.fromkeys(_ERROR_FIGURES, reason)
+    return missing
+
+
+def _hysteresis_label(file: str, report: dict[str, Any]) -> str:
+    """Source of the hysteresis, with the widths of both loops."""
+    return (
+        f"measured loop {file}, {report['hysteresis_loss_arcmin']:.4g} arcmin wide;"
+        f" that of the map {report['hysteresis_loss_map_arcmin']:.4g} arcmin"
+    )
 
 
 def _ratings(given: Ratings | float, largest: float) -> Ratings:
