@@ -43,7 +43,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -116,6 +115,23 @@ class Identified:
     """Reasons to doubt the parameters, one line each; empty if there are none."""
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Options:
+    """Options of :func:`identify`, with the parameters that a fit may leave out."""
+
+    teeth: tuple[int, int]
+    ratings: Ratings | float
+    corners: tuple[float, float] | None
+    layout: str
+    spring: str
+    rotor_inertia: float | None
+    orders: Sequence[tuple[int, int]] | None
+    hysteresis: bool
+    window: float
+    name: str
+    skew: bool = True
+
+
 def identify(
     log: BenchLog,
     *,
@@ -166,25 +182,25 @@ def identify(
         raise InputError(f"rotor inertia {rotor_inertia:g} kg·m²; accepted: > 0 kg·m²")
     teeth = (teeth_flexspline, teeth_circular_spline)
     check_ratio(log, layout, teeth)
-    options: dict[str, Any] = {
-        "teeth_flexspline": teeth_flexspline,
-        "teeth_circular_spline": teeth_circular_spline,
-        "ratings": ratings,
-        "corners": corners,
-        "layout": layout,
-        "spring": spring,
-        "rotor_inertia": rotor_inertia,
-        "orders": orders,
-        "window": window,
-        "name": name,
-    }
-    found = _identified(log, hysteresis=hysteresis, skew=True, **options)
+    options = _Options(
+        teeth=teeth,
+        ratings=ratings,
+        corners=corners,
+        layout=layout,
+        spring=spring,
+        rotor_inertia=rotor_inertia,
+        orders=orders,
+        hysteresis=hysteresis,
+        window=window,
+        name=name,
+    )
+    found = _identified(log, options)
     late = found.estimates.get("link_skew")
     if late is None or abs(late.value) < max(SURE * late.deviation, _SKEW_LEAST):
         return found
     # fit again with simultaneous angles, which also changes harmonics and rates
     again = without_skew(log, late.value)
-    found = _identified(again, hysteresis=hysteresis, skew=True, **options)
+    found = _identified(again, options)
     rest = found.estimates.get("link_skew")
     if rest is None:
         return found
@@ -210,102 +226,22 @@ def _doubts_of(found: Identified, estimates: Mapping[str, Estimate]) -> tuple[st
     return (*doubts_of(estimates, left, found.model.step), *units)
 
 
-def _identified(
-    log: BenchLog,
-    *,
-    teeth_flexspline: int,
-    teeth_circular_spline: int,
-    ratings: Ratings | float,
-    corners: tuple[float, float] | None,
-    layout: str,
-    spring: str,
-    rotor_inertia: float | None,
-    orders: Sequence[tuple[int, int]] | None,
-    hysteresis: bool,
-    window: float,
-    name: str,
-    skew: bool,
-) -> Identified:
+def _identified(log: BenchLog, options: _Options) -> Identified:
     """Identify the parameters from a log without correcting its delay."""
-    samples = log.average(window)
-    whole_turn = np.ptp(samples.link_angle) >= _TURN * 2.0 * np.pi
-    if orders is None:
-        orders = ORDERS if whole_turn else ORDERS_OF_PART
-    if len({*map(tuple, orders), (0, 0)}) != len(orders) + 1:
-        shown = ", ".join(f"{p}:{q}" for p, q in orders)
-        raise InputError(f"orders {shown}; accepted: each once, not 0:0")
-    model = Model.from_log(
-        log,
-        samples,
-        layout=layout,
-        teeth=(teeth_flexspline, teeth_circular_spline),
-        ratings=ratings,
-        corners=corners,
-        spring=spring,
-        rotor_inertia=rotor_inertia,
-        orders=orders,
-        hysteresis=hysteresis,
-        skew=skew,
-    )
-    if model.kept.sum() < FEWEST:
-        raise InputError(
-            f"{log.where}: the wave generator turns in {model.kept.sum()} of"
-            f" {model.kept.size} averages; accepted: at least {FEWEST}, or leave"
-            " motor_torque_Nm out"
-        )
+    samples = log.average(options.window)
+    model = _model_of(log, samples, options)
     values, residuals, jacobian = _solve(model)
     kappa = max(_correlation(r) for r in residuals.values())
-
-    def without(element: bool, link_skew: bool) -> Identified:
-        return _identified(
-            log,
-            teeth_flexspline=teeth_flexspline,
-            teeth_circular_spline=teeth_circular_spline,
-            ratings=ratings,
-            corners=corners,
-            layout=layout,
-            spring=spring,
-            rotor_inertia=rotor_inertia,
-            orders=orders,
-            hysteresis=hysteresis and not element,
-            window=window,
-            name=name,
-            skew=skew and not link_skew,
-        )
-
-    def without_element(why: str) -> Identified:
-        found = without(element=True, link_skew=False)
-        return replace(found, notes=(*found.notes, f"no hysteresis: {why}"))
-
     information = jacobian.T @ jacobian
-    scale = np.sqrt(np.diag(information))
-    normal = information / np.outer(scale, scale) if scale.all() else None
-    if normal is None or np.linalg.cond(normal) > 1.0 / _SINGULAR:
-        names = [p.name for p in model.unknowns]
-        worst = names[int(np.argmin(scale))]
-        if normal is not None:
-            worst = names[int(np.abs(np.linalg.eigh(normal)[1][:, 0]).argmax())]
-        if worst == "link_skew":
-            return without(element=False, link_skew=True)
-        if worst.startswith("hysteresis"):
-            return without_element(f"the log does not determine {worst}")
-        raise InputError(
-            f"{log.where}: the log does not determine {worst}; accepted: a log with"
-            " both signs of torque and speed, or fewer orders"
-        )
-    covariance = kappa * np.linalg.inv(normal) / np.outer(scale, scale)
-    estimates = {
-        p.name: Estimate(name=p.name, unit=p.unit, value=float(v), deviation=float(d))
-        for p, v, d in zip(
-            model.unknowns, values, np.sqrt(np.diag(covariance)), strict=True
-        )
-    }
-    lost = estimates.get("hysteresis_yield_torque")
-    if lost is not None and lost.low <= 0.0:
-        return without_element(
-            f"an element of {lost.value:.3g} N·m is within its noise"
-        )
-    drive, notes = map_of(model, values, name=name, source=Path(log.where).name)
+    undetermined = _undetermined(model, information)
+    if undetermined is not None:
+        return _without(undetermined, log, options)
+    estimates = _estimates(model, values, _covariance(information, kappa))
+    element = estimates.get("hysteresis_yield_torque")
+    if element is not None and element.low <= 0.0:
+        why = f"an element of {element.value:.3g} N·m is within its noise"
+        return _without_element(why, log, options)
+    drive, notes = map_of(model, values, name=options.name, source=Path(log.where).name)
     found = Identified(
         estimates=estimates,
         drive=drive,
@@ -316,6 +252,83 @@ def _identified(
         notes=(*notes, *remarks(model, drive, residuals)),
     )
     return replace(found, doubts=_doubts_of(found, estimates))
+
+
+def _model_of(log: BenchLog, samples: Averaged, options: _Options) -> Model:
+    """The model of the log; refuses repeated orders and too few moving samples."""
+    orders = options.orders
+    if orders is None:
+        whole_turn = np.ptp(samples.link_angle) >= _TURN * 2.0 * np.pi
+        orders = ORDERS if whole_turn else ORDERS_OF_PART
+    if len({*map(tuple, orders), (0, 0)}) != len(orders) + 1:
+        shown = ", ".join(f"{p}:{q}" for p, q in orders)
+        raise InputError(f"orders {shown}; accepted: each once, not 0:0")
+    model = Model.from_log(
+        log,
+        samples,
+        layout=options.layout,
+        teeth=options.teeth,
+        ratings=options.ratings,
+        corners=options.corners,
+        spring=options.spring,
+        rotor_inertia=options.rotor_inertia,
+        orders=orders,
+        hysteresis=options.hysteresis,
+        skew=options.skew,
+    )
+    if model.kept.sum() < FEWEST:
+        raise InputError(
+            f"{log.where}: the wave generator turns in {model.kept.sum()} of"
+            f" {model.kept.size} averages; accepted: at least {FEWEST}, or leave"
+            " motor_torque_Nm out"
+        )
+    return model
+
+
+def _undetermined(model: Model, information: Array) -> str | None:
+    """Name of the parameter that the log determines worst, if it is singular."""
+    names = [p.name for p in model.unknowns]
+    scale = np.sqrt(np.diag(information))
+    if not scale.all():
+        return names[int(np.argmin(scale))]
+    normal = information / np.outer(scale, scale)
+    if np.linalg.cond(normal) > 1.0 / _SINGULAR:
+        return names[int(np.abs(np.linalg.eigh(normal)[1][:, 0]).argmax())]
+    return None
+
+
+def _covariance(information: Array, kappa: float) -> Array:
+    """Covariance of the parameters, in their units."""
+    scale = np.sqrt(np.diag(information))
+    normal = information / np.outer(scale, scale)
+    return np.asarray(kappa * np.linalg.inv(normal) / np.outer(scale, scale))
+
+
+def _estimates(model: Model, values: Array, covariance: Array) -> dict[str, Estimate]:
+    """Every parameter with its standard deviation, by name."""
+    deviations = np.sqrt(np.diag(covariance))
+    return {
+        p.name: Estimate(name=p.name, unit=p.unit, value=float(v), deviation=float(d))
+        for p, v, d in zip(model.unknowns, values, deviations, strict=True)
+    }
+
+
+def _without(name: str, log: BenchLog, options: _Options) -> Identified:
+    """The result of a model without an optional parameter that is not determined."""
+    if name == "link_skew":
+        return _identified(log, replace(options, skew=False))
+    if name.startswith("hysteresis"):
+        return _without_element(f"the log does not determine {name}", log, options)
+    raise InputError(
+        f"{log.where}: the log does not determine {name}; accepted: a log with both"
+        " signs of torque and speed, or fewer orders"
+    )
+
+
+def _without_element(why: str, log: BenchLog, options: _Options) -> Identified:
+    """The result of a model without a Jenkin element, with a note that says why."""
+    found = _identified(log, replace(options, hysteresis=False))
+    return replace(found, notes=(*found.notes, f"no hysteresis: {why}"))
 
 
 def rms(x: Array) -> float:
