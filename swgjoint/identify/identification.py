@@ -194,36 +194,38 @@ def identify(
         window=window,
         name=name,
     )
-    found = _identified(log, options)
-    late = found.estimates.get("link_skew")
+    result = _identified(log, options)
+    late = result.estimates.get("link_skew")
     if late is None or abs(late.value) < max(SURE * late.deviation, _SKEW_LEAST):
-        return found
+        return result
     # fit again with simultaneous angles, which also changes harmonics and rates
     again = without_skew(log, late.value)
-    found = _identified(again, options)
-    rest = found.estimates.get("link_skew")
+    result = _identified(again, options)
+    rest = result.estimates.get("link_skew")
     if rest is None:
-        return found
+        return result
     whole = replace(rest, value=late.value + rest.value)
     note = (
         f"link_angle was {1e3 * whole.value:.4g} ms behind the other channels"
         f" ({1e3 * whole.low:.4g} to {1e3 * whole.high:.4g} ms); corrected"
     )
-    estimates = {**found.estimates, "link_skew": whole}
+    estimates = {**result.estimates, "link_skew": whole}
     return replace(
-        found,
+        result,
         estimates=estimates,
-        notes=(*found.notes, note),
-        doubts=_doubts_of(found, estimates),
+        notes=(*result.notes, note),
+        doubts=_doubts_of(result, estimates),
         skew=late.value,
     )
 
 
-def _doubts_of(found: Identified, estimates: Mapping[str, Estimate]) -> tuple[str, ...]:
-    measured = found.model.measured_torques()
-    left = {key: rms(r) / rms(measured[key]) for key, r in found.residuals.items()}
-    units = [note for note in found.notes if "plausible: " in note]
-    return (*doubts_of(estimates, left, found.model.step), *units)
+def _doubts_of(
+    result: Identified, estimates: Mapping[str, Estimate]
+) -> tuple[str, ...]:
+    measured = result.model.measured_torques()
+    left = {key: rms(r) / rms(measured[key]) for key, r in result.residuals.items()}
+    units = [note for note in result.notes if "plausible: " in note]
+    return (*doubts_of(estimates, left, result.model.step), *units)
 
 
 def _identified(log: BenchLog, options: _Options) -> Identified:
@@ -242,7 +244,7 @@ def _identified(log: BenchLog, options: _Options) -> Identified:
         why = f"an element of {element.value:.3g} N·m is within its noise"
         return _without_element(why, log, options)
     drive, notes = map_of(model, values, name=options.name, source=Path(log.where).name)
-    found = Identified(
+    result = Identified(
         estimates=estimates,
         drive=drive,
         samples=samples,
@@ -251,7 +253,7 @@ def _identified(log: BenchLog, options: _Options) -> Identified:
         correlation=kappa,
         notes=(*notes, *remarks(model, drive, residuals)),
     )
-    return replace(found, doubts=_doubts_of(found, estimates))
+    return replace(result, doubts=_doubts_of(result, estimates))
 
 
 def _model_of(log: BenchLog, samples: Averaged, options: _Options) -> Model:
@@ -327,8 +329,8 @@ def _without(name: str, log: BenchLog, options: _Options) -> Identified:
 
 def _without_element(why: str, log: BenchLog, options: _Options) -> Identified:
     """The result of a model without a Jenkin element, with a note that says why."""
-    found = _identified(log, replace(options, hysteresis=False))
-    return replace(found, notes=(*found.notes, f"no hysteresis: {why}"))
+    result = _identified(log, replace(options, hysteresis=False))
+    return replace(result, notes=(*result.notes, f"no hysteresis: {why}"))
 
 
 def rms(x: Array) -> float:
@@ -354,7 +356,7 @@ def _solve(model: Model) -> tuple[Array, dict[str, Array], Array]:
         )
 
     for _ in range(_ROUNDS):
-        found = least_squares(
+        solution = least_squares(
             residual,
             values,
             bounds=bounds,
@@ -362,12 +364,12 @@ def _solve(model: Model) -> tuple[Array, dict[str, Array], Array]:
             max_nfev=60,
             args=(weight,),
         )
-        if not np.isfinite(found.x).all():
+        if not np.isfinite(solution.x).all():
             raise ComputationError(
                 "identification diverged: check that torques and angles of the log"
                 " have the signs of the drive"
             )
-        values = found.x
+        values = solution.x
         got = model.torques(values)
         off = {key: measured[key] - got[key] for key in measured}
         # weight by each channel's own residual; a perfect log has none
@@ -377,8 +379,8 @@ def _solve(model: Model) -> tuple[Array, dict[str, Array], Array]:
         }
     # rescale the Jacobian to the final weights for the covariance
     rows = [len(r) for r in off.values()]
-    old = np.sqrt([np.mean(r**2) for r in np.split(found.fun, rows[:-1])])
-    jacobian = found.jac / np.repeat(np.maximum(old, 1e-9), rows)[:, None]
+    old = np.sqrt([np.mean(r**2) for r in np.split(solution.fun, rows[:-1])])
+    jacobian = solution.jac / np.repeat(np.maximum(old, 1e-9), rows)[:, None]
     return values, off, np.asarray(jacobian)
 
 

@@ -291,8 +291,8 @@ def _line_skew(torsion: Array, torque: Array, link_rate: Array) -> float:
     """Delay of the link angles from a linear fit of the drive [s]."""
     columns = np.column_stack([torque, link_rate, np.ones_like(torque)])
     scale = np.abs(columns).max(axis=0)
-    found = np.linalg.lstsq(columns / scale, torsion, rcond=None)[0] / scale
-    return float(found[1])
+    weights = np.linalg.lstsq(columns / scale, torsion, rcond=None)[0] / scale
+    return float(weights[1])
 
 
 def ratings_of(

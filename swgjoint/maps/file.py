@@ -358,9 +358,9 @@ def _array(data: bytes, name: str, dtype: str, ndim: int) -> NDArray[Any]:
     head = _NPY.match(data)
     if head is None or int.from_bytes(head["length"], "little") != head.end() - 10:
         raise MapFileError(f"{name}: not a plain array of format 1.0")
-    found = head["dtype"].decode()
-    if found != dtype:
-        raise MapFileError(f"{name} has dtype {found}; needed {dtype}")
+    stated = head["dtype"].decode()
+    if stated != dtype:
+        raise MapFileError(f"{name} has dtype {stated}; needed {dtype}")
     shape = tuple(int(n) for n in head["shape"].decode().split(",") if n.strip())
     if len(shape) != ndim or 0 in shape:
         raise MapFileError(f"{name} has shape {shape}; needed {ndim} axes, none empty")

@@ -169,8 +169,8 @@ def _ranges(drive: DriveMap, samples: MapSamples) -> dict[str, list[float]]:
 def _knots(samples: MapSamples, torsion: Array) -> Array:
     """Torsions at which the curves of all angles are compared [rad]."""
     zero = at = int(np.flatnonzero(samples.torque == 0.0)[0])
-    found = samples.tolerances
-    if found is None:
+    tolerances = samples.tolerances
+    if tolerances is None:
         # the mean torsions, ends inside the sampled range of every angle
         knots = torsion.mean(axis=1)
         knots[0], knots[-1] = torsion[0].max(), torsion[-1].min()
@@ -183,14 +183,14 @@ def _knots(samples: MapSamples, torsion: Array) -> Array:
     else:
         # with tooth errors the stiffness varies so much that stiff positions would end
         # the range far below the largest torque: their curves are continued instead
-        error = found.table[0]
-        rest = error[int(np.flatnonzero(found.torque == 0.0)[0])]
-        mean = PchipInterpolator(found.torque, (rest - error).mean(axis=1))
-        ends = found.torque[[0, -1]]
+        error = tolerances.table[0]
+        rest = error[int(np.flatnonzero(tolerances.torque == 0.0)[0])]
+        mean = PchipInterpolator(tolerances.torque, (rest - error).mean(axis=1))
+        ends = tolerances.torque[[0, -1]]
         knots = mean(np.clip(samples.torque, *ends))
-        _end_at_largest_torque(knots, found, rest - error)
+        _end_at_largest_torque(knots, tolerances, rest - error)
     knots[at] = 0.0
-    if found is None and samples.free:
+    if tolerances is None and samples.free:
         up = _clearance_knots(knots[at + 3 :], torsion[zero + 1 : zero + 3])
         down = _clearance_knots(-knots[: at - 2][::-1], -torsion[zero - 2 : zero][::-1])
         knots = np.concatenate([-down[::-1], [0.0], up])
@@ -198,19 +198,19 @@ def _knots(samples: MapSamples, torsion: Array) -> Array:
 
 
 def _end_at_largest_torque(
-    knots: Array, found: ToleranceSamples, torsion: Array
+    knots: Array, tolerances: ToleranceSamples, torsion: Array
 ) -> None:
     """Scale the knots of each sign to end at the largest sampled mean torque.
 
     Stiff positions are continued up to there and raise the mean at the mean torsion.
     """
-    torque = np.broadcast_to(found.torque[:, None], torsion.shape)
-    curve = np.stack([found.table[1], torque, 1.0 / found.table[2]])
+    torque = np.broadcast_to(tolerances.torque[:, None], torsion.shape)
+    curve = np.stack([tolerances.table[1], torque, 1.0 / tolerances.table[2]])
     for end, sign in ((0, -1.0), (-1, 1.0)):
         last = knots[[end]].copy()
         for _ in range(END_STEPS):
             _, reached, slope = interpolate_on_knots(torsion, curve, last).mean(axis=0)
-            last += (found.torque[end] - reached) / slope
+            last += (tolerances.torque[end] - reached) / slope
         side = knots * sign > 0.0
         knots[side] *= last / knots[end]
 

@@ -57,9 +57,11 @@ def against_solves(
     wrong = solved.output_error - error
     # the map has its zero at the mean of the unloaded error
     wrong -= wrong[zero].mean()
-    found = samples.tolerances
-    assert found is not None
-    turn = float(np.ptp(found.table[0, np.flatnonzero(found.torque == 0.0)[0]]))
+    tolerances = samples.tolerances
+    assert tolerances is not None
+    turn = float(
+        np.ptp(tolerances.table[0, np.flatnonzero(tolerances.torque == 0.0)[0]])
+    )
     psi = theta / drive.ratio + error
     on_input, on_output = drive.forces(theta, psi)
     simulated = solved.input_torque - solved.torque / drive.ratio
@@ -108,7 +110,7 @@ def energy_check(drive: DriveMap, samples: MapSamples) -> dict[str, float]:
     zero = int(np.flatnonzero(samples.torque == 0.0)[0])
     psi = theta / drive.ratio + samples.output_error - samples.output_error[zero].mean()
     on_input, on_output = drive.forces(theta, psi)
-    # the ripple is what the input feels beyond the output's torque over the ratio
+    # the ripple is the input torque in excess of the output torque over the ratio
     simulated = samples.input_torque - samples.torque[:, None] / drive.ratio
     error = np.abs(-on_input - on_output / drive.ratio - simulated)
     inside = (samples.torque > drive.torque_range[0]) & (

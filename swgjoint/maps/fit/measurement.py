@@ -242,15 +242,15 @@ def _hysteresis_label(file: str, report: dict[str, Any]) -> str:
     """Source of the hysteresis, with the widths of both loops."""
     return (
         f"measured loop {file}, {report['hysteresis_loss_arcmin']:.4g} arcmin wide;"
-        f" that of the map {report['hysteresis_loss_map_arcmin']:.4g} arcmin"
+        f" loop of the map {report['hysteresis_loss_map_arcmin']:.4g} arcmin wide"
     )
 
 
-def _ratings(given: Ratings | float, largest: float) -> Ratings:
+def _ratings(ratings: Ratings | float, largest: float) -> Ratings:
     """The given ratings, or ratings from a rated torque and the largest loop torque."""
-    if isinstance(given, Ratings):
-        return given
-    rated = float(given)
+    if isinstance(ratings, Ratings):
+        return ratings
+    rated = float(ratings)
     if not (np.isfinite(rated) and rated > 0.0):
         raise InputError(f"rated torque {rated:g} N·m; accepted: > 0 N·m")
     peak = max(rated, largest)

@@ -46,14 +46,14 @@ def tolerance_modes(samples: MapSamples, knots: Array) -> ToleranceModes:
         samples: Samples with tolerances.
         knots: Torsion of the knots [rad]. Shape (n_knots,).
     """
-    found = samples.tolerances
-    assert found is not None
-    zero = int(np.flatnonzero(found.torque == 0.0)[0])
+    tolerances = samples.tolerances
+    assert tolerances is not None
+    zero = int(np.flatnonzero(tolerances.torque == 0.0)[0])
 
     def tabulated(table: Array) -> Array:
         error, energy, compliance = table
         torsion = error[zero] - error
-        torque = np.broadcast_to(found.torque[:, None], torsion.shape)
+        torque = np.broadcast_to(tolerances.torque[:, None], torsion.shape)
         curve = interpolate_on_knots(
             torsion, np.stack([energy, torque, 1.0 / compliance]), knots
         )
@@ -62,8 +62,8 @@ def tolerance_modes(samples: MapSamples, knots: Array) -> ToleranceModes:
             [curve.reshape(len(curve), -1), error[zero][:, None]], axis=1
         )
 
-    change = tabulated(found.table)
-    change -= np.tile(tabulated(found.perfect), (found.pitches, 1))
+    change = tabulated(tolerances.table)
+    change -= np.tile(tabulated(tolerances.perfect), (tolerances.pitches, 1))
     spectrum = np.fft.rfft(change, axis=0)[: (len(change) + 1) // 2] / len(change)
     spectrum[1:] *= 2.0
     modes = np.stack([spectrum.real, -spectrum.imag], axis=1)
@@ -87,10 +87,10 @@ def orders_of(waves: Index, samples: MapSamples) -> Index:
         waves: Number of waves in the cycle. Shape (n,).
         samples: Samples with tolerances.
     """
-    found = samples.tolerances
-    assert found is not None
+    tolerances = samples.tolerances
+    assert tolerances is not None
     cycle, z_fs, z_cs = (
-        found.pitches,
+        tolerances.pitches,
         samples.teeth_flexspline,
         samples.teeth_circular_spline,
     )
@@ -149,10 +149,10 @@ def combine_modes(
         keep: A harmonic is kept if its e0 reaches this fraction of the largest one or
             its input torque reaches :data:`KEEP_TORQUE`; zero keeps all.
     """
-    found, count = samples.tolerances, len(potential)
-    assert found is not None
+    tolerances, count = samples.tolerances, len(potential)
+    assert tolerances is not None
     modes = tolerance_modes(samples, knots[coarse])
-    cycle = found.pitches
+    cycle = tolerances.pitches
     # harmonics that repeat with every pitch belong to the perfect pattern
     whole = modes.waves[: count * cycle : cycle]
     potential, error = potential.copy(), error.copy()
@@ -199,15 +199,17 @@ def combine_modes(
         error=error[kept],
         record={
             "cycle_pitches": cycle,
-            "positions_per_pitch": found.phases,
-            "free_positions": found.free,
+            "positions_per_pitch": tolerances.phases,
+            "free_positions": tolerances.free,
             "kept": int(kept.sum()),
             "dropped": int((~kept).sum()),
             "dropped_kinematic_error_rms": left(size**2),
             "dropped_input_torque_rms": left(ripple[:, middle] ** 2),
             "transmission_error": [
                 {"torque_Nm": float(torque), "peak_to_peak_rad": float(np.ptp(row))}
-                for torque, row in zip(found.torque, found.table[0], strict=True)
+                for torque, row in zip(
+                    tolerances.torque, tolerances.table[0], strict=True
+                )
             ],
         },
     )

@@ -65,8 +65,8 @@ class TorsionFit:
         """The fit whose spring follows the loop best with given yield torques [N·m]."""
         record = self.record
         rest = record.torque - record.signals @ yields
-        found = _solve(record.torsion, rest, record.knots, record.signals[:, :0])
-        return _fit_of(record, found, yields, self.report)
+        solution = _solve(record.torsion, rest, record.knots, record.signals[:, :0])
+        return _fit_of(record, solution, yields, self.report)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -117,7 +117,7 @@ def fit_torsion(loop: TorqueLoop, *, intervals: int = INTERVALS) -> TorsionFit:
         ),
     )
     plain = _solve(x, torque, record.knots, record.signals[:, :0])
-    found = plain
+    solution = plain
     if width > 0.0 and torque.size > count + 2 + reaches.size:
         slipping = _solve(x, torque, record.knots, record.signals)
         better = plain.rms**2 > slipping.rms**2 * (
@@ -125,29 +125,29 @@ def fit_torsion(loop: TorqueLoop, *, intervals: int = INTERVALS) -> TorsionFit:
         )
         yields = slipping.values[count + 2 :]
         if better and yields.sum() > FAINT * np.abs(torque).max():
-            found = slipping
+            solution = slipping
     yields = np.zeros(reaches.size)
-    yields[: found.values.size - (count + 2)] = found.values[count + 2 :]
+    yields[: solution.values.size - (count + 2)] = solution.values[count + 2 :]
     report = {"residual_rms_without_hysteresis_Nm": plain.rms}
-    return _fit_of(record, found, yields, report)
+    return _fit_of(record, solution, yields, report)
 
 
 def _fit_of(
-    record: LoopRecord, found: _Solution, yields: Array, report: dict[str, Any]
+    record: LoopRecord, solution: _Solution, yields: Array, report: dict[str, Any]
 ) -> TorsionFit:
     """Spring and elements of a solution, with a report of their residuals."""
     loop, knots, x = record.loop, record.knots, record.torsion
-    stiffness = found.values[1 : knots.size + 1]
+    stiffness = solution.values[1 : knots.size + 1]
     elements = tuple(
         Jenkin(stiffness=float(f / d), yield_torque=float(f))
         for f, d in zip(yields, record.reaches, strict=True)
         if f > FAINT * yields.sum()
     )
     steps = 0.5 * np.diff(knots) * (stiffness[1:] + stiffness[:-1])
-    at_knots = found.values[0] + np.concatenate([[0.0], np.cumsum(steps)])
+    at_knots = solution.values[0] + np.concatenate([[0.0], np.cumsum(steps)])
     zero = _inverse(0.0, knots, stiffness, at_knots)
     shifted = knots - zero
-    turned = np.abs(found.error / np.interp(x, knots, stiffness)) / arcmin
+    turned = np.abs(solution.error / np.interp(x, knots, stiffness)) / arcmin
     width = loop.hysteresis_loss()
     return TorsionFit(
         knots=shifted,
@@ -163,8 +163,8 @@ def _fit_of(
             "intervals": knots.size - 1,
             "elements": len(elements),
             "yield_torque_Nm": float(sum(e.yield_torque for e in elements)),
-            "residual_rms_Nm": found.rms,
-            "residual_max_Nm": float(np.abs(found.error).max()),
+            "residual_rms_Nm": solution.rms,
+            "residual_max_Nm": float(np.abs(solution.error).max()),
             "residual_rms_arcmin": float(np.sqrt(np.mean(turned**2))),
             "residual_max_arcmin": float(turned.max()),
             "torsion_at_zero_torque_arcmin": zero / arcmin,
@@ -172,7 +172,7 @@ def _fit_of(
             "torque_range_Nm": [
                 float(v) for v in torque_at_knots(shifted, stiffness)[[0, -1]]
             ],
-            "at_softest": int((found.bounded[1 : knots.size + 1] != 0).sum()),
+            "at_softest": int((solution.bounded[1 : knots.size + 1] != 0).sum()),
         },
     )
 

@@ -54,8 +54,8 @@ def validation(drive: Potential, samples: MapSamples) -> dict[str, Any] | None:
     zero = int(np.flatnonzero(samples.torque == 0.0)[0])
     offset = float(samples.output_error[zero].mean())
     if toleranced is not None:
-        found = solved.output_error - _predicted(drive, solved)
-        offset = float(found[solved.torque == 0.0].mean())
+        deviation = solved.output_error - _predicted(drive, solved)
+        offset = float(deviation[solved.torque == 0.0].mean())
     wrong = solved.output_error - offset - _predicted(drive, solved)
     missed = _input_torque(drive, solved) - solved.input_torque
     rows = []

@@ -147,7 +147,7 @@ class MapValidation:
             crosses = ends[0] < 0.0 < ends[1]
             ends = sorted(abs(end) for end in ends)
             ends[0] = 0.0 if crosses else ends[0]
-        found = {}
+        differences = {}
         for key, rows in self.rows.items():
             torque, largest, wave = np.array(rows).T
             inside = (torque >= ends[0]) & (torque <= ends[1])
@@ -156,14 +156,14 @@ class MapValidation:
             k = int(values.argmax())
             after = int(np.searchsorted(torque, at[k]))
             row, height = torque[after] == at[k], float(np.interp(at[k], torque, wave))
-            found[key] = Difference(
+            differences[key] = Difference(
                 quantity=key,
                 largest=float(values[k]),
                 torque=float(at[k]),
                 peak_to_peak=height if isfinite(height) else None,
                 from_rows=() if row else tuple(torque[after - 1 : after + 1].tolist()),
             )
-        return found
+        return differences
 
 
 def percent(share: float) -> str:
@@ -190,8 +190,8 @@ def map_validation(drive: Potential) -> tuple[MapValidation | None, str | None]:
 
 def validation_json(drive: Potential) -> dict[str, Any]:
     """``validation`` (None if unusable) and ``validation_reason`` of a map."""
-    found, reason = map_validation(drive)
-    record = None if found is None else drive.info["validation"]
+    checked, reason = map_validation(drive)
+    record = None if checked is None else drive.info["validation"]
     return {"validation": record, "validation_reason": reason}
 
 
@@ -267,28 +267,30 @@ class _Fault(Exception):
 
 def _read(record: Any) -> MapValidation:
     """The record after checks; unknown keys are ignored."""
-    given = _table(record, "")
-    rows = given.get("rows")
+    content = _table(record, "")
+    rows = content.get("rows")
     if not isinstance(rows, Sequence) or isinstance(rows, str | bytes):
         raise _Fault(f".rows is {_short(rows)}; accepted: a list")
     if not 0 < len(rows) <= MAX_ROWS:
         raise _Fault(f".rows has {len(rows)} entries; accepted: 1 to {MAX_ROWS}")
-    solves = given.get("solves")
+    solves = content.get("solves")
     if isinstance(solves, bool) or not isinstance(solves, int) or not 0 < solves < 1e9:
         raise _Fault(f".solves is {_short(solves)}; accepted: a count")
     totals = {
-        key: _total(given, key)
+        key: _total(content, key)
         for key in (*QUANTITIES, STIFFNESS)
-        if key in QUANTITIES or given.get(key) is not None
+        if key in QUANTITIES or content.get(key) is not None
     }
-    found: dict[str, dict[float, tuple[float, float]]] = {key: {} for key in QUANTITIES}
+    by_quantity: dict[str, dict[float, tuple[float, float]]] = {
+        key: {} for key in QUANTITIES
+    }
     torques = set()
     for k, row in enumerate(rows):
         where = f".rows.{k}"
         table = _table(row, where)
         torque = _number(table, "torque_Nm", where)
         torques.add(torque)
-        for key, of in found.items():
+        for key, of in by_quantity.items():
             # without ripple in the solves there is no relative difference
             if table.get(f"{key}_largest") is None:
                 continue
@@ -303,15 +305,15 @@ def _read(record: Any) -> MapValidation:
         rows={
             key: tuple((torque, *of[torque]) for torque in sorted(of))
             or ((totals[key].torque, totals[key].largest, nan),)
-            for key, of in found.items()
+            for key, of in by_quantity.items()
         },
-        reason=_text(given.get("reason", "")),
+        reason=_text(content.get("reason", "")),
     )
 
 
-def _total(given: Mapping[str, Any], key: str) -> Difference:
+def _total(content: Mapping[str, Any], key: str) -> Difference:
     where = f".{key}"
-    table = _table(given.get(key), where)
+    table = _table(content.get(key), where)
     return Difference(
         quantity=key,
         largest=_share(table, "largest", where),

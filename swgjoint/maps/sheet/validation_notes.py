@@ -37,13 +37,13 @@ def validation_of_sheet(drive: Potential | None, keys: Sequence[str]) -> dict[st
             "validation_notes": [],
         }
     result = validation_of_map(drive)
-    found, _ = map_validation(drive)
-    if found is None and drive.info.get("validation") is not None:
+    record, _ = map_validation(drive)
+    if record is None and drive.info.get("validation") is not None:
         result["validation_notes"] = [result["validation_reason"]]
     elif not needs_turn(keys):
         result["validation_notes"] = []
-    elif found is not None:
+    elif record is not None:
         result["validation_notes"] = result["validation_notes"] or [
-            validation_summary(found)
+            validation_summary(record)
         ]
     return result

@@ -42,11 +42,11 @@ def joint_doubt(
         joint: Figures of a joint from ``joint_metrics``.
         quantities: Keys of :data:`QUANTITIES` to consider.
     """
-    found = joint["map_difference"]
-    if found is None or joint["ripple_valid"] is None:
+    differences = joint["map_difference"]
+    if differences is None or joint["ripple_valid"] is None:
         return None
     worst = max(
-        (Difference.from_json(found[key]) for key in quantities),
+        (Difference.from_json(differences[key]) for key in quantities),
         key=lambda one: one.largest,
     )
     return worst if worst.largest > WARNING else None
