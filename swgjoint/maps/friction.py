@@ -73,7 +73,7 @@ class Friction:
     viscous: float = 0.0
     """Viscous friction eta [N·m·s/rad]."""
     load: float = 0.0
-    """Load factor c, friction per |T/i| [-]; above about 1 nothing can back-drive."""
+    """Load factor c, friction per |T/i| [-]; from about 1 back-driving fails."""
     bending: float = 0.0
     """Bending friction f_b, loss of the turning rim per radian [N·m]."""
     damping: float = 0.0

@@ -49,7 +49,8 @@ class ToleranceSamples:
     perfect: Array
     """The same quantities without tooth errors. Shape (3, n_torques, phases)."""
     free: int = 0
-    """Number of positions where the unloaded output has clearance."""
+    """Number of positions where the unloaded output has clearance, which is sampled at
+    its middle."""
     solved: FullSolves | None = None
     """Solves of the same drive and errors without linearisation."""
 

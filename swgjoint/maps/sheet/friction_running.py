@@ -28,7 +28,7 @@ RUNNING_SPEED = 2000.0 * rpm
 """Input speed at which catalogues state running torque and efficiency [rad/s]."""
 _ROUNDS = 4
 """Iterations between friction and the torque that it adds at the output; each one
-reduces the error by the ratio."""
+reduces the error by about a factor of the ratio."""
 _BALANCES = 30
 _SETTLED = 1e-9
 

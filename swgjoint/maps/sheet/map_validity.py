@@ -54,8 +54,8 @@ class Difference:
     rms: float | None = None
     """Root mean square over the same peak to peak [-]; None if unknown."""
     expected: float | None = None
-    """Estimate of the largest difference at more angles, in the same unit; None if
-    unknown."""
+    """Estimate of the largest difference at more angles over the same peak to peak [-];
+    None if unknown."""
     peak_to_peak: float | None = None
     """Peak to peak of the solves at that torque [N·m] or [rad]; None if unknown."""
     from_rows: tuple[float, ...] = ()
