@@ -1,6 +1,6 @@
-"""One scene at one level, integrator and step: its run, its error, its cost.
+"""Run, error and cost of one scene at one level, integrator and time step.
 
-Euler and implicitfast, which scenes do not offer, run on the model that RK4 would have.
+Euler and implicitfast, which scenes do not offer, use the model of an RK4 scene.
 """
 
 from __future__ import annotations
@@ -26,25 +26,26 @@ from swgjoint.units import arcmin, mm
 
 SCENE_INTEGRATORS = ("discrete", "RK4")
 RECORD = 1e-3
-"""Interval of the samples that runs of a smaller step keep [s]."""
+"""Interval between the samples that runs with smaller steps keep [s]."""
 TIMED_STEPS = 400
+"""Engine steps per timing."""
 QUANTITIES = {
     "link_angle": "arcmin",
     "tool_position": "mm",
     "torsion": "arcmin",
     "ripple_spectrum": "%",
 }
-"""With the unit of their error."""
+"""Error quantities and the units of their errors."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Setting:
-    """How a scene is simulated."""
+    """Level, integrator and time step of a simulation."""
 
     level: str
     integrator: str
     step: float
-    """[s]."""
+    """Time step of the scene [s]."""
 
     @property
     def name(self) -> str:
@@ -54,11 +55,11 @@ class Setting:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SettingOutcome:
-    """What became of a setting."""
+    """Result of running a scene at one setting."""
 
     run: Run | None
     assembly: Assembly | None
-    """None where the setting was refused."""
+    """Compiled scene; None if the setting was refused."""
     outcome: str
     """``ok``, ``sub_stepped``, ``refused`` or ``diverged``."""
     reason: str | None = None
@@ -67,7 +68,17 @@ class SettingOutcome:
 def assemble_setting(
     scene: Scene, setting: Setting, drives: Mapping[str, DriveMap] | None = None
 ) -> Assembly:
-    """The scene at a setting; explicit integrators are never cut into sub-steps."""
+    """Compile a scene at a setting; explicit integrators get no sub-steps.
+
+    Args:
+        scene: The scene.
+        setting: Level, integrator and time step.
+        drives: Maps that replace drive references of the scene.
+
+    Raises:
+        SwgError: If the setting is refused, see
+            :func:`swgjoint.sim.assembly.assemble`.
+    """
     explicit = setting.integrator != "discrete"
     changes = {
         "simulation.step_s": setting.step,
@@ -76,12 +87,12 @@ def assemble_setting(
     if explicit:
         changes["simulation.max_sub_steps"] = 1
     one = scene.with_level(setting.level).with_changes(changes)  # type: ignore[arg-type]
-    found = assemble(one, drives=drives)
+    assembly = assemble(one, drives=drives)
     if setting.integrator not in SCENE_INTEGRATORS:
-        found.model.opt.integrator = getattr(
+        assembly.model.opt.integrator = getattr(
             mujoco.mjtIntegrator, f"mjINT_{setting.integrator.upper()}"
         )
-    return found
+    return assembly
 
 
 def attempt(
@@ -91,13 +102,14 @@ def attempt(
     *,
     midway: bool = False,
 ) -> SettingOutcome:
-    """Run a setting; what is refused or diverges is part of the result.
+    """Run a scene at a setting; refusal and divergence are reported as outcomes.
 
     Args:
         scene: The scene.
-        setting: How.
-        drives: Maps that stand for the scene's drive references of these names.
-        midway: See :func:`hold_midway`.
+        setting: Level, integrator and time step.
+        drives: Maps that replace drive references of the scene.
+        midway: Whether inputs are those of the middle of each step, see
+            :func:`hold_midway`.
     """
     try:
         whole = assemble_setting(scene, setting, drives)
@@ -109,7 +121,13 @@ def attempt(
 
 
 def attempt_assembled(whole: Assembly, *, midway: bool = False) -> SettingOutcome:
-    """Run what was assembled."""
+    """Run a compiled scene; divergence is reported as an outcome.
+
+    Args:
+        whole: The compiled scene.
+        midway: Whether inputs are those of the middle of each step, see
+            :func:`hold_midway`.
+    """
     kept = thin_samples(hold_midway(whole) if midway else whole)
     try:
         run = simulate(kept, name=whole.scene.name)
@@ -127,9 +145,10 @@ def attempt_assembled(whole: Assembly, *, midway: bool = False) -> SettingOutcom
 
 
 def thin_samples(whole: Assembly) -> Assembly:
-    """The same, of which a run keeps samples at :data:`RECORD` instead of every step.
+    """Copy of which a run keeps samples every :data:`RECORD` instead of every step.
 
-    A loop of its own counts the steps of the scene, and is left as it is.
+    A scene with a sampled loop, which counts the steps of the scene, is returned
+    unchanged.
     """
     step = whole.scene.simulation.step_s
     n = round(RECORD / step)
@@ -141,11 +160,12 @@ def thin_samples(whole: Assembly) -> Assembly:
 
 
 def hold_midway(whole: Assembly) -> Assembly:
-    """The same with inputs of the middle of each step, for a reference.
+    """Copy with the inputs of the middle of each step, for reference solutions.
 
-    Explicit integrators hold the inputs of the start of a step through it, half a step
-    late: an error of the first order in the step whatever the integrator's own. A loop
-    that is sampled has its own instants, and is left as it is.
+    Explicit integrators hold the inputs of the start of a step throughout the step. The
+    inputs are half a step late on average, an error of first order in the step whatever
+    the order of the integrator. A scene with a sampled loop, which has its own
+    instants, is returned unchanged.
     """
     if whole.loops.sampled:
         return whole
@@ -170,13 +190,21 @@ def hold_midway(whole: Assembly) -> Assembly:
 def errors(run: Run, reference: Run) -> dict[str, float]:
     r"""Errors of a run under the keys of :data:`QUANTITIES`.
 
-    Angles: root mean square over the motion, of the worst joint. Tool: root mean square
-    of the distance. Ripple: of the torque ripple over the constant-speed part, line by
-    line of its spectrum up to that of the reference,
-    :math:`\sqrt{\sum (A_k - A_k^{ref})^2/2}` over the rated torque, of the worst joint.
+    Angles: root mean square over the motion, largest over the joints. Tool: root mean
+    square of the distance. Torque ripple over the constant-speed part: difference of
+    the amplitude spectra up to the highest line of the reference,
+    :math:`\sqrt{\sum (A_k - A_k^{ref})^2/2}`, divided by the rated torque, largest
+    over the joints.
+
+    Args:
+        run: The run.
+        reference: Reference run of the same motion.
+
+    Returns:
+        Errors in the units of :data:`QUANTITIES`; no ``tool_position`` without a tool.
 
     Raises:
-        ValueError: If the two have no samples at the same times.
+        ValueError: If the two runs have no samples at the same times.
     """
     own, theirs = common_samples(run, reference)
 
@@ -186,19 +214,30 @@ def errors(run: Run, reference: Run) -> dict[str, float]:
     def worst(name: str) -> float:
         return float(np.sqrt(np.mean(off(name) ** 2, axis=0)).max())
 
-    found = {
+    errors_by_name = {
         "link_angle": worst("position") / arcmin,
         "torsion": worst("torsion") / arcmin,
         "ripple_spectrum": _ripple_error(run, reference),
     }
     if run.tool_position.size:
         away = np.sum(off("tool_position") ** 2, axis=1)
-        found["tool_position"] = float(np.sqrt(away.mean())) / mm
-    return {name: found[name] for name in QUANTITIES if name in found}
+        errors_by_name["tool_position"] = float(np.sqrt(away.mean())) / mm
+    return {name: errors_by_name[name] for name in QUANTITIES if name in errors_by_name}
 
 
 def common_samples(run: Run, other: Run) -> tuple[slice, slice]:
-    """Samples at the same times."""
+    """Slices that select the samples of two runs at common times.
+
+    Args:
+        run: The first run.
+        other: The second run; one interval is a multiple of the other.
+
+    Returns:
+        Slices of ``run`` and of ``other``.
+
+    Raises:
+        ValueError: If the two runs have no samples at the same times.
+    """
     interval = run.time[1], other.time[1]
     by = [max(1, round(max(interval) / one)) for one in interval]
     count = min(len(run.time[:: by[0]]), len(other.time[:: by[1]]))
@@ -222,21 +261,21 @@ def _ripple_error(run: Run, reference: Run) -> float:
 
 
 def _lines(ripple: Array) -> Array:
-    """Amplitudes at whole cycles over a record [N·m]; its last sample begins anew."""
+    """Amplitudes at whole cycles per record [N·m]; the last sample is dropped."""
     n = ripple.size - 1
     return np.asarray(2.0 * np.abs(np.fft.rfft(ripple[:-1]))[1:] / max(n, 1))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Stepper:
-    """An assembled scene at its start, to be timed."""
+    """A compiled scene in its initial state, ready for timing."""
 
     assembly: Assembly
     data: mujoco.MjData
 
     @classmethod
     def from_assembly(cls, whole: Assembly) -> Stepper:
-        """At the start, with the inputs of the first step held."""
+        """Set the initial state and hold the inputs of the first step."""
         data = mujoco.MjData(whole.model)
         set_start(whole, data)
         if whole.model.nu:
@@ -244,36 +283,53 @@ class Stepper:
         return cls(assembly=whole, data=data)
 
     def seconds(self) -> float:
-        """CPU time of one step of the engine [s]."""
+        """CPU time of one engine step, averaged over :data:`TIMED_STEPS` [s]."""
         begin = time.process_time()
         mujoco.mj_step(self.assembly.model, self.data, TIMED_STEPS)
         return (time.process_time() - begin) / TIMED_STEPS
 
 
 def relative_speed(own: Stepper, rigid: Stepper, *, pairs: int = 7) -> float:
-    """Steps of the engine per second over those of another arm; median of pairs."""
+    """Engine steps per CPU second, relative to another scene; median of pairs.
+
+    Args:
+        own: The scene.
+        rigid: The scene to compare with, usually the rigid arm.
+        pairs: Number of paired timings.
+    """
     own.seconds(), rigid.seconds()
     ratios = [rigid.seconds() / own.seconds() for _ in range(pairs)]
     return float(np.median(ratios))
 
 
 def relative_cost(own: Stepper, rigid: Stepper, *, pairs: int = 7) -> float:
-    """:func:`cost_at` the speed that is measured."""
+    """Measured cost of a scene relative to the rigid arm, see :func:`cost_at`.
+
+    Args:
+        own: The scene.
+        rigid: The same scene with rigid joints.
+        pairs: Number of paired timings.
+    """
     return cost_at(own.assembly, relative_speed(own, rigid, pairs=pairs))
 
 
 def cost_at(whole: Assembly, speed: float) -> float:
-    """CPU time per simulated time over that of the rigid arm at 1 ms.
+    """CPU time per simulated time, relative to the rigid arm at 1 ms steps.
 
     Args:
         whole: The scene at its setting.
-        speed: See :func:`relative_speed`.
+        speed: Relative engine speed, see :func:`relative_speed`.
     """
     return 1e-3 / (whole.step * speed)
 
 
 def rigid_arm(scene: Scene, drives: Mapping[str, DriveMap] | None = None) -> Stepper:
-    """The arm with rigid joints at the scene's step."""
+    """The scene with rigid joints at its own time step, ready for timing.
+
+    Args:
+        scene: The scene.
+        drives: Maps that replace drive references of the scene.
+    """
     step = scene.simulation.step_s
     setting = Setting(level="rigid", integrator="discrete", step=step)
     return Stepper.from_assembly(assemble_setting(scene, setting, drives))

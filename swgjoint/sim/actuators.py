@@ -1,4 +1,4 @@
-"""Motors with their loops and limits, loads and disturbances as engine actuators."""
+"""Engine actuators for motors with loops and limits, loads and disturbances."""
 
 from __future__ import annotations
 
@@ -42,15 +42,16 @@ class Loops:
     damping: Array
     """Gain on the motor speed [N·m·s/rad]."""
     integral: Array
-    """Gain on the integral of the angle's error [N·m/(rad·s)]; 0: none."""
+    """Gain on the integral of the angle error [N·m/(rad·s)]; zero without integral."""
     integral_limit: Array
-    """Largest torque of the integral [N·m]."""
+    """Largest torque of the integral term [N·m]."""
     limits: tuple[MotorLimits | None, ...]
+    """Limits of each motor; None if it has none."""
     sampled: bool
-    """The loop is not the engine's: its motors only take torques."""
+    """Whether the loop runs outside the engine, so that motors take torques only."""
 
     def setpoints(self, j: int) -> bool:
-        """Whether motor j takes angle, speed and torque, or a torque alone."""
+        """Whether motor j takes angle, speed and torque, instead of torque alone."""
         limits = self.limits[j]
         line = limits is not None and limits.stall_torque_Nm is not None
         return not self.sampled and (line or bool(self.integral[j]))
@@ -65,19 +66,29 @@ def add_actuators(
     *,
     tool_site: str = "tool",
 ) -> None:
-    """A motor with its control loop on every joint, a load where there is one.
+    """Add a motor with its control loop to every joint, and loads and disturbances.
 
-    Actuators in this order: all motors, the loads that are not zero, disturbances.
+    The order of the actuators is: all motors, all loads that are not zero, all
+    disturbances.
 
     The loop is the actuator's own law, because MuJoCo then solves it within the step: a
-    light rotor under a stiff loop stays stable where a loop evaluated once per step
-    would not. Without integral and torque-speed line it is affine, torque = control -
-    kp angle - kd speed; with an integral the engine's ``pid``; with a torque-speed line
-    its ``dcmotor``, whose voltage limit is that line. Without a rotor the motor acts on
-    the joint through the gear, so angle and speed are the motor's too.
+    light rotor in a stiff loop stays stable where a loop evaluated once per step would
+    not. Without integral and torque-speed line the law is affine, torque = control -
+    kp angle - kd speed. With an integral it is the engine's ``pid``, with a
+    torque-speed line the engine's ``dcmotor``, whose voltage limit is that line.
+    Without a rotor the motor acts on the joint through the gear, so angle and speed of
+    the actuator are still those of the motor.
+
+    Args:
+        spec: Model with attached drives; changed in place.
+        transmissions: Drives, one per joint.
+        loops: Control loops and limits of all motors.
+        load: Constant load torque against every joint [N·m]. Shape (n_joints,).
+        disturbances: Disturbances of the scene.
+        tool_site: Site on which tool forces act.
     """
     for actuator in list(spec.actuators):
-        spec.delete(actuator)  # motors of the arm's file would act beside ours
+        spec.delete(actuator)  # actuators of the arm's file would act in addition
     for j, t in enumerate(transmissions):
         rigid = t.law is None
         motor = spec.add_actuator(
@@ -109,7 +120,7 @@ def add_actuators(
 
 
 def _set_law(motor: Any, loops: Loops, j: int) -> None:
-    """Gains and limits of one motor."""
+    """Set gains and limits of motor j."""
     limits = loops.limits[j]
     kp, kd, ki = (x[j] for x in (loops.stiffness, loops.damping, loops.integral))
     largest = loops.integral_limit[j] / ki if ki else 0.0
@@ -119,7 +130,7 @@ def _set_law(motor: Any, loops: Loops, j: int) -> None:
         motor.actlimited = mujoco.mjtLimited.mjLIMITED_TRUE
         motor.actrange = [-largest, largest]
     if limits is not None and limits.stall_torque_Nm is not None:
-        # voltage in units in which the motor constant is 1
+        # voltage in units that make the motor constant 1
         top = (limits.no_load_speed_rpm or 0.0) * rpm
         gains = [0.0] * 3 if loops.sampled else [kp, ki, kd]
         motor.set_to_dcmotor(
@@ -144,13 +155,17 @@ def _set_law(motor: Any, loops: Loops, j: int) -> None:
 
 
 def control_inputs(assembly: Assembly) -> Array:
-    """Actuator inputs of every step, motors, loads, disturbances. (n_steps, n_inputs).
+    """Inputs of motors, loads and disturbances at every step.
 
-    The integrator ``discrete`` evaluates the loop at the end of the step, so the
-    reference of that instant goes in; others evaluate it at the start. At level
-    ``kinematic`` the angle that the loop sees is off by the prescribed error, and the
-    rotor's inertia acts against that error's acceleration; see
-    :mod:`swgjoint.joint.prescribed`. Motors of a sampled loop get nothing but that.
+    The integrator ``discrete`` evaluates the loop at the end of a step and takes the
+    reference of that instant; other integrators evaluate the loop at the start. At
+    level ``kinematic`` the angle in the loop differs from the motor angle by the
+    prescribed error, and the motor input includes the torque that accelerates the rotor
+    inertia along this error; see :mod:`swgjoint.joint.prescribed`. Motors of a sampled
+    loop receive only this torque.
+
+    Returns:
+        Actuator inputs. Shape (n_steps, n_inputs).
     """
     path, ratio, loops = assembly.trajectory, assembly.ratio, assembly.loops
     angle = ratio * (path.position + assembly.prescribed)
@@ -181,7 +196,15 @@ def control_inputs(assembly: Assembly) -> Array:
 
 
 def disturbance_at(disturbance: Disturbance, time: Array) -> Array:
-    """Input of a disturbance's actuator: torque [N·m], or share of the force. (n,)."""
+    """Input of a disturbance's actuator over time.
+
+    Args:
+        disturbance: The disturbance.
+        time: Instants [s]. Shape (n,).
+
+    Returns:
+        Torque on the joint [N·m], or fraction of the tool force (0 or 1). Shape (n,).
+    """
     length = disturbance.duration_s
     end = np.inf if length is None else disturbance.start_s + length
     acts = ((time >= disturbance.start_s) & (time < end)).astype(float)
@@ -194,12 +217,15 @@ def disturbance_at(disturbance: Disturbance, time: Array) -> Array:
 
 
 def limit_torque(command: Array, speed: Array, limits: MotorLimits | None) -> Array:
-    """What a motor gives of a wanted torque at a speed [N·m]. Shape (n,).
+    """Torque that a motor delivers for a commanded torque at a speed [N·m].
 
     Args:
-        command: Wanted [N·m]. Shape (n,).
-        speed: Of the motor [rad/s]. Shape (n,).
-        limits: Of the motor; None: no limits.
+        command: Commanded torque [N·m]. Shape (..., n).
+        speed: Motor speed [rad/s]. Shape (n,).
+        limits: Limits of the motor; None applies no limits.
+
+    Returns:
+        Limited torque [N·m]. Shape of ``command``.
     """
     if limits is None:
         return command
@@ -214,26 +240,26 @@ def limit_torque(command: Array, speed: Array, limits: MotorLimits | None) -> Ar
 def wanted_torque(
     assembly: Assembly, theta: Array, theta_rate: Array, integral: Array
 ) -> Array:
-    """Torque that the engine's loops ask for on the way to each recorded state [N·m].
+    """Torque that the engine's loops commanded in the step to each state [N·m].
 
-    The torque beside a state is that of the step that led to it, at the start and at
-    the end of that step. The integrator ``discrete`` acts with the end alone: both are
-    the same. Others hold the reference while the motor turns on, taken at its mean
-    speed over the step: a stiff loop swings a light rotor within every step, which the
-    speeds at its ends do not show.
+    The torque of a state is that of the step that led to it, at the start and at the
+    end of that step. The integrator ``discrete`` applies only the torque at the end, so
+    both are equal. Other integrators hold the reference while the motor turns. They are
+    evaluated with the mean motor speed of the step: a stiff loop makes a light rotor
+    oscillate within every step, which the speeds at its ends do not show.
 
     Args:
         assembly: The scene as it was run.
-        theta: Motor angles in the recorded states [rad]. Shape (n, n_joints).
-        theta_rate: [rad/s]. Shape (n, n_joints).
-        integral: Of the angle's error [rad·s]. Shape (n, n_joints).
+        theta: Motor angles of the recorded states [rad]. Shape (n, n_joints).
+        theta_rate: Motor speeds of the recorded states [rad/s]. Shape (n, n_joints).
+        integral: Integral of the angle error [rad·s]. Shape (n, n_joints).
 
     Returns:
-        Shape (2, n, n_joints).
+        Torque at the start and at the end of the step [N·m]. Shape (2, n, n_joints).
     """
     path, ratio, loops = assembly.trajectory, assembly.ratio, assembly.loops
     parts = assembly.sub_steps
-    # as the loop sees them: a prescribed error moves reference and angle alike
+    # a prescribed error shifts reference and angle of the loop equally
     angle = ratio * (path.position + assembly.prescribed)
     speed = ratio * (path.velocity + assembly.prescribed_rate)
     asked = loops.stiffness * angle + loops.damping * speed + assembly.feedforward
@@ -243,7 +269,7 @@ def wanted_torque(
         theta_rate = theta_rate + ratio * assembly.prescribed_rate[::parts]
         wanted = asked[::parts] + given - loops.damping * theta_rate
         return np.stack([wanted, wanted])
-    # the mean of what the parts of a step were given
+    # mean input over the sub-steps of a step
     held = asked[:-1].reshape(-1, parts, len(ratio)).mean(axis=1)
     held -= loops.damping * np.diff(theta, axis=0) / (parts * assembly.step)
     first = held + given[:-1]

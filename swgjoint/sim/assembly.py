@@ -42,53 +42,57 @@ from swgjoint.typing import Array
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Assembly:
-    """A scene ready to run. Axes of joints follow ``joints``, n are the samples."""
+    """A scene ready to run; joint axes follow ``joints``, n counts the samples."""
 
     scene: Scene
     sub_steps: int
-    """Steps of the engine per step of the scene."""
+    """Engine steps per step of the scene."""
     outside: dict[str, str]
-    """Joints that the scene's own step would leave outside the region of their
-    integration, and what they exceed there."""
+    """Joints whose stability region the scene's own step would leave, each with the
+    bound that it exceeds."""
     arm: RigidArm
     known_arm: RigidArm
-    """What the controller takes the arm for; without a payload that it does not know.
-    """
+    """The controller's model of the arm, which lacks a payload that is not known."""
     model: mujoco.MjModel
     joints: tuple[str, ...]
     transmissions: tuple[Transmission, ...]
     trajectory: Trajectory
     loops: Loops
     link_inertia: Array
-    """About every joint at the start, as the controller knows it [kg·m²]."""
+    """Link inertia about every joint at the start, in the controller's model [kg·m²].
+    Shape (n_joints,)."""
     load: Array
-    """Torque of the load against every joint [N·m]. Shape (n_joints,)."""
+    """Constant load torque against every joint [N·m]. Shape (n_joints,)."""
     disturbances: tuple[Disturbance, ...]
     link_torque: Array
-    """Drive torque that the rigid arm needs on the motion [N·m]. (n, n_joints)."""
+    """Drive torque that the rigid arm needs for the motion [N·m]. Shape
+    (n, n_joints)."""
     feedforward: Array
     """Motor torque of the feed-forward [N·m]. Shape (n, n_joints)."""
     prescribed: Array
-    """Kinematic error on the commanded motion at level ``kinematic``, 0 at others
-    [rad]. Shape (n, n_joints)."""
+    """Kinematic error on the commanded motion at level ``kinematic``, zero at other
+    levels [rad]. Shape (n, n_joints)."""
     prescribed_rate: Array
-    """Its rate as the integrator's velocities have it [rad/s]. Same shape."""
+    """Rate of the prescribed error, differenced like the integrator's velocities
+    [rad/s]. Shape (n, n_joints)."""
     controlled_by: str | None
-    """Name of a controller from outside; None: the scene's own."""
+    """Name of an external controller; None if the scene's own controller runs."""
     link_position: NDArray[np.intp]
     """Addresses of the link angles in qpos. Shape (n_joints,)."""
     link_velocity: NDArray[np.intp]
+    """Addresses of the link speeds in qvel. Shape (n_joints,)."""
     motor_position: NDArray[np.intp]
-    """Addresses of the motor angles in qpos, -1 without a rotor. (n_joints,)."""
+    """Addresses of the motor angles in qpos, -1 without a rotor. Shape (n_joints,)."""
     motor_velocity: NDArray[np.intp]
+    """Addresses of the motor speeds in qvel, -1 without a rotor. Shape (n_joints,)."""
 
     @property
     def step(self) -> float:
-        """Step of the engine [s]."""
+        """Time step of the engine [s]."""
         return float(self.model.opt.timestep)
 
     def without_sub_steps(self) -> Assembly:
-        """The same with the samples that a run records, one per step of the scene."""
+        """Copy with only the samples that a run records, one per step of the scene."""
         n = self.sub_steps
         return replace(
             self,
@@ -101,12 +105,12 @@ class Assembly:
 
     @property
     def ratio(self) -> Array:
-        """Signed ratios. Shape (n_joints,)."""
+        """Signed ratios i, output = input / i. Shape (n_joints,)."""
         return np.array([t.ratio for t in self.transmissions])
 
     @property
     def rotor_inertia(self) -> Array:
-        """[kg·m²] about the motor axes. Shape (n_joints,)."""
+        """Rotor inertias about the motor axes [kg·m²]. Shape (n_joints,)."""
         return np.array([t.rotor_inertia for t in self.transmissions])
 
 
@@ -118,23 +122,26 @@ def assemble(
     variable: bool = False,
     progress: Progress = silent,
 ) -> Assembly:
-    """Build the model of a scene.
+    """Build and compile the model of a scene.
 
     Args:
         scene: The scene.
-        drives: Maps that stand for drive references of the scene; others are loaded
-            or built.
-        controlled_by: Name of a controller from outside, whose motors only take
-            torques; None for the scene's own.
-        variable: Whether drives at ``full`` can deviate from their maps, see
+        drives: Maps that replace drive references of the scene; all other drives are
+            loaded or built.
+        controlled_by: Name of an external controller, whose motors take torques only;
+            None if the scene's own controller runs.
+        variable: Whether drives at level ``full`` can deviate from their maps, see
             :mod:`swgjoint.joint.variation`.
         progress: Called while maps are built.
 
+    Returns:
+        The compiled scene with its commanded motion.
+
     Raises:
         InputError: If a joint or drive does not exist or does not fit.
-        ComputationError: If a joint lies outside the region in which its integration
-            holds even with the sub-steps that the scene accepts; the message names the
-            bound and the step that would do.
+        ComputationError: If a joint remains outside its stability region even with the
+            sub-steps that the scene accepts. The message names the exceeded bound and
+            a step that meets it.
     """
     arm, known_arm = arms_of(
         scene.arm,
@@ -295,7 +302,7 @@ def assemble(
 def _addresses(
     model: mujoco.MjModel, joints: tuple[str, ...], transmissions: list[Transmission]
 ) -> dict[str, NDArray[np.intp]]:
-    """Where link and motor angles lie in the state."""
+    """Addresses of link and motor coordinates in qpos and qvel."""
     rotors = [
         None if t.law is None else model.joint(t.attached.rotor) for t in transmissions
     ]

@@ -28,9 +28,10 @@ def motor_loops(
 
     Args:
         scene: The scene.
-        transmissions: Of all joints.
-        sections: Of all joints.
-        inertia: Of motor and link at the motor [kg·m²]. Shape (n_joints,).
+        transmissions: Compiled drives, one per joint.
+        sections: Joint settings, one per joint.
+        inertia: Inertia of motor and link, reduced to the motor [kg·m²]. Shape
+            (n_joints,).
     """
     section = scene.controller
     stiffness, damping = control_gains(section, inertia)
@@ -47,7 +48,15 @@ def motor_loops(
 
 
 def site_of_force(scene: Scene, arm: RigidArm) -> str:
-    """Name of the tool site; refuses a force on a tool that does not exist."""
+    """Name of the tool site, at which tool forces act.
+
+    Args:
+        scene: The scene.
+        arm: Its arm.
+
+    Raises:
+        InputError: If the scene has a tool force and the arm has no tool site.
+    """
     if arm.tool < 0 and any(isinstance(d, ToolForce) for d in scene.disturbance):
         raise InputError(
             f"{scene.where}: disturbance: tool_force on arm {scene.arm!r}, which has no"
@@ -57,17 +66,30 @@ def site_of_force(scene: Scene, arm: RigidArm) -> str:
 
 
 def joints_in_contact(arm: RigidArm, trajectory: Trajectory) -> NDArray[np.bool_]:
-    """Joints on which contacts or limits may act. Shape (n_joints,)."""
+    """Whether contacts or joint limits may act on each joint. Shape (n_joints,).
+
+    Args:
+        arm: The rigid arm.
+        trajectory: Commanded motion of its joints.
+    """
     model = arm.model
     collides = bool(model.geom_contype.any() and model.geom_conaffinity.any())
     low, high = model.jnt_range.T
-    path, slack = trajectory.position, 1e-3  # drives give way by minutes of arc [rad]
+    path, slack = trajectory.position, 1e-3  # drives yield by arc minutes [rad]
     beyond = (path <= low + slack) | (path >= high - slack)
     return np.asarray(collides | (model.jnt_limited.astype(bool) & beyond.any(axis=0)))
 
 
 def interpolate_samples(values: Array, n: int) -> Array:
-    """Values at n samples per sample, on straight lines. Shape (n (m - 1) + 1, ...)."""
+    """Linear interpolation to n samples per interval.
+
+    Args:
+        values: Samples at the ends of all intervals. Shape (m, n_joints).
+        n: Intervals that replace each interval.
+
+    Returns:
+        Interpolated samples. Shape (n (m - 1) + 1, n_joints).
+    """
     if n == 1:
         return values
     part = (np.arange(n) / n)[None, :, None]
@@ -78,8 +100,19 @@ def interpolate_samples(values: Array, n: int) -> Array:
 def prescribed_errors(
     position: Array, transmissions: list[Transmission], *, step: float, discrete: bool
 ) -> tuple[Array, Array]:
-    """Error and rate that level ``kinematic`` prescribes on the motion."""
-    # one more sample in front for the rate of the first, as if the motion went on
+    """Kinematic error that level ``kinematic`` prescribes on a motion, and its rate.
+
+    Args:
+        position: Commanded link angles [rad]. Shape (n, n_joints).
+        transmissions: Compiled drives, one per joint.
+        step: Interval between two samples [s].
+        discrete: Whether the integrator is ``discrete``, whose positions change by the
+            velocity at the end of a step.
+
+    Returns:
+        Error [rad] and rate [rad/s]. Shapes (n, n_joints).
+    """
+    # one extrapolated sample in front gives the rate at the first sample
     path = np.vstack([2.0 * position[:1] - position[1:2], position])
     error = np.column_stack(
         [
@@ -87,7 +120,7 @@ def prescribed_errors(
             for j, t in enumerate(transmissions)
         ]
     )
-    # positions of the discrete integrator change by the velocity after the step
+    # the discrete integrator advances positions by the velocity at the end of a step
     rate = np.diff(error, axis=0) / step
     if not discrete:
         rate = np.gradient(error, step, axis=0)[1:]
@@ -97,7 +130,15 @@ def prescribed_errors(
 def complete_sections(
     scene: Scene, joints: tuple[str, ...]
 ) -> tuple[JointSection, ...]:
-    """Settings of all joints; refuses what is missing, all at once."""
+    """Settings of all joints; every missing key is reported in one error.
+
+    Args:
+        scene: The scene.
+        joints: Names of all driven joints.
+
+    Raises:
+        InputError: If a joint has no drive or no rotor inertia.
+    """
     sections = tuple(scene.joint_settings(name) for name in joints)
     lines = []
     for name, section in zip(joints, sections, strict=True):
@@ -117,7 +158,13 @@ def complete_sections(
 
 
 def load_torque(scene: Scene, joint: str, drive: DriveMap) -> float:
-    """Constant load torque of a joint [N·m]; zero without a load."""
+    """Constant load torque against a joint [N·m]; zero without a load.
+
+    Args:
+        scene: The scene, with its table ``[load]``.
+        joint: Name of the joint.
+        drive: Drive of the joint, whose rated torque a relative load refers to.
+    """
     load = scene.load.get(joint)
     if load is None:
         return 0.0

@@ -1,4 +1,4 @@
-"""What is bundled: drives of the catalogue, designs, arms, scenes, files of studies."""
+"""Lists of bundled items: catalogue drives, designs, arms, scenes, study files."""
 
 from __future__ import annotations
 
@@ -18,14 +18,17 @@ NOTES = {
     "sweeps": "swgjoint sweep NAME; swgjoint schema sweep lists the keys.",
     "optimisations": "swgjoint optimise NAME; swgjoint schema optimise lists the keys.",
 }
-"""How else one of them is named, and what takes it."""
+"""Hints per kind: which commands take such a name, and what else they accept."""
 
 
 def bundled_rows(kind: str) -> list[dict[str, Any]]:
-    """One row for each, in the order of their names.
+    """One row per bundled item of a kind, in the order of their names.
 
     Args:
         kind: A key of :data:`NOTES`.
+
+    Returns:
+        Rows with the keys of ``swgjoint list --json``.
     """
     if kind == "drives":
         return _drives()

@@ -8,10 +8,12 @@ from swgjoint.sim.scene.sections import ControllerSection, FeedForward
 from swgjoint.typing import Array
 
 DEFAULT_FREQUENCY = 8.0
-"""Natural frequency of the motor control where a scene gives none [Hz]."""
+"""Natural frequency of the motor control unless a scene states one [Hz]."""
 DEFAULT_DAMPING_RATIO = 1.0
+"""Damping ratio of the motor control unless a scene states one."""
 INTEGRAL_TIME = 4.0
-"""Of a PID loop times its natural frequency; stable above 1/(2 zeta)."""
+"""Integral time of a PID loop times its natural frequency in rad/s, dimensionless. The
+loop is stable above 1/(2 zeta)."""
 
 
 def control_gains(section: ControllerSection, inertia: Array) -> tuple[Array, Array]:
@@ -19,7 +21,8 @@ def control_gains(section: ControllerSection, inertia: Array) -> tuple[Array, Ar
 
     Args:
         section: The scene's controller.
-        inertia: Of motor and link at the motor [kg·m²]. Shape (n_joints,).
+        inertia: Inertia of motor and link, reduced to the motor [kg·m²]. Shape
+            (n_joints,).
     """
     if section.stiffness_Nm_rad is not None and section.damping_Nms_rad is not None:
         one = np.ones_like(inertia)
@@ -32,12 +35,13 @@ def control_gains(section: ControllerSection, inertia: Array) -> tuple[Array, Ar
 def integral_gain(
     section: ControllerSection, stiffness: Array, inertia: Array
 ) -> Array:
-    """Gain on the integral of the motor angle's error [N·m/(rad·s)]. (n_joints,).
+    """Gain on the integral of the motor angle error [N·m/(rad·s)]. Shape (n_joints,).
 
     Args:
         section: The scene's controller.
         stiffness: Gain on the motor angle [N·m/rad]. Shape (n_joints,).
-        inertia: Of motor and link at the motor [kg·m²]. Shape (n_joints,).
+        inertia: Inertia of motor and link, reduced to the motor [kg·m²]. Shape
+            (n_joints,).
     """
     if section.kind != "pid":
         return np.zeros_like(stiffness)
@@ -47,16 +51,20 @@ def integral_gain(
 
 
 def answer_speed(section: ControllerSection, jump: Array) -> Array:
-    r"""Largest speed of the answer to a step, of a rigid drive without limits [rad/s].
+    r"""Largest joint speed of the step response, rigid drive without limits [rad/s].
 
-    Of the oscillator with the loop's :math:`\omega, \zeta`, whose velocity loop sees no
-    step: :math:`A\omega\,e^{-\zeta\varphi/\sin\varphi}` with
-    :math:`\cos\varphi = \zeta`, and :math:`A\omega/e` from :math:`\zeta = 1` on. Gains
-    that are given outright: those of the default frequency.
+    It is that of the oscillator with the loop's :math:`\omega, \zeta`, in which the
+    step enters the position loop only:
+    :math:`A\omega\,e^{-\zeta\varphi/\sin\varphi}` with :math:`\cos\varphi = \zeta`,
+    and :math:`A\omega/e` for :math:`\zeta \ge 1`. If the scene states gains instead of
+    a natural frequency, the default frequency is assumed.
 
     Args:
         section: The scene's controller.
-        jump: Of every joint [rad]. Shape (n_joints,).
+        jump: Height of the step of every joint [rad]. Shape (n_joints,).
+
+    Returns:
+        Largest speed of every joint [rad/s]. Shape (n_joints,).
     """
     omega = 2.0 * np.pi * (section.natural_frequency_Hz or DEFAULT_FREQUENCY)
     zeta = min(section.damping_ratio or DEFAULT_DAMPING_RATIO, 1.0)
@@ -78,10 +86,13 @@ def feedforward(
     Args:
         kind: ``none``, ``gravity`` or ``gravity_inertia``.
         link_torque: Drive torque that carries weight and load, for
-            ``gravity_inertia`` that on the whole motion. Shape (n, n_joints).
-        acceleration: Of the links [rad/s²]. Shape (n, n_joints).
-        ratio: Signed ratios. Shape (n_joints,).
-        rotor_inertia: [kg·m²]. Shape (n_joints,).
+            ``gravity_inertia`` that of the whole motion [N·m]. Shape (n, n_joints).
+        acceleration: Link accelerations [rad/s²]. Shape (n, n_joints).
+        ratio: Signed ratios i, output = input / i. Shape (n_joints,).
+        rotor_inertia: Rotor inertias about the motor axes [kg·m²]. Shape (n_joints,).
+
+    Returns:
+        Motor torques [N·m]. Shape (n, n_joints).
     """
     if kind == "none":
         return np.zeros_like(link_torque)

@@ -1,7 +1,7 @@
-"""What a sampled controller receives before a motion and measures during it.
+"""Interface of sampled controllers: task, nominal joint data and measurements.
 
-Arrays end with the joints; axes in front of them are motions that run side by side, so
-that one controller drives a single joint, an arm or a batch of either.
+The last axis of every array counts the joints. Leading axes count simultaneous motions,
+so that one controller drives a single joint, an arm, or a batch of either.
 """
 
 from __future__ import annotations
@@ -20,87 +20,102 @@ Number = TypeVar("Number", np.float64, np.complex128)
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class KnownJoints:
-    """Nominal data of the driven joints; the true ones may differ."""
+    """Nominal data of the driven joints; the true data may differ."""
 
     names: tuple[str, ...]
     drives: tuple[DriveMap, ...]
-    """Maps of all joints; ratio, layout and ratings are theirs."""
+    """Drive maps of all joints, with ratio, layout and ratings."""
     rotor_inertia: Array
-    """Motor rotor and wave generator [kg·m²]. Shape (n_joints,)."""
+    """Inertia of motor rotor and wave generator about the motor axis [kg·m²]. Shape
+    (n_joints,)."""
     link_inertia: Array
-    """About every joint where the motion starts, others locked [kg·m²]. Same shape."""
+    """Link inertia about every joint at the start of the motion, other joints locked
+    [kg·m²]. Shape (n_joints,)."""
     damping: Array
-    """Damping of rotor against link along the torsion [N·m·s/rad]. Same shape."""
+    """Damping between rotor and link along the torsion [N·m·s/rad]. Shape
+    (n_joints,)."""
     torque_limit: Array
-    """Torque limit of the motors [N·m], inf where there is none. Same shape."""
+    """Torque limit of the motors [N·m], inf without a limit. Shape (n_joints,)."""
 
     @property
     def ratio(self) -> Array:
-        """Signed ratios, output = input / i. Shape (n_joints,)."""
+        """Signed ratios i, output = input / i. Shape (n_joints,)."""
         return np.array([drive.ratio for drive in self.drives])
 
 
 class KnownArm(Protocol):
-    """What a controller takes the arm for, without drives.
+    """A controller's model of the arm without its drives.
 
-    :class:`swgjoint.sim.arm.rigid_arm.RigidArm` is one, and
-    :class:`swgjoint.control.pinocchio_arm.PinocchioArm`.
+    :class:`swgjoint.sim.arm.rigid_arm.RigidArm` and
+    :class:`swgjoint.control.pinocchio_arm.PinocchioArm` implement it.
     """
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """Names, in the order of all arrays."""
+        """Joint names, in the order of the last axis of all arrays."""
 
     def torques(self, position: Array, velocity: Array, acceleration: Array) -> Array:
-        """Joint torques that a motion needs [N·m]. All shapes (n, n_joints)."""
+        """Joint torques of a motion by inverse dynamics [N·m]. Shape (n, n_joints).
+
+        Args:
+            position: Joint angles [rad]. Shape (n, n_joints).
+            velocity: Joint speeds [rad/s]. Shape (n, n_joints).
+            acceleration: Joint accelerations [rad/s²]. Shape (n, n_joints).
+        """
 
     def inertia(self, position: Array) -> Array:
-        """About every joint, the others locked [kg·m²]. Shapes (n_joints,)."""
+        """Inertia about every joint, the others locked [kg·m²]. Shapes (n_joints,)."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class ReadingAge:
-    """How old the readings of the sensors are when the controller gets them [s].
+    """Age of the sensor readings when the controller receives them [s].
 
-    A nominal datum of the sensors: what their delay is stated to be. Before the motion
-    sensors read its beginning. The speed of a motor from a difference of its angles is
-    half a period older than these.
+    The ages are nominal data: the stated delays of the sensors. Before the motion the
+    sensors read its first sample. A motor speed that is a difference of two angles is
+    half a control period older than ``motor``.
     """
 
     motor: float = 0.0
+    """Age of the motor encoder readings [s]."""
     link: float = 0.0
+    """Age of the link encoder readings [s]."""
     torque: float = 0.0
+    """Age of the torque sensor readings [s]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Task:
-    """A commanded motion of the links at the instants of the control, n of them."""
+    """A commanded motion of the links at the n control instants."""
 
     period: float
-    """Between two instants [s]."""
+    """Control period: time between two instants [s]."""
     position: Array
-    """[rad]. Shape (n, ..., n_joints)."""
+    """Commanded link angles [rad]. Shape (n, ..., n_joints)."""
     velocity: Array
-    """[rad/s]. Same shape."""
+    """Commanded link speeds [rad/s]. Shape (n, ..., n_joints)."""
     acceleration: Array
-    """[rad/s²]. Same shape."""
+    """Commanded link accelerations [rad/s²]. Shape (n, ..., n_joints)."""
     link_torque: Array
-    """That the known arm, its weight and the known load ask of the drives on this
-    motion, inertia of the links included [N·m]. Same shape."""
+    """Drive torques that this motion requires: inertia and weight of the known arm,
+    and the known load [N·m]. Shape (n, ..., n_joints)."""
     joints: KnownJoints
     reading_age: ReadingAge = ReadingAge()
 
     def as_read(
         self, values: NDArray[Number], sensor: Literal["motor", "link", "torque"]
     ) -> NDArray[Number]:
-        """What a sensor would read at the instants if values were what it measures.
+        """Readings that a sensor would give at the instants if it measured ``values``.
 
-        Those of an instant before, as old as the readings are, between two instants on
-        the line; at the beginning the first ones.
+        Each reading is the value one reading age earlier, interpolated linearly between
+        instants. Readings from before the motion equal the first value.
 
         Args:
-            values: At the instants. Shape (n, ...).
-            sensor: Whose readings.
+            values: Exact values at the instants. Shape (n, ...).
+            sensor: Sensor whose age applies.
+
+        Returns:
+            Delayed values. Shape (n, ...).
         """
         age: float = getattr(self.reading_age, sensor) / self.period
         if age == 0.0:
@@ -114,38 +129,38 @@ class Task:
         return np.asarray((1.0 - part) * values[at] + part * before)
 
     def periods_old(self, sensor: Literal["motor", "link", "torque"]) -> int:
-        """Age of the readings of a sensor in periods, the nearest whole number."""
+        """Age of the readings of a sensor in control periods, rounded."""
         age: float = getattr(self.reading_age, sensor)
         return round(age / self.period)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Measured:
-    """Readings of the sensors that are there at one instant; shapes (..., n_joints).
+    """Sensor readings available at one instant; shapes (..., n_joints).
 
-    They were taken :attr:`Task.reading_age` before.
+    They were taken :attr:`Task.reading_age` earlier.
     """
 
     motor_angle: Array
-    """[rad]."""
+    """Motor angle [rad]."""
     motor_speed: Array
-    """[rad/s]."""
+    """Motor speed [rad/s]."""
     link_angle: Array | None = None
-    """Reading of a link encoder [rad]; None where there is none."""
+    """Link encoder reading [rad]; None without a link encoder."""
     output_torque: Array | None = None
-    """Reading of a torque sensor behind the drive [N·m]; None where there is none."""
+    """Output torque sensor reading [N·m]; None without a torque sensor."""
 
 
 class Controller(Protocol):
-    """Motor torques from readings, once a control period."""
+    """Computes motor torques from sensor readings once per control period."""
 
     def start(self, task: Task) -> None:
-        """Forget the last motion and prepare the next one."""
+        """Reset the controller and prepare it for a motion."""
 
     def torque(self, k: int, measured: Measured) -> Array:
         """Torque of every motor until the next instant [N·m]. Shape (..., n_joints).
 
         Args:
-            k: Instant of the task.
-            measured: What the sensors read there.
+            k: Index of the control instant.
+            measured: Sensor readings at this instant.
         """

@@ -1,4 +1,4 @@
-"""Where a run starts: the drives carry the load from the first instant."""
+"""Initial state of a run: the drives carry the load from the first instant."""
 
 from __future__ import annotations
 
@@ -18,28 +18,29 @@ if TYPE_CHECKING:
 
 
 RTOL = 1e-9
-"""Torque residual over the rated torque at which an equilibrium is accepted; the
-recording resolves 1e-6 of it."""
+"""Largest torque residual of an accepted equilibrium, relative to the rated torque. The
+recording resolves 1e-6 of the rated torque."""
 
 
 def start_state(assembly: Assembly) -> tuple[Array, Array]:
     """Positions and velocities at the first instant, free of start-up ringing.
 
-    The link of every joint lies where the drive carries weight and load. A joint that
-    starts at rest has its motor where motor torque, control loop and cogging balance,
-    the loop acting on the angle that it reads, the motor's or the link's. Computed
-    torque has gains that depend on the pose: with a payload that it does not know it
-    starts near its equilibrium, not in it.
-    A joint that starts moving has its motor on the reference, turning evenly, and its
-    link moves at the rate of its balance along the motion, because with kinematic
-    error the link moves unevenly while the motor turns evenly.
+    Every link starts at the angle at which its drive carries weight and load. If a
+    joint starts at rest, its motor starts at the angle at which motor torque, control
+    loop and cogging balance; the loop acts on the angle that it reads, that of the
+    motor or of the link. The gains of computed torque depend on the pose, so with an
+    unknown payload such a joint starts only near its equilibrium.
+
+    If a joint starts in motion, its motor starts on the reference at uniform speed. Its
+    link moves at the rate of the equilibrium along the motion, because with kinematic
+    error the link speed varies while the motor speed is uniform.
 
     Returns:
         qpos and qvel of the compiled model.
 
     Raises:
-        InputError: If bodies press each other there, so that no drive can hold them.
-        ComputationError: If the drives find no balance.
+        InputError: If bodies are in contact there, so that no drive can hold them.
+        ComputationError: If a drive has no equilibrium.
     """
     path, h = assembly.trajectory, assembly.step
     try:
@@ -50,16 +51,16 @@ def start_state(assembly: Assembly) -> tuple[Array, Array]:
             raise
         raise InputError(
             f"{assembly.scene.where}: trajectory.start_deg: bodies press each other"
-            f" where the arm starts: {touching}; accepted: a pose in which nothing"
-            f" touches, or an <exclude> of the pair in {assembly.arm.path}"
+            f" where the arm starts: {touching}; accepted: a pose without contact, or"
+            f" an <exclude> of the pair in {assembly.arm.path}"
         ) from exc
     link_rate = path.velocity[0].copy()
     if link_rate.any():
-        # a tenth of a step: small against the period of every order that a step carries
+        # a tenth of a step is short compared with the period of every resolved order
         (_, before), (_, after) = _balance(assembly, -0.1), _balance(assembly, 0.1)
         moving = link_rate != 0.0
         link_rate[moving] = ((after - before) / (0.2 * h))[moving]
-    # a prescribed error moves the link as the integrator's velocities have it
+    # a prescribed error adds its rate, differenced like the integrator's velocities
     stiff = assembly.motor_position < 0
     link_rate[stiff] = (path.velocity[0] + assembly.prescribed_rate[0])[stiff]
     model = assembly.model
@@ -73,11 +74,19 @@ def start_state(assembly: Assembly) -> tuple[Array, Array]:
 
 
 def set_start(assembly: Assembly, data: mujoco.MjData) -> None:
-    """Put a simulation at its start, with what the plugin remembers of the last step.
+    """Put a simulation into its initial state, including the state of the plugin.
 
-    The plugin predicts a step from the accelerations that all but the drive gave in the
-    step before; in balance they cancel those of the drive. Without them the first step
-    would be predicted as if the load were let go.
+    The plugin predicts a step from the accelerations that all forces except the drive's
+    caused in the previous step. In equilibrium they cancel those of the drive. Without
+    them the plugin would predict the first step as if the load were released.
+
+    Args:
+        assembly: The compiled scene.
+        data: Engine data of its model; overwritten.
+
+    Raises:
+        InputError: See :func:`start_state`.
+        ComputationError: See :func:`start_state`.
     """
     model = assembly.model
     mujoco.mj_resetData(model, data)
@@ -98,7 +107,7 @@ def set_start(assembly: Assembly, data: mujoco.MjData) -> None:
             float(on_input),
             float(on_output),
         ]
-        # the balance is that of the spring: hysteresis starts relaxed
+        # only the spring carries the load at the start: hysteresis starts relaxed
         torsion = float(transmission.law.torsion(theta, psi))
         elements = len(transmission.attached.elements)
         data.plugin_state[first + 2 : first + 2 + elements] = torsion
@@ -106,11 +115,14 @@ def set_start(assembly: Assembly, data: mujoco.MjData) -> None:
 
 
 def _balance(assembly: Assembly, shift: float) -> tuple[Array, Array]:
-    """Motor and link angles in balance, ``shift`` steps after the start. (n_joints,).
+    """Motor and link angles in equilibrium, ``shift`` steps after the start.
 
-    Weight depends on the sag of all joints, the drives are stiff: repeat with the
-    weight of the last pose; each round shrinks the error by weight gradient over
-    torsional stiffness, 1e-2 or less.
+    The weight torques depend on the sag of all joints, and the drives are stiff. So the
+    solution repeats with the weight torques of the last pose. Each pass reduces the
+    error by the ratio of weight gradient to torsional stiffness, 1e-2 or less.
+
+    Returns:
+        Motor and link angles [rad]. Shapes (n_joints,).
     """
 
     def at(samples: Array) -> Array:
@@ -138,7 +150,7 @@ def _balance(assembly: Assembly, shift: float) -> tuple[Array, Array]:
                     guess=float(psi[j]) if turn else None,
                 )
             else:
-                # a loop on the link is one on the motor that is ahead by the wind-up
+                # link feedback: the motor reference is advanced by the torsion
                 ahead = theta[j] - ratio[j] * psi[j] if by_link else 0.0
                 theta[j], psi[j] = joint_equilibrium(
                     transmission,
@@ -163,10 +175,13 @@ def link_equilibrium(
     """Link angle at which a drive with its motor held exerts a torque [rad].
 
     Args:
-        transmission: A drive with a law between the angles.
+        transmission: A drive with a torque law between motor and link.
         theta: Motor angle [rad].
-        output_torque: That the drive exerts on the link [N·m].
-        guess: Link angle near the solution [rad]; None: that of the mean curve.
+        output_torque: Torque that the drive exerts on the link [N·m].
+        guess: Link angle near the solution [rad]; None starts from the mean curve.
+
+    Raises:
+        ComputationError: If the iteration does not converge.
     """
     law, rated = transmission.law, transmission.drive.ratings.rated_torque
     assert law is not None
@@ -196,27 +211,30 @@ def joint_equilibrium(
 ) -> tuple[float, float]:
     r"""Motor and link angle at which one drive rests under a torque.
 
-    Minimum of :math:`V(\theta, \psi) + T\psi - \tau\theta
-    + \tfrac12 k_p (\theta - \theta_r)^2` over both angles, the one that a descent from
-    the reference reaches: with cogging there may be several.
+    They minimise :math:`V(\theta, \psi) + T\psi - \tau\theta
+    + \tfrac12 k_p (\theta - \theta_r)^2` over both angles. With cogging there may be
+    several minima; the result is the one that a descent from the reference reaches.
 
     Args:
-        transmission: A drive with a law between the angles.
-        output_torque: That the drive exerts on the link [N·m].
+        transmission: A drive with a torque law between motor and link.
+        output_torque: Torque that the drive exerts on the link [N·m].
         motor_reference: Commanded motor angle [rad].
-        motor_torque: Of the motor at that angle [N·m].
-        stiffness: Of the motor's position loop [N·m/rad].
-        guess: Angles near the solution [rad], as of nearly the same torque; None: the
-            reference.
+        motor_torque: Feed-forward torque of the motor at that angle [N·m].
+        stiffness: Stiffness of the motor's position loop [N·m/rad].
+        guess: Motor and link angle near the solution, for example those of a similar
+            torque [rad]; None starts from the reference.
+
+    Returns:
+        Motor and link angle [rad].
 
     Raises:
         ComputationError: If the descent does not settle.
     """
     law, rated = transmission.law, transmission.drive.ratings.rated_torque
     assert law is not None
-    # unknown x = (motor angle)/i and link angle, so that both have the size of K
+    # unknowns x = (motor angle)/i and link angle: both curvatures are of the order of K
     scale = np.array([law.ratio, 1.0])
-    # no step jumps over a tooth
+    # no step skips a tooth
     longest = 0.1 / max(float(np.abs(law.angle_orders[:, 0]).max()), 1.0)
 
     def energy(x: Array) -> float:
@@ -251,7 +269,7 @@ def joint_equilibrium(
                 for unit in np.eye(2)
             ]
         )
-        # downhill also where the energy bends down: a Newton step with |curvature|
+        # a Newton step with |curvature| also descends where the energy is not convex
         size, axes = np.linalg.eigh(0.5 * (bend + bend.T))
         size = np.maximum(np.abs(size), 1e-9 * np.abs(size).max())
         move = -axes @ ((axes.T @ value) / size)
@@ -268,5 +286,5 @@ def joint_equilibrium(
 def _message(transmission: Transmission, torque: float, left: float) -> str:
     return (
         f"joint {transmission.joint!r}: no equilibrium with {torque:.4g} N·m at the"
-        f" output (left: {left:.2g} N·m); start at another pose or lower the load"
+        f" output (residual {left:.2g} N·m); start at another pose or lower the load"
     )

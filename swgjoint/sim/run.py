@@ -1,4 +1,4 @@
-"""What a simulated scene leaves behind: every state, and the figures made of them."""
+"""Recorded run of a scene: all states, and the figures computed from them."""
 
 from __future__ import annotations
 
@@ -18,55 +18,58 @@ from swgjoint.typing import Array
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Run:
-    """A recorded run; arrays hold every state, the first included.
+    """A recorded run; arrays hold all n states, the first included.
 
-    Angles and torques at the output side unless named motor; n states, joints in the
-    order of ``joints``. Torques and torsions are the drive's law at the recorded state;
-    the motor's torque is the mean over the step that led to it.
+    Angles and torques refer to the output side unless their name says motor. Joints
+    follow ``joints``. Torques and torsions are the drive's law at the recorded state;
+    the motor torque is the mean over the step that led to it.
     """
 
     name: str
     assembly: Assembly
     joints: tuple[str, ...]
     time: Array
-    """[s]. Shape (n,)."""
+    """Times of the recorded states [s]. Shape (n,)."""
     position: Array
     """Link angles [rad]. Shape (n, n_joints)."""
     velocity: Array
     """Link speeds [rad/s]. Shape (n, n_joints)."""
     motor_position: Array
-    """Input angles [rad]; without a rotor those that the gear, ideal or with its
-    prescribed error, gives the link angles. Shape (n, n_joints)."""
+    """Motor angles [rad]; without a rotor those that follow from the link angles by the
+    ideal gear or the gear with prescribed error. Shape (n, n_joints)."""
     motor_velocity: Array
-    """[rad/s]. Shape (n, n_joints)."""
+    """Motor speeds [rad/s]. Shape (n, n_joints)."""
     reference: Array
     """Commanded link angles [rad]. Shape (n, n_joints)."""
     torsion: Array
-    """[rad]. Shape (n, n_joints)."""
+    """Torsion of the drives [rad]. Shape (n, n_joints)."""
     transmission_error: Array
     """Output minus ideal output [rad]. Shape (n, n_joints)."""
     output_torque: Array
-    """That the drive exerts on the link [N·m]. Shape (n, n_joints)."""
+    """Torque of the drives on the links [N·m]. Shape (n, n_joints)."""
     motor_torque: Array
-    """[N·m]. Shape (n, n_joints)."""
+    """Motor torques within their limits [N·m]. Shape (n, n_joints)."""
     wanted_torque: Array
-    """What the controller asked the motors for, without limits [N·m]. Same shape."""
+    """Motor torques that the controller commanded, before limits [N·m]. Shape
+    (n, n_joints)."""
     slipping_torque: Array
-    """Hysteresis torque along the torsion [N·m]; zero if there is none. Same shape."""
+    """Hysteresis torque along the torsion [N·m]; zero if the drive has none. Shape
+    (n, n_joints)."""
     friction_torque: Array
-    """Friction torque of the wave generator on the flexspline [N·m]. Same shape."""
+    """Friction torque of the wave generator on the flexspline [N·m]. Shape
+    (n, n_joints)."""
     tool_position: Array
-    """Tool in the world [m]. Shape (n, 3), or (n, 0) where the arm has no tool."""
+    """Tool position in the world frame [m]. Shape (n, 3), or (n, 0) without a tool."""
     tool_reference: Array
-    """Tool on the commanded motion without any error [m]. Same shape."""
+    """Tool position on the commanded motion [m]. Shape of ``tool_position``."""
     wall: float
-    """Time that the steps took [s]."""
+    """Wall time of all steps [s]."""
     recording: Path | None = None
-    """The recording for the viewer that was written with the run."""
+    """Recording for the viewer that was written with the run; None without one."""
 
     @property
     def steps_per_second(self) -> float:
-        """Recorded steps, each with its sub-steps, per second of wall time."""
+        """Recorded steps, each with its sub-steps, per second of wall time [1/s]."""
         return (self.time.size - 1) / self.wall
 
     @property
@@ -76,15 +79,15 @@ class Run:
 
     @property
     def contains(self) -> dict[str, Any]:
-        """What the compiled model contains, and what was left out and why."""
+        """Contents of the compiled model, and what it leaves out and why."""
         return contents(self.assembly)
 
     def tool_error(self, other: Run | None = None) -> Array:
         """Distance of the tool from that of another run [m]. Shape (n,).
 
         Args:
-            other: A run of the same motion, usually the rigid arm; None compares with
-                the commanded path.
+            other: A run of the same motion, usually of the rigid arm; None compares
+                with the commanded path.
         """
         reference = self.tool_reference if other is None else other.tool_position
         return np.asarray(np.linalg.norm(self.tool_position - reference, axis=1))

@@ -1,4 +1,4 @@
-"""Memory that a run takes: it grows with its steps and with the joints of the arm."""
+"""Memory demand of a run, which grows with its steps and joints."""
 
 from __future__ import annotations
 
@@ -7,22 +7,22 @@ from swgjoint.sim.scene.scene import Scene
 
 BYTES = 8
 STEP, STEP_AND_JOINT = 75, 32
-"""Numbers that live at once for every recorded step, and for every joint at it, while
-the signals and figures of a run are computed. Measured: 102 for one joint, 250 for
-six with 28 harmonics each; a recording is written in parts and adds none."""
+"""Numbers in memory per recorded step, and per recorded step and joint, while the
+signals and figures of a run are computed. Measured per step: 102 for one joint, 250 for
+six joints with 28 harmonics each. A recording is written in parts and adds none."""
 SUB_STEP_AND_JOINT = 12
-"""The same for every further step of the engine: motion, torques, inputs, speeds."""
+"""Numbers per joint and additional engine step: motion, torques, inputs, speeds."""
 VIEWER = 0.15e9
-"""The library that writes recordings [B]."""
+"""Memory of the library that writes recordings [B]."""
 
 
 def required_memory(scene: Scene, joints: int, *, sub_steps: int = 1) -> float:
-    """Estimate of what a run takes beyond a process that has read its scene [B].
+    """Estimated memory of a run, beyond that of a process that has read its scene [B].
 
     Args:
-        scene: The scene, for its duration and step.
-        joints: Driven joints of the arm.
-        sub_steps: Steps of the engine per step of the scene.
+        scene: The scene, which states duration and step.
+        joints: Number of driven joints.
+        sub_steps: Engine steps per step of the scene.
     """
     steps = scene.simulation.duration_s / scene.simulation.step_s
     each = STEP + STEP_AND_JOINT * joints
@@ -31,15 +31,16 @@ def required_memory(scene: Scene, joints: int, *, sub_steps: int = 1) -> float:
 
 
 def require_run_memory(scene: Scene, joints: int, *, sub_steps: int = 1) -> None:
-    """Refuse a run that would not fit, before anything is computed for it.
+    """Reject a run that would not fit in memory, before its computation starts.
 
     Args:
-        scene: The scene.
-        joints: Driven joints of the arm.
-        sub_steps: Steps of the engine per step of the scene.
+        scene: The scene, which states duration and step.
+        joints: Number of driven joints.
+        sub_steps: Engine steps per step of the scene.
 
     Raises:
-        ComputationError: With the memory that it needs and that which is free.
+        ComputationError: If memory is short; the message states required and free
+            memory.
     """
     section = scene.simulation
     cut = f" in {sub_steps} sub-steps each" if sub_steps > 1 else ""

@@ -1,8 +1,8 @@
-"""Controllers that run once a control period on what sensors read, in Python.
+"""Sampled controllers in Python, which read sensors once per control period.
 
-For scenes that ask for it (computed torque, a control period, sensors, link feedback)
-and for controllers that are given to :func:`swgjoint.run_scene`. Limits of the
-motors stay with the engine's actuators.
+They serve scenes with computed torque, a control period, sensors or link feedback, and
+external controllers passed to :func:`swgjoint.run_scene`. The engine's actuators still
+apply the motor limits.
 """
 
 from __future__ import annotations
@@ -23,19 +23,19 @@ if TYPE_CHECKING:
     from swgjoint.sim.assembly import Assembly
 
 
-_CHUNK = 1000  # recorded states between two signs of life
+_CHUNK = 1000  # recorded states between two progress reports
 _STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
 
 
 class Readings:
-    """What the sensors of a scene say; remembers the last angle of the motors."""
+    """Sensor readings of a scene; keeps the last motor angles for their speeds."""
 
     def __init__(self, assembly: Assembly, period: float) -> None:
         """Prepare the sensors of a scene.
 
         Args:
-            assembly: The scene.
-            period: Between two readings [s].
+            assembly: The compiled scene.
+            period: Time between two readings [s].
         """
         sensors = assembly.scene.sensors
         self.encoder = (sensors.motor if sensors else None) or Sensor()
@@ -47,7 +47,16 @@ class Readings:
         self._last: Array | None = None
 
     def motor(self, k: int, theta: Array, rate: Array) -> tuple[Array, Array]:
-        """Motor angles and speeds at sample k [rad], [rad/s]. Shapes (n_joints,)."""
+        """Readings of motor angles [rad] and speeds [rad/s] at sample k.
+
+        Args:
+            k: Index of the sample at which the readings are used.
+            theta: Motor angles of all samples [rad]. Shape (n, n_joints).
+            rate: Motor speeds of all samples [rad/s]. Shape (n, n_joints).
+
+        Returns:
+            Angles and speeds. Shapes (n_joints,).
+        """
         angle = self._read(self.encoder, theta, k)
         if self.encoder.counts_per_turn is None and not self.encoder.noise_arcsec:
             return angle, rate[self.sample_of(self.encoder, k)]
@@ -57,23 +66,33 @@ class Readings:
         return angle, (angle - last) / self._period
 
     def link(self, k: int, psi: Array) -> Array:
-        """Link angles at sample k [rad]. Shape (n_joints,)."""
+        """Readings of link angles at sample k [rad]. Shape (n_joints,).
+
+        Args:
+            k: Index of the sample at which the readings are used.
+            psi: Link angles of all samples [rad]. Shape (n, n_joints).
+        """
         return self._read(self.link_encoder, psi, k)
 
     def torque(self, k: int, torque: Array) -> Array:
-        """Output torques at sample k [N·m]. Shape (n_joints,)."""
+        """Readings of output torques at sample k [N·m]. Shape (n_joints,).
+
+        Args:
+            k: Index of the sample at which the readings are used.
+            torque: Output torques of all samples [N·m]. Shape (n, n_joints).
+        """
         return self._noisy(
             torque[self.sample_of(self._torque, k)], self._torque.noise_Nm
         )
 
     def _read(self, sensor: Sensor, angle: Array, k: int) -> Array:
-        got = self._noisy(
+        noisy = self._noisy(
             angle[self.sample_of(sensor, k)], sensor.noise_arcsec * arcsec
         )
         if sensor.counts_per_turn is None:
-            return np.asarray(got)
+            return np.asarray(noisy)
         count = 2.0 * np.pi / sensor.counts_per_turn
-        return np.asarray(np.floor(got / count) * count)
+        return np.asarray(np.floor(noisy / count) * count)
 
     def _noisy(self, exact: Array, deviation: float) -> Array:
         if not deviation:
@@ -81,46 +100,57 @@ class Readings:
         return exact + deviation * self._noise.standard_normal(exact.shape)
 
     def sample_of(self, sensor: Sensor | TorqueSensor, k: int) -> int:
-        """Sample at which a reading was taken that is used at sample k, 0 at least."""
+        """Index of the sample at which the reading used at sample k was taken.
+
+        Args:
+            sensor: The sensor, with its delay.
+            k: Index of the sample at which the reading is used.
+
+        Returns:
+            Index of the sample, at least zero.
+        """
         return max(k - round(sensor.delay_s / self._step), 0)
 
 
 class Loop(Protocol):
-    """A control law that run_sampled asks at its ticks."""
+    """A control law that :func:`run_sampled` evaluates once per control period."""
 
     every: int
-    """Steps of the engine per control period."""
+    """Engine steps per control period."""
     senses_torque: bool
-    """Whether it reads the output torque."""
+    """Whether the law reads the output torque."""
 
     def torque(
         self, k: int, theta: Array, psi: Array, theta_rate: Array, torque: Array
     ) -> Array:
-        """Torque of every motor from now on [N·m]. Shape (n_joints,).
+        """Torque of every motor until the next evaluation [N·m]. Shape (n_joints,).
+
+        Arrays are filled up to sample k.
 
         Args:
-            k: Sample of the commanded motion.
-            theta: Motor angles of all samples up to this one [rad]. (k + 1, n_joints).
-            psi: Link angles. Same shape.
-            theta_rate: Motor speeds [rad/s]. Same shape.
-            torque: Of the drives on their links, where it is sensed [N·m]. Same shape.
+            k: Index of the current sample.
+            theta: Motor angles of all samples [rad]. Shape (n, n_joints).
+            psi: Link angles of all samples [rad]. Shape (n, n_joints).
+            theta_rate: Motor speeds of all samples [rad/s]. Shape (n, n_joints).
+            torque: Drive torques on the links, if they are sensed [N·m]. Shape
+                (n, n_joints).
         """
 
 
 class SampledLoop:
-    """The scene's own law of all joints; holds integrals between periods."""
+    """The scene's own control law; keeps the error integrals between periods."""
 
     senses_torque = False
 
     def __init__(self, assembly: Assembly) -> None:
-        """Prepare the loop of a scene that :attr:`Scene.sampled` says has one."""
+        """Prepare the loop of a scene whose :attr:`Scene.sampled` is true."""
         self.assembly, self.controller = assembly, assembly.scene.controller
         self.period, self.every = control_period(assembly)
         self._readings = Readings(assembly, self.period)
         self._integral = np.zeros(len(assembly.joints))
         section, ratio = self.controller, assembly.ratio
         inertia = assembly.rotor_inertia * ratio**2 + assembly.link_inertia
-        # per unit of inertia: the loop's own natural frequency and damping
+        # gains per inertia keep the loop's natural frequency and damping ratio
         self._kp = assembly.loops.stiffness * ratio**2 / inertia
         self._kd = assembly.loops.damping * ratio**2 / inertia
         self._by_link = section.feedback == "link"
@@ -128,12 +158,21 @@ class SampledLoop:
     def torque(
         self, k: int, theta: Array, psi: Array, theta_rate: Array, torque: Array
     ) -> Array:
-        """See :class:`Loop`."""
+        """Motor torques, see :class:`Loop`.
+
+        Args:
+            k: Index of the current sample.
+            theta: Motor angles of all samples [rad]. Shape (n, n_joints).
+            psi: Link angles of all samples [rad]. Shape (n, n_joints).
+            theta_rate: Motor speeds of all samples [rad/s]. Shape (n, n_joints).
+            torque: Drive torques on the links, if they are sensed [N·m]. Shape
+                (n, n_joints).
+        """
         whole, path = self.assembly, self.assembly.trajectory
         ratio, loops = whole.ratio, whole.loops
         readings = self._readings
         angle, speed = readings.motor(k, theta, theta_rate)
-        # a reading is held against the command of the sample at which it was taken
+        # compare a reading with the command of the sample at which it was taken
         then = moved = readings.sample_of(readings.encoder, k)
         if self._by_link:
             angle = ratio * readings.link(k, psi)
@@ -166,10 +205,10 @@ class SampledLoop:
 
 
 class GivenLoop:
-    """A user's controller, which receives the task and the sensor readings."""
+    """An external controller, which receives the task and the sensor readings."""
 
     def __init__(self, assembly: Assembly, controller: Controller, task: Task) -> None:
-        """Start the controller on the task of the scene."""
+        """Start the controller with the task of the scene."""
         scene = assembly.scene
         self.controller, self._joints = controller, assembly.joints
         self.period, self.every = control_period(assembly)
@@ -182,7 +221,16 @@ class GivenLoop:
     def torque(
         self, k: int, theta: Array, psi: Array, theta_rate: Array, torque: Array
     ) -> Array:
-        """See :class:`Loop`."""
+        """Motor torques, see :class:`Loop`.
+
+        Args:
+            k: Index of the current sample.
+            theta: Motor angles of all samples [rad]. Shape (n, n_joints).
+            psi: Link angles of all samples [rad]. Shape (n, n_joints).
+            theta_rate: Motor speeds of all samples [rad/s]. Shape (n, n_joints).
+            torque: Drive torques on the links, if they are sensed [N·m]. Shape
+                (n, n_joints).
+        """
         angle, speed = self._readings.motor(k, theta, theta_rate)
         measured = Measured(
             motor_angle=angle,
@@ -203,7 +251,7 @@ class GivenLoop:
 
 
 def control_period(assembly: Assembly) -> tuple[float, int]:
-    """Control period [s] and steps of the engine in it."""
+    """Control period [s], and engine steps per control period."""
     step = assembly.scene.simulation.step_s
     period = assembly.scene.controller.control_period_s or step
     whole = round(period / step)
@@ -219,20 +267,21 @@ def run_sampled(
     check: Callable[[Array], None],
     progress: Callable[[int], None],
 ) -> tuple[Array, Array, Array]:
-    """Step the engine with the loop in between.
+    """Step the engine and evaluate the loop once per control period.
 
     Args:
-        assembly: The scene.
+        assembly: The compiled scene.
         loop: The control law.
-        data: At its start; left at the end.
-        inputs: Of the engine's actuators without the loop. Shape (n_steps, n_inputs).
+        data: Engine data in the initial state; left in the final state.
+        inputs: Actuator inputs without the torques of the loop. Shape (n_steps,
+            n_inputs).
         check: Called with the states since its last call.
         progress: Called with the steps done.
 
     Returns:
-        States of the scene's steps, shape (n, n_state), speeds of the links and torques
-        that the loop asked for at every step of the engine, shape (n_steps + 1,
-        n_joints), the torque beside the state that it led to.
+        States at the scene's steps, shape (n, n_state); link speeds [rad/s] and motor
+        torques of the loop [N·m] at every engine step, shapes (n_steps + 1, n_joints).
+        The torque of a state is that of the step that led to it.
     """
     model, parts, n = assembly.model, assembly.sub_steps, len(inputs)
     joints = len(assembly.joints)

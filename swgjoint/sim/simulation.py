@@ -1,4 +1,4 @@
-"""The simulation of a scene: the arm under its controller, recorded at every step."""
+"""Simulation of a scene: the controlled arm, recorded at every step."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from swgjoint.sim.scene.scene import Scene
 from swgjoint.sim.scene.task import task_of
 from swgjoint.typing import Array
 
-_CHUNK = 1000  # steps of the engine between two signs of life
+_CHUNK = 1000  # engine steps between two progress reports
 _STATE = mujoco.mjtState.mjSTATE_FULLPHYSICS
 
 
@@ -40,10 +40,23 @@ def simulate_scene(
     name: str | None = None,
     progress: Progress = silent,
 ) -> Run:
-    """Simulate a scene from an equilibrium to its end.
+    """Simulate a scene from its initial equilibrium to its end.
 
-    The arguments are those of :func:`swgjoint.run_scene`, which also records the run
-    for the viewer.
+    :func:`swgjoint.run_scene` also records the run for the viewer.
+
+    Args:
+        scene: The scene, or the path or bundled name of a scene file.
+        overrides: Changes of the scene, see :meth:`Scene.load_file`.
+        drives: Maps that replace drive references of the scene.
+        controller: External controller; None runs the scene's own.
+        known_drives: Drive maps in the controller's model, by joint.
+        known_arm: Arm in the controller's model; None for the scene's own.
+        name: Name of the run; None for the name of the scene.
+        progress: Called with the steps done, and while maps are built.
+
+    Raises:
+        InputError: If the scene or the arguments do not fit.
+        ComputationError: If the motion diverges or the start has no equilibrium.
     """
     assembly, loop = prepare_scene(
         scene,
@@ -69,9 +82,23 @@ def prepare_scene(
     known_arm: KnownArm | None = None,
     progress: Progress = silent,
 ) -> tuple[Assembly, Loop | None]:
-    """The compiled scene and the law of a controller from outside, if there is one.
+    """Compile a scene and prepare its external controller, if there is one.
 
-    The arguments are those of :func:`swgjoint.run_scene`.
+    Args:
+        scene: The scene, or the path or bundled name of a scene file.
+        overrides: Changes of the scene, see :meth:`Scene.load_file`.
+        drives: Maps that replace drive references of the scene.
+        controller: External controller; None runs the scene's own.
+        known_drives: Drive maps in the controller's model, by joint.
+        known_arm: Arm in the controller's model; None for the scene's own.
+        progress: Called while maps are built.
+
+    Returns:
+        The compiled scene, and the loop of the external controller or None.
+
+    Raises:
+        InputError: If the scene does not fit, or if ``known_drives`` or ``known_arm``
+            is given without a controller.
     """
     if not isinstance(scene, Scene):
         scene = Scene.load_file(scene, overrides)
@@ -89,16 +116,16 @@ def prepare_scene(
             assembly, controller, task_of(assembly, known_drives, known_arm)
         )
     elif known_drives or known_arm is not None:
-        what = "known_drives" if known_drives else "known_arm"
-        raise InputError(f"{what} without controller; accepted: both or none")
+        argument = "known_drives" if known_drives else "known_arm"
+        raise InputError(f"{argument} without controller; accepted: both or none")
     return assembly, loop
 
 
 @contextmanager
 def _without_log_file() -> Iterator[None]:
-    """Let the engine put its warnings on the console alone, not in the working folder.
+    """Keep the engine's warnings on the console, out of the working folder.
 
-    A run tells what they mean; the engine's ``MUJOCO_LOG.TXT`` would stay for ever.
+    A run reports what they mean; the engine's ``MUJOCO_LOG.TXT`` would remain there.
     """
     config = mujoco.MjLogConfig.get()
     before, config.logto_file = config.logto_file, False
@@ -121,10 +148,13 @@ def simulate(
     """Run an assembled scene; see :func:`swgjoint.run_scene`.
 
     Args:
-        assembly: The scene.
-        name: Of the run.
-        loop: Law of a controller from outside.
+        assembly: The compiled scene.
+        name: Name of the run.
+        loop: Loop of an external controller; None runs the scene's own.
         progress: Called with the steps done.
+
+    Raises:
+        ComputationError: If the motion diverges or the start has no equilibrium.
     """
     model, path = assembly.model, assembly.trajectory
     inputs = control_inputs(assembly)
@@ -158,34 +188,35 @@ def simulate(
     with Rollout(nthread=0) as rollout:
         for first in range(0, steps, chunk):
             last = min(first + chunk, steps)
-            got, _ = rollout.rollout(
+            rolled, _ = rollout.rollout(
                 model,
                 data,
                 states[first // parts][None],
                 inputs[None, first:last],
                 initial_warmstart=data.qacc_warmstart[None],
             )
-            states[first // parts + 1 : last // parts + 1] = got[0, parts - 1 :: parts]
-            rates[first + 1 : last + 1] = got[0][:, speeds]
-            _check_finite(assembly, data, got[0])
+            kept = slice(first // parts + 1, last // parts + 1)
+            states[kept] = rolled[0, parts - 1 :: parts]
+            rates[first + 1 : last + 1] = rolled[0][:, speeds]
+            _check_finite(assembly, data, rolled[0])
             progress(f"run {name}", last, steps)
     return _recorded(assembly, name, states, rates, time.perf_counter() - begin)
 
 
 def _check_finite(assembly: Assembly, data: mujoco.MjData, states: Array) -> None:
-    """Stop a run that diverged; the engine would go on with a reset state."""
+    """Stop a run that diverged; the engine would continue from a reset state."""
     nq, nv = assembly.model.nq, assembly.model.nv
     if data.warning[mujoco.mjtWarning.mjWARN_BADCTRL].number:
         raise ComputationError(
-            f"scene {assembly.scene.name!r}: before t = {states[-1, 0]:.3f} s a motor"
-            " or a disturbance was asked for more than 1e10, which the engine does not"
-            " apply; use lower gains of the controller"
+            f"scene {assembly.scene.name!r}: before t = {states[-1, 0]:.3f} s the"
+            " command of a motor or a disturbance exceeded 1e10, which the engine does"
+            " not apply; use lower gains of the controller"
         )
     if data.warning[mujoco.mjtWarning.mjWARN_INERTIA].number:
         raise ComputationError(
             f"scene {assembly.scene.name!r}: before t = {states[-1, 0]:.3f} s the"
-            " engine could not solve for the accelerations: the masses of the arm are"
-            " too far apart, or its inertia is close to singular; see mjWARN_INERTIA"
+            " engine could not solve for the accelerations: the masses of the arm"
+            " differ too much, or its inertia is close to singular; see mjWARN_INERTIA"
             " in MuJoCo's manual"
         )
     bad = any(
@@ -220,12 +251,12 @@ def _recorded(
 
     Args:
         whole: The scene as it was run.
-        name: Of the run.
-        states: One per step of the scene. Shape (n, n_state).
-        rates: Link speeds at every step of the engine [rad/s].
-        wall: Time that the steps took [s].
-        wanted: Motor torque that a sampled loop asked for at every step of the engine
-            [N·m]; None for the engine's own loops.
+        name: Name of the run.
+        states: Full engine states, one per step of the scene. Shape (n, n_state).
+        rates: Link speeds at every engine step [rad/s].
+        wall: Wall time of all steps [s].
+        wanted: Motor torque that a sampled loop requested at every engine step [N·m];
+            None for the engine's own loops.
     """
     assembly, ratio = whole.without_sub_steps(), whole.ratio
     model, path = assembly.model, assembly.trajectory
@@ -255,8 +286,9 @@ def _recorded(
         axis=-1,
     ).mean(axis=0)
     wanted = asked.mean(axis=0)
-    # no rotor: what the motor gives less what its rotor takes; the integrator's own
-    # acceleration is the velocity difference of the step that led to the state
+    # without a rotor the output torque is the motor torque minus the torque that
+    # accelerates the rotor inertia; the integrator's own acceleration is the velocity
+    # difference of the step that led to the state
     ideal = ratio * (rates - whole.prescribed_rate)
     slowing = np.diff(ideal, axis=0, prepend=ideal[:1])[:: whole.sub_steps] / whole.step
     output = ratio * (motor - assembly.rotor_inertia * slowing)
@@ -267,15 +299,15 @@ def _recorded(
     if assembly.scene.simulation.integrator == "discrete":
         ahead = 0.5 * whole.step
     for j in np.flatnonzero(flexible):
-        got = assembly.transmissions[j].signals(
+        signals = assembly.transmissions[j].signals(
             theta[:, j] - ahead * theta_rate[:, j],
             position[:, j] - ahead * velocity[:, j],
             theta_rate[:, j],
             velocity[:, j],
         )
-        torsion[:, j], error[:, j] = got.torsion, got.transmission_error
-        output[:, j] = got.torque
-        slipping[:, j], friction[:, j] = got.slipping, got.friction
+        torsion[:, j], error[:, j] = signals.torsion, signals.transmission_error
+        output[:, j] = signals.torque
+        slipping[:, j], friction[:, j] = signals.slipping, signals.friction
     return Run(
         name=name,
         assembly=assembly,
@@ -302,8 +334,8 @@ def _recorded(
 def _integrals(assembly: Assembly, states: Array) -> Array:
     """Integral of the error in the engine's loops [rad·s]. Shape (n, n_joints).
 
-    Under ``discrete`` as it acted on the way to the state: the engine integrates after
-    the forces.
+    Under ``discrete`` it is the integral that acted in the step to the state: the
+    engine integrates after it has computed the forces.
     """
     model = assembly.model
     integral = np.zeros((len(states), len(assembly.joints)))

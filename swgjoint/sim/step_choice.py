@@ -1,4 +1,4 @@
-"""Time step at which a run carries the ripple of its drives."""
+"""Time step that resolves the torque ripple of all drives of a run."""
 
 from __future__ import annotations
 
@@ -14,21 +14,22 @@ from swgjoint.sim.motion.commanded import trajectory_of
 from swgjoint.sim.scene.scene import Scene
 
 STEPS = (1e-3, 5e-4, 2.5e-4, 2e-4, 1e-4, 5e-5)
-"""Steps to choose from [s]."""
+"""Candidate time steps [s]."""
 PHASE_STEP = 0.25
-"""Phase of the highest order that matters in a step [rad]: half of what the step can
-carry, so that its amplitude is right to some percent."""
+"""Largest phase advance of the highest relevant order per step [rad]. It is half the
+phase that a step can resolve, so that the amplitude is accurate to a few percent."""
 TOOTH_ORDERS = 2
-"""Multiples of the tooth order of a design, whose map is not known yet."""
+"""Multiple of the tooth order that is resolved for a design without a map."""
 
 
 def resolving_step(scene: Scene, arm: RigidArm) -> float:
-    """Largest of :data:`STEPS` that carries the ripple of every drive [s].
+    """Largest of :data:`STEPS` that resolves the torque ripple of every drive [s].
 
-    The smallest of them where none does; the run then marks what it leaves out.
+    If none does, the smallest step is returned, and the run marks the orders that it
+    leaves out.
 
     Args:
-        scene: Scene of the arm; its own step is not used.
+        scene: Scene of the arm; its own step is ignored.
         arm: The arm.
     """
     speed = trajectory_of(scene, arm).top_speed
@@ -45,12 +46,19 @@ def resolving_step(scene: Scene, arm: RigidArm) -> float:
 
 
 def needed_order(source: DriveMap | Design) -> float:
-    """Highest order per input turn that matters for the ripple; 0 without harmonics.
+    """Highest order per input turn that contributes to the torque ripple.
 
-    Its torque, as :mod:`swgjoint.sim.figures.ripple_validity` estimates it, is at least
-    :data:`~swgjoint.sim.figures.ripple_validity.SHARE` of the largest; low orders have
-    less ripple than that estimate, so the sum of all says little. Of a design, whose
-    map is not known yet, the second tooth order.
+    An order contributes if its torque, as :mod:`swgjoint.sim.figures.ripple_validity`
+    estimates it, is at least
+    :data:`~swgjoint.sim.figures.ripple_validity.SHARE` of the largest. The estimate
+    exceeds the ripple of low orders, so a share of the sum would be a poor criterion.
+    For a design, whose map is not computed yet, it is the second tooth order.
+
+    Args:
+        source: Map or design of the drive.
+
+    Returns:
+        Order per input turn; zero if the map has no harmonics.
     """
     if isinstance(source, Design):
         return float(TOOTH_ORDERS * source.periodicity)
