@@ -14,7 +14,7 @@ from swgjoint.drives.sections import JointSection
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.maps.friction import Friction
 from swgjoint.maps.hysteresis import Jenkin
-from swgjoint.sim.figures.metrics import first_ratcheting
+from swgjoint.sim.figures.rating_use import first_ratcheting
 
 LINEAR = DriveMap.linear(2e4, teeth_flexspline=120, teeth_circular_spline=122)
 LAW = Friction(stiffness=50.0, coulomb=0.05, static=0.05, load=0.1, damping=0.05)

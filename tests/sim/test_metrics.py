@@ -8,11 +8,11 @@ import pytest
 from swgjoint.maps.drive_map import DriveMap
 from swgjoint.sim.figures.metrics import (
     against_rigid,
-    cubed_mean,
     orders_untold,
     signal_statistics,
     torque_ripple,
 )
+from swgjoint.sim.figures.rating_use import cubed_mean
 from swgjoint.units import arcmin
 from swgjoint.view.run import run_scene
 

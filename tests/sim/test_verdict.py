@@ -89,7 +89,7 @@ def test_missing_energy_makes_a_run_invalid(bench, synthetic_map):
     assert energy_reasons(energy, 50.0) == []
     work = abs(energy["motor_work_J"])
     (line,) = energy_reasons(energy | {"balance_error_J": work}, 50.0)
-    assert line.startswith(f"{work:.3g} J") and names(line, "simulation.step_s")
+    assert names(line, f"{work:.3g} J", "simulation.step_s")
     assert energy_reasons(energy | {"balance_error_J": 0.01 * work}, 50.0) == []
     # works of nothing: round-off of it is no reason
     nothing = dict.fromkeys(energy, 0.0) | {"balance_error_J": 1e-6}
@@ -215,10 +215,10 @@ def test_a_ripple_that_the_step_cannot_carry_is_unknown_rather_than_none(
     bench, synthetic_map
 ):
     joints = bench(synthetic_map).metrics()["joints"]
-    joints["joint"]["ripple_missing"] = "the step carries none of its orders"
+    joints["joint"]["ripple_missing"] = "the step resolves none of its orders"
     (line,) = [text for text in notes(joints) if text.startswith("-:")]
     assert line == (
-        "-: no figure for the torque ripple: the step carries none of its orders"
+        "-: no figure for the torque ripple: the step resolves none of its orders"
     )
 
 

@@ -1,4 +1,4 @@
-"""What a compiled model contains, and what was left out and why."""
+"""Contents of a compiled model, and what it leaves out and why."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from swgjoint.sim.figures.transmission import Transmission
 
 OFF_DAMPING = 0.02
-"""Damping ratio by steps from which the model is said to be without the drive's."""
+"""Excess of the damping ratio due to time steps from which it is reported."""
 _LOSSY = ("native", "full")
 _ERRING = ("kinematic", "full")
 _LEFT_OUT = {
@@ -27,7 +27,7 @@ _LEFT_OUT = {
 
 
 def contents(assembly: Assembly) -> dict[str, Any]:
-    """Counts of the compiled model and the content of every joint; JSON values only."""
+    """Counts of the compiled model and contents of every joint, as JSON values."""
     model = assembly.model
     return {
         "degrees_of_freedom": int(model.nv),
@@ -50,13 +50,13 @@ def contents(assembly: Assembly) -> dict[str, Any]:
 
 
 def _features(assembly: Assembly) -> dict[str, Any]:
-    """Controller, and of limits, payload, sensors, disturbances what there is."""
+    """Controller, and the motor limits, payload, sensors and disturbances present."""
     scene, loops = assembly.scene, assembly.loops
     step = scene.simulation.step_s
-    given = assembly.controlled_by
-    found: dict[str, Any] = {
+    external = assembly.controlled_by
+    features: dict[str, Any] = {
         "controller": {
-            "kind": scene.controller.kind if given is None else given,
+            "kind": scene.controller.kind if external is None else external,
             "feedback": scene.controller.feedback,
             "control_period_s": (scene.controller.control_period_s or step)
             if loops.sampled
@@ -65,43 +65,44 @@ def _features(assembly: Assembly) -> dict[str, Any]:
         }
     }
     limits = {
-        name: _given(one)
+        name: _set_keys(one)
         for name, one in zip(assembly.joints, loops.limits, strict=True)
         if one is not None
     }
     if limits:
-        found["motor_limits"] = limits
+        features["motor_limits"] = limits
     if scene.payload is not None:
-        found["payload"] = scene.payload.model_dump()
+        features["payload"] = scene.payload.model_dump()
     if scene.sensors is not None:
-        found["sensors"] = _given(scene.sensors)
+        features["sensors"] = _set_keys(scene.sensors)
     if scene.disturbance:
-        found["disturbances"] = [_given(one) for one in scene.disturbance]
-    return found
+        features["disturbances"] = [_set_keys(one) for one in scene.disturbance]
+    return features
 
 
 def _absent(assembly: Assembly) -> list[dict[str, str]]:
-    """Optional parts of a scene that this one does not have, so the model has none."""
+    """Optional parts that the scene, and therefore the model, does not have."""
     scene, loops, tables = assembly.scene, assembly.loops, "the scene has no"
     plugin = any(t.attached.plugin for t in assembly.transmissions)
     parts = (
         ("motor limits", any(loops.limits), f"{tables} motor table"),
         ("payload", scene.payload, f"{tables} [payload]"),
-        ("sensors", scene.sensors, f"{tables} [sensors]: angles are read as they are"),
+        ("sensors", scene.sensors, f"{tables} [sensors]: angles are read exactly"),
         ("disturbances", scene.disturbance, f"{tables} [[disturbance]]"),
         ("load torques", any(assembly.load), f"{tables} [load] that is not zero"),
-        ("integral of the error", any(loops.integral), "the controller is no pid"),
+        ("integral of the error", any(loops.integral), "the controller is not a pid"),
         (
             "sampled controller",
             loops.sampled,
-            "nothing in the scene asks for one: it acts within every step",
+            "nothing in the scene requires one: control acts within every step",
         ),
         ("engine plugin", plugin, "no joint has a level that needs it"),
     )
     return [{"part": part, "reason": why} for part, there, why in parts if not there]
 
 
-def _given(section: Section) -> dict[str, Any]:
+def _set_keys(section: Section) -> dict[str, Any]:
+    """Keys of a table that have a value."""
     return section.model_dump(exclude_none=True)
 
 
@@ -135,7 +136,7 @@ def _joint(assembly: Assembly, transmission: Transmission) -> dict[str, Any]:
 
 
 def _at_step(assembly: Assembly, transmission: Transmission) -> dict[str, Any]:
-    """Damping and frequency of the torsion as the steps leave them."""
+    """Damping ratio and frequency of the torsional vibration in discrete time."""
     mode, loaded = _modes(assembly, transmission)
     if mode is None or loaded is None:
         return {}
@@ -150,7 +151,7 @@ def _at_step(assembly: Assembly, transmission: Transmission) -> dict[str, Any]:
 def _modes(
     assembly: Assembly, transmission: Transmission
 ) -> tuple[StepMode | None, StepMode | None]:
-    """Torsional vibration about zero and about the rated torque."""
+    """Torsional vibration about zero and rated torque; None if not ``discrete``."""
     if assembly.scene.simulation.integrator != "discrete":
         return None, None
     rated = transmission.drive.ratings.rated_torque
@@ -164,14 +165,14 @@ def _modes(
 def _off_damping(
     assembly: Assembly, transmission: Transmission
 ) -> list[dict[str, str]]:
-    """Where steps damp the torsion much more than the drive does."""
+    """Report that the time steps damp the torsion much more than the drive does."""
     for mode, where in zip(
         _modes(assembly, transmission), ("", " at rated torque"), strict=True
     ):
         if mode is None or mode.damping_ratio < mode.own_damping_ratio + OFF_DAMPING:
             continue
         own, got = mode.own_damping_ratio, mode.damping_ratio
-        part = f"the damping ratio {own:.2g} of the drive: {got:.2g} results{where}"
+        part = f"the damping ratio {own:.2g} of the drive: it becomes {got:.2g}{where}"
         reason = (
             f"steps of {1e3 * assembly.step:.3g} ms damp the torsion at"
             f" {mode.own_frequency / hertz:.3g} Hz; a shorter simulation.step_s, or"
@@ -182,7 +183,7 @@ def _off_damping(
 
 
 def _error(attached: JointDrive) -> str | None:
-    """Where the kinematic error that the model has comes from; None without one."""
+    """Source of the kinematic error in the model; None without kinematic error."""
     drive = attached.drive
     if attached.level not in _ERRING or not drive.kinematic_error[1:].any():
         return None
@@ -190,7 +191,7 @@ def _error(attached: JointDrive) -> str | None:
 
 
 def _no_error(transmission: Transmission) -> str | None:
-    """Why a level that could carry one has no kinematic error of a catalogue drive."""
+    """Why a catalogue drive has no kinematic error at a level that can have one."""
     drive = transmission.drive
     if (
         transmission.level not in _ERRING
@@ -202,7 +203,7 @@ def _no_error(transmission: Transmission) -> str | None:
 
 
 def _native(attached: JointDrive) -> dict[str, Any]:
-    """The elements of level ``native``; nothing for others."""
+    """Elements of level ``native``; empty at other levels."""
     spring = attached.native
     if spring is None:
         return {}
@@ -230,10 +231,10 @@ def _left_out(transmission: Transmission) -> list[dict[str, str]]:
         reason = (
             "no native form"
             if attached.level == "native"
-            else f"not at level {attached.level}; joints.*.level = 'full' has it"
+            else f"not at level {attached.level}; use joints.*.level = 'full'"
         )
         items.append({"part": _LEFT_OUT[attached.level], "reason": reason})
-    lossless = f"not at level {attached.level}; native and full have it"
+    lossless = f"not at level {attached.level}; use level native or full"
     if attached.drive.hysteresis and attached.level not in _LOSSY:
         part = f"hysteresis ({len(attached.drive.hysteresis)} elements)"
         items.append({"part": part, "reason": lossless})
@@ -259,7 +260,7 @@ def _left_out(transmission: Transmission) -> list[dict[str, str]]:
         share = 100.0 * ratio_variation(attached.drive)
         items.append(
             {
-                "part": f"change of the ratio in the torque, up to {share:.2g} %",
+                "part": f"ratio variation in the torque, up to {share:.2g} %",
                 "reason": "the error is prescribed on the commanded motion",
             }
         )
@@ -274,7 +275,7 @@ def _left_out(transmission: Transmission) -> list[dict[str, str]]:
         items.append(
             {
                 "part": f"{orders} per input turn ({len(left)} harmonics)",
-                "reason": "the step cannot carry them at the speed of this joint",
+                "reason": "the step cannot resolve them at the speed of this joint",
             }
         )
     return items

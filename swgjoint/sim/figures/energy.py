@@ -1,15 +1,17 @@
-r"""Where the energy of a run goes: works, losses, storage, and whether they balance.
+r"""Energy balance of a run: works, losses and stored energy.
 
 .. math:: W_\text{motor} + W_\text{load} = \Delta E_\text{kinetic}
     + \Delta E_\text{weight} + \Delta E_\text{elastic} + D
-    + \text{what the balance misses}
+    + E_\text{balance error}
 
-The miss is the integrator's own damping and the error of sums over samples. Each term
-is computed by itself: none is a remainder of the others.
+The balance error consists of the numerical damping of the integrator and the error of
+sums over samples. Every term is computed independently, none as the remainder of the
+others.
 
-A torque that acts over a step does the work of the mean of the speeds before and after
-it, which is the change of kinetic energy exactly. The way of that step would not do:
-positions of the discrete integrator follow the speed after the step, half a step late.
+The work of a torque during a step is torque times step times the mean of the speeds
+before and after the step, which equals the change of kinetic energy exactly. The
+displacement of that step would not: the discrete integrator advances positions by the
+speed after the step, which is half a step late.
 """
 
 from __future__ import annotations
@@ -28,11 +30,11 @@ if TYPE_CHECKING:
 
 
 IDLE = 1e-3
-"""Mean torque over rated torque below which a joint does no work to speak of."""
+"""Mean torque over rated torque below which a joint counts as idle."""
 
 
 def run_energy(run: Run) -> dict[str, float]:
-    """Energies of the whole arm over the whole run [J]."""
+    """Energy balance of the whole arm over the whole run [J]."""
     joints = [joint_energy(run, j) for j in range(len(run.joints))]
     motor = sum(joint["motor_work_J"] for joint in joints)
     in_arm = arm_dissipation(run)
@@ -57,10 +59,10 @@ def run_energy(run: Run) -> dict[str, float]:
 
 
 def joint_energy(run: Run, j: int) -> dict[str, Any]:
-    """Works at both sides of one drive and what it dissipates over the run [J].
+    """Work on both sides of one drive and its dissipation over the run [J].
 
-    ``efficiency`` is work out over work in over the part at constant speed, whichever
-    side drives; None where the joint has no such part or carries no torque there.
+    ``efficiency`` is output work over input work in the constant-speed part, whichever
+    side drives. It is None if the joint has no such part or transmits no torque there.
 
     Args:
         run: The run.
@@ -73,13 +75,13 @@ def joint_energy(run: Run, j: int) -> dict[str, Any]:
     if run.assembly.trajectory.steady_velocity[j] == 0.0:
         missing = "the joint has no constant speed"
     else:
-        given, taken = _motor_work(run, j, window), _link_work(run, j, window)
+        work_in, work_out = _motor_work(run, j, window), _link_work(run, j, window)
         rated = run.assembly.transmissions[j].drive.ratings.rated_torque
         mean = np.abs(run.output_torque[window, j]).mean()
-        if mean < IDLE * rated or given * taken <= 0.0:
+        if mean < IDLE * rated or work_in * work_out <= 0.0:
             missing = "the joint runs idle"
         else:
-            efficiency = taken / given if taken > 0.0 else given / taken
+            efficiency = work_out / work_in if work_out > 0.0 else work_in / work_out
     return {
         "motor_work_J": motor,
         "link_work_J": out,
@@ -98,7 +100,7 @@ def load_work(run: Run) -> float:
     for disturbance in assembly.disturbances:
         value = disturbance_at(disturbance, middle)
         if isinstance(disturbance, ToolForce):
-            # the tool's way over two steps, as that of the speeds
+            # mean displacement of the tool over two steps, like that from the speeds
             way = np.gradient(run.tool_position @ np.array(disturbance.force_N))[:-1]
         else:
             way = _way(run, run.velocity[:, run.joints.index(disturbance.joint)])
@@ -107,7 +109,9 @@ def load_work(run: Run) -> float:
 
 
 def dissipation(run: Run, j: int) -> float:
-    """Damping, slipping and friction of one drive [J]; none without a rotor.
+    """Energy that one drive dissipates [J]; zero without a rotor.
+
+    It is the sum of damping, hysteresis and friction losses.
 
     Args:
         run: The run.
@@ -135,7 +139,7 @@ def dissipation(run: Run, j: int) -> float:
 
 
 def arm_dissipation(run: Run) -> float:
-    """What damping and dry friction of the arm's own joints and tendons take [J]."""
+    """Energy that damping and dry friction of the arm itself dissipate [J]."""
     model = run.assembly.arm.model
     step = run.assembly.scene.simulation.step_s
     speeds = 0.5 * (run.velocity[1:] + run.velocity[:-1])
@@ -158,13 +162,13 @@ def arm_dissipation(run: Run) -> float:
 
 
 def _dry_friction(run: Run, speeds: Array, accelerations: Array) -> Array:
-    r"""Torque that dry friction of the arm's joints takes as the engine has it [N·m].
+    r"""Dry-friction torque of the arm's joints in the engine's model [N·m].
 
     .. math:: \tau = \operatorname{clip}\left((b v + a)/R, \pm f\right), \quad
         R = A (1 - d)/d, \quad b = 2/(d_\text{max} t_c)
 
     with A the inverse inertia at the joint, d the impedance and t_c the time constant
-    of the constraint: it creeps where a rigid law would stick.
+    of the constraint. The joint creeps where a rigid friction law would stick.
 
     Source:
         MuJoCo documentation, chapter Computation, "Constraint model".
@@ -176,13 +180,13 @@ def _dry_friction(run: Run, speeds: Array, accelerations: Array) -> Array:
     constant = np.maximum(model.dof_solref[dofs, 0], 2.0 * assembly.step)
     rate = 2.0 / (model.dof_solimp[dofs, 1] * constant)
     most = model.dof_frictionloss[dofs]
-    asked = (rate * speeds + accelerations) / np.maximum(slip, 1e-15)
-    return np.asarray(np.clip(asked, -most, most))
+    stopping = (rate * speeds + accelerations) / np.maximum(slip, 1e-15)
+    return np.asarray(np.clip(stopping, -most, most))
 
 
 def _arm_springs(run: Run) -> float:
     """Change of the energy in springs of the arm's joints and tendons [J]."""
-    model, found = run.assembly.arm.model, []
+    model, energies = run.assembly.arm.model, []
     data = mujoco.MjData(model)
     for q in run.position[[0, -1]]:
         data.qpos[:] = q
@@ -191,12 +195,12 @@ def _arm_springs(run: Run) -> float:
         mujoco.mj_tendon(model, data)
         mujoco.mj_energyPos(model, data)
         weight = -float(model.body_mass @ (data.xipos @ model.opt.gravity))
-        found.append(float(data.energy[0]) - weight)
-    return found[1] - found[0]
+        energies.append(float(data.energy[0]) - weight)
+    return energies[1] - energies[0]
 
 
 def _motor_work(run: Run, j: int, part: slice) -> float:
-    # the torque beside a state is that of the whole way to it
+    # the torque of a state acted during the whole step that led to it
     torque = run.motor_torque[part, j][1:]
     if run.assembly.scene.simulation.integrator == "discrete":
         return float(torque @ _way(run, run.motor_velocity[part, j]))
@@ -204,7 +208,7 @@ def _motor_work(run: Run, j: int, part: slice) -> float:
 
 
 def _way(run: Run, speed: Array) -> Array:
-    """Step times the mean of the speeds before and after it. Shape (n - 1, ...)."""
+    """Displacement per step from the mean of both speeds. Shape (n - 1, ...)."""
     step = run.assembly.scene.simulation.step_s
     return np.asarray(0.5 * step * (speed[1:] + speed[:-1]))
 
@@ -214,12 +218,12 @@ def _link_work(run: Run, j: int, part: slice) -> float:
 
 
 def _work(torque: Array, angle: Array) -> float:
-    """Integral of a torque over its angle, by trapezoids [J]."""
+    """Integral of a torque over its angle by the trapezoidal rule [J]."""
     return float(0.5 * (torque[1:] + torque[:-1]) @ np.diff(angle))
 
 
 def _elastic(run: Run, j: int) -> float:
-    """Change of the energy in the spring of one drive [J]."""
+    """Change of the elastic energy of one drive [J]."""
     transmission = run.assembly.transmissions[j]
     law = transmission.law
     if law is None:
@@ -232,9 +236,9 @@ def _elastic(run: Run, j: int) -> float:
 
 
 def _rigid_energies(run: Run) -> tuple[float, float]:
-    """Change of the kinetic energy and of that of the weight [J]."""
+    """Changes of kinetic energy and of potential energy of the weight [J]."""
     assembly, model = run.assembly, run.assembly.model
-    data, found = mujoco.MjData(model), []
+    data, energies = mujoco.MjData(model), []
     flexible = assembly.motor_position >= 0
     for k in (0, -1):
         data.qpos[assembly.link_position] = run.position[k]
@@ -245,6 +249,6 @@ def _rigid_energies(run: Run) -> tuple[float, float]:
         mujoco.mj_fwdVelocity(model, data)
         mujoco.mj_energyVel(model, data)
         weight = -float(model.body_mass @ (data.xipos @ model.opt.gravity))
-        found.append((float(data.energy[1]), weight))
-    (first_kinetic, first_weight), (last_kinetic, last_weight) = found
+        energies.append((float(data.energy[1]), weight))
+    (first_kinetic, first_weight), (last_kinetic, last_weight) = energies
     return last_kinetic - first_kinetic, last_weight - first_weight

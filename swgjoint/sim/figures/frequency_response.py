@@ -2,8 +2,8 @@ r"""Two-mass frequency response of one joint, from a periodic chirp of motor tor
 
 Rotor J_m (at the input) and link J_l on a torsional stiffness K at the output resonate
 at :math:`\sqrt{K (1/J_l + 1/(i^2 J_m))}`; at :math:`\sqrt{K/J_l}` the rotor stands
-still (anti-resonance). The chirp repeats: once the transient of the first periods is
-gone, the ratio of two Fourier transforms over whole periods has no leakage.
+still (anti-resonance). The chirp repeats: once the initial transient has decayed, the
+ratio of two Fourier transforms over whole periods has no leakage.
 """
 
 from __future__ import annotations
@@ -32,48 +32,48 @@ class TwoMass:
     """Inertias on both sides of a drive."""
 
     rotor_inertia: float
-    """Rotor and wave generator about the input axis [kg·m²]."""
+    """Inertia of rotor and wave generator about the input axis [kg·m²]."""
     link_inertia: float
-    """Load about the output axis [kg·m²]."""
+    """Inertia of the load about the output axis [kg·m²]."""
 
     def resonance(self, stiffness: float, ratio: float) -> float:
-        """Closed form of the undamped resonance [Hz].
+        """Undamped resonance frequency in closed form [Hz].
 
         Args:
             stiffness: Torsional stiffness [N·m/rad].
-            ratio: Signed ratio i.
+            ratio: Signed ratio i, output = input / i.
         """
         reflected = ratio**2 * self.rotor_inertia
         compliance = 1.0 / self.link_inertia + 1.0 / reflected
         return sqrt(stiffness * compliance) / (2.0 * pi)
 
     def antiresonance(self, stiffness: float) -> float:
-        """Closed form of the undamped anti-resonance of the rotor [Hz]."""
+        """Undamped anti-resonance frequency of the rotor in closed form [Hz]."""
         return sqrt(stiffness / self.link_inertia) / (2.0 * pi)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Chirp:
-    """A sine whose frequency grows exponentially from low to high, repeated."""
+    """A periodic sine sweep whose frequency grows exponentially from low to high."""
 
     low: float
-    """[Hz]."""
+    """Lowest frequency [Hz]."""
     high: float
-    """[Hz]."""
+    """Highest frequency [Hz]."""
     period: float = 16.0
-    """One sweep [s]; lines of the spectrum are 1/period apart."""
+    """Duration of one sweep [s]; spectral lines are 1/period apart."""
     settling: int = 1
-    """Periods before the one that is evaluated."""
+    """Number of periods before the evaluated one."""
 
     def __post_init__(self) -> None:
         if not 0.0 < self.low < self.high or self.period * self.low < 1.0:
             raise InputError(
                 f"chirp from {self.low:g} to {self.high:g} Hz in {self.period:g} s;"
-                " accepted: 0 < low < high, at least one cycle of the lowest in it"
+                " accepted: 0 < low < high, with low * period >= 1"
             )
 
     def samples(self, step: float) -> Array:
-        """One period with an amplitude of one, without mean. Shape (n,)."""
+        """One period of unit amplitude, without its mean. Shape (n,)."""
         n = round(self.period / step)
         rate = np.log(self.high / self.low) / n
         phase = 2.0 * pi * self.low * step * np.expm1(rate * np.arange(n)) / rate
@@ -83,34 +83,34 @@ class Chirp:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FrequencyResponse:
-    """Speeds per motor torque, complex, over the band of the chirp."""
+    """Complex speeds per motor torque over the band of the chirp."""
 
     frequency: Array
-    """[Hz]. Shape (n,)."""
+    """Frequencies of the spectral lines [Hz]. Shape (n,)."""
     rotor: Complex
-    """Rotor speed per motor torque [rad/s per N·m]. Complex, shape (n,)."""
+    """Rotor speed per motor torque [rad/s per N·m]. Shape (n,)."""
     link: Complex
-    """Link speed per motor torque [rad/s per N·m]. Complex, shape (n,)."""
+    """Link speed per motor torque [rad/s per N·m]. Shape (n,)."""
     largest_torque: float
-    """Largest elastic torque of the drive on the way [N·m]."""
+    """Largest elastic torque of the drive in the evaluated period [N·m]."""
 
     @property
     def resonance(self) -> float:
-        """Where the link moves most against the free body [Hz]."""
+        """Frequency of the largest link motion relative to a free body [Hz]."""
         return self._extreme(np.abs(self.link) * self.frequency)
 
     @property
     def antiresonance(self) -> float:
-        """Where the rotor moves least against the free body [Hz]."""
+        """Frequency of the least rotor motion relative to a free body [Hz]."""
         return self._extreme(1.0 / (np.abs(self.rotor) * self.frequency))
 
     @property
     def peak(self) -> float:
-        """Link speed per motor torque at the resonance [rad/s per N·m]."""
+        """Largest link speed per motor torque [rad/s per N·m]."""
         return float(np.abs(self.link).max())
 
     def _extreme(self, height: Array) -> float:
-        """Vertex of the parabola through the logarithms at the largest line."""
+        """Frequency of the maximum [Hz], by a parabola through the log values."""
         k = int(height.argmax())
         if not 0 < k < len(height) - 1:
             raise ComputationError(
@@ -136,24 +136,24 @@ def frequency_response(
     integrator: str = "RK4",
     damping_ratio: float | None = None,
 ) -> FrequencyResponse:
-    """Excite the rotor of a joint that is free at both ends and look at both speeds.
+    """Excite the rotor of a joint that is free at both ends and record both speeds.
 
     Args:
         drive: Map of the drive.
-        masses: Rotor and link.
+        masses: Inertias of rotor and link.
         chirp: Excitation.
-        level: Of the joint: ``linear``, ``native`` or ``full``.
-        amplitude: Of the motor torque, seen at the output [N·m].
-        bias: Constant torque on the drive beside it, seen at the output [N·m]: the
+        level: Level of the joint: ``linear``, ``native`` or ``full``.
+        amplitude: Amplitude of the motor torque, reduced to the output [N·m].
+        bias: Additional constant torque on the drive, reduced to the output [N·m]: the
             motor drives, the load resists.
-        step: Of the simulation [s].
-        integrator: RK4 has no numerical damping at these steps; ``discrete`` is what
-            scenes use.
+        step: Time step of the simulation [s].
+        integrator: Integrator of the engine. RK4 has no numerical damping at these
+            steps; scenes use ``discrete`` by default.
         damping_ratio: As in :func:`swgjoint.joint.attach.attach`.
 
     Raises:
-        InputError: For a level without a rotor or a chirp that the step cannot carry.
-        ComputationError: If the simulation leaves finite numbers.
+        InputError: If the level has no rotor or the step cannot resolve the chirp.
+        ComputationError: If the simulation diverges.
     """
     if level not in ("linear", "native", "full"):
         raise InputError(f"level {level!r}; accepted: linear, native, full")
@@ -163,7 +163,7 @@ def frequency_response(
             f" up to {0.1 / step:g} Hz"
         )
     spec = _bench(masses, step, integrator)
-    got = attach(
+    attached = attach(
         spec,
         joint=JOINT,
         drive=drive,
@@ -172,19 +172,19 @@ def frequency_response(
         damping_ratio=damping_ratio,
         friction=False,
     )
-    assert got.rotor is not None
+    assert attached.rotor is not None
     if is_implicit(spec):
-        damp_as_asked(spec, {JOINT: got})
-    for name in (got.rotor, JOINT):
+        damp_as_asked(spec, {JOINT: attached})
+    for name in (attached.rotor, JOINT):
         motor = spec.add_actuator(name=name, target=name)
         motor.trntype = mujoco.mjtTrn.mjTRN_JOINT
         motor.gear[0] = 1.0
     model = spec.compile()
     wave = chirp.samples(step)
-    torque = (amplitude * wave + bias) / got.ratio
-    # the load holds the bias: the joint speeds up under the chirp alone
+    torque = (amplitude * wave + bias) / attached.ratio
+    # the load balances the bias, so that only the chirp accelerates the joint
     control = np.stack([torque, np.full_like(torque, -bias)], axis=-1)
-    x, speed = _last_period(model, got.rotor, control, chirp.settling + 1)
+    x, speed = _last_period(model, attached.rotor, control, chirp.settling + 1)
     bins = np.asarray(np.fft.rfftfreq(len(wave), step), dtype=np.float64)
     band = (bins >= chirp.low) & (bins <= chirp.high)
     spectrum = np.fft.rfft(speed, axis=0)[band] / np.fft.rfft(torque)[band, None]
@@ -199,7 +199,7 @@ def frequency_response(
 
 
 def _bench(masses: TwoMass, step: float, integrator: str) -> mujoco.MjSpec:
-    """A link on a hinge, without gravity."""
+    """Model of a link on a hinge without gravity."""
     spec = mujoco.MjSpec()
     spec.option.timestep = step
     spec.option.gravity = [0.0, 0.0, 0.0]
@@ -216,7 +216,7 @@ def _bench(masses: TwoMass, step: float, integrator: str) -> mujoco.MjSpec:
 def _last_period(
     model: mujoco.MjModel, rotor: str, control: Array, periods: int
 ) -> tuple[Array, Array]:
-    """Angles and speeds of rotor and link under a repeated control (n, 2) each."""
+    """Angles and speeds of rotor and link in the last period. Shapes (n, 2)."""
     data = mujoco.MjData(model)
     full = mujoco.mjtState.mjSTATE_FULLPHYSICS
     state = np.empty(mujoco.mj_stateSize(model, full))
@@ -225,8 +225,8 @@ def _last_period(
     q = [1 + int(joint.qposadr[0]) for joint in joints]  # after the time
     v = [1 + model.nq + int(joint.dofadr[0]) for joint in joints]
     for _ in range(periods):
-        found, _ = mujoco.rollout.rollout(model, data, state[None], control[None])
-        state = found[0, -1]
-    if not np.isfinite(found).all():
-        raise ComputationError("the response left finite numbers; try a smaller step")
-    return found[0][:, q], found[0][:, v]
+        states, _ = mujoco.rollout.rollout(model, data, state[None], control[None])
+        state = states[0, -1]
+    if not np.isfinite(states).all():
+        raise ComputationError("the response diverged; try a smaller step")
+    return states[0][:, q], states[0][:, v]

@@ -1,4 +1,4 @@
-"""Figures by which runs are compared, and which way is better."""
+"""Figures that comparisons and specifications use, with their better direction."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ UPPER = (
     "cubed_mean_torque_of_rating",
     "wall_s",
 )
-"""Figures that a spec limits from above."""
+"""Figures that a specification bounds from above."""
 LOWER = ("K1_Nm_rad", "fatigue_safety_factor", "real_time_factor")
-"""Figures that a spec limits from below."""
+"""Figures that a specification bounds from below."""
 RIPPLE = (
     "ripple_rms_percent",
     "ripple_pp_percent",
     "transmission_error_ripple_arcmin",
 )
-"""Figures that a drive without harmonics does not have."""
+"""Ripple figures, which a drive without harmonics does not have."""

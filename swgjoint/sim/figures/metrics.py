@@ -1,12 +1,12 @@
-"""Figures of a run, defined once; keys and units are those of the JSON output.
+"""Figures of a run; keys and units are those of the JSON output.
 
-Joint figures are taken over the constant-speed part of the motion, at every step; a
-motion without such a part (a chirp, a path of the tool) gives them over the motion.
+Joint figures refer to all steps of the constant-speed part of the motion, or to the
+whole motion if it has no such part (a chirp, a path of the tool).
 
-Torque ripple of the arm in motion: output torque of the drive, less the torque that
-the rigid arm needs at the same instant of the commanded motion (its weight changes
-with the pose), less the straight line that remains. The line holds the mean and the
-slow effect of sagging; nothing above half a cycle per record is touched.
+Torque ripple of the moving arm is the output torque of the drive minus the torque that
+the rigid arm needs at the same instant of the commanded motion (its weight torque
+changes with the pose), minus a straight line in time. The line removes the mean and the
+slow effect of sag; nothing above half a cycle per record is affected.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ import numpy as np
 from swgjoint.joint.step_error import LinearMotorLoop, step_error
 from swgjoint.sim.figures.energy import joint_energy, run_energy
 from swgjoint.sim.figures.orders import OrderLine, resample, strongest_lines
+from swgjoint.sim.figures.rating_use import use_of_ratings
 from swgjoint.sim.figures.ripple_validity import (
     HARMONIC_LEVELS,
     map_label,
@@ -26,7 +27,7 @@ from swgjoint.sim.figures.ripple_validity import (
 from swgjoint.sim.figures.tool_metrics import joint_settling, tool_metrics
 from swgjoint.sim.figures.verdict import PHASE_STEP, judge_run
 from swgjoint.typing import Array
-from swgjoint.units import arcmin, deg, mm, rpm
+from swgjoint.units import arcmin, deg, mm
 
 if TYPE_CHECKING:
     from swgjoint.sim.figures.transmission import Transmission
@@ -34,11 +35,10 @@ if TYPE_CHECKING:
 
 
 NOISE = 1e-6
-"""Lines below this share of the rated torque, or of one arcmin, are round-off."""
-SLACK = 1.01
-"""Ratings have two or three digits; a run at rated torque is within them."""
+"""Amplitude, relative to rated torque or to 1 arcmin, below which lines are round-off.
+"""
 RIPPLE_OF = "arm in motion, rigid-arm torque and straight line removed"
-NOT_STEADY = "whole motion, no speed is constant: no ripple alone, but dynamics too"
+NOT_STEADY = "whole motion, no speed is constant: includes the dynamics of the motion"
 
 
 def run_metrics(run: Run) -> dict[str, Any]:
@@ -60,7 +60,7 @@ def run_metrics(run: Run) -> dict[str, Any]:
 
 
 def joint_metrics(run: Run, j: int) -> dict[str, Any]:
-    """Figures of one joint; torsion and error are zero, never absent, if rigid.
+    """Figures of one joint; torsion and error of a rigid joint are zero.
 
     Args:
         run: The run.
@@ -122,7 +122,7 @@ def joint_metrics(run: Run, j: int) -> dict[str, Any]:
 
 
 def _off_command(run: Run, j: int) -> float | None:
-    """Largest distance of a link from its command; None without a constant speed."""
+    """Largest deviation of a link from its command [deg]; None if speed varies."""
     if not _any_steady(run):
         return None
     off = run.position[run.steady, j] - run.reference[run.steady, j]
@@ -130,11 +130,11 @@ def _off_command(run: Run, j: int) -> float | None:
 
 
 def orders_untold(angle: Array, highest: float | None) -> str | None:
-    """Why a record has no orders per input turn; None where it has.
+    """Reason why a record has no orders per input turn; None if it has.
 
     Args:
         angle: Input angle over the record [rad]. Shape (n,).
-        highest: Highest order that the step resolves; None at rest.
+        highest: Highest order that the step resolves; None for a joint at rest.
     """
     if highest is None:
         return "the joint has no constant speed"
@@ -144,7 +144,7 @@ def orders_untold(angle: Array, highest: float | None) -> str | None:
 
 
 def _any_steady(run: Run) -> bool:
-    """Whether a joint turns at constant speed, or none is commanded to move at all."""
+    """Whether a joint turns at constant speed, or no joint is commanded to move."""
     path = run.assembly.trajectory
     return bool(path.steady_velocity.any()) or not (
         path.velocity.any() or path.answer_speed is not None
@@ -152,7 +152,7 @@ def _any_steady(run: Run) -> bool:
 
 
 def use_of_motor(run: Run, j: int) -> dict[str, Any]:
-    """Torque and current of one motor over the run, and how long it was at a limit.
+    """Torque and current of one motor over the run, and its time at a limit.
 
     Args:
         run: The run.
@@ -160,38 +160,38 @@ def use_of_motor(run: Run, j: int) -> dict[str, Any]:
     """
     torque = run.motor_torque[:, j]
     limits = run.assembly.loops.limits[j]
-    found: dict[str, Any] = {
+    use: dict[str, Any] = {
         "peak_Nm": float(np.abs(torque).max()),
         "rms_Nm": float(np.sqrt(np.mean(torque**2))),
     }
     if limits is None:
-        return found
+        return use
     lacking = np.abs(run.wanted_torque[:, j] - torque)
     step = run.assembly.scene.simulation.step_s
-    limit = 1e-9 * max(found["peak_Nm"], 1e-300)
-    found["at_limit_s"] = float(np.count_nonzero(lacking[1:] > limit) * step)
+    limit = 1e-9 * max(use["peak_Nm"], 1e-300)
+    use["at_limit_s"] = float(np.count_nonzero(lacking[1:] > limit) * step)
     constant = limits.torque_constant_Nm_A
     if constant is not None:
-        found["current_peak_A"] = found["peak_Nm"] / constant
-        found["current_rms_A"] = found["rms_Nm"] / constant
-    return found
+        use["current_peak_A"] = use["peak_Nm"] / constant
+        use["current_rms_A"] = use["rms_Nm"] / constant
+    return use
 
 
 def torque_deviation(run: Run, j: int, part: slice = slice(None)) -> Array:
-    """Output torque less what the rigid arm needs at that instant [N·m]. Shape (n,).
+    """Output torque minus that of the rigid arm at the same instant [N·m]. Shape (n,).
 
     Args:
         run: The run.
-        j: Number of the joint.
-        part: Samples, all by default.
+        j: Index of the joint.
+        part: Samples; all by default.
     """
     return np.asarray(run.output_torque[part, j] - run.assembly.link_torque[part, j])
 
 
 def torque_ripple(run: Run, j: int) -> Array:
-    """Ripple of one joint over the constant-speed part [N·m]. Shape (n_window,).
+    """Torque ripple of one joint in the constant-speed part [N·m]. Shape (n_window,).
 
-    Deviation of the torque less its mean and its straight line in time.
+    It is the torque deviation minus its mean and its linear trend in time.
 
     Args:
         run: The run.
@@ -204,7 +204,7 @@ def torque_ripple(run: Run, j: int) -> Array:
 
 
 def highest_resolved_order(run: Run, j: int) -> float | None:
-    """Highest order per input turn that the step carries; None for a joint at rest.
+    """Highest order per input turn that the step resolves; None for a joint at rest.
 
     Args:
         run: The run.
@@ -217,11 +217,15 @@ def highest_resolved_order(run: Run, j: int) -> float | None:
 
 
 def phase_step(run: Run, j: int) -> float:
-    """Largest phase of the highest kept order in one step of the engine [rad].
+    """Largest phase advance of the highest kept order in one engine step [rad].
 
-    Over the part of the motion that the figures are taken from. Harmonics are kept by
-    the commanded speed; a rotor may turn faster than that. Levels without harmonics
-    have no such phase.
+    It refers to the part of the motion that the figures use. The commanded speed
+    decides which harmonics are kept, but a rotor may turn faster. Zero at levels
+    without harmonics.
+
+    Args:
+        run: The run.
+        j: Index of the joint.
     """
     attached = run.assembly.transmissions[j].attached
     if attached.level not in HARMONIC_LEVELS:
@@ -232,15 +236,15 @@ def phase_step(run: Run, j: int) -> float:
 
 
 def drive_order(run: Run, j: int, order: float) -> float | None:
-    """The order of the joint's own drive that a line belongs to, None for others.
+    """Order of the joint's own drive to which a line belongs; None for other lines.
 
-    Others are vibrations of the arm, products of two orders, and the orders of other
-    joints, which reach this one through the arm.
+    Other lines are vibrations of the arm, products of two orders, and orders of other
+    joints that reach this one through the arm.
 
     Args:
         run: The run.
         j: Index of the joint.
-        order: Order per turn of the input.
+        order: Order of the line per input turn.
     """
     attached = run.assembly.transmissions[j].attached
     if attached.level not in HARMONIC_LEVELS or not attached.kept_orders:
@@ -251,9 +255,17 @@ def drive_order(run: Run, j: int, order: float) -> float | None:
 
 
 def line_error(run: Run, j: int, order: float) -> float | None:
-    """Relative error of a torque line by the step, the joint moving alone.
+    """Relative amplitude error of a torque line due to the step, joint moving alone.
 
-    See :mod:`swgjoint.joint.step_error`; None for lines that are not of the drive.
+    See :mod:`swgjoint.joint.step_error`.
+
+    Args:
+        run: The run.
+        j: Index of the joint.
+        order: Order of the line per input turn.
+
+    Returns:
+        Relative error; None for lines that are not of the drive.
     """
     if run.assembly.scene.simulation.integrator != "discrete":
         return None
@@ -280,8 +292,8 @@ def line_error(run: Run, j: int, order: float) -> float | None:
 def strongest_left_out(transmission: Transmission) -> bool:
     """Whether the strongest harmonic of a drive is among those left out.
 
-    Strength as angle: amplitude in the kinematic error, plus that in the torque at
-    rated torque over the stiffness.
+    Strength is an angle: amplitude in the kinematic error, plus amplitude in the torque
+    at rated torque divided by the stiffness.
     """
     attached = transmission.attached
     if not attached.unresolved:
@@ -294,13 +306,8 @@ def strongest_left_out(transmission: Transmission) -> bool:
     return bool(lost > strength[1:].max(initial=0.0))
 
 
-AT_REST = 1e-9
-"""Commanded speed of a joint that rests [rad/s]: the round-off of a motion through
-equal points is below it."""
-
-
 def signal_statistics(values: Array) -> dict[str, float]:
-    """Mean, root mean square and peak to peak of a signal, in its unit."""
+    """Mean, root mean square and peak-to-peak value of a signal, in its unit."""
     return {
         "mean": float(np.mean(values)),
         "rms": float(np.sqrt(np.mean(values**2))),
@@ -308,79 +315,13 @@ def signal_statistics(values: Array) -> dict[str, float]:
     }
 
 
-def use_of_ratings(run: Run, j: int) -> dict[str, Any]:
-    """Torques and speed of one joint over the whole run against the ratings.
-
-    At rest the cubed mean is that over time.
-    """
-    transmission = run.assembly.transmissions[j]
-    ratings = transmission.drive.ratings
-    torque = np.abs(run.output_torque[:, j])
-    speed = np.abs(run.velocity[:, j])
-    moving = run.assembly.trajectory.top_speed[j] > AT_REST and speed.any()
-    cubed = cubed_mean(torque, speed if moving else np.ones_like(speed))
-    peak = float(torque.max())
-    low, high = transmission.drive.torque_range
-    skips = ratings.ratcheting_torque
-    return {
-        "rated_Nm": ratings.rated_torque,
-        "repeated_peak_Nm": ratings.repeated_peak,
-        "momentary_peak_Nm": ratings.momentary_peak,
-        "ratcheting_Nm": skips,
-        "source": ratings.source,
-        "peak_Nm": peak,
-        "cubed_mean_Nm": cubed,
-        "input_speed_rpm": float(np.abs(run.motor_velocity[:, j]).max() / rpm),
-        "within": bool(
-            cubed <= SLACK * ratings.rated_torque
-            and peak <= SLACK * ratings.repeated_peak
-        ),
-        "ratcheting_margin": None if skips is None else skips / max(peak, 1e-300),
-        "ratcheting": first_ratcheting(run.time, run.output_torque[:, j], skips),
-        "map_range_Nm": [low, high],
-        "within_map": bool(
-            low <= run.output_torque[:, j].min()
-            and run.output_torque[:, j].max() <= high
-        ),
-    }
-
-
-def first_ratcheting(
-    time: Array, torque: Array, limit: float | None
-) -> dict[str, Any] | None:
-    """The first instant at which teeth would skip; None where they do not.
-
-    The simulation goes on with the elastic law: what follows is no skipped tooth.
-
-    Args:
-        time: [s]. Shape (n,).
-        torque: At the output [N·m]. Shape (n,).
-        limit: Ratcheting torque [N·m], None where it is not known.
-    """
-    above = np.flatnonzero(np.abs(torque) > (np.inf if limit is None else limit))
-    if not above.size:
-        return None
-    first = int(above[0])
-    return {
-        "time_s": float(time[first]),
-        "torque_Nm": float(torque[first]),
-        "after_it": "elastic, without the skipped tooth",
-    }
-
-
-def cubed_mean(torque: Array, speed: Array) -> float:
-    """Mean load torque as catalogues define it, (sum |T|³ |n| / sum |n|)^(1/3) [N·m].
-
-    Args:
-        torque: Output torque at equal steps of time [N·m]. Shape (n,).
-        speed: Output speed, any unit, not zero throughout. Shape (n,).
-    """
-    weight = np.abs(speed)
-    return float(np.average(np.abs(torque) ** 3, weights=weight) ** (1.0 / 3.0))
-
-
 def against_rigid(run: Run, rigid: Run) -> dict[str, float]:
-    """Distance of the tool from that of the rigid arm on the same motion [mm]."""
+    """Distance of the tool from that of the rigid arm on the same motion [mm].
+
+    Args:
+        run: The run.
+        rigid: Run of the same motion with rigid joints.
+    """
     error = run.tool_error(rigid) / mm
     steady = error[run.steady]
     return {

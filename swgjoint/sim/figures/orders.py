@@ -1,13 +1,13 @@
 r"""Order analysis: lines of a signal per turn of the wave generator.
 
-The signal is resampled at equal steps of the input angle, a cubic trend is removed and
-a Hann window finds the lines one after the other, strongest first. Their amplitudes
-come from one least-squares fit of all lines and the trend together,
+The signal is resampled at equal steps of the input angle and a cubic trend is removed.
+The lines are then found one by one in a Hann-windowed spectrum, strongest first. Their
+amplitudes result from one least-squares fit of all lines and the trend,
 
 .. math:: x(\theta) = \sum_{j<4} c_j \theta^j
     + \sum_k a_k \cos(n_k \theta) + b_k \sin(n_k \theta),
 
-so they are neither lowered by the window nor by an order between two bins.
+so neither the window nor an order between two bins reduces them.
 """
 
 from __future__ import annotations
@@ -19,10 +19,13 @@ import numpy as np
 from swgjoint.typing import Array
 
 TREND_DEGREE = 3
+"""Degree of the polynomial trend in the input angle."""
 PADDING = 8
+"""Factor by which zero padding at least extends the record."""
 SKIRT = 4.0
-"""Lines closer than this over the turns of the record are one line: twice the half
-width of the Hann window, since loads and amplitudes change along a motion."""
+"""Order distance times turns of the record below which two lines count as one. It is
+twice the half width of the Hann window, because loads and amplitudes vary along a
+motion."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,35 +35,37 @@ class OrderLine:
     order: float
     """Cycles per turn of the wave generator."""
     amplitude: float
-    """Zero to peak, in the unit of the signal."""
+    """Zero-to-peak amplitude in the unit of the signal."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class OrderSpectrum:
-    """Amplitude over order with a Hann window, for pictures."""
+    """Hann-windowed amplitude spectrum over order, for plots."""
 
     order: Array
-    """Cycles per turn. Shape (n,)."""
+    """Cycles per turn of the wave generator. Shape (n,)."""
     amplitude: Array
-    """Zero to peak of a lone line at that order, unit of the signal. Shape (n,)."""
+    """Zero-to-peak amplitude of a single line at that order, in the unit of the signal.
+    Shape (n,)."""
 
 
 def resample(angle: Array, signal: Array) -> tuple[Array, Array] | None:
-    """The signal at equal steps of the angle, or None where the angle stands still.
+    """Resample a signal at equal steps of the angle.
 
     Args:
-        angle: Input angle [rad], monotone but for small wobble. Shape (n,).
-        signal: Any unit. Shape (n,).
+        angle: Input angle [rad], monotonic except for small vibration. Shape (n,).
+        signal: Signal in any unit. Shape (n,).
 
     Returns:
-        Angle from 0 [rad] and signal, both of shape (n,).
+        Angle from zero [rad] and signal, both of shape (n,). None if the angle covers
+        less than half a turn or reverses too often.
     """
     from scipy.interpolate import CubicSpline
 
     travel = (angle - angle[0]) * np.sign(angle[-1] - angle[0])
     if travel.size < 16 or travel[-1] < np.pi:
         return None
-    # a drive that vibrates back and forth would not be a function of its angle
+    # the signal of a vibrating drive would not be a function of its angle
     keep = np.concatenate([[True], travel[1:] > np.maximum.accumulate(travel)[:-1]])
     if keep.mean() < 0.5:
         return None
@@ -69,7 +74,15 @@ def resample(angle: Array, signal: Array) -> tuple[Array, Array] | None:
 
 
 def order_spectrum(angle: Array, signal: Array) -> OrderSpectrum | None:
-    """Amplitude spectrum over the input angle; None where the input stands still."""
+    """Amplitude spectrum over orders of the input angle.
+
+    Args:
+        angle: Input angle [rad]. Shape (n,).
+        signal: Signal in any unit. Shape (n,).
+
+    Returns:
+        The spectrum; None where :func:`resample` returns None.
+    """
     even = resample(angle, signal)
     return None if even is None else _spectrum(even[0], _detrend(*even))
 
@@ -86,14 +99,14 @@ def strongest_lines(
 
     Args:
         angle: Input angle [rad]. Shape (n,).
-        signal: Any unit. Shape (n,).
-        highest: Largest order to look for; what the step resolves.
+        signal: Signal in any unit. Shape (n,).
+        highest: Highest order to search, usually the highest that the step resolves.
         count: Number of lines.
-        floor: Lines below this amplitude are noise and left out.
+        floor: Amplitude below which lines are noise and are left out.
 
     Returns:
-        At most ``count`` lines; none where the input turns less than half a turn.
-        Orders below one half or below two cycles in the record belong to the trend.
+        At most ``count`` lines; none if the input turns less than half a turn. Orders
+        below one half or below two cycles per record belong to the trend.
     """
     even = resample(angle, signal)
     if even is None:
@@ -106,7 +119,7 @@ def strongest_lines(
     while len(orders) < count:
         spectrum = _spectrum(grid, residual)
         allowed = (spectrum.order >= lowest) & (spectrum.order <= highest)
-        for known in orders:  # skirts of a line whose amplitude changes on the way
+        for known in orders:  # skirts of a line whose amplitude varies along the motion
             allowed &= np.abs(spectrum.order - known) > SKIRT / turns
         if not allowed.any():
             break
@@ -128,13 +141,13 @@ def _detrend(grid: Array, values: Array) -> Array:
 
 
 def _fit(grid: Array, values: Array, orders: list[float]) -> tuple[Array, Array]:
-    """Residual of trend and lines fitted together, and the amplitudes of the lines."""
+    """Residual of the joint fit of trend and lines, and amplitudes of the lines."""
     x = 2.0 * grid / grid[-1] - 1.0
     columns = [np.polynomial.legendre.legvander(x, TREND_DEGREE)]
     for order in orders:
         columns += [np.cos(order * grid)[:, None], np.sin(order * grid)[:, None]]
     basis = np.hstack(columns)
-    # normal equations: a handful of columns, well conditioned, 10x faster than lstsq
+    # normal equations: few, well-conditioned columns; ten times faster than lstsq
     weights = np.linalg.lstsq(basis.T @ basis, basis.T @ values, rcond=1e-12)[0]
     pairs = weights[TREND_DEGREE + 1 :].reshape(-1, 2)
     return values - basis @ weights, np.hypot(pairs[:, 0], pairs[:, 1])

@@ -1,15 +1,15 @@
-r"""How far the torque ripple of a joint may be believed.
+r"""Validity of the torque ripple of a joint.
 
-The ripple comes from the harmonics of the maps, which :func:`map_label` judges. A run
-without any harmonics has no ripple, only vibration and round-off. A run that leaves
-harmonics out, because its step cannot carry them, has less ripple than the drive. The
-missing part is estimated from the map: inertia on either side resists fast orders, so
-that order n of the kinematic error, :math:`e_n`, becomes torsion, with the torque
+The ripple results from the harmonics of the maps, which :func:`map_label` assesses. A
+run without harmonics has no ripple, only vibration and round-off. A run whose step
+cannot resolve some harmonics leaves them out and has less ripple than the drive. The
+missing part is estimated from the map. The inertias on both sides resist fast motion,
+so that order n of the kinematic error, :math:`e_n`, becomes torsion, with the torque
 
 .. math:: T_n = K e_n + |\partial_\Delta V_n|
 
-at rated torque. The rms of the ripple is then at least the recorded one and about
-:math:`\sqrt{r^2 + \sum T_n^2/2}`.
+at rated torque. The rms of the ripple is then at least the recorded rms :math:`r`, and
+about :math:`\sqrt{r^2 + \sum T_n^2/2}`.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 HARMONIC_LEVELS = ("kinematic", "full")
 SHARE = 0.05
-"""Part of the ripple that may be left out before the figure is a lower bound."""
+"""Relative increase of the ripple by orders left out that makes it a lower bound."""
 ABOVE_NOISE = 3.0
 """Smallest ratio of ripple to integration noise at which the ripple is reported."""
 ROUND_OFF = 1e-6
@@ -37,20 +37,20 @@ ROUND_OFF = 1e-6
 
 
 def ripple_label(run: Run, j: int, ripple: Array) -> dict[str, Any]:
-    """Validity of the ripple of one joint.
+    """Validity of the torque ripple of one joint.
 
     Args:
         run: The run.
-        j: Number of the joint.
-        ripple: Of the joint [N·m]. Shape (n_window,).
+        j: Index of the joint.
+        ripple: Torque ripple of the joint [N·m]. Shape (n_window,).
 
     Returns:
-        ``ripple_missing``: why there is none to tell, None where there is.
-        ``ripple_noise_percent``: rms of the noise of the integration, of the rated
+        ``ripple_missing``: reason why no ripple is reported; None if it is.
+        ``ripple_noise_percent``: rms of the integration noise, relative to the rated
         torque. ``ripple_left_out_percent``: rms of the orders that the step leaves out.
-        ``ripple_is_lower_bound``: whether they matter. ``resolving``: the strongest
-        order that is left out with the step, and the speed of the joint at the step of
-        the run, that carry it; None where nothing is left out.
+        ``ripple_is_lower_bound``: whether they are significant. ``resolving``: the
+        strongest order left out, the step that resolves it, and the joint speed at
+        which the step of the run resolves it; None if nothing is left out.
     """
     transmission = run.assembly.transmissions[j]
     rated = transmission.drive.ratings.rated_torque
@@ -63,7 +63,7 @@ def ripple_label(run: Run, j: int, ripple: Array) -> dict[str, Any]:
     elif rms < max(ABOVE_NOISE * noise, ROUND_OFF * rated):
         missing = "below the noise of the integration"
         if left:
-            missing = "the step carries none of its orders"
+            missing = "the step resolves none of its orders"
     whole = float(np.hypot(rms, left))
     return {
         "ripple_missing": missing,
@@ -75,29 +75,29 @@ def ripple_label(run: Run, j: int, ripple: Array) -> dict[str, Any]:
 
 
 def map_label(run: Run, j: int, *, told: bool) -> dict[str, Any]:
-    """What the map of one joint misses at the torques of the figures.
+    """Validity of the map of one joint at the torques of the run.
 
-    The validation of the map is read over the torques of the part of the motion that
-    the figures are taken from.
+    The validation record of the map is evaluated over the torques of the part of the
+    motion that the figures use.
 
     Args:
         run: The run.
-        j: Number of the joint.
-        told: Whether the run tells a ripple of the joint.
+        j: Index of the joint.
+        told: Whether the run reports a ripple of the joint.
 
     Returns:
-        ``ripple_valid``: whether the map is within the limit there, None where it has
-        no ripple to judge or no record. ``map_difference``: the largest differences
-        under ``input_torque`` and ``output_error``, and ``torque_range_Nm``; None with
-        the reason in ``map_difference_missing``.
+        ``ripple_valid``: whether the map is within the limit; None if there is no
+        ripple to assess or no record. ``map_difference``: the largest differences under
+        ``input_torque`` and ``output_error``, and ``torque_range_Nm``; None with the
+        reason in ``map_difference_missing``.
     """
     transmission = run.assembly.transmissions[j]
-    found, reason = map_validation(transmission.drive)
+    record, reason = map_validation(transmission.drive)
     if transmission.level != "full":
-        found, reason = None, f"level {transmission.level} has no ripple of a map"
+        record, reason = None, f"level {transmission.level} has no ripple of a map"
     elif not transmission.attached.kept_orders:
-        found, reason = None, "the step carries no order of the map"
-    if found is None:
+        record, reason = None, "the step resolves no order of the map"
+    if record is None:
         return {
             "ripple_valid": None,
             "map_difference": None,
@@ -105,7 +105,7 @@ def map_label(run: Run, j: int, *, told: bool) -> dict[str, Any]:
         }
     torque = run.output_torque[run.steady, j]
     low, high = float(torque.min()), float(torque.max())
-    differences = found.worst_between(low, high)
+    differences = record.worst_between(low, high)
     worst = max(one.largest for one in differences.values())
     return {
         "ripple_valid": worst <= LIMIT if told else None,
@@ -118,7 +118,12 @@ def map_label(run: Run, j: int, *, told: bool) -> dict[str, Any]:
 
 
 def has_harmonics(run: Run, j: int) -> bool:
-    """Whether the map of a joint makes ripple at the level of the joint."""
+    """Whether the map of a joint causes torque ripple at the level of the joint.
+
+    Args:
+        run: The run.
+        j: Index of the joint.
+    """
     attached = run.assembly.transmissions[j].attached
     return attached.level in HARMONIC_LEVELS and bool(
         len(attached.drive.orders) > 1 or attached.unresolved
@@ -126,10 +131,10 @@ def has_harmonics(run: Run, j: int) -> bool:
 
 
 def integration_noise(signal: Array) -> float:
-    r"""Noise between neighbouring samples, rms, unit of the signal.
+    r"""Rms noise between adjacent samples, in the unit of the signal.
 
-    White noise of standard deviation s has second differences of
-    :math:`\sqrt 6\, s`; a wave that the step carries has next to none.
+    White noise of standard deviation s has second differences of standard deviation
+    :math:`\sqrt 6\, s`; those of a wave that the step resolves are almost zero.
     """
     if signal.size < 3:
         return 0.0
@@ -137,7 +142,12 @@ def integration_noise(signal: Array) -> float:
 
 
 def left_out_torque(run: Run, j: int) -> float:
-    """Estimated rms of the ripple that unresolved orders would add [N·m]."""
+    """Estimated rms of the torque ripple of the unresolved orders [N·m].
+
+    Args:
+        run: The run.
+        j: Index of the joint.
+    """
     attached = run.assembly.transmissions[j].attached
     return float(
         np.sqrt(
@@ -150,7 +160,16 @@ def left_out_torque(run: Run, j: int) -> float:
 
 
 def find_resolving_step(run: Run, j: int) -> dict[str, float] | None:
-    """Step and speed that carry the strongest order that is left out."""
+    """Strongest order left out, with the step and the speed that resolve it.
+
+    Args:
+        run: The run.
+        j: Index of the joint.
+
+    Returns:
+        ``order`` per input turn; ``step_s`` at the speed of the run [s];
+        ``speed_deg_s`` at the step of the run [deg/s]; None if nothing is left out.
+    """
     transmission = run.assembly.transmissions[j]
     attached = transmission.attached
     speed = float(run.assembly.trajectory.top_speed[j])

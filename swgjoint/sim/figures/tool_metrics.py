@@ -1,4 +1,4 @@
-r"""Figures of the tool: pose and path accuracy after ISO 9283 (1998), settling.
+r"""Figures of the tool: pose and path accuracy by ISO 9283 (1998), settling.
 
 With attained positions :math:`x_j` of n approaches of one pose, their barycentre
 :math:`\bar x` and :math:`l_j = |x_j - \bar x|`,
@@ -6,8 +6,8 @@ With attained positions :math:`x_j` of n approaches of one pose, their barycentr
 .. math:: AP = |\bar x - x_c|, \qquad
     RP = \bar l + 3 \sqrt{\textstyle\sum_j (l_j - \bar l)^2 / (n - 1)}
 
-and along a path the same in planes square to the command, the largest value along it:
-AT and RT. Positions only, no orientations.
+AT and RT are the largest values of the same quantities along a path, in planes
+perpendicular to the commanded path. Only positions are evaluated, not orientations.
 """
 
 from __future__ import annotations
@@ -24,93 +24,96 @@ if TYPE_CHECKING:
 
 
 PATH_POINTS = 50
-"""Planes along a path in which the passes are compared."""
+"""Number of planes along a path in which the passes are compared."""
 ON_PLANE = 1e-9
-"""Distance from its plane within which a crossing is found [m]."""
+"""Largest distance of an accepted crossing from its plane [m]."""
 REST = 16
-"""Least number of samples at rest from which settling is determined."""
+"""Smallest number of samples at rest from which settling is determined."""
 
 
 def pose_accuracy(attained: Array, commanded: Array) -> float:
-    """AP: from the commanded to the mean attained position, in their unit.
+    """AP: distance of the mean attained from the commanded position, in their unit.
 
     Args:
-        attained: One row per approach. Shape (n, 3).
-        commanded: Shape (3,).
+        attained: Attained positions, one row per approach. Shape (n, 3).
+        commanded: Commanded position. Shape (3,).
     """
     return float(np.linalg.norm(attained.mean(axis=0) - commanded))
 
 
 def pose_repeatability(attained: Array) -> float:
-    """RP: mean distance from the barycentre and three standard deviations of it.
+    """RP: mean distance from the barycentre plus three standard deviations of it.
 
     Args:
-        attained: One row per approach, two or more. Shape (n, 3).
+        attained: Attained positions, one row per approach, two or more. Shape (n, 3).
     """
     distance = np.linalg.norm(attained - attained.mean(axis=0), axis=-1)
     return float(distance.mean() + 3.0 * distance.std(ddof=1))
 
 
 def path_accuracy(attained: Array, commanded: Array) -> float:
-    """AT: largest distance of the mean attained path from the commanded one.
+    """AT: largest distance of the mean attained path from the commanded path.
 
     Args:
-        attained: Where passes cross the planes. Shape (n_passes, n_planes, 3).
-        commanded: Shape (n_planes, 3).
+        attained: Crossings of the planes. Shape (n_passes, n_planes, 3).
+        commanded: Commanded crossings. Shape (n_planes, 3).
     """
     off = np.linalg.norm(attained.mean(axis=0) - commanded, axis=-1)
     return float(off.max())
 
 
 def path_repeatability(attained: Array) -> float:
-    """RT: largest RP of the crossings of one plane; two passes or more."""
+    """RT: largest RP of the crossings of any plane, from two or more passes."""
     return max(pose_repeatability(crossings) for crossings in attained.swapaxes(0, 1))
 
 
 def crossings(run: Run) -> tuple[Array, Array] | None:
-    """Where the tool crosses planes square to the commanded path, in every pass [m].
+    """Crossings of planes perpendicular to the commanded path, in every pass [m].
 
-    The crossing is looked for from the commanded instant on, so a lag along the path is
-    no error of the path.
+    The search for a crossing starts at the commanded instant, so a lag along the path
+    does not count as a path error.
 
     Returns:
-        Attained, shape (n_passes, n_planes, 3), and commanded, shape (n_planes, 3);
-        None where the tool misses a plane.
+        Attained crossings, shape (n_passes, n_planes, 3), and commanded crossings,
+        shape (n_planes, 3); None if the tool misses a plane.
     """
     from scipy.interpolate import CubicSpline
 
     path = run.assembly.trajectory
     tool = CubicSpline(run.time, run.tool_position)
     command = CubicSpline(run.time, run.tool_reference)
-    # a lag must not look beyond the pass: keep off its ends
+    # stay away from the ends of the pass, so that a lag does not lead beyond them
     offsets = np.linspace(0.02, 0.98, PATH_POINTS) * path.pass_time
     attained = []
     for begin in path.passes:
-        asked, speed = command(begin + offsets), command(begin + offsets, 1)
+        planes, speed = command(begin + offsets), command(begin + offsets, 1)
         along = speed / np.linalg.norm(speed, axis=1)[:, None]
         instant = begin + offsets
         for _ in range(20):
-            ahead = ((tool(instant) - asked) * along).sum(axis=1)
+            ahead = ((tool(instant) - planes) * along).sum(axis=1)
             rate = (tool(instant, 1) * along).sum(axis=1)
             with np.errstate(divide="ignore", invalid="ignore"):  # a tool at rest
                 instant = instant - ahead / rate
             instant = np.clip(instant, run.time[0], run.time[-1])
-        found = tool(instant)
-        ahead = ((found - asked) * along).sum(axis=1)
+        crossed = tool(instant)
+        ahead = ((crossed - planes) * along).sum(axis=1)
         if not (np.abs(ahead) <= ON_PLANE).all():
             return None
-        attained.append(found)
+        attained.append(crossed)
     return np.array(attained), np.asarray(command(path.passes[0] + offsets))
 
 
 def settling_time(time: Array, distance: Array, arrival: float, band: float) -> Any:
-    """From the command's arrival to the last leaving of a band; None: not told.
+    """Time from the end of the command until the distance remains in a band [s].
 
     Args:
-        time: [s]. Shape (n,).
-        distance: From the end pose, any unit. Shape (n,).
-        arrival: When the command reaches its end [s].
-        band: Half width, unit of the distance.
+        time: Times of the samples [s]. Shape (n,).
+        distance: Distance from the final pose, any unit. Shape (n,).
+        arrival: Time at which the command reaches its end [s].
+        band: Half width of the band, in the unit of the distance.
+
+    Returns:
+        Settling time [s]; None if the rest is too short or the signal does not settle.
     """
     rest = time >= arrival - 1e-9
     if np.count_nonzero(rest) < REST:
@@ -118,14 +121,19 @@ def settling_time(time: Array, distance: Array, arrival: float, band: float) -> 
     outside = np.flatnonzero(rest & (distance > band))
     if not outside.size:
         return 0.0
-    # the end pose is its own: only what stays inside for a tenth of the rest settles
+    # the last sample is the final pose: settling needs a tenth of the rest inside
     if time[-1] - time[outside[-1]] < 0.1 * (time[-1] - arrival):
         return None
     return float(time[outside[-1] + 1] - arrival)
 
 
 def joint_settling(run: Run, j: int) -> dict[str, Any]:
-    """Settling of one link about its last angle, after the end of the command."""
+    """Settling of one link about its final angle, after the end of the command.
+
+    Args:
+        run: The run.
+        j: Index of the joint.
+    """
     band = run.assembly.scene.metrics.settle_band_arcmin
     off = np.abs(run.position[:, j] - run.position[-1, j]) / arcmin
     return {"settling_band_arcmin": band, **_settling(run, off, band)}
@@ -135,9 +143,9 @@ def _settling(run: Run, off: Array, band: float) -> dict[str, Any]:
     arrival = run.assembly.trajectory.arrival
     if arrival is None:
         return {"settling_s": None, "missing": {"settling_s": "no rest at the end"}}
-    found = settling_time(run.time, off, arrival, band)
-    if found is not None:
-        return {"settling_s": found}
+    settled = settling_time(run.time, off, arrival, band)
+    if settled is not None:
+        return {"settling_s": settled}
     return {
         "settling_s": None,
         "missing": {"settling_s": "rest too short, or still outside the band"},
@@ -145,12 +153,12 @@ def _settling(run: Run, off: Array, band: float) -> dict[str, Any]:
 
 
 def tool_metrics(run: Run) -> dict[str, Any]:
-    """Errors of the tool against its command; None with the reason in ``missing``."""
+    """Errors of the tool relative to its command; None with a reason in ``missing``."""
     keys = ("ap_mm", "rp_mm", "at_mm", "rt_mm", "path_rms_mm")
     if run.tool_position.shape[1] == 0:
         return {
             **dict.fromkeys(keys),
-            "missing": {"tool": "the arm has no such site"},
+            "missing": {"tool": "the arm has no tool site"},
         }
     band = run.assembly.scene.metrics.settle_band_mm
     off = np.linalg.norm(run.tool_position - run.tool_position[-1], axis=1) / mm
@@ -163,14 +171,14 @@ def tool_metrics(run: Run) -> dict[str, Any]:
     missing: dict[str, str] = {}
     for part in parts:
         missing |= part.pop("missing", {})
-    found: dict[str, Any] = dict.fromkeys(keys)
+    figures: dict[str, Any] = dict.fromkeys(keys)
     for part in parts:
-        found |= part
-    return {**found, "missing": missing}
+        figures |= part
+    return {**figures, "missing": missing}
 
 
 def _poses(run: Run) -> dict[str, Any]:
-    """AP and RP, of the cycle's poses or of the last one."""
+    """AP and RP of the poses of a cycle, or AP of the last pose."""
     path = run.assembly.trajectory
     if not path.visits:
         once = {"rp_mm": "repeatability needs repeated approaches of a pose"}
@@ -199,13 +207,13 @@ def _poses(run: Run) -> dict[str, Any]:
         "ap_mm": max(pose["ap_mm"] for pose in poses),
         "rp_mm": max(repeated) if repeated else None,
         "poses": poses,
-        "against": "commanded poses; ap_mm and rp_mm of the worst of them",
+        "against": "commanded poses; ap_mm and rp_mm are the largest of all poses",
         "missing": {} if repeated else {"rp_mm": "one cycle; needed: two or more"},
     }
 
 
 def _path(run: Run) -> dict[str, Any]:
-    """Distance from the commanded tool at the same instant."""
+    """Distance of the tool from its command at the same instant."""
     if run.assembly.trajectory.answer_speed is not None:
         return {"missing": {"path_rms_mm": "a step commands no path"}}
     error = run.tool_error() / mm
@@ -216,7 +224,7 @@ def _path(run: Run) -> dict[str, Any]:
 
 
 def _passes(run: Run) -> dict[str, Any]:
-    """AT and RT, where one path is run at constant speed."""
+    """AT and RT of a path that the tool follows at constant speed."""
     count = len(run.assembly.trajectory.passes)
     if not count:
         reason = "no pass along a path of the tool at constant speed"
@@ -226,10 +234,10 @@ def _passes(run: Run) -> dict[str, Any]:
         reason = "the tool does not cross the planes of the path"
         return {"passes": count, "missing": {"at_mm": reason, "rt_mm": reason}}
     attained, commanded = crossed
-    found: dict[str, Any] = {
+    figures: dict[str, Any] = {
         "passes": count,
         "at_mm": path_accuracy(attained, commanded) / mm,
     }
     if count < 2:
-        return {**found, "missing": {"rt_mm": "one pass; needed: two or more"}}
-    return {**found, "rt_mm": path_repeatability(attained) / mm}
+        return {**figures, "missing": {"rt_mm": "one pass; needed: two or more"}}
+    return {**figures, "rt_mm": path_repeatability(attained) / mm}

@@ -1,4 +1,4 @@
-"""One driven joint of a run: the law between motor and link, evaluated on arrays."""
+"""Law between motor and link of one driven joint, evaluated on recorded arrays."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from swgjoint.maps.friction import play_friction
 from swgjoint.maps.hysteresis import play_hysteresis, stretches
 from swgjoint.typing import Array
 
-_CHUNK = 1024  # samples at once: the coefficient table of a chunk stays in the cache
+_CHUNK = 1024  # samples per call: the coefficient table of a chunk fits in the cache
 STIFF = 1e3
-"""Stiffness of the map that stands for a drive without torsion, over that of the drive:
-0.01 arcmin at rated torque, and its torque is still told apart from round-off."""
+"""Stiffness of the map that represents a drive without torsion, relative to that of the
+drive. The torsion is then 0.01 arcmin at rated torque, still well above round-off."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PlayedSignals(JointSignals):
-    """Signals of a record, with the torques that have a history; shapes (n,)."""
+    """Signals of a record, including the history-dependent torques; shapes (n,)."""
 
     slipping: Array
     """Hysteresis torque along the torsion [N·m]."""
@@ -36,12 +36,12 @@ class Transmission:
 
     attached: JointDrive
     drive: DriveMap
-    """The whole map; ratings, name and validity come from it."""
+    """The complete map, which provides ratings, name and validity."""
     law: DriveMap | None
-    """The map that the model carries between motor and link: without unresolved
-    harmonics, of constant stiffness at level ``linear``, the elastic polynomial at
-    ``native``; friction where the model has it. None at the levels without a rotor,
-    ``rigid`` and ``kinematic``."""
+    """The map that the model contains between motor and link: without unresolved
+    harmonics, with constant stiffness at level ``linear``, with the elastic polynomial
+    at ``native``, and with friction if the model has it. None at the levels without a
+    rotor, ``rigid`` and ``kinematic``."""
 
     @property
     def joint(self) -> str:
@@ -60,16 +60,16 @@ class Transmission:
 
     @property
     def rotor_inertia(self) -> float:
-        """[kg·m²] about the motor axis."""
+        """Rotor inertia about the motor axis [kg·m²]."""
         return self.attached.rotor_inertia
 
     @property
     def told(self) -> DriveMap:
-        """The drive as it is simulated, for a controller.
+        """Map of the drive as simulated, for a controller.
 
-        :attr:`law`, and at the levels without a rotor a map of level ``rigid``: no
-        torsion (a spring :data:`STIFF` times as stiff stands for it), no friction, the
-        kinematic error at ``kinematic`` alone.
+        It is :attr:`law`. At the levels without a rotor it is a map of level ``rigid``
+        without friction, whose torsion is negligible (its spring is :data:`STIFF` times
+        as stiff), and which has a kinematic error at level ``kinematic`` only.
         """
         if self.law is not None:
             return self.law
@@ -82,10 +82,17 @@ class Transmission:
     def signals(
         self, theta: Array, psi: Array, theta_rate: Array, psi_rate: Array
     ) -> PlayedSignals:
-        """Torsion, transmission error and output torque of recorded states. (n,).
+        """Torsion, transmission error and torques of recorded states.
 
-        The law at the true positions and velocities of each state; hysteresis and
-        friction are played over the whole record. Not for the levels without a rotor.
+        The law is evaluated at the positions and velocities of each state; hysteresis
+        and friction follow from the whole record. Levels without a rotor have no such
+        signals.
+
+        Args:
+            theta: Motor angles [rad]. Shape (n,).
+            psi: Link angles [rad]. Shape (n,).
+            theta_rate: Motor speeds [rad/s]. Shape (n,).
+            psi_rate: Link speeds [rad/s]. Shape (n,).
         """
         pieces = [
             self.attached.signals(
@@ -126,10 +133,10 @@ class Transmission:
         )
 
     def hysteresis_energy_change(self, torsion: Array) -> float:
-        """Change of the energy in the springs of the hysteresis over a record [J].
+        """Change of the energy stored in the hysteresis springs over a record [J].
 
         Args:
-            torsion: [rad]. Shape (n,).
+            torsion: Torsion of the drive [rad]. Shape (n,).
         """
         total, torsion = 0.0, torsion - self._relaxed(torsion)
         for element in self.attached.elements:
@@ -138,19 +145,20 @@ class Transmission:
         return total
 
     def _relaxed(self, torsion: Array) -> float:
-        """Torsion at which a run's hysteresis starts relaxed [rad].
+        """Torsion at which the hysteresis of a run is relaxed at the start [rad].
 
-        ``native`` relaxed at zero torsion, ``full`` where it stands.
+        Level ``native`` is relaxed at zero torsion, level ``full`` at the initial
+        torsion.
         """
         return float(torsion[0]) if self.level == "full" else 0.0
 
 
 def transmission_of(attached: JointDrive, drive: DriveMap) -> Transmission:
-    """What the compiled model contains of one joint's drive.
+    """Drive of one joint as the compiled model contains it.
 
     Args:
-        attached: What attaching left behind.
-        drive: The whole map.
+        attached: The attached drive.
+        drive: The complete map.
     """
     law: DriveMap | None = None
     if attached.level == "full":
@@ -163,7 +171,7 @@ def transmission_of(attached: JointDrive, drive: DriveMap) -> Transmission:
 
 
 def _linear(drive: DriveMap, stiffness: float) -> DriveMap:
-    """A drive as a constant spring alone; name and ratings are its own."""
+    """A map with constant stiffness only, with name and ratings of a drive."""
     spring = DriveMap.linear(
         stiffness,
         layout=drive.layout,

@@ -1,12 +1,12 @@
-"""Whether the figures of a run describe the scene: the verdict and its reasons.
+"""Verdict on the figures of a run, with its reasons.
 
-A run is ``NOT VALID`` where it left what its model covers: bodies collide, so that the
-torque ripple and the tool error have no reference; a torque leaves the map of its
-drive; teeth would skip; a rotor turns too fast for the orders that the step carries;
-the ripple of a map differs too much from unseen finite elements at the torques of the
-run; the energies do not add up.
-A drive above its ratings is a fault of the design and not of the figures: it is a
-warning.
+A run is ``NOT VALID`` if it leaves the range of its model: bodies collide, so that
+torque ripple and tool error have no reference; a torque leaves the map of its drive;
+teeth would skip; a rotor turns too fast for the orders that the step resolves; the
+ripple of a map differs too much from finite elements that the map was not fitted to, at
+the torques of the run; or the energy balance is not closed.
+A drive above its ratings is a fault of the design, not of the figures, and causes a
+warning only.
 """
 
 from __future__ import annotations
@@ -27,16 +27,16 @@ if TYPE_CHECKING:
 
 VALID, NOT_VALID = "VALID", "NOT VALID"
 PHASE_STEP = 0.5
-"""Largest phase of an order per step that counts as resolved [rad]."""
+"""Largest phase advance per step of a resolved order [rad]."""
 FAST = 1.5
-"""Phase of an order in a step, over :data:`PHASE_STEP`, that invalidates a run."""
+"""Phase advance per step, relative to :data:`PHASE_STEP`, that invalidates a run."""
 POSES = 400
-"""Recorded states at which collisions are looked for, at most."""
+"""Largest number of recorded states that are checked for collisions."""
 ENERGY_SHARE, ENERGY_FLOOR = 0.1, 1e-3
-"""Energy that may be missing: of all works and losses, or, where they are small, of the
-rated torques times a radian. Bundled scenes miss 0.4 % at most."""
+"""Largest accepted balance error: relative to all works and losses, or, if these are
+small, to the sum of the rated torques times 1 rad. Bundled scenes reach 0.4 %."""
 MAPPED = ("native", "full")
-"""Levels whose torque comes from the map."""
+"""Levels at which the torque follows the map."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,12 +45,12 @@ class Collision:
 
     bodies: tuple[str, str]
     time: float
-    """Time of the first state that was looked at and has the contact [s]."""
+    """Time of the first checked state with the contact [s]."""
     depth: float
     """Largest penetration [m]."""
 
     def to_json(self) -> dict[str, Any]:
-        """Keys of the JSON output."""
+        """Values under the keys of the JSON output."""
         return {
             "bodies": list(self.bodies),
             "time_s": self.time,
@@ -59,13 +59,13 @@ class Collision:
 
 
 def collisions(run: Run) -> list[Collision]:
-    """Bodies that touch, the deepest first; looked for at :data:`POSES` states."""
+    """Bodies that touch in up to :data:`POSES` recorded states, the deepest first."""
     assembly, model = run.assembly, run.assembly.model
     if not (model.geom_contype.any() and model.geom_conaffinity.any()):
         return []
     data = mujoco.MjData(model)
     flexible = assembly.motor_position >= 0
-    found: dict[tuple[int, int], tuple[float, float]] = {}
+    contacts: dict[tuple[int, int], tuple[float, float]] = {}
     count = min(POSES, run.time.size)
     for k in np.linspace(0, run.time.size - 1, count).astype(int):
         data.qpos[assembly.link_position] = run.position[k]
@@ -78,8 +78,8 @@ def collisions(run: Run) -> list[Collision]:
             if depth <= 0.0 or (geoms < 0).any():
                 continue
             first, second = sorted(int(b) for b in model.geom_bodyid[geoms])
-            time, most = found.get((first, second), (float(run.time[k]), 0.0))
-            found[first, second] = (time, max(most, float(depth)))
+            time, most = contacts.get((first, second), (float(run.time[k]), 0.0))
+            contacts[first, second] = (time, max(most, float(depth)))
     return sorted(
         (
             Collision(
@@ -87,7 +87,7 @@ def collisions(run: Run) -> list[Collision]:
                 time=time,
                 depth=depth,
             )
-            for (first, second), (time, depth) in found.items()
+            for (first, second), (time, depth) in contacts.items()
         ),
         key=lambda one: -one.depth,
     )
@@ -101,7 +101,7 @@ def judge_run(
     Args:
         run: The run.
         joints: Figures of its joints, see :meth:`swgjoint.sim.run.Run.metrics`.
-        energy: Its energies, see :mod:`swgjoint.sim.figures.energy` [J].
+        energy: Its energy balance, see :mod:`swgjoint.sim.figures.energy` [J].
     """
     touching = collisions(run)
     reasons = []
@@ -119,7 +119,12 @@ def judge_run(
 
 
 def joint_reasons(name: str, joint: Mapping[str, Any]) -> list[str]:
-    """What takes the figures of one joint out of its model, one line each."""
+    """Reasons why the figures of one joint are not valid, one line each.
+
+    Args:
+        name: Name of the joint.
+        joint: Its figures, see :meth:`swgjoint.sim.run.Run.metrics`.
+    """
     lines = []
     ratings = joint["ratings"]
     if not ratings["within_map"] and joint["level"] in MAPPED:
@@ -145,23 +150,23 @@ def joint_reasons(name: str, joint: Mapping[str, Any]) -> list[str]:
     if joint["phase_step_rad"] > FAST * PHASE_STEP:
         lines.append(
             f"{name}: its rotor turned faster than commanded, the highest order of its"
-            f" drive by {joint['phase_step_rad']:.2g} rad a step; accepted: up to"
+            f" drive by {joint['phase_step_rad']:.2g} rad per step; accepted: up to"
             f" {PHASE_STEP:g} rad; use a smaller simulation.step_s"
         )
     return lines
 
 
 def _range(torques: Sequence[float]) -> str:
-    """Torques from the smallest to the largest."""
+    """Range of torques from the smallest to the largest."""
     low, high = torques
     return f"{low:.4g} to {high:.4g} N·m"
 
 
 def energy_reasons(energy: Mapping[str, float], rated: float) -> list[str]:
-    """One line where more energy is missing than integration and sums can explain.
+    """One line if the balance error exceeds that of integration and sums.
 
     Args:
-        energy: See :func:`judge_run` [J].
+        energy: Energy balance, see :func:`judge_run` [J].
         rated: Sum of the rated torques [N·m].
     """
     works = ("motor_work_J", "load_work_J", "dissipated_J")
@@ -170,14 +175,14 @@ def energy_reasons(energy: Mapping[str, float], rated: float) -> list[str]:
     if abs(missing) <= max(ENERGY_SHARE * turnover, ENERGY_FLOOR * rated):
         return []
     return [
-        f"{missing:.3g} J are missing in the balance of energies, with {turnover:.3g} J"
-        " of works and losses: a joint works against its stops, or the step is too"
-        " long; use another motion or a smaller simulation.step_s"
+        f"the energy balance has an error of {missing:.3g} J, with {turnover:.3g} J of"
+        " works and losses: a joint works against its stops, or the step is too long;"
+        " use another motion or a smaller simulation.step_s"
     ]
 
 
 def _collision_reason(touching: list[Collision]) -> str:
-    """The deepest collisions in one line."""
+    """One line with the deepest collisions."""
     some = [
         f"{' and '.join(one.bodies)} ({one.depth / mm:.3g} mm deep, from"
         f" {one.time:.3g} s)"

@@ -1,4 +1,4 @@
-"""Tables of a scene file for what a joint need not have: limits, sensors, payload."""
+"""Optional tables of a scene file: sensors, payload, disturbances."""
 
 from __future__ import annotations
 
@@ -16,37 +16,38 @@ Seconds = Annotated[float, Field(ge=0, le=10_000)]
 
 
 class Sensor(Section):
-    """An angle sensor as the controller reads it."""
+    """An angle sensor that the controller reads."""
 
     counts_per_turn: Annotated[int, Field(ge=4, le=2**32)] | None = None
-    """Resolution; None reads the angle itself. Speed is then its change over a control
-    period."""
+    """Resolution; None reads the exact angle. With a resolution, the speed is the
+    change of the reading over a control period."""
     delay_s: Seconds = 0.0
-    """Age of a reading when the controller uses it, which knows it: it holds a reading
-    against the command of the instant at which that was taken. A multiple of
-    ``step_s``."""
+    """Age of a reading when the controller uses it. The controller knows the age: it
+    compares a reading with the command of the instant at which it was taken. A multiple
+    of ``step_s``."""
     noise_arcsec: Annotated[float, Field(ge=0, le=1e5)] = 0.0
-    """Standard deviation of every reading, normal, before it is counted. Speed is then
-    the change of the angle over a control period, too."""
+    """Standard deviation of the normally distributed noise of every reading, before
+    quantisation. With noise, the speed is the change of the reading over a control
+    period."""
 
 
 class TorqueSensor(Section):
-    """Behind every drive, for a controller that is given to ``run_scene``."""
+    """Torque sensor at the output of every drive, for a controller of ``run_scene``."""
 
     delay_s: Seconds = 0.0
     """Age of a reading when the controller uses it; a multiple of ``step_s``."""
     noise_Nm: Annotated[float, Field(ge=0, le=1e6)] = 0.0
-    """Standard deviation of every reading, normal."""
+    """Standard deviation of the normally distributed noise of every reading."""
 
 
 class SensorsSection(Section):
-    """Sensors of every joint; without one an angle reads exactly and at once."""
+    """Sensors of every joint; without one the reading is exact and has no delay."""
 
     motor: Sensor | None = None
     link: Sensor | None = None
     torque: TorqueSensor | None = None
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 0
-    """Of the noise."""
+    """Seed of the noise."""
 
 
 class Payload(Section):
@@ -58,15 +59,16 @@ class Payload(Section):
         0.0,
         0.0,
     )
-    """Centre of mass."""
+    """Centre of mass in the frame of the tool site."""
     inertia_kgm2: Vector = (
         0.0,
         0.0,
         0.0,
     )
-    """About the axes through its centre; zeros: a point mass."""
+    """Moments of inertia about the axes through the centre of mass; zero for a point
+    mass."""
     known: bool = True
-    """Whether the controller's model of the arm has it."""
+    """Whether the controller's model of the arm includes the payload."""
 
     @model_validator(mode="after")
     def _is_a_body(self) -> Self:
@@ -87,35 +89,35 @@ class Payload(Section):
 
 
 class JointPulse(Section):
-    """A constant torque against a joint for a while, as if somebody leaned on it."""
+    """A rectangular disturbance-torque pulse on a joint."""
 
     kind: Literal["joint_pulse"] = "joint_pulse"
     joint: str
     torque_Nm: Torque
-    """On the link, positive along the joint."""
+    """Torque on the link, positive along the joint axis."""
     start_s: Seconds
     duration_s: Positive
 
 
 class JointSine(Section):
-    """A torque on a joint that swings."""
+    """A sinusoidal disturbance torque on a joint."""
 
     kind: Literal["joint_sine"] = "joint_sine"
     joint: str
     torque_Nm: Torque
-    """Amplitude, on the link."""
+    """Amplitude of the torque on the link."""
     frequency_Hz: Annotated[float, Field(gt=0, le=1_000)]
     start_s: Seconds = 0.0
     duration_s: Positive | None = None
-    """None: until the end."""
+    """Duration; None lasts until the end of the run."""
 
 
 class ToolForce(Section):
-    """A constant force on the tool site for a while."""
+    """A rectangular force pulse on the tool site."""
 
     kind: Literal["tool_force"] = "tool_force"
     force_N: Vector
-    """In the world."""
+    """Force vector in the world frame."""
     start_s: Seconds
     duration_s: Positive
 
@@ -130,36 +132,47 @@ Disturbance = Annotated[JointPulse | JointSine | ToolForce, Field(discriminator=
 
 
 def too_fast(frequency: float, step: float) -> list[str]:
-    """What to say of a frequency [Hz] that steps of this length [s] cannot carry."""
+    """Fault of a frequency that the time step cannot resolve.
+
+    Args:
+        frequency: Frequency of a sine [Hz].
+        step: Time step of the scene [s].
+
+    Returns:
+        One message, or none if the step resolves the frequency.
+    """
     highest = 0.1 / step
     if frequency <= highest * (1.0 + 1e-9):
         return []
     return [
         f"{frequency:g} Hz; accepted: at most {highest:g} Hz, ten steps of"
-        f" {step:g} s in a period"
+        f" {step:g} s per period"
     ]
 
 
 def misfits(
     disturbance: JointPulse | JointSine | ToolForce, *, run: float, step: float
 ) -> list[tuple[str, str]]:
-    """Keys of a disturbance that would have no effect or another one, and why.
+    """Faults of a disturbance that would have no effect or a wrong one.
 
     Args:
-        disturbance: The table.
-        run: Length of the run [s].
-        step: Of the scene [s].
+        disturbance: The table of the disturbance.
+        run: Duration of the run [s].
+        step: Time step of the scene [s].
+
+    Returns:
+        Keys of the table, each with its message.
     """
-    found = []
+    faults = []
     if isinstance(disturbance, JointSine):
         fast = too_fast(disturbance.frequency_Hz, step)
-        found += [("frequency_Hz", fault) for fault in fast]
+        faults += [("frequency_Hz", fault) for fault in fast]
     length, start = disturbance.duration_s, disturbance.start_s
     if length is not None and length < step * (1.0 - 1e-9):
-        found.append(("duration_s", f"{length:g} s; accepted: >= step_s, {step:g} s"))
-    # it acts by its value in the middle of a step
+        faults.append(("duration_s", f"{length:g} s; accepted: >= step_s, {step:g} s"))
+    # the value in the middle of a step acts
     if start > run - 0.5 * step:
-        found.append(
+        faults.append(
             ("start_s", f"{start:g} s; accepted: before the run ends, at {run:g} s")
         )
-    return found
+    return faults

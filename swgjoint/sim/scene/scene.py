@@ -37,38 +37,38 @@ from swgjoint.toml_file import MAX_DEPTH, parse_toml, parse_value, read_toml
 from swgjoint.units import deg
 
 MAX_STEPS = 2_000_000
-"""Recorded steps of a run; memory bounds the sub-steps of the engine."""
+"""Largest number of recorded steps of a run; memory limits the sub-steps."""
 
 
 class Scene(Section):
-    """One scene: attributes mirror the tables and keys of the file, units included."""
+    """One scene; its attributes have the names and units of the keys of the file."""
 
     name: str
     description: str = ""
     arm: str
     """Path or bundled name of an MJCF file."""
     tool_site: str = "tool"
-    """Site whose position is the tool; the arm may have none."""
+    """Site at the tool position; optional for the arm."""
     driven: Annotated[tuple[str, ...], Several] = ()
-    """Names or patterns (``*``, ``?``) of the hinges that have drives; none: all. The
-    others are held, where ``trajectory.start_deg`` or ``pose`` has them."""
+    """Names or patterns (``*``, ``?``) of the hinges that have drives; all if empty.
+    The other hinges are held at ``trajectory.start_deg`` or ``pose``."""
     pose: str | None = None
-    """Keyframe of the arm's file at which joints without a drive are held; None: the
-    reference position."""
+    """Keyframe of the arm's file at which joints without a drive are held; None holds
+    them at the reference position."""
     balance_inertia: bool = False
-    """Whether inertias that no rigid body has are repaired."""
+    """Whether inertias that no rigid body can have are repaired."""
     defaults: JointSection = JointSection()
-    """Drive of every hinge joint that does not say otherwise."""
+    """Settings of all joints, which ``joints`` overrides."""
     joints: dict[str, JointSection] = Field(default_factory=dict)
     trajectory: TrajectorySection
     controller: ControllerSection = ControllerSection()
     load: dict[str, LoadSection] = Field(default_factory=dict)
     """Constant torque that the load exerts against a joint."""
     sensors: SensorsSection | None = None
-    """What the controller reads; None reads every angle exactly and at once."""
+    """Sensors of the controller; None reads every angle exactly and without delay."""
     payload: Payload | None = None
     disturbance: list[Disturbance] = Field(default_factory=list)
-    """Torques and forces that the controller does not know of."""
+    """Torques and forces that the controller does not know."""
     simulation: Simulation
     recording: Recording = Recording()
     metrics: Metrics = Metrics()
@@ -77,7 +77,7 @@ class Scene(Section):
 
     @property
     def reading(self) -> ArmReading:
-        """How the file of the arm is read."""
+        """Choices for reading the arm's file."""
         angles = {name: q * deg for name, q in self.trajectory.start_deg.items()}
         return ArmReading(
             driven=self.driven,
@@ -88,7 +88,7 @@ class Scene(Section):
 
     @property
     def where(self) -> str:
-        """What messages call this scene: its file or its name."""
+        """Name of this scene in messages: its file or ``scene``."""
         return self._where
 
     @model_validator(mode="after")
@@ -105,14 +105,14 @@ class Scene(Section):
                 (
                     "simulation.duration_s",
                     f"{duration:g} s{rounded}; accepted: more than the {needed:g} s"
-                    " that holds, ramps and settling of the trajectory take",
+                    " of holds, ramps and settling of the trajectory",
                 )
             )
         if duration / step > MAX_STEPS:
             faults.append(
                 (
                     "simulation.step_s",
-                    f"{step:g} s makes {duration / step:.3g} steps; accepted: at most"
+                    f"{step:g} s gives {duration / step:.3g} steps; accepted: at most"
                     f" {MAX_STEPS} steps in a run",
                 )
             )
@@ -144,15 +144,15 @@ class Scene(Section):
                 for fault in too_fast(getattr(self.trajectory, key), step)
             ]
         for k, one in enumerate(self.disturbance):
-            found = misfits(one, run=run, step=step)
-            faults += [(f"disturbance[{k}].{key}", fault) for key, fault in found]
+            misfit = misfits(one, run=run, step=step)
+            faults += [(f"disturbance[{k}].{key}", fault) for key, fault in misfit]
         if faults:
             raise Fault(*faults)
         return self
 
     @property
     def sampled(self) -> bool:
-        """Whether the controller is a loop of its own, once a control period."""
+        """Whether the controller is sampled, that is, runs once per control period."""
         controller = self.controller
         return (
             controller.kind == "computed_torque"
@@ -167,15 +167,15 @@ class Scene(Section):
         reference: str | Path,
         overrides: Mapping[str, Any] | Iterable[str] | None = None,
     ) -> Self:
-        """Read a scene file, given as a path or as the name of a bundled one.
+        """Read a scene file.
 
         Args:
             reference: Path or bundled name.
             overrides: Dotted keys with new values, as a mapping or as ``key=value``
-                texts whose value is read as TOML (a bare word is a text).
+                strings whose value is parsed as TOML (a bare word is a string).
 
         Raises:
-            InputError: With one line per fault of the file.
+            InputError: If the file has faults; one line per fault.
         """
         path = find(reference, "scenes", ".toml", what="scene")
         data = read_toml(path, what="scene")
@@ -184,7 +184,15 @@ class Scene(Section):
 
     @classmethod
     def from_toml(cls, text: str, where: str = "scene") -> Self:
-        """A scene from the text of a scene file; ``where`` names it in messages."""
+        """Read a scene from the text of a scene file.
+
+        Args:
+            text: TOML text.
+            where: Name of the scene in messages.
+
+        Raises:
+            InputError: If the text has faults; one line per fault.
+        """
         return cls.from_data(parse_toml(text, where=where), where=where)
 
     @classmethod
@@ -195,10 +203,19 @@ class Scene(Section):
         where: str = "scene",
         overrides: Mapping[str, Any] | Iterable[str] | None = None,
     ) -> Self:
-        """A scene from plain tables; all faults are listed at once."""
+        """Read a scene from plain tables.
+
+        Args:
+            data: Tables of a scene file.
+            where: Name of the scene in messages.
+            overrides: Changes, see :meth:`load_file`.
+
+        Raises:
+            InputError: If the tables have faults; one line per fault.
+        """
         merged = _merged(data, overrides, where)
         lines: list[str] = []
-        # tables keyed by joint are checked one by one, so that messages know their keys
+        # tables by joint are checked one by one, so that messages name their keys
         for table, model in (("joints", JointSection), ("load", LoadSection)):
             entries = merged.get(table)
             if not isinstance(entries, dict):
@@ -222,7 +239,7 @@ class Scene(Section):
         return scene
 
     def with_changes(self, overrides: Mapping[str, Any] | Iterable[str]) -> Self:
-        """A checked copy with other values for some dotted keys."""
+        """A checked copy with new values for some dotted keys."""
         data = self.model_dump(exclude_unset=True)
         return self.from_data(data, where=self.where, overrides=overrides)
 
@@ -231,7 +248,7 @@ class Scene(Section):
         return self._with_all(drive=drive, linear=None, model=None)
 
     def with_model(self, model: str) -> Self:
-        """A copy in which every drive, a design, has a map of this fidelity."""
+        """A copy whose drives, all designs, get a map of this fidelity."""
         return self._with_all(model=model)
 
     def with_level(self, level: Level) -> Self:
@@ -239,11 +256,11 @@ class Scene(Section):
         return self._with_all(level=level)
 
     def with_friction(self, friction: bool) -> Self:
-        """A copy in which every joint has the friction of its drive, or none has."""
+        """A copy in which all joints have the friction of their drives, or none has."""
         return self._with_all(friction=friction)
 
     def with_kinematic_error(self, arcmin: float | None) -> Self:
-        """A copy in which every joint has this assumed error; None: that stated."""
+        """A copy with this error in every joint [arcmin]; None for the stated error."""
         return self._with_all(kinematic_error_arcmin=arcmin)
 
     def _with_all(self, **values: Any) -> Self:
@@ -257,12 +274,12 @@ class Scene(Section):
         return copy
 
     def joint_settings(self, name: str) -> JointSection:
-        """Settings of one joint, its own over the defaults."""
+        """Settings of one joint; its own values override the defaults."""
         return self.joints.get(name, JointSection()).fill_from(self.defaults)
 
 
 def _faults_of(model: type[Section], entry: dict[str, Any], path: str) -> list[str]:
-    """Lines about one table that lies at a dotted path of the file."""
+    """Messages about one table at a dotted path of the file."""
     try:
         validate(model, entry, where="\0")
     except InputError as exc:
@@ -275,7 +292,7 @@ def _merged(
     overrides: Mapping[str, Any] | Iterable[str] | None,
     where: str,
 ) -> dict[str, Any]:
-    """Deep copy of the tables with the overrides in place."""
+    """Deep copy of the tables with the overrides applied."""
 
     def copied(value: Any) -> Any:
         if isinstance(value, Mapping):
@@ -288,7 +305,7 @@ def _merged(
         if isinstance(overrides, Mapping)
         else [parse_override(text) for text in overrides or ()]
     )
-    # another kind of motion first: keys that only the old one has go with it
+    # a new kind of motion first: it drops the keys that only the old kind has
     for key, value in sorted(pairs, key=lambda pair: pair[0] != "trajectory.kind"):
         if key == "trajectory.kind":
             _switch_motion(merged.get("trajectory"), value)
@@ -305,7 +322,7 @@ def _merged(
 
 
 def _switch_motion(table: Any, kind: Any) -> None:
-    """Leave of a motion what a motion of another kind has, too."""
+    """Drop the keys of a motion that the new kind does not have."""
     if not isinstance(table, dict) or table.get("kind") == kind:
         return
     model = MOTIONS.get(kind) if isinstance(kind, str) else None
@@ -315,12 +332,12 @@ def _switch_motion(table: Any, kind: Any) -> None:
 
 
 def _make_room(table: dict[str, Any], key: str) -> None:
-    """A drive by name and a linear one exclude each other: the new one wins."""
+    """Drop the alternative key: a named and a linear drive exclude each other."""
     table.pop({"drive": "linear", "linear": "drive"}.get(key, ""), None)
 
 
 def parse_override(text: str) -> tuple[str, Any]:
-    """``key=value`` of the command line as a dotted key and a TOML value."""
+    """Split ``key=value`` of the command line into a dotted key and a TOML value."""
     key, equals, value = text.partition("=")
     key = key.strip()
     if not equals or not all(key.split(".")):
@@ -337,7 +354,7 @@ def parse_override(text: str) -> tuple[str, Any]:
 
 
 def _anchor_paths(data: dict[str, Any], folder: Path) -> None:
-    """Make paths in a scene file relative to that file, names stay names."""
+    """Resolve paths in a scene file relative to that file; names stay unchanged."""
 
     def anchor(table: Any, key: str) -> None:
         value = table.get(key) if isinstance(table, dict) else None

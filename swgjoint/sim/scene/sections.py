@@ -1,4 +1,4 @@
-"""The tables of a scene file, with the same names as in the file."""
+"""Tables of a scene file, with the names of their keys."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Signal = Literal[
     "position_deg",
     "reference_deg",
 ]
-"""Of a joint in a recording."""
+"""Signals of a joint in a recording."""
 
 Positive = Annotated[float, Field(gt=0)]
 Several = Field(strict=False)
@@ -36,12 +36,12 @@ class ControllerSection(Section):
     .. math:: \tau = k_p e + k_d \dot e + k_i \int e\,dt + \tau_\text{ff}, \quad
         e = i q_r - \theta.
 
-    Gains either from a natural frequency and a damping ratio, which hold for a rigid
-    drive, :math:`k_p = J\omega^2`, :math:`k_d = 2\zeta J\omega` with
-    :math:`J = J_m + J_l(q_0)/i^2`, or given outright; :math:`k_i = k_p/T_i`.
+    The gains are either stated, or follow from a natural frequency and a damping ratio
+    of the rigid drive, :math:`k_p = J\omega^2`, :math:`k_d = 2\zeta J\omega` with
+    :math:`J = J_m + J_l(q_0)/i^2`. The integral gain is :math:`k_i = k_p/T_i`.
 
     ``computed_torque`` is the inverse dynamics of the rigid arm (M, h) with its rotors
-    (J) at the measured motion, motor angles over the ratio:
+    (J) at the measured motion, which is the motor motion divided by the ratio:
 
     .. math:: \tau = \left(M a + h\right)/i + i J a, \quad
         a = \ddot q_r + 2\zeta\omega(\dot q_r - \dot\theta/i)
@@ -52,20 +52,23 @@ class ControllerSection(Section):
     natural_frequency_Hz: Annotated[float, Field(gt=0, le=1_000)] | None = None
     damping_ratio: Annotated[float, Field(gt=0, le=10)] | None = None
     stiffness_Nm_rad: Annotated[float, Field(gt=0)] | None = None
-    """Motor side, N·m of motor torque per rad of motor angle."""
+    """Motor torque per motor angle."""
     damping_Nms_rad: Annotated[float, Field(ge=0)] | None = None
     integral_time_s: Positive | None = None
-    """Of ``pid``; None: 4 over the loop's natural frequency in rad/s."""
+    """Integral time of ``pid``; None is 4 divided by the loop's natural frequency in
+    rad/s."""
     integral_limit_Nm: Positive | None = None
-    """Largest motor torque of the integral; None: that of the rated torque."""
+    """Largest motor torque of the integral term; None is the rated torque over the
+    ratio."""
     feedforward: FeedForward = "gravity"
-    """Torques of the rigid arm on the reference motion, and of the constant load."""
+    """Motor torques for the rigid arm on the reference motion and for the load."""
     control_period_s: Positive | None = None
-    """Given, the loop is computed once a period and its torque held; a multiple of
-    ``step_s``. None: ``pd`` and ``pid`` act within every step of the engine, a loop
-    that must be sampled (computed torque, sensors, link feedback) once a step."""
+    """Control period, a multiple of ``step_s``: the loop is evaluated once per period
+    and its torque held. None: ``pd`` and ``pid`` act within every engine step, and a
+    loop that must be sampled (computed torque, sensors, link feedback) once per step.
+    """
     feedback: Literal["motor", "link"] = "motor"
-    """Whose angle the position error is taken from; the speed is the motor's."""
+    """Side at which the position error is measured; the speed is that of the motor."""
 
     @model_validator(mode="after")
     def _fits(self) -> Self:
@@ -99,11 +102,11 @@ class ControllerSection(Section):
 
 
 class LoadSection(Section):
-    """Constant torque of the load against a joint; the drive exerts the same."""
+    """Constant torque of the load against a joint, which the drive must balance."""
 
     torque_Nm: Annotated[float, Field(ge=-1e6, le=1e6)] | None = None
     rated_fraction: Annotated[float, Field(ge=-5, le=5)] | None = None
-    """Share of the drive's rated torque."""
+    """Load torque as a fraction of the drive's rated torque."""
 
     @model_validator(mode="after")
     def _one_value(self) -> Self:
@@ -119,38 +122,38 @@ class Simulation(Section):
     step_s: Annotated[float, Field(ge=1e-6, le=0.02)] = 0.001
     integrator: Integrator = "discrete"
     max_sub_steps: Annotated[int, Field(ge=1, le=1_000)] = MAX_SUB_STEPS
-    """Equal parts that a step may be cut into where the integration of a joint asks for
-    it; 1 refuses such a scene. What is recorded and which harmonics are kept follows
-    from ``step_s`` alone."""
+    """Largest number of equal sub-steps of a step, used if the integration of a joint
+    requires them; 1 rejects such a scene. Recorded samples and kept harmonics depend on
+    ``step_s`` only."""
 
 
 class Recording(Section):
-    """What goes into the recording and its layout.
+    """Contents and layout of the recording.
 
-    The signals of every joint are kept at every step, whatever is drawn.
+    The signals of every joint are kept at every step, whether they are plotted or not.
     """
 
     pose_rate_Hz: Annotated[float, Field(gt=0, le=10_000)] = 50.0
     """Rate of the body poses that the viewer shows."""
     joints: Annotated[tuple[str, ...], Several] = ()
-    """Joints that have a tab, in this order; none named: all, the most loaded first.
-    The drive that is drawn is that of the first one whose map has fields."""
+    """Joints that have a tab, in this order; if empty all joints, most loaded first.
+    The viewer draws the drive of the first joint whose map has fields."""
     plots: Annotated[tuple[Signal, ...], Several] = (
         "torsion_arcmin",
         "transmission_error_arcmin",
         "output_torque_Nm",
         "torque_deviation_Nm",
     )
-    """Signals that every tab draws over time."""
+    """Signals that every tab plots over time."""
 
 
 class Metrics(Section):
-    """What the figures of a run refer to."""
+    """Reference values for the figures of a run."""
 
     settle_band_mm: Positive = 0.1
-    """Half width of the band about the last tool position that settling refers to."""
+    """Half width of the settling band about the last tool position."""
     settle_band_arcmin: Positive = 1.0
-    """The same about the last angle of every joint."""
+    """Half width of the settling band about the last angle of every joint."""
     contacts_expected: bool = False
-    """Whether bodies may touch in this scene; if not, a run in which they do is not
-    valid."""
+    """Whether bodies may touch in this scene; if not, a run with contacts is not valid.
+    """

@@ -1,4 +1,4 @@
-"""What a scene tells a controller that is given to it."""
+"""Task of a scene for an external controller."""
 
 from __future__ import annotations
 
@@ -19,23 +19,23 @@ def task_of(
     known_drives: Mapping[str, DriveMap] | None = None,
     known_arm: KnownArm | None = None,
 ) -> Task:
-    """The commanded motion at the instants of the control, and the nominal joints.
+    """The commanded motion at the control instants, and nominal data of the joints.
 
-    The known torque is that of the arm as the controller knows it, with weight, inertia
-    and the constant load; drives are told as they are simulated
-    (:attr:`~swgjoint.sim.figures.transmission.Transmission.told`): without what their
-    level does not have, what the scene switches off and the orders that the step does
-    not carry.
+    The link torque is that of the controller's model of the arm, with weight, inertia
+    and the constant load. By default the nominal drives are the simulated ones
+    (:attr:`~swgjoint.sim.figures.transmission.Transmission.told`), without effects that
+    their level lacks or the scene disables, and without unresolved orders.
 
     Args:
-        assembly: The scene.
-        known_drives: Of some joints, what the controller takes them for.
-        known_arm: What it takes the arm for; None: the scene's, without a payload that
-            is not known.
+        assembly: The compiled scene.
+        known_drives: Drive maps in the controller's model, by joint; other joints use
+            the default.
+        known_arm: Arm in the controller's model; None for that of the scene, without a
+            payload that is not known.
 
     Raises:
-        InputError: If a joint of ``known_drives`` is not one of the scene's, or those
-            of ``known_arm`` are not these.
+        InputError: If ``known_drives`` names an unknown joint, or if ``known_arm`` has
+            other joints than the scene.
     """
     known = dict(known_drives or {})
     unknown = sorted(set(known) - set(assembly.joints))
@@ -78,7 +78,7 @@ def task_of(
 
 
 def _reading_age(assembly: Assembly) -> ReadingAge:
-    """Delays of the scene's sensors."""
+    """Stated delays of the scene's sensors."""
     sensors = assembly.scene.sensors
     if sensors is None:
         return ReadingAge()
@@ -87,7 +87,7 @@ def _reading_age(assembly: Assembly) -> ReadingAge:
 
 
 def _limit(limits: MotorLimits | None) -> float:
-    """Largest torque of a motor at any speed [N·m]; inf where there is none."""
+    """Largest torque of a motor at any speed [N·m]; inf without limits."""
     if limits is None:
         return np.inf
     bounds = (limits.torque, limits.stall_torque_Nm)

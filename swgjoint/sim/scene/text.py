@@ -1,4 +1,4 @@
-"""A scene as the text of a scene file."""
+"""Text of a scene file from a scene."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from swgjoint.toml_text import toml_text
 
 
 def scene_toml(scene: Scene) -> str:
-    """What the scene sets, as TOML that :meth:`Scene.load_file` reads anywhere.
+    """Keys that a scene sets, as TOML that :meth:`Scene.load_file` reads in any folder.
 
-    Files that it names stand with their whole paths.
+    Paths of files are absolute.
     """
     data = scene.model_dump(exclude_unset=True, exclude_none=True)
     named = (data, data["trajectory"], data.get("defaults", {}))

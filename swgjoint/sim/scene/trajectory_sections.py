@@ -17,14 +17,14 @@ Plane = Literal["+x", "-x", "+y", "-y"]
 
 
 class MotionSection(Section):
-    """What all motions share."""
+    """Keys that all motions share."""
 
     start_deg: dict[str, Degrees] = Field(default_factory=dict)
-    """Joint angles at the first instant; a joint that is not named starts at 0."""
+    """Joint angles at the first instant; zero for joints that are not named."""
 
     @property
     def shortest_s(self) -> float:
-        """Time that must be left for the motion to exist [s]."""
+        """Duration that the run must exceed [s]."""
         return 0.0
 
     @property
@@ -40,9 +40,9 @@ class SweepSection(MotionSection):
     hold_s: Seconds = 0.2
     ramp_s: Annotated[float, Field(gt=0, le=10_000)] = 1.0
     settle_s: Seconds = 0.0
-    """Start of the constant-speed part that the metrics leave out."""
+    """Initial time of the constant-speed part that the metrics leave out."""
     end_deg: dict[str, Degrees] = Field(default_factory=dict)
-    """Joint angles; a joint that is not named stays."""
+    """Joint angles at the end; joints that are not named stay at rest."""
 
     @property
     def shortest_s(self) -> float:
@@ -60,12 +60,12 @@ class ConstantSpeed(MotionSection):
 
     kind: Literal["constant_speed"] = "constant_speed"
     settle_s: Seconds = 0.0
-    """Start that the metrics leave out."""
+    """Initial time that the metrics leave out."""
     speed_deg_s: dict[str, Degrees]
 
     @property
     def shortest_s(self) -> float:
-        """Time without any part that the metrics use [s]."""
+        """Time before the part that the metrics use [s]."""
         return self.settle_s
 
     @property
@@ -78,12 +78,12 @@ class ConstantSpeed(MotionSection):
 
 
 class StepSection(MotionSection):
-    """Joint angles jump once; what follows is the controller's answer."""
+    """Joint angles jump once; the rest of the run is the controller's step response."""
 
     kind: Literal["step"] = "step"
     at_s: Annotated[float, Field(gt=0, le=10_000)] = 0.2
     step_deg: dict[str, Degrees]
-    """How far each joint jumps."""
+    """Height of the step of each joint."""
 
     @property
     def shortest_s(self) -> float:
@@ -99,24 +99,24 @@ class StepSection(MotionSection):
 class Trapezoid(MotionSection):
     """Point to point at constant acceleration, speed and deceleration, then rest.
 
-    All joints start and stop together, and the one that needs longest runs at a limit.
+    All joints start and stop together; the slowest joint reaches a limit.
     """
 
     kind: Literal["trapezoid"] = "trapezoid"
     hold_s: Seconds = 0.2
-    """Rest before the motion; after it the arm rests until the end."""
+    """Rest before the motion; after the motion the arm rests until the end."""
     end_deg: dict[str, Degrees]
     max_speed_deg_s: Annotated[float, Field(gt=0, le=3_600)]
     max_acceleration_deg_s2: Annotated[float, Field(gt=0, le=1e6)]
 
     @property
     def shortest_s(self) -> float:
-        """Rest and motion [s]."""
+        """Time of rest and motion [s]."""
         return self.hold_s + self.move_s
 
     @property
     def move_s(self) -> float:
-        """Time of the motion [s]."""
+        """Time of the motion without rest [s]."""
         way = max(
             (abs(end - self.start_deg.get(j, 0.0)) for j, end in self.end_deg.items()),
             default=0.0,
@@ -133,7 +133,7 @@ class Trapezoid(MotionSection):
 
 
 class ChirpSection(MotionSection):
-    """One joint swings about its start, faster and faster (or slower and slower)."""
+    """One joint oscillates about its start at increasing or decreasing frequency."""
 
     kind: Literal["chirp"] = "chirp"
     joint: str
@@ -141,9 +141,9 @@ class ChirpSection(MotionSection):
     from_Hz: Annotated[float, Field(gt=0, le=1_000)]
     to_Hz: Annotated[float, Field(gt=0, le=1_000)]
     hold_s: Seconds = 0.2
-    """Rest before and after."""
+    """Rest before and after the oscillation."""
     ramp_s: Annotated[float, Field(gt=0, le=10_000)] = 0.5
-    """Time in which the amplitude grows, and in which it fades."""
+    """Time in which the amplitude grows, and in which it decays."""
 
     @property
     def shortest_s(self) -> float:
@@ -157,13 +157,13 @@ class ChirpSection(MotionSection):
 
 
 class FromFile(MotionSection):
-    """Joint angles from a CSV file, smoothly through all of its points."""
+    """A smooth motion through all joint angles of a CSV file."""
 
     kind: Literal["csv"] = "csv"
     file: str
     """Columns ``time_s`` and ``<joint>_deg`` or ``<joint>_rad``."""
     hold_s: Seconds = 0.2
-    """Rest before; after the last point the arm rests until the end."""
+    """Rest before the motion; after the last point the arm rests until the end."""
 
     @property
     def shortest_s(self) -> float:
@@ -172,18 +172,18 @@ class FromFile(MotionSection):
 
 
 class ToolMotion(MotionSection):
-    """A motion that the tool site makes; joints follow by inverse kinematics."""
+    """A motion of the tool site; the joint angles follow by inverse kinematics."""
 
     orientation: Literal["hold", "free"] | None = None
-    """Whether the tool keeps its orientation; None: from six joints on."""
+    """Whether the tool keeps its orientation; None holds it for six or more joints."""
 
 
 class LineSection(ToolMotion):
-    """The tool goes straight forth and back, resting at either end."""
+    """The tool moves back and forth on a straight line and rests at both ends."""
 
     kind: Literal["line"] = "line"
     displacement_mm: Vector
-    """From the tool at ``start_deg`` to the far end, in the world."""
+    """Displacement from the tool at ``start_deg`` to the far end, in the world."""
     cycles: Cycles = 1
     hold_s: Seconds = 0.2
     """Rest at the start and at every turning point."""
@@ -202,14 +202,15 @@ class LineSection(ToolMotion):
 
 
 class Circle(ToolMotion):
-    """The tool runs round a circle: rest, ramp, constant speed, ramp, rest."""
+    """The tool moves along a circle: rest, ramp, constant speed, ramp, rest."""
 
     kind: Literal["circle"] = "circle"
     radius_mm: Annotated[float, Field(gt=0, le=10_000)]
     normal: Vector = (0.0, 0.0, 1.0)
-    """Axis of the circle in the world; the tool turns about it right-handed."""
+    """Axis of the circle in the world frame; the tool turns about it right-handed."""
     towards: Vector = (1.0, 0.0, 0.0)
-    """Direction from the tool at ``start_deg`` to the centre, made square to it."""
+    """Direction from the tool at ``start_deg`` to the centre, projected perpendicular
+    to ``normal``."""
     cycles: Cycles = 1
     hold_s: Seconds = 0.2
     ramp_s: Annotated[float, Field(gt=0, le=10_000)] = 0.5
@@ -226,26 +227,26 @@ class Circle(ToolMotion):
         size = (a * a + b * b + c * c) * (x * x + y * y + z * z)
         if sum(v * v for v in across) <= 1e-12 * size:
             raise Fault(
-                ("towards", "along normal; accepted: a direction across the normal")
+                ("towards", "parallel to normal; accepted: any other direction")
             )
         return self
 
 
 class Iso9283(ToolMotion):
-    """The pose cycle of ISO 9283: P1 in the middle of a cube, P2 to P5 around it."""
+    """The pose cycle of ISO 9283: P1 at the centre of a cube, P2 to P5 around it."""
 
     kind: Literal["iso9283"] = "iso9283"
     edge_mm: Annotated[float, Field(gt=0, le=10_000)] = 250.0
-    """Edge of the cube; the standard has 250, 400, 630 and 1000 mm. Its centre P1 is
-    the tool at ``start_deg``, its edges lie along the axes of the world."""
+    """Edge of the cube; the standard lists 250, 400, 630 and 1000 mm. The centre P1 is
+    the tool at ``start_deg``, and the edges are parallel to the world axes."""
     plane: Plane = "+x"
-    """Horizontal direction in which the diagonal plane rises: the four planes of the
-    standard are the four directions."""
+    """Horizontal direction in which the diagonal plane rises; the four directions are
+    the four planes of the standard."""
     cycles: Cycles = 30
     hold_s: Seconds = 0.2
     """Rest at P1 before the first cycle."""
     rest_s: Annotated[float, Field(gt=0, le=10_000)] = 0.4
-    """Rest at every pose; the pose is measured at its end."""
+    """Rest at every pose; the pose is measured at the end of the rest."""
 
     @property
     def shortest_s(self) -> float:
@@ -279,4 +280,4 @@ MOTIONS: dict[str, type[MotionSection]] = {
         Iso9283,
     )
 }
-"""Kinds of motion by name."""
+"""Classes of the kinds of motion by name."""

@@ -1,0 +1,96 @@
+"""Use of the drive ratings in a run: peak, cubed mean torque, ratcheting, map range."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from swgjoint.typing import Array
+from swgjoint.units import rpm
+
+if TYPE_CHECKING:
+    from swgjoint.sim.run import Run
+
+
+SLACK = 1.01
+"""Factor on ratings, which have two or three digits: a run at rated torque passes."""
+AT_REST = 1e-9
+"""Commanded speed below which a joint counts as resting [rad/s]; the round-off of a
+motion through equal points is below it."""
+
+
+def use_of_ratings(run: Run, j: int) -> dict[str, Any]:
+    """Torques and speed of one joint over the whole run, compared with its ratings.
+
+    The cubed mean is weighted with the speed; for a joint at rest it is the mean over
+    time.
+
+    Args:
+        run: The run.
+        j: Index of the joint.
+    """
+    transmission = run.assembly.transmissions[j]
+    ratings = transmission.drive.ratings
+    torque = np.abs(run.output_torque[:, j])
+    speed = np.abs(run.velocity[:, j])
+    moving = run.assembly.trajectory.top_speed[j] > AT_REST and speed.any()
+    cubed = cubed_mean(torque, speed if moving else np.ones_like(speed))
+    peak = float(torque.max())
+    low, high = transmission.drive.torque_range
+    skips = ratings.ratcheting_torque
+    return {
+        "rated_Nm": ratings.rated_torque,
+        "repeated_peak_Nm": ratings.repeated_peak,
+        "momentary_peak_Nm": ratings.momentary_peak,
+        "ratcheting_Nm": skips,
+        "source": ratings.source,
+        "peak_Nm": peak,
+        "cubed_mean_Nm": cubed,
+        "input_speed_rpm": float(np.abs(run.motor_velocity[:, j]).max() / rpm),
+        "within": bool(
+            cubed <= SLACK * ratings.rated_torque
+            and peak <= SLACK * ratings.repeated_peak
+        ),
+        "ratcheting_margin": None if skips is None else skips / max(peak, 1e-300),
+        "ratcheting": first_ratcheting(run.time, run.output_torque[:, j], skips),
+        "map_range_Nm": [low, high],
+        "within_map": bool(
+            low <= run.output_torque[:, j].min()
+            and run.output_torque[:, j].max() <= high
+        ),
+    }
+
+
+def first_ratcheting(
+    time: Array, torque: Array, limit: float | None
+) -> dict[str, Any] | None:
+    """First instant at which teeth would skip; None if they do not.
+
+    The simulation continues with the elastic law, without a skipped tooth.
+
+    Args:
+        time: Times of the samples [s]. Shape (n,).
+        torque: Output torque [N·m]. Shape (n,).
+        limit: Ratcheting torque [N·m]; None if it is not known.
+    """
+    above = np.flatnonzero(np.abs(torque) > (np.inf if limit is None else limit))
+    if not above.size:
+        return None
+    first = int(above[0])
+    return {
+        "time_s": float(time[first]),
+        "torque_Nm": float(torque[first]),
+        "after_it": "elastic, without the skipped tooth",
+    }
+
+
+def cubed_mean(torque: Array, speed: Array) -> float:
+    """Mean load torque as catalogues define it, (sum |T|³ |n| / sum |n|)^(1/3) [N·m].
+
+    Args:
+        torque: Output torque at equal time steps [N·m]. Shape (n,).
+        speed: Output speed in any unit, not all zero. Shape (n,).
+    """
+    weight = np.abs(speed)
+    return float(np.average(np.abs(torque) ** 3, weights=weight) ** (1.0 / 3.0))
