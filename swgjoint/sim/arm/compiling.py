@@ -1,4 +1,4 @@
-"""The engine's compiler, with its complaints as lines for the user."""
+"""Compilation of models, with failures as one-line messages."""
 
 from __future__ import annotations
 
@@ -8,10 +8,14 @@ from swgjoint.errors import InputError
 
 
 def compile_spec(spec: mujoco.MjSpec, *, where: str) -> mujoco.MjModel:
-    """Compile, with a failure as one line.
+    """Compile a model and report failure in one line.
+
+    Args:
+        spec: The model.
+        where: Start of the message.
 
     Raises:
-        InputError: If the engine refuses the model.
+        InputError: If the engine rejects the model.
     """
     try:
         return spec.compile()
@@ -21,18 +25,23 @@ def compile_spec(spec: mujoco.MjSpec, *, where: str) -> mujoco.MjModel:
         if "balanceinertia" in line or "positive eigenvalues" in line:
             remedy = (
                 "; accepted: moments of inertia of a rigid body, or the option"
-                " --balance-inertia (scene key balance_inertia), which takes their mean"
+                " --balance-inertia (scene key balance_inertia), which sets all three"
+                " to their mean"
             )
         raise InputError(f"{where}: MuJoCo cannot compile it: {line}{remedy}") from None
 
 
 def skeleton(spec: mujoco.MjSpec, *, where: str) -> mujoco.MjModel:
-    """Bodies, joints and keyframes of a model alone: compiled without its shapes.
+    """Compile only bodies, joints and keyframes of a model, without its shapes.
 
-    Every body has a mass of 1 kg: of the model only the kinematics holds.
+    Every body gets a mass of 1 kg, so only the kinematics of the result is valid.
+
+    Args:
+        spec: The model; left unchanged.
+        where: Start of the message.
 
     Raises:
-        InputError: If the engine refuses the model.
+        InputError: If the engine rejects the model.
     """
     bones = spec.copy()
     for elements in (bones.tendons, bones.pairs, bones.flexes, bones.skins):

@@ -1,4 +1,4 @@
-"""Catalogue drives for an arm by rule: the smallest that carries every joint."""
+"""Selection of catalogue drives by rule: the smallest that carries each joint."""
 
 from __future__ import annotations
 
@@ -13,39 +13,41 @@ from swgjoint.sim.arm.rigid_arm import RigidArm
 from swgjoint.sim.motion.trajectory import Trajectory
 
 SERIES = "CSG"
+"""Series of the selected drives."""
 RATIO = 100
+"""Reduction of the selected drives."""
 LARGER = 10.0
-"""A drive that carries more than this many times what a joint asks is said to be larger
-than the joint."""
+"""Available over required torque above which the smallest drive is reported as larger
+than needed."""
 SAMPLES = 200
-"""Poses of a motion whose torques count."""
+"""Approximate number of poses of a motion at which torques are evaluated."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class DriveChoice:
-    """The drive of one joint and what decided."""
+    """The drive of one joint and the torque that decided its size."""
 
     drive: str
     decided_by: str
-    """``effort`` (torque of the motor in the arm's file), ``weight`` or ``motion``."""
+    """``effort`` (motor torque in the arm's file), ``weight`` or ``motion``."""
     needed: float
-    """Torque that decided [N·m]."""
+    """Required torque that decided the size [N·m]."""
     available: float
-    """What the drive has for it [N·m]: repeated peak torque, for the weight its rated
-    torque."""
+    """Torque of the drive that ``needed`` is compared with [N·m]: rated torque for the
+    weight, repeated peak torque otherwise."""
     fits: bool
-    """False where no drive of the series carries it; the drive is the largest then."""
+    """Whether the drive suffices; if not, it is the largest of the series."""
     asked: Mapping[str, float]
-    """Torques that were compared [N·m]."""
+    """All required torques by kind [N·m]."""
 
     @property
     def larger_than_needed(self) -> bool:
-        """Whether even the smallest drive is much larger than the joint."""
+        """Whether even the smallest drive is much larger than the joint requires."""
         smallest = _rows()[0].name == self.drive
         return smallest and self.available > LARGER * self.needed
 
     def as_json(self) -> dict[str, Any]:
-        """Under the keys of ``drive_choice`` in the output of ``swgjoint run``."""
+        """Values under the keys of ``drive_choice`` of ``swgjoint run --json``."""
         return {
             "drive": self.drive,
             "decided_by": self.decided_by,
@@ -58,12 +60,20 @@ class DriveChoice:
 
 
 def choose_drives(arm: RigidArm, motion: Trajectory) -> dict[str, DriveChoice]:
-    """The smallest CSG of ratio 100 for every joint of an arm on a motion.
+    """Select the smallest CSG of ratio 100 for every joint of an arm on a motion.
 
-    Its repeated peak torque is at least what the file lets the joint's motor exert,
-    where the file says, and what the motion of the rigid arm needs at most, weight,
-    acceleration and friction of the file together; its rated torque is at least the
-    weight on that motion. The largest drive where none carries that much.
+    The repeated peak torque of the drive is at least the motor torque limit in the
+    arm's file, if there is one, and at least the largest torque of the rigid arm on the
+    motion (weight, acceleration and friction of the file). The rated torque is at
+    least the largest weight torque on the motion. If no drive suffices, the largest is
+    selected.
+
+    Args:
+        arm: The rigid arm.
+        motion: Its commanded motion.
+
+    Returns:
+        Drive selection by joint.
     """
     step = max(1, len(motion.time) // SAMPLES)
     path = motion.every(step)
@@ -79,12 +89,12 @@ def choose_drives(arm: RigidArm, motion: Trajectory) -> dict[str, DriveChoice]:
 
 
 def choose_drive(*, effort: float | None, weight: float, motion: float) -> DriveChoice:
-    """The smallest drive for three torques at the output [N·m].
+    """Select the smallest drive for three output torques.
 
     Args:
-        effort: Of the motor, None where the file does not say.
-        weight: Largest at rest.
-        motion: Largest in motion, weight included.
+        effort: Motor torque limit [N·m]; None if the file states none.
+        weight: Largest torque at rest [N·m].
+        motion: Largest torque in motion, weight included [N·m].
     """
     rows = _rows()
     asked = {"weight": weight, "motion": motion}
@@ -96,7 +106,7 @@ def choose_drive(*, effort: float | None, weight: float, motion: float) -> Drive
         sizes[kind] = fits[0] if fits else len(rows)
     largest = len(rows) - 1
     row = rows[min(max(sizes.values()), largest)]
-    # of those that ask for this size the one that uses most of it
+    # of the torques that require this size, the one that uses most of it decides
     decided_by = max(
         asked, key=lambda kind: (sizes[kind], asked[kind] / _carries(row, kind))
     )

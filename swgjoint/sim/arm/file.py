@@ -1,4 +1,4 @@
-"""A user's arm, MJCF or URDF, as the bare mechanics that a scene puts drives into."""
+"""Import of an MJCF or URDF arm as bare mechanics, without motors."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from swgjoint.sim.arm.number_checks import check_numbers
 from swgjoint.sim.arm.reading import ArmReading
 
 MESHES = (".stl", ".obj", ".msh")
-"""What the engine reads."""
+"""Mesh formats that the engine reads."""
 _ON_JOINT = (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT)
 _OF_ACTUATORS = (
     *("ctrllimited", "ctrlrange", "forcelimited", "forcerange", "actlimited"),
@@ -29,40 +29,41 @@ _OF_ACTUATORS = (
     *("biastype", "biasprm", "dyntype", "dynprm", "delay", "nsample", "interp"),
     *("damping", "armature", "cranklength", "lengthrange"),
 )
-"""What a class may say of actuators."""
+"""Actuator attributes that a default class may set."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ArmFile:
-    """What a scene takes from the file of an arm."""
+    """Contents of an arm's file that a scene uses."""
 
     spec: mujoco.MjSpec
-    """Links, joints, shapes, tendons; without actuators, sensors, keyframes, limits of
-    motor torque and armature, all of which are the drive's and the scene's."""
+    """Links, joints, shapes and tendons. Actuators, sensors, keyframes, motor torque
+    limits and armature are removed, because drives and scene provide them."""
     held: dict[str, str]
-    """Joints that do not move in a scene, and why: their type, or what ties them."""
+    """Held joints with the reason: their type, or what ties them."""
     keyframes: dict[str, dict[str, float]]
-    """Poses that the file names: angles of all hinges [rad]."""
+    """Named poses of the file: angles of all hinges [rad]."""
     effort: dict[str, float]
-    """Torque that the file lets motors exert on a joint, where it says so [N·m]."""
+    """Motor torque limits of the joints for which the file states one [N·m]."""
 
 
 def read_arm(path: Path, reading: ArmReading | None = None) -> ArmFile:
-    """Read an arm and leave out what belongs to the scene.
+    """Read an arm and remove everything that the scene provides.
 
-    Joints that are no hinges, or that an equality ties to others, are held in the pose
-    of ``reading``. Shapes of a URDF whose meshes are missing or of a kind that the
-    engine does not read are left out: the file states the inertia. Forces that carry
-    the weight of bodies (``gravcomp``) are left out, for in the arm the drives do. Each
-    gives a warning of one line. Shapes of a URDF do not collide, for neighbours overlap
-    and the format cannot say which may; those of an MJCF file do as it says.
+    Joints that are not hinges, or that an equality ties to others, are held in the pose
+    of ``reading``. Shapes of a URDF file are dropped if their meshes are missing or in
+    a format that the engine does not read; the inertia is stated in the file. Gravity
+    compensation (``gravcomp``) is removed, because the drives carry the weight. Each
+    case causes a one-line warning. Shapes of a URDF file do not collide, because
+    adjacent links overlap and the format cannot exclude them; shapes of an MJCF file
+    collide as the file states.
 
     Args:
         path: MJCF or URDF file.
-        reading: What moves, and where the rest is held; None: every hinge.
+        reading: Which hinges move, and the pose of held joints; None moves every hinge.
 
     Raises:
-        InputError: If the file is no arm, or none of its hinges moves on its own.
+        InputError: If the file is not an arm, or no hinge of it moves independently.
     """
     try:
         return _arm_of(path, reading or ArmReading())
@@ -81,7 +82,7 @@ def _arm_of(path: Path, reading: ArmReading) -> ArmFile:
         _balance_inertia(spec)
     spec.compiler.fusestatic = False  # every link keeps its name
     if path.suffix.lower() == ".urdf":
-        spec.compiler.discardvisual = False  # what does not collide is seen, still
+        spec.compiler.discardvisual = False  # shapes without collision stay visible
         _find_meshes(spec, path)
         for geom in spec.geoms:
             geom.contype = geom.conaffinity = 0
@@ -107,7 +108,7 @@ def _arm_of(path: Path, reading: ArmReading) -> ArmFile:
     for element in [*spec.sensors, *spec.actuators]:
         spec.delete(element)
     for key in spec.keys:
-        key.ctrl, key.act = [], []  # of actuators that are gone
+        key.ctrl, key.act = [], []  # their actuators are removed
     bones = skeleton(spec, where=str(path))
     check_numbers(bones, where=str(path))
     keyframes = _keyframes(bones)
@@ -129,15 +130,15 @@ def _arm_of(path: Path, reading: ArmReading) -> ArmFile:
     effort = {
         name: limit
         for name, limit in limits.items()
-        if name not in holding.held and np.isfinite(limit)  # inf is no limit
+        if name not in holding.held and np.isfinite(limit)  # inf means no limit
     }
     return ArmFile(spec=spec, held=holding.held, keyframes=keyframes, effort=effort)
 
 
 def _check_references(spec: mujoco.MjSpec, path: Path) -> None:
-    """Refuse tendons, equalities and pairs of what the file does not have.
+    """Reject tendons, equalities and pairs that name elements missing in the file.
 
-    The engine refuses them, too, but not before joints are held.
+    The engine rejects them as well, but only after joints have been held.
     """
     tendons = [
         (f"tendon {tendon.name!r}", wrap.target)
@@ -156,18 +157,18 @@ def _check_references(spec: mujoco.MjSpec, path: Path) -> None:
         for pair in spec.pairs
         for name in (pair.geomname1, pair.geomname2)
     ]
-    for what, target in [*tendons, *equalities, *pairs]:
+    for element, target in [*tendons, *equalities, *pairs]:
         if target is None:
             raise InputError(
-                f"{path}: {what} names what is not in the file; accepted: its joints,"
-                " sites, bodies, geoms and tendons"
+                f"{path}: {element} names an element that is not in the file;"
+                " accepted: its joints, sites, bodies, geoms and tendons"
             )
 
 
 def _tied_element(
     spec: mujoco.MjSpec, equality: mujoco.MjsEquality, name: str
 ) -> object:
-    """What an equality names; None if there is none, or the name for other kinds."""
+    """Element that an equality names, None if missing; the name for other kinds."""
     if equality.type == mujoco.mjtEq.mjEQ_JOINT:
         return spec.joint(name)
     if equality.type == mujoco.mjtEq.mjEQ_TENDON:
@@ -179,7 +180,7 @@ def _tied_element(
 
 
 def _forget_actuators(spec: mujoco.MjSpec) -> None:
-    """Undo what the main class says of actuators: those of the scene would take it."""
+    """Reset the default actuator class, which actuators of the scene would inherit."""
     fresh = mujoco.MjSpec()
     own, plain = spec.default.actuator, fresh.default.actuator
     for key in _OF_ACTUATORS:
@@ -187,28 +188,28 @@ def _forget_actuators(spec: mujoco.MjSpec) -> None:
 
 
 def _spec_of(path: Path) -> mujoco.MjSpec:
-    """What the engine reads; a suffix counts in upper case, too."""
+    """Read a file with the engine; suffixes may be in upper case."""
     suffix = path.suffix.lower()
     if suffix == ".xacro":
         raise InputError(
-            f"{path}: a template of a URDF; accepted: what 'xacro {path.name}' makes of"
-            " it, as a file ending .urdf"
+            f"{path}: a URDF template; accepted: the output of 'xacro {path.name}' in a"
+            " file with the suffix .urdf"
         )
     check_class_names(path)
     try:
         if suffix == path.suffix or suffix not in (".urdf", ".xml"):
             return mujoco.MjSpec.from_file(str(path))
-        # the engine chooses its reader by the suffix, and knows it in lower case only
+        # the engine selects its reader by the suffix, in lower case only
         spec = mujoco.MjSpec.from_string(path.read_text(encoding="utf-8"))
         spec.modelfiledir = str(path.parent)
         return spec
     except (ValueError, OSError) as exc:
         line = " ".join(str(exc).split())
-        raise InputError(f"{path}: not an MJCF arm and no URDF: {line}") from None
+        raise InputError(f"{path}: neither an MJCF nor a URDF arm: {line}") from None
 
 
 def _balance_inertia(spec: mujoco.MjSpec) -> None:
-    """Repair inertias that no rigid body has: three moments become their mean."""
+    """Replace the moments of inertias that no rigid body can have by their mean."""
     spec.compiler.balanceinertia = True  # those that break the triangle inequality
     for body in spec.bodies:
         full = np.array(body.fullinertia)
@@ -235,39 +236,39 @@ def _keyframes(model: mujoco.MjModel) -> dict[str, dict[str, float]]:
 def _tell_held(
     held: dict[str, str], reading: ArmReading, path: Path, *, moves: bool
 ) -> None:
-    """One line about joints that are held although the user did not ask for it."""
-    told = {name: why for name, why in held.items() if why != NOT_CHOSEN}
-    if not told or not moves:
+    """Warn in one line about joints that are held although the user chose none."""
+    reported = {name: why for name, why in held.items() if why != NOT_CHOSEN}
+    if not reported or not moves:
         return
     where = "the reference position"
     if reading.pose is not None:
         where = f"keyframe {reading.pose!r}"
     hangs = ""
-    if FREE in told.values():
-        hangs = "; a robot without its free joint hangs and does not feel the floor"
-    which = ", ".join(f"{name} ({why})" for name, why in told.items())
+    if FREE in reported.values():
+        hangs = "; a robot without its free joint hangs and does not touch the floor"
+    which = ", ".join(f"{name} ({why})" for name, why in reported.items())
     warnings.warn(
-        f"{path}: held at {where}, because a drive needs a hinge that moves on its own:"
-        f" {which}{hangs}",
+        f"{path}: held at {where}, because a drive needs a hinge that moves"
+        f" independently: {which}{hangs}",
         stacklevel=3,
     )
 
 
 def _let_weigh(spec: mujoco.MjSpec, path: Path) -> None:
-    """Take out forces that carry bodies without any drive."""
+    """Remove gravity compensation, which carries bodies without a drive."""
     carried = [body for body in spec.bodies if body.gravcomp]
     for body in carried:
         body.gravcomp = 0.0
     if carried:
         warnings.warn(
-            f"{path}: gravcomp of {len(carried)} bodies is left out, because the drives"
+            f"{path}: gravcomp of {len(carried)} bodies is ignored, because the drives"
             f" carry the weight: {', '.join(body.name for body in carried)}",
             stacklevel=3,
         )
 
 
 def _effort(spec: mujoco.MjSpec) -> dict[str, float]:
-    """Largest motor torque on every joint that the file limits [N·m]."""
+    """Motor torque limits of the joints for which the file states one [N·m]."""
     limits: dict[str, float] = {}
     for actuator in spec.actuators:
         force = max(map(abs, actuator.forcerange))
@@ -276,17 +277,17 @@ def _effort(spec: mujoco.MjSpec) -> dict[str, float]:
             force = abs(actuator.gainprm[0]) * max(map(abs, actuator.ctrlrange))
         if force and actuator.trntype in _ON_JOINT:
             limits[actuator.target] = float(force * abs(actuator.gear[0]))
-    for joint in spec.joints:  # of URDF: <limit effort="...">
+    for joint in spec.joints:  # from URDF: <limit effort="...">
         if force := max(map(abs, joint.actfrcrange)):
             limits[joint.name] = float(force)
     return limits
 
 
 def _solve_well(spec: mujoco.MjSpec) -> None:
-    """Let the engine iterate as much as it does by default.
+    """Restore at least the default solver effort of the engine.
 
-    Files made for learning allow it a few iterations. The drives are part of the system
-    that it solves in a step: unfinished, they exert wrong torques.
+    Files made for learning limit the solver to a few iterations. The drives are part of
+    the system that it solves in a step: without convergence their torques are wrong.
     """
     usual = mujoco.MjSpec().option
     option = spec.option
@@ -299,7 +300,7 @@ def _solve_well(spec: mujoco.MjSpec) -> None:
 
 
 def _find_meshes(spec: mujoco.MjSpec, path: Path) -> None:
-    """Resolve ``package://`` and leave out shapes whose mesh cannot be read."""
+    """Resolve ``package://`` and drop shapes whose mesh cannot be read."""
     unknown: list[str] = []
     missing: list[str] = []
     for mesh in list(spec.meshes):
@@ -314,23 +315,23 @@ def _find_meshes(spec: mujoco.MjSpec, path: Path) -> None:
     reasons = []
     if unknown:
         kinds = Counter(Path(file).suffix for file in unknown)
-        of = ", ".join(f"{n} {kind}" for kind, n in kinds.items())
+        counts = ", ".join(f"{n} {kind}" for kind, n in kinds.items())
         reasons.append(
-            f"{of} that the engine cannot read (accepted: {', '.join(MESHES)}), the"
+            f"{counts} that the engine cannot read (accepted: {', '.join(MESHES)}), the"
             f" first is {unknown[0]}"
         )
     if missing:
         reasons.append(f"{len(missing)} not found, the first is {missing[0]}")
     if reasons:
         warnings.warn(
-            f"{path}: shapes are left out for want of their meshes:"
+            f"{path}: shapes are left out because of their meshes:"
             f" {'; '.join(reasons)}",
             stacklevel=3,
         )
 
 
 def _mesh_file(reference: str, folder: Path, meshdir: str) -> Path | None:
-    """Where a mesh of a URDF lies; None if nowhere."""
+    """Path of a URDF mesh; None if it is not found."""
     for file in _places(reference, folder, meshdir):
         if is_file(file):
             return file.resolve()
@@ -344,7 +345,7 @@ def _places(reference: str, folder: Path, meshdir: str) -> Iterable[Path]:
         return [folder / meshdir / reference, folder / reference]
     if scheme != "package":
         return [Path(rest)]
-    # a package is a folder above the file, or beside one above it
+    # a package is a parent folder of the file, or a sibling of a parent folder
     package, _, inside = rest.partition("/")
     above = folder.resolve()
     parents = (above, *above.parents)
@@ -353,5 +354,5 @@ def _places(reference: str, folder: Path, meshdir: str) -> Iterable[Path]:
         for parent in parents
         for place in ((parent,) if parent.name == package else (parent / package,))
     ]
-    # a copy of the package under another name keeps its folders
+    # a renamed copy of the package keeps its folders
     return [*places, *(parent / inside for parent in parents[:4])]

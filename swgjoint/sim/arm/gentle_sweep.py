@@ -1,4 +1,4 @@
-"""Where an arm starts, and a sweep of its joints in which nothing collides."""
+"""Start pose of an arm, and a collision-free sweep of its joints."""
 
 from __future__ import annotations
 
@@ -16,46 +16,47 @@ from swgjoint.typing import Array
 from swgjoint.units import deg, mm
 
 SWEEP = 20.0 * deg
-"""Travel of every joint, less where its range is short or something is near [rad]."""
+"""Travel of every joint, unless its range or obstacles limit it [rad]."""
 MARGIN = 0.1
-"""Share of a joint's range that the sweep keeps from either end, unless the arm starts
-nearer to it."""
+"""Distance of the sweep from both ends of a joint's range, relative to the range. The
+start may be closer to an end."""
 START_MARGIN = 0.01
-"""Share that the pose of a keyframe keeps: drives give way, and a limit pushes."""
+"""Such a distance for the pose of a keyframe: drives yield, and limits exert force."""
 CLEARANCE = 5.0 * mm
-"""Distance that bodies keep on a sweep: more than drives give way."""
+"""Distance between bodies on a sweep [m], more than the compliance of the drives."""
 DEEPER = 0.1 * mm
-"""What bodies that touch where the arm starts may press on [m]."""
+"""Accepted increase in penetration of bodies that touch at the start [m]."""
 SPACING = 1.0 * deg
-"""Between two poses in which distances are checked [rad]."""
+"""Joint angle between two poses at which distances are checked [rad]."""
 BENDS = (45.0 * deg, 30.0 * deg, 60.0 * deg)
-"""Of joints that are stretched where a tool is to move [rad]."""
+"""Bends of the joints of a stretched arm whose tool must move [rad]."""
 SHARES = (1.0, 0.5, 0.25)
-"""Of the sweep, tried one after the other where something is in the way."""
+"""Fractions of the sweep to try in turn if obstacles limit it."""
 REFERENCE, MIDDLE, HOME = "reference", "middle", "home"
 
 
 class StartWarning(UserWarning):
-    """Bodies touch where an arm starts."""
+    """Warns that bodies touch at the start of an arm."""
 
 
 def place_arm(
     reference: str, *, reading: ArmReading, pose: str | None = None
 ) -> tuple[RigidArm, Array]:
-    """Read an arm in the pose from which it starts.
+    """Read an arm in its start pose.
 
-    That is the first in which no bodies touch of: the file's first keyframe; the
-    reference position, joints outside their range in the middle of it; the middle of
-    all ranges. Hinges that are not driven are held there, too.
+    The start pose is the first of these poses in which no bodies touch: the first
+    keyframe of the file; the reference position, with joints outside their range at the
+    middle of the range; the middle of all ranges. Hinges without a drive are held
+    there.
 
     Args:
         reference: Path or name of a bundled arm.
-        reading: What moves; its pose and angles are chosen here.
-        pose: Keyframe, ``reference`` or ``middle``; ``home`` is a keyframe of that name
-            or else the first. None: as above.
+        reading: Which hinges move; its pose and angles are replaced.
+        pose: Keyframe, ``reference`` or ``middle``. ``home`` is a keyframe of that name
+            or else the first keyframe. None chooses as above.
 
     Returns:
-        The arm, and the angles of its joints [rad], shape (n_joints,).
+        The arm, and its joint angles [rad], shape (n_joints,).
 
     Raises:
         InputError: If the arm cannot be used or has no such pose.
@@ -72,7 +73,7 @@ def place_arm(
     first, second, depth = arm.contacts(start[None])[0]
     names = ", ".join(name for name, _, _ in tried)
     warnings.warn(
-        f"{arm.path}: bodies {first!r} and {second!r} touch where the arm starts,"
+        f"{arm.path}: bodies {first!r} and {second!r} touch at the start,"
         f" {depth / mm:.2g} mm deep (tried: {names}); another pose: --pose with one of"
         f" {', '.join([*whole.keyframes, REFERENCE, MIDDLE])}",
         StartWarning,
@@ -88,7 +89,7 @@ def _in_pose(
     keyframe: str | None,
     angles: dict[str, float],
 ) -> RigidArm:
-    """The arm with what does not move in a pose."""
+    """The arm, with its held joints in a pose."""
     others = {name: q for name, q in angles.items() if not reading.drives(name)}
     if not others and (keyframe is None or not whole.held):
         return whole if not reading.driven else RigidArm(reference, reading=reading)
@@ -97,9 +98,9 @@ def _in_pose(
 
 
 def _poses(
-    arm: RigidArm, asked: str | None
+    arm: RigidArm, chosen: str | None
 ) -> list[tuple[str, str | None, dict[str, float]]]:
-    """Name, keyframe and angles of the poses that may be the start."""
+    """Name, keyframe and angles of all candidate start poses."""
     model = arm.model
     low, high = model.jnt_range.T
     limited = _limited(arm)
@@ -112,31 +113,38 @@ def _poses(
         kept = np.where(limited, np.clip(q, low + pad, high - pad), q)
         return dict(zip(arm.joints, kept.tolist(), strict=True))
 
-    found: dict[str, tuple[str | None, dict[str, float]]] = {
+    poses: dict[str, tuple[str | None, dict[str, float]]] = {
         key: (key, angles(np.array([values[name] for name in arm.joints])))
         for key, values in arm.keyframes.items()
     }
-    first = list(found)[:1]
-    found.setdefault(REFERENCE, (None, angles(reference, MARGIN)))
-    found.setdefault(MIDDLE, (None, angles(middle)))
-    if asked is None:
+    first = list(poses)[:1]
+    poses.setdefault(REFERENCE, (None, angles(reference, MARGIN)))
+    poses.setdefault(MIDDLE, (None, angles(middle)))
+    if chosen is None:
         names = [*first, REFERENCE, MIDDLE]
     else:
-        if asked == HOME and HOME not in found:
+        if chosen == HOME and HOME not in poses:
             names = first or [REFERENCE]
-        elif asked in found:
-            names = [asked]
+        elif chosen in poses:
+            names = [chosen]
         else:
             raise InputError(
-                f"{arm.path}: pose {asked!r}; accepted: {', '.join(found)}"
+                f"{arm.path}: pose {chosen!r}; accepted: {', '.join(poses)}"
             )
-    return [(name, *found[name]) for name in dict.fromkeys(names)]
+    return [(name, *poses[name]) for name in dict.fromkeys(names)]
 
 
 def bent_starts(arm: RigidArm, start: Array) -> list[Array]:
-    """Poses about a start in which the arm is not stretched and no bodies touch [rad].
+    """Poses near a start in which the arm is bent and no bodies touch.
 
-    Joints bend to either side in turn, each within its range.
+    Successive joints bend in opposite directions, each within its range.
+
+    Args:
+        arm: The arm.
+        start: Joint angles at the start [rad]. Shape (n_joints,).
+
+    Returns:
+        Joint angles of each pose [rad]. Shapes (n_joints,).
     """
     model = arm.model
     low, high = model.jnt_range.T
@@ -149,16 +157,19 @@ def bent_starts(arm: RigidArm, start: Array) -> list[Array]:
 
 
 def gentle_sweep(arm: RigidArm, start: Array | None = None) -> tuple[Array, Array]:
-    """Where the joints start and end [rad]. Shapes (n_joints,).
+    """Start and end of a collision-free sweep [rad]. Shapes (n_joints,).
 
-    Every joint turns towards its farther limit, by :data:`SWEEP` or less. Where bodies
-    would come nearer to each other than :data:`CLEARANCE`, the joints are taken one
-    after the other, and each turns the other way or less far, or stays.
+    Every joint turns towards its farther limit by :data:`SWEEP` or less. If bodies
+    would come closer than :data:`CLEARANCE`, the joints are treated one by one: each
+    turns in the other direction, or less far, or remains at rest.
 
     Args:
         arm: The arm.
-        start: [rad]; None: the reference position, or the middle of the range of a
-            joint that may not be there. Shape (n_joints,).
+        start: Joint angles at the start [rad], shape (n_joints,). None is the reference
+            position, with joints outside their range at the middle of it.
+
+    Raises:
+        InputError: If no joint can turn without a collision.
     """
     if start is None:
         ((_, _, angles),) = _poses(arm, REFERENCE)
@@ -183,18 +194,18 @@ def gentle_sweep(arm: RigidArm, start: Array | None = None) -> tuple[Array, Arra
             break
     if not (end != start).any():
         raise InputError(
-            f"{arm.path}: no joint can turn by {SHARES[-1] * SWEEP / deg:g} deg either"
-            f" way from the start, {way.in_the_way}; accepted: another --pose, or"
-            " --motion with a motion of your own"
+            f"{arm.path}: no joint can turn by {SHARES[-1] * SWEEP / deg:g} deg in"
+            f" either direction from the start, {way.in_the_way}; accepted: another"
+            " --pose, or --motion with another motion"
         )
     return start, end
 
 
 def _room(arm: RigidArm, start: Array) -> tuple[Array, Array]:
-    """Bounds of all joints [rad]; a start beyond the margin is within."""
+    """Bounds of the sweep of all joints [rad]; they always include the start."""
     model = arm.model
     low, high = model.jnt_range.T.copy()
-    # a limit far beyond any turn is none, and differences of such ones overflow
+    # a limit beyond any real angle is none, and differences of such limits overflow
     free = ~_limited(arm)
     low[free], high[free] = 0.0, 0.0
     room = MARGIN * (high - low)
@@ -204,31 +215,31 @@ def _room(arm: RigidArm, start: Array) -> tuple[Array, Array]:
 
 
 def _limited(arm: RigidArm) -> NDArray[np.bool_]:
-    """Joints whose range has two ends that a state can reach. Shape (n_joints,)."""
+    """Whether both ends of each joint's range can be reached. Shape (n_joints,)."""
     model = arm.model
     reached = (abs(model.jnt_range) < LARGEST).all(axis=1)
     return np.asarray(model.jnt_limited.astype(bool) & reached)
 
 
 class _Way:
-    """What lies in the way of an arm from its start."""
+    """Collision check of straight joint motions from the start of an arm."""
 
     def __init__(self, arm: RigidArm, start: Array) -> None:
         self._arm, self._start = arm, start
-        self.in_the_way = "where the ranges end"
-        # bodies that are near from the start: half the distance is left to them, those
-        # that touch stay as deep as they are
+        self.in_the_way = "because the ranges end there"
+        # bodies that are close at the start may come half as close; those that touch
+        # there must not penetrate much deeper
         self._allowed = {
             (a, b): 0.5 * depth if depth < 0.0 else depth + DEEPER
             for a, b, depth in arm.contacts(start[None], within=CLEARANCE)
         }
 
     def is_free(self, end: Array) -> bool:
-        """Whether nothing collides on the straight way to an end."""
+        """Whether no bodies collide on the straight joint motion to an end."""
         count = 2 + int(np.abs(end - self._start).max() / SPACING)
         path = np.linspace(self._start, end, count)
         for a, b, depth in self._arm.contacts(path, within=CLEARANCE):
             if depth > self._allowed.get((a, b), -CLEARANCE):
-                self.in_the_way = f"bodies {a!r} and {b!r} would collide"
+                self.in_the_way = f"because bodies {a!r} and {b!r} would collide"
                 return False
         return True

@@ -1,4 +1,4 @@
-"""Joints of an arm that do not move: taken out where a pose of the file has them."""
+"""Joints that do not move in a scene: removed in a pose of the arm."""
 
 from __future__ import annotations
 
@@ -25,26 +25,31 @@ _ON_BODIES = (mujoco.mjtEq.mjEQ_CONNECT, mujoco.mjtEq.mjEQ_WELD)
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Holding:
-    """Which joints of a file do not move, and why."""
+    """Joints of a file that do not move, with reasons and consequences."""
 
     held: dict[str, str]
-    """Joint and reason: its type, or what ties it."""
+    """Held joints with the reason: their type, or what ties them."""
     unfiltered: list[tuple[str, str]]
-    """Pairs of bodies that must be excluded from contact once these joints are gone."""
+    """Pairs of bodies to exclude from contact after these joints are removed."""
     hung: frozenset[str]
-    """Bodies that hang on a free joint that is held."""
+    """Bodies that a held free joint carries."""
     still: frozenset[str]
     """Bodies that no joint of the file moves."""
 
 
 def choose_held(spec: mujoco.MjSpec, reading: ArmReading, path: Path) -> Holding:
-    """Joints that are no hinges, that equalities tie, or that are not to be driven.
+    """Find joints that are not hinges, that equalities tie, or that have no drive.
 
-    Equalities are deleted: those that are inactive, those that pull a body to a mocap
-    body, which replace a motor, and those whose joints are all held.
+    All equalities are deleted: inactive ones, those that pull a body to a mocap body,
+    which replace a motor, and those whose joints are all held.
+
+    Args:
+        spec: The arm; its equalities are deleted.
+        reading: Which hinges have drives.
+        path: File of the arm, for messages.
 
     Raises:
-        InputError: If no hinge is left to move, or a pattern names none.
+        InputError: If no hinge is left to move, or a pattern matches none.
     """
     held = {
         joint.name: mujoco.mjtJoint(joint.type).name.removeprefix("mjJNT_").lower()
@@ -75,13 +80,13 @@ def choose_held(spec: mujoco.MjSpec, reading: ArmReading, path: Path) -> Holding
     if hinges and not free:
         raise InputError(
             f"{path}: every hinge is tied to another joint: {first}; accepted in a"
-            " scene: a hinge that moves on its own"
+            " scene: a hinge that moves independently"
         )
     for pattern in reading.driven:
         if not any(ArmReading(driven=(pattern,)).drives(name) for name in free):
             raise InputError(
-                f"{path}: joints {pattern!r}: no hinge that moves on its own has such"
-                f" a name; accepted: {', '.join(free)}"
+                f"{path}: joints {pattern!r}: no independent hinge has such a"
+                f" name; accepted: {', '.join(free)}"
             )
     held |= {name: NOT_CHOSEN for name in free if not reading.drives(name)}
     hung = {
@@ -107,24 +112,24 @@ def hold(
     bones: mujoco.MjModel,
     path: Path,
 ) -> None:
-    """Take out the held joints, each where the pose has it, and what hangs on them.
+    """Remove the held joints in their pose, with the tendons and pairs that need them.
 
     Args:
-        spec: The arm.
-        holding: Which joints, and why.
-        reading: Where they are held.
-        bones: The arm as it was read, see :func:`swgjoint.sim.arm.compiling.skeleton`.
-        path: Begins the messages.
+        spec: The arm; changed in place.
+        holding: Joints to hold, with reasons.
+        reading: Pose in which they are held.
+        bones: The arm as read, see :func:`swgjoint.sim.arm.compiling.skeleton`.
+        path: File of the arm, for messages.
 
     Raises:
-        InputError: If an angle is given for a held joint that is no hinge.
+        InputError: If an angle is given for a held joint that is not a hinge.
     """
     held = holding.held
     for name in set(reading.angles) & set(held):
         if not held[name].startswith(HINGE):
             raise InputError(
-                f"{path}: an angle for joint {name!r}, which is a {held[name]} and held"
-                f" in the {reading.pose or 'reference'} pose; accepted: hinges"
+                f"{path}: an angle for joint {name!r}, a {held[name]} joint held in"
+                f" the {reading.pose or 'reference'} pose; accepted: hinges"
             )
     for tendon in list(spec.tendons):
         if _joints_of_tendon(tendon) & set(held):
@@ -135,7 +140,7 @@ def hold(
         spec.delete(spec.joint(name))
     for first, second in holding.unfiltered:
         spec.add_exclude(bodyname1=first, bodyname2=second)
-    for pair in list(spec.pairs):  # which no <exclude> keeps apart
+    for pair in list(spec.pairs):  # <exclude> has no effect on pairs
         geoms = (spec.geom(pair.geomname1), spec.geom(pair.geomname2))
         bodies = {geom.parent.name for geom in geoms}
         if bodies & holding.hung and bodies & holding.still:
@@ -148,11 +153,11 @@ def _fold(
     reading: ArmReading,
     model: mujoco.MjModel,
 ) -> None:
-    r"""Move the frames of bodies by what their held joints do in the pose.
+    r"""Move the frames of bodies by the displacement of their held joints in the pose.
 
-    A body's pose in its parent is :math:`T_0 J_1 J_2 \dots` with one factor per joint.
-    A held factor moves to the front past those that stay, whose axes and anchors turn
-    with it: :math:`J_m J_h = J_h\,(J_h^{-1} J_m J_h)`.
+    The pose of a body in its parent is :math:`T_0 J_1 J_2 \dots` with one factor per
+    joint. A held factor moves to the front past the remaining factors, which transforms
+    their axes and anchors: :math:`J_m J_h = J_h\,(J_h^{-1} J_m J_h)`.
     """
     qpos = model.qpos0
     if reading.pose is not None:
@@ -194,7 +199,7 @@ _WIDTH = {
 
 
 def _moved(joint: object, value: Array, *, start: float, body: object) -> Pose:
-    """What one joint does to its body, in the body's frame."""
+    """Displacement of a body by one joint, in the frame of the body."""
     own, here = joint, body
     kind = int(own.type[0])  # type: ignore[attr-defined]
     axis, anchor = own.axis, own.pos  # type: ignore[attr-defined]
@@ -212,7 +217,7 @@ def _moved(joint: object, value: Array, *, start: float, body: object) -> Pose:
 
 
 def _own_pose(body: mujoco.MjsBody) -> Pose:
-    """Pose of a body in its parent or frame, as its file writes it."""
+    """Pose of a body in its parent or frame, as stated in the file."""
     quat = np.array(body.quat)
     if body.alt.type != mujoco.mjtOrientation.mjORIENTATION_QUAT:
         compiler = body.compiler
@@ -233,7 +238,7 @@ def _unit(quat: Array) -> Array:
 
 
 def _after(first: Pose, second: Pose) -> Pose:
-    """The second pose within the first."""
+    """Composition of two poses: the second in the frame of the first."""
     place, turn = np.empty(3), np.empty(4)
     mujoco.mju_mulPose(place, turn, *first, *second)
     return place, turn
@@ -256,7 +261,7 @@ def _placed(pose: Pose, point: Array) -> Array:
 
 
 def _tied(spec: mujoco.MjSpec, equality: mujoco.MjsEquality) -> set[str] | None:
-    """Joints that an equality lets move only together; None if it cannot be said."""
+    """Joints that an equality couples; None for unsupported kinds of equality."""
     names = [name for name in (equality.name1, equality.name2) if name]
     if equality.type == mujoco.mjtEq.mjEQ_JOINT:
         return set(names)
@@ -270,7 +275,7 @@ def _tied(spec: mujoco.MjSpec, equality: mujoco.MjsEquality) -> set[str] | None:
 
 
 def _pulls_to_mocap(spec: mujoco.MjSpec, equality: mujoco.MjsEquality) -> bool:
-    """Whether an equality draws a body to one that a user moves by hand."""
+    """Whether an equality pulls a body to a mocap body, which a user moves."""
     if equality.type not in _ON_BODIES:
         return False
     names = [name for name in (equality.name1, equality.name2) if name]
@@ -286,7 +291,7 @@ def _body(
 
 
 def _between(ends: Iterable[mujoco.MjsBody]) -> set[str]:
-    """Joints on the way from body to body through the tree; from one to the world."""
+    """Joints between bodies in the tree, or between one body and the world."""
     chains = [{body.name: body for body in _chain(end)} for end in ends]
     shared = set(chains[0]).intersection(*chains[1:]) if len(chains) > 1 else {WORLD}
     return {
@@ -299,7 +304,7 @@ def _between(ends: Iterable[mujoco.MjsBody]) -> set[str]:
 
 
 def _chain(body: mujoco.MjsBody) -> Iterator[mujoco.MjsBody]:
-    """A body and all that carry it, the world last."""
+    """A body and all its parents, the world last."""
     while True:
         yield body
         if body.name == WORLD:
@@ -312,7 +317,7 @@ def _joints_of_tendon(tendon: mujoco.MjsTendon) -> set[str]:
 
 
 def _joints_along(tendon: mujoco.MjsTendon) -> set[str]:
-    """Joints between the sites that a spatial tendon passes."""
+    """Joints between the sites along a spatial tendon."""
     sites = [w.target for w in tendon.path if w.type == mujoco.mjtWrap.mjWRAP_SITE]
     return _between([site.parent for site in sites]) if sites else set()
 
@@ -322,10 +327,10 @@ def _unfiltered(
 ) -> list[tuple[str, str]]:
     """Pairs of bodies that would touch only because joints are held.
 
-    The engine keeps a body and its parent from contact, bodies welded together counted
-    as one, but not where the parent is fixed to the world: there the arm may lie on its
-    base. Holding a joint fixes bodies to the world. And a robot whose free base is held
-    hangs: what its feet feel of the floor would follow from where it is held.
+    The engine excludes contact between a body and its parent, counting welded bodies as
+    one, but not if the parent is fixed to the world. Holding a joint fixes bodies to
+    the world. A robot whose free base is held hangs: contact forces between its feet
+    and the floor would depend on the height at which it is held.
     """
     before, after = _welds(spec, set()), _welds(spec, set(held))
     shaped = [body.name for body in spec.bodies if _collides(body)]
@@ -354,7 +359,7 @@ def _tree(body: mujoco.MjsBody) -> Iterator[mujoco.MjsBody]:
 
 
 def _welds(spec: mujoco.MjSpec, held: set[str]) -> dict[str, tuple[str, str]]:
-    """For every body the one that it is welded to, and what carries that one."""
+    """For every body, the root of its welded group and the parent of that root."""
     welds = {WORLD: (WORLD, WORLD)}
 
     def visit(body: mujoco.MjsBody, parent: str) -> None:
@@ -370,7 +375,7 @@ def _welds(spec: mujoco.MjSpec, held: set[str]) -> dict[str, tuple[str, str]]:
 def _apart(
     welds: Mapping[str, tuple[str, str]], first: str, second: str, parents: bool
 ) -> bool:
-    """Whether the engine keeps two bodies from contact by the tree alone."""
+    """Whether the kinematic tree alone excludes contact between two bodies."""
     (a, above_a), (b, above_b) = welds[first], welds[second]
     if a == b:
         return True

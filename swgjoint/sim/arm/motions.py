@@ -12,9 +12,9 @@ from swgjoint.units import deg
 
 SWEEP_TIMING = {"hold_s": 0.25, "ramp_s": 0.5, "settle_s": 0.25}
 DURATION = 4.0
-"""Of most motions [s]."""
+"""Duration of most motions [s]."""
 STEP = 1.0
-"""Of every joint, and amplitude of the chirp [deg]."""
+"""Step height of every joint, and amplitude of the chirp [deg]."""
 AXES = ((0, 0, 1), (0, 0, -1), (1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0))
 TOOL_MOTIONS = ("line", "circle", "iso9283")
 PLANES = ("+x", "-x", "+y", "-y")
@@ -23,20 +23,21 @@ PLANES = ("+x", "-x", "+y", "-y")
 def tables_of(
     kind: str, arm: RigidArm, start: Array, end: Array
 ) -> tuple[list[dict[str, Any]], float]:
-    """Tables ``[trajectory]`` of one kind, the first that works is meant, and a time.
+    """Candidate tables ``[trajectory]`` of one kind, and a duration.
 
-    Motions of the tool are tried in several directions: an arm that is near the end of
-    its reach can go one way only. A kind that does not exist, or that needs a file,
-    gets the table with which the scene says so.
+    The caller uses the first table that the arm can follow. Motions of the tool have
+    candidates in several directions, because an arm near the limit of its reach can
+    move in one direction only. An unknown kind, or one that needs a file, gets a table
+    that the scene rejects with its message.
 
     Args:
         kind: Kind of the trajectory.
         arm: The arm.
-        start: [rad]. Shape (n_joints,).
-        end: Where a sweep without collision ends [rad]. Shape (n_joints,).
+        start: Joint angles at the start [rad]. Shape (n_joints,).
+        end: Joint angles at the end of a collision-free sweep [rad]. Shape (n_joints,).
 
     Returns:
-        The tables, and the duration of the run [s].
+        The tables, best first, and the duration of the run [s].
     """
 
     def degrees(values: Array) -> dict[str, float]:

@@ -1,4 +1,4 @@
-"""Numbers of an arm's file that no arm has, found in the compiled model."""
+"""Checks of a compiled arm for numbers that no real arm has."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from swgjoint.errors import InputError
 
 LARGEST = 1e10
-"""The engine's ``mjMAXVAL``, SI units: a state beyond it counts as diverged."""
+"""The engine's ``mjMAXVAL`` in SI units; larger states count as diverged."""
 _KINDS = {
     "body": mujoco.mjtObj.mjOBJ_BODY,
     "jnt": mujoco.mjtObj.mjOBJ_JOINT,
@@ -19,31 +19,31 @@ _KINDS = {
     "eq": mujoco.mjtObj.mjOBJ_EQUALITY,
     "key": mujoco.mjtObj.mjOBJ_KEY,
 }
-"""Prefixes of the model's arrays, and whose rows they have."""
+"""Prefixes of the model's arrays, and the elements that own their rows."""
 _BOUNDED = {
     *("body_mass", "body_inertia", "body_pos", "body_ipos", "geom_pos", "geom_size"),
     *("jnt_pos", "site_pos", "key_qpos"),
 }
-"""Arrays of the file's own numbers; others may follow from them and be larger, and a
-range without an end is written as a large number."""
+"""Arrays that hold numbers of the file. Derived arrays may be larger, and an unlimited
+range is written as a large number."""
 _HOLDING = {
     *("jnt_stiffness", "dof_damping", "dof_frictionloss"),
     *("tendon_stiffness", "tendon_damping", "tendon_frictionloss"),
 }
-"""Arrays with which some arms hold a joint for good, by a damping of 1e11."""
+"""Arrays with which some arms lock a joint, for example by a damping of 1e11."""
 HOLDING = LARGEST**2
-"""Their largest value."""
+"""Largest value of the arrays that may lock a joint."""
 
 
 def check_numbers(model: mujoco.MjModel, *, where: str) -> None:
-    """Refuse numbers that are not finite or absurdly large, and axes of no direction.
+    """Reject non-finite or absurdly large numbers, and axes without direction.
 
     Args:
         model: The compiled arm.
-        where: Begins the message.
+        where: Start of the message.
 
     Raises:
-        InputError: Naming the first element and attribute.
+        InputError: If there is such a number; names the first element and attribute.
     """
     for name in ("timestep", "gravity", "wind", "density", "viscosity"):
         _refuse(where, f"option: {name}", np.atleast_1d(getattr(model.opt, name)))
@@ -56,7 +56,7 @@ def check_numbers(model: mujoco.MjModel, *, where: str) -> None:
         top = LARGEST if key in _BOUNDED else np.finfo(float).max
         if key in _HOLDING:
             top = HOLDING
-        if key.endswith("range"):  # inf is a range without an end
+        if key.endswith("range"):  # inf means an unlimited range
             top = np.inf
         for row in np.flatnonzero(~(abs(rows) <= top).all(axis=1)).tolist():
             _refuse(where, f"{_element(model, kind, row)}: {attribute}", rows[row], top)
@@ -64,22 +64,22 @@ def check_numbers(model: mujoco.MjModel, *, where: str) -> None:
     for row in np.flatnonzero(abs(lengths - 1.0) > 1e-6).tolist():
         raise InputError(
             f"{where}: {_element(model, 'jnt', row)}: the axis has no direction;"
-            " accepted: a vector of a length that can be computed"
+            " accepted: a vector of finite, non-zero length"
         )
 
 
-def _refuse(where: str, what: str, values: np.ndarray, top: float = LARGEST) -> None:
-    """One line about the first value beyond the bound, if there is one."""
-    wrong = values[~(abs(values) <= top)]  # NaN, too
+def _refuse(where: str, name: str, values: np.ndarray, top: float = LARGEST) -> None:
+    """Reject values beyond a bound, with a message about the first one."""
+    wrong = values[~(abs(values) <= top)]  # includes NaN
     if wrong.size:
         raise InputError(
-            f"{where}: {what} {wrong[0]:g}; accepted: finite numbers up to"
+            f"{where}: {name} {wrong[0]:g}; accepted: finite numbers up to"
             f" {top:.3g} in SI units"
         )
 
 
 def _element(model: mujoco.MjModel, kind: str, row: int) -> str:
-    """Kind and name of a row's owner."""
+    """Kind and name of the element that owns a row."""
     index = int(model.dof_jntid[row]) if kind == "dof" else row
     word = {"jnt": "joint", "dof": "joint", "eq": "equality"}.get(kind, kind)
     name = mujoco.mj_id2name(model, _KINDS[kind], index)

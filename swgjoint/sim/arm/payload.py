@@ -13,7 +13,7 @@ from swgjoint.units import mm
 
 BODY = "payload"
 POINT = 1e-9
-"""Inertia of a point mass over its mass [m²]: the engine wants some."""
+"""Inertia of a point mass over its mass [m²], because the engine needs some."""
 
 
 class LoadedArm(RigidArm):
@@ -28,7 +28,18 @@ class LoadedArm(RigidArm):
         where: str,
         reading: ArmReading | None = None,
     ) -> None:
-        """Load an arm; ``where`` begins messages about the payload."""
+        """Load an arm with a payload.
+
+        Args:
+            reference: Path or bundled name.
+            tool_site: Site at which the payload is fixed.
+            payload: The payload.
+            where: Start of messages about the payload.
+            reading: Which hinges move; None moves every hinge.
+
+        Raises:
+            InputError: If the arm has no such site.
+        """
         self._payload: Payload | None = None
         self._site, self._where = tool_site, where
         super().__init__(reference, tool_site=tool_site, reading=reading)
@@ -69,7 +80,18 @@ def arms_of(
     where: str,
     reading: ArmReading | None = None,
 ) -> tuple[RigidArm, RigidArm]:
-    """The arm of a scene, and what its controller takes it for."""
+    """The arm of a scene, and the controller's model of it.
+
+    Args:
+        reference: Path or bundled name.
+        tool_site: Name of the tool site.
+        payload: Payload at the tool site; None without a payload.
+        where: Start of messages about the payload.
+        reading: Which hinges move; None moves every hinge.
+
+    Returns:
+        The arm, and the controller's model: without the payload if it is not known.
+    """
     if payload is None:
         arm = RigidArm(reference, tool_site=tool_site, reading=reading)
         return arm, arm

@@ -1,4 +1,4 @@
-"""How a scene reads the file of an arm: what moves, and where the rest is held."""
+"""Choices of a scene for an arm's file: moving hinges, and pose of held joints."""
 
 from __future__ import annotations
 
@@ -12,32 +12,36 @@ class ArmReading:
     """Choices that the file of an arm leaves open."""
 
     driven: tuple[str, ...] = ()
-    """Names or patterns (``*``, ``?``) of the hinges that move; none: all. The ending
-    ``_joint`` of a name may be left out."""
+    """Names or patterns (``*``, ``?``) of the hinges that move; all if empty. Names may
+    omit the suffix ``_joint``."""
     pose: str | None = None
-    """Keyframe of the file at which the other joints are held; None: the reference
-    position."""
+    """Keyframe of the file at which the other joints are held; None holds them at the
+    reference position."""
     angles: Mapping[str, float] = field(default_factory=dict)
-    """Angles of hinges, for those that are held elsewhere than in ``pose`` [rad]."""
+    """Angles of held hinges that differ from ``pose`` [rad]."""
     balance_inertia: bool = False
-    """Whether the engine repairs inertias that no rigid body can have: the three
-    principal moments become their mean."""
+    """Whether inertias that no rigid body can have are repaired: the mean replaces the
+    three principal moments."""
 
     def drives(self, hinge: str) -> bool:
-        """Whether a hinge is among those that move."""
+        """Whether a hinge moves."""
         return not self.driven or matches(hinge, self.driven)
 
 
 def matches(name: str, patterns: Sequence[str]) -> bool:
-    """Whether a joint fits one of the patterns, with or without its ending ``_joint``.
+    """Whether a joint matches a pattern, with or without its suffix ``_joint``.
 
-    Upper and lower case differ.
+    The match is case-sensitive.
+
+    Args:
+        name: Name of the joint.
+        patterns: Names or patterns (``*``, ``?``).
     """
     names = {name, name.removesuffix("_joint")}
     return any(fnmatchcase(one, pattern) for one in names for pattern in patterns)
 
 
 def patterns_of(texts: Sequence[str]) -> tuple[str, ...]:
-    """Patterns of comma-separated texts, e.g. ``["shoulder*,elbow", "wrist_1"]``."""
+    """Patterns in comma-separated strings, e.g. ``["shoulder*,elbow", "wrist_1"]``."""
     parts = (part.strip() for text in texts for part in text.split(","))
     return tuple(dict.fromkeys(part for part in parts if part))

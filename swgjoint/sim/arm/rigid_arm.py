@@ -1,4 +1,4 @@
-"""The arm without drives: torques, inertia and poses on a commanded motion."""
+"""An arm without drives: torques, inertia and poses on a commanded motion."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ from swgjoint.typing import Array
 
 
 class RigidArm:
-    """One MJCF or URDF arm with ideal joints; the reference for control and errors.
+    """An MJCF or URDF arm with ideal joints, the reference for control and errors.
 
     Attributes:
-        reference: As it was given.
-        path: The file.
-        reading: What moves, and where the rest is held.
+        reference: Path or bundled name of the arm, as passed.
+        path: File of the arm.
+        reading: Which hinges move, and the pose of held joints.
         model: The compiled arm, see :class:`~swgjoint.sim.arm.file.ArmFile`.
         joints: Names of its joints, in the order of all arrays.
-        held: Joints of the file that do not move, and why: their type, or what ties
-            them.
-        keyframes: Poses that the file names: angles of all hinges, those that are held
-            included [rad].
-        effort: Torque limits of joints that the file states [N·m].
+        held: Joints of the file that do not move, with the reason: their type, or what
+            ties them.
+        keyframes: Named poses of the file: angles of all hinges, held ones included
+            [rad].
+        effort: Torque limits of the joints for which the file states one [N·m].
     """
 
     def __init__(
@@ -42,12 +42,13 @@ class RigidArm:
         tool_site: str = "tool",
         reading: ArmReading | None = None,
     ) -> None:
-        """Load an arm, given as a path or as the name of a bundled one.
+        """Load an arm.
 
         Args:
             reference: Path or bundled name.
-            tool_site: Site whose place is the tool, or a body whose frame it is.
-            reading: What moves, and where the rest is held; None: every hinge.
+            tool_site: Site at the tool, or a body whose frame is the tool frame.
+            reading: Which hinges move, and the pose of held joints; None moves every
+                hinge.
 
         Raises:
             InputError: If the file is missing, neither MJCF nor URDF, or has no hinge.
@@ -78,7 +79,7 @@ class RigidArm:
         return self._spec.copy()
 
     def _mark_tool(self, name: str) -> None:
-        """Give a body that stands for the tool a site of its name."""
+        """Add a site to a body that is named as the tool."""
         spec = self._spec
         if spec.site(name) is not None:
             return
@@ -93,15 +94,18 @@ class RigidArm:
             )
 
     def torques(self, position: Array, velocity: Array, acceleration: Array) -> Array:
-        """Joint torques that the motion needs, gravity included [N·m].
+        """Joint torques of a motion by inverse dynamics, gravity included [N·m].
 
         Args:
-            position: [rad]. Shape (n, n_joints).
-            velocity: [rad/s]. Shape (n, n_joints).
-            acceleration: [rad/s²]. Shape (n, n_joints).
+            position: Joint angles [rad]. Shape (n, n_joints).
+            velocity: Joint speeds [rad/s]. Shape (n, n_joints).
+            acceleration: Joint accelerations [rad/s²]. Shape (n, n_joints).
+
+        Returns:
+            Joint torques. Shape (n, n_joints).
         """
         model, data, out, touching = self.model, self._data, np.empty_like(position), ""
-        # a lookup costs as much as a copy
+        # an attribute lookup takes as long as a copy
         qpos, qvel, qacc, needed = data.qpos, data.qvel, data.qacc, data.qfrc_inverse
         motion = zip(position, velocity, acceleration, strict=True)
         for k, (q, v, a) in enumerate(motion):
@@ -115,9 +119,9 @@ class RigidArm:
         if touching:
             warnings.warn(
                 f"{self.path}: bodies {touching} touch on the commanded motion and push"
-                " each other; where that is not meant: an <exclude> of the pair, or"
-                " contype and conaffinity 0 for their geoms",
-                stacklevel=1,  # once, whoever asks
+                " each other; if this is not intended, add an <exclude> of the pair or"
+                " set contype and conaffinity of their geoms to 0",
+                stacklevel=1,  # one warning for all callers
             )
         return out
 
@@ -132,12 +136,12 @@ class RigidArm:
         """Pairs of bodies that touch on a motion, the deepest first.
 
         Args:
-            position: [rad]. Shape (n, n_joints).
-            within: Distance at which bodies count as touching [m].
+            position: Joint angles [rad]. Shape (n, n_joints).
+            within: Distance below which bodies count as touching [m].
 
         Returns:
-            Two bodies and how deep they are in each other at worst [m], negative for a
-            distance. Bodies that the model keeps from contact are not among them.
+            Two bodies and their largest penetration [m], negative for a distance. Pairs
+            that the model excludes from contact are omitted.
         """
         model, data = self._probe, self._probe_data
         model.geom_margin[:] = np.maximum(self.model.geom_margin, within)
@@ -147,10 +151,10 @@ class RigidArm:
             data.qpos[:] = q
             mujoco.mj_kinematics(model, data)
             mujoco.mj_collision(model, data)
-            found = data.contact
-            near = found.dist < within
-            bodies = np.sort(model.geom_bodyid[found.geom[near]], axis=1)
-            for (a, b), distance in zip(bodies, found.dist[near], strict=True):
+            contact = data.contact
+            near = contact.dist < within
+            bodies = np.sort(model.geom_bodyid[contact.geom[near]], axis=1)
+            for (a, b), distance in zip(bodies, contact.dist[near], strict=True):
                 pair = (int(a), int(b))
                 deepest[pair] = max(deepest.get(pair, -np.inf), -float(distance))
         pairs = [
@@ -161,7 +165,7 @@ class RigidArm:
 
     @cached_property
     def _probe(self) -> mujoco.MjModel:
-        """A copy whose margins may change."""
+        """A copy of the model whose margins may change."""
         return copy(self.model)
 
     @cached_property
@@ -178,7 +182,7 @@ class RigidArm:
         return np.diag(full).copy()
 
     def tool_positions(self, position: Array) -> Array:
-        """Tool in the world [m]. Shape (n, 3); empty rows where the arm has none."""
+        """Tool position in the world [m]. Shape (n, 3), or (n, 0) without a tool."""
         if self.tool < 0:
             return np.empty((len(position), 0))
         model, data, out = self.model, self._data, np.empty((len(position), 3))
@@ -190,7 +194,7 @@ class RigidArm:
         return out
 
     def body_poses(self, position: Array) -> tuple[Array, Array]:
-        """World positions [m] and quaternions (w, x, y, z) of all bodies.
+        """Positions [m] and quaternions (w, x, y, z) of all bodies in the world frame.
 
         Returns:
             Shapes (n, n_bodies, 3) and (n, n_bodies, 4), the world body first.

@@ -1,4 +1,4 @@
-"""A scene around any arm: a drive in every hinge and a gentle motion."""
+"""A scene for any arm: a drive in every hinge and a gentle motion."""
 
 from __future__ import annotations
 
@@ -33,20 +33,20 @@ from swgjoint.typing import Array
 from swgjoint.units import deg
 
 ROTOR_INERTIA = 1e-4
-"""Where the drive is not of the catalogue [kg·m²]: assumed, as in scene ``bench``."""
+"""Assumed for drives outside the catalogue, as in scene ``bench`` [kg·m²]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class ArmScene:
-    """A scene made around an arm."""
+    """A generated scene for an arm."""
 
     scene: Scene
     drive_choice: dict[str, DriveChoice]
-    """Drives that the rule chose; empty where a drive was given for all joints."""
+    """Drives selected by rule; empty if one drive was given for all joints."""
 
 
 def is_arm(reference: str) -> bool:
-    """Whether a reference names an arm and no scene: a file or a bundled name."""
+    """Whether a file or bundled name denotes an arm rather than a scene."""
     if Path(reference).suffix.lower() in (".xml", ".urdf", ".xacro"):
         return True
     return (
@@ -66,7 +66,17 @@ def scene_of_arm(
     balance_inertia: bool = False,
     overrides: Mapping[str, Any] | Iterable[str] | None = None,
 ) -> Scene:
-    """The scene of :func:`arm_scene` alone."""
+    """The scene of :func:`arm_scene`, without its drive selection.
+
+    Args:
+        reference: Path of an MJCF or URDF file, or the name of a bundled arm.
+        drive: Drive of all joints.
+        joints: Names or patterns of the hinges that move.
+        pose: Start pose.
+        motion: Kind of the trajectory.
+        balance_inertia: Whether inertias that no rigid body can have are repaired.
+        overrides: Changes of the scene.
+    """
     return arm_scene(
         reference,
         drive=drive,
@@ -88,25 +98,25 @@ def arm_scene(
     balance_inertia: bool = False,
     overrides: Mapping[str, Any] | Iterable[str] | None = None,
 ) -> ArmScene:
-    """All hinges, or those that are named, turn gently, each with a drive.
+    """Generate a scene in which the chosen hinges have drives and move gently.
 
-    Without a drive each joint gets the one that
-    :func:`swgjoint.sim.arm.drive_choice.choose_drives` finds: a rule to start from, not
-    the choice of the arm's maker. The rotor has twice the inertia of the wave generator
-    of its size: a motor of the same inertia is assumed.
+    Without ``drive``, :func:`swgjoint.sim.arm.drive_choice.choose_drives` selects a
+    drive for each joint. This rule is a starting point, not the choice of the arm's
+    manufacturer. The rotor inertia is twice that of the wave generator of the size: a
+    motor of the same inertia is assumed.
 
     Args:
         reference: Path of an MJCF or URDF file, or the name of a bundled arm.
         drive: Drive of all joints: design, map or catalogue name.
-        joints: Names or patterns of the hinges that move, each text one or several
-            after commas; none: all. The others are held in the start pose.
-        pose: Where the arm starts, see :func:`swgjoint.sim.arm.gentle_sweep.place_arm`.
-        motion: Kind of the trajectory; None: ``trajectory.kind`` of the overrides, else
-            ``sweep``. A motion of the tool that is out of reach from the start begins
-            where the joints are bent, unless a start is given.
-        balance_inertia: Whether inertias that no rigid body has are repaired.
+        joints: Names or patterns of the hinges that move, each string one or several
+            separated by commas; all if empty. The others are held in the start pose.
+        pose: Start pose, see :func:`swgjoint.sim.arm.gentle_sweep.place_arm`.
+        motion: Kind of the trajectory. None uses ``trajectory.kind`` of the overrides,
+            otherwise ``sweep``. If a motion of the tool is out of reach from the start,
+            the arm starts with bent joints, unless a start is given.
+        balance_inertia: Whether inertias that no rigid body can have are repaired.
         overrides: Changes of the scene, as for :meth:`Scene.load_file`. Unless they
-            state ``simulation.step_s``, the step carries the strongest order of every
+            state ``simulation.step_s``, the step resolves the strongest order of every
             drive, see :mod:`swgjoint.sim.step_choice`.
 
     Raises:
@@ -117,20 +127,20 @@ def arm_scene(
     reading = ArmReading(
         driven=patterns_of(list(joints)), balance_inertia=balance_inertia
     )
-    with warnings.catch_warnings(record=True) as said:
+    with warnings.catch_warnings(record=True) as recorded:
         warnings.simplefilter("always")
         arm, start = place_arm(reference, reading=reading, pose=pose)
         start = _started(arm, start, changes)
         by_tool = kind in TOOL_MOTIONS
         end = start if by_tool or kind == "csv" else gentle_sweep(arm, start)[1]
-    _say_once(said)
+    _say_once(recorded)
     data: dict[str, Any] = {
         "name": _name(arm.path),
         "description": f"{kind.capitalize()} of {arm.path.name}",
         "arm": reference,
         "tool_site": _tool(arm),
         "defaults": {"level": "full"},
-        # the integral carries the friction of the drives, which would else be a lag
+        # the integral compensates drive friction, which would otherwise cause a lag
         "controller": {"kind": "pid", "feedforward": "gravity_inertia"},
     }
     if reading.driven:
@@ -145,7 +155,7 @@ def arm_scene(
     except InputError:
         own = pose or any(key.startswith("trajectory.start_deg") for key in changes)
         bent = [] if own or not by_tool else bent_starts(arm, start)
-        for other in bent:  # stretched out, a tool cannot go every way
+        for other in bent:  # a stretched arm cannot move its tool in every direction
             with suppress(InputError):
                 scene, rigid = _with_motion(data, kind, arm, other, end, held, changes)
                 break
@@ -156,7 +166,7 @@ def arm_scene(
         choice = {}
     else:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # the run says it
+            warnings.simplefilter("ignore")  # the run repeats them
             choice = choose_drives(rigid, trajectory_of(scene, rigid))
         data["joints"] = {
             joint: {"drive": one.drive, "rotor_inertia_kgm2": _rotor(one.drive)}
@@ -184,7 +194,9 @@ def _with_motion(
     held: dict[str, float],
     changes: Mapping[str, Any],
 ) -> tuple[Scene, RigidArm]:
-    """Put a motion into the data: the first of a kind that the arm can make freely.
+    """Add a motion to the data: the first of a kind without reach limit or collision.
+
+    If all candidates collide, the first reachable one is used.
 
     Returns:
         The scene, still without drives, and its arm with its payload.
@@ -201,7 +213,7 @@ def _with_motion(
         rigid = arm
         if scene.payload is not None or kind in TOOL_MOTIONS or _read_anew(scene, arm):
             with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # the run says it
+                warnings.simplefilter("ignore")  # the run repeats them
                 rigid = rigid_arm_of(scene)
         try:
             path = trajectory_of(scene, rigid)
@@ -221,7 +233,7 @@ def _with_motion(
 
 
 def _read_anew(scene: Scene, arm: RigidArm) -> bool:
-    """Whether the changes of a user make it another arm."""
+    """Whether the user's changes lead to another arm."""
     there, here = scene.reading, arm.reading
     return scene.arm != arm.reference or (
         there.driven,
@@ -243,7 +255,7 @@ def rigid_arm_of(scene: Scene) -> RigidArm:
 
 
 def _collides(arm: RigidArm, path: Array, start: Array) -> bool:
-    """Whether bodies touch on a motion that do not where the arm starts."""
+    """Whether bodies touch on a motion that do not touch at the start."""
     before = {pair[:2] for pair in arm.contacts(start[None])}
     few = path[:: max(1, len(path) // 100)]
     return any(pair[:2] not in before for pair in arm.contacts(few))
@@ -258,7 +270,7 @@ def _as_mapping(
 
 
 def _started(arm: RigidArm, start: Array, changes: Mapping[str, Any]) -> Array:
-    """The start with the angles that a user sets; wrong ones are the scene's to say."""
+    """The start with the user's angles; the scene itself reports wrong ones."""
     start = start.copy()
     for key, value in changes.items():
         table, _, name = key.rpartition(".")
@@ -271,26 +283,26 @@ def _started(arm: RigidArm, start: Array, changes: Mapping[str, Any]) -> Array:
     return start
 
 
-def _say_once(said: list[warnings.WarningMessage]) -> None:
-    """Pass on what concerns the start; the run says again what concerns the file."""
-    for one in said:
+def _say_once(recorded: list[warnings.WarningMessage]) -> None:
+    """Repeat warnings about the start; the run itself repeats those about the file."""
+    for one in recorded:
         if issubclass(one.category, StartWarning):
             warnings.warn(one.message, stacklevel=3)
 
 
 def _name(path: Path) -> str:
-    """What a scene is called: its arm's file, or its folder where that says more."""
+    """Name of a scene: that of the arm's file, or of the folder of a ``scene`` file."""
     folder = path.resolve().parent.name
     return folder if path.stem.lower() == "scene" and folder else path.stem
 
 
 def _rotor(drive: str) -> float:
-    """Rotor with wave generator of a drive [kg·m²]."""
+    """Inertia of rotor and wave generator of a drive [kg·m²]."""
     return catalogue_rotor_inertia(drive) or ROTOR_INERTIA
 
 
 def _tool(arm: RigidArm) -> str:
-    """The site ``tool``, else the last body of the longest chain."""
+    """The site ``tool``, or else the last body of the longest chain."""
     if arm.tool >= 0:
         return "tool"
     model = arm.model

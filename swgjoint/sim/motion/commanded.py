@@ -28,17 +28,22 @@ from swgjoint.typing import Array
 from swgjoint.units import deg, mm
 
 HOLDS_ORIENTATION = 6
-"""Joints from which on the tool keeps its orientation unless the scene says."""
+"""Number of joints from which the tool keeps its orientation by default."""
 
 
 def trajectory_of(scene: Scene, arm: RigidArm, *, sub_steps: int = 1) -> Trajectory:
-    """The commanded motion of all joints of an arm, at every step or part of one.
+    """The commanded motion of all joints of an arm at every engine step.
+
+    Args:
+        scene: The scene.
+        arm: Its arm.
+        sub_steps: Engine steps per step of the scene.
 
     Raises:
-        InputError: If the arm cannot make the motion, or no sample of the run is left
-            for the metrics.
+        InputError: If the arm cannot follow the motion, or if no sample of the run
+            remains for the metrics.
     """
-    with np.errstate(all="ignore"):  # what is not finite is refused below
+    with np.errstate(all="ignore"):  # non-finite values are rejected below
         path = _motion_of(scene, arm, sub_steps)
     samples = (path.position, path.velocity, path.acceleration)
     if not all(np.isfinite(part).all() for part in samples):
@@ -49,7 +54,7 @@ def trajectory_of(scene: Scene, arm: RigidArm, *, sub_steps: int = 1) -> Traject
         ]
         raise InputError(
             f"{scene.where}: trajectory.{', '.join(values) or 'kind'}: the motion is"
-            " not finite; accepted: times, speeds and distances of a real motion"
+            " not finite; accepted: realistic times, speeds and distances"
         )
     if path.steady.stop <= path.steady.start:
         raise InputError(
@@ -61,7 +66,7 @@ def trajectory_of(scene: Scene, arm: RigidArm, *, sub_steps: int = 1) -> Traject
 
 
 def _motion_of(scene: Scene, arm: RigidArm, sub_steps: int) -> Trajectory:
-    """The motion by its kind."""
+    """The motion of the scene's kind, not yet checked."""
     section, timing = scene.trajectory, scene.simulation
     joints = arm.joints
     start = _angles(section.start_deg, joints)
@@ -171,23 +176,23 @@ def _tool_motion(
 
 
 def _angles(values: dict[str, float], joints: tuple[str, ...]) -> Array:
-    """Values of a table of degrees in the order of the joints [rad]."""
+    """Angles of a table in degrees, in the order of the joints [rad]."""
     return np.array([values.get(name, 0.0) for name in joints]) * deg
 
 
 def check_motion(scene: Scene, levels: set[str | None]) -> None:
-    """Refuse what a level cannot make of a motion.
+    """Reject a motion that a level cannot represent.
 
     Args:
         scene: The scene.
-        levels: Those of all joints.
+        levels: Levels of all joints.
 
     Raises:
-        InputError: For a step at level ``kinematic``.
+        InputError: If the motion is a step and a joint has level ``kinematic``.
     """
     if scene.trajectory.kind == "step" and "kinematic" in levels:
         raise InputError(
-            f"{scene.where}: trajectory.kind = 'step' at level kinematic, which"
-            " prescribes its error on the commanded motion, and that jumps; accepted:"
-            " rigid, linear, native, full"
+            f"{scene.where}: trajectory.kind = 'step' at level kinematic, whose"
+            " error is prescribed on a continuous commanded motion; accepted: rigid,"
+            " linear, native, full"
         )

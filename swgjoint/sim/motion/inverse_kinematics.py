@@ -1,12 +1,12 @@
-r"""Joint angles that carry the tool along a path, by damped least squares.
+r"""Joint angles that move the tool along a path, by damped least squares.
 
 .. math:: \Delta q = J^T (J J^T + \lambda^2 I)^{-1} e, \qquad \lambda = c\,|e|,
 
-so that the damping vanishes with the error :math:`e` and the last steps are Newton's
-(Wampler 1986, IEEE Trans. SMC 16:93-101, with :math:`\lambda` constant there). Each
-solution starts from the one before, which keeps the arm in one configuration. A spline
-of degree five through the solutions is refined until it carries the tool along the path
-between them, too; its derivatives are the joint speeds and accelerations.
+so that the damping vanishes with the error :math:`e` and the last steps are Newton
+steps (Wampler 1986, IEEE Trans. SMC 16:93-101, with constant :math:`\lambda`). Each
+solution starts from the previous one, which keeps the arm in one configuration. A
+quintic spline through the solutions is refined until the tool also follows the path
+between them; its derivatives are the joint speeds and accelerations.
 """
 
 from __future__ import annotations
@@ -23,22 +23,33 @@ from swgjoint.typing import Array
 from swgjoint.units import mm
 
 TOLERANCE = 1e-12
-"""Error of a pose, metres and radians together."""
+"""Largest error of a pose: norm of its position [m] and rotation [rad] errors."""
 PATH_TOLERANCE = 1e-10
-"""Error of the path between two solutions [m]."""
+"""Largest path error between two solutions [m]."""
 DAMPING = 0.1
-"""c: damping over error [1/m]."""
+"""Factor c: damping over error [1/m]."""
 MAX_STEPS = 200
+"""Largest number of iterations per pose."""
 MAX_NODES = 8192
+"""Number of nodes along a path beyond which refinement stops."""
 LONGEST_STEP = 0.2
-"""Of a joint in one step of the iteration [rad]."""
+"""Largest change of a joint angle per iteration [rad]."""
 
 
 class ToolKinematics:
     """Forward and inverse kinematics of the tool site of one arm."""
 
     def __init__(self, arm: RigidArm, *, hold_orientation: bool, where: str) -> None:
-        """Use an arm that has a tool; ``where`` begins the messages."""
+        """Use an arm that has a tool site.
+
+        Args:
+            arm: The arm.
+            hold_orientation: Whether the tool keeps its orientation.
+            where: Start of the messages.
+
+        Raises:
+            InputError: If the arm has no tool site.
+        """
         if arm.tool < 0:
             raise InputError(
                 f"{where}: arm {arm.path.stem!r} has no site for the tool; needed for"
@@ -59,10 +70,19 @@ class ToolKinematics:
         )
 
     def solve(self, guess: Array, position: Array, rotation: Array) -> Array:
-        """Joint angles [rad] near a guess that put the tool at a pose.
+        """Joint angles at which the tool has a pose.
+
+        Args:
+            guess: Joint angles near the solution [rad]. Shape (n_joints,).
+            position: Position of the tool [m]. Shape (3,).
+            rotation: Rotation matrix of the tool. Shape (9,); unused if the orientation
+                is free.
+
+        Returns:
+            Joint angles [rad]. Shape (n_joints,).
 
         Raises:
-            InputError: If the tool does not get there.
+            InputError: If the tool cannot reach the pose.
         """
         model, data, tool = self.arm.model, self._data, self.arm.tool
         q, jacobian = guess.copy(), np.zeros((6, model.nv))
@@ -105,17 +125,18 @@ def follow(
     length: float,
     nodes: int = 32,
 ) -> Any:
-    """Joint angles along a path at the tool's first orientation.
+    """Joint angles along a path with the initial orientation of the tool.
 
     Args:
-        kinematics: Of the arm.
-        start: Joint angles whose tool is the start of the path [rad]. (n_joints,).
-        place: Points of the path [m], shape (m, 3), at parameters of shape (m,).
-        length: The parameter runs from 0 to this.
-        nodes: Solutions of the first attempt.
+        kinematics: Kinematics of the tool.
+        start: Joint angles at the start of the path [rad]. Shape (n_joints,).
+        place: Function of the path parameter, shape (m,), that returns points of the
+            path [m], shape (m, 3).
+        length: Largest parameter; the smallest is zero.
+        nodes: Number of intervals of the first attempt.
 
     Returns:
-        A spline of the parameter with values of shape (m, n_joints).
+        A spline of the parameter, with joint angles of shape (m, n_joints) [rad].
 
     Raises:
         InputError: If the tool cannot reach the path, leaves the range of a joint, or
@@ -148,7 +169,7 @@ def follow(
 
 
 def _check_limits(kinematics: ToolKinematics, q: Array) -> None:
-    """Refuse a path that leaves the range of a joint."""
+    """Reject a path that leaves the range of a joint."""
     model = kinematics.arm.model
     for j, name in enumerate(kinematics.arm.joints):
         low, high = model.jnt_range[j]

@@ -1,4 +1,4 @@
-"""Motions that are given joint by joint: step, trapezoid, chirp, points of a file."""
+"""Motions of the joints: step, trapezoid, chirp, points of a file."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ from swgjoint.typing import Array
 from swgjoint.units import deg
 
 CLOSEST, LONGEST = 1e-6, 1e4
-"""Times between points of a file and of the whole motion [s]: the shortest step and the
-longest duration of a simulation."""
+"""Shortest time between points of a file and longest motion [s], equal to the shortest
+step and the longest duration of a simulation."""
 LARGEST = 1e4
-"""Angle of a point of a file [rad]: more than a thousand turns."""
+"""Largest angle of a point of a file [rad], more than a thousand turns."""
 
 
 def step(
     time: Array, *, start: Array, jump: Array, at: float, answer_speed: Array
 ) -> Trajectory:
-    """Rest, and rest somewhere else from ``at`` [s] on; not continuous.
+    """A discontinuous step of the reference between two positions at rest.
 
     Args:
-        time: [s]. Shape (n,).
-        start: [rad]. Shape (n_joints,).
-        jump: [rad]. Shape (n_joints,).
-        at: [s]; the reference is already there at a sample of that time.
-        answer_speed: Largest speed that the controller's answer is expected to have
-            [rad/s]. Shape (n_joints,).
+        time: Time grid [s]. Shape (n,).
+        start: Joint angles before the step [rad]. Shape (n_joints,).
+        jump: Height of the step [rad]. Shape (n_joints,).
+        at: Time of the step [s]; a sample at this time has the new reference.
+        answer_speed: Expected largest speed of the step response [rad/s]. Shape
+            (n_joints,).
     """
     after = time >= at - 1e-9
     position = start + after[:, None] * jump
@@ -58,24 +58,24 @@ def trapezoid(
 ) -> Trajectory:
     """Constant acceleration, constant speed, constant deceleration, rest.
 
-    All joints follow one law from 0 to 1, the fastest that keeps every joint within
-    its limits. The velocity is continuous, the acceleration jumps.
+    All joints follow one law from 0 to 1, the fastest that keeps every joint within its
+    limits. The velocity is continuous, the acceleration is not.
 
     Args:
-        time: [s]. Shape (n,).
-        start: [rad]. Shape (n_joints,).
-        end: [rad]. Shape (n_joints,).
-        hold: Rest before [s].
-        max_speed: Limit of every joint [rad/s].
-        max_acceleration: Limit of every joint [rad/s²].
-        where: Begins the message.
+        time: Time grid [s]. Shape (n,).
+        start: Joint angles at the start [rad]. Shape (n_joints,).
+        end: Joint angles at the end [rad]. Shape (n_joints,).
+        hold: Rest before the motion [s].
+        max_speed: Speed limit of every joint [rad/s].
+        max_acceleration: Acceleration limit of every joint [rad/s²].
+        where: Start of the message.
 
     Raises:
         InputError: If start and end are the same.
     """
     way = float(np.abs(end - start).max())
     if way == 0.0:
-        raise InputError(f"{where}.end_deg: where the arm starts; needed: a way to go")
+        raise InputError(f"{where}.end_deg: equal to start_deg; needed: a difference")
     speed, acceleration = max_speed / way, max_acceleration / way
     ramp = min(speed / acceleration, acceleration**-0.5)
     speed = acceleration * ramp
@@ -115,7 +115,7 @@ def chirp(
     hold: float,
     ramp: float,
 ) -> Trajectory:
-    r"""One joint swings, its frequency changing evenly; twice differentiable.
+    r"""Oscillation of one joint at linearly changing frequency; twice differentiable.
 
     .. math:: q = q_0 + A\,w(t)\sin\phi(t), \quad
         \dot\phi = 2\pi\left(f_0 + (f_1 - f_0)\,t/T\right)
@@ -123,14 +123,14 @@ def chirp(
     with :math:`w` the smooth step from 0 to 1 and back over ``ramp``.
 
     Args:
-        time: [s]. Shape (n,).
-        start: [rad]. Shape (n_joints,).
-        joint: Which one.
-        amplitude: [rad].
-        first_frequency: At the start of the swing [Hz].
-        last_frequency: At its end [Hz].
-        hold: Rest before and after [s].
-        ramp: Time in which the amplitude grows, and fades [s].
+        time: Time grid [s]. Shape (n,).
+        start: Joint angles at the start [rad]. Shape (n_joints,).
+        joint: Index of the joint.
+        amplitude: Amplitude of the joint angle [rad].
+        first_frequency: Frequency at the start of the oscillation [Hz].
+        last_frequency: Frequency at the end of the oscillation [Hz].
+        hold: Rest before and after the oscillation [s].
+        ramp: Time in which the amplitude grows, and in which it decays [s].
     """
     length = time[-1] - 2.0 * hold
     t = np.clip(time - hold, 0.0, length)
@@ -143,7 +143,7 @@ def chirp(
         60.0 * x * (1.0 - x) * (1.0 - 2.0 * x)
         for x in (np.clip(s / ramp, 0.0, 1.0) for s in (t, length - t))
     )
-    # the two ramps do not overlap: where one changes the other is 1
+    # the two ramps do not overlap: while one changes the other is 1
     w, w_1 = up * down, (up_1 - down_1) / ramp
     w_2 = (up_2 + down_2) / ramp**2
     sine, cosine = np.sin(phase), np.cos(phase)
@@ -170,15 +170,17 @@ def chirp(
 def spline_motion(
     time: Array, *, points_time: Array, points: Array, hold: float
 ) -> Trajectory:
-    """Rest, a smooth motion through all points, rest; twice differentiable throughout.
+    """Rest, a smooth motion through all points, rest; twice differentiable.
 
-    A spline of degree five that starts and ends at rest without acceleration.
+    The motion is a quintic spline that starts and ends with zero speed and
+    acceleration.
 
     Args:
-        time: [s]. Shape (n,).
-        points_time: Increasing [s]; the first is where the rest ends. Shape (m,).
-        points: [rad]. Shape (m, n_joints).
-        hold: Rest before [s].
+        time: Time grid [s]. Shape (n,).
+        points_time: Increasing times of the points [s]; the rest ends at the first.
+            Shape (m,).
+        points: Joint angles [rad]. Shape (m, n_joints).
+        hold: Rest before the motion [s].
     """
     from scipy.interpolate import make_interp_spline
 
@@ -206,13 +208,13 @@ def read_points(
     """Times [s] and joint angles [rad] of a CSV file. Shapes (m,) and (m, n_joints).
 
     Args:
-        path: Columns ``time_s`` and ``<joint>_deg`` or ``<joint>_rad``; a joint without
-            a column stays at its start.
-        joints: Of the arm.
-        start: [rad]. Shape (n_joints,).
+        path: File with the columns ``time_s`` and ``<joint>_deg`` or ``<joint>_rad``;
+            joints without a column remain at their start.
+        joints: Names of all joints of the arm.
+        start: Joint angles at the start [rad]. Shape (n_joints,).
 
     Raises:
-        InputError: If the file cannot be used; names file, line or column.
+        InputError: If the file cannot be used; names the file and the line or column.
     """
     accepted = {
         name: {f"{name}_deg": deg, f"{name}_rad": 1.0} for name in joints
@@ -229,9 +231,9 @@ def read_points(
         if any(cell in units for cell in header)
     ]
     if header and (unknown or not moved):
-        what = f"column {unknown[0][:40]!r}" if unknown else "no column of a joint"
+        fault = f"column {unknown[0][:40]!r}" if unknown else "no column of a joint"
         raise InputError(
-            f"{path}: {what}; accepted: time_s and <joint>_deg or <joint>_rad of"
+            f"{path}: {fault}; accepted: time_s and <joint>_deg or <joint>_rad of"
             f" {', '.join(joints)}"
         )
     columns = read_columns(
@@ -240,15 +242,15 @@ def read_points(
     time = columns["time"]
     if time.size < 2 or not (np.diff(time) > 0.0).all():
         raise InputError(
-            f"{path}: time_s does not increase from line to line; needed: two points"
-            " or more, each later than the one before"
+            f"{path}: time_s does not increase from line to line; needed: two or more"
+            " points at increasing times"
         )
     nearest, length = float(np.diff(time).min()), float(time[-1] - time[0])
     if nearest < CLOSEST or length > LONGEST:
         raise InputError(
-            f"{path}: time_s: points {nearest:.3g} s apart at the closest,"
-            f" {length:.3g} s in all; accepted: at least {CLOSEST:g} s and at most"
-            f" {LONGEST:g} s"
+            f"{path}: time_s: smallest interval {nearest:.3g} s, duration"
+            f" {length:.3g} s; accepted: intervals of at least {CLOSEST:g} s, duration"
+            f" of at most {LONGEST:g} s"
         )
     for name in moved:
         largest = float(np.abs(columns[name]).max())

@@ -1,4 +1,4 @@
-"""What is wrong with a motion or a link, said before anything is solved."""
+"""Checks of motions and links before a simulation starts."""
 
 from __future__ import annotations
 
@@ -12,20 +12,21 @@ from swgjoint.typing import Array
 from swgjoint.units import deg, mm
 
 FASTEST = 1e10
-"""Acceleration of a link by the largest torque that the engine still carries [rad/s²].
-"""
+"""Largest acceleration of a link by the peak torque of its drive that the engine can
+integrate [rad/s²]."""
 
 
 def check_ranges(arm: RigidArm, trajectory: Trajectory, *, where: str) -> None:
-    """Refuse a motion that leaves the range of a joint: its limit would push.
+    """Reject a motion that leaves the range of a joint, whose limit would exert force.
 
     Args:
         arm: The arm.
         trajectory: The commanded motion.
-        where: Begins the message.
+        where: Start of the message.
 
     Raises:
-        InputError: Names joint, angle and range; one line per joint.
+        InputError: If the motion leaves a range; one line per joint with angle and
+            range.
     """
     model, path = arm.model, trajectory.position
     lines = []
@@ -36,11 +37,11 @@ def check_ranges(arm: RigidArm, trajectory: Trajectory, *, where: str) -> None:
         worst = int(beyond.argmax())
         if not model.jnt_limited[j] or beyond[worst] <= 1e-9:
             continue
-        # the ends of a motion are what its user gave
-        for k, does in ((0, "starts at"), (-1, "ends at"), (worst, "gets to")):
+        # report the ends first, because the user stated them
+        for k, verb in ((0, "starts at"), (-1, "ends at"), (worst, "reaches")):
             if beyond[k] > 1e-9:
                 lines.append(
-                    f"{where}: trajectory: {name} {does} {angles[k] / deg:.6g} deg;"
+                    f"{where}: trajectory: {name} {verb} {angles[k] / deg:.6g} deg;"
                     f" accepted: {low / deg:.6g} to {high / deg:.6g} deg, its range in"
                     f" {arm.path}"
                 )
@@ -50,15 +51,15 @@ def check_ranges(arm: RigidArm, trajectory: Trajectory, *, where: str) -> None:
 
 
 def check_link(attached: JointDrive, arm: RigidArm, *, where: str) -> None:
-    """Refuse a link that is too light for its drive.
+    """Reject a link that is too light for its drive.
 
     Args:
-        attached: The drive in the joint.
+        attached: The drive of the joint.
         arm: The arm.
-        where: Begins the message.
+        where: Start of the message.
 
     Raises:
-        InputError: Names link, inertia and mass.
+        InputError: If the link is too light; names link, inertia and mass.
     """
     torque, inertia = attached.drive.ratings.repeated_peak, attached.link_inertia
     if attached.rotor is None or torque <= FASTEST * inertia:
@@ -71,17 +72,17 @@ def check_link(attached: JointDrive, arm: RigidArm, *, where: str) -> None:
         f" about the joint (its own mass: {body.mass[0]:.2g} kg), which"
         f" {torque:.3g} N·m of drive {attached.drive.name} accelerate by"
         f" {fastest:.1g} rad/s²; needed: more than"
-        f" {torque / FASTEST:.1g} kg·m², so an inertia in {arm.path} that a real link"
-        " has, or a joint that is not driven"
+        f" {torque / FASTEST:.1g} kg·m², that is, a realistic inertia in {arm.path}, or"
+        " a joint without a drive"
     )
 
 
 def touching_bodies(arm: RigidArm, position: Array) -> str:
-    """Bodies that press each other in a pose, as part of a message; empty if none.
+    """Bodies in contact in a pose, as part of a message; empty if there are none.
 
     Args:
         arm: The arm.
-        position: [rad]. Shape (n_joints,).
+        position: Joint angles [rad]. Shape (n_joints,).
     """
     pairs = arm.contacts(position[None])[:3]
     return ", ".join(f"{a!r} and {b!r} by {depth / mm:.2g} mm" for a, b, depth in pairs)

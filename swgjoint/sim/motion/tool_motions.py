@@ -1,4 +1,4 @@
-"""Motions that the tool makes: line, circle, and the pose cycle of ISO 9283."""
+"""Motions of the tool: line, circle, and the pose cycle of ISO 9283."""
 
 from __future__ import annotations
 
@@ -16,11 +16,12 @@ DIRECTIONS = {
     "+y": (0.0, 1.0),
     "-y": (0.0, -1.0),
 }
+"""Horizontal unit vectors (x, y) by name."""
 ORDER = (5, 4, 3, 2, 1)
 """Poses of one cycle in the order of the standard."""
 POSE_SHARE = 0.8
-"""Of the way from the centre of the cube to a corner: P2 to P5 lie a tenth of the
-diagonal inside its ends."""
+"""Distance of P2 to P5 from the centre of the cube, relative to that of the corners: a
+tenth of the diagonal from its ends."""
 
 
 def line(
@@ -33,19 +34,19 @@ def line(
     hold: float,
     ramp: float,
 ) -> Trajectory:
-    """Forth and back on a straight line, resting at either end.
+    """Motion back and forth on a straight line with a rest at both ends.
 
-    The motion fills the time. Runs for path figures are the parts at constant speed of
-    the ways forth.
+    The motion fills the time grid. The passes for path figures are the constant-speed
+    parts of the forward strokes.
 
     Args:
-        time: [s]. Shape (n,).
-        kinematics: Of the arm.
+        time: Time grid [s]. Shape (n,).
+        kinematics: Kinematics of the tool.
         start: Joint angles at the start of the line [rad]. Shape (n_joints,).
-        displacement: From start to end [m]. Shape (3,).
-        cycles: How often forth and back.
+        displacement: Vector from the start to the far end [m]. Shape (3,).
+        cycles: Number of cycles back and forth.
         hold: Rest at the start and at every end [s].
-        ramp: Time of speeding up, and of slowing down [s].
+        ramp: Time of acceleration, and of deceleration [s].
     """
     path = _straight(kinematics, start, displacement)
     way = (time[-1] - hold) / (2 * cycles) - hold
@@ -79,21 +80,22 @@ def circle(
     hold: float,
     ramp: float,
 ) -> Trajectory:
-    """Round a circle at constant speed between smooth ramps.
+    """Motion along a circle at constant speed between smooth ramps.
 
-    The motion fills the time. Runs for path figures are the whole turns at constant
-    speed, counted from where the ramp ends.
+    The motion fills the time grid. The passes for path figures are the whole turns at
+    constant speed, counted from the end of the first ramp.
 
     Args:
-        time: [s]. Shape (n,).
-        kinematics: Of the arm.
+        time: Time grid [s]. Shape (n,).
+        kinematics: Kinematics of the tool.
         start: Joint angles at the start [rad]. Shape (n_joints,).
-        radius: [m].
-        normal: Axis. Shape (3,).
-        towards: Direction from the start to the centre. Shape (3,).
-        cycles: Turns.
-        hold: Rest before and after [s].
-        ramp: Time of speeding up, and of slowing down [s].
+        radius: Radius of the circle [m].
+        normal: Axis of the circle. Shape (3,).
+        towards: Direction from the start to the centre, not parallel to ``normal``.
+            Shape (3,).
+        cycles: Number of turns.
+        hold: Rest before and after the motion [s].
+        ramp: Time of acceleration, and of deceleration [s].
     """
     origin, _ = kinematics.pose(start)
     axis = normal / np.linalg.norm(normal)
@@ -126,13 +128,13 @@ def circle(
 def cube_poses(centre: Array, edge: float, plane: str) -> Array:
     """P1 to P5 of ISO 9283 (1998) [m]. Shape (5, 3).
 
-    The diagonal plane of the cube holds two opposite edges that are level and both
-    space diagonals between them; P1 is the centre, P2 to P5 lie on the diagonals in the
+    The diagonal plane of the cube contains two opposite horizontal edges and the two
+    space diagonals between them. P1 is the centre. P2 to P5 are on the diagonals in the
     order of the corners, a tenth of a diagonal away from them.
 
     Args:
-        centre: Of the cube [m]. Shape (3,).
-        edge: [m].
+        centre: Centre of the cube [m]. Shape (3,).
+        edge: Edge of the cube [m].
         plane: Direction in which the plane rises, see :data:`DIRECTIONS`.
     """
     x, y = DIRECTIONS[plane]
@@ -153,20 +155,20 @@ def iso9283(
     hold: float,
     rest: float,
 ) -> Trajectory:
-    """From P1 again and again to P5, P4, P3, P2 and P1, with a rest at each.
+    """Cycles from P1 to P5, P4, P3, P2 and back to P1, with a rest at each pose.
 
-    Between the poses the joints move together and smoothly, point to point; the moves
-    share the time that the rests leave.
+    Between the poses all joints move together on a smooth point-to-point motion. All
+    moves take the same share of the time without the rests.
 
     Args:
-        time: [s]. Shape (n,).
-        kinematics: Of the arm.
-        start: Joint angles of P1 [rad]. Shape (n_joints,).
-        edge: Of the cube [m].
-        plane: See :func:`cube_poses`.
-        cycles: How often.
+        time: Time grid [s]. Shape (n,).
+        kinematics: Kinematics of the tool.
+        start: Joint angles at P1 [rad]. Shape (n_joints,).
+        edge: Edge of the cube [m].
+        plane: Direction in which the diagonal plane rises, see :func:`cube_poses`.
+        cycles: Number of cycles.
         hold: Rest before the first cycle [s].
-        rest: At every pose [s].
+        rest: Rest at every pose [s].
     """
     centre, _ = kinematics.pose(start)
     poses = cube_poses(centre, edge, plane)
@@ -181,7 +183,7 @@ def iso9283(
         way = angles[number] - angles[last]
         first = int(np.searchsorted(time, begin))
         x = np.clip((time[first:] - begin) / move, 0.0, 1.0)
-        x[x > 1.0 - 1e-9] = 1.0  # round-off of the time is no motion
+        x[x > 1.0 - 1e-9] = 1.0  # round-off of the time is not a motion
         x = x[: int(np.searchsorted(x, 1.0)) + 1]
         # the integral of the smooth ramp's slope: a smooth step of the position
         _, value, slope = smooth_ramp(x)
@@ -207,7 +209,7 @@ def iso9283(
 
 
 def _straight(kinematics: ToolKinematics, start: Array, way: Array) -> Any:
-    """Joint angles over 0 to 1 from the tool at ``start`` to ``way`` [m] from there."""
+    """Joint angles from ``start`` to a tool displaced by ``way`` [m], over 0 to 1."""
     origin, _ = kinematics.pose(start)
     return follow(kinematics, start, lambda s: origin + s[:, None] * way, length=1.0)
 
@@ -234,7 +236,7 @@ def _along(
     steady: tuple[float, float],
     **rest: Any,
 ) -> Trajectory:
-    """Joint motion from a path over its parameter and the parameter over time."""
+    """Joint motion from a path over its parameter, and the parameter over time."""
     s, v, a = (x[:, None] for x in law)
     slope, bend = path(s[:, 0], 1), path(s[:, 0], 2)
     return Trajectory(

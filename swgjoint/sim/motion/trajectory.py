@@ -16,25 +16,26 @@ class Trajectory:
     time: Array
     """Start of every step and the end of the last one [s]. Shape (n,)."""
     position: Array
-    """[rad]. Shape (n, n_joints)."""
+    """Joint angles [rad]. Shape (n, n_joints)."""
     velocity: Array
-    """[rad/s]. Shape (n, n_joints)."""
+    """Joint speeds [rad/s]. Shape (n, n_joints)."""
     acceleration: Array
-    """[rad/s²]. Shape (n, n_joints)."""
+    """Joint accelerations [rad/s²]. Shape (n, n_joints)."""
     steady: slice
     """Samples of the constant-speed part that the metrics use."""
     steady_velocity: Array
-    """Speed of that part [rad/s], 0 where no speed is constant. Shape (n_joints,)."""
+    """Speed in that part [rad/s], zero if no speed is constant. Shape (n_joints,)."""
     arrival: float | None = None
-    """When the command reaches its last pose and rests [s]; None: it never does."""
+    """Time at which the command comes to rest at its last pose [s]; None if never."""
     visits: tuple[tuple[int, float], ...] = ()
-    """Poses that are visited again and again: number and end of the rest there [s]."""
+    """Repeatedly visited poses: number of the pose and end of the rest there [s]."""
     passes: tuple[float, ...] = ()
-    """Starts of runs along one path at constant speed of the tool [s]."""
+    """Start times of passes along one path at constant tool speed [s]."""
     pass_time: float = 0.0
-    """Duration of each of them [s]."""
+    """Duration of each pass [s]."""
     answer_speed: Array | None = None
-    """Speed that joints reach although none is commanded [rad/s]. Shape (n_joints,)."""
+    """Speed of a step response, whose commanded speed is zero [rad/s]. Shape
+    (n_joints,)."""
 
     def every(self, n: int) -> Trajectory:
         """The same motion at every n-th sample, the first included."""
@@ -51,7 +52,7 @@ class Trajectory:
     def top_speed(self) -> Array:
         """Largest commanded speed of every joint [rad/s]. Shape (n_joints,).
 
-        Of a step, which commands none, that of the controller's answer.
+        For a step, whose commanded speed is zero, it is that of the step response.
         """
         if self.answer_speed is not None:
             return self.answer_speed
@@ -61,8 +62,14 @@ class Trajectory:
 def smooth_ramp(x: Array) -> tuple[Array, Array, Array]:
     r"""Integral, value and slope of the smooth step :math:`10x^3 - 15x^4 + 6x^5`.
 
-    Value and first two derivatives vanish or agree at both ends, so a velocity that
-    follows it gives a position that is three times continuously differentiable.
+    The slope and the second derivative of the step vanish at both ends, so a velocity
+    that follows it gives a three times continuously differentiable position.
+
+    Args:
+        x: Argument from 0 to 1.
+
+    Returns:
+        Integral, value and slope, each of the shape of ``x``.
     """
     return (
         x**4 * (2.5 - 3.0 * x + x**2),
@@ -85,14 +92,14 @@ def sweep(
     """Rest, smooth ramp to constant speed, smooth ramp to rest; all joints together.
 
     Args:
-        start: First position [rad]. Shape (n_joints,).
-        end: Last position [rad]. Shape (n_joints,).
-        duration: Whole time [s], more than ``2 (hold + ramp) + settle``.
-        step: Time step [s].
-        hold: Rest before and after [s].
-        ramp: Time of either ramp [s].
+        start: Joint angles at the start [rad]. Shape (n_joints,).
+        end: Joint angles at the end [rad]. Shape (n_joints,).
+        duration: Total time [s], more than ``2 (hold + ramp) + settle``.
+        step: Time step of the scene [s].
+        hold: Rest before and after the motion [s].
+        ramp: Time of each ramp [s].
         settle: Time after the first ramp that the metrics leave out [s].
-        sub_steps: Samples per step.
+        sub_steps: Samples per time step.
     """
     time = time_grid(duration, step, sub_steps)
     top = duration - hold - ramp  # the second ramp starts here
@@ -123,7 +130,16 @@ def constant_speed(
     settle: float = 0.0,
     sub_steps: int = 1,
 ) -> Trajectory:
-    """Constant speed from the first instant; arguments as for :func:`sweep`."""
+    """Constant speed from the first instant.
+
+    Args:
+        start: Joint angles at the start [rad]. Shape (n_joints,).
+        speed: Joint speeds [rad/s]. Shape (n_joints,).
+        duration: Total time [s].
+        step: Time step of the scene [s].
+        settle: Initial time that the metrics leave out [s].
+        sub_steps: Samples per time step.
+    """
     time = time_grid(duration, step, sub_steps)
     return Trajectory(
         time=time,
@@ -138,6 +154,11 @@ def constant_speed(
 def time_grid(duration: float, step: float, sub_steps: int = 1) -> Array:
     """Times of all states of a run, first and last included [s].
 
+    Args:
+        duration: Total time [s].
+        step: Time step of the scene [s].
+        sub_steps: Samples per time step.
+
     >>> time_grid(0.004, 0.001).tolist()
     [0.0, 0.001, 0.002, 0.003, 0.004]
     """
@@ -146,7 +167,13 @@ def time_grid(duration: float, step: float, sub_steps: int = 1) -> Array:
 
 
 def window(time: Array, first: float, last: float) -> slice:
-    """Samples between two times, ends included."""
+    """Samples between two times, both included.
+
+    Args:
+        time: Increasing times [s]. Shape (n,).
+        first: First time [s].
+        last: Last time [s].
+    """
     tolerance = 1e-9
     return slice(
         int(np.searchsorted(time, first - tolerance)),
