@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import mujoco
@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.drives.references import check_joint_names, drive_of
+from swgjoint.drives.sections import JointSection
 from swgjoint.errors import InputError
 from swgjoint.joint.attach import attach_all
+from swgjoint.joint.drive import JointDrive
 from swgjoint.joint.fitting import Fitting
 from swgjoint.joint.region import check_region
 from swgjoint.joint.step_damping import damp_as_asked, is_implicit
@@ -150,6 +152,89 @@ def assemble(
         where=scene.where,
         reading=scene.reading,
     )
+    sections = _checked_sections(scene, arm, external=controlled_by is not None)
+    require_run_memory(scene, len(arm.joints))
+    trajectory = trajectory_of(scene, arm)
+    check_ranges(arm, trajectory, where=scene.where)
+
+    # drives keep the harmonics that the scene's own step resolves: the contents of a
+    # run follow from the step that its user chose, not from that of the integrator
+    spec = _spec_at_step(scene, arm)
+    fittings = _fittings(
+        dict(zip(arm.joints, sections, strict=True)),
+        trajectory.top_speed,
+        known=dict(drives or {}),
+        variable=variable,
+        progress=progress,
+    )
+    attached = attach_all(spec, fittings)
+    sub_steps, outside = _stable_sub_steps(scene, arm, trajectory, attached, fittings)
+    if sub_steps > 1:
+        require_run_memory(scene, len(arm.joints), sub_steps=sub_steps)
+        spec.option.timestep = scene.simulation.step_s / sub_steps
+        trajectory = trajectory_of(scene, arm, sub_steps=sub_steps)
+    if is_implicit(spec):
+        attached = damp_as_asked(spec, attached)
+    transmissions = tuple(
+        transmission_of(attached[name], fittings[name].drive) for name in arm.joints
+    )
+
+    # motors, loads and disturbances act on the finished drives
+    load = np.array([load_torque(scene, t.joint, t.drive) for t in transmissions])
+    link_inertia = known_arm.inertia(trajectory.position[0])
+    loops = motor_loops(
+        scene,
+        transmissions,
+        sections,
+        link_inertia,
+        sampled=scene.sampled or controlled_by is not None,
+    )
+    add_actuators(
+        spec,
+        transmissions,
+        loops,
+        load,
+        scene.disturbance,
+        tool_site=site_of_force(scene, arm),
+    )
+    model = compile_spec(spec, where=f"scene {scene.name!r}")
+
+    link_torque, motor_torque = _planned_torques(
+        scene, arm, known_arm, trajectory, transmissions, load, sub_steps
+    )
+    prescribed, prescribed_rate = prescribed_errors(
+        trajectory.position,
+        transmissions,
+        step=float(model.opt.timestep),
+        discrete=scene.simulation.integrator == "discrete",
+    )
+    return Assembly(
+        scene=scene,
+        sub_steps=sub_steps,
+        outside=outside,
+        arm=arm,
+        known_arm=known_arm,
+        model=model,
+        joints=arm.joints,
+        transmissions=transmissions,
+        trajectory=trajectory,
+        loops=loops,
+        link_inertia=link_inertia,
+        load=load,
+        disturbances=tuple(scene.disturbance),
+        link_torque=link_torque,
+        feedforward=motor_torque,
+        prescribed=prescribed,
+        prescribed_rate=prescribed_rate,
+        controlled_by=controlled_by,
+        **_addresses(model, arm.joints, transmissions),
+    )
+
+
+def _checked_sections(
+    scene: Scene, arm: RigidArm, *, external: bool
+) -> tuple[JointSection, ...]:
+    """Settings of all joints of a scene that fits its arm and its controller."""
     named = scene.trajectory.named_joints
     named["start_deg"] -= set(arm.held)  # where hinges without a drive are held
     check_joint_names(
@@ -170,25 +255,35 @@ def assemble(
     )
     sections = complete_sections(scene, arm.joints)
     check_motion(scene, {section.level for section in sections})
-    if scene.sensors and scene.sensors.torque and controlled_by is None:
+    if scene.sensors and scene.sensors.torque and not external:
         raise InputError(
             f"{scene.where}: sensors.torque: unused; accepted: with a"
             " controller that is given to run_scene"
         )
-    require_run_memory(scene, len(arm.joints))
-    trajectory = trajectory_of(scene, arm)
-    check_ranges(arm, trajectory, where=scene.where)
-    known = dict(drives or {})
+    return sections
+
+
+def _spec_at_step(scene: Scene, arm: RigidArm) -> mujoco.MjSpec:
+    """Editable model of the arm with the step and the integrator of the scene."""
     spec = arm.spec()
     spec.option.timestep = scene.simulation.step_s
     spec.option.integrator = getattr(
         mujoco.mjtIntegrator, f"mjINT_{scene.simulation.integrator.upper()}"
     )
+    return spec
 
-    fittings: dict[str, Fitting] = {}
-    for name, section, speed in zip(
-        arm.joints, sections, trajectory.top_speed, strict=True
-    ):
+
+def _fittings(
+    sections: Mapping[str, JointSection],
+    top_speed: Array,
+    *,
+    known: dict[str, DriveMap],
+    variable: bool,
+    progress: Progress,
+) -> dict[str, Fitting]:
+    """Drive and settings of every joint; ``top_speed`` in the order of the joints."""
+    fittings = {}
+    for (name, section), speed in zip(sections.items(), top_speed, strict=True):
         drive = drive_of(section, known=known, joint=name, progress=progress)
         fittings[name] = Fitting(
             drive=drive,
@@ -198,65 +293,63 @@ def assemble(
             friction=section.friction is not False,
             rotor=section.rotor or "gyroscopic",
             variable=variable,
-            # a joint at rest carries every order
+            # any step resolves all orders of a joint at rest
             max_input_speed=float(abs(drive.ratio) * speed) or None,
         )
-    got = attach_all(spec, fittings)
-    transmissions, sub_steps, outside = [], 1, {}
-    for name, touches in zip(
-        arm.joints, joints_in_contact(arm, trajectory), strict=True
-    ):
-        attached, fitting = got[name], fittings[name]
-        check_link(attached, arm, where=scene.where)
+    return fittings
+
+
+def _stable_sub_steps(
+    scene: Scene,
+    arm: RigidArm,
+    trajectory: Trajectory,
+    attached: Mapping[str, JointDrive],
+    fittings: Mapping[str, Fitting],
+) -> tuple[int, dict[str, str]]:
+    """Sub-steps that all joints need, and the bounds that joints exceed without them.
+
+    Raises:
+        InputError: If a link is too light for its drive.
+        ComputationError: If the scene does not accept that many sub-steps.
+    """
+    sub_steps, outside = 1, {}
+    contacts = joints_in_contact(arm, trajectory)
+    for name, touches in zip(arm.joints, contacts, strict=True):
+        check_link(attached[name], arm, where=scene.where)
         region = check_region(
-            attached,
+            attached[name],
             timestep=scene.simulation.step_s,
-            max_input_speed=fitting.max_input_speed or 0.0,
+            max_input_speed=fittings[name].max_input_speed or 0.0,
             contacts=bool(touches),
             integrator=scene.simulation.integrator,
         )
         sub_steps = max(sub_steps, region.require(scene.simulation.max_sub_steps))
         if not region.ok:
             outside[name] = region.exceeded
-        transmissions.append(transmission_of(attached, fitting.drive))
+    return sub_steps, outside
 
-    # attach kept the harmonics that the scene's own step carries: what a run contains
-    # follows from the step that its user chose, not from what the integrator needs
-    if sub_steps > 1:
-        require_run_memory(scene, len(arm.joints), sub_steps=sub_steps)
-        spec.option.timestep = scene.simulation.step_s / sub_steps
-        trajectory = trajectory_of(scene, arm, sub_steps=sub_steps)
-    if is_implicit(spec):
-        got = damp_as_asked(spec, got)
-        transmissions = [replace(t, attached=got[t.joint]) for t in transmissions]
-    load = np.array(
-        [
-            load_torque(scene, name, t.drive)
-            for name, t in zip(arm.joints, transmissions, strict=True)
-        ]
-    )
-    ratio = np.array([t.ratio for t in transmissions])
-    rotor = np.array([t.rotor_inertia for t in transmissions])
-    link_inertia = known_arm.inertia(trajectory.position[0])
-    loops = motor_loops(scene, transmissions, sections, rotor + link_inertia / ratio**2)
-    if controlled_by is not None:
-        loops = replace(loops, sampled=True)
-    add_actuators(
-        spec,
-        transmissions,
-        loops,
-        load,
-        scene.disturbance,
-        tool_site=site_of_force(scene, arm),
-    )
-    model = compile_spec(spec, where=f"scene {scene.name!r}")
+
+def _planned_torques(
+    scene: Scene,
+    arm: RigidArm,
+    known_arm: RigidArm,
+    trajectory: Trajectory,
+    transmissions: Sequence[Transmission],
+    load: Array,
+    sub_steps: int,
+) -> tuple[Array, Array]:
+    """Drive torques of the rigid arm and motor torques of the feed-forward [N·m].
+
+    Returns:
+        Both on the commanded motion. Shapes (n, n_joints).
+    """
     # torques of the rigid arm change little within a step
     coarse = trajectory.every(sub_steps)
     motion = (coarse.position, coarse.velocity, coarse.acceleration)
     link_torque = load + interpolate_samples(arm.torques(*motion), sub_steps)
     kind = scene.controller.feedforward
     if scene.controller.kind == "computed_torque":
-        kind = "gravity_inertia"  # where it starts; its loop has its own
+        kind = "gravity_inertia"  # for the start only; its loop has its own
     known_torque = link_torque
     if kind == "gravity":
         known_torque = load + interpolate_samples(
@@ -264,43 +357,19 @@ def assemble(
         )
     elif known_arm is not arm:
         known_torque = load + interpolate_samples(known_arm.torques(*motion), sub_steps)
-    prescribed, prescribed_rate = prescribed_errors(
-        trajectory.position,
-        transmissions,
-        step=float(model.opt.timestep),
-        discrete=scene.simulation.integrator == "discrete",
-    )
-    return Assembly(
-        scene=scene,
-        sub_steps=sub_steps,
-        outside=outside,
-        arm=arm,
-        known_arm=known_arm,
-        model=model,
-        joints=arm.joints,
-        transmissions=tuple(transmissions),
-        trajectory=trajectory,
-        loops=loops,
-        link_inertia=link_inertia,
-        load=load,
-        disturbances=tuple(scene.disturbance),
-        link_torque=link_torque,
-        feedforward=feedforward(
-            kind,
-            link_torque=known_torque,
-            acceleration=trajectory.acceleration,
-            ratio=ratio,
-            rotor_inertia=rotor,
-        ),
-        prescribed=prescribed,
-        prescribed_rate=prescribed_rate,
-        controlled_by=controlled_by,
-        **_addresses(model, arm.joints, transmissions),
+    return link_torque, feedforward(
+        kind,
+        link_torque=known_torque,
+        acceleration=trajectory.acceleration,
+        ratio=np.array([t.ratio for t in transmissions]),
+        rotor_inertia=np.array([t.rotor_inertia for t in transmissions]),
     )
 
 
 def _addresses(
-    model: mujoco.MjModel, joints: tuple[str, ...], transmissions: list[Transmission]
+    model: mujoco.MjModel,
+    joints: Sequence[str],
+    transmissions: Sequence[Transmission],
 ) -> dict[str, NDArray[np.intp]]:
     """Addresses of link and motor coordinates in qpos and qvel."""
     rotors = [

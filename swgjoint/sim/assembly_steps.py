@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,9 +22,11 @@ from swgjoint.typing import Array
 
 def motor_loops(
     scene: Scene,
-    transmissions: list[Transmission],
-    sections: tuple[JointSection, ...],
-    inertia: Array,
+    transmissions: Sequence[Transmission],
+    sections: Sequence[JointSection],
+    link_inertia: Array,
+    *,
+    sampled: bool,
 ) -> Loops:
     """Gains and limits of all motors.
 
@@ -30,20 +34,23 @@ def motor_loops(
         scene: The scene.
         transmissions: Compiled drives, one per joint.
         sections: Joint settings, one per joint.
-        inertia: Inertia of motor and link, reduced to the motor [kg·m²]. Shape
-            (n_joints,).
+        link_inertia: Link inertia about every joint [kg·m²]. Shape (n_joints,).
+        sampled: Whether the loops run outside the engine.
     """
     section = scene.controller
+    ratio = np.array([t.ratio for t in transmissions])
+    rotor = np.array([t.rotor_inertia for t in transmissions])
+    inertia = rotor + link_inertia / ratio**2  # reduced to the motor
     stiffness, damping = control_gains(section, inertia)
-    own = [t.drive.ratings.rated_torque / abs(t.ratio) for t in transmissions]
+    rated = [t.drive.ratings.rated_torque / abs(t.ratio) for t in transmissions]
     limit = section.integral_limit_Nm
     return Loops(
         stiffness=stiffness,
         damping=damping,
         integral=integral_gain(section, stiffness, inertia),
-        integral_limit=np.array(own) if limit is None else np.full(len(own), limit),
+        integral_limit=np.array(rated) if limit is None else np.full(len(rated), limit),
         limits=tuple(s.motor for s in sections),
-        sampled=scene.sampled,
+        sampled=sampled,
     )
 
 
@@ -98,7 +105,11 @@ def interpolate_samples(values: Array, n: int) -> Array:
 
 
 def prescribed_errors(
-    position: Array, transmissions: list[Transmission], *, step: float, discrete: bool
+    position: Array,
+    transmissions: Sequence[Transmission],
+    *,
+    step: float,
+    discrete: bool,
 ) -> tuple[Array, Array]:
     """Kinematic error that level ``kinematic`` prescribes on a motion, and its rate.
 
