@@ -256,7 +256,7 @@ def test_a_scene_file_takes_the_name_of_its_folder(tmp_path):
             {"trajectory.kind": "chirp", "trajectory.joint": "lift",
              "trajectory.amplitude_deg": 60.0, "trajectory.from_Hz": 0.5,
              "trajectory.to_Hz": 1.0},
-            ("lift", "gets", "deg", "-90 to 30"),
+            ("lift", "reaches", "deg", "-90 to 30"),
         ),
     ],
 )  # fmt: skip
