@@ -262,15 +262,15 @@ def wanted_torque(
     # a prescribed error shifts reference and angle of the loop equally
     angle = ratio * (path.position + assembly.prescribed)
     speed = ratio * (path.velocity + assembly.prescribed_rate)
-    asked = loops.stiffness * angle + loops.damping * speed + assembly.feedforward
+    setpoint = loops.stiffness * angle + loops.damping * speed + assembly.feedforward
     theta = theta + ratio * assembly.prescribed[::parts]
-    given = loops.integral * integral - loops.stiffness * theta
+    feedback = loops.integral * integral - loops.stiffness * theta
     if assembly.scene.simulation.integrator == "discrete":
         theta_rate = theta_rate + ratio * assembly.prescribed_rate[::parts]
-        wanted = asked[::parts] + given - loops.damping * theta_rate
+        wanted = setpoint[::parts] + feedback - loops.damping * theta_rate
         return np.stack([wanted, wanted])
     # mean input over the sub-steps of a step
-    held = asked[:-1].reshape(-1, parts, len(ratio)).mean(axis=1)
+    held = setpoint[:-1].reshape(-1, parts, len(ratio)).mean(axis=1)
     held -= loops.damping * np.diff(theta, axis=0) / (parts * assembly.step)
-    first = held + given[:-1]
-    return np.stack([np.vstack([first[:1], x]) for x in (first, held + given[1:])])
+    first = held + feedback[:-1]
+    return np.stack([np.vstack([first[:1], x]) for x in (first, held + feedback[1:])])

@@ -257,8 +257,8 @@ def _checked_sections(
     check_motion(scene, {section.level for section in sections})
     if scene.sensors and scene.sensors.torque and not external:
         raise InputError(
-            f"{scene.where}: sensors.torque: unused; accepted: with a"
-            " controller that is given to run_scene"
+            f"{scene.where}: sensors.torque: unused; accepted: with an external"
+            " controller, run_scene(..., controller=...)"
         )
     return sections
 
@@ -349,7 +349,7 @@ def _planned_torques(
     link_torque = load + interpolate_samples(arm.torques(*motion), sub_steps)
     kind = scene.controller.feedforward
     if scene.controller.kind == "computed_torque":
-        kind = "gravity_inertia"  # for the start only; its loop has its own
+        kind = "gravity_inertia"  # for the start only; the loop itself computes its feed-forward
     known_torque = link_torque
     if kind == "gravity":
         known_torque = load + interpolate_samples(

@@ -13,7 +13,7 @@ NOTES = {
     " designs), design files and .swg maps.",
     "designs": "Any size-NN-RRR with size 8 to 100 and ratio 30 to 200 is a design by"
     " rule; swgjoint design new scales one; swgjoint schema design lists the keys.",
-    "arms": "Any MJCF or URDF file is an arm, too: swgjoint run FILE.",
+    "arms": "Any MJCF or URDF file can be used as an arm: swgjoint run FILE.",
     "scenes": "swgjoint run NAME; swgjoint schema scene lists the keys.",
     "sweeps": "swgjoint sweep NAME; swgjoint schema sweep lists the keys.",
     "optimisations": "swgjoint optimise NAME; swgjoint schema optimise lists the keys.",
@@ -87,7 +87,7 @@ def _arm(name: str, _: str) -> dict[str, Any]:
     from swgjoint.sim.arm.rigid_arm import RigidArm
 
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # a run says what it leaves out
+        warnings.simplefilter("ignore")  # a run repeats these warnings
         arm = RigidArm(name)
     tool = arm.tool_positions(np.zeros((1, len(arm.joints))))
     return {

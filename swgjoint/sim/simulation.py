@@ -271,21 +271,21 @@ def _recorded(
 
     if wanted is None:
         integral = _integrals(assembly, states)
-        asked = wanted_torque(whole, theta, theta_rate, integral)
+        commanded = wanted_torque(whole, theta, theta_rate, integral)
     else:
-        asked = np.stack(2 * [wanted[:: whole.sub_steps]])
+        commanded = np.stack(2 * [wanted[:: whole.sub_steps]])
     speed = theta_rate
     if assembly.scene.simulation.integrator != "discrete":
         speed = np.diff(theta, axis=0) / np.diff(path.time)[:, None]
         speed = np.vstack([speed[:1], speed])
     motor = np.stack(
         [
-            limit_torque(asked[:, :, j], speed[:, j], limits)
+            limit_torque(commanded[:, :, j], speed[:, j], limits)
             for j, limits in enumerate(assembly.loops.limits)
         ],
         axis=-1,
     ).mean(axis=0)
-    wanted = asked.mean(axis=0)
+    wanted = commanded.mean(axis=0)
     # without a rotor the output torque is the motor torque minus the torque that
     # accelerates the rotor inertia; the integrator's own acceleration is the velocity
     # difference of the step that led to the state

@@ -166,7 +166,7 @@ def arm_scene(
         choice = {}
     else:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # the run repeats them
+            warnings.simplefilter("ignore")  # the run repeats these warnings
             choice = choose_drives(rigid, trajectory_of(scene, rigid))
         data["joints"] = {
             joint: {"drive": one.drive, "rotor_inertia_kgm2": _rotor(one.drive)}
@@ -213,7 +213,7 @@ def _with_motion(
         rigid = arm
         if scene.payload is not None or kind in TOOL_MOTIONS or _read_anew(scene, arm):
             with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # the run repeats them
+                warnings.simplefilter("ignore")  # the run repeats these warnings
                 rigid = rigid_arm_of(scene)
         try:
             path = trajectory_of(scene, rigid)

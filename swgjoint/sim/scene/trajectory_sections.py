@@ -46,7 +46,7 @@ class SweepSection(MotionSection):
 
     @property
     def shortest_s(self) -> float:
-        """Time without any constant-speed part [s]."""
+        """Duration without a constant-speed part [s]."""
         return 2.0 * (self.hold_s + self.ramp_s) + self.settle_s
 
     @property
@@ -147,7 +147,7 @@ class ChirpSection(MotionSection):
 
     @property
     def shortest_s(self) -> float:
-        """Time without any part at full amplitude [s]."""
+        """Duration without a part at full amplitude [s]."""
         return 2.0 * (self.hold_s + self.ramp_s)
 
     @property
@@ -191,7 +191,7 @@ class LineSection(ToolMotion):
 
     @property
     def shortest_s(self) -> float:
-        """Time without any part at constant speed [s]."""
+        """Duration without a part at constant speed [s]."""
         return self.hold_s + 2 * self.cycles * (self.hold_s + 2.0 * self.ramp_s)
 
     @model_validator(mode="after")
@@ -217,7 +217,7 @@ class Circle(ToolMotion):
 
     @property
     def shortest_s(self) -> float:
-        """Time without any part at constant speed [s]."""
+        """Duration without a part at constant speed [s]."""
         return 2.0 * (self.hold_s + self.ramp_s)
 
     @model_validator(mode="after")
