@@ -349,7 +349,7 @@ def _planned_torques(
     link_torque = load + interpolate_samples(arm.torques(*motion), sub_steps)
     kind = scene.controller.feedforward
     if scene.controller.kind == "computed_torque":
-        kind = "gravity_inertia"  # for the start only; the loop itself computes its feed-forward
+        kind = "gravity_inertia"  # the start only; the loop computes its own
     known_torque = link_torque
     if kind == "gravity":
         known_torque = load + interpolate_samples(
