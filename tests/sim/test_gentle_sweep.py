@@ -300,3 +300,10 @@ def test_a_start_in_contact_names_the_bodies(tmp_path):
             match=naming("start_deg", "'world'", "'fore'", "mm", "<exclude>"),
         ):
             run_scene(scene.with_changes(low))
+
+
+@pytest.mark.parametrize("motion", ["line", "circle"])
+def test_tool_motions_begin_away_from_singular_poses(motion):
+    """The UR5e of the models folder is stretched at its reference position."""
+    made = arm_scene("ur5e", motion=motion)
+    assert not np.allclose(list(made.scene.trajectory.start_deg.values()), 0.0)

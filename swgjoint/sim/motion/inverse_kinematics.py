@@ -106,12 +106,18 @@ class ToolKinematics:
             if waited > 20:
                 break
             damped = J @ J.T + (DAMPING * size) ** 2 * np.eye(self.rows)
-            step = J.T @ np.linalg.solve(damped, error)
+            try:
+                step = J.T @ np.linalg.solve(damped, error)
+            except np.linalg.LinAlgError:  # the damping is below round-off, too
+                raise InputError(
+                    f"{self.where}: the arm is in a singular pose where the tool passes"
+                    f" ({_in_mm(position)}) mm; accepted: a path away from it, or"
+                    " another start_deg"
+                ) from None
             q += step * min(1.0, LONGEST_STEP / max(np.abs(step).max(), 1e-300))
-        place = ", ".join(f"{x / mm:.4g}" for x in position)
         off = float(np.linalg.norm(error[:3])) / mm
         raise InputError(
-            f"{self.where}: the tool cannot reach ({place}) mm"
+            f"{self.where}: the tool cannot reach ({_in_mm(position)}) mm"
             f"{' in its orientation' if self.rows == 6 else ''}: {off:.3g} mm short;"
             " accepted: a path within reach of the arm from start_deg"
         )
@@ -160,7 +166,7 @@ def follow(
             worst = place(middle)[int(np.abs(off).max(axis=1).argmax())]
             raise InputError(
                 f"{kinematics.where}: the joints jump where the tool passes"
-                f" ({', '.join(f'{x / mm:.4g}' for x in worst)}) mm, a singular pose;"
+                f" ({_in_mm(worst)}) mm, a singular pose;"
                 " accepted: a path away from it"
             )
         s = np.linspace(0.0, length, 2 * (s.size - 1) + 1)
@@ -181,3 +187,7 @@ def _check_limits(kinematics: ToolKinematics, q: Array) -> None:
                 f" {reached[1]:.4g} deg; accepted: {limits[0]:.4g} to"
                 f" {limits[1]:.4g} deg"
             )
+
+
+def _in_mm(point: Array) -> str:
+    return ", ".join(f"{x / mm:.4g}" for x in point)
