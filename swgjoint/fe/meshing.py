@@ -45,28 +45,31 @@ def simulate_meshing(
     Args:
         design: The drive.
         model: Fidelity, ``2d`` or, for a design with a cup, ``3d``.
-        torque: T that the drive exerts on the output [N·m], constant over the turn.
+        torque: Torque T that the drive exerts on the output, constant over the turn
+            [N·m].
         steps: Wave-generator positions k turn/steps, k = 0 to steps - 1. None chooses
-            35, or the nearest number whose positions spread over the tooth pitch, see
-            :mod:`swgjoint.fe.meshing_phases`; a given one that does not is kept, and
-            the ``warnings`` of the result say so.
+            35, or the nearest number whose positions spread over the tooth pitch (see
+            :mod:`swgjoint.fe.meshing_phases`). An explicit number that does not spread
+            is used as it is, and the ``warnings`` of the result say so.
         turn: Turns of the input.
-        nonlinear: Large rotations of the sectors; False is the cheap linear level.
-        half: Half model, which needs even tooth counts and a symmetric wave generator
-            without errors; ``auto``: where it applies.
+        nonlinear: Whether sectors rotate by large angles; False selects the cheap
+            linear level.
+        half: Whether to use the half model, which needs even tooth counts and a
+            symmetric wave generator without errors; ``auto`` uses it wherever it
+            applies.
         elastic_circular_spline: Whether the circular spline deforms; False makes it
             rigid.
-        throw: Whether a position that cannot be solved is an error; else it is kept
-            with its outcome and the turn goes on from the last good one.
-        progress: Called with the stage, the steps done and their number.
+        throw: Whether a position that cannot be solved raises an error. If not, the
+            position keeps its outcome and the next one starts from the last solved one.
+        progress: Called with the stage, the number of finished steps and their total.
         keep: Folder for the state of every position of a 3D run; None keeps none.
-        resume: Whether to go on with the interrupted run in that folder.
+        resume: Whether to resume the interrupted run in that folder.
 
     Raises:
-        DesignError: If the design cannot be built or holds what is not modelled.
+        DesignError: If the design cannot be built or has features that the model lacks.
         ComputationError: If a solve fails; the message carries the outcome's advice.
-            Without deflection, engagement and load there is nothing to go on from, so
-            their failure is an error in any case.
+            A failed deflection, engagement or loading is always an error, because no
+            position can be solved without them.
     """
     if steps is None:
         steps = default_steps(design, turn)
@@ -155,7 +158,7 @@ def _step(
     torque: float,
     series: float,
 ) -> MeshingStep:
-    """Results at one position; of a solve that failed, only its outcome."""
+    """Results at one position; only the outcome if the solve failed."""
     if not state.outcome.ok:
         return MeshingStep(input_angle=angle, outcome=state.outcome)
     return MeshingStep(
@@ -178,7 +181,7 @@ def _step(
 
 
 def _pairs(model: RingModel, state: State) -> int:
-    """Tooth pairs that carry force, whole drive; both flanks of a tooth count once."""
+    """Loaded tooth pairs of the whole drive; both flanks of a tooth count once."""
     if state.contacts is None:
         return 0
     return model.copies * len(set(state.contacts.sector.tolist()))

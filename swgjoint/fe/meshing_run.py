@@ -27,7 +27,7 @@ from swgjoint.units import arcsec, deg
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SetupState:
-    """One of the equilibria that lead to the first wave-generator position."""
+    """One of the equilibria before the first wave-generator position."""
 
     name: str
     """``wave_generator`` (no tooth contact), ``meshed`` or ``torque``."""
@@ -36,7 +36,13 @@ class SetupState:
 
     @classmethod
     def from_state(cls, model: RingModel, name: str, state: State) -> SetupState:
-        """Recover the stresses of a state."""
+        """Recover the stresses of a state.
+
+        Args:
+            model: Ring model of the drive.
+            name: Name of the equilibrium, see :attr:`name`.
+            state: The equilibrium.
+        """
         return cls(name=name, state=state, stress=MemberMaxima.from_state(model, state))
 
 
@@ -45,10 +51,10 @@ class Position:
     """Results at one wave-generator position; NaN and None where the solve failed."""
 
     input_angle: float
-    """theta [rad]."""
+    """Input angle theta [rad]."""
     outcome: Outcome = Outcome.CONVERGED
     output_error: float = nan
-    """Output angle minus theta/i, from the undeformed position [rad]."""
+    """Output angle minus theta/i, measured from the undeformed position [rad]."""
     input_torque: float = nan
     """External torque on the input [N·m]."""
     wave_generator_torque: float = nan
@@ -63,21 +69,22 @@ class Position:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MeshingStep(Position):
-    """Results at one position of a plane model."""
+    """Results at one position of a 2D model."""
 
     wave_generator_angle: float = nan
-    """Against the frame in which the flexspline or circular spline stands [rad]."""
+    """Angle of the wave generator in the frame of the fixed flexspline or circular
+    spline [rad]."""
     friction_work: float = nan
     """Work of tooth friction since the deflection [J]."""
     contact_nodes: int | None = None
     """Bore nodes that touch the wave generator, whole drive."""
     stress: MemberMaxima | None = None
     state: State | None = None
-    """The equilibrium, for fields and pictures."""
+    """The equilibrium, from which fields and pictures are evaluated."""
 
 
 class Positions:
-    """What the runs of every model tell from their positions, ``steps``."""
+    """Results that the runs of every model derive from their positions, ``steps``."""
 
     design: Design
     torque: float
@@ -85,47 +92,47 @@ class Positions:
 
     @property
     def turn(self) -> float:
-        """Turns of the input; 0 of a single position."""
+        """Turns of the input; zero for a single position."""
         if len(self.steps) < 2:
             return 0.0
         return float(self.steps[1].input_angle * len(self.steps) / (2.0 * pi))
 
     @property
     def unspread(self) -> str | None:
-        """On how few tooth phases the positions fall; None if they spread."""
+        """Number of phases on which the positions fall, in words; None if they spread."""
         return unspread(self.design, len(self.steps), self.turn)
 
     def warnings(self) -> list[str]:
-        """What makes the figures less than they seem; a line each."""
+        """Limits of the validity of the results, one line each."""
         lines = [alike(self.design, len(self.steps), self.turn)]
         over = overload(self.design, self.torque)
         if over is not None:
-            lines.append(f"{over}: far beyond what a strain wave gear carries")
+            lines.append(f"{over}: far above the load capacity of a strain wave gear")
         return [line for line in lines if line is not None]
 
     @property
     def outcome(self) -> Outcome:
-        """Converged, or what the first position that failed says."""
+        """``CONVERGED``, or the outcome of the first position that failed."""
         failed = (s.outcome for s in self.steps if not s.outcome.ok)
         return next(failed, Outcome.CONVERGED)
 
     @property
     def states(self) -> tuple[Any, ...]:
-        """Equilibria of the positions that were solved."""
+        """Equilibria of the solved positions."""
         return tuple(step.state for step in self.steps if step.state is not None)
 
     def series(self, name: str) -> Array:
-        """One quantity of the positions, NaN where a solve failed."""
+        """One quantity at all positions, NaN where a solve failed."""
         return np.array([getattr(step, name) for step in self.steps], dtype=float)
 
     def averages(self) -> dict[str, Any]:
-        """Means of the per-step maxima by member, null for a rigid one [MPa]."""
+        """Means of the per-step maxima by member, null for a rigid member [MPa]."""
         solved = [step.stress for step in self.steps if step.stress is not None]
         members = ("flexspline", "circular_spline")
         return {name: _averages([getattr(s, name) for s in solved]) for name in members}
 
     def common_series(self) -> dict[str, list[Any]]:
-        """Lists of ``per_step`` that every model has; stress of the flexspline."""
+        """Lists of ``per_step`` that every model reports; stresses of the flexspline."""
         return {
             "angle_deg": list(self.series("input_angle") / deg),
             **{
@@ -167,7 +174,7 @@ class MeshingRun(Positions):
 
     @property
     def nodes(self) -> int:
-        """Nodes before condensation, of the deformable members."""
+        """Nodes of the deformable members before condensation."""
         total = 0
         for element, sectors in self._members():
             face = element.face_size
@@ -177,11 +184,11 @@ class MeshingRun(Positions):
 
     @property
     def elements(self) -> int:
-        """Elements before condensation, of the deformable members."""
+        """Elements of the deformable members before condensation."""
         return sum(int(e.mesh.mesh.t.shape[1]) * n for e, n in self._members())
 
     def to_json(self) -> dict[str, Any]:
-        """The JSON object of ``swgjoint meshing``; per-step stress: flexspline."""
+        """JSON object of ``swgjoint meshing``; per-step stresses of the flexspline."""
         elastic = self.model.circular_spline.compliance is not None
         cup = None if self.design.cup is None else "closed-form torsion in series"
         ring = f"elastic, outside {self.design.circular_spline.outer_rim}"
@@ -224,14 +231,16 @@ class MeshingRun(Positions):
         }
 
     def _arcs(self, state: State | None) -> list[list[list[float]]] | None:
-        """Contact arcs of the wave generator from each lobe [deg], as they are."""
+        """Contact arcs of the wave generator, measured from each lobe [deg]."""
         if state is None:
             return None
-        found = wave_generator_contact(self.model, state, self.design.lobes)
-        return [[[low / deg, high / deg] for low, high in arcs] for arcs in found.arcs]
+        contact = wave_generator_contact(self.model, state, self.design.lobes)
+        return [
+            [[low / deg, high / deg] for low, high in arcs] for arcs in contact.arcs
+        ]
 
     def _tooth_forces(self) -> dict[str, list[float]] | None:
-        """Forces on all flexspline teeth at the last position that was solved."""
+        """Forces on all flexspline teeth at the last solved position [N]."""
         if not self.states:
             return None
         force = tooth_forces(self.model, self.states[-1])
@@ -241,12 +250,12 @@ class MeshingRun(Positions):
         """Stress at one tooth root as the lobe passes."""
         if not self.states:
             return None
-        found = root_stress(self.model, self.states, self.design.lobes)
+        stress = root_stress(self.model, self.states, self.design.lobes)
         return {
-            "tooth": found.tooth,
-            "lobe_deg": list(found.lobe_position[:, found.tooth] / deg),
+            "tooth": stress.tooth,
+            "lobe_deg": list(stress.lobe_position[:, stress.tooth] / deg),
         } | {
-            f"{kind}_MPa": list(getattr(found, kind)[:, found.tooth] / 1e6)
+            f"{kind}_MPa": list(getattr(stress, kind)[:, stress.tooth] / 1e6)
             for kind in KINDS
         }
 

@@ -1,4 +1,4 @@
-"""The cycle of the teeth: errors of both members and of the axis, pitch by pitch."""
+"""Errors of both members' teeth and of the axis, pitch by pitch over their cycle."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ MEMBERS: tuple[MemberName, MemberName] = ("flexspline", "circular_spline")
 
 
 def pitches_of(design: Design) -> int:
-    """Pitches after which errors of teeth and axis repeat; 1 without such errors."""
+    """Pitches after which errors of teeth and axis repeat; one without such errors."""
     shifts = [tooth_errors(design, member).shift for member in MEMBERS]
     counts = [len(shift) for shift in shifts if shift.any()]
     if axis_tilt(design).any() and design.drive.layout != "wave_generator_fixed":
@@ -24,24 +24,24 @@ def pitches_of(design: Design) -> int:
 
 
 def pitch_of(design: Design) -> float:
-    """Input angle after which the teeth stand alike [rad]."""
+    """Input angle after which the teeth are in an equivalent position [rad]."""
     return 2.0 * pi / design.periodicity
 
 
 def shift_errors(errors: ToothErrors, pitches: Index, layout: str) -> Array:
-    """Shifts of the teeth that stand where those of the first pitch stood.
+    """Shifts of the teeth that have moved to the places of the first pitch.
 
     Args:
-        errors: Of one member.
-        pitches: Whole pitches that the input has moved on (n,).
-        layout: Which member is fixed.
+        errors: Errors of one member's teeth.
+        pitches: Whole pitches by which the input has turned (n,).
+        layout: Layout of the drive, which names the fixed member.
 
     Returns:
-        In the frames of the teeth (n, n_teeth, 2) [m].
+        Shifts in the frames of the teeth (n, n_teeth, 2) [m].
     """
     count = len(errors.shift)
-    # the lobes move on to the next teeth; a wave generator that stands still sees the
-    # teeth come from behind
+    # the lobes advance to the next teeth; past a fixed wave generator the teeth move,
+    # so that the preceding ones arrive
     onwards = -pitches if layout == "wave_generator_fixed" else pitches
     return np.asarray(errors.shift[(np.arange(count) + onwards[:, None]) % count])
 
@@ -49,24 +49,31 @@ def shift_errors(errors: ToothErrors, pitches: Index, layout: str) -> Array:
 def gap_errors(design: Design, pitches: Index) -> tuple[Array, Array, Array]:
     """Shifts of both members' teeth and slope of the axis after whole pitches.
 
-    As the first pitch sees them: (n, N, 2), (n, N_c, 2) [m], (n, 2) [rad].
+    Args:
+        design: The drive.
+        pitches: Whole pitches by which the input has turned (n,).
+
+    Returns:
+        Shifts of the flexspline's teeth (n, N, 2) [m] and of the circular spline's
+        teeth (n, N_c, 2) [m], and slope of the axis (n, 2) [rad], all as they act in
+        the first pitch.
     """
-    own, other = (
+    flexspline, circular_spline = (
         shift_errors(tooth_errors(design, member), pitches, design.drive.layout)
         for member in MEMBERS
     )
-    return own, other, axis_slope(design, pitches)
+    return flexspline, circular_spline, axis_slope(design, pitches)
 
 
 def axis_slope(design: Design, pitches: Index) -> Array:
-    """Slope of the axis, turned back with the wave generator to the first pitch.
+    """Slope of the axis, rotated back with the wave generator to the first pitch.
 
     Args:
         design: The drive.
-        pitches: Whole pitches that the input has moved on (n,).
+        pitches: Whole pitches by which the input has turned (n,).
 
     Returns:
-        Shape (n, 2) [rad].
+        Slope (n, 2) [rad].
     """
     stands = design.drive.layout == "wave_generator_fixed"
     angle = np.asarray((0.0 if stands else -pitch_of(design)) * pitches, dtype=float)

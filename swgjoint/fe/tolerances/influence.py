@@ -1,4 +1,4 @@
-"""How the gap of every tooth acts on the output of the 2D drive."""
+"""Influence of the gap of every tooth on the output of the 2D drive."""
 
 from __future__ import annotations
 
@@ -16,28 +16,35 @@ from swgjoint.fe.plane.state import State
 from swgjoint.typing import Mask
 
 STATIONS = 30
-"""Points along a flank that may touch, beside those of the perfect drive: contacts
-wander along flanks that conform."""
+"""Possible contact points along a flank, in addition to those of the perfect drive,
+because contacts move along conforming flanks."""
 SUPPORTS = 3
-"""Intervals of the bore of a sector that may touch the wave generator, beside those
-that do: with two of them lots are 1.04 % of their peak to peak off full solves."""
+"""Intervals of a sector's bore that may touch the wave generator, in addition to those
+that do. With two of them the kinematic error of lots deviates from full solves by
+1.04 % of its peak-to-peak value."""
 
 
 def influence(model: RingModel, state: State, *, ring_is_output: bool) -> Influence:
     """Condense a drive with perfect teeth at an equilibrium.
 
     Args:
-        model: All sectors, an elastic circular spline, a rigid wave generator, no
-            errors of the teeth, no friction.
+        model: Ring model of all sectors with an elastic circular spline and a rigid
+            wave generator, without errors of the teeth and without friction.
         state: The equilibrium.
         ring_is_output: Whether the circular spline is the output.
+
+    Raises:
+        ValueError: If the model does not meet these conditions, or no tooth carries
+            force at the equilibrium.
     """
     shifts = (model.tooth_shift, model.ring_tooth_shift)
     flawed = any(shift is not None and shift.any() for shift in shifts)
     if model.half or model.friction is not None or flawed:
-        raise ValueError("needs all sectors, without friction and errors of the teeth")
+        raise ValueError(
+            "the influence needs all sectors, no friction and teeth without errors"
+        )
     if model.race is not None:
-        raise ValueError("needs a rigid wave generator")
+        raise ValueError("the influence needs a rigid wave generator")
     assert model.circular_spline.compliance is not None
     ring = linearise(model, state, None if ring_is_output else state.torque)
     contacts, carries = _tooth_contacts(model, ring, state)
@@ -50,20 +57,20 @@ def influence(model: RingModel, state: State, *, ring_is_output: bool) -> Influe
         contacts=contacts,
         carries=carries,
     )
-    place = supports.intervals.mean(model.bore_points(state))
-    place = rotate(place, -state.wave_generator_angle)
-    return replace(drive.influence(supports), supports=place)
+    points = supports.intervals.mean(model.bore_points(state))
+    points = rotate(points, -state.wave_generator_angle)
+    return replace(drive.influence(supports), supports=points)
 
 
 def _tooth_contacts(
     model: RingModel, ring: Linearised, state: State
 ) -> tuple[Contacts, Mask]:
-    """Points that may touch, and which of them carry force at the state."""
-    held = state.contacts
-    if held is None or not len(held):
-        raise ValueError("needs an equilibrium whose teeth carry force")
+    """Possible contact points, and a mask of those that carry force at the state."""
+    loaded = state.contacts
+    if loaded is None or not len(loaded):
+        raise ValueError("the influence needs an equilibrium whose teeth carry force")
     reach = REACH * model.lobe_height
-    near = ring.search.search(ring.flank, reach, held)
+    near = ring.search.search(ring.flank, reach, loaded)
     stations, step = np.linspace(*model.element.flank_range, STATIONS, retstep=True)
     flanks = np.unique(2 * near.sector + near.side)
     key = np.repeat(flanks, STATIONS)
@@ -74,12 +81,12 @@ def _tooth_contacts(
     more = near.chosen(np.zeros(added.size, dtype=np.int64))
     sector, side = np.divmod(key[added], 2)
     more = replace(more, sector=sector, side=side, station=place[added])
-    found = ring.search.search(ring.flank, reach, Contacts.join(held, more))
-    return distinct(found, state)
+    possible = ring.search.search(ring.flank, reach, Contacts.join(loaded, more))
+    return distinct(possible, state)
 
 
 def _near_supports(model: RingModel, ring: Linearised, state: State) -> Mask:
-    """Intervals of the bore that touch, and some of those that may (N, intervals)."""
+    """Mask of the bore intervals that touch, and of some that may (N, intervals)."""
     shape = (model.sectors, -1, model.stations.per_interval)
     gap = ring.gap.reshape(shape)
     used = np.asarray(state.touching.reshape(shape).any(axis=2))

@@ -1,8 +1,8 @@
-"""Output of many drives of one design, each with errors of its own, in the plane.
+"""Output errors of many 2D drives of one design, each with its own errors.
 
 One perfect drive is linearised at a few positions within a pitch. The errors of every
-drive, of its teeth and of its wave generator, are superposed there: a fraction of a
-millisecond an equilibrium.
+drive's teeth and wave generator are superposed at these positions, which takes a
+fraction of a millisecond per equilibrium.
 """
 
 from __future__ import annotations
@@ -33,11 +33,11 @@ from swgjoint.typing import Array, Index
 PHASES = 4
 """Positions within a pitch."""
 POSITIONS = 320
-"""Of the input over one output turn. On six specimens of reference-2d-tolerances the
-accuracy read from them (see ``study``) is 0.98 of that of all 29,280 positions, with a
-standard deviation of 0.012."""
+"""Input positions over one output turn. For six specimens of reference-2d-tolerances
+their transmission accuracy (see ``study``) is 0.98 of that of all 29,280 positions,
+with a standard deviation of 0.012."""
 CHECKS = 6
-"""Positions of one drive that are solved without linearisation, to judge the others."""
+"""Positions of one drive solved without linearisation, which validate the others."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -51,17 +51,21 @@ class Lot:
     loaded: Array
     """Transmission error at rated torque (n, P) [rad]."""
     compliance: Array
-    """-d(psi)/dT there (n, P) [rad/(N·m)]."""
+    """Compliance -d(psi)/dT at rated torque (n, P) [rad/(N·m)]."""
     whole: NDArray[np.bool_]
-    """Whether a drive's errors repeat so soon that no position is left out (n,)."""
+    """Whether the positions cover the whole cycle of a drive's errors (n,)."""
 
 
 def perfect_positions(design: Design, phases: int = PHASES) -> list[Rest]:
     """The drive without errors at positions in a pitch, for :func:`sample_lot`.
 
+    Args:
+        design: The drive; its errors are ignored.
+        phases: Positions, equally spaced within a pitch.
+
     Raises:
-        DesignError: If the design cannot be built or holds what is not modelled.
-        ComputationError: If it cannot be solved.
+        DesignError: If the design cannot be built or has features that the model lacks.
+        ComputationError: If a position cannot be solved.
     """
     check_modelled(design, "2d")
     return influences(without_errors(design), phases=phases)[1]
@@ -70,24 +74,25 @@ def perfect_positions(design: Design, phases: int = PHASES) -> list[Rest]:
 def sample_lot(
     drives: Sequence[Design], rests: Sequence[Rest], *, positions: int = POSITIONS
 ) -> Lot:
-    """Errors of many drives of one design.
+    """Output errors of many drives of one design.
 
-    The error without torque is, where clearance leaves the output free, the middle of
-    the positions at +-1 % of rated torque. A cup counts as closed-form torsion.
+    Where clearance leaves the unloaded output free, its error is the mean of those at
+    +-1 % of rated torque. The torsion of a cup is added in closed form.
 
     Args:
-        drives: One design with ``tolerances`` of each drive's own.
-        rests: Of that design, see :func:`perfect_positions`.
-        positions: Input angles, at random in equal parts of one output turn.
+        drives: Drives that differ only in their ``tolerances``.
+        rests: Unloaded positions of the perfect drive, see :func:`perfect_positions`.
+        positions: Number of input angles, one placed at random in each of as many
+            equal parts of one output turn.
     """
     design, phases = drives[0], len(rests)
     rated = ratings_of(design).rated_torque
     series = series_compliance(design, cup=True)
-    # an output turn even where errors repeat sooner: orders of both members are told
-    # apart by their beat
+    # a whole output turn even if the errors repeat sooner: only their beat separates
+    # the orders of the two members
     turn = round(2.0 * np.pi * abs(design.ratio) / pitch_of(design))
-    pitch, phase = np.divmod(_strewn(turn * phases, positions), phases)
-    # psi - theta/i: whole pitches see the first one with other errors
+    pitch, phase = np.divmod(_stratified(turn * phases, positions), phases)
+    # psi - theta/i: every pitch is the first pitch with different errors
     ideal = pitch_of(design) * phase / phases / design.ratio
     shape = (len(drives), pitch.size)
     unloaded, loaded, compliance = (np.empty(shape) for _ in range(3))
@@ -96,10 +101,10 @@ def sample_lot(
         errors = [gap_errors(drive, pitch[here]) for drive in drives]
         unloaded[:, here] = _unloaded(rest, drives, errors, rated)
         at = rest.sides[0][1]
-        found = at.with_supports().respond(_gap_changes(at, drives, errors), rated)
+        response = at.with_supports().respond(_gap_changes(at, drives, errors), rated)
         part = (len(drives), -1)
-        loaded[:, here] = (found.output_angle - series * rated).reshape(part)
-        compliance[:, here] = (found.compliance + series).reshape(part)
+        loaded[:, here] = (response.output_angle - series * rated).reshape(part)
+        compliance[:, here] = (response.compliance + series).reshape(part)
     return Lot(
         input_angle=pitch_of(design) * (pitch + phase / phases),
         unloaded=unloaded - ideal,
@@ -117,14 +122,15 @@ def _is_whole(drive: Design, pitch: Index, phase: Index, phases: int) -> bool:
 def superposition_error(
     drive: Design, perfect: Sequence[Rest], *, positions: int = CHECKS
 ) -> float | None:
-    """Largest difference of the kinematic error to full solves, over its peak to peak.
-
-    None where no full solve succeeds.
+    """Largest deviation of the kinematic error from full solves, over its peak to peak.
 
     Args:
-        drive: One of a lot.
-        perfect: See :func:`perfect_positions`.
-        positions: Input angles, equally spaced over one output turn.
+        drive: One drive of a lot.
+        perfect: Positions of the perfect drive, see :func:`perfect_positions`.
+        positions: Number of input angles, equally spaced over one output turn.
+
+    Returns:
+        Relative deviation [-]; None if no full solve succeeds.
     """
     turn = round(2.0 * np.pi * abs(drive.ratio) / pitch_of(drive))
     pitch = np.arange(positions) * turn // positions
@@ -134,20 +140,24 @@ def superposition_error(
     if not at.size:
         return None
     errors = gap_errors(drive, at)
-    found = _unloaded(perfect[0], [drive], [errors], ratings_of(drive).rated_torque)
+    rated = ratings_of(drive).rated_torque
+    superposed = _unloaded(perfect[0], [drive], [errors], rated)
     spread = np.ptp(sample_lot([drive], perfect).unloaded)
-    return float(np.abs(found[0] - solved.output_error).max() / spread)
+    return float(np.abs(superposed[0] - solved.output_error).max() / spread)
 
 
 def outline_change(at: Influence, drive: Design) -> Array:
-    """Change of the gaps to the wave generator by its errors (k,) [m].
+    """Change of the gaps to the wave generator caused by its errors (k,) [m].
 
     Args:
-        at: A drive without errors, linearised in the plane.
-        drive: The same with errors.
+        at: Influence of the 2D drive without errors.
+        drive: The drive with errors.
+
+    Raises:
+        ValueError: If the influence is not that of a 2D drive.
     """
     if at.supports is None:
-        raise ValueError("needs an influence in the plane")
+        raise ValueError("the change of the outline needs a 2D influence")
     flawed = flawed_wave_generator(drive)
     centred = at.supports - wave_generator_offset(drive)
     recedes = flawed.signed_distance(centred)[0]
@@ -160,7 +170,7 @@ def _unloaded(
     errors: Sequence[tuple[Array, Array, Array]],
     rated: float,
 ) -> Array:
-    """Psi without torque, or the middle of a free output (n, n_positions) [rad]."""
+    """Unloaded psi, or the middle of its range if free (n, n_positions) [rad]."""
     loads = (0.0,) if rest.opposite is None else (SMALL * rated, -SMALL * rated)
     angles = [
         at.with_supports().respond(_gap_changes(at, drives, errors), load).output_angle
@@ -174,7 +184,7 @@ def _gap_changes(
     drives: Sequence[Design],
     errors: Sequence[tuple[Array, Array, Array]],
 ) -> Array:
-    """Of teeth and wave generator, one drive after the other (n_sets, n + k) [m]."""
+    """Changes of tooth and wave-generator gaps by drive (n_sets, n + k) [m]."""
     rows = []
     for drive, shifts in zip(drives, errors, strict=True):
         teeth = at.gap_change(*shifts)
@@ -183,8 +193,8 @@ def _gap_changes(
     return np.concatenate(rows)
 
 
-def _strewn(count: int, wanted: int) -> Index:
-    """Positions out of a count, at random in equal parts: no order is met in step."""
+def _stratified(count: int, wanted: int) -> Index:
+    """Random positions, one in each of equal parts of a count, to avoid aliasing."""
     if wanted >= count:
         return np.arange(count)
     inside = np.random.default_rng(0).uniform(size=wanted)

@@ -19,14 +19,19 @@ from swgjoint.gear.design.design import Design
 from swgjoint.gear.design.tolerances import with_perfect_teeth
 
 PHASES = 4
-"""Positions within a pitch: what the errors add varies slowly within one."""
+"""Positions within a pitch; the effect of the errors varies slowly within one."""
 SMALL = 0.01
-"""Part of the rated torque of either sign between whose positions an output without
-torque stands where clearance leaves it free."""
+"""Part of the rated torque that takes up the clearance; without torque, an output with
+clearance is midway between its positions under both signs of it [-]."""
 
 
 def perfect_drive(design: Design, model: str = "2d") -> Follower[Any]:
-    """All of the drive, its teeth and its axis perfect, without friction."""
+    """Model of the whole drive without friction, with perfect teeth and axis.
+
+    Args:
+        design: The drive; errors of its wave generator are kept.
+        model: Fidelity, ``2d`` or ``3d``.
+    """
     perfect, layout = with_perfect_teeth(design), design.drive.layout
     if model == "3d":
         ring = solid_ring(perfect)
@@ -39,14 +44,15 @@ def perfect_drive(design: Design, model: str = "2d") -> Follower[Any]:
 class Rest:
     """The drive with perfect teeth at one position, linearised without load.
 
-    Where clearance leaves the output free, that is done at both of its ends.
+    If clearance leaves the output free, it is linearised at both ends of the clearance.
     """
 
     state: Any
-    """Without load, or under the small torque that takes the clearance up."""
+    """Equilibrium without load, or under the small torque that takes up the clearance.
+    """
     at: Influence
     opposite: tuple[Any, Influence] | None = None
-    """The same under the opposite torque, where the output is free."""
+    """State and influence under the opposite torque, if the output is free."""
 
     @property
     def sides(self) -> tuple[tuple[Any, Influence], tuple[Any, Influence]]:
@@ -64,13 +70,16 @@ def influences(
 ) -> tuple[Follower[Any], list[Rest]]:
     """The drive with perfect teeth, unloaded and linearised at positions in a pitch.
 
-    Errors of its wave generator turn with it, so that all pitches are alike.
+    Errors of the wave generator turn with it, so that all pitches are equivalent.
 
     Args:
         design: The drive; errors of its wave generator are kept.
-        phases: Positions, equally spaced.
+        phases: Number of equally spaced positions.
         model: Fidelity, ``2d`` or ``3d``.
         tick: Called after every position.
+
+    Returns:
+        The model that follows the drive, and its positions.
 
     Raises:
         ComputationError: If the unloaded drive cannot be solved.
@@ -79,7 +88,7 @@ def influences(
     follow = perfect_drive(design, model)
     state = follow.engage(follow.deflect())
     rest = Unloaded(state=state, small=small)
-    found = []
+    positions = []
     for k in range(phases):
         if k:
             rest = follow.turn_unloaded(rest, period * k / phases)
@@ -87,11 +96,11 @@ def influences(
             rest = follow.unload(state, small)
         if not rest.state.outcome.ok:
             raise ComputationError(
-                f"{design.drive.name}: no equilibrium without torque and errors:"
+                f"{design.drive.name}: no equilibrium without torque and tooth errors:"
                 f" {rest.state.outcome.value}"
             )
         up, down = rest.sides or (rest.state, None)
         opposite = None if down is None else (down, follow.influence(down))
-        found.append(Rest(state=up, at=follow.influence(up), opposite=opposite))
+        positions.append(Rest(state=up, at=follow.influence(up), opposite=opposite))
         tick()
-    return follow, found
+    return follow, positions

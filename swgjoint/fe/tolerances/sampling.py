@@ -1,9 +1,10 @@
 """Equilibria of a drive with manufacturing errors over the whole cycle of its teeth.
 
-Errors of the circular spline repeat with alpha, those of the flexspline with beta; both
-together after as many pitches as the least common multiple of the tooth counts, a turn
-of the output or a part of it. Full solves would take hours: the drive is linearised at
-a few positions within one pitch, and the errors of all pitches are superposed there.
+Errors of the circular spline repeat with alpha, those of the flexspline with beta. Both
+together repeat after a number of pitches equal to the least common multiple of the
+tooth counts, which is one output turn or a part of it. Full solves would take hours.
+Instead, the drive is linearised at a few positions within one pitch, and the errors of
+all pitches are superposed there.
 """
 
 from __future__ import annotations
@@ -31,23 +32,25 @@ from swgjoint.progress import Progress, silent
 from swgjoint.typing import Array, Index
 
 PHASES = {"2d": 6, "3d": 4}
-"""Positions within a pitch: what the errors add varies slowly within one."""
+"""Positions within a pitch; the effect of the errors varies slowly within one."""
 ALONE = 24
-"""Positions within a pitch without errors of the teeth, where one is all there is."""
+"""Positions within the only pitch of a cycle without errors of teeth and axis."""
 POSITIONS = 40_000
-"""Positions of the cycle, if that leaves two in a pitch: what two minutes allow."""
+"""Most positions of the cycle, about two minutes of computation, as long as every pitch
+has at least two."""
 LEVELS = (0.15, 0.45, 1.0)
-"""Sampled torques, of both signs, as parts of the repeated peak torque."""
+"""Sampled torques, of both signs, as parts of the repeated peak torque [-]."""
 CHECKS = {"2d": 12, "3d": 3}
-"""Positions that are solved without linearisation, too, to judge the map; in space one
-takes half a minute."""
+"""Positions that are also solved without linearisation to validate the map; each takes
+half a minute in 3D."""
 STAGES = ("equilibria", "linearised positions", "superposition", "full solves")
-"""Of the sampling of a drive with errors, as the progress counts them."""
+"""Stages of the sampling of a drive with errors, as the progress counts them."""
 FREE = 100.0
-"""Compliance, in the median of all positions, from which the output counts as free."""
+"""Multiple of the median compliance of all positions from which the output counts as
+free [-]."""
 CHUNK = 128
-"""Sets of errors that are superposed between two calls of the progress: of drives with
-many teeth a torque takes minutes."""
+"""Sets of errors superposed between two calls of the progress, because one torque takes
+minutes for drives with many teeth."""
 _PHASE, _CHECK = "superposition-{:04d}", "full-solves-{:04d}"
 
 
@@ -61,20 +64,21 @@ def sample_tolerances(
     progress: Progress = silent,
     keep: Unfinished | None = None,
 ) -> ToleranceSamples:
-    """Superposed equilibria over the cycle of the teeth.
+    """Superpose errors on equilibria over the cycle of the teeth.
 
     Args:
         design: A drive with errors of its teeth.
-        repeated_peak: Largest torque [N·m].
-        rated_torque: [N·m].
-        phases: Positions within a pitch; fewer than usual for many pitches if None.
+        repeated_peak: Repeated peak torque, the largest one sampled [N·m].
+        rated_torque: Rated torque [N·m].
+        phases: Positions within a pitch; None chooses :data:`PHASES`, or fewer for a
+            cycle of many pitches.
         model: Fidelity, ``2d`` or ``3d``.
-        progress: Called with the stage, the parts done and their number.
-        keep: Where finished positions are kept and taken up again; None keeps none.
+        progress: Called with the stage, the number of finished parts and their total.
+        keep: Store of finished positions, which a resumed run reads; None keeps none.
 
     Raises:
-        ComputationError: If the drive without errors or without torque, or a torque
-            with errors cannot be solved.
+        ComputationError: If no equilibrium is found without load, or with errors at
+            one of the torques.
     """
     drive = design.drive
     if phases is None:
@@ -158,12 +162,15 @@ def full_solves(
 
     Args:
         design: A drive with errors of its teeth.
-        follow: The same without them.
-        rests: It without load at positions in a pitch.
-        positions: Numbers of positions in the cycle, ``len(rests)`` a pitch.
-        torques: T at each of them [N·m].
+        follow: Model of the drive without these errors.
+        rests: Unloaded positions of that model in a pitch.
+        positions: Numbers of positions in the cycle, ``len(rests)`` per pitch (n,).
+        torques: Torques T at each position [N·m].
         tick: Called after every position.
-        keep: Where solved positions are kept and taken up again; None keeps none.
+        keep: Store of solved positions, which a resumed run reads; None keeps none.
+
+    Returns:
+        Results of the positions and torques that were solved.
     """
     tables = []
     step = pitch_of(design) / len(rests)
@@ -175,7 +182,7 @@ def full_solves(
         state = rest.state
         for torque in torques:
             if torque == 0.0 and rest.opposite is not None:
-                # in the middle of the clearance
+                # midway between both ends of the clearance
                 found = [flawed.to_torque(s, at.torque) for s, at in rest.sides]
             else:
                 state = flawed.to_torque(state, torque)
@@ -215,10 +222,13 @@ def _over_torque(
     small: float,
     tick: Callable[[], None] = lambda: None,
 ) -> tuple[Array, int]:
-    """Output angle, strain energy, compliance at all torques (3, n_torques, n_sets).
+    """Output angle, strain energy and compliance at all torques.
 
-    And the number of sets whose unloaded output is free. ``tick`` is called after
-    :data:`CHUNK` sets at a torque.
+    ``tick`` is called after every :data:`CHUNK` sets of errors at a torque.
+
+    Returns:
+        Table (3, n_torques, n_sets), and the number of sets whose unloaded output is
+        free.
     """
     gaps = [at.gap_change(*errors) for _, at in rest.sides]
 
@@ -233,7 +243,7 @@ def _over_torque(
             part = slice(k, k + CHUNK)
             begin = None if start is None else start[part]
             found = at.respond(change[part], torque, begin)
-            # of the equilibrium at which it is linearised
+            # the influence counts from the equilibrium at which it is linearised
             potential = found.potential + state.energy + at.torque * at.angle
             energy = potential - torque * found.output_angle
             tables.append(np.stack([found.output_angle, energy, found.compliance]))
@@ -245,12 +255,12 @@ def _over_torque(
     free = np.ones(len(gaps[0]), dtype=bool)
     if rest.opposite is None:
         unloaded, at_rest = row(0.0, slice(None), None, tick)
-        # a few free positions leave the median as it is
+        # a few free positions do not change the median much
         free = ~(unloaded[2] < FREE * np.nanmedian(unloaded[2]))
     if free.any():
         ends = [row(t, free, None, lambda: None)[0] for t in (small, -small)]
         middle = 0.5 * (ends[0] + ends[1])
-        middle[1] -= 0.5 * small**2 * middle[2]  # what the small torque stores
+        middle[1] -= 0.5 * small**2 * middle[2]  # energy stored by the small torque
         middle[2] = 0.5 * (ends[1][0] - ends[0][0]) / small
         unloaded[:, free] = middle
     if rest.opposite is not None:
@@ -270,7 +280,7 @@ def _over_torque(
 def _stage(
     progress: Progress, design: Design, number: int, total: int
 ) -> Callable[..., None]:
-    """What counts the parts of one stage of the sampling."""
+    """Counter of the finished parts of one stage of the sampling."""
     done = 0
     name = f"{design.drive.name}: {STAGES[number]}, part {number + 1} of {len(STAGES)}"
     progress(name, 0, total)
@@ -286,12 +296,12 @@ def _stage(
 def _kept(
     keep: Unfinished | None, phase: int, shape: tuple[int, ...]
 ) -> tuple[Array, int] | None:
-    """Table and free sets of a phase of an interrupted run."""
+    """Table and number of free sets of a phase of an interrupted run."""
 
     def taken(arrays: Mapping[str, Any]) -> tuple[Array, int]:
         table = np.asarray(arrays["table"], float)
         if table.shape != shape:
-            raise ValueError(f"a table of shape {table.shape}")
+            raise ValueError(f"table of shape {table.shape}: expected {shape}")
         return table, int(arrays["free"])
 
     return None if keep is None else keep.read(_PHASE.format(phase), taken)
@@ -301,19 +311,19 @@ def _checked(at: Array, arrays: Mapping[str, Any]) -> Array:
     """Rows of a position of an interrupted run, see :func:`full_solves`."""
     table = np.asarray(arrays["table"], float)
     if table.shape != (len(at), 4) or not np.array_equal(table[:, :2], at):
-        raise ValueError("another position of the cycle")
+        raise ValueError("the stored rows belong to another position of the cycle")
     return table
 
 
 def _with_onsets(table: Array, small: float) -> Array:
-    """Rows where the teeth begin to hold a free output, on both sides of the middle.
+    """Add the rows at which the teeth take up the clearance, on both sides of zero.
 
     Args:
         table: Output angle, strain energy, compliance (3, n_torques, n_sets).
-        small: Torque of the rows beside the middle [N·m].
+        small: Torque of the rows next to zero torque [N·m].
     """
     zero = table.shape[1] // 2
-    # the fourth quantity of a pattern, the input torque, has no part here
+    # the fourth quantity of a pattern, the input torque, is unused here
     rows = np.concatenate([table, np.zeros_like(table[:1])])
     sides = [
         across_clearance(rows[:, zero], rows[:, zero + side], side * small)[1][:3]
