@@ -99,7 +99,7 @@ class Positions:
 
     @property
     def unspread(self) -> str | None:
-        """Number of phases on which the positions fall, in words; None if they spread."""
+        """Number of phases that the positions hit, in words; None if they spread."""
         return unspread(self.design, len(self.steps), self.turn)
 
     def warnings(self) -> list[str]:
@@ -132,7 +132,7 @@ class Positions:
         return {name: _averages([getattr(s, name) for s in solved]) for name in members}
 
     def common_series(self) -> dict[str, list[Any]]:
-        """Lists of ``per_step`` that every model reports; stresses of the flexspline."""
+        """Lists of ``per_step`` for every model; the stresses are the flexspline's."""
         return {
             "angle_deg": list(self.series("input_angle") / deg),
             **{

@@ -1,4 +1,4 @@
-"""Where the output of a thin-ring drive stands over input turns, errors included."""
+"""Transmission error of a thin-ring drive with manufacturing errors."""
 
 from __future__ import annotations
 
@@ -16,22 +16,23 @@ from swgjoint.typing import Array
 def transmission_error(
     design: Design, input_angles: ArrayLike, *, torque: float | None = None
 ) -> Array:
-    """Output less ideal output, psi - theta/i, one direction of the load [rad].
+    """Output minus ideal output, psi - theta/i, under torque of one sign (n,) [rad].
 
-    Every angle is solved by itself, so that any of them will do, in any order.
+    Every angle is solved independently, so that their order does not matter.
 
     Args:
         design: The drive, with its manufacturing errors.
-        input_angles: theta, of any number of turns (n,) [rad].
-        torque: T [N·m]; by default 1 % of rated, which takes up the play.
+        input_angles: Input angles theta, any number of turns (n,) [rad].
+        torque: Output torque T [N·m]; None selects 1 % of the rated torque, which takes
+            up the clearance.
 
     Raises:
-        DesignError: If the design cannot be built or holds what is not modelled.
+        DesignError: If the design cannot be built or has features that the model lacks.
         ComputationError: If an equilibrium cannot be solved.
     """
     model = thin_ring(design)
     load = SMALL * ratings_of(design).rated_torque if torque is None else torque
-    found = []
+    errors = []
     for theta in np.asarray(input_angles, dtype=float).ravel().tolist():
         state = solve_loaded(model, solve_unloaded(model, theta), load)
         if not state.outcome.ok:
@@ -39,15 +40,20 @@ def transmission_error(
                 f"{design.drive.name}: no equilibrium at {load:.4g} N·m and input angle"
                 f" {theta:.4g} rad: {state.outcome.value}"
             )
-        found.append(state.rotation - theta / model.ratio)
-    return np.array(found)
+        errors.append(state.rotation - theta / model.ratio)
+    return np.array(errors)
 
 
 def output_turn_angles(design: Design, count: int, seed: int = 0) -> Array:
-    """Random input angles over one output turn, one in every equal part (n,) [rad].
+    """Random input angles, one in each of equal parts of an output turn (n,) [rad].
 
-    Strewn, so that no order of tooth, ball or turn is met in step.
+    The random placement avoids aliasing with the orders of teeth, balls and turns.
+
+    Args:
+        design: The drive.
+        count: Number n of angles.
+        seed: Seed of the random generator.
     """
     turns = abs(design.ratio)
-    strewn = np.random.default_rng(seed).uniform(size=count)
-    return np.asarray(2.0 * np.pi * turns * (np.arange(count) + strewn) / count)
+    inside = np.random.default_rng(seed).uniform(size=count)
+    return np.asarray(2.0 * np.pi * turns * (np.arange(count) + inside) / count)

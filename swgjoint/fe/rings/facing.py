@@ -1,8 +1,8 @@
 r"""Points that face the mean line of a ring: balls from inside, a bore from outside.
 
-The foot of the perpendicular from a point p moves with both. With n from the line to
-the side of the point, tangent :math:`\tau`, curvature :math:`\kappa = n\cdot
-r''/|r'|^2` and distance :math:`g = n\cdot(p - r)`,
+The foot of the perpendicular from a point p moves with the point and with the ring.
+With the normal n from the line towards the point, tangent :math:`\tau`, curvature
+:math:`\kappa = n\cdot r''/|r'|^2` and distance :math:`g = n\cdot(p - r)`,
 
 .. math:: dg = u_n, \quad
     d^2g = -\frac{\kappa u_t^2 + 2u_t\beta + g\beta^2}{1 - g\kappa} + n\cdot d^2p,
@@ -22,27 +22,27 @@ from swgjoint.typing import Array, Index
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Facing:
-    """Distances of n points from a ring, and how they change."""
+    """Distances of n points from a ring, and their derivatives."""
 
     place: Array
-    """Feet on the ring (n,)."""
+    """Feet on the ring, element number plus parameter (n,)."""
     distance: Array
-    """g [m]. Shape (n,)."""
+    """Distance g from the mean line (n,) [m]."""
     normal: Array
-    """From the ring to the points (n, 2)."""
+    """Unit normals from the ring to the points (n, 2)."""
     tangent: Array
-    """Tangent of the ring, counter-clockwise (n, 2)."""
+    """Unit tangents of the ring, counter-clockwise (n, 2)."""
     dofs: Index
     """Degrees of freedom of the ring at the feet (n, 8)."""
     by_ring: Array
-    """Rows u_n, u_t, beta by these (n, 3, 8)."""
+    """Derivatives of u_n, u_t and beta by these degrees of freedom (n, 3, 8)."""
     curvature: Array
-    """kappa [1/m]. Shape (n,)."""
+    """Curvature kappa (n,) [1/m]."""
 
     def bends(self) -> Array:
-        """Second derivative of the distance by u_n, u_t, beta (n, 3, 3).
+        """Second derivatives of the distance by u_n, u_t, beta (n, 3, 3).
 
-        That of the point, n . d2p, is left out.
+        The term of the point, n . d2p, is not included.
         """
         form = np.zeros((len(self.distance), 3, 3))
         form[:, 1, 1] = self.curvature
@@ -71,11 +71,12 @@ def distances_to_ring(
 
     Args:
         ring: The ring.
-        q: Its coordinates.
-        points: Shape (n, 2) [m].
-        start: Places near the feet (n,).
-        inside: On which side of the line the points are.
-        own: Elements that the points face even from beyond their ends (n,).
+        q: Coordinates of the ring (size,) [m].
+        points: The points (n, 2) [m].
+        start: Initial guess of the feet, element number plus parameter (n,).
+        inside: Whether the points are inside the ring.
+        own: Elements on whose cubics the feet are sought, beyond their ends if
+            necessary (n,); None for the elements at the feet.
     """
     place = ring.nearest(q, points, start, own)
     element, xi = ring.split(place, own)
@@ -109,16 +110,19 @@ def distances_to_ring(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FacingSurface:
-    """Points beside a ring at fixed places, carried along by its sections."""
+    """Points at fixed places and a constant offset from a ring's mean line.
+
+    They move with the sections of the ring.
+    """
 
     ring: HermiteRing
     place: Array
     """Element number plus parameter (n,)."""
     offset: float
-    """Outwards from the mean line [m]."""
+    """Offset outwards from the mean line [m]."""
 
     def points(self, q: Array) -> tuple[Array, Array, Array, Array]:
-        """Points (n, 2), tangents, outward normals there, lengths of the derivative."""
+        """Points (n, 2) [m], unit tangents, outward normals, and |r'| [m] (n,)."""
         r, v, _ = self.ring.evaluate_at(q, self.place)
         length = np.hypot(v[:, 0], v[:, 1])
         tangent = v / length[:, None]
@@ -126,19 +130,21 @@ class FacingSurface:
         return r + self.offset * outward, tangent, outward, length
 
     def rows(self, q: Array, seen: Facing) -> tuple[Index, Array, Array]:
-        """Degrees of freedom, rows u_n, u_t, turn of the section, and n . d2p.
+        """How the points move with the degrees of freedom of their ring.
 
         Args:
-            q: Coordinates of the ring.
-            seen: All points as the other ring sees them.
+            q: Coordinates of the ring (size,) [m].
+            seen: Distances of all points from the other ring.
 
         Returns:
-            (n, 8), (n, 3, 8) and the factor of the squared turn (n,).
+            Degrees of freedom (n, 8); derivatives of u_n, u_t and of the rotation of
+            the section by these (n, 3, 8); factor of the squared rotation in
+            n . d2p (n,) [m].
         """
         element, xi = self.ring.split(self.place)
         value, slope, _ = hermite(xi)
         _, tangent, outward, length = self.points(q)
-        # turn of the section: -N . dr'/|r'|; the outward normal moves along t with it
+        # rotation of the section: -N . dr'/|r'|; it moves the outward normal along t
         turn = -(slope / length[:, None])[:, :, None] * outward[:, None, :]
         turn = turn.reshape(-1, 8)
         rows = np.empty((len(element), 3, 8))

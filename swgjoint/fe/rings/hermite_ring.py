@@ -1,14 +1,15 @@
-r"""A closed elastic ring of Hermite cubics, large rotations and small strains.
+r"""A closed elastic ring of Hermite cubics with large rotations and small strains.
 
-Nodes carry their position and the derivative of the position by the element parameter,
-so that the mean line is smooth and a force may act anywhere on it:
+The coordinates of a node are its position and the derivative of the position by the
+element parameter, so that the mean line is smooth and a force may act anywhere on it:
 
 .. math:: U = \int \tfrac12 EA\,\varepsilon^2
     + \tfrac12 EI\,(\vartheta' - \vartheta_0')^2\,ds, \quad
     \varepsilon = |r'| - |r_0'|, \quad \vartheta' = \frac{r' \times r''}{|r'|^2},
 
-primes by the arc length of the undeformed ring, theta the angle of the tangent. Exact
-in the rotations; the strain of a section is linear in its distance from the mean line.
+where primes denote derivatives by the arc length of the undeformed ring and theta is
+the angle of the tangent. Rotations are exact; the strain of a section is linear in the
+distance from the mean line.
 """
 
 from __future__ import annotations
@@ -24,7 +25,8 @@ from swgjoint.typing import Array, Index
 
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(3)
 GAUSS = 0.5 * (_POINTS + 1.0), 0.5 * _WEIGHTS
-"""Places and weights on an element, where bending is linear, stretch nearly even."""
+"""Gauss points and weights on an element, where bending is linear and stretch nearly
+constant [-]."""
 _EYE = np.eye(2)
 _CROSS = np.array([[0.0, 1.0], [-1.0, 0.0]])  # v x w = v . (_CROSS w)
 
@@ -50,18 +52,19 @@ def hermite(xi: Array) -> tuple[Array, Array, Array]:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class HermiteRing:
-    """A ring about the origin; node 0 lies on +y, the others counter-clockwise.
+    """A ring about the origin; node 0 is on +y, the others follow counter-clockwise.
 
-    Coordinates have the shape (elements, 2, 2): node, position or derivative, x and y.
+    Coordinates form an array (elements, 2, 2) of node, position or derivative, and x or
+    y; arguments ``q`` hold them flattened (size,).
     """
 
     radius: float
     """Radius of the undeformed mean line [m]."""
     elements: int
     stretching: float
-    """E A [N]."""
+    """Axial stiffness E A [N]."""
     bending: float
-    """E I [N m^2]."""
+    """Bending stiffness E I [N m^2]."""
 
     @property
     def step(self) -> float:
@@ -70,7 +73,7 @@ class HermiteRing:
 
     @property
     def size(self) -> int:
-        """Degrees of freedom."""
+        """Number of degrees of freedom."""
         return 4 * self.elements
 
     @cached_property
@@ -84,12 +87,13 @@ class HermiteRing:
     def two_lobes(self, height: float, angle: ArrayLike, major: float) -> Array:
         """Coordinates of nodes deflected by two lobes without stretch (n, 2, 2) [m].
 
-        Radial w0 cos 2 phi, tangential -w0/2 sin 2 phi, phi from the major axis.
+        At the angle phi from the major axis, the displacement is w0 cos 2 phi outwards
+        and -w0/2 sin 2 phi counter-clockwise.
 
         Args:
-            height: w0 [m].
-            angle: Of the undeformed nodes from +y (n,) [rad].
-            major: Of the major axis [rad].
+            height: Deflection w0 at the major axis [m].
+            angle: Angles of the undeformed nodes from +y (n,) [rad].
+            major: Angle of the major axis from +y [rad].
         """
         angle = np.asarray(angle, dtype=np.float64)
         r, w0, wave = self.radius, height, 2.0 * (angle - major)
@@ -109,7 +113,7 @@ class HermiteRing:
         return np.concatenate([first, np.roll(first, -1, axis=0)], axis=1)
 
     def nodal(self, q: Array) -> Array:
-        """Coordinates by element (elements, 4, 2): both nodes."""
+        """Coordinates of both nodes of every element (elements, 4, 2) [m]."""
         x = q.reshape(self.elements, 2, 2)
         return np.concatenate([x, np.roll(x, -1, axis=0)], axis=1)
 
@@ -119,9 +123,9 @@ class HermiteRing:
         """Position and its first two derivatives by the element parameter, (n, 2) each.
 
         Args:
-            q: Coordinates.
-            place: Element number plus parameter, from 0 to ``elements`` (n,).
-            own: As in :meth:`split`.
+            q: Coordinates of the ring (size,) [m].
+            place: Element number plus parameter, any number of turns (n,).
+            own: Elements whose cubics are extended, see :meth:`split` (n,).
         """
         element, xi = self.split(place, own)
         local = self.nodal(q)[element]
@@ -129,12 +133,12 @@ class HermiteRing:
         return value, first, second
 
     def split(self, place: Array, own: Index | None = None) -> tuple[Index, Array]:
-        """Element numbers and parameters of places, any number of turns.
+        """Element numbers and parameters of places on the ring.
 
         Args:
-            place: Element number plus parameter (n,).
-            own: Elements whose cubics go on where places lie beyond them (n,); None
-                for those that the places lie on.
+            place: Element number plus parameter, any number of turns (n,).
+            own: Elements whose cubics are extended to places beyond their ends (n,);
+                None for the elements that contain the places.
         """
         if own is not None:
             return own, place - own
@@ -147,7 +151,7 @@ class HermiteRing:
         return first, second
 
     def _strains(self, q: Array) -> tuple[Array, ...]:
-        """Derivatives, length, stretch and rate of turning at all Gauss points."""
+        """Derivatives, length, stretch and curvature at all Gauss points."""
         first, second = self._shape
         local = self.nodal(q)
         v = np.einsum("ga,eai->egi", first, local)
@@ -170,7 +174,7 @@ class HermiteRing:
         return float(0.5 * self.step * (density @ GAUSS[1]).sum())
 
     def forces(self, q: Array) -> tuple[Array, Array]:
-        """Gradient (size,) [N] and Hessians of the elements (elements, 8, 8) [N/m]."""
+        """Gradient of the energy (size,) [N] and Hessians (elements, 8, 8) [N/m]."""
         v, w, length, stretch, turning = self._strains(q)
         stretch0, turning0 = self._unstrained
         h = self.step
@@ -224,13 +228,13 @@ class HermiteRing:
     def nearest(
         self, q: Array, points: Array, start: Array, own: Index | None = None
     ) -> Array:
-        """Places of the feet of perpendiculars from points, near given ones (n,).
+        """Feet of the perpendiculars from points, element number plus parameter (n,).
 
         Args:
-            q: Coordinates.
-            points: Shape (n, 2) [m].
-            start: Places near the feet (n,).
-            own: As in :meth:`split`.
+            q: Coordinates of the ring (size,) [m].
+            points: The points (n, 2) [m].
+            start: Initial guess of the feet, element number plus parameter (n,).
+            own: Elements whose cubics are extended, see :meth:`split` (n,).
         """
         place = start
         for _ in range(6):

@@ -1,8 +1,9 @@
 """The thin-ring model of a design: rim, outer race, balls on a rigid cam, teeth.
 
-Plane, in the frame of the circular spline; the wave generator is turned by alpha. The
-rim is a line with the stiffness of its toothed sector, the race another inside it. They
-press on each other through half of either thickness, and nowhere pull.
+The model is 2D, in the frame of the circular spline; alpha is the wave-generator angle.
+The rim is a line with the stiffness of its toothed sector, and the race is a second
+line inside it. The two are in unilateral contact, whose compliance is that of half of
+each thickness.
 """
 
 from __future__ import annotations
@@ -29,31 +30,31 @@ from swgjoint.typing import Index
 from swgjoint.units import mm
 
 ELEMENTS = 190
-"""Fewest elements of a ring: eight between neighbouring balls of 23."""
+"""Least number of elements of a ring: eight between neighbouring balls of 23."""
 PER_ELEMENT = GAUSS[0][[0, 2]]
-"""Where bore and race are held apart, two points of equal weight on an element."""
+"""Contact points of bore and race on an element, two of equal weight [-]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ThinRing(RaceOnBalls):
-    """All that an equilibrium needs, in SI."""
+    """Rim, race, balls, cam and teeth of a drive, in SI units."""
 
     rim: HermiteRing
     nodes_per_tooth: int
     teeth: RingTeeth
     press: float
-    """Stiffness of bore against race per length [N/m^2]."""
+    """Contact stiffness of bore and race per length of the rim's line [N/m^2]."""
 
     @cached_property
     def bore(self) -> FacingSurface:
-        """Points of the rim's bore that face the race."""
+        """Points of the rim's bore that may touch the race."""
         place = np.arange(self.rim.elements)[:, None] + PER_ELEMENT
         offset = self.bearing.bore_radius - self.rim.radius
         return FacingSurface(ring=self.rim, place=place.ravel(), offset=offset)
 
     @property
     def press_per_point(self) -> float:
-        """[N/m]."""
+        """Contact stiffness of bore and race at each contact point [N/m]."""
         return self.press * self.rim.step / len(PER_ELEMENT)
 
     @property
@@ -63,10 +64,10 @@ class ThinRing(RaceOnBalls):
 
     @cached_property
     def order(self) -> Index:
-        """Places of the coordinates in a narrow band.
+        """Positions of the coordinates in an order of narrow bandwidth (size,).
 
-        Both rings together, from node 0 both ways at once: the band of a closed ring is
-        twice that of an open one. Shape (size,).
+        Both rings are numbered together, from node 0 in both directions alternately,
+        so that the band of the closed ring is only twice that of an open one.
         """
         count = self.rim.elements
         place = np.arange(count)
@@ -76,31 +77,31 @@ class ThinRing(RaceOnBalls):
 
 
 def check_modelled(design: Design) -> None:
-    """Refuse what the ring model does not contain.
+    """Reject features that the ring model lacks.
 
     Raises:
-        DesignError: One line per key.
+        DesignError: If the design has any; one line per key.
     """
     drive, faults = design.drive, []
     if design.wave_generator.bearing is None:
         faults.append(
-            "wave_generator.bearing is absent: the ring model is that of a wave"
-            " generator with its ball bearing; accepted: the table, or the 2d model"
+            "wave_generator.bearing is absent: the ring model needs the ball bearing of"
+            " the wave generator; accepted: this table, or the 2d model"
         )
     if drive.layout != "circular_spline_fixed":
         faults.append(
-            f"drive.layout = {drive.layout!r}: accepted by the ring model:"
+            f"drive.layout = {drive.layout!r}: the ring model expects"
             " 'circular_spline_fixed'"
         )
     if design.wave_generator.kind not in ("elliptical", "cosine", "table"):
         faults.append(
-            f"wave_generator.kind = {design.wave_generator.kind!r}: a bearing of the"
-            " ring model runs on 'elliptical', 'cosine' or 'table'"
+            f"wave_generator.kind = {design.wave_generator.kind!r}: the ring model"
+            " expects 'elliptical', 'cosine' or 'table'"
         )
     if design.tolerances.misalignment_arcmin:
         faults.append(
             f"tolerances.misalignment_arcmin ="
-            f" {design.tolerances.misalignment_arcmin:g}: the ring model is a plane;"
+            f" {design.tolerances.misalignment_arcmin:g}: the ring model is 2D;"
             " accepted: 0"
         )
     if design.friction.tooth_coefficient:
@@ -116,7 +117,7 @@ def thin_ring(design: Design) -> ThinRing:
     """Ring model of a design.
 
     Raises:
-        DesignError: If the design cannot be built or holds what is not modelled.
+        DesignError: If the design cannot be built or has features that the model lacks.
     """
     check_modelled(design)
     raise_faults(bearing_checks(design))

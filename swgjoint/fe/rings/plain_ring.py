@@ -1,7 +1,7 @@
-"""A plain ring pulled apart by two rollers in its bore, large displacements.
+"""A plain ring pulled apart by two rollers in its bore, with large displacements.
 
-A model of its own beside the toothed ring: total Lagrangian, quadratic elements on
-curved meshes, a quarter of the ring.
+This model is independent of the toothed ring. It is a total Lagrangian formulation with
+quadratic elements on a curved mesh of a quarter of the ring.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from swgjoint.errors import ComputationError, Outcome
 from swgjoint.typing import Array
 
 RADIAL, AROUND = 2, 32
-"""Elements of the coarsest mesh through the thickness and over a quarter."""
+"""Elements of the coarsest mesh through the thickness and along a quarter."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,47 +44,48 @@ class PlainRing:
 
     @property
     def mean_radius(self) -> float:
-        """[m]."""
+        """Radius of the mean line [m]."""
         return self.outer_radius - 0.5 * self.thickness
 
     @property
     def bending_stiffness(self) -> float:
-        """E I [N m^2]."""
+        """Bending stiffness E I [N m^2]."""
         return self.youngs_modulus * self.width * self.thickness**3 / 12.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PulledRing:
-    """Equilibria of a ring whose rollers move apart, one row a position."""
+    """Equilibria of a ring whose rollers move apart, one row per position."""
 
     angle: Array
-    """Directions in which the outside is measured, from the rollers' axis [rad]. (m,)
+    """Directions in which the outside is measured, from the rollers' axis (m,) [rad].
     """
     deflection: Array
-    """Outward displacement of the outside in these directions, fixed in space as a dial
-    indicator is [m]. Shape (n, m)."""
+    """Outward displacement of the outside in these directions (n, m) [m]; the
+    directions are fixed in space, like those of a dial indicator."""
     force: Array
-    """Force of each roller [N]. Shape (n,)."""
+    """Force of each roller (n,) [N]."""
     outline: Array
-    """Deformed outside of a quarter, from the roller (n, k, 2) [m]."""
+    """Deformed outside of a quarter, starting at the roller (n, k, 2) [m]."""
 
 
 def pull_ring(
     ring: PlainRing, roller_travel: Array, angle: Array, *, refinement: int = 1
 ) -> PulledRing:
-    r"""Pull a ring by two opposite rollers without friction.
+    r"""Pull a ring apart by two opposite rollers without friction.
 
-    The contact stays at the crown: the bore is less curved than any roller that fits.
+    The contact stays at the crown because any roller that fits is more curved than the
+    bore.
 
     .. math:: \int S : F^T \nabla v = 0, \quad S = 2\mu E + \lambda^* \mathrm{tr}E\,I,
         \quad E = \tfrac12 (F^T F - I), \quad F = I + \nabla u
 
     Args:
         ring: The ring.
-        roller_travel: Outward travel of each roller, in the order in which the
-            equilibria are followed (n,) [m].
-        angle: Directions to measure in, from the rollers' axis (m,) [rad].
-        refinement: Multiplies the elements per direction.
+        roller_travel: Outward travel of each roller (n,) [m], in the order in which
+            the equilibria are followed.
+        angle: Directions of measurement, from the rollers' axis (m,) [rad].
+        refinement: Factor on the number of elements in each direction.
 
     Raises:
         ComputationError: If Newton's method fails.
@@ -120,11 +121,12 @@ def pull_ring(
         # without convergence, or folded up on the way
         if np.abs(step).max() >= 1e-9 * abs(travel) or (np.diff(around) <= 0.0).any():
             raise ComputationError(
-                f"plain ring at {travel:g} m of travel: {Outcome.MAX_ITERATIONS.value}"
+                f"plain ring, roller travel = {travel:g} m:"
+                f" {Outcome.MAX_ITERATIONS.value}"
             )
         shape = CubicSpline(around, np.hypot(px, py))
         rows.append(shape(angle) - ring.outer_radius)
-        # a quarter of the ring holds half of the roller's force
+        # a quarter of the ring carries half of the roller's force
         forces.append(2.0 * residual.assemble(basis, state=basis.interpolate(u))[crown])
         outlines.append(np.stack([px, py], axis=-1))
     return PulledRing(

@@ -1,4 +1,4 @@
-"""The outer race on its balls, which sit on the rigid cam: Hertz contact, clearance."""
+"""The outer race on balls and a rigid cam: Hertz contact with clearance."""
 
 from __future__ import annotations
 
@@ -20,19 +20,20 @@ from swgjoint.typing import Array
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PressedBalls:
-    """Hertz contact of the balls, which sit on the cam, with the race."""
+    """Hertz contact of the race with the balls, which sit on the cam."""
 
     seen: Facing
+    """Distances of the ball centres from the race."""
     overlap: Array
-    """[m]. Shape (balls,)."""
+    """Overlap of the balls with race and cam (balls,) [m]."""
     force: Array
-    """Q (balls,) [N]."""
+    """Ball forces Q (balls,) [N]."""
     push: Array
-    """Forces on the race (balls, 2) [N]."""
+    """Force vectors on the race (balls, 2) [N]."""
     input_torque: float
-    """Power per speed of the wave generator that moves the balls [N·m]."""
+    """Power of the ball forces per speed of the wave generator [N·m]."""
     cage_torque: float
-    """Power per speed of the cage against the cam [N·m]."""
+    """Power of the ball forces per speed of the cage relative to the cam [N·m]."""
 
     @property
     def energy(self) -> float:
@@ -42,27 +43,32 @@ class PressedBalls:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RaceOnBalls:
-    """Race, balls and cam, in SI."""
+    """Race, balls and cam, in SI units."""
 
     race: HermiteRing
     bearing: BallBearing
     ball_constant: float
-    """K of one ball [N/m^1.5]."""
+    """Hertz constant K of one ball, F = K overlap^1.5 [N/m^1.5]."""
     cam: NeutralLine
-    """Line of the ball centres when they sit on the cam."""
+    """Line of the ball centres when the balls sit on the cam."""
     cam_offset: Array
-    """Its centre in the frame of the wave generator (2,) [m]."""
+    """Centre of the cam in the frame of the wave generator (2,) [m]."""
     lobe_height: float
-    """Radial deflection that the clearances leave [m]."""
+    """Radial deflection that remains after the clearances are taken up [m]."""
     ratio: float
+    """Signed ratio i of input to output speed [-]."""
     cage_held: bool = False
-    """Whether the cage stands still on the cam instead of rolling: every pitch of the
-    teeth then finds the balls in the same places, and only the passage of balls is
-    lost."""
+    """Whether the cage is fixed to the cam instead of rolling. Every tooth pitch then
+    has the balls in the same places, and only the passage of balls is lost."""
 
     @classmethod
     def from_design(cls, design: Design, elements: int) -> RaceOnBalls:
-        """Those of a design, the race of so many elements."""
+        """Race, balls and cam of a design.
+
+        Args:
+            design: A drive whose wave generator has a ball bearing.
+            elements: Number of elements of the race.
+        """
         bearing = BallBearing.from_design(design)
         inwards = (
             0.5 * (bearing.fit_clearance + bearing.clearance + bearing.ball_diameter)
@@ -94,12 +100,15 @@ class RaceOnBalls:
     def balls(self, alpha: float, phase: float) -> tuple[Array, Array, Array]:
         """Ball centres on the cam and their derivatives by alpha and by phase (n, 2).
 
-        The cage lags behind the wave generator as rolling without slip has it; the race
-        turns with the flexspline, at the ideal ratio.
+        The cage lags behind the wave generator as in rolling without slip. The race
+        turns with the flexspline at the ideal ratio.
 
         Args:
             alpha: Wave-generator angle [rad].
             phase: Angle of ball 0 from the major axis at alpha = 0 [rad].
+
+        Returns:
+            Centres [m] and both derivatives [m/rad], each (n, 2).
         """
         lag = -self.bearing.cage_share * (1.0 - 1.0 / self.ratio)
         if self.cage_held:
@@ -113,13 +122,13 @@ class RaceOnBalls:
     def press_balls(
         self, race: Array, alpha: float, phase: float, feet: Array
     ) -> PressedBalls:
-        """The balls under a race.
+        """Contact of the balls with a race.
 
         Args:
-            race: Its coordinates.
+            race: Coordinates of the race (size,) [m].
             alpha: Wave-generator angle [rad].
-            phase: As in :meth:`balls`.
-            feet: Places on the race near the balls (balls,).
+            phase: Angle of ball 0 from the major axis at alpha = 0 [rad].
+            feet: Initial guess of the feet of the balls on the race (balls,).
         """
         centre, d_centre, d_phase = self.balls(alpha, phase)
         seen = distances_to_ring(self.race, race, centre, feet, inside=True)
@@ -147,11 +156,12 @@ def pressed_form(
     r"""Second derivative :math:`k\,dg\,dg - F\,d^2g` by u_n, u_t, beta (n, m, m).
 
     Args:
-        seen: The points.
-        count: m, 3 or, with a turn of the section, 4.
-        force: F (n,) [N].
-        stiffness: k (n,) [N/m].
-        bend: Factor of that turn squared in n . d2p (n,).
+        seen: Distances of the points.
+        count: Number m of quantities: 3, or 4 with the rotation of the section.
+        force: Contact forces F (n,) [N].
+        stiffness: Contact stiffnesses k (n,) [N/m].
+        bend: Factor of the squared rotation in n . d2p (n,) [m]; None for points that
+            do not rotate.
     """
     form = np.zeros((len(force), count, count))
     form[:, :3, :3] = -force[:, None, None] * seen.bends()

@@ -1,8 +1,9 @@
-r"""The toothed rim as a line: stiffness and neutral radius from its plane sector.
+r"""The toothed rim as a line: stiffness and neutral radius from its 2D sector.
 
-The teeth stiffen the rim; by how much comes out of the condensed sector of the plane
-finite elements. Its faces stay radial planes under a uniform stretch and bending, free
-to slide along themselves, and the sector is held back evenly along its bore.
+The teeth stiffen the rim. The condensed sector of the 2D finite elements gives the
+effective stiffness: its faces remain plane under a uniform stretch and bending and are
+free to deform within their planes, and the mean radial displacement of its bore is
+zero.
 """
 
 from __future__ import annotations
@@ -18,23 +19,24 @@ from swgjoint.fe.plane.superelement import Superelement
 
 @dataclass(frozen=True, kw_only=True)
 class RimSection:
-    """Section of the rim with its teeth, smeared over the pitch."""
+    """Section of the rim with its teeth, averaged over the pitch."""
 
     stretching: float
-    """E A [N]."""
+    """Axial stiffness E A [N]."""
     bending: float
-    """E I about the neutral line [N m^2]."""
+    """Bending stiffness E I about the neutral line [N m^2]."""
     neutral_radius: float
-    """Where bending does not stretch [m]."""
+    """Radius at which bending causes no stretch [m]."""
 
 
 def rim_section(element: Superelement) -> RimSection:
-    r"""Stretching and bending of a sector between its faces.
+    r"""Axial and bending stiffness of a sector between its faces.
 
-    Both faces, p apart, turn by :math:`\omega` and move apart by a, normal to
-    themselves: :math:`u_n = a + \omega(r - r_b)`. From the energy
+    Each of the two faces, which enclose the angle p, rotates by :math:`\omega` and
+    moves outwards by a along its normal: :math:`u_n = a + \omega(r - r_b)`. The strain
+    energy
     :math:`\tfrac12 S_{aa}a^2 + S_{a\omega}a\omega + \tfrac12 S_{\omega\omega}\omega^2`
-    that this takes,
+    of this deformation yields
 
     .. math:: r_n = r_b + \frac{S_{a\omega}}{S_{aa}}, \quad
         EA = \tfrac14 p r_n S_{aa}, \quad
@@ -65,14 +67,14 @@ def rim_section(element: Superelement) -> RimSection:
     held[along] = x[along] / np.hypot(*x[along].T)[:, None]
     rows.append(held.ravel() / len(along))
     values.append([0.0, 0.0])
-    constraint, wanted = np.array(rows), np.array(values)
+    constraint, prescribed = np.array(rows), np.array(values)
     n, m = 2 * count, len(constraint)
     scale = float(np.mean(np.diag(element.stiffness)))
     system = np.zeros((n + m, n + m))
     system[:n, :n] = element.stiffness / scale
     system[n:, :n], system[:n, n:] = constraint, constraint.T
     right = np.zeros((n + m, 2))
-    right[n:] = wanted
+    right[n:] = prescribed
     moved = np.linalg.solve(system, right)[:n]
     s = moved.T @ element.stiffness @ moved
     neutral = bore + s[0, 1] / s[0, 0]
@@ -89,15 +91,20 @@ def tooth_pair_stiffness(
 ) -> float:
     """Stiffness of a pair of teeth along the normal, half-way up the flanks [N/m].
 
-    The tooth of the flexspline on its rim, whose skeleton is held, and the tooth of the
-    circular spline, whose outside is; forces are averaged over the patch of a contact.
+    The compliances of both teeth add. The skeleton of the flexspline's sector and the
+    outside of the circular spline are fixed. Forces are averaged over the patch of a
+    contact.
+
+    Args:
+        flexspline: Condensed sector of the flexspline.
+        circular_spline: Condensed sector of the circular spline.
     """
     ring = ring_compliance(circular_spline)
-    own = ring.flank[int(np.flatnonzero(ring.offsets == 0)[0])]
+    same_tooth = ring.flank[int(np.flatnonzero(ring.offsets == 0)[0])]
     total = 0.0
     for element, compliance in (
         (flexspline, flexspline.flank_compliance),
-        (circular_spline, own),
+        (circular_spline, same_tooth),
     ):
         middle = np.array([0.5 * sum(element.flank_range)])
         _, normal, _ = element.profile.evaluate(middle)
