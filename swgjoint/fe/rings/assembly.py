@@ -1,4 +1,4 @@
-"""Sum of the energies of many small parts, and its banded tangent."""
+"""Sum of the energies of many small parts and its banded tangent."""
 
 from __future__ import annotations
 
@@ -19,9 +19,13 @@ class BandedAssembly:
     def add(
         self, name: str, dofs: Index, gradient: Array | None, hessian: Array
     ) -> None:
-        """Parts with degrees of freedom (n, m), gradients (n, m), Hessians (n, m, m).
+        """Add the gradients and Hessians of n parts.
 
-        The gradient is None where it has been counted.
+        Args:
+            name: Name under which :meth:`shares` sums the parts.
+            dofs: Degrees of freedom of the parts (n, m).
+            gradient: Gradients (n, m); None if they are already included.
+            hessian: Hessians (n, m, m).
         """
         if gradient is not None:
             self.gradient += np.bincount(
@@ -30,22 +34,25 @@ class BandedAssembly:
         self._parts.append((name, dofs, hessian))
 
     def shares(self, way: Array) -> dict[str, float]:
-        """Energy of the tangent along a displacement, twice, by part."""
-        found: dict[str, float] = {}
+        """Twice the tangent energy of a displacement, by name of the part."""
+        energies: dict[str, float] = {}
         for name, dofs, hessian in self._parts:
             moved = way[dofs]
             value = float(np.einsum("ni,nij,nj->", moved, hessian, moved))
-            found[name] = found.get(name, 0.0) + value
-        return found
+            energies[name] = energies.get(name, 0.0) + value
+        return energies
 
     def solve(self, order: Index, held: int, right: Array, anchor: float) -> Array:
-        """Solve with one coordinate held and a part of the diagonal added.
+        """Solve with one coordinate fixed and an addition to the diagonal.
 
         Args:
-            order: Place of every coordinate in a narrow band.
-            held: The coordinate that is held.
+            order: Position of every coordinate in an order of narrow bandwidth (size,).
+            held: Number of the coordinate that is fixed.
             right: Right-hand sides (size, n).
-            anchor: Part of the largest diagonal entry.
+            anchor: Addition to the diagonal, relative to its largest entry [-].
+
+        Returns:
+            Solutions (size, n).
         """
         size = len(order)
         rows, columns, values = [], [], []

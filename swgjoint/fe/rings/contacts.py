@@ -15,18 +15,22 @@ from swgjoint.fe.rings.state import RingState
 from swgjoint.typing import Array, Index
 
 PARTS = ("rim", "race", "balls", "bore", "teeth")
-"""What stores energy; bore is what the rim presses on the race."""
+"""Parts that store energy; ``bore`` is the contact of rim and race."""
 
 
 def linearise(
     model: ThinRing, state: RingState, *, teeth: bool
 ) -> tuple[RingState, BandedAssembly, int]:
-    """Forces and tangent at the positions of a state, and the coordinate that is held.
+    """Forces and tangent at the positions of a state.
 
     Args:
         model: The rings.
-        state: Their positions and where contacts were; forces are written anew.
-        teeth: Whether the teeth touch.
+        state: Positions of the rings and previous feet of the contacts.
+        teeth: Whether the teeth can touch.
+
+    Returns:
+        The state with its forces, the assembled potential, and the number of the race's
+        coordinate that is fixed.
     """
     total = BandedAssembly(model.size)
     first = model.rim.size
@@ -43,7 +47,7 @@ def linearise(
         state = _teeth(model, state, rim, total)
     else:
         state = replace(state, contacts=None, tooth_force=None, tooth_moment=0.0)
-    # the tangential coordinate of race node 0, whichever axis it is nearer to
+    # the coordinate of race node 0 that is closest to its tangential direction
     node = race.reshape(-1, 2, 2)[0, 0]
     held = first + (0 if abs(node[1]) > abs(node[0]) else 1)
     total.gradient[held] = 0.0
@@ -51,7 +55,13 @@ def linearise(
 
 
 def race_on_balls(model: ThinRing, state: RingState, race: Array) -> PressedBalls:
-    """Balls of a state under a race with given coordinates."""
+    """Contact of a state's balls with a race.
+
+    Args:
+        model: The rings.
+        state: Wave-generator angle, ball phase and feet of the balls.
+        race: Coordinates of the race (size,) [m].
+    """
     return model.press_balls(race, state.alpha, state.phase, state.ball_feet)
 
 
@@ -86,7 +96,7 @@ def _bore(
     force = k * overlap[on]
     dofs, rows, bend = model.bore.chosen(on).rows(rim, near)
     both = np.concatenate([dofs, near.dofs + model.rim.size], axis=1)
-    # the turn of the section has a row of its own
+    # the rotation of the section has its own row
     by_both = np.zeros((len(on), 4, 16))
     by_both[:, :2, :8], by_both[:, 3, :8] = rows[:, :2], rows[:, 2]
     by_both[:, :3, 8:] = near.by_ring
@@ -98,7 +108,7 @@ def _bore(
 def _teeth(
     model: ThinRing, state: RingState, rim: Array, total: BandedAssembly
 ) -> RingState:
-    """Contact of the flanks."""
+    """Contact of the tooth flanks."""
     nodes = rim.reshape(-1, 2, 2)[:: model.nodes_per_tooth]
     foot, slope = nodes[:, 0], nodes[:, 1]
     contacts, angle = model.teeth.find_contacts(foot, slope)
@@ -130,19 +140,20 @@ def _press(
     stiffness: Array,
     bend: Array | None = None,
 ) -> None:
-    r"""Add contacts of normal force F and tangent k.
+    r"""Add contacts of normal force F and stiffness k.
 
-    Gradient :math:`-F\,dg`, Hessian :math:`k\,dg\,dg - F\,d^2g`.
+    The gradient is :math:`-F\,dg`, the Hessian :math:`k\,dg\,dg - F\,d^2g`.
 
     Args:
-        total: Where to.
-        name: Of the part.
-        seen: The points.
-        rows: u_n, u_t, beta and perhaps a turn by the coordinates (n, 3 or 4, m).
-        dofs: These coordinates (n, m).
-        force: F (n,) [N].
-        stiffness: k (n,) [N/m].
-        bend: Factor of that turn squared in n . d2p (n,).
+        total: Assembly to which the contacts are added.
+        name: Name of the part, one of :data:`PARTS`.
+        seen: Distances of the points.
+        rows: Derivatives of u_n, u_t, beta and, with m = 4, of the section's rotation
+            by the coordinates (n, m, n_dofs).
+        dofs: Numbers of these coordinates (n, n_dofs).
+        force: Contact forces F (n,) [N].
+        stiffness: Contact stiffnesses k (n,) [N/m].
+        bend: Factor of the squared rotation in n . d2p (n,) [m].
     """
     hessian = np.swapaxes(rows, 1, 2) @ (
         pressed_form(seen, rows.shape[1], force, stiffness, bend) @ rows

@@ -4,12 +4,13 @@ r"""Equilibrium of the thin rings: Newton's method on the potential.
     + \sum_p \tfrac12 k_p\langle -g_p\rangle^2 + \sum_t \tfrac12 k_t\langle
     -g_t\rangle^2 + T\psi
 
-over balls j, points p between bore and race, and tooth contacts t; g is a gap and
-:math:`\langle\cdot\rangle` its overlap. Every contact yields, so the conditions
-:math:`0 \le F \perp g + F/k \ge 0` are in the potential and Newton's method with the
-tangent of the overlapping contacts is their primal-dual active set. psi is the best-fit
-rotation of the rim. The race could turn in its place: one of its nodes is kept from
-that, with a force that vanishes because nothing rubs.
+with sums over balls j, contact points p between bore and race, and tooth contacts t; g
+is a gap and :math:`\langle -g\rangle = \max(-g, 0)` the overlap. Every contact is
+compliant, so the potential contains the conditions :math:`0 \le F \perp g + F/k \ge 0`,
+and Newton's method with the tangent of the overlapping contacts is their primal-dual
+active set. psi is the best-fit rotation of the rim. Without friction the race is free
+to rotate; one coordinate of one of its nodes is fixed to prevent this, and the reaction
+there is zero.
 """
 
 from __future__ import annotations
@@ -32,14 +33,15 @@ class RingSolver:
 
     max_iterations: int = 80
     shortest: float = 1e-3
-    """Part of a Newton step down to which it is halved while the potential rises."""
+    """Shortest part of a Newton step; steps are halved while the potential rises [-].
+    """
     step_tolerance: float = 3e-12
-    """Increment, relative to the radius of the rim, at which the iteration ends."""
+    """Displacement increment at which the iteration ends, in radii of the rim [-]."""
     stride: float = 0.1
-    """Longest move of one iteration, in lobe heights."""
+    """Largest displacement increment of an iteration, in lobe heights [-]."""
     anchor: float = 1e-11
-    """Part of the rim's stiffness that holds back, in every step, an output that no
-    tooth holds; it does not shift an equilibrium."""
+    """Stiffness added to every step, relative to the largest one, so that an output
+    held by no tooth has a tangent; it does not shift an equilibrium [-]."""
 
     def __call__(
         self,
@@ -54,14 +56,21 @@ class RingSolver:
 
         Args:
             model: The rings.
-            start: Where to begin.
-            torque: T on the output [N·m]; else ``rotation`` is held [rad] and the
-                torque is what that takes.
-            rotation: psi of the rim.
-            teeth: Whether the teeth touch.
+            start: State from which the search starts.
+            torque: Prescribed torque T on the output [N·m]; None if the rotation is
+                prescribed.
+            rotation: Prescribed rotation psi of the rim [rad]; the torque is then a
+                result. None if the torque is prescribed.
+            teeth: Whether the teeth can touch.
+
+        Returns:
+            The state with its outcome, whether it converged or not.
+
+        Raises:
+            ValueError: Unless exactly one of torque and rotation is prescribed.
         """
         if (torque is None) == (rotation is None):
-            raise ValueError("give a torque or a rotation")
+            raise ValueError("torque, rotation: expected exactly one of them")
         state, history = start, list[float]()
         load = start.torque if torque is None else torque
         step, part, last = np.zeros(model.size), 0.0, np.inf
@@ -105,10 +114,13 @@ def _moved(step: Array) -> float:
 
 
 def rim_rotation(model: ThinRing, q: Array, near: float) -> tuple[float, Array]:
-    """Best-fit rotation of the rim's nodes and its gradient.
+    """Best-fit rotation of the rim's nodes [rad] and its gradient (size,) [rad/m].
 
-    Of all that differ by whole turns the nearest to another, so that it has no jump
-    within half a turn of where a search begins.
+    Args:
+        model: The rings.
+        q: Coordinates of rim and race (size,) [m].
+        near: Rotation to which the whole turns are matched [rad]; the result has no
+            jump within half a turn of it.
     """
     x0 = model.rim.reference[:, 0]
     x = q[: model.rim.size].reshape(-1, 2, 2)[:, 0]
@@ -128,7 +140,7 @@ def _finished(
     *,
     teeth: bool,
 ) -> RingState:
-    """Forces and energy at the last positions."""
+    """The state with forces and energy at its final positions."""
     state, _, _ = linearise(model, state, teeth=teeth)
     psi, _ = rim_rotation(model, state.q, state.rotation)
     return replace(state, rotation=psi, outcome=outcome, history=tuple(history))

@@ -1,18 +1,18 @@
-r"""What rubs in a thin-ring drive under torque, the wave generator locked.
+r"""Friction losses of a thin-ring drive under torque with a locked wave generator.
 
-The rim slides in the tooth spaces and on the race; the balls roll. Along the path of
-the drive without friction, contacts of normal force N that slide by :math:`d\sigma`
-take the work
+The flexspline slides in the tooth spaces and on the race; the balls roll. Along the
+loading path without friction, contacts of normal force N that slide by :math:`d\sigma`
+dissipate the work
 
 .. math:: dW = \mu \sum N\,|d\sigma| = R\,dx,
 
-so that a torque :math:`R = dW/dx` stands against any change of the torsion x: the loop
-is the curve T(x) without friction, R above it while x grows and R below it while x
-falls. This is the first order in mu. It takes every contact as sliding and none as
-sticking, so near the turns of a loop it is wrong, and what sticks makes it narrower.
+so that a torque :math:`R = dW/dx` resists any change of the torsion x. The loop is the
+curve T(x) without friction, shifted by R upwards while x grows and by R downwards while
+x falls. This is a first-order result in mu. It treats every contact as sliding, so it
+is wrong near the reversals of a loop, and sticking makes the real loop narrower.
 
-The race is free to creep in the bore: it turns so that the work is least. One mu holds
-for both: what is stated for teeth is taken for rim on race, too, which is assumed.
+The race is free to creep in the bore: it rotates so that the work is least. The
+coefficient of friction mu of the teeth is assumed for the rim on the race as well.
 """
 
 from __future__ import annotations
@@ -34,54 +34,56 @@ from swgjoint.gear.mounting import series_compliance
 from swgjoint.typing import Array
 
 POSITIONS = 2
-"""Wave-generator angles of a mean: torsion differs by 0.2 % between them."""
+"""Wave-generator angles of a mean; the torsion differs by 0.2 % between them."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RubbedPath:
-    """Torsion without friction, and the work of friction per mu, over the torque.
+    """Torsion without friction and work of friction per mu along a loading path.
 
-    Means over the wave-generator angles; torsion is zero in the middle of the play.
+    All values are means over the wave-generator angles. The torsion is zero in the
+    middle of the clearance.
     """
 
     torque: Array
-    """T, positive and increasing, the first takes up the play [N·m]. Shape (n,)."""
+    """Torques T, positive and increasing; the first takes up the clearance (n,) [N·m].
+    """
     torsion: Array
-    """x, what is in series included [rad]. Shape (n,)."""
+    """Torsion x including that of the springs in series (n,) [rad]."""
     series: float
-    """Compliance of what is in series, mostly the cup [rad/(N·m)]."""
+    """Compliance of the springs in series, mostly the cup [rad/(N·m)]."""
     teeth_work: Array
-    """Sum of N |d sigma| of the teeth from torque to torque [J]. Shape (n - 1,)."""
+    """Sum of N |d sigma| of the teeth between neighbouring torques (n - 1,) [J]."""
     race_work: Array
-    """The same of rim and race [J]. Shape (n - 1,)."""
+    """Sum of N |d sigma| of rim and race between neighbouring torques (n - 1,) [J]."""
     compliance: Array
-    """Tangent at the torques, what is in series included [rad/(N·m)]. Shape (n,)."""
+    """Tangent compliance including the springs in series (n,) [rad/(N·m)]."""
     shares: Mapping[str, Array]
-    """Of that compliance by part of the rings: ``rim``, ``race``, ``balls``, ``bore``
-    (pressed on the race), ``teeth``; the rest is in series. Shapes (n,)."""
+    """Shares of ``rim``, ``race``, ``balls``, ``bore`` (contact of rim and race) and
+    ``teeth`` in the compliance, each (n,) [-]; the rest is in series."""
     balls: Array
-    """Balls that carry load. Shape (n,)."""
+    """Number of loaded balls (n,)."""
     tooth_pairs: Array
-    """Tooth contacts that do. Shape (n,)."""
+    """Number of loaded tooth contacts (n,)."""
     outcome: Outcome
     """Outcome of the first solve that failed; the path ends before it."""
 
     @property
     def torque_per_mu(self) -> Array:
-        """R/mu from torque to torque [N·m]. Shape (n - 1,)."""
+        """Friction torque per mu, R/mu, between neighbouring torques (n - 1,) [N·m]."""
         return np.asarray((self.teeth_work + self.race_work) / np.diff(self.torsion))
 
     def torsion_at(self, torque: float) -> float:
-        """Torsion at a torque, on a straight line below the second one [rad].
+        """Torsion at a torque [rad], extrapolated linearly below the first one.
 
         Args:
-            torque: T, from zero to the last of the path [N·m].
+            torque: Torque T from zero to the last one of the path [N·m].
 
         Raises:
-            InputError: If the path does not reach that far.
+            InputError: If the path does not reach this torque.
         """
         last = float(self.torque[-1])
-        if not 0.0 <= torque <= last * (1.0 + 1e-9):  # the same torque, rounded
+        if not 0.0 <= torque <= last * (1.0 + 1e-9):  # accept rounding of the last one
             raise InputError(
                 f"torque = {torque:.6g} N·m: outside the path; accepted: 0 to"
                 f" {last:.6g} N·m"
@@ -92,9 +94,10 @@ class RubbedPath:
         return float(np.interp(torque, self.torque, self.torsion))
 
     def hysteresis_loss(self, mu: float) -> float:
-        """Width of the loop where the load is zero, the play included [rad].
+        """Width of the loop at zero load, including the clearance [rad].
 
-        The falling branch comes to rest where T(x) = R, the rising one where it is -R.
+        The falling branch crosses zero load where T(x) = R, the rising one where
+        T(x) = -R.
 
         Raises:
             InputError: If the path does not reach R.
@@ -102,12 +105,12 @@ class RubbedPath:
         return 2.0 * self.torsion_at(mu * float(self.torque_per_mu[0]))
 
     def widths(self, mu: float) -> Array:
-        """Width 2 R/K between the torques [rad]. Shape (n - 1,)."""
+        """Width 2 R/K of the loop between neighbouring torques (n - 1,) [rad]."""
         slope = np.diff(self.torsion) / np.diff(self.torque)
         return np.asarray(2.0 * mu * self.torque_per_mu * slope)
 
     def round_loss(self, mu: float) -> Array:
-        """Work of a round between plus and minus each torque [J]. Shape (n,)."""
+        """Work of a full cycle between plus and minus each torque (n,) [J]."""
         work = self.teeth_work + self.race_work
         return np.asarray(4.0 * mu * np.concatenate([[0.0], np.cumsum(work)]))
 
@@ -118,16 +121,17 @@ def friction_path(
     *,
     angles: ArrayLike | None = None,
 ) -> RubbedPath:
-    """Load a drive with the wave generator locked and look at what slides.
+    """Load a drive with a locked wave generator and sum the sliding of its contacts.
 
     Args:
-        design: The drive, with the bearing of its wave generator; its own coefficient
-            of friction must be absent.
-        torques: T, positive [N·m]; 1 % of the rated torque is put before them.
-        angles: Wave-generator angles [rad]; by default :data:`POSITIONS`.
+        design: The drive, whose wave generator has a ball bearing; its coefficient of
+            friction must be zero.
+        torques: Positive torques T [N·m]; 1 % of the rated torque is added as the
+            first, and smaller ones are dropped.
+        angles: Wave-generator angles [rad]; None chooses :data:`POSITIONS` angles.
 
     Raises:
-        DesignError: If the design cannot be built or holds what is not modelled.
+        DesignError: If the design cannot be built or has features that the model lacks.
     """
     model = thin_ring(design)
     small = SMALL * ratings_of(design).rated_torque
@@ -165,12 +169,13 @@ def _along(
 ) -> tuple[list[list[float]], Outcome]:
     """Torsion, works, balls, tooth contacts, compliance and its parts, by torque.
 
-    Works since the torque before [J], compliance without what is in series.
+    The works count from the previous torque [J]; the compliance excludes the springs in
+    series.
     """
     rest = solve_unloaded(model, alpha)
     if not rest.outcome.ok:
         return [], rest.outcome
-    # the middle of the play between the smallest torque and its opposite
+    # torsion counts from midway between the smallest torque and its opposite
     down = solve_loaded(model, rest, -float(torques[0]))
     if not down.outcome.ok:
         return [], down.outcome

@@ -12,14 +12,20 @@ from swgjoint.fe.rings.state import RingState, initial_state
 from swgjoint.typing import Array
 
 SMALL = 0.01
-"""Part of the rated torque that takes up a clearance of the teeth."""
+"""Part of the rated torque that takes up the clearance of the teeth [-]."""
 GOLDEN = 0.5 * (5.0**0.5 - 1.0)
+"""Golden section, which spreads angles over the tooth pitch [-]."""
 HALVINGS = 5
-"""How often a step of the torque that fails is halved."""
+"""Number of times that failing torque steps are halved."""
 
 
 def positions(model: ThinRing, count: int) -> Array:
-    """Wave-generator angles spread over ball passage and tooth pitch [rad]."""
+    """Wave-generator angles spread over ball passage and tooth pitch (count,) [rad].
+
+    Args:
+        model: The rings.
+        count: Number of angles.
+    """
     k = np.arange(count)
     passage = 2.0 * pi / model.bearing.balls / model.bearing.cage_share
     pitch = 2.0 * pi / model.teeth.circular_spline.teeth
@@ -27,11 +33,11 @@ def positions(model: ThinRing, count: int) -> Array:
 
 
 def solve_unloaded(model: ThinRing, alpha: float, phase: float = 0.0) -> RingState:
-    """The drive without torque: rings on the balls, output at the ideal ratio.
+    """The drive with its output held at the ideal ratio.
 
     Args:
         model: The rings.
-        alpha: Wave-generator angle, of any number of turns [rad].
+        alpha: Wave-generator angle, any number of turns [rad].
         phase: Angle of ball 0 from the major axis at alpha = 0 [rad].
     """
     start = initial_state(model, alpha, phase)
@@ -41,11 +47,11 @@ def solve_unloaded(model: ThinRing, alpha: float, phase: float = 0.0) -> RingSta
 
 
 def without_torque(model: ThinRing, alpha: float) -> RingState:
-    """The drive that nothing loads; an output that play leaves free stays as ideal.
+    """The unloaded drive; an output that clearance leaves free is at the ideal ratio.
 
     Args:
         model: The rings.
-        alpha: Wave-generator angle, of any number of turns [rad].
+        alpha: Wave-generator angle, any number of turns [rad].
     """
     state = solve_unloaded(model, alpha)
     if state.outcome.ok and state.loaded_teeth:
@@ -54,13 +60,16 @@ def without_torque(model: ThinRing, alpha: float) -> RingState:
 
 
 def solve_loaded(model: ThinRing, state: RingState, torque: float) -> RingState:
-    """Equilibrium under a torque; on failure in halved steps.
+    """Equilibrium under a torque, reached in halved steps if the full step fails.
 
     Args:
         model: The rings.
-        state: Where to begin; one that holds no tooth counts as free of torque, and
-            finds the teeth fastest under a small one.
-        torque: T, not zero [N·m].
+        state: State from which the search starts. If no tooth carries load in it, its
+            torque counts as zero; a small ``torque`` then converges fastest.
+        torque: Torque T, not zero [N·m].
+
+    Returns:
+        The equilibrium, or the state of the last failed step.
     """
     solver = RingSolver()
     begin = state.torque if state.loaded_teeth else 0.0

@@ -1,23 +1,24 @@
-r"""What friction of teeth and race asks of the input of a thin-ring drive that turns.
+r"""Input torque that friction of teeth and race requires of a turning thin-ring drive.
 
 The wave generator turns slowly by :math:`d\theta` under a torque T that the output
 exerts; contacts of normal force N slide by :math:`d\sigma` against each other. Without
-friction the input torque is that of the potential, whose mean over the passage of balls
-and teeth is T/i. With it, to first order in mu,
+friction the input torque derives from the potential, and its mean over the passage of
+balls and teeth is T/i. With friction, to first order in mu,
 
 .. math:: \tau(\theta) = \partial_\theta \Pi + \mu \sum N \Bigl|
     \frac{d\sigma}{d\theta}\Bigr|, \qquad \bar\tau = \frac Ti + \frac{W}{2\pi},
 
-W the work of friction in one turn of the input: at every angle, not only in the mean,
-for the forces of friction shift the rings by as much as takes that power. It is against
-the motion whichever way the input turns. N and the sliding are those without friction,
-and every contact slides. Where play leaves the output free, friction drags it to the
-next flank; what that flank then rubs is of second order.
+where W is the work of friction in one turn of the input. The first equation applies at
+every angle, not only to the mean, because the friction forces shift the rings until the
+input supplies this power. The friction torque opposes the motion in both directions. N
+and the sliding are those without friction, and every contact is assumed to slide. Where
+clearance leaves the output free, friction drags it to the next flank; the friction at
+that flank is of second order.
 
-Rim on race and flank on flank rub, with one mu, as in
-:mod:`swgjoint.fe.rings.friction`; nothing holds the race but friction, so that it
-creeps in the bore. Balls roll without loss, and there are no seals and no grease: a
-lower bound of what a drive takes.
+Rim and race and pairs of flanks have friction with the same mu, as in
+:mod:`swgjoint.fe.rings.friction`. Only friction holds the race, which therefore creeps
+in the bore. Balls roll without loss, and seals and grease are not included, so that the
+result is a lower bound.
 """
 
 from __future__ import annotations
@@ -39,51 +40,51 @@ from swgjoint.typing import Array
 POSITIONS = 8
 """Wave-generator angles of a mean."""
 STEP = 1e-3
-"""Turn of the input over which sliding is a difference, half of it either way [rad]."""
+"""Input angle of the central difference that gives the sliding [rad]."""
 COEFFICIENT = "friction.tooth_coefficient"
 LEFT_OUT = "churning of grease, seals, balls and their cage, bending loss of the rim"
-"""What a drive takes besides."""
+"""Losses of a real drive that the model omits."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RunningFriction:
-    """Torque on the input without friction, and what friction adds per mu."""
+    """Input torque without friction, and friction torque per mu."""
 
     input_angle: Array
-    """theta [rad]. Shape (n,)."""
+    """Input angles theta (n,) [rad]."""
     elastic: Array
-    """Torque without friction [N·m]. Shape (n,)."""
+    """Input torque without friction (n,) [N·m]."""
     teeth: Array
-    """Torque per mu that the teeth take [N·m]. Shape (n,)."""
+    """Friction torque of the teeth per mu (n,) [N·m]."""
     race: Array
-    """The same of rim on race [N·m]. Shape (n,)."""
+    """Friction torque of the rim on the race per mu (n,) [N·m]."""
     tooth_pairs: Array
-    """Tooth contacts that carry load. Shape (n,)."""
+    """Number of loaded tooth contacts (n,)."""
 
     @property
     def per_mu(self) -> Array:
-        """Torque per mu of both [N·m]. Shape (n,)."""
+        """Friction torque of teeth and race per mu (n,) [N·m]."""
         return np.asarray(self.teeth + self.race)
 
     @property
     def teeth_share(self) -> float:
-        """Part of the teeth in the work of friction; 0 where nothing rubs [-]."""
+        """Share of the teeth in the work of friction; zero without friction [-]."""
         total = float(self.per_mu.sum())
         return float(self.teeth.sum()) / total if total > 0.0 else 0.0
 
     def running_torque(self, mu: float) -> float:
-        """Mean torque that friction takes from the input [N·m]."""
+        """Mean friction torque on the input [N·m]."""
         return mu * float(self.per_mu.mean())
 
     def starting_torque(self, mu: float) -> float:
-        """Torque on the input from which it keeps turning [N·m].
+        """Smallest input torque that keeps the drive turning at all angles [N·m].
 
-        That of the worst angle, the elastic part included: it must not stop anywhere.
+        It is the torque at the worst angle and includes the elastic part.
         """
         return float((self.elastic + mu * self.per_mu).max())
 
     def as_dict(self, mu: float) -> dict[str, Any]:
-        """Both torques, their parts and what is not in them: plain values."""
+        """Both torques, their parts and the omitted losses, as plain values."""
         return {
             "coefficient": mu,
             "running_torque_Nm": self.running_torque(mu),
@@ -100,17 +101,17 @@ class RunningFriction:
 def running_friction(
     design: Design, *, torque: float = 0.0, angles: ArrayLike | None = None
 ) -> RunningFriction:
-    """Turn the input of a drive slowly and look at what slides.
+    """Turn the input of a drive slowly and sum the sliding of its contacts.
 
     Args:
-        design: The drive, with the bearing of its wave generator; its coefficient of
-            friction is not looked at.
-        torque: T at the output [N·m].
-        angles: Input angles [rad]; by default :data:`POSITIONS`, spread over the
-            passage of balls and teeth.
+        design: The drive, whose wave generator has a ball bearing; its coefficient of
+            friction is ignored.
+        torque: Torque T at the output [N·m].
+        angles: Input angles [rad]; None chooses :data:`POSITIONS` angles, spread over
+            the passage of balls and teeth.
 
     Raises:
-        DesignError: If the design cannot be built or holds what is not modelled.
+        DesignError: If the design cannot be built or has features that the model lacks.
         ComputationError: If an equilibrium cannot be solved.
     """
     model = thin_ring(design.with_changes({COEFFICIENT: 0.0}))

@@ -1,8 +1,8 @@
 """Equilibria of the thin rings over torque and ball passage, for a map.
 
-The pattern of the map is that of the balls passing the lobes. They roll, so that their
-order per input turn is no whole number; the map carries it at the nearest one. The
-passage of teeth, a tenth as large in the kinematic error under load, is left out.
+The pattern of the map is that of the balls passing the lobes. Since the balls roll,
+their order per input turn is not an integer; the map uses the nearest integer. The
+passage of teeth is not included; its kinematic error under load is a tenth as large.
 """
 
 from __future__ import annotations
@@ -38,48 +38,56 @@ from swgjoint.typing import Array
 PHASES = 12
 """Positions of the balls over one passage."""
 LEVELS = (0.03, 0.06, 0.1, 0.15, 0.22, 0.31, 0.43, 0.58, 0.78, 1.01)
-"""Sampled torques, of both signs, as parts of the repeated peak torque; closer where
-balls join the loaded arc, and so far that every position reaches the peak."""
+"""Sampled torques, of both signs, as parts of the repeated peak torque [-]. They are
+closer together where balls join the loaded arc, and the last one exceeds the peak so
+that every position reaches it."""
 
 UNSEEN = (0.04, 0.12, 0.26, 0.5, 0.9)
-"""Torques that judge the map, between those that are sampled."""
+"""Torques that validate the map, between the sampled ones, as parts of the repeated
+peak torque [-]."""
 UNSEEN_PHASES = 3
-"""Positions of the balls of each, between those that are sampled."""
+"""Positions of the balls for every such torque, between the sampled ones."""
 
 
 def check_modelled(design: Design) -> None:
-    """Refuse what a map of the thin rings does not contain.
+    """Reject features that a map of the thin rings lacks.
 
     Raises:
-        DesignError: One line per key.
+        DesignError: If the design has any.
     """
     thin.check_modelled(design)
     if design.wave_generator.kind == "table":
         raise DesignError(
-            f"{design.drive.name}: wave_generator.kind = 'table': a ring map takes the"
-            " mirror image for negative torques; accepted: 'elliptical', 'cosine'"
+            f"{design.drive.name}: wave_generator.kind = 'table': a ring map mirrors"
+            " its results for negative torques; accepted: 'elliptical', 'cosine'"
         )
     if has_errors(design):
         raise DesignError(
-            f"{design.drive.name}: tolerances: a ring map is that of a drive without"
-            " manufacturing errors; accepted: 0, or the 2d model"
+            f"{design.drive.name}: tolerances: a ring map has no manufacturing errors;"
+            " accepted: 0, or the 2d model"
         )
 
 
 @dataclass(frozen=True, kw_only=True)
 class BallPassage:
-    """How often a position of the balls against the lobes returns."""
+    """Periods of the positions of the balls relative to the lobes."""
 
     per_cage_turn: int
-    """Balls, twice for an odd number: then the lobes take turns."""
+    """Periods per turn of the cage relative to the cam: the number of balls, or twice
+    an odd number, because the two lobes then alternate."""
     per_input_turn: float
-    """Passages per input turn of a ball that rolls without slip."""
+    """Periods per input turn of balls that roll without slip."""
     carried_as: int
-    """Order of the map."""
+    """Order per input turn that the map uses."""
 
 
 def ball_passage(design: Design, model: ThinRing) -> BallPassage:
-    """Ball passage of a design."""
+    """Ball passage of a design.
+
+    Args:
+        design: The drive.
+        model: Its ring model.
+    """
     balls = model.bearing.balls
     count = balls * (2 if balls % 2 and can_halve(design, bearing=False) else 1)
     rate = count * model.bearing.cage_share * (1.0 - 1.0 / model.ratio)
@@ -95,20 +103,21 @@ def sample_rings(
     progress: Progress = silent,
     keep: Unfinished | None = None,
 ) -> MapSamples:
-    """Equilibria over the passage of a ball and both signs of torque.
+    """Sample equilibria over the passage of a ball and both signs of torque.
 
-    Torques at which a solve fails, and those beyond, are left out, and the record says
-    so.
+    A torque at which a solve fails and all larger ones are omitted, and the record
+    (``truncated``) says so.
 
     Args:
         design: The drive.
-        angles: Positions over one passage; :data:`PHASES` by default.
-        progress: Called with the stage, the solves done and their number.
-        keep: Where every position of the balls is kept and taken up again after an
-            interruption; the samples are the same, bit for bit. None keeps none.
+        angles: Positions over one passage; None chooses :data:`PHASES`.
+        progress: Called with the stage, the number of finished positions and their
+            total.
+        keep: Store of the positions of the balls, from which an interrupted run resumes
+            with bit-identical samples; None keeps none.
 
     Raises:
-        DesignError: If the design holds what is not modelled.
+        DesignError: If the design has features that the model lacks.
         ComputationError: If the unloaded drive or small torques cannot be solved.
     """
     check_modelled(design)
@@ -233,15 +242,16 @@ def _position(
     torques: list[float],
     small: float,
 ) -> tuple[dict[float, list[float]], bool]:
-    """Table rows by torque at one position of the balls, and whether it is free.
+    """Table rows by torque at one position of the balls; whether the output is free.
 
-    Empty if nothing can be solved; torques end where a solve fails.
+    The rows are empty if the unloaded drive cannot be solved, and end at the first
+    torque at which a solve fails.
     """
 
     def row(state: RingState, torque: float) -> list[float]:
         race = state.q[model.rim.size :]
         rolled = race_on_balls(model, state, race).cage_torque
-        # per turn of the input in the map
+        # torque per input speed at the order of the map
         ripple = -rolled * passage.carried_as / passage.per_cage_turn
         return [
             state.rotation,
@@ -278,7 +288,7 @@ def _position(
 def _arrays(
     phase: float, rows: dict[float, list[float]], free: bool
 ) -> dict[str, float | bool | Array]:
-    """What :func:`_position` found, for a file."""
+    """Results of :func:`_position` as arrays for a file."""
     return {
         "phase": phase,
         "free": free,
@@ -290,14 +300,14 @@ def _arrays(
 def _taken(
     phase: float, arrays: Mapping[str, Any]
 ) -> tuple[dict[float, list[float]], bool]:
-    """What :func:`_position` found in an interrupted run.
+    """Results of :func:`_position` from an interrupted run.
 
     Raises:
-        ValueError: If it is another position.
+        ValueError: If they belong to another position.
     """
     torque, rows = np.asarray(arrays["torque"]), np.asarray(arrays["rows"])
     if float(arrays["phase"]) != phase or not np.isfinite(rows).all():
-        raise ValueError("another position of the balls")
+        raise ValueError("the stored rows belong to another position of the balls")
     rows = rows.reshape(torque.size, 4)
-    found = dict(zip(torque.tolist(), rows.tolist(), strict=True))
-    return found, bool(arrays["free"])
+    by_torque = dict(zip(torque.tolist(), rows.tolist(), strict=True))
+    return by_torque, bool(arrays["free"])

@@ -1,4 +1,4 @@
-"""How far teeth and race slide between two equilibria, times what presses them."""
+"""Normal force times sliding distance of teeth and race between two equilibria."""
 
 from __future__ import annotations
 
@@ -14,9 +14,15 @@ from swgjoint.typing import Array
 def sliding_sums(
     model: ThinRing, first: RingState, last: RingState
 ) -> tuple[float, float]:
-    r"""Sums of N |sigma| between two equilibria, of the teeth and of the race [J].
+    r"""Sums of N |sigma| of the teeth and of the race between two equilibria [J].
 
-    The mean of the forces at both ends; teeth that come in or leave count half.
+    N is the mean force of both equilibria, so that a tooth loaded in only one of them
+    counts half.
+
+    Args:
+        model: The rings.
+        first: Equilibrium before the motion.
+        last: Equilibrium after the motion.
     """
     return (
         0.5 * (_teeth(model, first, last) + _teeth(model, last, first)),
@@ -25,7 +31,7 @@ def sliding_sums(
 
 
 def _teeth(model: ThinRing, state: RingState, other: RingState) -> float:
-    """Contacts of one state, slid as their steel moves to the other."""
+    """Sum of N |sigma| of one state's contacts as their teeth move to another state."""
     contacts, force = state.contacts, state.tooth_force
     if contacts is None or force is None or not len(force):
         return 0.0
@@ -39,14 +45,14 @@ def _teeth(model: ThinRing, state: RingState, other: RingState) -> float:
 
 
 def _tooth_frames(model: ThinRing, state: RingState) -> tuple[Array, Array]:
-    """Where the teeth stand (N, 2) and how they are turned (N,)."""
+    """Positions of the teeth on the rim (N, 2) [m] and their angles (N,) [rad]."""
     nodes = state.q[: model.rim.size].reshape(-1, 2, 2)[:: model.nodes_per_tooth]
     slope = nodes[:, 1]
     return nodes[:, 0], np.arctan2(-slope[:, 1], -slope[:, 0])
 
 
 def _race(model: ThinRing, first: RingState, last: RingState) -> float:
-    """Points of the bore on the race, which creeps so that the work is least."""
+    """Sum of N |sigma| of the bore on the race, which creeps so that it is least."""
     forces, places = zip(*(_pressed(model, s) for s in (first, last)), strict=True)
     count = model.race.elements
     slid = np.mod(places[1] - places[0] + 0.5 * count, count) - 0.5 * count
@@ -58,7 +64,7 @@ def _race(model: ThinRing, first: RingState, last: RingState) -> float:
 
 
 def _pressed(model: ThinRing, state: RingState) -> tuple[Array, Array]:
-    """Forces of the bore's points on the race [N], and their places on it."""
+    """Forces of the bore's contact points on the race [N], and their feet on it."""
     rim, race = np.split(state.q, [model.rim.size])
     points = model.bore.points(rim)[0]
     seen = distances_to_ring(model.race, race, points, state.bore_feet, inside=False)
@@ -67,7 +73,12 @@ def _pressed(model: ThinRing, state: RingState) -> tuple[Array, Array]:
 
 
 def weighted_median(values: Array, weight: Array) -> float:
-    """Where the weighted sum of distances is least; zero without weight."""
+    """Value with the least weighted sum of distances; zero if all weights are zero.
+
+    Args:
+        values: The values (n,).
+        weight: Their weights, not negative (n,).
+    """
     order = np.argsort(values)
     total = np.cumsum(weight[order])
     if not total[-1] > 0.0:

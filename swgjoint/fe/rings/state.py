@@ -1,4 +1,4 @@
-"""What is known of the thin rings at one equilibrium."""
+"""State of the thin rings at one equilibrium."""
 
 from __future__ import annotations
 
@@ -20,37 +20,39 @@ class RingState:
     q: Array
     """Coordinates of rim and race (size,) [m]."""
     ball_feet: Array
-    """Places of the balls on the race."""
+    """Feet of the balls on the race, element number plus parameter (balls,)."""
     bore_feet: Array
-    """Places of the bore's points on the race."""
+    """Feet of the bore's contact points on the race, in the same measure (n_points,).
+    """
     alpha: float
     """Wave-generator angle [rad]."""
     phase: float = 0.0
     """Angle of ball 0 from the major axis at alpha = 0 [rad]."""
     torque: float = 0.0
-    """T that the flexspline exerts on its load [N·m]."""
+    """Torque T that the flexspline exerts on its load [N·m]."""
     rotation: float = 0.0
-    """psi, of the rim, of any number of turns [rad]."""
+    """Rotation psi of the rim, any number of turns [rad]."""
     ball_force: Array | None = None
-    """[N]. Shape (balls,)."""
+    """Force of every ball (balls,) [N]."""
     tooth_force: Array | None = None
-    """Tooth force of every tooth contact [N]."""
+    """Normal force of every tooth contact (n,) [N]."""
     contacts: Contacts | None = None
     tooth_moment: float = 0.0
-    """Moment of the tooth forces on the flexspline: with that of the balls it must
-    balance T [N·m]."""
+    """Moment of the tooth forces on the flexspline [N·m]; together with the moment of
+    the ball forces it must balance T."""
     wave_generator_torque: float = 0.0
-    """External torque on the wave generator, what drives the cage included: without
-    friction its mean over ball passage must be T/i [N·m]."""
+    """External torque on the wave generator, including that which drives the cage
+    [N·m]; without friction its mean over the ball passage must be T/i."""
     energy: float = 0.0
-    """Strain energy, contacts included [J]."""
+    """Strain energy including that of the contacts [J]."""
     compliance: float = 0.0
-    """-d psi / dT [rad/(N·m)]."""
+    """Compliance -d psi / dT of the output [rad/(N·m)]."""
     shares: Mapping[str, float] = field(default_factory=dict)
-    """Parts of the compliance: rim and race, balls, bore (pressed by the race), teeth.
+    """Shares of rim, race, balls, bore (contact of rim and race) and teeth in the
+    compliance [-].
 
-    Of the energy of a small twist, as a share of the whole; a contact that bends over
-    under its force may have a negative one."""
+    They are the shares in the strain energy of a small twist. That of a contact may be
+    negative because its force adds a geometric stiffness."""
     outcome: Outcome = Outcome.CONVERGED
     history: tuple[float, ...] = ()
     """Largest displacement increment of every iteration [m]."""
@@ -62,9 +64,14 @@ class RingState:
 
 
 def initial_state(model: ThinRing, alpha: float, phase: float = 0.0) -> RingState:
-    """Start of a search: both rings deflected by the lobes, not stretched.
+    """Start of a search: both rings deflected by two lobes without stretch.
 
-    They have turned with the flexspline, however far: at the ideal ratio.
+    Both rings have rotated with the flexspline at the ideal ratio, any number of turns.
+
+    Args:
+        model: The rings.
+        alpha: Wave-generator angle [rad].
+        phase: Angle of ball 0 from the major axis at alpha = 0 [rad].
     """
     psi = alpha / model.ratio
     parts = []

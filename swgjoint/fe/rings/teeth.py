@@ -1,7 +1,7 @@
-"""Rigid teeth on the rim and their gaps to those of the circular spline.
+"""Rigid teeth on the rim and their gaps to the teeth of the circular spline.
 
-The flanks are exact and the search for contact is that of the plane finite elements: a
-tooth that moves as a whole is a flank whose nodes all move alike.
+The flanks are exact and the contact search is that of the 2D finite elements: all nodes
+of a rigid tooth's flank have the same displacement.
 """
 
 from __future__ import annotations
@@ -20,46 +20,47 @@ from swgjoint.gear.teeth.profile import ToothProfile
 from swgjoint.typing import Array
 
 NODES = 10
-"""Of a flank; the search for minima of the gap begins at twice as many places."""
+"""Nodes of a flank; the search for minima of the gap starts at twice as many points."""
 
 
 def _flank_spline(profile: ToothProfile) -> CubicSpline:
-    """Weights of the nodes of a flank, whose displacements are all alike."""
+    """Weights of the nodes of a flank along its stations."""
     return CubicSpline(np.linspace(*profile.contact_range, NODES), np.eye(NODES))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RigidFlanks:
-    """The flexspline's flanks as :mod:`swgjoint.fe.plane.tooth_contact` wants them."""
+    """The flexspline's flanks as input to :mod:`swgjoint.fe.plane.tooth_contact`."""
 
     profile: ToothProfile
     flank_size: int = NODES
 
     @cached_property
     def spline(self) -> CubicSpline:
-        """Weights of the nodes."""
+        """Weights of the flank's nodes along its stations."""
         return _flank_spline(self.profile)
 
     @property
     def flank_range(self) -> tuple[float, float]:
-        """Between the lands [m]."""
+        """Stations of both ends of a flank, between the lands [m]."""
         return self.profile.contact_range
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RingTeeth:
-    """Both members' teeth; those of the flexspline stand on a line of given radius."""
+    """Teeth of both members; the flexspline's are fixed to the mean line of the rim."""
 
     flexspline: ToothProfile
     circular_spline: ToothProfile
     foot_radius: float
-    """Foot radius of the mean line that carries them [m]."""
+    """Radius of the mean line that carries the flexspline's teeth [m]."""
     stiffness: float
-    """Stiffness of a pair along the common normal [N/m]."""
+    """Stiffness of a tooth pair along the common normal [N/m]."""
     shift: Array
     """Errors of the flexspline's teeth in their frames (N, 2) [m]."""
     ring_shift: Array | None = None
-    """The same of the circular spline (N_c, 2) [m]; None for none."""
+    """Errors of the circular spline's teeth in their frames (N_c, 2) [m]; None without
+    errors."""
 
     @cached_property
     def _flanks(self) -> RigidFlanks:
@@ -73,16 +74,19 @@ class RingTeeth:
         return CircularSpline(profile=profile, weights=_flank_spline(profile))
 
     def find_contacts(self, foot: Array, slope: Array) -> tuple[Contacts, Array]:
-        """Contacts of teeth on a deformed rim, and the angles of the teeth.
+        """Contacts of the teeth on a deformed rim.
 
         Args:
-            foot: Where the teeth stand (N, 2) [m].
-            slope: Tangents of the rim there (N, 2).
+            foot: Positions of the teeth on the rim's mean line (N, 2) [m].
+            slope: Tangents of the mean line at the teeth (N, 2).
+
+        Returns:
+            The contacts, and the angles of the flexspline's teeth (N,) [rad].
         """
         angle = np.arctan2(-slope[:, 1], -slope[:, 0])
-        own = rotate(foot, -angle)
-        own[:, 1] -= self.foot_radius
-        own = own + self.shift
+        offset = rotate(foot, -angle)
+        offset[:, 1] -= self.foot_radius
+        offset = offset + self.shift
         ring_flank = np.zeros((self.circular_spline.teeth, 0))
         if self.ring_shift is not None:
             ring_flank = np.tile(self.ring_shift, 2 * NODES)
@@ -93,22 +97,30 @@ class RingTeeth:
             angle=angle,
             bearing=np.arctan2(-foot[:, 0], foot[:, 1]),
         )
-        # only what overlaps is pressed, so nothing is followed before it touches
-        return search.search(np.tile(own, 2 * NODES), 0.0, None, thorough=False), angle
+        # only overlapping flanks carry force, so open gaps need not be followed
+        nodal = np.tile(offset, 2 * NODES)
+        return search.search(nodal, 0.0, None, thorough=False), angle
 
     def rows(
         self, contacts: Contacts, foot: Array, slope: Array, angle: Array
     ) -> tuple[Array, Array]:
-        r"""How the gaps change with the coordinates of the nodes that carry the teeth.
+        r"""Derivatives of the gaps by the coordinates of the nodes below the teeth.
 
-        With n out of the circular spline, t across it, the point p of contact moves by
-        :math:`dp = dr + J(p - r)\,d\varphi`, :math:`d\varphi = r' \times dr'/|r'|^2`;
-        flanks of curvatures :math:`\kappa` (flexspline) and :math:`\kappa_c` roll and
-        slide on each other:
+        n is the normal out of the circular spline and t its tangent. The contact point
+        p moves by :math:`dp = dr + J(p - r)\,d\varphi`,
+        :math:`d\varphi = r' \times dr'/|r'|^2`; flanks of curvatures :math:`\kappa`
+        (flexspline) and :math:`\kappa_c` (circular spline) roll and slide on each
+        other:
 
         .. math:: dg = n\cdot dp, \quad d^2g = \frac{\kappa\kappa_c\,(t\cdot dp)^2
             - 2\kappa_c\,(t\cdot dp)\,d\varphi - d\varphi^2}{\kappa + \kappa_c}
             - n\cdot(p - r)\,d\varphi^2
+
+        Args:
+            contacts: The n contacts.
+            foot: Positions r of the teeth on the rim's mean line (N, 2) [m].
+            slope: Tangents r' of the mean line at the teeth (N, 2).
+            angle: Angles of the flexspline's teeth (N,) [rad].
 
         Returns:
             First (n, 4) and second (n, 4, 4) derivatives by (r, r').
@@ -144,12 +156,12 @@ class RingTeeth:
         """Curvature of the circular spline's flank at contacts (n,) [1/m].
 
         Args:
-            contacts: The contacts.
-            points: Where they are (n, 2) [m].
+            contacts: The n contacts.
+            points: Positions of the contacts (n, 2) [m].
         """
         pitch = 2.0 * np.pi / self.circular_spline.teeth
         place = np.asarray((contacts.tooth + 0.5) * pitch, dtype=np.float64)
         local = rotate(points, -place)
-        # a right flank of the flexspline faces a left one, and flanks are right ones
+        # the profile is a right flank; a right flank of the flexspline faces a left one
         local[:, 0] *= np.where(contacts.side == 0, -1.0, 1.0)
         return np.asarray(self.circular_spline.signed_distance(local)[2])
