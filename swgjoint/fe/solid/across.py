@@ -1,21 +1,22 @@
-r"""Where bodies touch between the planes of the mesh: vertices of gaps over the width.
+r"""Contact between the planes of the mesh, at vertices of gaps over the face width.
 
-Crowned surfaces touch within a part of an element, and a contact that acts in the mesh
-planes alone would close a gap that is too large by up to :math:`g'' h^2/8`: two
-micrometres at a crowned wave generator, another amount for every mesh. Beside the
-planes, contact therefore acts at the vertex of the gap, interpolated by a cubic spline,
+Crowned surfaces touch within a part of an element. Contact in the planes of the mesh
+alone would close gaps that are too large by up to :math:`g'' h^2/8`, which is 2 µm at a
+crowned wave generator and depends on the mesh. Contact therefore also acts at the
+vertex of the gap, interpolated by a cubic spline,
 
 .. math:: \bar g = \sum_p w_p(t)\, g_p, \qquad \sum_p w'_p(t)\, g_p = 0 .
 
-Since the gap does not change with t there, its derivative by displacements is the same
-mean of the derivatives in the planes: force and gap stay conjugate. The vertex rolls
-along the width as the surfaces tilt, which adds to the tangent of a force
-:math:`\lambda` the square of the derivative of the slope,
+Since the gap is stationary in t at the vertex, its derivative by displacements is the
+mean of the derivatives in the planes with the same weights: force and gap remain
+conjugate. The vertex moves along the width as the surfaces tilt. This adds to the
+tangent of a force :math:`\lambda` the square of the derivative of the slope,
 
 .. math:: -\lambda\, \nabla\nabla \bar g
     = \frac{\lambda}{\bar g''} \nabla \bar g' \otimes \nabla \bar g' ,
 
-a spring between the slopes that is at rest. Without it the iteration rocks.
+which acts like an unloaded spring between the slopes. Without it the iteration
+oscillates.
 """
 
 from __future__ import annotations
@@ -30,25 +31,27 @@ from swgjoint.fe.common.contact_patch import average_spline
 from swgjoint.typing import Array, Mask
 
 PATCH = 0.15
-"""Half of the width over which a contact force is spread, in face widths: one and a
+"""Half of the width over which a contact force is spread, in face widths [-]: one and a
 half elements of the thesis mesh, as along the flanks."""
 ELEMENTS = 1.5
-"""The same in elements where those are larger."""
+"""Least value of that half width, in elements [-]; it applies to coarser meshes."""
 FLAT = 0.1
-"""Part of the crown's bend between planes below which the planes are enough: the bodies
-have flattened each other, and touch in several planes. Straight surfaces do always."""
+"""Part of the crown's bend between planes below which a gap has no vertex [-]. The
+bodies are then flattened and touch in several planes, as straight surfaces always do.
+"""
 WIDE = 3.0
-"""How many times larger it is where planes share the contact: they keep it so long."""
+"""Factor on :data:`FLAT` for planes that already share a contact, which they therefore
+keep for longer [-]."""
 
 
 def spread_forces(z: Array, nodes: int) -> sparse.csr_matrix:
-    """Forces in the planes of the mesh by forces there that act on patches.
+    """Matrix that spreads the forces in the planes of the mesh over patches.
 
-    A point force on a mesh sinks in by an amount that depends on the elements, and on
-    its place in them: see :mod:`swgjoint.fe.common.contact_patch`.
+    The indentation under a point force depends on the elements and on the position of
+    the force in them, see :mod:`swgjoint.fe.common.contact_patch`.
 
     Args:
-        z: Of the planes, equally spaced (n_planes,) [m].
+        z: Positions of the planes, equally spaced (n_planes,) [m].
         nodes: Degrees of freedom in a plane.
     """
     half = max(PATCH * float(z[-1] - z[0]), ELEMENTS * float(z[1] - z[0]))
@@ -62,35 +65,36 @@ def crown_bend(height: float, z: Array) -> float:
     """Bend of a crown's gap between neighbouring planes [m].
 
     Args:
-        height: Of the crown, at the edges [m].
-        z: Of the planes, equally spaced (n_planes,) [m].
+        height: Height of the crown at the edges [m].
+        z: Positions of the planes, equally spaced (n_planes,) [m].
     """
     return 8.0 * height / (len(z) - 1) ** 2
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Vertices:
-    """Of gaps over the planes; n columns."""
+    """Vertices of n gaps over the planes; t counts in distances between planes."""
 
     weight: Array
-    """w, 0 without a vertex (n_planes, n)."""
+    """Weights w of the planes, zero without a vertex (n_planes, n)."""
     slope: Array
-    """w', the derivative by t, in distances of the planes (n_planes, n)."""
+    """Derivatives w' of the weights by t (n_planes, n)."""
     bend: Array
-    """g'' in these units (n,) [m]."""
+    """Second derivative g'' by t (n,) [m]."""
     covered: Mask
-    """Planes for which a vertex stands, those around it: no gap is negative there where
-    its own is not (n_planes, n)."""
+    """Mask of the planes next to a vertex, which it replaces: their gaps are positive
+    if that at the vertex is (n_planes, n)."""
     found: Mask
-    """Which columns have a vertex (n,): not those closest at an edge, nor flat ones."""
+    """Mask of the columns that have a vertex (n,); columns with the smallest gap at an
+    edge and flat ones have none."""
 
 
 def vertices(gap: Array, flat: Array) -> Vertices:
     """Vertices of gaps in equally spaced planes.
 
     Args:
-        gap: In the planes (n_planes, n) [m].
-        flat: Bend up to which a column has none (n,) [m].
+        gap: Gaps in the planes (n_planes, n) [m].
+        flat: Bend up to which a column has no vertex (n,) [m].
     """
     planes, n = gap.shape
     none = np.zeros((planes, n))
@@ -116,8 +120,8 @@ def vertices(gap: Array, flat: Array) -> Vertices:
     root = np.sqrt(np.maximum(a * a - 3.0 * b * d0, 0.0))
     t = np.clip(-d0 / np.where(a + root > 0.0, a + root, 1.0), 0.0, 1.0)
     bend = 2.0 * a + 6.0 * b * t
-    # a gap that is hollow on both sides of a plane has two vertices, of which the lower
-    # one would change: the bodies have flattened each other there, too
+    # a gap with a minimum on both sides of a plane has two vertices, and the lower one
+    # would alternate: the bodies have flattened each other there as well
     convex = (a > 0.0) & (a + 3.0 * b > 0.0)
     good = np.flatnonzero(convex & (bend > flat[index]) & (d0 <= 0.0) & (d1 >= 0.0))
     index, cell, t = index[good], cell[good], t[good]

@@ -1,4 +1,4 @@
-"""States of a run in files, so that an interrupted run can go on."""
+"""States of a run in files, from which an interrupted run can resume."""
 
 from __future__ import annotations
 
@@ -33,26 +33,26 @@ class Checkpoint:
 
     folder: Path
     asked: bool
-    """Whether the user has asked to go on: a damaged state is an error then."""
+    """Whether the user requested to resume; a damaged state is then an error."""
 
     @classmethod
     def open(
         cls, folder: Path, settings: dict[str, Any], *, resume: bool
     ) -> Checkpoint:
-        """Begin a run in a folder, or go on with the same run if it is there.
+        """Begin a run in a folder, or resume the same run if the folder holds it.
 
-        Nothing in the folder is ever removed.
+        Files in the folder are never removed.
 
         Args:
-            folder: Of the states.
-            settings: What makes the run the same: design hash, torque, positions.
-            resume: Whether there has to be a run to go on with.
+            folder: Folder of the states.
+            settings: Settings that identify the run: design hash, torque, positions.
+            resume: Whether the folder must already hold the run.
 
         Raises:
-            InputError: If the folder holds another run or other files, or there is
-                nothing to resume.
+            InputError: If the folder holds another run or other files, or no run to
+                resume.
         """
-        # code that has changed may solve the states differently
+        # changed code may solve the states differently
         settings = json.loads(json_text({"code": code_version()} | settings))
         file = folder / RUN
         try:
@@ -62,14 +62,14 @@ class Checkpoint:
             return cls(folder=folder, asked=resume)
         except (OSError, DamagedError) as error:
             raise InputError(
-                f"{file} is of no run that --resume could go on with:"
+                f"{file} does not describe a run that --resume could continue:"
                 f" {one_line(error)}; accepted: another --out"
             ) from None
         if there != settings:
             keys = [k for k in {**settings, **there} if there.get(k) != settings.get(k)]
             raise InputError(
                 f"the run in {folder} differs in {', '.join(keys)}; accepted: the same"
-                " design, options and version to go on with it (--resume), or another"
+                " design, options and version to resume it (--resume), or another"
                 " --out"
             )
         return cls(folder=folder, asked=resume)
@@ -77,9 +77,7 @@ class Checkpoint:
     @classmethod
     def _begin(cls, folder: Path, settings: dict[str, Any], *, resume: bool) -> None:
         if resume:
-            raise InputError(
-                f"--resume: no interrupted run in {folder}; leave --resume out"
-            )
+            raise InputError(f"--resume: no interrupted run in {folder}; omit --resume")
         folder.mkdir(parents=True, exist_ok=True)
         # an interrupted write leaves a hidden file
         foreign = sorted(
@@ -88,39 +86,44 @@ class Checkpoint:
         if foreign:
             raise InputError(
                 f"{folder} holds {foreign[0]!r}, but no {RUN} of a run that --resume"
-                " could go on with; accepted: another --out"
+                " could continue; accepted: another --out"
             )
         write_whole(folder / RUN, json_file(settings))
 
     @property
     def count(self) -> int:
-        """States in the folder."""
+        """Number of states in the folder."""
         return len(list(self.folder.glob("*.npz")))
 
     def read(self, name: str) -> SolidState | None:
-        """A state of that name; None if the run did not get there.
+        """A state by name; None if the run did not reach it or its file is ignored.
 
         Raises:
-            InputError: If it is damaged and the user has asked to go on.
+            InputError: If the file is damaged and the user requested to resume.
         """
         path = self.folder / f"{name}.npz"
         try:
-            found = unpack(arrays_content(read_regular(path)), _STATE)
-            if not isinstance(found, SolidState):
-                raise DamagedError("it holds no state")
+            state = unpack(arrays_content(read_regular(path)), _STATE)
+            if not isinstance(state, SolidState):
+                raise DamagedError("the file does not contain a state")
         except FileNotFoundError:
             return None
         except Exception as error:  # a file may be anything
             if self.asked:
                 raise InputError(
-                    f"--resume: {path}: {one_line(error)}; remove it to compute it"
-                    " again"
+                    f"--resume: {path}: {one_line(error)}; remove the file to compute"
+                    " its state again"
                 ) from None
             warn_ignored(path, error)
             return None
-        return found
+        return state
 
     def write(self, name: str, state: SolidState) -> None:
-        """Keep a state, whole or not at all."""
+        """Write a state, completely or not at all.
+
+        Args:
+            name: Name of the state.
+            state: The state.
+        """
         data = arrays_file(pack(state, _STATE))
         write_whole(self.folder / f"{name}.npz", data)

@@ -17,23 +17,24 @@ from swgjoint.typing import Array
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Condensed:
-    """The linearised ring seen from its n tooth contacts and its rotations.
+    """The linearised ring condensed to its n tooth contacts and two rotations.
 
-    Unknowns are the tooth forces, then how far the bore of the diaphragm and the
-    circular spline turn. What they give are the gaps, then minus the moments on the
-    two; with these signs the matrix is symmetric.
+    The unknowns are the tooth forces and the rotations of the diaphragm's bore and of
+    the circular spline. The results are the gaps and the negative moments on both; with
+    these signs the matrix is symmetric.
     """
 
     system: Array
-    """(n + 2, n + 2)."""
+    """Matrix from unknowns to results (n + 2, n + 2)."""
     offset: Array
-    """The same at no tooth force, members where they are (n + 2,)."""
+    """Results without tooth forces and rotations (n + 2,)."""
     coupling: Array
-    """Gaps to the wave generator by tooth forces (n, p) [m/N]."""
+    """Derivative of the gaps to the wave generator by the tooth forces (n, p) [m/N]."""
     base: Array
-    """Motion of the masters at no tooth force (N, size) [m]."""
+    """Motion of the masters without tooth forces and rotations (N, size) [m]."""
     response: Array
-    """The same by tooth forces and the rotation of the bore (N, size, n + 1)."""
+    """Derivative of this motion by the tooth forces and the rotation of the diaphragm's
+    bore (N, size, n + 1)."""
 
 
 def condense(
@@ -47,16 +48,17 @@ def condense(
 
     Args:
         ring: The ring.
-        state: At which it is linearised.
-        linear: Its tangent there.
-        found: Tooth contacts.
-        rotation: To which the bore of the diaphragm is brought; where it is if None.
+        state: State at which the ring is linearised.
+        linear: The linearised ring.
+        found: Tooth contacts; None without.
+        rotation: Rotation to which the bore of the diaphragm is brought [rad]; None
+            keeps that of the state.
     """
     masters, bore, strip = ring.strip.masters, linear.bore, ring.strip
     teeth_dofs, held = ring.dofs(strip.teeth.masters), ring.dofs(masters.held)
     n_sectors, size = linear.gradient.shape
     n = 0 if found is None else len(found)
-    # known motions of the bore of the diaphragm: to its place, and turning
+    # prescribed motions of the diaphragm's bore: to its position, and by a rotation
     rotation = state.rotation if rotation is None else rotation
     target = np.einsum("ij,saj->sai", about_z(np.array(rotation)), ring.reference)
     value = np.zeros((n_sectors, size, 2))
@@ -112,7 +114,7 @@ def condense(
     base, response = solved[:, :, 0] + value[:, :, 0], solved[:, :, 1:]
     response[:, :, n] += value[:, :, 1]
 
-    # gaps, the torque on the bore of the diaphragm and that on the circular spline
+    # gaps, and the torques on the bore of the diaphragm and on the circular spline
     system, offset = np.zeros((n + 2, n + 2)), np.zeros(n + 2)
     lever = value[:, held, 1]
     into = np.einsum("sh,shi->si", lever, linear.hessian[:, held])
@@ -132,7 +134,7 @@ def condense(
 
 
 def _solve_ring(ring: SolidRing, matrix: Array, columns: Array) -> Array:
-    """Solve, the last face of a half model written in the frame of the first one."""
+    """Solve with the last face of a half model in the frame of the first face."""
     sign = ring.face_closure
     size = len(sign)
     matrix[-1, -size:] *= sign[:, None]

@@ -23,8 +23,8 @@ from swgjoint.typing import Array
 class SolidContinuation(Follower[SolidState]):
     """Follows equilibria of the 3D model.
 
-    As :class:`swgjoint.fe.plane.continuation.Continuation` does in the plane; what
-    turns with the flexspline is the bore of the diaphragm.
+    It corresponds to :class:`swgjoint.fe.plane.continuation.Continuation` in 2D; the
+    rotation of the flexspline is that of the diaphragm's bore.
     """
 
     ring: SolidRing
@@ -39,11 +39,11 @@ class SolidContinuation(Follower[SolidState]):
 
     @property
     def ring_is_output(self) -> bool:
-        """Whether the circular spline turns."""
+        """Whether the circular spline is the output."""
         return self.layout != "circular_spline_fixed"
 
     def input_angle(self, state: SolidState) -> float:
-        """Theta [rad]."""
+        """Input angle theta [rad]."""
         if self.layout == "wave_generator_fixed":
             return state.rotation
         return state.wave_generator_angle
@@ -55,11 +55,15 @@ class SolidContinuation(Follower[SolidState]):
         return state.wave_generator_torque
 
     def output_angle(self, state: SolidState) -> float:
-        """Psi [rad]."""
+        """Output angle psi [rad]."""
         return state.ring_rotation if self.ring_is_output else state.rotation
 
     def deflect(self, angle: float = 0.0) -> SolidState:
-        """Wave generator in place, members at the ideal ratio, no tooth contact."""
+        """Flexspline deflected by the wave generator, without tooth contact.
+
+        Args:
+            angle: Input angle [rad]; the members are at the ideal ratio.
+        """
         alpha, rotation, ring_rotation = self._ideal(angle)
         start = self.ring.initial_guess(alpha, rotation)
         load = SolidLoad(rotation=rotation, teeth=False)
@@ -67,28 +71,46 @@ class SolidContinuation(Follower[SolidState]):
         return replace(state, ring_rotation=ring_rotation)
 
     def load(self, start: SolidState, torque: float, angle: float) -> SolidState:
-        """Equilibrium under a torque, from a start with its input at that angle."""
+        """Equilibrium under a torque at an input angle.
+
+        Args:
+            start: State from which the search starts, with its input at ``angle``.
+            torque: Output torque [N·m].
+            angle: Input angle [rad].
+        """
         if not self.ring_is_output:
             return self.solver(self.ring, start, SolidLoad(torque=torque))
         held = angle if self.layout == "wave_generator_fixed" else 0.0
         return self.solver(self.ring, start, SolidLoad(torque=torque, rotation=held))
 
     def hold_output(self, state: SolidState) -> SolidState:
-        """Equilibrium with the output where it is; the torque is what that takes."""
-        found = self.solver(self.ring, state, SolidLoad(rotation=state.rotation))
+        """Equilibrium with the output fixed at its angle; the torque is a result."""
+        fixed = self.solver(self.ring, state, SolidLoad(rotation=state.rotation))
         if self.ring_is_output:
-            return replace(found, torque=-found.tooth_moment)
-        return found
+            return replace(fixed, torque=-fixed.tooth_moment)
+        return fixed
 
     def rotate_output(self, state: SolidState, output: float) -> SolidState:
-        """Predictor: the output turned at a fixed input, within a field that stays."""
+        """Predictor that rotates the output at a fixed input and a fixed wave field.
+
+        Args:
+            state: Equilibrium from which the prediction starts.
+            output: New output angle [rad].
+        """
         alpha = state.wave_generator_angle
         if self.ring_is_output:
             return self._moved(state, alpha, state.rotation, output)
         return self._moved(state, alpha, output, state.ring_rotation)
 
     def predict(self, state: SolidState, angle: float) -> SolidState:
-        """Predictor: the field travels with the wave generator, the members turn."""
+        """Predictor that moves the displacement field with the wave generator.
+
+        The members rotate at the ideal ratio.
+
+        Args:
+            state: Equilibrium from which the prediction starts.
+            angle: New input angle [rad].
+        """
         was, now = self._ideal(self.input_angle(state)), self._ideal(angle)
         alpha, rotation, ring_rotation = (y - x for x, y in zip(was, now, strict=True))
         return self._moved(
@@ -99,13 +121,19 @@ class SolidContinuation(Follower[SolidState]):
         )
 
     def influence(self, state: SolidState) -> Influence:
-        """How the gap of every tooth acts on the output, at an equilibrium."""
+        """Influence of the gap of every tooth on the output at an equilibrium."""
         return influence(self.ring, state, ring_is_output=self.ring_is_output)
 
     def with_errors(
         self, flexspline: Array, circular_spline: Array, tilt: Array
     ) -> SolidContinuation:
-        """The same drive with errors of its teeth and of its axis."""
+        """The same drive with errors of its teeth and of its axis.
+
+        Args:
+            flexspline: Shifts of the flexspline's teeth in their frames (N, 2) [m].
+            circular_spline: Shifts of the circular spline's teeth (N_c, 2) [m].
+            tilt: Slope of the circular spline's axis (2,) [rad].
+        """
         teeth = replace(
             self.ring.teeth, shift=flexspline, ring_shift=circular_spline, tilt=tilt
         )

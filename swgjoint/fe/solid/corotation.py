@@ -1,14 +1,14 @@
-r"""Corotational segments in space: large rotations, small strains within a segment.
+r"""Corotational 3D segments: large rotations, small strains within a segment.
 
 Each segment of each sector has a frame R, the best-fit rotation of its masters (polar
 decomposition of :math:`\sum x_i X_i^T`). With :math:`d = R^T x - X` the energy is
-:math:`\tfrac12 d^T \hat K d`. To first order a motion :math:`\delta y` seen in the
-frame turns it by :math:`\omega = G\,\delta y` and deforms the segment by
-:math:`P = I - S G`, :math:`S\omega = \omega\times y`.
+:math:`\tfrac12 d^T \hat K d`. To first order, a motion :math:`\delta y` in the frame
+rotates it by :math:`\omega = G\,\delta y` and deforms the segment by
+:math:`P\,\delta y`, :math:`P = I - S G`, :math:`S\omega = \omega\times y`.
 
-The gradient is exact. The tangent leaves out the moment of the forces about the frame,
-which is of second order in d: Newton's method converges linearly by a factor of the
-strain, about 1e-3.
+The gradient is exact. The tangent omits the moment of the forces about the frame, which
+is of second order in d. Newton's method therefore converges linearly, with a factor of
+the order of the strain, about 1e-3.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ LEVI[0, 2, 1] = LEVI[2, 1, 0] = LEVI[1, 0, 2] = -1.0
 
 
 def spin(vectors: Array) -> Array:
-    """Matrices of v x (..., 3, 3)."""
+    """Matrices of the cross product v x (..., 3, 3)."""
     return np.asarray(np.einsum("ijk,...j->...ik", LEVI, vectors))
 
 
@@ -43,22 +43,23 @@ def about_z(angle: Array) -> Array:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SolidFrames:
-    """Kinematics of one segment in all sectors; m masters."""
+    """Kinematics of one segment with m masters in all sectors."""
 
     turn: Array
-    """From the frame to the global frame (N, 3, 3)."""
+    """Rotations from the frames to the global frame (N, 3, 3)."""
     position: Array
-    """y, masters in the frames, from their mean (N, m, 3) [m]."""
+    """Positions y of the masters in the frames, relative to their mean (N, m, 3) [m].
+    """
     centre: Array
-    """That mean against the mean of X, in the frames (N, 3) [m]."""
+    """Mean of the masters minus the mean of X, in the frames (N, 3) [m]."""
     deformation: Array
-    """d without its mean (N, 3 m) [m]."""
+    """Deformation d without its mean (N, 3 m) [m]."""
     gradient: Array
-    """G, derivative of the rotation by the masters in the frame (N, 3, 3 m) [1/m]."""
+    """Derivative G of the rotation by the masters in the frame (N, 3, 3 m) [1/m]."""
 
     @property
     def displacement(self) -> Array:
-        """d, travel included (N, 3 m) [m]."""
+        """Deformation d including its mean (N, 3 m) [m]."""
         n, m = self.position.shape[:2]
         return self.deformation + np.tile(self.centre, (1, m)).reshape(n, 3 * m)
 
@@ -66,13 +67,14 @@ class SolidFrames:
 def segment_frames(
     segment: StripSegment, x: Array, place: Array, *, fitted: bool = True
 ) -> SolidFrames:
-    """Best-fit frames.
+    """Best-fit frames of a segment in all sectors.
 
     Args:
         segment: The condensed segment.
-        x: Its masters in the global frame (N, m, 3) [m].
+        x: Positions of its masters in the global frame (N, m, 3) [m].
         place: Rotations of the sectors in the undeformed ring (N, 3, 3).
-        fitted: False keeps the frames at their places (linear level).
+        fitted: Whether the frames follow the masters; False keeps the rotations
+            ``place`` (linear level).
     """
     reference = segment.position - segment.position.mean(axis=0)
     mean = x.mean(axis=1)
@@ -99,28 +101,39 @@ def segment_frames(
 
 
 def energies(segment: StripSegment, frames: SolidFrames) -> Array:
-    """Strain energy of the masters' part in each sector (N,) [J]."""
+    """Strain energy of the masters' displacements in each sector (N,) [J].
+
+    Args:
+        segment: The condensed segment.
+        frames: Its frames, see :func:`segment_frames`.
+    """
     d = frames.deformation
     return np.asarray(0.5 * np.einsum("si,ij,sj->s", d, segment.stiffness, d))
 
 
 def project_to_frames(frames: SolidFrames, force: Array) -> Array:
-    """P^T f: gradient by the masters seen in the frame (N, 3 m) [N]."""
+    """Gradient P^T f by the masters in the frames (N, 3 m) [N].
+
+    Args:
+        frames: Frames of a segment.
+        force: Forces f on its masters in the frames (N, 3 m) [N].
+    """
     n, m = frames.position.shape[:2]
     moment = np.cross(frames.position, force.reshape(n, m, 3)).sum(axis=1)
     return np.asarray(force - np.einsum("sw,swi->si", moment, frames.gradient))
 
 
 def tangent(segment: StripSegment, frames: SolidFrames, force: Array) -> Array:
-    r"""Second derivative by the masters seen in the frames, to first order in d.
+    r"""Second derivative by the masters in the frames, to first order in d.
 
     .. math:: T = P^T \hat K P + H G + (H G)^T - G^T \mathrm{sym}(H^T S) G, \quad
         H\omega = \omega \times f
 
     Args:
         segment: The condensed segment.
-        frames: From :func:`segment_frames`.
-        force: f, forces on the masters in the frames, those of loads included (N, 3 m).
+        frames: Its frames, see :func:`segment_frames`.
+        force: Forces f on the masters in the frames, including those of loads (N, 3 m)
+            [N].
 
     Returns:
         Symmetric matrices (N, 3 m, 3 m) [N/m].
@@ -141,14 +154,24 @@ def tangent(segment: StripSegment, frames: SolidFrames, force: Array) -> Array:
 
 
 def rotate_to_global(frames: SolidFrames, rows: Array) -> Array:
-    """Vectors per master from the frames to the global frame (N, 3 m)."""
+    """Rotate vectors per master from the frames to the global frame (N, 3 m).
+
+    Args:
+        frames: Frames of a segment.
+        rows: Vectors in the frames (N, 3 m).
+    """
     n, m = frames.position.shape[:2]
     turned = np.einsum("sij,saj->sai", frames.turn, rows.reshape(n, m, 3))
     return np.asarray(turned.reshape(n, 3 * m))
 
 
 def matrices_in_global(frames: SolidFrames, matrix: Array) -> Array:
-    """Matrices over masters from the frames to the global frame (N, 3 m, 3 m)."""
+    """Rotate matrices over masters from the frames to the global frame (N, 3 m, 3 m).
+
+    Args:
+        frames: Frames of a segment.
+        matrix: Matrices in the frames (N, 3 m, 3 m).
+    """
     n, m = frames.position.shape[:2]
     half = frames.turn[:, None] @ matrix.reshape(n, m, 3, 3 * m)
     full = half.reshape(n, 3 * m * m, 3) @ frames.turn.transpose(0, 2, 1)

@@ -27,7 +27,7 @@ from swgjoint.typing import Array
 from swgjoint.units import mm, um
 
 Bearing = Literal["free", "held"]
-"""Along the axis the grooves of the balls give way to the race, or hold it."""
+"""Whether the ball grooves leave the race free along the axis or hold it."""
 
 
 def solid_ring(
@@ -43,17 +43,18 @@ def solid_ring(
 
     Args:
         design: The drive; it needs a ``[cup]``.
-        half: Half of the drive, closed by its symmetry; ``auto``: where it applies.
-        nonlinear: Large rotations of the segments.
+        half: Whether to model half of the drive, closed by its symmetry; ``auto`` does
+            so wherever it applies.
+        nonlinear: Whether segments rotate by large angles.
         elastic_circular_spline: Whether the circular spline deforms.
-        orders: Degrees of the displacements of faces and sections.
-        bearing: The outer race of ``[wave_generator.bearing]`` on its balls, free or
-            held along the axis; without, the wave generator is rigid.
+        orders: Polynomial degrees of the displacements of faces and sections.
+        bearing: Axial support of the outer race of ``[wave_generator.bearing]`` on its
+            balls; None makes the wave generator rigid.
 
     Raises:
-        DesignError: If the design cannot be built, the half model does not apply, or
-            errors meet a rigid circular spline.
-        ComputationError: If the memory of the machine will not do.
+        DesignError: If the design cannot be built, the half model does not apply, or a
+            design with errors has a rigid circular spline.
+        ComputationError: If the model does not fit in the memory of the machine.
     """
     name = design.drive.name
     check_modelled(design)
@@ -64,7 +65,7 @@ def solid_ring(
     if bearing is not None:
         check_bearing(design, half=half)
     if half and not can_halve(design, bearing=False):
-        raise DesignError(f"{name}: the half model does not apply; leave --half out")
+        raise DesignError(f"{name}: the half model does not apply; omit --half")
     profile = tooth_profile(design, "flexspline")
     facing = tooth_profile(design, "circular_spline")
     orders = orders or Orders()
@@ -81,7 +82,9 @@ def solid_ring(
     shape, errors = design.micro_geometry, dict[str, Array]()
     if has_errors(design):
         if gear is None:
-            raise DesignError(f"{name}: tolerances need an elastic circular spline")
+            raise DesignError(
+                f"{name}: tolerances: accepted only with an elastic circular spline"
+            )
         errors = {
             "shift": tooth_errors(design, "flexspline").shift,
             "ring_shift": tooth_errors(design, "circular_spline").shift,
@@ -112,15 +115,21 @@ def solid_ring(
 
 
 def check_bearing(design: Design, *, half: bool) -> None:
-    """Refuse what the bearing in space does not contain.
+    """Reject features that the 3D bearing model lacks.
+
+    Args:
+        design: The drive.
+        half: Whether the half model is used.
 
     Raises:
-        DesignError: One line per key.
+        DesignError: If the design has any; one line per key.
     """
     drive, generator = design.drive, design.wave_generator
     faults = []
     if generator.bearing is None:
-        faults.append("wave_generator.bearing is absent")
+        faults.append(
+            "wave_generator.bearing is absent: the 3d bearing model needs this table"
+        )
     elif half and generator.bearing.balls % 2:
         faults.append(
             f"wave_generator.bearing.balls = {generator.bearing.balls}: the half model"
@@ -128,12 +137,12 @@ def check_bearing(design: Design, *, half: bool) -> None:
         )
     if drive.layout != "circular_spline_fixed":
         faults.append(
-            f"drive.layout = {drive.layout!r}: accepted with the bearing in space:"
+            f"drive.layout = {drive.layout!r}: the 3d bearing model expects"
             " 'circular_spline_fixed'"
         )
     if generator.kind not in ("elliptical", "cosine", "table"):
         faults.append(
-            f"wave_generator.kind = {generator.kind!r}: a bearing in space runs on"
+            f"wave_generator.kind = {generator.kind!r}: the 3d bearing model expects"
             " 'elliptical', 'cosine' or 'table'"
         )
     if faults:
@@ -142,10 +151,10 @@ def check_bearing(design: Design, *, half: bool) -> None:
 
 
 def check_modelled(design: Design) -> None:
-    """Refuse what the 3D model does not contain yet.
+    """Reject features that the 3D model lacks.
 
     Raises:
-        DesignError: One line per key.
+        DesignError: If the design has any; one line per key.
     """
     drive = design.drive
     faults = []
@@ -153,8 +162,8 @@ def check_modelled(design: Design) -> None:
         faults.append("the 3d model needs a [cup]; accepted without one: --model 2d")
     if design.friction.tooth_coefficient:
         faults.append(
-            f"friction.tooth_coefficient = {design.friction.tooth_coefficient:g} is not"
-            " modelled in 3d yet; accepted: 0"
+            f"friction.tooth_coefficient = {design.friction.tooth_coefficient:g}: the"
+            " 3d model has no friction; accepted: 0"
         )
     if faults:
         raise DesignError("\n".join(f"{drive.name}: {fault}" for fault in faults))

@@ -1,8 +1,9 @@
-"""Equilibrium of the cup between wave generator and circular spline, in space.
+"""Equilibrium of the 3D cup between wave generator and circular spline.
 
-Newton's method on the corotational strips. The wave generator's contact is a
-primal-dual active set, condensed in every sector; tooth contact and the rotation of the
-output are a small complementarity problem on the frozen tangent, as in the plane model.
+Newton's method is applied to the corotational strips. The contact of the wave generator
+is a primal-dual active set, condensed in every sector. Tooth contact and the rotation
+of the output form a small complementarity problem on the frozen tangent, as in the 2D
+model.
 """
 
 from __future__ import annotations
@@ -25,27 +26,27 @@ from swgjoint.fe.solid.wave_generator.race import NODE
 from swgjoint.typing import Array
 
 RELEASES = 6
-"""How often planes may give up a contact that they share; some would for ever."""
+"""Number of times that planes may release a shared contact; some would never settle."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class SolidLoad:
-    """What is prescribed.
+    """Prescribed torque and rotation.
 
-    The torque alone: the bore of the diaphragm is the output. The rotation alone: it is
-    held. Both: it is held and the circular spline is the output.
+    With the torque alone the bore of the diaphragm is the output; with the rotation
+    alone it is held; with both it is held and the circular spline is the output.
     """
 
     torque: float | None = None
-    """T that the output exerts on its load, whole drive [N·m]."""
+    """Torque T that the output of the whole drive exerts on its load [N·m]."""
     rotation: float | None = None
     """Rotation of the bore of the diaphragm [rad]."""
     teeth: bool = True
-    """Whether the teeth touch."""
+    """Whether the teeth can touch."""
 
     def __post_init__(self) -> None:
         if self.torque is None and self.rotation is None:
-            raise ValueError("give a torque, a rotation, or both")
+            raise ValueError("torque, rotation: expected at least one of them")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,21 +56,28 @@ class SolidSolver:
     max_iterations: int = 80
     step_tolerance: float = 1e-10
     """Displacement increment at which the iteration ends [m]; a thousandth of the
-    smallest effect of interest, a tenth of a micrometre."""
+    smallest effect of interest, which is 0.1 µm."""
     thorough_below: float = 1e-7
-    """Increment below which contact is searched between the nodes, too [m]."""
+    """Displacement increment below which contact is also searched between the nodes
+    [m]."""
     stride: float = 0.2
-    """Longest move of one iteration, in lobe heights: contact changes on the way."""
+    """Largest displacement increment of an iteration, in lobe heights [-]; it is
+    limited because contact changes on the way."""
     largest_step: float = 0.1
-    """Displacement increment beyond which the search has left the drive [m]."""
+    """Displacement increment from which the search counts as diverged [m]."""
 
     def __call__(
         self, ring: SolidRing, start: SolidState, load: SolidLoad
     ) -> SolidState:
         """Equilibrium at the wave-generator angle of ``start``.
 
+        Args:
+            ring: The ring.
+            start: State from which the search starts.
+            load: Prescribed torque and rotation.
+
         Returns:
-            The state with its outcome; states that did not converge come back too.
+            The state with its outcome, whether it converged or not.
         """
         state, history = start, list[float]()
         tried: set[bytes] = set()
@@ -80,7 +88,8 @@ class SolidSolver:
             for iteration in range(self.max_iterations):
                 linear = linearise(ring, state, kept=released >= RELEASES)
                 reach = (0.02 if iteration > 2 else 0.1) * ring.lobe_height
-                # from then on: what only that search finds would come and go for ever
+                # once thorough, always thorough: contacts that only this search finds
+                # would otherwise appear and disappear for ever
                 thorough |= bool(history) and history[-1] < self.thorough_below
                 step = _solve_linear(ring, state, linear, load, reach, thorough)
                 history.append(step.largest)
@@ -91,7 +100,7 @@ class SolidSolver:
                 longest = 0.5 if _takes_back(step.increment, last) else 1.0
                 damping = min(longest, self.stride * ring.lobe_height / step.largest)
                 last = step.increment
-                # a set that comes back would come back for ever
+                # a set of contacts that repeats would repeat for ever
                 repeats = state.touching.tobytes() in tried
                 tried.add(state.touching.tobytes())
                 shared = state.shared
@@ -114,10 +123,10 @@ class SolidSolver:
 
 
 def _takes_back(increment: Array, last: Array | None) -> bool:
-    """Whether an increment takes back most of the last one.
+    """Whether an increment reverses at least half of the last one.
 
-    A flexspline that rocks on a crowned wave generator may change between two sets of
-    contacts for ever, each of which asks for the other.
+    A flexspline that rocks on a crowned wave generator may alternate for ever between
+    two sets of contacts, each of which leads to the other.
     """
     if last is None:
         return False
@@ -130,24 +139,26 @@ class _Step:
 
     found: ToothRows | None
     force: Array
-    """Force of the candidates (n,) [N]."""
+    """Forces of the candidates (n,) [N]."""
     active: NDArray[np.int64]
+    """Candidates that carry force."""
     increment: Array
     """Increment of the masters in the global frame (N, n) [m]."""
     turn: float
-    """Turn of the bore of the diaphragm [rad]."""
+    """Rotation increment of the bore of the diaphragm [rad]."""
     ring_turn: float
-    """Turn of the circular spline [rad]."""
+    """Rotation increment of the circular spline [rad]."""
     pressure: Array
-    """Pressure of the wave generator (N, p) [N]."""
+    """Forces of the wave generator at the contact points (N, p) [N]."""
     after: Array
-    """Gaps to it after the step (N, p) [m]."""
+    """Gaps to the wave generator after the step (N, p) [m]."""
     torque: float
-    """[N·m]."""
+    """Output torque [N·m]."""
     holding_torque: float
-    """On the bore of the diaphragm [N·m]."""
+    """Torque on the bore of the diaphragm [N·m]."""
     compliance: float
-    """-d(output)/dT of the whole drive [rad/(N·m)], NaN without a given torque."""
+    """Compliance -d(output)/dT of the whole drive [rad/(N·m)]; NaN without a prescribed
+    torque."""
 
     @property
     def largest(self) -> float:
@@ -163,7 +174,7 @@ def _solve_linear(
     reach: float,
     thorough: bool,
 ) -> _Step:
-    """Condense the ring to tooth forces and the rotations, solve, go back."""
+    """Condense the ring to tooth forces and rotations, solve, and expand the result."""
     found = None
     if load.teeth:
         found = ring.teeth.find(
@@ -234,7 +245,7 @@ def _advance(
     *,
     one_at_a_time: bool,
 ) -> tuple[SolidState, bool]:
-    """Move, exchange the contact forces, update which bore nodes touch."""
+    """Move the ring, replace the contact forces and update the touching bore nodes."""
     bore, masters = linear.bore, ring.strip.masters
     local = np.einsum("spp->sp", bore.compliance)
     wrong = np.where(bore.active, -step.pressure * local, -step.after)
@@ -242,7 +253,7 @@ def _advance(
     if bad.any() and one_at_a_time:
         bad &= wrong == wrong[bad].max()
     touching = bore.active ^ bad
-    # without a vertex, or with contact far from it, too
+    # shared if the line has no vertex, or also touches far from its vertex
     nodes, lines = bore.normal.shape[1], bore.found.shape[1]
     apart = (touching & bore.present)[:, :nodes].reshape(len(touching), -1, lines)
     shared = ~bore.found | apart.any(axis=1)
@@ -311,7 +322,7 @@ def _finished(
         forces = ring.race.forces(state.race, state.wave_generator_angle)
         energy += forces.energy
         balls, torque = forces.balls.force, forces.balls.input_torque
-    # in one order in memory, so that a state read from a file goes on bit for bit
+    # contiguous arrays, so that a state read from a file continues bit for bit
     return replace(
         state,
         faces=np.ascontiguousarray(state.faces),

@@ -1,13 +1,14 @@
 r"""Tangent of the ring with the wave generator's contact eliminated in every sector.
 
-Contact points of a sector, the bore nodes and a vertex in every line of them along the
-axis, touch each other and the masters through the compliance C of the toothed segment
-alone, so their forces are condensed sector by sector:
+The contact points of a sector are the bore nodes and one vertex in every line of bore
+nodes along the axis. They are coupled to each other and to the masters only through the
+compliance C of the toothed segment, so their forces are condensed sector by sector:
 
 .. math:: \lambda = -W^{-1}(g + B\,\delta q + D F), \quad W = n^T C n,
 
-with g the gaps as if the old forces were gone, B their derivative by the masters, F the
-tooth forces. What remains is a ring of small matrices.
+where g are the gaps without the previous forces, B is their derivative by the masters,
+D their derivative by the tooth forces, and F are the tooth forces. The result is a ring
+of small matrices.
 """
 
 from __future__ import annotations
@@ -38,40 +39,50 @@ from swgjoint.typing import Array, Index, Mask
 class BoreContact:
     """Contact points on the bore at one state; p of them in each sector.
 
-    These are the b bore nodes, plane after plane; after them the vertices of the gap
-    over the face width, one for every line of nodes along the axis; and the slopes of
-    the gap there, rows that hold while a vertex carries force and do no work at rest.
+    The first b points are the bore nodes, plane after plane. The vertices of the gap
+    over the face width follow, one for every line of nodes along the axis, and then the
+    slopes of the gap at the vertices. The rows of the slopes are active while a vertex
+    carries force, and do no work at equilibrium.
     """
 
     gap: Array
-    """(N, p) [m]."""
+    """Gaps (N, p) [m]."""
     normal: Array
     """Gradient of the gap at the nodes in the frames of the teeth (N, b, 3)."""
     vertex: Array
-    """Vertices and slopes there by the nodes (N, p - b, b)."""
+    """Weights of the nodes in the vertices and in their slopes (N, p - b, b)."""
     found: Mask
-    """Which lines have a vertex (N, L)."""
+    """Mask of the lines that have a vertex (N, L)."""
     present: Mask
-    """Which points can open and close (N, p)."""
+    """Mask of the points that can open and close (N, p)."""
     active: Mask
-    """Which touch (N, p)."""
+    """Mask of the points that touch (N, p)."""
     rows: Array
-    """B, by the masters of the teeth in the global frame and by the coordinates of a
-    race (N, p, 3 m)."""
+    """Derivative B of the gaps by the masters of the teeth in the global frame and by
+    the coordinates of a race (N, p, 3 m)."""
     free_gap: Array
-    """g, gaps as if the old forces were gone (N, p) [m]."""
+    """Gaps g without the previous forces (N, p) [m]."""
     compliance: Array
-    """W of all points (N, p, p) [m/N]."""
+    """Compliance W of all points (N, p, p) [m/N]."""
     inverse: Array
-    """W^-1 of the active points, zero elsewhere (N, p, p) [N/m]."""
+    """Inverse W^-1 of the active points, zero elsewhere (N, p, p) [N/m]."""
 
     def with_vertices(self, nodal: Array, sector: Index) -> Array:
-        """Of all points, from that of the nodes, in given sectors (n, b) -> (n, p)."""
+        """Extend nodal values to all contact points, (n, b) -> (n, p).
+
+        Args:
+            nodal: Values at the bore nodes (n, b).
+            sector: Sectors of these values (n,).
+        """
         vertex = np.einsum("kvb,kb->kv", self.vertex[sector], nodal)
         return np.concatenate([nodal, vertex], axis=1)
 
     def nodal_force(self, pressure: Array) -> Array:
-        """In the frames of the teeth (N, 3 b) [N], from that of all points (N, p)."""
+        """Nodal forces in the frames of the teeth (N, 3 b) [N].
+
+        Args:
+            pressure: Forces at all contact points (N, p) [N].
+        """
         b = self.normal.shape[1]
         size = pressure[:, :b] + np.einsum("svb,sv->sb", self.vertex, pressure[:, b:])
         return np.asarray((size[..., None] * self.normal).reshape(len(size), -1))
@@ -79,30 +90,34 @@ class BoreContact:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SolidLinearised:
-    """Ring at one state; n = 3 masters, and the coordinates of a race."""
+    """Ring linearised at one state.
+
+    A sector has n coordinates, three for each master and those of a race.
+    """
 
     frames: tuple[SolidFrames, ...]
     gradient: Array
     """Derivative of the strain energy (N, n) [N]."""
     hessian: Array
-    """With the condensed contact of the wave generator (N, n, n) [N/m]."""
+    """Tangent, including the condensed contact of the wave generator (N, n, n) [N/m].
+    """
     pushed: Array
-    """B^T W^-1 g, forces of the wave generator on undisplaced masters (N, n) [N]."""
+    """Forces B^T W^-1 g of the wave generator on undisplaced masters (N, n) [N]."""
     bore: BoreContact
     race: RaceForces | None = None
-    """Counted in gradient and tangent."""
+    """Forces of a race, already included in gradient and tangent."""
 
 
 def linearise(
     ring: SolidRing, state: SolidState, *, kept: Mask | None = None
 ) -> SolidLinearised:
-    """Linearise a ring.
+    """Linearise a ring at a state.
 
     Args:
         ring: The ring.
-        state: At which.
-        kept: Lines that stay shared if they are, see :class:`SolidState`, its shape;
-            all without it.
+        state: The state.
+        kept: Mask of the lines that remain shared if the state shares them, see
+            ``shared`` of :class:`SolidState` (N, L); None for all lines.
     """
     frames = ring.frames(state)
     n = ring.size
@@ -146,7 +161,14 @@ def linearise(
 def bore_contact(
     ring: SolidRing, state: SolidState, frame: SolidFrames, *, kept: Mask | None = None
 ) -> BoreContact:
-    """Contact points of all sectors; see :func:`linearise`."""
+    """Contact points of all sectors.
+
+    Args:
+        ring: The ring.
+        state: The state.
+        frame: Frames of the toothed segments.
+        kept: Mask of the lines that remain shared, see :func:`linearise` (N, L).
+    """
     teeth, first = ring.strip.teeth, ring.strip.flank_dofs
     n, p = state.touching.shape
     b = len(ring.strip.bore)
@@ -161,7 +183,7 @@ def bore_contact(
         gap, by_race = gap.reshape(n, b), np.zeros((n, b, 0))
     normal = np.einsum("sji,spj->spi", frame.turn, normal.reshape(n, b, 3))
     vertex, found, bend, covered = _vertices(ring, gap, state, kept)
-    # by masters in the frame: carried by the teeth, and turned with the frame
+    # derivative by the masters in the frame: motion of the teeth and of the frame
     carry = teeth.loaded_from_masters[first:].reshape(b, 3, -1)
     carried = np.einsum("spi,pim->spm", normal, carry)
     m = frame.position.shape[1]
@@ -221,9 +243,9 @@ def _vertices(
     """Vertices of the gap along the axis.
 
     Returns:
-        Weights of the bore nodes, of the vertices and of the slopes there (N, 2 L, b);
-        which of the L lines have a vertex, and its bend (N, L); for which of the nodes
-        vertices stand (N, b).
+        Weights of the bore nodes in the vertices and in their slopes (N, 2 L, b); mask
+        of the lines that have a vertex (N, L), and its bend (N, L) [m]; mask of the
+        nodes that the vertices replace (N, b).
     """
     n, b = gap.shape
     planes = ring.strip.planes
@@ -234,12 +256,12 @@ def _vertices(
         return nodal.reshape(n, planes, lines).transpose(1, 0, 2).reshape(planes, -1)
 
     flat = np.full(n * lines, crown * FLAT if crown else inf)
-    # planes that share a contact keep it until it is clearly bent
+    # planes that share a contact keep it until the gap is clearly bent
     shared = state.shared.ravel()
     flat[shared] *= WIDE
     flat[shared & (True if kept is None else kept.ravel())] = inf
     seen = vertices(over(gap), flat)
-    if ring.race is not None:  # none beside the race
+    if ring.race is not None:  # no vertex outside the width of the race
         beside = ~ring.race.covers(ring.strip.mesh.teeth.z @ seen.weight)
         seen.found[beside], seen.covered[:, beside] = False, False
     means = np.zeros((n, 2, lines, planes, lines))

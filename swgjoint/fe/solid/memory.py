@@ -1,4 +1,4 @@
-"""Memory that a 3D model will take, before it is built."""
+"""Estimate of the memory that a 3D model needs, before it is built."""
 
 from __future__ import annotations
 
@@ -7,31 +7,32 @@ from swgjoint.fe.solid.strip.mesh import StripMesh
 from swgjoint.memory import INTERPRETER, require_memory
 
 BYTES = 8
+"""Memory of a floating-point number [B]."""
 FILL = 28.0
-"""Entries of a sparse factor of a segment over its unknowns to the power 4/3: 27 with
-the teeth in the mesh of the thesis."""
+"""Entries of a segment's sparse factor over its unknowns to the power 4/3 [-]; 27 for
+the toothed segment in the mesh of the thesis."""
 CONTACTS = 400
-"""Tooth contact points that an iteration carries along, more than any seen."""
+"""Tooth contact points of an iteration, more than observed in any run."""
 COPIES = 4
-"""Arrays of the size of the system or of its right-hand sides that live at once."""
+"""Simultaneous arrays of the size of the system or of its right-hand sides."""
 OFFSETS = 9
-"""Teeth of the circular spline that feel a loaded one."""
+"""Teeth of the circular spline that a loaded tooth displaces, itself included."""
 
 
 def required_memory(
     strip: StripMesh, ring: StripMesh | None, sectors: int, orders: Orders
 ) -> float:
-    """Estimate of the peak [B]; measured peaks lie between a half of it and all of it.
+    """Estimate of the peak memory [B]; measured peaks are 50 to 100 % of it.
 
     Args:
         strip: Mesh of the flexspline.
         ring: Mesh of the circular spline; None if it is rigid.
         sectors: Teeth of the flexspline in the model.
-        orders: Degrees of the displacements of faces and sections.
+        orders: Polynomial degrees of the displacements of faces and sections.
     """
     nodes = strip.teeth.segment.mesh.p.shape[1]
     loaded = 3 * (strip.teeth.flank.size + strip.teeth.bore.size)
-    # condensation of the teeth: right-hand sides, their solution, what is kept
+    # condensation of the teeth: right-hand sides, their solution, stored results
     condensing = BYTES * (3 * 3 * nodes * loaded + FILL * (3 * nodes) ** (4 / 3))
     kept = BYTES * (3 * nodes * loaded + loaded**2)
     size = 3 * strip_masters(strip, orders).size
@@ -49,10 +50,15 @@ def required_memory(
 
 
 def require_solid_memory(name: str, required: float) -> None:
-    """Refuse a 3D model that would not fit.
+    """Reject a 3D model that would not fit in memory.
+
+    Args:
+        name: Name of the drive.
+        required: Memory that the model needs [B].
 
     Raises:
-        ComputationError: With both figures and what would need less.
+        ComputationError: If the model does not fit; the message states required and
+            available memory and how to reduce the former.
     """
     require_memory(
         f"{name}: the 3d model",

@@ -33,7 +33,7 @@ from swgjoint.units import deg
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SolidSetup:
-    """One of the equilibria that lead to the first wave-generator position."""
+    """One of the equilibria before the first wave-generator position."""
 
     name: str
     """``wave_generator`` (no tooth contact), ``meshed`` or ``torque``."""
@@ -62,7 +62,7 @@ class SolidRun(Positions):
 
     @property
     def nodes(self) -> int:
-        """Nodes before condensation, of the deformable members."""
+        """Nodes of the deformable members before condensation."""
         total = _nodes(self.model)
         gear = self.model.teeth.ring_gear
         if gear is not None:
@@ -72,7 +72,7 @@ class SolidRun(Positions):
 
     @property
     def elements(self) -> int:
-        """Elements before condensation, of the deformable members."""
+        """Elements of the deformable members before condensation."""
         total = self.model.strip.mesh.elements * self.model.sectors
         gear = self.model.teeth.ring_gear
         if gear is not None:
@@ -80,7 +80,7 @@ class SolidRun(Positions):
         return total
 
     def to_json(self) -> dict[str, Any]:
-        """The JSON object of ``swgjoint meshing``; per-step stress: flexspline."""
+        """JSON object of ``swgjoint meshing``; per-step stresses of the flexspline."""
         solved = [step.stress for step in self.steps if step.stress is not None]
         elastic = self.model.teeth.ring_gear is not None
         gear = f"elastic, outside {self.design.circular_spline.outer_rim}"
@@ -143,29 +143,28 @@ def simulate_solid_meshing(
     keep: Path | None = None,
     resume: bool = False,
 ) -> SolidRun:
-    """What :func:`swgjoint.fe.meshing.simulate_meshing` does for ``model="3d"``.
+    """Simulate meshing in 3D, see :func:`swgjoint.fe.meshing.simulate_meshing`.
 
     Args:
         design: The drive, with a cup.
-        torque: T that the drive exerts on the output [N·m].
+        torque: Torque T that the drive exerts on the output [N·m].
         steps: Wave-generator positions k turn/steps, k = 0 to steps - 1; None chooses
-            as :func:`swgjoint.fe.meshing_phases.default_steps`.
+            :func:`swgjoint.fe.meshing_phases.default_steps`.
         turn: Turns of the input.
-        nonlinear: Large rotations of the segments.
-        half: Half model; needs even tooth counts.
+        nonlinear: Whether segments rotate by large angles.
+        half: Whether to use the half model, which needs even tooth counts.
         elastic_circular_spline: Whether the circular spline deforms.
-        throw: Whether a position that cannot be solved is an error.
-        progress: Called with the stage, the steps done and their number.
+        throw: Whether a position that cannot be solved raises an error.
+        progress: Called with the stage, the number of finished steps and their total.
         keep: Folder for the state of every position; None keeps none. If it holds an
-            interrupted run of the same settings and code, that run goes on; the result
-            is the same, bit for bit.
-        resume: Whether there has to be a run to go on with in that folder.
+            interrupted run of the same settings and code, that run is resumed with
+            bit-identical results.
+        resume: Whether that folder must already hold a run to resume.
 
     Raises:
-        DesignError: If the design cannot be built or holds what is not modelled.
-        ComputationError: If a solve fails or memory will not do.
-        InputError: If the folder holds another run or other files, or there is no run
-            to resume.
+        DesignError: If the design cannot be built or has features that the model lacks.
+        ComputationError: If a solve fails or the model does not fit in memory.
+        InputError: If the folder holds another run or other files, or no run to resume.
     """
     begin = time.perf_counter()
     check_modelled(design)
@@ -186,7 +185,7 @@ def simulate_solid_meshing(
         kept = Checkpoint.open(keep, settings, resume=resume)
         if kept.count:
             # three states of the set-up, then all positions but the first
-            stage = f"going on with the run in {keep}: states that are kept"
+            stage = f"resuming the run in {keep}: finished states"
             progress(stage, kept.count, steps + 2)
     ring = solid_ring(
         design,
@@ -278,7 +277,7 @@ def _step(
 
 
 def _nodes(ring: SolidRing) -> int:
-    """Nodes of the flexspline; nodes on a face belong to one sector."""
+    """Nodes of the flexspline; those on a face count for one sector."""
     face = sum(len(segment.mesh.first) for segment in ring.strip.segments)
     rows = [s.begin.shape[1] for s in ring.strip.mesh.cup if s.begin is not None]
     return int((ring.strip.mesh.nodes - face + sum(rows)) * ring.sectors)

@@ -1,4 +1,4 @@
-"""The ring of strips on its wave generator: geometry, frames, contact points."""
+"""The ring of strips on the wave generator: geometry, frames, contact points."""
 
 from __future__ import annotations
 
@@ -27,16 +27,18 @@ class SolidRing:
     lobe_height: float
     """Radial deflection at the lobes [m]."""
     half: bool = False
-    """Half of the ring, closed by a rotation of 180 deg."""
+    """Whether the model is half of the ring, closed by a rotation of 180 deg."""
     nonlinear: bool = True
-    """Large rotations of the segments; else they turn with the output alone."""
+    """Whether segments rotate by large angles; if not, they rotate only with the
+    output."""
     race: SolidRace | None = None
-    """Outer race on balls in place of the rigid wave generator."""
+    """Outer race on balls that replaces the rigid wave generator."""
 
     def dofs(self, masters: Index) -> Index:
         """Degrees of freedom of masters in a sector.
 
-        Those of the race's nodes follow the first face and end the last one.
+        Those of the race's nodes follow the masters of the first face and of the last
+        face.
         """
         first = 3 * masters
         if self.race is not None:
@@ -45,7 +47,7 @@ class SolidRing:
 
     @cached_property
     def race_dofs(self) -> Index:
-        """Those of the race's nodes at both faces of a sector; empty without."""
+        """Degrees of freedom of the race's nodes at both faces; empty without one."""
         if self.race is None:
             return np.zeros(0, dtype=np.int64)
         ends = 3 * self.strip.masters.face_size, self.size - NODE
@@ -53,18 +55,18 @@ class SolidRing:
 
     @cached_property
     def bore_places(self) -> Array:
-        """Bore nodes on the undeformed elements of their sectors, 0 to 1 (b,)."""
+        """Parameters of the bore nodes along the undeformed elements, 0 to 1 (b,)."""
         x, y, _ = self.strip.bore.T
         return np.asarray(0.5 + np.arctan2(-x, y) * self.strip.sectors / (2.0 * pi))
 
     @cached_property
     def contact_dofs(self) -> Index:
-        """Those that move the gap of the bore: of the teeth, then of the race."""
+        """Degrees of freedom that move the bore's gap, those of the teeth first."""
         return np.concatenate([self.dofs(self.strip.teeth.masters), self.race_dofs])
 
     @property
     def size(self) -> int:
-        """Degrees of freedom of a sector, both faces counted."""
+        """Number of degrees of freedom of a sector, including both faces."""
         return 3 * self.strip.masters.size + (0 if self.race is None else 2 * NODE)
 
     @property
@@ -77,12 +79,12 @@ class SolidRing:
 
     @property
     def copies(self) -> int:
-        """How many times the model repeats in the drive."""
+        """Number of copies of the model in the drive."""
         return 2 if self.half else 1
 
     @property
     def sectors(self) -> int:
-        """Sectors in the model."""
+        """Number of sectors in the model."""
         return self.strip.sectors // self.copies
 
     @cached_property
@@ -125,17 +127,27 @@ class SolidRing:
         )
 
     def bore_positions(self, frames: SolidFrames, state: SolidState) -> Array:
-        """Bore nodes in the frames of the teeth (N, n_bore, 3) [m]."""
+        """Positions of the bore nodes in the frames of the teeth (N, n_bore, 3) [m].
+
+        Args:
+            frames: Frames of the toothed segments.
+            state: The state.
+        """
         teeth, first = self.strip.teeth, self.strip.flank_dofs
         moved = frames.displacement @ teeth.loaded_from_masters[first:].T
         moved += self.loads(state) @ teeth.compliance[:, first:]
         return self.strip.bore + moved.reshape(len(moved), -1, 3)
 
     def initial_guess(self, alpha: float = 0.0, rotation: float = 0.0) -> SolidState:
-        """Start of a search: a cup whose wall stays straight and does not stretch.
+        """Start of a search: a cup whose wall remains straight and does not stretch.
 
-        Radial w0 s cos 2 phi with s falling from the teeth to the closed end,
-        tangential -w0 s/2 sin 2 phi; no shear in the wall gives the axial motion.
+        The displacement is w0 s cos 2 phi radially and -w0 s/2 sin 2 phi tangentially,
+        where s decreases from the teeth to the closed end; the axial displacement
+        follows from zero shear in the wall.
+
+        Args:
+            alpha: Wave-generator angle [rad].
+            rotation: Rotation of the flexspline [rad].
         """
         x = self.reference
         strip, w0 = self.strip, self.lobe_height
@@ -167,7 +179,7 @@ class SolidRing:
         race, touching = None, np.zeros((self.sectors, points), bool)
         if self.race is not None:
             race = self.race.initial_guess(alpha, rotation, closed)
-            # nothing but the rim keeps the race on its balls
+            # only the rim presses the race on its balls
             along = np.arange(self.sectors) * 2.0 * pi / strip.sectors
             at_lobe = np.cos(2.0 * (along + rotation - alpha)) > 0.9
             touching[:, :n_bore] = at_lobe[:, None] & self.race.covers(strip.bore[:, 2])

@@ -1,4 +1,4 @@
-"""Direct solution of a symmetric ring of sectors with large faces."""
+"""Direct solver for a symmetric ring of sectors with large faces."""
 
 from __future__ import annotations
 
@@ -12,20 +12,21 @@ from swgjoint.typing import Array
 class RingFactor:
     """Factorised ring of symmetric sector matrices.
 
-    What :class:`swgjoint.fe.common.cyclic.CyclicFactor` does, sector by sector in dense
-    blocks without its pivoting across them: for faces of a hundred degrees of freedom
-    several times faster than a band, with half of the fill. The insides are eliminated
-    first, then the faces one after the other; the last one is coupled to all.
+    It solves the same systems as :class:`swgjoint.fe.common.cyclic.CyclicFactor`, but
+    sector by sector in dense blocks and without pivoting across blocks. For faces of a
+    hundred degrees of freedom it is several times faster than a banded solver, with
+    half of the fill. The interiors are eliminated first, then the faces one after the
+    other; the last face is coupled to all others.
     """
 
     def __init__(self, blocks: Array, face: int) -> None:
         """Factorise.
 
         Args:
-            blocks: Symmetric sector matrices (N, n, n), degrees of freedom in the order
-                first face, inside, last face; the last face of a sector is the first
-                of the next, of the last sector that of sector 0. At least 3 sectors.
-            face: Degrees of freedom of a face.
+            blocks: Symmetric matrices of at least three sectors (N, n, n), with degrees
+                of freedom in the order first face, interior, last face. The last face
+                of a sector is the first face of the next one, cyclically.
+            face: Number of degrees of freedom of a face.
 
         Raises:
             SingularRingError: If a pivot vanishes.
@@ -53,10 +54,10 @@ class RingFactor:
         self._lu.append(_factor(corner))
 
     def solve(self, rhs: Array) -> Array:
-        """Solve for many right-hand sides given per sector.
+        """Solve for k right-hand sides.
 
         Args:
-            rhs: Contributions of each sector (N, n, k); those of a shared face add up.
+            rhs: Contributions of each sector (N, n, k), which add up on shared faces.
 
         Returns:
             Solution at the degrees of freedom of each sector (N, n, k).

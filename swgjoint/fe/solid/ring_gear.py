@@ -1,4 +1,4 @@
-"""The elastic circular spline in 3D: linear, with its outer surface fixed."""
+"""The elastic 3D circular spline: linear, with a fixed outer surface."""
 
 from __future__ import annotations
 
@@ -20,39 +20,47 @@ from swgjoint.gear.teeth.profile import ToothProfile
 from swgjoint.typing import Array, Index
 
 REACH = 4
-"""Teeth on either side of a loaded one that feel it: beyond, a fixed outside leaves
-less than a thousandth."""
+"""Teeth on either side of a loaded tooth that it displaces; with a fixed outer surface
+the displacement of others is less than 0.1 %."""
 WINDOW = 12
-"""Teeth of the ring in which the response to one of them is computed."""
+"""Teeth of the ring in which the response to one loaded tooth is computed."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RingGear:
-    """Response of the flanks to forces on them, by the offset of the teeth.
+    """Response of the flanks to forces on them, by the offset between teeth.
 
-    Forces and displacements in x and y in the frames of the teeth, plane after plane,
-    right then left flank; forces are spread over a part of the face width, and
-    displacements of the flanks averaged over it.
+    Forces and displacements are in x and y of the frames of the teeth, plane after
+    plane, right flank before left flank. Forces are spread over a part of the face
+    width, and flank displacements are averaged over it.
     """
 
     mesh: StripMesh
     body: Solid
     offsets: Index
+    """Offsets between a loaded tooth and the teeth that it displaces (n_offsets,)."""
     flank: Array
-    """G [m/N]. Shape (n_offsets, n_b, n_b)."""
+    """Compliance G of the flanks (n_offsets, n_b, n_b) [m/N]."""
     nodal: Array
-    """Displacement of all nodes of a tooth [m/N]. (n_offsets, 3 n_nodes, n_b)."""
+    """Displacement of all nodes of a tooth per flank force (n_offsets, 3 n_nodes, n_b)
+    [m/N]."""
 
     def displacement(self, force: Array) -> Array:
-        """Flank displacement (N_c, n_b) [m] under flank forces (N_c, n_b) [N]."""
+        """Flank displacements (N_c, n_b) [m] under flank forces (N_c, n_b) [N]."""
         return respond(self.offsets, self.flank, force)
 
     def nodal_displacement(self, force: Array) -> Array:
-        """Displacement of all nodes (N_c, n_nodes, 3) [m]."""
+        """Displacements of all nodes (N_c, n_nodes, 3) [m] under flank forces."""
         return respond(self.offsets, self.nodal, force).reshape(len(force), -1, 3)
 
     def contact_compliance(self, tooth: Index, weight: Array, teeth: int) -> Array:
-        """Compliance between contact points (n, n) [m/N]; see the plane model."""
+        """Compliance between contact points (n, n) [m/N].
+
+        Args:
+            tooth: Teeth of the contact points (n,).
+            weight: Derivatives of the gaps by the flank nodes (n, n_b).
+            teeth: Teeth of the circular spline in the model.
+        """
         return contact_compliance(self.offsets, self.flank, tooth, weight, teeth)
 
 
@@ -62,15 +70,15 @@ def ring_gear(design: Design, profile: ToothProfile, mesh: StripMesh) -> RingGea
     Args:
         design: The drive.
         profile: Flank of the circular spline.
-        mesh: From :func:`swgjoint.fe.solid.strip.mesh.circular_spline_strip`.
+        mesh: Mesh of :func:`swgjoint.fe.solid.strip.mesh.circular_spline_strip`.
 
     Raises:
-        DesignError: If its outside is free.
+        DesignError: If the outer surface of the circular spline is free.
     """
     if design.circular_spline.outer_rim == "free":
         raise DesignError(
-            f"{design.drive.name}: circular_spline.outer_rim = 'free' is not modelled"
-            " in 3d; accepted: 'fixed'"
+            f"{design.drive.name}: circular_spline.outer_rim = 'free': the 3d model"
+            " expects 'fixed'"
         )
     material = design.material_of("circular_spline")
     segment, teeth = mesh.teeth.segment, mesh.teeth
@@ -99,7 +107,7 @@ def ring_gear(design: Design, profile: ToothProfile, mesh: StripMesh) -> RingGea
     solved = factor.solve(np.concatenate([-pull, units], axis=1))
     n = len(boundary)
     stiffness = matrix[boundary][:, boundary].toarray() + pull.T @ solved[:, :n]
-    # a last face is the next tooth's first face, in that tooth's frame
+    # the last face of a tooth is the first face of the next tooth, in whose frame it is
     pitch = about_z(np.array(2.0 * pi / profile.teeth))
     turn = np.eye(n)
     turn[n // 2 :, n // 2 :] = np.kron(np.eye(n // 6), pitch)

@@ -1,7 +1,7 @@
-"""Fields of solved positions in 3D, as :mod:`swgjoint.fe.plane.shape_fields` in 2D.
+"""Fields of solved 3D positions, as :mod:`swgjoint.fe.plane.shape_fields` in 2D.
 
-The surface goes along the bore of the open edge, over the teeth at both edges of the
-face width, and down the outside of the cup, one row of nodes a section.
+The surface runs along the bore of the open edge, over the teeth at both edges of the
+face width, and down the outside of the cup, with one row of nodes per section.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from swgjoint.typing import Index
 
 
 def solid_surface(ring: SolidRing) -> ShapeSurface:
-    """Outside of a sector, nodes of its segments numbered one after the other."""
+    """Outer surface of a sector; nodes are numbered segment after segment."""
     strip = ring.strip.mesh
     bore, outline = outline_rows(strip.teeth.plane)
     open_edge, back = strip.teeth.nodes[0], strip.teeth.nodes[-1]
@@ -41,9 +41,15 @@ def solid_surface(ring: SolidRing) -> ShapeSurface:
 def solid_fields(
     ring: SolidRing, state: SolidState, surface: ShapeSurface
 ) -> SectorFields:
-    """An equilibrium of the 3D model."""
+    """Fields of an equilibrium of the 3D model.
+
+    Args:
+        ring: The ring.
+        state: The equilibrium.
+        surface: Surface of a sector, see :func:`solid_surface`.
+    """
     loads, frames = ring.loads(state), ring.frames(state)
-    # from where the teeth stood, undeformed and turned with the flexspline
+    # frames of the undeformed teeth, rotated with the flexspline
     stood = about_z(np.array(state.rotation)) @ ring.place
     moved = []
     for number, (segment, frame) in enumerate(

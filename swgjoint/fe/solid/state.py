@@ -13,34 +13,38 @@ from swgjoint.typing import Array, Mask
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SolidState(StateFigures):
-    """One equilibrium, or the start of the search for one. Global frame, SI."""
+    """One equilibrium, or the start of the search for one; global frame, SI units."""
 
     faces: Array
-    """Masters on the first face of each sector (N, n_face, 3) [m]."""
+    """Positions of the masters on the first face of each sector (N, n_face, 3) [m]."""
     inside: Array
-    """Masters inside the sectors (N, n_inside, 3) [m]."""
+    """Positions of the masters inside the sectors (N, n_inside, 3) [m]."""
     pressure: Array
-    """Force of the wave generator per gradient of its gap, at the bore nodes, at the
-    vertices of the gap over the face width and of the slopes there
+    """Forces of the wave generator per gradient of its gap, at the bore nodes, at the
+    vertices of the gap over the face width and at the slopes of the gap there
     (N, n_bore + 2 n_lines) [N]."""
     touching: Mask
-    """Which of these points touch it, shape of ``pressure``."""
+    """Mask of the contact points that touch the wave generator, in the shape of
+    ``pressure``."""
     shared: Mask
-    """Lines of bore nodes along the axis whose contact the planes of the mesh share,
-    instead of a vertex of the gap (N, n_lines)."""
+    """Mask of the lines of bore nodes along the axis whose contact acts in several
+    planes of the mesh instead of at a vertex of the gap (N, n_lines)."""
     bore_force: Array
-    """The same as nodal forces in the frames of the teeth (N, 3 n_bore) [N]."""
+    """Forces of the wave generator as nodal forces in the frames of the teeth
+    (N, 3 n_bore) [N]."""
     flank_force: Array
-    """Tooth forces as nodal forces in those frames (N, n_flank) [N]."""
+    """Tooth forces as nodal forces in the frames of the flexspline's teeth (N, n_flank)
+    [N]."""
     ring_force: Array
-    """The same on the circular spline, in the frames of its teeth (N_c, n_c) [N]."""
+    """Tooth forces as nodal forces in the frames of the circular spline's teeth
+    (N_c, n_c) [N]."""
     race: Array | None = None
     """Coordinates of the outer race (N, 2, 4), see
-    :class:`swgjoint.fe.solid.wave_generator.race.SolidRace`; None on a rigid wave
+    :class:`swgjoint.fe.solid.wave_generator.race.SolidRace`; None for a rigid wave
     generator."""
     ball_force: Array | None = None
-    """Force of the balls of the drive [N]."""
+    """Forces of all balls of the drive (balls,) [N]."""
     held: ToothRows | None = None
     """Tooth contacts that carry force."""
     tooth_force: Array = field(default_factory=lambda: np.zeros(0))
-    """Their normal forces (n_contacts,) [N]."""
+    """Normal forces of these contacts (n_contacts,) [N]."""

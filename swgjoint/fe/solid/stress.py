@@ -16,10 +16,14 @@ from swgjoint.typing import Array, Index
 
 
 def flexspline_stresses(ring: SolidRing, state: SolidState) -> dict[str, Array]:
-    """Stress xx, yy, zz, xy, yz, zx at the nodes by segment [Pa]. (N, n_nodes, 6).
+    """Stress xx, yy, zz, xy, yz, zx at the nodes by segment (N, n_nodes, 6) [Pa].
 
-    In the frames of the segments; nodes on the faces get the mean of their two sectors,
-    those on the sections that of their two segments.
+    Stresses are in the frames of the segments. Nodes on the faces have the mean of
+    their two sectors, nodes on the sections that of their two segments.
+
+    Args:
+        ring: The ring.
+        state: The equilibrium.
     """
     found: dict[str, Array] = {}
     loads = ring.loads(state)
@@ -41,7 +45,15 @@ def flexspline_stresses(ring: SolidRing, state: SolidState) -> dict[str, Array]:
 
 
 def circular_spline_stresses(ring: SolidRing, state: SolidState) -> Array | None:
-    """The same in the frames of the circular spline's teeth; None if it is rigid."""
+    """Stresses of the circular spline as by :func:`flexspline_stresses`.
+
+    Args:
+        ring: The ring.
+        state: The equilibrium.
+
+    Returns:
+        Stress in the frames of its teeth (N_c, n_nodes, 6) [Pa]; None if it is rigid.
+    """
     gear = ring.teeth.ring_gear
     if gear is None:
         return None
@@ -58,14 +70,15 @@ def circular_spline_stresses(ring: SolidRing, state: SolidState) -> Array | None
 def average_faces(
     stress: Array, turn: Array, first: Index, last: Index, closure: Array
 ) -> None:
-    """Average a face over the sectors that share it, in place.
+    """Average the stress on a face over the sectors that share it, in place.
 
     Args:
-        stress: By sector and node in the frames of the sectors (N, n_nodes, 6) [Pa].
-        turn: Those frames (N, 3, 3).
+        stress: Stress by sector and node in the frames of the sectors (N, n_nodes, 6)
+            [Pa].
+        turn: Rotations of these frames (N, 3, 3).
         first: Nodes on the first face.
-        last: The same on the last one, which the next sector's first face meets.
-        closure: Factors of x, y, z that close the ring, of :class:`SolidRing`.
+        last: Nodes on the last face, which is the first face of the next sector.
+        closure: Factors of x, y, z that close the ring, see :class:`SolidRing` (3,).
     """
     after = np.roll(turn, -1, axis=0)
     after[-1] *= closure[:, None]
@@ -81,13 +94,13 @@ def average_faces(
 def average_sections(
     one: Array, other: Array, turns: tuple[Array, Array], sections: tuple[Index, Index]
 ) -> None:
-    """Average the section that two segments share, in place.
+    """Average the stress on a section over the segments that share it, in place.
 
     Args:
         one: Stress by sector and node in the frames of a segment (N, n_nodes, 6) [Pa].
-        other: The same of the next segment.
-        turns: Frames of both (N, 3, 3).
-        sections: Nodes of the section in both, in the same order.
+        other: Stress of the next segment in its frames (N, n_nodes, 6) [Pa].
+        turns: Rotations of the frames of both segments (N, 3, 3).
+        sections: Nodes of the section in both segments, in the same order.
     """
     end, begin = sections
     step = np.einsum("sji,sjk->sik", *turns)
@@ -97,7 +110,12 @@ def average_sections(
 
 
 def turned_stress(stress: Array, turn: Array) -> Array:
-    """Components in a frame in which the given one is turned by R (N, 3, 3)."""
+    """Stress R sigma R^T in frames in which the original ones are rotated by R.
+
+    Args:
+        stress: Components xx, yy, zz, xy, yz, zx (N, n, 6) [Pa].
+        turn: Rotations R (N, 3, 3).
+    """
     tensor = np.empty((*stress.shape[:-1], 3, 3))
     for k, (i, j) in enumerate(zip(ROWS, COLUMNS, strict=True)):
         tensor[..., i, j] = tensor[..., j, i] = stress[..., k]
@@ -107,13 +125,14 @@ def turned_stress(stress: Array, turn: Array) -> Array:
 
 @dataclass(frozen=True, kw_only=True)
 class StressPlace:
-    """Where the largest von Mises stress of the flexspline lies, in its sector."""
+    """Location of the largest von Mises stress of the flexspline."""
 
     part: str
-    """Segment; of the teeth: ``tooth``, ``root``, ``bore`` or ``back edge``."""
+    """Segment, or part of the toothed segment: ``tooth``, ``root``, ``bore`` or ``back
+    edge``."""
     sector: int
     position: tuple[float, float, float]
-    """In the frame of the tooth [m]."""
+    """Undeformed position in the frame of the tooth [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -128,7 +147,12 @@ class SolidMaxima:
 
     @classmethod
     def from_state(cls, ring: SolidRing, state: SolidState) -> SolidMaxima:
-        """Recover the stresses of a state."""
+        """Recover the stresses of a state.
+
+        Args:
+            ring: The ring.
+            state: The equilibrium.
+        """
         by_part, places = {}, {}
         for name, stress in flexspline_stresses(ring, state).items():
             maxima = stress_maxima(stress)
@@ -165,7 +189,7 @@ def _largest(maxima: tuple[Array, Array, Array]) -> StressMaxima:
 
 
 def _place(ring: SolidRing, part: str, sector: int, node: int) -> StressPlace:
-    """Name the place of a node."""
+    """Location of a node, with the name of its part."""
     strip = ring.strip
     number = [segment.name for segment in strip.segments].index(part)
     mesh = strip.mesh.segments[number].mesh

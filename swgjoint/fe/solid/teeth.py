@@ -1,7 +1,7 @@
-"""Tooth contact over the face width: the search of the plane model, plane by plane.
+"""Tooth contact over the face width: the 2D contact search in every plane of the mesh.
 
-The teeth of the circular spline are straight, so that a point of a flank meets them in
-its own plane. Crowning thins the flexspline's teeth towards both ends.
+The teeth of the circular spline are straight, so that a point of a flank touches them
+in its own plane. Crowning thins the flexspline's teeth towards both ends.
 """
 
 from __future__ import annotations
@@ -23,13 +23,14 @@ from swgjoint.typing import Array, Index
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FlankCrowning:
-    """Material taken off the flanks at the edges of the face width."""
+    """Crowning of the flanks over the face width."""
 
     height: float = 0.0
-    """[m]."""
+    """Material removed at the edges of the face width [m]."""
     width: float = 1.0
     """Face width [m]."""
     circular: bool = False
+    """Whether the crown is a circular arc instead of a parabola."""
 
     def displacement(self, strip: Strip) -> Array:
         """Inward motion of the flank nodes in their planes (n_planes, 2 n_b, 2) [m]."""
@@ -44,22 +45,23 @@ class FlankCrowning:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ToothRows:
-    """Candidates in all planes, seen by the flexspline in space; n of them."""
+    """The n candidate contacts of all planes and the 3D derivatives of their gaps."""
 
     contacts: Contacts
-    """In the planes' own frames; ``tooth`` counts the teeth of one plane."""
+    """Contacts in the frames of the planes; ``tooth`` counts the teeth of one plane."""
     plane: Index
-    """(n,)."""
+    """Planes of the contacts (n,)."""
     weight: Array
-    """Derivative of the gap by the flank nodes, frames of the teeth (n, n_flank)."""
+    """Derivative by the flank nodes in the frames of the teeth (n, n_flank)."""
     ring_weight: Array
-    """The same by the flanks of the circular spline (n, n_ring_flank)."""
+    """Derivative by the flank nodes of the circular spline (n, n_ring_flank)."""
     rows: Array
-    """Derivative by the masters of the teeth, global frame (n, 3 m)."""
+    """Derivative by the masters of the teeth in the global frame (n, 3 m)."""
     arm: Array
-    """Derivative by a rotation of the flexspline as a whole (n,) [m]."""
+    """Derivative by a rotation of the whole flexspline (n,) [m]."""
     ring_arm: Array
-    """Minus that by a rotation of the circular spline about its own axis (n,) [m]."""
+    """Negative derivative by a rotation of the circular spline about its own axis (n,)
+    [m]."""
 
     def __len__(self) -> int:
         return len(self.plane)
@@ -76,27 +78,28 @@ class ToothRows:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SolidTeeth:
-    """Both members' flanks."""
+    """Flanks of both members."""
 
     strip: Strip
     circular_spline: CircularSpline
-    """Profile and weights of its flank nodes in a plane."""
+    """Profile of the circular spline and weights of its flank nodes in a plane."""
     ring_gear: RingGear | None
-    """Elastic circular spline; None while it is rigid."""
+    """Elastic circular spline; None if it is rigid."""
     ring_teeth: int
     """Teeth of the circular spline in the model."""
     crowning: FlankCrowning
     shift: Array | None = None
     """Manufacturing errors of the flexspline's teeth in their frames (N, 2) [m]."""
     ring_shift: Array | None = None
-    """The same of the circular spline, which must be elastic (N_c, 2) [m]."""
+    """Manufacturing errors of the teeth of the circular spline, which must be elastic
+    (N_c, 2) [m]."""
     tilt: Array | None = None
-    """Slope in x and y of the axis of the circular spline, which meets that of the
-    drive in the middle of the face width and stands still (2,) [rad]."""
+    """Slope of the circular spline's axis in x and y (2,) [rad]; this axis is fixed and
+    intersects that of the drive in the middle of the face width."""
 
     @property
     def ring_dofs(self) -> int:
-        """Degrees of freedom of the flanks of one of its teeth, 0 if rigid."""
+        """Flank degrees of freedom of a circular spline's tooth; zero if rigid."""
         return 0 if self.ring_gear is None else self.ring_gear.flank.shape[1]
 
     def find(
@@ -114,12 +117,15 @@ class SolidTeeth:
 
         Args:
             frame: Frames of the toothed segments.
-            force: At their loaded degrees of freedom (N, n_b) [N].
-            ring_force: On the flanks of the circular spline (N_c, n_ring_flank) [N].
-            reach: Candidates with a larger gap are left out [m].
-            held: Points of the last iteration that carry force.
-            thorough: As in :meth:`ToothContact.search`.
-            ring_rotation: Of the circular spline [rad].
+            force: Forces at the loaded degrees of freedom of these segments (N, n_b)
+                [N].
+            ring_force: Forces on the flanks of the circular spline (N_c, n_ring_flank)
+                [N].
+            reach: Largest gap of a candidate [m].
+            held: Contacts of the last iteration that carry force; None without.
+            thorough: Whether to search between the nodes, see
+                :meth:`ToothContact.search`.
+            ring_rotation: Rotation of the circular spline [rad].
         """
         strip = self.strip
         n, planes, size = len(frame.turn), strip.planes, 2 * strip.flank_size
@@ -165,12 +171,12 @@ class SolidTeeth:
 
     def ring_place(self, ring_rotation: float) -> Array:
         """Angles of the teeth of the circular spline (N_c,) [rad]."""
-        # tooth j stands half a pitch on from space j
+        # tooth j is half a pitch ahead of space j
         pitch = 2.0 * np.pi / self.circular_spline.profile.teeth
         return np.asarray(pitch * (np.arange(self.ring_teeth) + 0.5) + ring_rotation)
 
     def _ring_offset(self, ring_rotation: float) -> Array:
-        """Errors of the circular spline's teeth in their frames (N_c, n_planes, 2)."""
+        """Errors of the circular spline's teeth by plane (N_c, n_planes, 2) [m]."""
         planes = self.strip.mesh.teeth.z
         offset = np.zeros((self.ring_teeth, len(planes), 2))
         if self.ring_shift is not None:

@@ -1,7 +1,7 @@
-"""How the gap of every tooth acts on the output of the 3D drive.
+"""Influence of the gap of every tooth on the output of the 3D drive.
 
-Tooth contacts may open and close anywhere over the face width; which bore nodes touch
-the wave generator stays as in the perfect drive.
+Tooth contacts may open and close anywhere over the face width; the bore nodes that
+touch the wave generator remain those of the perfect drive.
 """
 
 from __future__ import annotations
@@ -18,28 +18,36 @@ from swgjoint.fe.solid.teeth import ToothRows
 from swgjoint.typing import Mask
 
 REACH = 0.03
-"""Gap up to which a contact may close, in lobe heights. More points along the flanks
-than their local minima, as the plane model needs them, change nothing here."""
+"""Gap up to which a contact may close, in lobe heights [-]. Additional points along the
+flanks, which the 2D model needs, change nothing here."""
 
 
 def influence(ring: SolidRing, state: SolidState, *, ring_is_output: bool) -> Influence:
     """Condense a drive with perfect teeth at an equilibrium.
 
     Args:
-        ring: All sectors, an elastic circular spline, no errors of teeth and axis.
+        ring: Model of all sectors with an elastic circular spline, without errors of
+            teeth and axis.
         state: The equilibrium.
         ring_is_output: Whether the circular spline is the output.
+
+    Raises:
+        ValueError: If the model does not meet these conditions, or no tooth carries
+            force at the equilibrium.
     """
     teeth = ring.teeth
     errors = (teeth.shift, teeth.ring_shift, teeth.tilt)
     flawed = any(error is not None and error.any() for error in errors)
     if ring.half or teeth.ring_gear is None or flawed:
-        raise ValueError("needs all sectors, elastic, without errors of the teeth")
+        raise ValueError(
+            "the influence needs all sectors, an elastic circular spline and teeth"
+            " without errors"
+        )
     linear = linearise(ring, state)
     found, carries = _tooth_contacts(ring, linear, state)
     n = len(found)
     condensed = condense(ring, state, linear, found)
-    # the other member stands: the bore of the diaphragm or the circular spline
+    # the other member is fixed: the bore of the diaphragm or the circular spline
     used = np.append(np.arange(n), n + 1 if ring_is_output else n)
     offset = condensed.offset[used]
     offset[n] -= state.torque
@@ -75,10 +83,10 @@ def _gaps(ring: SolidRing, state: SolidState, found: ToothRows, carries: Mask) -
 def _tooth_contacts(
     ring: SolidRing, linear: SolidLinearised, state: SolidState
 ) -> tuple[ToothRows, Mask]:
-    """Points that may touch, and which of them carry force at the state."""
+    """Possible contact points, and a mask of those that carry force at the state."""
     held = state.held
     if held is None or not len(held):
-        raise ValueError("needs an equilibrium whose teeth carry force")
+        raise ValueError("the influence needs an equilibrium whose teeth carry force")
     found = ring.teeth.find(
         linear.frames[0],
         ring.loads(state),
