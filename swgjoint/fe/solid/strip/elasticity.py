@@ -18,22 +18,23 @@ ROWS, COLUMNS = (0, 1, 2, 0, 1, 2), (0, 1, 2, 1, 2, 0)
 
 
 def solid_basis(mesh: MeshHex) -> Basis:
-    """Vector basis of incompatible-mode hexahedra, 2 x 2 x 2 Gauss points."""
+    """Vector basis of incompatible-mode hexahedra with 2 x 2 x 2 Gauss points."""
     return Basis(mesh, ElementVector(ElementHexIncompatible()), intorder=3)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Solid:
-    """Stiffness and stress of a mesh in the displacements of its nodes.
+    """Stiffness and stress of a mesh in terms of its nodal displacements.
 
     Degrees of freedom list x, y, z of node after node; the incompatible modes are
     eliminated element by element.
     """
 
     stiffness: sparse.csr_matrix
-    """[N/m]. Shape (3 n, 3 n)."""
+    """Stiffness (3 n, 3 n) [N/m]."""
     stress: sparse.csr_matrix
-    """Nodal stress [Pa/m], rows 6 i to 6 i + 5 the components of node i. (6 n, 3 n)."""
+    """Nodal stress per displacement (6 n, 3 n) [Pa/m]; rows 6 i to 6 i + 5 are the
+    components at node i."""
 
 
 def solid(mesh: MeshHex, youngs_modulus: float, poisson_ratio: float) -> Solid:
@@ -44,8 +45,8 @@ def solid(mesh: MeshHex, youngs_modulus: float, poisson_ratio: float) -> Solid:
 
     Args:
         mesh: Hexahedra.
-        youngs_modulus: [Pa].
-        poisson_ratio: [-].
+        youngs_modulus: Young's modulus [Pa].
+        poisson_ratio: Poisson's ratio [-].
     """
     basis = solid_basis(mesh)
     mu = youngs_modulus / (2.0 * (1.0 + poisson_ratio))
@@ -79,8 +80,8 @@ def solid(mesh: MeshHex, youngs_modulus: float, poisson_ratio: float) -> Solid:
 def _stress_operator(basis: Basis, mu: float, lame: float) -> sparse.csr_matrix:
     """Nodal stress as a linear operator on all degrees of freedom.
 
-    Evaluated at the 2 x 2 x 2 Gauss points, extrapolated trilinearly to the corners of
-    each element and averaged over the elements of a node with equal weight.
+    Stress is evaluated at the 2 x 2 x 2 Gauss points, extrapolated trilinearly to the
+    corners of each element and averaged over the elements of a node with equal weights.
     """
     mesh = basis.mesh
     corners = np.asarray(mesh.elem.doflocs).T  # (3, 8)
@@ -120,10 +121,10 @@ def _stress_operator(basis: Basis, mu: float, lame: float) -> sparse.csr_matrix:
 
 
 def stress_maxima(stress: Array) -> tuple[Array, Array, Array]:
-    """Tensile, compressive (as a magnitude) and von Mises stress.
+    """Largest tensile and compressive (as a magnitude) and von Mises stress [Pa].
 
     Args:
-        stress: xx, yy, zz, xy, yz, zx in the last axis [Pa].
+        stress: Stress with components xx, yy, zz, xy, yz, zx in the last axis [Pa].
     """
     tensor = np.empty((*stress.shape[:-1], 3, 3))
     for k, (i, j) in enumerate(zip(ROWS, COLUMNS, strict=True)):

@@ -1,14 +1,16 @@
-r"""Master nodes: few points whose displacements carry those of faces and sections.
+r"""Master nodes: a few points whose displacements define those of faces and sections.
 
-Through the wall the displacement of a face is a straight line, a polynomial along the
-meridian of each segment, and what bends that line: a parabola and higher degrees, of
-lower degree along. A section between segments is the same around the sector. A plate
-that bends swells on one side and shrinks on the other, so its parabola follows the
-bending moment, which changes less along the wall than the wall moves: leaving the
-parabola out made the cup 0.5 % too stiff, its being short in degree costs 0.01 %.
+Through the wall the displacement of a face is a straight line plus a parabola and
+higher degrees. The coefficients are polynomials along the meridian of each segment,
+those of the parabola and above of a lower degree. On a section between segments they
+are polynomials around the sector. A plate in bending expands on one side and contracts
+on the other, so its parabola follows the bending moment, which varies less along the
+wall than the displacement. Without the parabola the cup was 0.5 % too stiff; its low
+degree costs 0.01 %.
 
-All this contains every linear field and adds up to one, so that master nodes turn like
-points of a body: the corotational model needs no more than their positions.
+These displacements contain every linear field and their weights add up to one, so that
+master nodes rotate like points of a body. The corotational model therefore needs only
+their positions.
 """
 
 from __future__ import annotations
@@ -24,46 +26,50 @@ from swgjoint.typing import Array, Index
 
 @dataclass(frozen=True, kw_only=True)
 class Orders:
-    """Degrees of the polynomials; no higher than the nodes of a mesh can tell apart.
+    """Degrees of the polynomials, limited to those that the nodes of a mesh resolve.
 
-    With these an improved reference cup under given forces is within 0.02 % of the
-    compliance that all nodes of faces and sections as masters give (465, not 176).
+    With the default degrees (176 masters) the compliance of an improved reference cup
+    under given forces is within 0.02 % of that with all nodes of faces and sections as
+    masters (465).
     """
 
     teeth: int = 10
-    """Of the straight lines through the rim along the face width; 8 raises the largest
-    tensile stress, at the back edge of the teeth, by 3 %."""
+    """Degree along the face width of the straight lines through the rim; with 8 the
+    largest tensile stress, at the back edge of the teeth, is 3 % higher."""
     cup: int = 4
-    """The same along each segment of the cup."""
+    """Degree along each segment of the cup of the straight lines through the wall."""
     at_teeth: int = 4
-    """Around the sector where the cup meets the teeth: the rim bends between teeth."""
+    """Degree around the sector where the cup meets the teeth, between which the rim
+    bends."""
     around: int = 2
-    """Around the sector at the other sections."""
+    """Degree around the sector at the other sections."""
     rim: int = 3
-    """Through the rim between two teeth."""
+    """Degree through the rim between two teeth."""
     wall: int = 2
-    """Through the wall of the cup, no higher than through the rim."""
+    """Degree through the wall of the cup, at most that through the rim."""
     rim_bending: int = 3
-    """Along the face width, of the degrees above one through the rim."""
+    """Degree along the face width of the parabola and higher degrees through the rim.
+    """
     wall_bending: int = 1
-    """Along a segment and around a section, of those through the wall."""
+    """Degree along a segment and around a section of the parabola and higher degrees
+    through the wall."""
 
     def __post_init__(self) -> None:
         most = len(THROUGH) - 1
         if not 1 <= self.wall <= self.rim <= most:
-            raise ValueError(f"degrees must be 1 <= wall <= rim <= {most}")
+            raise ValueError(f"expected degrees 1 <= wall <= rim <= {most}")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SegmentMasters:
-    """How the boundary of one segment follows the masters of the strip."""
+    """Boundary of one segment in terms of the masters of the strip."""
 
     boundary: Index
     """Node numbers of faces and sections (n_boundary,)."""
     masters: Index
-    """Masters of the strip, those that this segment hangs on (n_m,)."""
+    """Numbers of the strip's masters that move this segment (n_m,)."""
     weight: Array
-    """Displacement of the boundary by that of these masters (n_boundary, n_m)."""
+    """Weights of these masters in the boundary's displacement (n_boundary, n_m)."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -71,26 +77,33 @@ class Masters:
     """Master nodes of a strip: first face, sections, last face."""
 
     position: Array
-    """In the frame of the tooth (n, 3) [m]."""
+    """Positions in the frame of the tooth (n, 3) [m]."""
     face_size: int
+    """Number of masters on a face."""
     segments: tuple[SegmentMasters, ...]
     held: Index
-    """Masters of the strip at the bore of the diaphragm; all of its end section."""
+    """Masters at the bore of the diaphragm, which are those of the strip's end section.
+    """
 
     @property
     def size(self) -> int:
-        """How many."""
+        """Number of masters."""
         return len(self.position)
 
 
 def strip_masters(strip: StripMesh, orders: Orders | None = None) -> Masters:
-    """Masters of a strip and how its segments follow them."""
+    """Masters of a strip and the weights of its segments.
+
+    Args:
+        strip: Mesh of the strip.
+        orders: Degrees of the polynomials; None for the default ones.
+    """
     orders = orders or Orders()
     segments = strip.segments
     degrees = [_degrees(strip, k, orders) for k in range(len(segments))]
     faces, ends, count = list[Patch](), list[Index](), 0
     for k, along in enumerate(degrees):
-        # where it meets the cup the rim knows no more than the wall
+        # where it meets the cup, the rim has no higher degrees than the wall
         kept = min(len(part) for part in degrees[k : k + 2])
         points, numbers = [], []
         for level, degree in enumerate(along):
@@ -119,9 +132,10 @@ def strip_masters(strip: StripMesh, orders: Orders | None = None) -> Masters:
         around = tuple(min(part, len(segment.end) - 1) for part in (line, line, *bent))
         points, numbers = [], []
         for level, degree in enumerate(around):
-            own = int(ends[k][level])
+            on_first = int(ends[k][level])
             points += [(level, station) for station in range(degree + 1)]
-            numbers += [own, *range(count, count + degree - 1), own - face_size]
+            on_last = on_first - face_size  # counts from the end
+            numbers += [on_first, *range(count, count + degree - 1), on_last]
             count += degree - 1
         sections[k] = Patch(
             degrees=around, points=tuple(points), masters=np.array(numbers)
@@ -159,19 +173,19 @@ def strip_masters(strip: StripMesh, orders: Orders | None = None) -> Masters:
 
 
 def _degrees(strip: StripMesh, number: int, orders: Orders) -> tuple[int, ...]:
-    """Along a segment, by level through its wall."""
+    """Degrees along a segment, by level through its wall."""
     segment = strip.segments[number]
     line, bent, most = orders.cup, orders.wall_bending, orders.wall
     if number == 0:
         line, bent, most = orders.teeth, orders.rim_bending, orders.rim
     stations = len(np.unique(np.round(segment.position, 9)))
     levels = min(most, int(np.sum(segment.position < 1e-9)) - 1)
-    wanted = (line, line, *[bent] * (levels - 1))
-    return tuple(min(degree, stations - 1) for degree in wanted)
+    degrees = (line, line, *[bent] * (levels - 1))
+    return tuple(min(degree, stations - 1) for degree in degrees)
 
 
 def _inside(section: Index, patch: Patch, narrow: float, size: int) -> dict[int, Array]:
-    """Rows of the nodes of a section between the faces."""
+    """Weights of the nodes of a section between the faces."""
     n_phi, n_wall = section.shape
     around = np.linspace(0.0, 1.0, n_phi)[1:-1]
     depth = narrow + (1.0 - narrow) * np.linspace(0.0, 1.0, n_wall)
@@ -180,9 +194,10 @@ def _inside(section: Index, patch: Patch, narrow: float, size: int) -> dict[int,
 
 
 def _place(segment: SegmentMesh, follow: SegmentMasters, position: Array) -> None:
-    """Where new masters lie: the boundary follows them at rest, too.
+    """Set the positions of new masters so that they interpolate the boundary at rest.
 
-    The faces first: their masters must stay in them, where the next sector meets.
+    Those of the faces are set first, because they must lie in the faces, which the
+    neighbouring sectors share.
     """
     points = np.asarray(segment.mesh.p).T[follow.boundary]
     faces = np.isin(follow.boundary, np.concatenate([segment.first, segment.last]))
@@ -191,5 +206,5 @@ def _place(segment: SegmentMesh, follow: SegmentMasters, position: Array) -> Non
         known = np.isfinite(position[follow.masters, 0])
         new = ~known & (np.abs(weight).max(axis=0, initial=0.0) > 0.0)
         rest = points[part] - weight[:, known] @ position[follow.masters[known]]
-        found = np.linalg.lstsq(weight[:, new], rest, rcond=None)[0]
-        position[follow.masters[new]] = found
+        fitted = np.linalg.lstsq(weight[:, new], rest, rcond=None)[0]
+        position[follow.masters[new]] = fitted

@@ -1,9 +1,9 @@
 """3D mesh of one tooth sector of a member: a strip of segments along the axis.
 
-z runs from the open end to the closed one, 0 in the middle of the face width. The
-flexspline's strip has the teeth, three lengths of cylinder, the fillet and two lengths
-of diaphragm (thesis figures 3.21 to 3.23); the circular spline's has the teeth alone.
-Each segment turns on its own in the corotational model.
+z points from the open end to the closed one and is zero in the middle of the face
+width. The strip of the flexspline consists of the teeth, three lengths of cylinder, the
+fillet and two lengths of diaphragm (thesis figures 3.21 to 3.23); that of the circular
+spline has only the teeth. Each segment has its own rotation in the corotational model.
 """
 
 from __future__ import annotations
@@ -28,24 +28,27 @@ from swgjoint.gear.teeth.profile import ToothProfile
 from swgjoint.typing import Array, Index
 from swgjoint.units import mm
 
-# elements of the thesis along the face width; the cup then has 24 stations of 33 nodes
+# elements of the thesis along the face width; with it the cup has 24 stations of 33
+# nodes
 FACE_WIDTH = 10
 CYLINDER, FILLET, DIAPHRAGM = (2, 3, 4, 3), 4, (4, 4)
-# lengths of the parts of cylinder and diaphragm, from the teeth to the bore; the first
-# one belongs to the toothed segment, so that no section cuts its back edge
+# relative lengths of the parts of cylinder and diaphragm, from the teeth to the bore;
+# the first part belongs to the toothed segment, so that no section cuts its back edge
 CYLINDER_PARTS, DIAPHRAGM_PARTS = (0.05, 0.15, 0.5, 0.3), (0.3, 0.7)
 LARGEST_WALL = 0.9
-"""Of the rim: what is left of it above the cup's wall carries two rows of elements."""
+"""Largest wall of the cup over the rim [-]; the rest of the rim has two rows of
+elements."""
 SMALLEST_INNER_FILLET = 0.1
-"""Inner radius of the fillet over the wall thickness that can be meshed."""
+"""Smallest inner radius of the fillet over the wall thickness that can be meshed [-].
+"""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SegmentMesh:
     """One segment of a strip, in the frame of its tooth (tooth on +y).
 
-    Sections hold node numbers: around the sector from the first face to the last one,
-    both included, then from the outside to the bore side.
+    Sections hold node numbers by position around the sector, from the first face to the
+    last face, and by position through the wall, from the outside to the bore side.
     """
 
     name: str
@@ -53,15 +56,16 @@ class SegmentMesh:
     first: Index
     """Nodes of the clockwise face (n,)."""
     last: Index
-    """Their images on the counter-clockwise face (n,)."""
+    """Nodes of the counter-clockwise face, in the same order (n,)."""
     position: Array
-    """Where a face node lies between the ends of the segment, 0 to 1. (n,)."""
+    """Relative positions of the face nodes between both ends, 0 to 1 (n,) [-]."""
     depth: Array
-    """Where it lies between outside and bore side, 0 to 1. (n,)."""
+    """Relative depths of the face nodes from the outside to the bore side, 0 to 1 (n,)
+    [-]."""
     begin: Index | None
     """Section towards the teeth (n_phi, n_wall); None at a free end."""
     end: Index | None
-    """Section towards the bore of the diaphragm, the same."""
+    """Section towards the bore of the diaphragm (n_phi, n_wall); None at a free end."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -70,21 +74,21 @@ class TeethMesh:
 
     segment: SegmentMesh
     plane: SectorMesh
-    """The section that was extruded."""
+    """The extruded section."""
     z: Array
-    """Coordinate z of the planes (n_planes,) [m]."""
+    """Coordinates z of the planes (n_planes,) [m]."""
     nodes: Index
     """Node numbers by plane and node of the section (n_planes, n_plane_nodes)."""
 
     @property
     def flank(self) -> Index:
-        """Right, then left flank without the nodes on the faces (n_planes, n_b)."""
+        """Nodes of right and then left flank, except on faces (n_planes, n_b)."""
         plane = self.plane
         return self.nodes[:, np.r_[plane.flank_right[:-1], plane.flank_left[:-1]]]
 
     @property
     def bore(self) -> Index:
-        """Bore without the nodes on the faces (n_planes, n_phi)."""
+        """Nodes of the bore, except on faces (n_planes, n_phi)."""
         return self.nodes[:, self.plane.bore[1:-1]]
 
 
@@ -97,12 +101,12 @@ class StripMesh:
 
     @property
     def segments(self) -> tuple[SegmentMesh, ...]:
-        """All of them, the teeth first."""
+        """All segments, the teeth first."""
         return (self.teeth.segment, *self.cup)
 
     @property
     def narrow(self) -> float:
-        """How deep below the roots of the teeth the cup's outside lies, in rims."""
+        """Depth of the cup's outside below the roots of the teeth, in rims [-]."""
         end = self.teeth.segment.end
         if end is None:
             return 0.0
@@ -111,13 +115,13 @@ class StripMesh:
 
     @property
     def nodes(self) -> int:
-        """Nodes, sections between segments counted once, both faces counted."""
+        """Number of nodes; sections between segments count once, faces count twice."""
         shared = sum(seg.begin.size for seg in self.cup if seg.begin is not None)
         return int(sum(seg.mesh.p.shape[1] for seg in self.segments) - shared)
 
     @property
     def elements(self) -> int:
-        """Hexahedra."""
+        """Number of hexahedra."""
         return int(sum(seg.mesh.t.shape[1] for seg in self.segments))
 
 
@@ -128,7 +132,11 @@ def cup_wall(design: Design) -> float:
 
 
 def flexspline_strip(design: Design, profile: ToothProfile) -> StripMesh:
-    """Strip of the flexspline; without a ``[cup]`` the toothed ring alone.
+    """Strip of the flexspline; without a ``[cup]`` only the toothed ring.
+
+    Args:
+        design: The drive.
+        profile: Flank of the flexspline.
 
     Raises:
         DesignError: If the fillet is too small for the wall or the cup too short.
@@ -144,7 +152,12 @@ def flexspline_strip(design: Design, profile: ToothProfile) -> StripMesh:
 
 
 def circular_spline_strip(design: Design, profile: ToothProfile) -> StripMesh:
-    """Strip of the circular spline: the teeth over the face width."""
+    """Strip of the circular spline: the teeth over the face width.
+
+    Args:
+        design: The drive.
+        profile: Flank of the circular spline.
+    """
     rim, n = design.circular_spline.rim_mm * mm, design.mesh.refinement
     plane = sector_mesh(profile, rim, n)
     return StripMesh(teeth=teeth_mesh(plane, design.drive.face_width_mm * mm, n))
@@ -153,7 +166,14 @@ def circular_spline_strip(design: Design, profile: ToothProfile) -> StripMesh:
 def teeth_mesh(
     plane: SectorMesh, width: float, n: float, apron: SegmentMesh | None = None
 ) -> TeethMesh:
-    """The section extruded over the face width, the first part of the cup behind."""
+    """Extrude a section over the face width and join the first part of the cup.
+
+    Args:
+        plane: The section.
+        width: Face width [m].
+        n: Mesh refinement, a factor on the number of elements.
+        apron: First part of the cup; None without a cup.
+    """
     z = np.linspace(-0.5 * width, 0.5 * width, refine_count(FACE_WIDTH, n) + 1)
     size = plane.mesh.p.shape[1]
     nodes = np.arange(len(z))[:, None] * size + np.arange(size)
@@ -191,7 +211,7 @@ def teeth_mesh(
 
 
 def _joined(mesh: MeshHex, more: MeshHex) -> tuple[MeshHex, Index]:
-    """Two meshes that share nodes, and the new numbers of the second one's nodes."""
+    """Join two meshes at coincident nodes; new node numbers of the second mesh."""
     own, other = np.asarray(mesh.p).T, np.asarray(more.p).T
     apart, nearest = cKDTree(own).query(other)
     new = apart > 1e-9
@@ -204,7 +224,17 @@ def _joined(mesh: MeshHex, more: MeshHex) -> tuple[MeshHex, Index]:
 def cup_segments(
     design: Design, plane: SectorMesh, width: float, n: float
 ) -> tuple[SegmentMesh, ...]:
-    """Cylinder, fillet and diaphragm or flange."""
+    """Segments of cylinder, fillet and diaphragm or flange.
+
+    Args:
+        design: The drive, with a ``[cup]``.
+        plane: Section of the teeth, whose lower rim the cup continues.
+        width: Face width [m].
+        n: Mesh refinement, a factor on the number of elements.
+
+    Raises:
+        DesignError: If the fillet is too small for the wall or the cup too short.
+    """
     cup = design.cup
     assert cup is not None
     name, wall = design.drive.name, cup_wall(design)
@@ -213,20 +243,20 @@ def cup_segments(
     )
     if fillet < (1.0 + SMALLEST_INNER_FILLET) * wall:
         raise DesignError(
-            f"{name}: cup.fillet_mm = {cup.fillet_mm:g} around a wall of"
-            f" {wall / mm:.3g} mm cannot be meshed; accepted: at least"
+            f"{name}: cup.fillet_mm = {cup.fillet_mm:g}: with a wall of"
+            f" {wall / mm:.3g} mm the mesh needs at least"
             f" {(1.0 + SMALLEST_INNER_FILLET) * wall / mm:.3g} mm"
         )
     if length < 2.0 * fillet:
         raise DesignError(
-            f"{name}: cup.length_mm = {cup.length_mm:g} with a fillet of"
-            f" {cup.fillet_mm:g} mm; accepted: at least {2 * cup.fillet_mm:g} mm"
+            f"{name}: cup.length_mm = {cup.length_mm:g}: with a fillet of"
+            f" {cup.fillet_mm:g} mm expected at least {2 * cup.fillet_mm:g} mm"
         )
     face = plane.mesh.p[:, plane.face_first]
     inner = float(np.hypot(*face).min())
     z0, z1 = 0.5 * width, 0.5 * width + length
     inward = cup.kind == "cup"
-    # at the teeth the wall is the lower rim
+    # at the teeth the wall continues the lower rim
     rows = refine_count(LOWER_RIM, n) + 1
     at_teeth = np.hypot(*face)[-rows:]
     across = np.linspace(1.0, 0.0, rows)  # outside to bore side
@@ -271,10 +301,11 @@ def _shell(name: str, r: Array, z: Array, phi: Array) -> SegmentMesh:
     """A structured segment between two sections.
 
     Args:
-        name: Of the segment.
-        r: Radii by station and across the wall (n_s, n_w) [m].
-        z: The same.
-        phi: Angles clockwise from the tooth axis, the first face's first (n_phi,).
+        name: Name of the segment.
+        r: Radii by station and position across the wall (n_s, n_w) [m].
+        z: Coordinates z of the same points (n_s, n_w) [m].
+        phi: Angles clockwise from the tooth axis, starting at the first face (n_phi,)
+            [rad].
     """
     shape = (len(r), len(phi), r.shape[1])
     x = r[:, None, :] * np.sin(phi)[None, :, None]
@@ -287,7 +318,7 @@ def _shell(name: str, r: Array, z: Array, phi: Array) -> SegmentMesh:
         for b in (0, 1)
         for c in (0, 1)
     ]
-    # quadrilateral of the section, then the same one station on
+    # quadrilateral of the section, then that of the next station
     cells = np.stack([corner[k].ravel() for k in (0, 1, 3, 2, 4, 5, 7, 6)])
     middle = np.hypot(np.diff(r.mean(axis=1)), np.diff(z.mean(axis=1)))
     along = np.concatenate([[0.0], np.cumsum(middle)])
@@ -305,11 +336,11 @@ def _shell(name: str, r: Array, z: Array, phi: Array) -> SegmentMesh:
 
 
 def _hexahedra(points: Array, cells: Index) -> MeshHex:
-    """Mesh from cells that list a quadrilateral and the one opposite to it."""
+    """Mesh from cells that list a quadrilateral and the opposite one."""
     # corners of the unit cube in scikit-fem's order
     cube = np.array([7, 4, 1, 5, 6, 2, 0, 3])
     sorted_cells = np.empty_like(cells)
-    # our order: (0,0,0) (1,0,0) (1,1,0) (0,1,0), then the same at z = 1
+    # order of the cells: (0,0,0) (1,0,0) (1,1,0) (0,1,0), then the same at z = 1
     sorted_cells[[7, 4, 1, 5, 6, 2, 0, 3]] = cells
     a, b, d, e = (points[cells[k]] for k in (0, 1, 3, 4))
     volume = np.einsum("ei,ei->e", np.cross(b - a, d - a), e - a)

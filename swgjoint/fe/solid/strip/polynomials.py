@@ -1,4 +1,4 @@
-"""Polynomials on faces and sections in the displacements of master nodes."""
+"""Polynomials on faces and sections in terms of the displacements of master nodes."""
 
 from __future__ import annotations
 
@@ -11,18 +11,28 @@ from numpy.polynomial import Legendre
 from swgjoint.typing import Array, Index
 
 THROUGH = (0.0, 1.0, 0.5, 0.25, 0.75)
-"""Masters through the wall, from the outside: each one raises the degree by one."""
+"""Relative depths of the masters through the wall, from the outside [-]; each master
+raises the degree by one."""
 
 
 @cache
 def lobatto(order: int) -> Array:
-    """Points from 0 to 1, ends included, between which polynomials stay tame."""
+    """Gauss-Lobatto points from 0 to 1, between which interpolation does not oscillate.
+
+    Args:
+        order: Degree of the polynomials; there is one point more.
+    """
     inner = np.asarray(Legendre.basis(order).deriv().roots(), dtype=np.float64)
     return np.concatenate([[0.0], 0.5 * (1.0 + np.sort(inner)), [1.0]])
 
 
 def lagrange(points: Array, x: Array) -> Array:
-    """Values of the Lagrange polynomials of the points (n_x, n_points)."""
+    """Values of the Lagrange polynomials of some points (n_x, n_points).
+
+    Args:
+        points: Interpolation points (n_points,).
+        x: Places of evaluation (n_x,).
+    """
     weights = np.empty((len(x), len(points)))
     for k, point in enumerate(points):
         others = np.delete(points, k)
@@ -31,9 +41,13 @@ def lagrange(points: Array, x: Array) -> Array:
 
 
 def newton_polynomial(level: int, depth: Array) -> Array:
-    """Newton's polynomial that is one at a point of ``THROUGH``, zero at those before.
+    """Newton's polynomial that is one at a point of ``THROUGH``, zero at earlier ones.
 
     The first two are straight lines.
+
+    Args:
+        level: Number of the point in ``THROUGH``.
+        depth: Relative depths of evaluation, 0 to 1 [-].
     """
     before = THROUGH[:2] if level < 2 else THROUGH[:level]
     value = np.ones_like(depth)
@@ -45,25 +59,27 @@ def newton_polynomial(level: int, depth: Array) -> Array:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Patch:
-    """Polynomials on a face of a segment or on a section, and the masters they have."""
+    """Polynomials on a face of a segment or on a section, and their masters."""
 
     degrees: tuple[int, ...]
-    """Along, by level through the wall."""
+    """Degrees along the face or section, by level through the wall."""
     points: tuple[tuple[int, int], ...]
     """Level and station of every master."""
     masters: Index
-    """Their numbers; those of the last face count from the end."""
+    """Numbers of the masters; those of the last face count from the end."""
     narrow: float = 0.0
-    """How deep below the outside the segment's own begins at the first station."""
+    """Relative depth at which the outside of the segment begins at the first station
+    [-]."""
 
     def rows(self, along: Array, depth: Array, size: int, first: int = 0) -> Array:
         """Weights of all masters of a strip at points (n, size).
 
         Args:
-            along: Of the points, 0 to 1 (n,).
-            depth: The same from the outside to the bore side.
-            size: Of the strip.
-            first: Master that number 0 stands for.
+            along: Relative positions of the points along the patch, 0 to 1 (n,).
+            depth: Relative depths of the points from the outside to the bore side, 0 to
+                1 (n,).
+            size: Number of masters of the strip.
+            first: Offset added to the numbers of the masters.
         """
         own = np.array([lobatto(self.degrees[j])[k] for j, k in self.points])
         deep = np.array([THROUGH[j] for j, _ in self.points])
@@ -76,7 +92,7 @@ class Patch:
         return rows
 
     def _basis(self, along: Array, depth: Array) -> Array:
-        """Functions of the masters, not yet one at their own and zero at the others."""
+        """Basis functions at points, before the transformation to nodal ones."""
         columns = []
         for level, station in self.points:
             curve = lagrange(lobatto(self.degrees[level]), along)[:, station]

@@ -18,47 +18,53 @@ from swgjoint.typing import Array, Index
 class StripSegment:
     r"""One condensed segment in the frame of its tooth.
 
-    With d the displacements of its masters, F forces on the loaded surfaces:
+    With the displacements d of its masters and forces F on the loaded surfaces, the
+    displacements of these surfaces and the forces of the masters are
 
     .. math:: u_b = A d + C F, \quad f = \hat K d - A^T F,
 
-    and every node moves by :math:`u = N d + N_F F`. Vectors list x, y, z point after
+    and all nodes move by :math:`u = N d + N_F F`. Vectors list x, y, z point after
     point.
     """
 
     name: str
     mesh: SegmentMesh
     masters: Index
-    """Masters of the strip (n_m,)."""
+    """Numbers of its masters in the strip (n_m,)."""
     position: Array
-    """Their reference positions (n_m, 3) [m]."""
+    """Reference positions of its masters (n_m, 3) [m]."""
     stiffness: Array
-    """K hat [N/m]. Shape (3 n_m, 3 n_m)."""
+    """Stiffness K hat (3 n_m, 3 n_m) [N/m]."""
     loaded: Index
-    """Loaded degrees of freedom among those of the nodes (n_b,); none for a cup."""
+    """Loaded degrees of freedom among those of the nodes (n_b,); empty for a cup."""
     spread: sparse.csr_matrix
-    """S, forces there of forces F; u_b are averages with it (n_b, n_b)."""
+    """Matrix S from the forces F to nodal forces; u_b are averages with its transpose
+    (n_b, n_b)."""
     loaded_from_masters: Array
-    """A. Shape (n_b, 3 n_m)."""
+    """Matrix A from masters to loaded surfaces (n_b, 3 n_m)."""
     compliance: Array
-    """C [m/N]. Shape (n_b, n_b)."""
+    """Compliance C of the loaded surfaces (n_b, n_b) [m/N]."""
     nodal: Array
-    """N. Shape (3 n_nodes, 3 n_m)."""
+    """Matrix N from masters to all nodes (3 n_nodes, 3 n_m)."""
     nodal_from_force: Array
-    """N_F [m/N]. Shape (3 n_nodes, n_b)."""
+    """Displacement N_F of all nodes per force (3 n_nodes, n_b) [m/N]."""
     stress: sparse.csr_matrix
-    """Stress at the nodes from their displacements (6 n_nodes, 3 n_nodes) [Pa/m]."""
+    """Nodal stress per nodal displacement (6 n_nodes, 3 n_nodes) [Pa/m]."""
 
     def nodal_force(self, force: Array) -> Array:
-        """Forces S F at the loaded degrees of freedom (n, n_b) [N]."""
+        """Nodal forces S F at the loaded degrees of freedom (n, n_b) [N].
+
+        Args:
+            force: Forces F on the loaded surfaces (n, n_b) [N].
+        """
         return np.asarray((self.spread @ force.T).T)
 
     def displacement(self, d: Array, force: Array | None = None) -> Array:
-        """Displacement of all nodes (n, n_nodes, 3) [m].
+        """Displacements of all nodes (n, n_nodes, 3) [m].
 
         Args:
-            d: Of the masters in n sectors (n, 3 n_m) [m].
-            force: F on the loaded surfaces (n, n_b) [N].
+            d: Displacements of the masters in n sectors (n, 3 n_m) [m].
+            force: Forces F on the loaded surfaces (n, n_b) [N]; None without.
         """
         u = d @ self.nodal.T
         if force is not None:
@@ -69,10 +75,10 @@ class StripSegment:
         """Stress xx, yy, zz, xy, yz, zx at the nodes (n, n_nodes, 6) [Pa].
 
         Args:
-            u: From :meth:`displacement`.
+            u: Displacements of :meth:`displacement` (n, n_nodes, 3) [m].
         """
-        found = self.stress @ u.reshape(len(u), -1).T
-        return np.asarray(found.T).reshape(len(u), -1, 6)
+        stress = self.stress @ u.reshape(len(u), -1).T
+        return np.asarray(stress.T).reshape(len(u), -1, 6)
 
 
 def condense_segment(
@@ -86,17 +92,17 @@ def condense_segment(
     spread: sparse.csr_matrix | None = None,
     held: Index | None = None,
 ) -> StripSegment:
-    """Condense a segment, in real arithmetic, once per member.
+    """Condense a segment to its masters and loaded surfaces.
 
     Args:
-        mesh: The segment.
-        masters: What its faces and sections follow.
-        position: All masters of the strip (n, 3) [m].
-        youngs_modulus: [Pa].
-        poisson_ratio: [-].
-        loaded: Degrees of freedom at which forces may act (n_b,).
-        spread: S of :class:`StripSegment`; by default forces act where they are.
-        held: Nodes that do not move, beside the boundary.
+        mesh: Mesh of the segment.
+        masters: Masters that move its faces and sections.
+        position: Positions of all masters of the strip (n, 3) [m].
+        youngs_modulus: Young's modulus [Pa].
+        poisson_ratio: Poisson's ratio [-].
+        loaded: Degrees of freedom at which forces may act (n_b,); None for none.
+        spread: Matrix S of :class:`StripSegment`; None if forces are not spread.
+        held: Fixed nodes in addition to the boundary; None for none.
     """
     body = solid(mesh.mesh, youngs_modulus, poisson_ratio)
     return _condensed(mesh, body, masters, position, loaded, spread, held)
@@ -140,8 +146,8 @@ def _condensed(
     stiffness += pull.T @ solved[:, :n]
     stiffness = 0.5 * (stiffness + stiffness.T)
     if held is None:
-        # strips travel a thousand times farther than they strain: make rigid
-        # translation free of force to the last digit, not only to the solver's
+        # strips move a thousand times more than they deform: rigid translation must
+        # cause no force to the last digit, not only to the accuracy of the solver
         count = n // 3
         move = np.tile(np.eye(3), (count, 1)) / np.sqrt(count)
         strain = np.eye(n) - move @ move.T

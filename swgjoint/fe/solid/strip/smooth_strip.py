@@ -1,4 +1,4 @@
-"""A flexspline without teeth: the wall alone, for closed forms and comparison."""
+"""A flexspline without teeth, for comparison with closed forms."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from swgjoint.units import mm
 def smooth_strip(design: Design) -> StripMesh:
     """Strip whose first segment is the rim without its tooth.
 
-    The rows of elements are those of the toothed strip, so that the cup joins alike.
+    The rows of elements are those of the toothed strip, so that the same cup joins it.
     """
     n, rim = design.mesh.refinement, design.flexspline.rim_mm * mm
     side = refine_count(BORE, n)

@@ -21,10 +21,11 @@ from swgjoint.typing import Array
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Strip:
-    """One tooth sector of the flexspline, condensed; the teeth are the first segment.
+    """One condensed tooth sector of the flexspline; the teeth are the first segment.
 
-    Forces act at flank nodes, plane after plane, right then left flank, and after them
-    at bore nodes, plane after plane, all of them spread over a part of the face width.
+    Forces act at flank nodes, plane after plane, right flank before left flank, and
+    then at bore nodes, plane after plane. All of them are spread over a part of the
+    face width.
     """
 
     sectors: int
@@ -40,27 +41,27 @@ class Strip:
 
     @cached_property
     def flank_dofs(self) -> int:
-        """Loaded degrees of freedom of the flanks."""
+        """Number of loaded degrees of freedom on the flanks."""
         return int(3 * self.mesh.teeth.flank.size)
 
     @property
     def planes(self) -> int:
-        """Planes over the face width."""
+        """Number of mesh planes over the face width."""
         return len(self.mesh.teeth.z)
 
     @cached_property
     def spline(self) -> CubicSpline:
-        """Weights of the flank nodes of a plane at an arc length."""
+        """Weights of the flank nodes of a plane as functions of the arc length."""
         return average_spline(self.mesh.teeth.plane.flank_stations[:-1])
 
     @property
     def flank_size(self) -> int:
-        """Nodes of one flank in a plane."""
+        """Number of nodes of one flank in a plane."""
         return int(self.mesh.teeth.flank.shape[1]) // 2
 
     @property
     def flank_range(self) -> tuple[float, float]:
-        """Arc length over which a flank can touch: between the lands [m]."""
+        """Range of arc length over which a flank can touch, between the lands [m]."""
         low, high = self.profile.contact_range
         return max(low, float(self.spline.x[0])), min(high, float(self.spline.x[-1]))
 
@@ -89,8 +90,8 @@ def flexspline(
     Args:
         design: The drive.
         profile: Flank of the flexspline.
-        mesh: From :func:`swgjoint.fe.solid.strip.mesh.flexspline_strip`.
-        orders: Degrees of the displacements of faces and sections.
+        mesh: Mesh of :func:`swgjoint.fe.solid.strip.mesh.flexspline_strip`.
+        orders: Polynomial degrees of the displacements of faces and sections.
     """
     masters = strip_masters(mesh, orders)
     material = design.material_of("flexspline")

@@ -1,19 +1,21 @@
-r"""What an elastic wave generator does to a cup: lobe force, deflection, play.
+r"""Cup on an elastic wave generator: lobe force, deflection and tooth clearance.
 
 An elastic wave generator presses its lobes outward with springs instead of setting
-their height. With w the deflection of a lobe, :math:`w_0` the height of the lobes of
-the drive, k the stiffness and :math:`F_0` the force of a lobe at that height,
+their height. With the deflection w of a lobe, the height :math:`w_0` of the lobes of
+the drive, the stiffness k and the force :math:`F_0` of a lobe at that height,
 
 .. math:: F = F_0 + k\,(w_0 - w) = F_{cup}(w).
 
 :math:`F_{cup}` is the force of two opposite loads with large rotations
-(:mod:`swgjoint.fe.solid.figures.pinched_cup`): to first order the radial stiffness
-times w. A rigid wave generator is :math:`k \to \infty`, a soft one with preload k = 0.
+(:mod:`swgjoint.fe.solid.figures.pinched_cup`); to first order it is the radial
+stiffness times w. The limit :math:`k \to \infty` is a rigid wave generator, k = 0 a
+soft one with preload.
 
 The play of the teeth is the rotation of the unloaded output between the contacts of its
-two directions, teeth undeformed. It falls as w grows; where it vanishes the teeth take
-up, and from there on they carry what the springs have beyond :math:`F_{cup}`
-(:mod:`swgjoint.fe.solid.wave_generator.lobe_pads`; the circular spline elastic).
+two directions, with undeformed teeth. It decreases as w increases. Beyond the take-up
+deflection, at which it vanishes, the teeth carry the force of the springs in excess of
+:math:`F_{cup}` (:mod:`swgjoint.fe.solid.wave_generator.lobe_pads`, with an elastic
+circular spline).
 """
 
 from __future__ import annotations
@@ -39,9 +41,10 @@ from swgjoint.typing import Array
 from swgjoint.units import mm
 
 HEIGHTS = (0.25, 0.5, 0.75, 0.85, 0.95, 1.05, 1.15, 1.25)
-"""Of the lobes over that of the drive, about, where the cup is solved."""
+"""Approximate deflections at which the cup is solved, in lobe heights of the drive [-].
+"""
 BEYOND = (0.02, 0.05, 0.1, 0.15)
-"""Deflections beyond the take-up at which teeth are solved [lobe heights]."""
+"""Deflections beyond the take-up at which teeth are solved, in lobe heights [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,67 +52,68 @@ class ElasticWaveGenerator:
     """Springs behind two lobes."""
 
     stiffness: float
-    """Stiffness of each lobe, inf if rigid [N/m]."""
+    """Stiffness of each lobe, infinite if rigid [N/m]."""
     preload: float
-    """Force of each lobe at the lobe height of the drive; without effect if rigid [N].
-    """
+    """Force of each lobe at the lobe height of the drive [N]; unused if rigid."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class WorkingPoint:
-    """Where an elastic wave generator and a cup balance, without torque."""
+    """Equilibrium of an elastic wave generator and a cup without torque."""
 
     deflection: float
-    """Deflection of a lobe, outward [m]."""
+    """Outward deflection of a lobe [m]."""
     force: float
     """Force of a lobe [N]."""
     on_teeth: float
-    """Part of the force that presses the teeth into the spaces [N]."""
+    """Part of the force that presses the teeth into the tooth spaces [N]."""
     play: float
-    """Of the output, 0 where teeth are pressed; NaN where the lobes are so low that
-    teeth beside them overlap [rad]."""
+    """Play of the output [rad]; zero if the teeth are pressed, NaN if the lobes are so
+    low that teeth next to them overlap."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LobeCharacteristic:
-    """A cup between two lobes, from rest on."""
+    """Force and play of a cup over the deflection of two lobes."""
 
     height: float
     """Height of the lobes of the drive [m]."""
     deflection: Array
-    """Deflection of a lobe, increasing from 0 (n,) [m]."""
+    """Deflections of a lobe, increasing from zero (n,) [m]."""
     force: Array
-    """That it takes, the teeth free (n,) [N]."""
+    """Forces of a lobe without tooth contact (n,) [N]."""
     play: Array
-    """Of the output, see :mod:`swgjoint.fe.solid.figures.tooth_play` (n,) [rad]."""
+    """Play of the output (n,) [rad], see :mod:`swgjoint.fe.solid.figures.tooth_play`.
+    """
     pressed_deflection: Array
-    """From the take-up on; empty without one (m,) [m]."""
+    """Deflections from the take-up on (m,) [m]; empty without a take-up."""
     pressed_force: Array
-    """Part of the force of a lobe that the teeth take there, from 0 on (m,) [N]."""
+    """Parts of the force of a lobe that the teeth carry at these deflections,
+    increasing from zero (m,) [N]."""
 
     def force_at(self, deflection: float) -> float:
-        """Force of a lobe [N].
+        """Force of a lobe without tooth contact [N].
 
         Raises:
-            InputError: Outside the range that was solved.
+            InputError: If the deflection [m] is outside the range that was solved.
         """
         self._check(deflection)
         return float(CubicSpline(self.deflection, self.force)(deflection))
 
     def deflection_at(self, force: float) -> float:
-        """Deflection of a lobe [m].
+        """Deflection of a lobe without tooth contact [m].
 
         Raises:
-            InputError: Outside the range that was solved.
+            InputError: If the force [N] is outside the range that was solved.
         """
         if not self.force[0] <= force <= self.force[-1]:
             raise InputError(
-                f"lobe force {force:.4g} N; accepted: 0 to {self.force[-1]:.4g} N"
+                f"lobe force = {force:.4g} N: expected 0 to {self.force[-1]:.4g} N"
             )
         return float(CubicSpline(self.force, self.deflection)(force))
 
     def play_at(self, deflection: float) -> float:
-        """Play of the output, NaN where it has none that is finite [rad]."""
+        """Play of the output [rad]; NaN outside the deflections with a finite play."""
         self._check(deflection)
         finite = np.isfinite(self.play)
         w, play = self.deflection[finite], self.play[finite]
@@ -119,7 +123,7 @@ class LobeCharacteristic:
 
     @property
     def take_up(self) -> float:
-        """Deflection at which the play vanishes, inf beyond the range [m]."""
+        """Deflection at which the play vanishes [m]; infinite if beyond the range."""
         finite = np.isfinite(self.play)
         w, play = self.deflection[finite], self.play[finite]
         free = np.flatnonzero(play > 0.0)
@@ -130,35 +134,35 @@ class LobeCharacteristic:
         return float(brentq(self.play_at, w[free[-1]], w[free[-1] + 1]))
 
     def tooth_force_at(self, deflection: float) -> float:
-        """Part of the force of a lobe that the teeth take [N].
+        """Part of the force of a lobe that the teeth carry [N].
 
         Raises:
-            InputError: Outside the range that was solved.
+            InputError: If the deflection [m] is outside the range that was solved.
         """
         self._check(deflection)
         if not deflection > self.take_up:
             return 0.0
         if deflection > self.highest:
             raise InputError(
-                f"deflection {deflection / mm:.4g} mm; accepted: up to"
-                f" {self.highest / mm:.4g} mm, the teeth in contact"
+                f"deflection = {deflection / mm:.4g} mm: expected at most"
+                f" {self.highest / mm:.4g} mm with teeth in contact"
             )
         through = PchipInterpolator(self.pressed_deflection, self.pressed_force)
         return float(through(deflection))
 
     @property
     def highest(self) -> float:
-        """Deflection up to which force and contact of the teeth are known [m]."""
+        """Largest deflection with known forces of lobe and teeth [m]."""
         last = float(self.deflection[-1])
         if isinf(self.take_up):
             return last
         return min(last, float(np.max(self.pressed_deflection, initial=self.take_up)))
 
     def working_point(self, generator: ElasticWaveGenerator) -> WorkingPoint:
-        """Balance of springs, cup and teeth.
+        """Equilibrium of springs, cup and teeth.
 
         Raises:
-            InputError: If they balance outside the range that was solved.
+            InputError: If the equilibrium is outside the range that was solved.
         """
         k, w = generator.stiffness, self.height
         if not isinf(k):
@@ -171,8 +175,8 @@ class LobeCharacteristic:
             if not pushed(low) >= 0.0 >= pushed(high):
                 least, most = (generator.preload - pushed(end) for end in (low, high))
                 raise InputError(
-                    f"preload {generator.preload:.4g} N with {k / 1e3:.4g} N/mm;"
-                    f" accepted: {least:.4g} to {most:.4g} N"
+                    f"preload = {generator.preload:.4g} N with a stiffness of"
+                    f" {k / 1e3:.4g} N/mm: expected {least:.4g} to {most:.4g} N"
                 )
             w = float(brentq(pushed, low, high, xtol=1e-15))
         on_teeth = self.tooth_force_at(w)
@@ -187,7 +191,7 @@ class LobeCharacteristic:
         low, high = self.deflection[0], self.deflection[-1]
         if not low <= deflection <= high:
             raise InputError(
-                f"deflection {deflection / mm:.4g} mm; accepted: {low / mm:.4g} to"
+                f"deflection = {deflection / mm:.4g} mm: expected {low / mm:.4g} to"
                 f" {high / mm:.4g} mm"
             )
 
@@ -199,24 +203,25 @@ def lobe_characteristic(
     heights: Sequence[float] = HEIGHTS,
     progress: Progress = silent,
 ) -> LobeCharacteristic:
-    """Press the flexspline of a design apart and look at its teeth.
+    """Force and play of a design's flexspline pressed apart by two lobes.
 
     Args:
         design: The drive, with a ``[cup]``.
-        place: One of :data:`swgjoint.fe.solid.figures.pinched_cup.PLACES`.
-        heights: Deflections over the lobe height of the drive, about, increasing.
-        progress: Called after every one.
+        place: Axial position of the lobe force, one of
+            :data:`swgjoint.fe.solid.figures.pinched_cup.PLACES`.
+        heights: Approximate deflections, increasing, in lobe heights of the drive [-].
+        progress: Called after every deflection.
 
     Raises:
-        DesignError: If it cannot be meshed, has an odd number of teeth or is not
-            modelled in space.
-        ComputationError: If a solve fails or memory will not do.
+        DesignError: If the design cannot be meshed, has an odd number of teeth or has
+            features that the 3D model lacks.
+        ComputationError: If a solve fails or the model does not fit in memory.
     """
     ring = solid_ring(design, half=True)
     cup, height = cup_of(ring, design), lobe_height(design)
     stiffness = cup.pull(1.0, place).stiffness
     total = len(heights) + len(BEYOND)
-    rows = [(0.0, 0.0, nan)]  # at rest the teeth of every drive overlap
+    rows = [(0.0, 0.0, nan)]  # undeflected, the teeth of every drive overlap
     for k, share in enumerate(heights):
         pulled = cup.pull(share * stiffness * height, place, nonlinear=True)
         frame = cup.frames(pulled.masters, nonlinear=True)[0]
@@ -227,7 +232,7 @@ def lobe_characteristic(
         progress("lobe force", k + 1, total)
     force, deflection, plays = np.array(rows).T
     none = np.zeros(0)
-    found = LobeCharacteristic(
+    free_teeth = LobeCharacteristic(
         height=height,
         force=force,
         deflection=deflection,
@@ -235,14 +240,14 @@ def lobe_characteristic(
         pressed_deflection=none,
         pressed_force=none,
     )
-    if isinf(found.take_up):
-        return found
-    pressed, planes = [(found.take_up, 0.0)], cup.share(place)
+    if isinf(free_teeth.take_up):
+        return free_teeth
+    pressed, planes = [(free_teeth.take_up, 0.0)], cup.share(place)
     for k, part in enumerate(BEYOND):
-        w = found.take_up + part * height
+        w = free_teeth.take_up + part * height
         if w > deflection[-1]:
             break
-        pulled = cup.pull(found.force_at(w), place, nonlinear=True)
+        pulled = cup.pull(free_teeth.force_at(w), place, nonlinear=True)
         try:
             taken = force_on_teeth(ring, design.ratio, planes, pulled.of_planes)
         except ComputationError:
@@ -250,11 +255,16 @@ def lobe_characteristic(
         pressed.append((pulled.deflection, taken))
         progress("lobe force", len(heights) + k + 1, total)
     beyond, taken_by_teeth = np.array(pressed).T
-    return replace(found, pressed_deflection=beyond, pressed_force=taken_by_teeth)
+    return replace(free_teeth, pressed_deflection=beyond, pressed_force=taken_by_teeth)
 
 
 def cup_of(ring: SolidRing, design: Design) -> PinchedCup:
-    """The flexspline of half a drive, to be pulled apart."""
+    """The flexspline of a half model, with loads on its bore.
+
+    Args:
+        ring: Half model of the drive.
+        design: The drive.
+    """
     strip, flank = ring.strip, ring.strip.flank_dofs // 3
     return PinchedCup(
         name=design.drive.name,

@@ -1,8 +1,9 @@
-"""Two opposite pads in the bore: a lobe height that the teeth may resist.
+"""Two opposite pads in the bore that prescribe a lobe height against the teeth.
 
-Loads leave the deflection free, so that teeth that touch would only stop it. A pad over
-one pitch of the bore sets it, plane by plane to what the loads do, and the solver of
-the drive finds the contacts. Its force with teeth less that without is what they take.
+Prescribed loads leave the deflection free, so that touching teeth would only limit it.
+A pad over one pitch of the bore prescribes the deflection that the loads cause in every
+plane, and the solver of the drive finds the contacts. The teeth carry the difference of
+the pad's force with and without them.
 """
 
 from __future__ import annotations
@@ -20,26 +21,31 @@ from swgjoint.fe.solid.wave_generator.surface import WaveGeneratorSurface
 from swgjoint.typing import Array
 
 NEAR = 0.49
-"""Half of the width of a pad [pitches]: the nodes of one tooth."""
+"""Half of the width of a pad, which covers the nodes of one tooth [pitches]."""
 AWAY = 1.0
-"""Gap where there is no pad [m]."""
+"""Gap outside the pads [m]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LobePads(WaveGeneratorSurface):
-    """Two pads on the y axis, round as the bore, in the planes of a load."""
+    """Two cylindrical pads on the y axis in the planes of a load."""
 
     planes: Array
-    """z where they press (n,) [m]."""
+    """Coordinates z of the loaded planes (n,) [m]."""
     radius: Array
-    """There, from the axis of the drive (n,) [m]."""
+    """Radii of the pads in these planes, from the axis of the drive (n,) [m]."""
     half: float
-    """Half of their width [m]."""
+    """Half of the width of a pad [m]."""
     reach: float
-    """Along z, around these planes [m]."""
+    """Half of the length of a pad in each plane, along z [m]."""
 
     def gap(self, points: Array, alpha: float) -> tuple[Array, Array, Array]:
-        """As that of a wave generator; the pads stand at angle zero."""
+        """Gap, its gradient and curvature, see :meth:`WaveGeneratorSurface.gap`.
+
+        Args:
+            points: Positions in the global frame (n, 3) [m].
+            alpha: Angle of the wave generator [rad]; ignored, the pads are at zero.
+        """
         x, y, z = points.T
         radius = np.hypot(x, y)
         away = np.abs(z[:, None] - self.planes)
@@ -50,17 +56,17 @@ class LobePads(WaveGeneratorSurface):
 
 
 def with_pads(ring: SolidRing, share: Array, deflection: Array) -> SolidRing:
-    """The drive with pads in place of its wave generator.
+    """The drive with pads instead of its wave generator.
 
     Args:
-        ring: Half of it.
-        share: Part of the load in every plane, as in
-            :meth:`swgjoint.fe.solid.figures.pinched_cup.PinchedCup.share` (n_planes,).
-        deflection: Of the lobe in every plane (n_planes,) [m].
+        ring: Half model of the drive.
+        share: Part of the load in every plane (n_planes,) [-], see
+            :meth:`swgjoint.fe.solid.figures.pinched_cup.PinchedCup.share`.
+        deflection: Deflection of the lobe in every plane (n_planes,) [m].
     """
     bore = float(np.hypot(ring.strip.bore[:, 0], ring.strip.bore[:, 1]).min())
     z, loaded = ring.strip.mesh.teeth.z, share > 0.0
-    # contact sees displacements averaged over a part of the width
+    # contact acts on displacements averaged over a part of the width
     deflection = spread_forces(z, 1).T @ deflection
     pads = LobePads(
         outline=ring.wave_generator.outline,
@@ -77,13 +83,13 @@ def with_pads(ring: SolidRing, share: Array, deflection: Array) -> SolidRing:
 def force_on_teeth(
     ring: SolidRing, ratio: float, share: Array, deflection: Array
 ) -> float:
-    """What the teeth add to the force of a lobe [N].
+    """Part of the force of a lobe that the teeth carry [N].
 
     Args:
-        ring: Half of the drive.
-        ratio: Signed i.
-        share: As in :func:`with_pads`.
-        deflection: The same.
+        ring: Half model of the drive.
+        ratio: Signed ratio i [-].
+        share: Part of the load in every plane (n_planes,) [-].
+        deflection: Deflection of the lobe in every plane (n_planes,) [m].
 
     Raises:
         ComputationError: If a solve fails.
@@ -96,7 +102,12 @@ def force_on_teeth(
 
 
 def pad_force(ring: SolidRing, state: SolidState) -> float:
-    """Outward force of a pad on the half [N]."""
+    """Outward force of a pad on the half model [N].
+
+    Args:
+        ring: Half model with pads.
+        state: Its equilibrium.
+    """
     turn = ring.frames(state)[0].turn
     force = state.bore_force.reshape(ring.sectors, -1, 3)
     return float(np.einsum("sj,spj->", turn[:, 1], force))
@@ -104,5 +115,7 @@ def pad_force(ring: SolidRing, state: SolidState) -> float:
 
 def _checked(state: SolidState, height: float) -> SolidState:
     if not state.outcome.ok:
-        raise ComputationError(f"lobes at {1e3 * height:.4g} mm: {state.outcome.value}")
+        raise ComputationError(
+            f"lobe height = {1e3 * height:.4g} mm: {state.outcome.value}"
+        )
     return state

@@ -1,17 +1,18 @@
-"""The bearing of the wave generator in space: its outer race on its balls.
+"""The 3D bearing of the wave generator: its outer race on its balls.
 
-The race bends and stretches in its plane as the nonlinear ring of
+In its plane the race bends and stretches like the nonlinear ring of
 :mod:`swgjoint.fe.rings`, on Hertz balls with clearance on the cam. Its outside
 (:mod:`swgjoint.fe.solid.wave_generator.race_outside`) is straight over its width and
 rolls about the circumferential direction
 (:mod:`swgjoint.fe.solid.wave_generator.race_roll`), by u(s) at its edges.
 
-Assumed: all balls roll in the middle plane of race and face width, and their grooves
-take no moment about the circumferential direction. Along the axis the grooves give way
-(normal clearances leave tenths of a millimetre; the race may warp) or hold (it may not,
-and rolls sixteen times as hard at two lobes): two bounds. The axial motion does not
-shift the outside. A slope of the wave generator is none of the race's, which takes the
-slope of the bore; a crown is ground on its outside.
+All balls are assumed to roll in the middle plane of race and face width, in grooves
+that transmit no moment about the circumferential direction. Along the axis the grooves
+leave the race free (normal clearances allow tenths of a millimetre, and the race may
+warp) or hold it (no warping, and sixteen times the roll stiffness at two lobes). These
+are two bounds. The axial motion does not shift the outside. A slope of the wave
+generator does not apply to the race, which adopts the slope of the bore; a crown is
+ground on its outside.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ from swgjoint.gear.design.design import Design
 from swgjoint.typing import Array, Mask
 
 KINDS = ("x", "y", "roll", "axial")
-"""Of a node; values, then derivatives by the parameter of an element."""
+"""Coordinates of a node: values, then derivatives by the parameter of an element."""
 NODE = 2 * len(KINDS)
 SIGN = np.tile([-1.0, -1.0, 1.0, 1.0], 2)
 """Factors that close half a ring."""
@@ -39,16 +40,16 @@ PLANE = np.array([0, 1, 4, 5, 8, 9, 12, 13])
 ROLL = np.array([2, 6, 10, 14])
 AXIAL = np.array([3, 7, 11, 15])
 ANCHOR = 1e-11
-"""Part of the largest stiffness that holds back in every step what nothing holds. At
-1e-9 the race of size 25 and ratio 100 went half of the way left at every step."""
+"""Stiffness added to every step against unconstrained motions, relative to the largest
+one [-]. At 1e-9 the race of size 25 and ratio 100 halved its error at every step."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SolidRace:
     """Outer race, balls and cam around the sectors of a model.
 
-    Coordinates have the shape (sectors, 2, 4): nodes at the first faces of the sectors,
-    value and derivative, x and y of the mean line, u and w, all in metres.
+    Coordinates form an array (sectors, 2, 4) [m] of nodes at the first faces of the
+    sectors, value or derivative, and x and y of the mean line, u or w.
     """
 
     on_balls: RaceOnBalls
@@ -63,7 +64,13 @@ class SolidRace:
     def from_design(
         cls, design: Design, *, half: bool, axially_free: bool = True
     ) -> SolidRace:
-        """That of a design; its flexspline has as many sectors as the race elements."""
+        """Race of a design, with as many elements as its flexspline has sectors.
+
+        Args:
+            design: A drive whose wave generator has a ball bearing.
+            half: Whether to model half of the race.
+            axially_free: Whether the grooves leave the race free along the axis.
+        """
         own = RaceOnBalls.from_design(design, design.drive.teeth_flexspline)
         return cls(
             on_balls=own,
@@ -75,7 +82,7 @@ class SolidRace:
 
     @property
     def sectors(self) -> int:
-        """Elements in the model."""
+        """Number of elements in the model."""
         return self.on_balls.race.elements // (2 if self.half else 1)
 
     @property
@@ -84,16 +91,16 @@ class SolidRace:
         return 2.0 * pi / self.on_balls.race.elements
 
     def covers(self, z: Array) -> Mask:
-        """Which places along the axis lie on the race."""
+        """Mask of the positions z along the axis [m] that are on the race."""
         return self.outside.covers(z)
 
     def initial_guess(self, alpha: float, rotation: float, closed: float) -> Array:
-        """Start of a search: deflected by the lobes, pressed on the balls there.
+        """Start of a search: a race deflected by the lobes and pressed on their balls.
 
         Args:
             alpha: Wave-generator angle [rad].
-            rotation: Of race and flexspline [rad].
-            closed: Where the coned bore would meet the undeformed one [m].
+            rotation: Rotation of race and flexspline [rad].
+            closed: Coordinate z at which the coned bore meets the undeformed one [m].
         """
         own = self.on_balls
         w0 = 1.01 * (own.lobe_height + 0.5 * own.bearing.clearance)
@@ -108,25 +115,30 @@ class SolidRace:
 
     @property
     def _still(self) -> Array:
-        """Undeformed coordinates in the frames of the teeth, of all nodes (2, 4)."""
+        """Undeformed coordinates of every node in the frame of its tooth (2, 4) [m]."""
         still = np.zeros((2, len(KINDS)))
         still[:, :2] = self.on_balls.race.reference[0]
         still[:, :2] = rotate(still[:, :2], -0.5 * self.pitch)
         return still
 
     def displacements(self, race: Array, rotation: float) -> Array:
-        """Motion of the nodes in the frames of the teeth, turned with the flexspline.
+        """Displacements of the nodes in frames that rotate with the flexspline.
 
         Args:
-            race: Coordinates.
-            rotation: Of the flexspline [rad].
+            race: Coordinates (N, 2, 4) [m].
+            rotation: Rotation of the flexspline [rad].
         """
         angle = self.pitch * np.arange(self.sectors, dtype=np.float64) + rotation
         flat = rotate(race[..., :2], -angle[:, None])
         return np.concatenate([flat, race[..., 2:]], axis=-1) - self._still
 
     def coordinates(self, displaced: Array, rotation: float) -> Array:
-        """Coordinates of nodes that have moved so in the frames of the teeth."""
+        """Coordinates (N, 2, 4) [m], the inverse of :meth:`displacements`.
+
+        Args:
+            displaced: Displacements in the frames of the teeth (N, 2, 4) [m].
+            rotation: Rotation of the flexspline [rad].
+        """
         race = displaced + self._still
         angle = self.pitch * np.arange(self.sectors, dtype=np.float64) + rotation
         flat = rotate(race[..., :2], angle[:, None])
@@ -141,7 +153,12 @@ class SolidRace:
         return np.concatenate([nodes, last], axis=1)
 
     def forces(self, race: Array, alpha: float) -> RaceForces:
-        """Race and balls at given coordinates."""
+        """Forces of race and balls.
+
+        Args:
+            race: Coordinates (N, 2, 4) [m].
+            alpha: Wave-generator angle [rad].
+        """
         own, n = self.on_balls.race, self.sectors
         plane = race[..., :2]
         whole = np.concatenate([plane, -plane]) if self.half else plane
@@ -184,14 +201,14 @@ class SolidRace:
         )
 
     def _feet(self, race: Array, alpha: float) -> Array:
-        """Places of the balls on the race, about."""
+        """Approximate feet of the balls on the race, element number plus parameter."""
         centre = self.on_balls.balls(alpha, self.phase)[0]
         angle = np.arctan2(-centre[:, 0], centre[:, 1])
         begin = np.arctan2(-race[0, 0, 0], race[0, 0, 1])
         return np.asarray(np.mod(angle - begin, 2.0 * pi) / self.pitch)
 
     def _fixed(self, race: Array) -> Mask:
-        """The race turns and moves along the axis in its place: node 0 does not."""
+        """Mask of fixed coordinates: node 0 prevents rotation and axial motion."""
         fixed = np.zeros((len(race), 2 * NODE), dtype=bool)
         x, y = race[0, 0, :2]
         first = [0 if abs(y) > abs(x) else 1, 3]
@@ -205,9 +222,9 @@ class SolidRace:
         """Gap of bore nodes to the outside of the race, and its derivatives.
 
         Args:
-            race: Coordinates.
-            points: Of every sector, global frame (N, b, 3) [m].
-            start: Their places on the elements of their sectors, about (b,).
+            race: Coordinates (N, 2, 4) [m].
+            points: Points of every sector in the global frame (N, b, 3) [m].
+            start: Initial guess of their parameters on the elements (b,).
 
         Returns:
             Gap (N, b) [m], derivatives by the points (N, b, 3) and by the coordinates

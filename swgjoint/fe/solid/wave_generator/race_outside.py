@@ -1,8 +1,8 @@
-r"""Outside of the wave generator's outer race: where the bore of the rim lies on it.
+r"""Outer surface of the wave generator's outer race, which supports the rim's bore.
 
-It is straight over its width but for a crown c, and rolls by u at its edges. With z
-from its middle, the bore at a distance d outside of the mean line of a race of
-thickness t and width b has
+The surface is straight over its width except for a crown c, and rolls by u at its
+edges. With z from its middle, the gap of a bore at a distance d from the mean line of a
+race of thickness t and width b is
 
 .. math:: g = d - \tfrac12 t + c(z) - \frac{2z}{b}\,u .
 """
@@ -23,21 +23,22 @@ from swgjoint.units import mm, um
 
 @dataclass(frozen=True, kw_only=True)
 class RaceOutside:
-    """Surface that carries the bore, in SI."""
+    """Surface that supports the bore, in SI units."""
 
     thickness: float
-    """t of the race [m]."""
+    """Thickness t of the race [m]."""
     width: float
-    """b of the race [m]."""
+    """Width b of the race [m]."""
     crowning: float
-    """At the edges of the face width [m]."""
+    """Depth of the crown at the edges of the face width [m]."""
     face_width: float
-    """[m]."""
+    """Face width of the teeth [m]."""
     circular: bool
+    """Whether the crown is a circular arc instead of a parabola."""
 
     @classmethod
     def from_design(cls, design: Design) -> RaceOutside:
-        """That of a design."""
+        """Outer surface of a design's race."""
         bearing, shape = BallBearing.from_design(design), design.micro_geometry
         return cls(
             thickness=bearing.race_thickness,
@@ -48,7 +49,7 @@ class RaceOutside:
         )
 
     def covers(self, z: Array) -> Mask:
-        """Which places along the axis lie on the race."""
+        """Mask of the positions z along the axis [m] that are on the race."""
         return np.asarray(np.abs(z) <= 0.5 * self.width * (1.0 + 1e-9))
 
     def gap(
@@ -57,16 +58,16 @@ class RaceOutside:
         """Gap of points to the outside, and its derivatives.
 
         Args:
-            line: Mean line: both nodes of the elements, values and derivatives by
-                their parameters, x and y (N, 4, 2) [m].
-            edge: u in the same order (N, 4) [m].
-            points: Of every sector, global frame (N, b, 3) [m].
-            start: Their places on the elements of their sectors, about (b,).
+            line: Mean line: values and derivatives by the parameter at both nodes of
+                the elements, in x and y (N, 4, 2) [m].
+            edge: Roll displacements u in the same order (N, 4) [m].
+            points: Points of every sector in the global frame (N, b, 3) [m].
+            start: Initial guess of their parameters on the elements (b,).
 
         Returns:
             Gap (N, b) [m], derivatives by the points (N, b, 3), by the mean line
-            (N, b, 4, 2) and by u (N, b, 4). Points beyond an element see its cubic go
-            on.
+            (N, b, 4, 2) and by u (N, b, 4). The cubic of an element is extended to
+            points beyond its ends.
         """
         flat, z = points[..., :2], points[..., 2]
         xi = np.broadcast_to(start, z.shape).copy()

@@ -1,8 +1,9 @@
 r"""Roll of the wave generator's outer race about the circumferential direction.
 
-The edge at z = b/2 goes out by u, the other one in. Roll :math:`\vartheta = 2u/b` and
-motion w along the axis resist as in a curved beam (Timoshenko, Strength of Materials
-II, circular rings out of their plane; textbook, not checked):
+The edge at z = b/2 moves outward by u and the other edge inward. Roll
+:math:`\vartheta = 2u/b` and axial motion w have the strain energy of a curved beam
+(Timoshenko, Strength of Materials II, circular rings out of their plane; textbook, not
+checked):
 
 .. math:: U = \int \tfrac12 EI_z\Bigl(\frac\vartheta r - w''\Bigr)^2
     + \tfrac12 GJ\Bigl(\vartheta' + \frac{w'}r\Bigr)^2 ds, \quad
@@ -23,19 +24,26 @@ from swgjoint.typing import Array
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RaceRoll:
-    """Out-of-plane stiffness of the elements of a ring, in SI."""
+    """Out-of-plane stiffness of the elements of a ring, in SI units."""
 
     ring: HermiteRing
     width: float
-    """b of the race [m]."""
+    """Width b of the race [m]."""
     rolling: float
-    """E I_z [N m^2]."""
+    """Out-of-plane bending stiffness E I_z [N m^2]."""
     twisting: float
-    """G J [N m^2]."""
+    """Torsional stiffness G J [N m^2]."""
 
     @classmethod
     def from_bearing(cls, bearing: BallBearing, ring: HermiteRing) -> RaceRoll:
-        """That of a bearing; the groove takes its part of J, none of I_z."""
+        """Out-of-plane stiffness of a bearing's race.
+
+        The groove reduces J but not I_z.
+
+        Args:
+            bearing: The bearing.
+            ring: Its outer race in the plane.
+        """
         t, b, steel = bearing.race_thickness, bearing.race_width, bearing.material
         torsion = bearing.groove_inertia_factor * b * t**3 / 3.0 * (1.0 - 0.63 * t / b)
         shear = 0.5 * steel.youngs_modulus / (1.0 + steel.poisson_ratio)
@@ -48,7 +56,7 @@ class RaceRoll:
 
     @cached_property
     def stiffness(self) -> Array:
-        """Stiffness of an element by u and w of its nodes (8, 8) [N/m]."""
+        """Stiffness of an element for u and w of its nodes (8, 8) [N/m]."""
         points, weights = np.polynomial.legendre.leggauss(4)
         value, first, second = hermite(0.5 * (points + 1.0))
         h, r, per_u = self.ring.step, self.ring.radius, 2.0 / self.width

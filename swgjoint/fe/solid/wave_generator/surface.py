@@ -1,10 +1,11 @@
 r"""Surface of the wave generator over the face width: crowning and slope.
 
-Crowning lowers both edges by :math:`c (2 z/b)^2` (parabolic) or a circular arc through
-the same points. Slope raises the edge at the open end (z < 0) by s at the major axis
-and lowers it at the minor axis, :math:`-s\,(2 z/b) \cos 2\varphi`: with positive s the
-surface follows the cone of the deflected cup (thesis figure 7.27; its figure 7.33 is
-described with the opposite sign). Beyond the edges there is no surface.
+Crowning lowers the surface towards both edges by :math:`c (2 z/b)^2` (parabolic) or by
+a circular arc through the same points. Slope raises the edge at the open end (z < 0) by
+s at the major axis and lowers it at the minor axis, :math:`-s\,(2 z/b) \cos 2\varphi`.
+With positive s the surface follows the cone of the deflected cup (thesis figure 7.27;
+the description of its figure 7.33 has the opposite sign). There is no surface beyond
+the edges.
 """
 
 from __future__ import annotations
@@ -23,22 +24,24 @@ from swgjoint.units import mm, um
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class WaveGeneratorSurface:
-    """Outline and micro-geometry."""
+    """Outline and micro-geometry of a rigid wave generator."""
 
     outline: WaveGenerator
     width: float
     """Face width b [m]."""
     crowning: float = 0.0
-    """c [m]."""
+    """Crowning c [m]."""
     slope: float = 0.0
-    """s [m]."""
+    """Slope s [m]."""
     circular: bool = False
+    """Whether the crown is a circular arc instead of a parabola."""
     offset: Array | None = None
-    """Centre of the outline in the frame that turns with it (2,) [m]."""
+    """Centre of the outline in the frame of the wave generator (2,) [m]; None for the
+    axis."""
 
     @classmethod
     def from_design(cls, design: Design) -> WaveGeneratorSurface:
-        """That of a design."""
+        """Surface of a design's wave generator."""
         shape = design.micro_geometry
         return cls(
             outline=flawed_wave_generator(design),
@@ -66,7 +69,7 @@ class WaveGeneratorSurface:
         lowered, by_z = crown(
             points[:, 2], self.crowning, self.width, circular=self.circular
         )
-        # angle from the major axis, which lies along y
+        # angle from the major axis, which is the y axis
         radius = np.hypot(flat[:, 0], flat[:, 1])
         double = 2.0 * np.arctan2(-flat[:, 0], flat[:, 1])
         z = 2.0 * points[:, 2] / self.width
@@ -85,13 +88,14 @@ class WaveGeneratorSurface:
 def crown(
     z: Array, height: float, width: float, *, circular: bool
 ) -> tuple[Array, Array]:
-    """How far a crowned surface lies below a straight one, and the slope of that.
+    """Depth of a crowned surface below a straight one (n,) [m] and its derivative by z.
 
     Args:
-        z: From the middle of the face width (n,) [m].
-        height: At the edges [m].
+        z: Positions from the middle of the face width (n,) [m].
+        height: Depth at the edges [m].
         width: Face width [m].
-        circular: An arc through the same points instead of a parabola.
+        circular: Whether the crown is a circular arc through the same points instead of
+            a parabola.
     """
     if not height:
         return np.zeros_like(z), np.zeros_like(z)
