@@ -1,8 +1,8 @@
 """Axial sections of the deflected flexspline and the coning of its teeth.
 
-A cup held at its boss cannot follow the wave generator with both ends of its teeth
-alike: the open edge moves farther than the closed one. Sections run through the axes of
-the teeth that stand nearest to the major and the minor axis.
+A cup held at its boss cannot follow the wave generator equally at both ends of its
+teeth: the open edge moves farther than the closed edge. Sections pass through the axes
+of the teeth closest to the major and the minor axis.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from swgjoint.typing import Array, Index
 from swgjoint.units import mm
 
 ON_AXIS = 1e-9
-"""Distance from the plane of the section below which a node lies in it [m]."""
+"""Distance from the section plane below which a node is in it [m]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -26,11 +26,11 @@ class AxialSection:
     """One segment cut through the axis of a tooth."""
 
     cells: Index
-    """Quadrilaterals of the section by its points (n_cells, 4)."""
+    """Point numbers of the section's quadrilaterals (n_cells, 4)."""
     rest: Array
-    """z and radius of the points at rest (n, 2) [m]."""
+    """Coordinate z and radius of the undeformed points (n, 2) [m]."""
     moved: Array
-    """The same, deflected (n, 2) [m]."""
+    """Coordinate z and radius of the deflected points (n, 2) [m]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -38,14 +38,14 @@ class Coning:
     """Radial displacement of the bore under the teeth along the face width."""
 
     z: Array
-    """From the open edge to the closed one (n_planes,) [m]."""
+    """Coordinates z of the planes from the open to the closed edge (n_planes,) [m]."""
     major: Array
-    """At the tooth nearest to the major axis, outward (n_planes,) [m]."""
+    """Outward displacement at the tooth closest to the major axis (n_planes,) [m]."""
     minor: Array
-    """The same at the minor axis (n_planes,) [m]."""
+    """Outward displacement at the tooth closest to the minor axis (n_planes,) [m]."""
 
     def to_json(self) -> dict[str, dict[str, float]]:
-        """Both edges of both axes in mm."""
+        """Displacements of both edges at both axes [mm]."""
         return {
             axis: {"open_edge": float(u[0]) / mm, "closed_edge": float(u[-1]) / mm}
             for axis, u in (("major", self.major), ("minor", self.minor))
@@ -53,7 +53,12 @@ class Coning:
 
 
 def axis_sectors(ring: SolidRing, state: SolidState) -> tuple[int, int]:
-    """Sectors whose teeth stand nearest to the major and the minor axis."""
+    """Sectors whose teeth are closest to the major and the minor axis.
+
+    Args:
+        ring: The ring.
+        state: The equilibrium.
+    """
     place = 2.0 * pi / ring.strip.sectors * np.arange(ring.sectors, dtype=float)
     angle = place + state.rotation - state.wave_generator_angle
     from_major = np.abs((angle + 0.5 * pi) % pi - 0.5 * pi)
@@ -61,22 +66,34 @@ def axis_sectors(ring: SolidRing, state: SolidState) -> tuple[int, int]:
 
 
 def sector_points(ring: SolidRing, state: SolidState, sector: int) -> list[Array]:
-    """Nodes of a sector's segments in the global frame, each (n_nodes, 3) [m]."""
-    force, found = ring.loads(state)[sector, None], []
+    """Deflected nodes of a sector's segments in the global frame, each (n, 3) [m].
+
+    Args:
+        ring: The ring.
+        state: The equilibrium.
+        sector: Number of the sector.
+    """
+    force, points = ring.loads(state)[sector, None], []
     for number, (segment, frame) in enumerate(
         zip(ring.strip.segments, ring.frames(state), strict=True)
     ):
         d = frame.displacement[sector, None]
         u = segment.displacement(d, None if number else force)[0]
         rest = np.asarray(segment.mesh.mesh.p).T
-        found.append((rest + u) @ frame.turn[sector].T)
-    return found
+        points.append((rest + u) @ frame.turn[sector].T)
+    return points
 
 
 def axial_sections(
     ring: SolidRing, state: SolidState, sector: int
 ) -> tuple[AxialSection, ...]:
-    """Every segment of a sector, cut through the axis of its tooth."""
+    """All segments of a sector, cut through the axis of its tooth.
+
+    Args:
+        ring: The ring.
+        state: The equilibrium.
+        sector: Number of the sector.
+    """
     sections = []
     points = sector_points(ring, state, sector)
     for segment, moved in zip(ring.strip.segments, points, strict=True):
@@ -96,7 +113,12 @@ def axial_sections(
 
 
 def coning(ring: SolidRing, state: SolidState) -> Coning:
-    """Radial displacement of the bore along the face width at both axes."""
+    """Radial displacement of the bore along the face width at both axes.
+
+    Args:
+        ring: The ring.
+        state: The equilibrium.
+    """
     teeth = ring.strip.mesh.teeth
     line = teeth.nodes[:, teeth.plane.bore[len(teeth.plane.bore) // 2]]
     rest = _meridian(np.asarray(teeth.segment.mesh.p).T[line])[:, 1]
@@ -108,5 +130,5 @@ def coning(ring: SolidRing, state: SolidState) -> Coning:
 
 
 def _meridian(points: Array) -> Array:
-    """Coordinate z and radius of points in space (n, 2) [m]."""
+    """Coordinate z and radius of 3D points (n, 2) [m]."""
     return np.stack([points[:, 2], np.hypot(points[:, 0], points[:, 1])], axis=-1)

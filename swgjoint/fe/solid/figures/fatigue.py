@@ -1,14 +1,15 @@
-r"""Fatigue of the flexspline from the stresses of an equilibrium in space.
+r"""Fatigue of the flexspline from the stresses of a 3D equilibrium.
 
-A point of the flexspline meets all phases of the wave generator in half a turn, and at
-one position of it the equal points of all sectors are at just these phases: they are
-the history of one. Teeth are met at as many phases of mesh.
+A point of the flexspline passes all phases of the wave generator in half a turn. At one
+position of the wave generator the corresponding points of all sectors are at these
+phases, so that together they give the stress history of one point. Teeth are in contact
+at as many phases of the mesh.
 
-Nominal stress is what the article's shell theory speaks of: in the section between two
-teeth, from the middle of the root land to the bore, the membrane and bending part of
-the stress at the root (linearised over the wall), to which the article's concentration
-factors apply. What the mesh itself makes of the fillet stands beside it as half of the
-largest range of von Mises stress, with no factor.
+Nominal stress is that of the article's shell theory: in the section between two teeth,
+from the middle of the root land to the bore, it is the membrane and bending part of the
+stress (linearised over the wall) at the root. The article's stress concentration
+factors apply to it. For comparison, half of the largest range of the von Mises stress
+of the meshed fillet is reported without any factor.
 """
 
 from __future__ import annotations
@@ -46,10 +47,10 @@ class FatigueLimits:
 
     @classmethod
     def from_design(cls, design: Design) -> FatigueLimits:
-        """Those of the flexspline.
+        """Endurance limits of the flexspline's material.
 
         Raises:
-            DesignError: If the design states none.
+            DesignError: If the design does not state both limits.
         """
         material = design.material_of("flexspline")
         bending, torsion = (
@@ -67,21 +68,25 @@ class FatigueLimits:
 
 @dataclass(frozen=True, kw_only=True)
 class SectionFatigue:
-    """Nominal stress over a turn at the root of one section [Pa]."""
+    """Nominal stress over a turn at the root of one section."""
 
     z: float
-    """Coordinate z of the section, 0 in the middle of the face width [m]."""
+    """Coordinate z of the section, zero in the middle of the face width [m]."""
     normal_amplitude: float
-    """Around."""
+    """Amplitude of the circumferential normal stress [Pa]."""
     normal_mean: float
-    """The article's formulas leave it out."""
+    """Mean of the circumferential normal stress, which the article's formulas omit
+    [Pa]."""
     axial_amplitude: float
+    """Amplitude of the axial normal stress [Pa]."""
     shear_amplitude: float
+    """Amplitude of the shear stress [Pa]."""
     shear_mean: float
+    """Mean of the shear stress [Pa]."""
     safety: SafetyFactor
 
     def to_json(self) -> dict[str, float]:
-        """Millimetres and MPa."""
+        """Values in mm and MPa."""
         return {
             "z_mm": self.z / mm,
             "normal_amplitude_MPa": self.normal_amplitude / MPa,
@@ -100,20 +105,19 @@ class Fatigue:
     """Safety factors at one torque."""
 
     torque: float
-    """[N·m]."""
+    """Output torque [N·m]."""
     sections: tuple[SectionFatigue, ...]
-    """From the open edge to the back edge of the teeth."""
+    """Sections from the open edge to the back edge of the teeth."""
     amplitude: Mapping[str, float]
     """Half of the largest range of von Mises stress by part [Pa]; ``root`` is the
-    surface between the teeth, ``root, mid-face`` that in the middle of the face
-    width."""
+    region between the teeth, ``root, mid-face`` its middle of the face width."""
     shell: SafetyFactor
-    """From closed forms alone."""
+    """Safety factor of the closed forms."""
     limits: FatigueLimits
 
     @property
     def worst(self) -> SectionFatigue:
-        """Section with the least safety."""
+        """Section with the smallest safety factor."""
         return min(self.sections, key=lambda section: section.safety.combined)
 
     @property
@@ -122,11 +126,11 @@ class Fatigue:
         return min(self.sections, key=lambda section: abs(section.z))
 
     def local(self, part: str) -> float:
-        """Bending limit over the amplitude that the mesh gives, no factors."""
+        """Bending limit over the amplitude of a part, without further factors [-]."""
         return self.limits.bending / self.amplitude[part]
 
     def to_json(self) -> dict[str, Any]:
-        """The worst section, the middle one, the mesh's own peaks, closed forms."""
+        """Worst and middle section, peaks of the meshed stress and closed forms."""
         return {
             "torque_Nm": self.torque,
             "worst_section": self.worst.to_json(),
@@ -144,16 +148,17 @@ class Fatigue:
 def fatigue(
     design: Design, torques: Sequence[float], *, progress: Progress = silent
 ) -> list[Fatigue]:
-    """Safety factors of a drive at several torques, on its own wave generator.
+    """Safety factors of a drive on its wave generator at several torques.
 
     Args:
-        design: With a ``[cup]`` and endurance limits.
-        torques: T that the drive exerts on the output, followed in this order [N·m].
+        design: The drive, with a ``[cup]`` and endurance limits.
+        torques: Torques T that the drive exerts on the output, followed in this order
+            [N·m].
         progress: Called after every equilibrium.
 
     Raises:
         DesignError: If the design cannot be built or lacks endurance limits.
-        ComputationError: If a solve fails or memory will not do.
+        ComputationError: If a solve fails or the model does not fit in memory.
     """
     limits, shell = (
         FatigueLimits.from_design(design),
@@ -194,11 +199,11 @@ def assess(
 
     Args:
         strip: Mesh of a sector.
-        stresses: xx, yy, zz, xy, yz, zx at the nodes by segment (N, n_nodes, 6) [Pa],
-            the sectors of half a turn or of a whole one.
-        torque: [N·m].
-        limits: Of the material.
-        shell: For the closed forms.
+        stresses: Stress xx, yy, zz, xy, yz, zx at the nodes by segment (N, n_nodes, 6)
+            [Pa] in the sectors of half a turn or of a whole turn.
+        torque: Output torque [N·m].
+        limits: Endurance limits of the material.
+        shell: Dimensions for the closed forms.
     """
     nominal = root_stress(strip, stresses[strip.teeth.segment.name])
     low, high = nominal.min(axis=0), nominal.max(axis=0)
@@ -241,14 +246,14 @@ def root_stress(strip: StripMesh, stress: Array) -> Array:
     .. math:: \sigma = \frac1h\int\sigma\,dr
         + \frac6{h^2}\int\sigma\,(r - \bar r)\,dr
 
-    over the wall on the face of a sector, at its outer surface.
+    integrated over the wall on the face of a sector and evaluated at its outer surface.
 
     Args:
         strip: Mesh of a sector.
-        stress: Of the teeth (N, n_nodes, 6) [Pa].
+        stress: Stress of the toothed segment (N, n_nodes, 6) [Pa].
 
     Returns:
-        Around, along the axis, shear of both (N, n_planes, 3) [Pa].
+        Circumferential, axial and shear stress (N, n_planes, 3) [Pa].
     """
     teeth = strip.teeth
     nodes = teeth.nodes[:, teeth.plane.face_first]
@@ -267,7 +272,7 @@ def root_stress(strip: StripMesh, stress: Array) -> Array:
     weight[:-1] += 0.5 * step
     weight[1:] += 0.5 * step
     arm = r - middle
-    linear = weight @ arm**2  # h^3/12, so that a linear stress is met exactly
+    linear = weight @ arm**2  # h^3/12, so that a linear stress is reproduced exactly
     return np.asarray(
         np.einsum(
             "spdk,d->spk", parts, weight / height + 0.5 * height * weight * arm / linear
@@ -291,10 +296,11 @@ def _amplitudes(strip: StripMesh, stresses: Mapping[str, Array]) -> dict[str, fl
 
 
 def half_range(stress: Array) -> Array:
-    """Half of the largest von Mises stress of the difference of two times.
+    """Half of the largest von Mises stress of the differences between two times [Pa].
 
     Args:
-        stress: By time in the first axis, components in the last one [Pa].
+        stress: Stress by time in the first axis, with components xx, yy, zz, xy, yz, zx
+            in the last axis [Pa].
     """
     largest = np.zeros(stress.shape[1:-1])
     for shift in range(1, len(stress) // 2 + 1):

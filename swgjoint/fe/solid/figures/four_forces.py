@@ -1,10 +1,11 @@
 r"""Load case of the article on stress and fatigue: four forces, no wave generator.
 
-Four small areas of the bore are pressed outward, at :math:`\pm\beta` from both ends of
-the major axis, until the teeth move by w_0 somewhere. Instead of mesh, the torque is
-equal tangential forces on 11 teeth around each end. The areas stay where they are while
-the torque rises: with forces that stay, too, the teeth would move by twice w_0 at 60
-N·m, the article finds 0.001 mm per N·m. Small deflections, so that loads add up.
+Four small areas of the bore, at :math:`\pm\beta` from both ends of the major axis, are
+pressed outward until the largest radial displacement of the teeth is w_0. The torque
+acts through equal tangential forces on 11 teeth around each end instead of tooth
+contact. The areas keep their displacement while the torque rises. With constant forces
+instead, the teeth would move by twice w_0 at 60 N·m; the article reports 0.001 mm per
+N·m. Deflections are small, so that load cases superpose.
 """
 
 from __future__ import annotations
@@ -20,46 +21,47 @@ from swgjoint.typing import Array
 from swgjoint.units import deg
 
 ANGLE = 25.0 * deg
-"""beta of the article."""
+"""Angle beta of the article [rad]."""
 TEETH = 11
-"""The article spreads the torque over 11 nodes."""
+"""Teeth around each end that carry the torque; the article uses 11 nodes."""
 HALF_WIDTH, HALF_LENGTH = 2.5 * deg, 0.2
-"""Of the areas: around, and along the axis in face widths. The article has "small"."""
+"""Half sizes of the areas, around [rad] and along the axis in face widths [-]; the
+article only calls them small."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FourForces:
-    """A cup under the four forces, without torque and per N·m; frames of the teeth."""
+    """Response of a cup to four forces and a torque, in the frames of the teeth."""
 
     force: Array
-    """Force of the areas after and before the major axis (2,) [N]."""
+    """Forces of the areas after and before the major axis, without torque (2,) [N]."""
     force_by_torque: Array
-    """(2,) [N/(N·m)]."""
+    """Derivative of these forces by the torque (2,) [N/(N·m)]."""
     radial: Array
-    """Outward displacement of the nodes of the teeth (N, n) [m]."""
+    """Outward displacement of the nodes of the teeth, without torque (N, n) [m]."""
     radial_by_torque: Array
-    """(N, n) [m/(N·m)]."""
+    """Derivative of this displacement by the torque (N, n) [m/(N·m)]."""
     stress: Mapping[str, Array]
-    """By segment (N, n_nodes, 6) [Pa]."""
+    """Nodal stress by segment, without torque (N, n_nodes, 6) [Pa]."""
     stress_by_torque: Mapping[str, Array]
-    """[Pa/(N·m)]."""
+    """Derivative of this stress by the torque (N, n_nodes, 6) [Pa/(N·m)]."""
 
     def largest_radial(self, torque: float) -> float:
-        """Largest outward displacement of the teeth [m]."""
+        """Largest outward displacement of the teeth [m] at a torque [N·m]."""
         return float((self.radial + torque * self.radial_by_torque).max())
 
     def stresses(self, torque: float) -> dict[str, Array]:
-        """Stress at the nodes by segment [Pa]."""
+        """Nodal stress by segment (N, n_nodes, 6) [Pa] at a torque [N·m]."""
         return {
             k: s + torque * self.stress_by_torque[k] for k, s in self.stress.items()
         }
 
 
 def four_forces(cup: PinchedCup, deflection: float) -> FourForces:
-    """Load a cup as the article does.
+    """Apply the load case of the article to a cup.
 
     Args:
-        cup: With teeth.
+        cup: A cup with teeth.
         deflection: Largest outward displacement of the teeth without torque [m].
     """
     teeth = cup.segments[0]
@@ -83,13 +85,13 @@ def four_forces(cup: PinchedCup, deflection: float) -> FourForces:
     load = np.zeros_like(load)
     around = np.stack([-outward[:, 1], outward[:, 0], outward[:, 2]], axis=-1)
     lever = float(np.hypot(at[~bore, 0], at[~bore, 1]).sum())
-    # half of the torque in the half
+    # the half model carries half of the torque
     load[np.ix_(meshing, ~bore)] = 0.5 / (TEETH * lever) * around[~bore]
     cases.append(load.reshape(cup.sectors, -1))
 
     found = [cup.respond(case) for case in cases]
     radial = np.array([np.einsum("sni,ni->sn", u, out) for u, _ in found])
-    # motion of the areas, each weighted as its load
+    # mean displacement of each area, weighted as its load
     moved = np.array(
         [
             [np.sum(case * u[:, nodes].reshape(cup.sectors, -1)) for u, _ in found]

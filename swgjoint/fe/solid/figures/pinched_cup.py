@@ -1,11 +1,11 @@
-r"""A cup between two opposite radial loads, its boss clamped.
+r"""A cup with a clamped boss between two opposite radial loads.
 
-A load acts outward on the bore of one tooth sector, over one pitch around, and on the
-opposite one; its direction stays. What a solid gives way right under a point grows
-without limit on finer meshes, so the deflection is the mean over the wall above the
-load, from the bore to the roots of the teeth, where that dent is gone.
+Loads of constant direction act outward on the bore of one tooth sector, over one pitch
+around, and of the opposite sector. The local indentation of a solid under a point load
+grows without limit on finer meshes. The deflection is therefore the mean over the wall
+above the load, from the bore to the roots of the teeth, where it is negligible.
 
-The potential of a load is exact with its point carried by the corotational segment:
+The potential of a load is exact; its point moves with the corotational segment:
 
 .. math:: \Pi = \sum\tfrac12 d^T\hat K d - F\cdot x_p, \quad
     x_p = R\,(X_p + A d + C R^T F)
@@ -45,12 +45,12 @@ from swgjoint.typing import Array, Index
 from swgjoint.units import mm
 
 PLACES = ("mid_face", "open_edge", "face_width")
-"""Where the load acts along the axis; the last one is spread evenly over the teeth."""
+"""Axial positions of the load; ``face_width`` spreads it evenly over the teeth."""
 MAX_ITERATIONS = 40
 STEP_TOLERANCE = 1e-10
 """Displacement increment at which the iteration ends [m]."""
 CLOSURE = np.array([-1.0, -1.0, 1.0])
-"""Factors of x, y, z that close the half."""
+"""Factors of x, y, z that close the half model."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -58,48 +58,49 @@ class Pinched:
     """Equilibrium of a cup between two opposite loads."""
 
     force: float
-    """Force of each load, outward [N]."""
+    """Outward force of each load [N]."""
     deflection: float
-    """Outward, mean over the wall above the load [m]."""
+    """Mean outward displacement of the wall above the load [m]."""
     under_load: float
-    """Outward, of the loaded points themselves [m]."""
+    """Mean outward displacement of the loaded points [m]."""
     of_planes: Array
-    """Outward, mean over the wall above the loaded sector, from the open edge on [m].
-    """
+    """Mean outward displacement of the wall above the loaded sector by plane, starting
+    at the open edge (n_planes,) [m]."""
     masters: Array
-    """Where they stand, global frame (N, n, 3) [m]."""
+    """Positions of the masters in the global frame (N, n, 3) [m]."""
     load: Array
     """Forces at the loaded points of the first sector, in its frame (3 p,) [N]."""
     energy: float
-    """Strain energy, whole cup [J]."""
+    """Strain energy of the whole cup [J]."""
     iterations: int
 
     @property
     def stiffness(self) -> float:
-        """Force over deflection of a lobe [N/m]."""
+        """Force of a lobe over its deflection [N/m]."""
         return self.force / self.deflection
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class PinchedCup:
-    """Half of a flexspline, closed by its symmetry, that can be pulled at the bore."""
+    """Half of a flexspline, closed by its symmetry, with loads on the bore."""
 
     name: str
     sectors: int
-    """In the half."""
+    """Number of sectors in the half model."""
     strip: StripMesh
     masters: Masters
     segments: tuple[StripSegment, ...]
     root: float
-    """Radius of the outside of the wall [m]."""
+    """Outer radius of the wall below the teeth [m]."""
     bore: int
-    """Loaded points on the bore, plane after plane."""
+    """Number of loaded points on the bore, which are listed plane after plane."""
     first: int = 0
-    """Loaded points on the flanks before them; others on the flanks follow."""
+    """Number of loaded points on the flanks that precede those of the bore; others may
+    follow."""
 
     @cached_property
     def reference(self) -> Array:
-        """Masters at rest in the global frame (N, n, 3) [m]."""
+        """Undeformed masters in the global frame (N, n, 3) [m]."""
         return np.asarray(np.einsum("sij,aj->sai", self._place, self.masters.position))
 
     @cached_property
@@ -108,7 +109,7 @@ class PinchedCup:
 
     @cached_property
     def _held(self) -> Index:
-        """Degrees of freedom at the boss; of a ring without one none."""
+        """Degrees of freedom at the boss; empty for a ring without one."""
         held = 3 * self.masters.held[:, None] + np.arange(3)
         size = 0 if len(self.segments) == 1 else held.size
         return np.asarray(held.ravel()[:size], dtype=np.int64)
@@ -118,11 +119,11 @@ class PinchedCup:
         return slice(self.first, self.first + self.bore)
 
     def share(self, place: str) -> Array:
-        """Part of the load in every plane (n_planes,)."""
+        """Part of a load at one of :data:`PLACES` in every plane (n_planes,) [-]."""
         z = self.strip.teeth.z
         share = np.zeros(len(z))
         if place == "mid_face":
-            # two planes where none lies in the middle
+            # two planes if none is in the middle
             near = np.abs(z) <= np.abs(z).min() + 1e-9 * np.ptp(z)
             share[near] = 1.0 / near.sum()
         elif place == "open_edge":
@@ -142,9 +143,9 @@ class PinchedCup:
         """Equilibrium under two opposite loads.
 
         Args:
-            force: Of each, outward [N].
-            place: One of :data:`PLACES`.
-            nonlinear: Large rotations of the segments.
+            force: Outward force of each load [N].
+            place: Axial position of the loads, one of :data:`PLACES`.
+            nonlinear: Whether segments rotate by large angles.
 
         Raises:
             ComputationError: If Newton's method fails.
@@ -169,7 +170,12 @@ class PinchedCup:
         )
 
     def frames(self, x: Array, *, nonlinear: bool) -> tuple[SolidFrames, ...]:
-        """Frames of all segments with the masters at x (N, n, 3) [m]."""
+        """Frames of all segments.
+
+        Args:
+            x: Positions of the masters in the global frame (N, n, 3) [m].
+            nonlinear: Whether segments rotate by large angles.
+        """
         return tuple(
             segment_frames(
                 segment, x[:, segment.masters], self._place, fitted=nonlinear
@@ -178,7 +184,7 @@ class PinchedCup:
         )
 
     def _points(self, frame: SolidFrames, load: Array) -> Array:
-        """Loaded points of the first sector in its frame (p, 3) [m]."""
+        """Deflected loaded points of the first sector in its frame (p, 3) [m]."""
         teeth = self.segments[0]
         rest = np.asarray(teeth.mesh.mesh.p).T[teeth.loaded[::3] // 3]
         moved = teeth.loaded_from_masters @ frame.displacement[0]
@@ -191,8 +197,8 @@ class PinchedCup:
         """Derivative of the loaded points' outward motion, and the forces on them.
 
         Returns:
-            By the masters of the teeth in the global frame (3 m,), in sector 0;
-            forces in its frame (3 p,) [N].
+            Derivative by the masters of sector 0's teeth in the global frame (3 m,),
+            and forces in the frame of the sector (3 p,) [N].
         """
         teeth = self.segments[0]
         outward = frame.turn[0, 1]  # the global y axis in the frame
@@ -211,10 +217,11 @@ class PinchedCup:
         """Newton increment of the masters (N, 3 n) [m].
 
         Args:
-            frames: Of all segments.
+            frames: Frames of all segments.
             loads: Forces at the loaded points of the first k sectors, in their frames
                 (k, 3 p) [N].
-            pushed: The same on the masters of the teeth, global frame (k, 3 m) [N].
+            pushed: These forces on the masters of the teeth, in the global frame
+                (k, 3 m) [N].
         """
         n, few = 3 * self.masters.size, len(loads)
         out = np.zeros((self.sectors, n))
@@ -236,7 +243,7 @@ class PinchedCup:
         matrix[:, held], matrix[:, :, held] = 0.0, 0.0
         matrix[:, held, held] = scale
         out[:, held] = 0.0
-        if not len(held):  # the loads balance: what stops rigid motion carries nothing
+        if not len(held):  # the loads balance: the constraint of rigid motion is idle
             matrix[0, [0, 2], [0, 2]] += scale
         # the last face of the half in the frame of the first one
         size = 3 * self.masters.face_size
@@ -252,11 +259,11 @@ class PinchedCup:
         """Small deflections under forces at the loaded points of all sectors.
 
         Args:
-            loads: In the frames of the teeth (N, 3 p) [N].
+            loads: Forces in the frames of the teeth (N, 3 p) [N].
 
         Returns:
-            Displacement of the nodes of the teeth (N, n_nodes, 3) [m]; stress xx, yy,
-            zz, xy, yz, zx at the nodes by segment (N, n_nodes, 6) [Pa]; both in the
+            Displacements of the nodes of the teeth (N, n_nodes, 3) [m], and stress xx,
+            yy, zz, xy, yz, zx at the nodes by segment (N, n_nodes, 6) [Pa], both in the
             frames of the teeth.
         """
         frames = self.frames(self.reference, nonlinear=False)
@@ -315,21 +322,21 @@ def pinched_cup(
     """Condense the flexspline of a design.
 
     Args:
-        design: The drive; a ring without a ``[cup]`` is free.
-        toothless: A smooth wall of the rim's thickness where the teeth are.
-        orders: Degrees of the displacements of faces and sections; the usual ones if
-            None.
+        design: The drive; without a ``[cup]`` its flexspline is a free ring.
+        toothless: Whether a smooth wall of the rim's thickness replaces the teeth.
+        orders: Polynomial degrees of the displacements of faces and sections; None for
+            the default ones.
 
     Raises:
         DesignError: If it cannot be meshed or has an odd number of teeth, so that no
             two of them are opposite.
-        ComputationError: If the memory of the machine will not do.
+        ComputationError: If the model does not fit in the memory of the machine.
     """
     name, teeth = design.drive.name, design.drive.teeth_flexspline
     if teeth % 2:
         raise DesignError(
-            f"{name}: drive.teeth_flexspline = {teeth}: no tooth is opposite to"
-            " another; accepted for the radial stiffness: an even number"
+            f"{name}: drive.teeth_flexspline = {teeth}: the radial stiffness needs"
+            " opposite teeth; expected an even number"
         )
     profile = tooth_profile(design, "flexspline")
     strip = smooth_strip(design) if toothless else flexspline_strip(design, profile)
@@ -366,7 +373,12 @@ def pinched_cup(
 
 
 def pitch_points(strip: StripMesh, profile: ToothProfile) -> Index:
-    """Nodes of both flanks next to the pitch circle, plane after plane."""
+    """Nodes of both flanks closest to the pitch circle, plane after plane.
+
+    Args:
+        strip: Mesh of the flexspline's strip.
+        profile: Flank of the flexspline.
+    """
     plane = strip.teeth.plane
     points = np.asarray(plane.mesh.p)
     pair = []

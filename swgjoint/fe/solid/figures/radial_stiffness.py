@@ -1,4 +1,4 @@
-"""Radial stiffness of a flexspline with what it depends on and how sure it is."""
+"""Radial stiffness of a flexspline, its dependence on the load and its error."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from swgjoint.progress import Progress, silent
 from swgjoint.units import mm
 
 COARSEST = 0.5
-"""Refinement that a mesh has at least."""
+"""Least refinement of a mesh [-]."""
 SMALL = 1.0
-"""Load of the linear level, where only the ratio matters [N]."""
+"""Load of the linear model, whose stiffness does not depend on it [N]."""
 FINER = replace(
     Orders(),
     teeth=Orders().teeth + 2,
@@ -24,34 +24,38 @@ FINER = replace(
     at_teeth=Orders().at_teeth + 2,
     around=Orders().around + 2,
 )
-"""Next degrees of the displacements of faces and sections, to estimate the error."""
+"""Higher degrees of the displacements of faces and sections, to estimate the error."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class RadialStiffness:
-    """Force of a lobe over its deflection, boss clamped [N/m]."""
+    """Force of a lobe over its deflection with a clamped boss [N/m]."""
 
     mid_face: float
-    """Small deflections, load and deflection in the middle of the face width."""
+    """Linear stiffness for a load in the middle of the face width [N/m]."""
     open_edge: float
-    """The same at the open end."""
+    """Linear stiffness for a load at the open end [N/m]."""
     face_width: float
-    """The same with the load spread evenly over the teeth."""
+    """Linear stiffness for a load spread evenly over the face width [N/m]."""
     outward: float
-    """Large rotations at mid-face, secant at about the deflection of the lobes."""
+    """Secant stiffness with large rotations for a load pulling apart at mid-face, at
+    about the deflection of the lobes [N/m]."""
     inward: float
-    """The same, pressed together instead of pulled apart."""
+    """Secant stiffness with large rotations for a load pressing together at mid-face
+    [N/m]."""
     force: float
-    """Load at which the secants were taken [N]."""
+    """Load of the secant stiffnesses [N]."""
     finer: float
-    """At mid-face with finer displacements of faces and sections, the same mesh."""
+    """Linear stiffness at mid-face with higher degrees of the displacements of faces
+    and sections on the same mesh [N/m]."""
     coarser: float
-    """At mid-face with half of the elements per direction."""
+    """Linear stiffness at mid-face with half of the elements per direction [N/m]."""
     shell: float
-    """Closed form of a smooth cup with the wall of the cup, at mid-face."""
+    """Closed form of a smooth cup with the wall thickness of the cup, at mid-face
+    [N/m]."""
 
     def to_json(self) -> dict[str, Any]:
-        """In N/mm, with where and how."""
+        """Stiffnesses [N/mm] with a description of load and deflection."""
         scale = 1e3
         return {
             "load": "two opposite radial forces at mid-face, outward on the bore over"
@@ -70,7 +74,7 @@ class RadialStiffness:
 
 
 def radial_stiffness(design: Design, *, progress: Progress = silent) -> RadialStiffness:
-    """Pull the flexspline of a design apart.
+    """Compute the radial stiffness of a design's flexspline.
 
     Args:
         design: The drive, with a ``[cup]``.
@@ -78,7 +82,7 @@ def radial_stiffness(design: Design, *, progress: Progress = silent) -> RadialSt
 
     Raises:
         DesignError: If it cannot be meshed or has an odd number of teeth.
-        ComputationError: If a solve fails or memory will not do.
+        ComputationError: If a solve fails or the model does not fit in memory.
     """
     stage, parts = "radial stiffness", 4
     half = max(COARSEST, 0.5 * design.mesh.refinement)
@@ -111,11 +115,11 @@ def radial_stiffness(design: Design, *, progress: Progress = silent) -> RadialSt
 
 
 def smooth_cup_stiffness(design: Design, *, open_edge: bool = False) -> float:
-    """Closed form of a smooth cup with one wall throughout [N/m].
+    """Closed-form radial stiffness of a smooth cup of uniform wall thickness [N/m].
 
     Args:
         design: The drive, with a ``[cup]``.
-        open_edge: Load at the open end instead of mid-face.
+        open_edge: Whether the load acts at the open end instead of mid-face.
     """
     assert design.cup is not None
     shell = ShellDimensions.from_design(design)

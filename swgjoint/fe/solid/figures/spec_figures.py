@@ -1,4 +1,4 @@
-"""Figures of a spec sheet that no map holds: radial stiffness and fatigue."""
+"""Figures of a specification sheet beyond those of a map: radial stiffness, fatigue."""
 
 from __future__ import annotations
 
@@ -16,13 +16,15 @@ from swgjoint.progress import Progress, silent
 
 @dataclass(frozen=True, kw_only=True)
 class SolidFigures:
-    """What was found, in the units of the keys."""
+    """Computed figures, in the units of their keys."""
 
     values: dict[str, float] = field(default_factory=dict)
+    """Figures by key."""
     missing: dict[str, str] = field(default_factory=dict)
-    """Reason of every key that this design cannot have."""
+    """Reasons, by key, why a figure is not available for this design."""
     details: dict[str, Any] = field(default_factory=dict)
-    """``radial_stiffness`` and ``fatigue``: where, how, and how sure."""
+    """Load case, location and error estimates of ``radial_stiffness`` and ``fatigue``.
+    """
 
 
 def solid_figures(
@@ -32,19 +34,20 @@ def solid_figures(
     *,
     progress: Progress = silent,
 ) -> SolidFigures:
-    """Compute the wanted ones of ``radial_stiffness_N_mm``, ``fatigue_safety_factor``.
+    """Compute ``radial_stiffness_N_mm`` and ``fatigue_safety_factor``.
 
-    The safety factor is the least of all sections over the face width. Each figure
-    takes up to minutes and is kept in the user's cache.
+    The safety factor is the smallest one of all sections over the face width. Each
+    figure takes up to several minutes and is stored in the user's cache.
 
     Args:
         design: The drive.
-        keys: Of the sheet; others are passed over.
-        torque: At which fatigue is assessed, the rated one [N·m].
-        progress: Called on the way.
+        keys: Keys of the sheet; only these figures are computed, and keys other than
+            the two above are ignored.
+        torque: Torque at which fatigue is assessed, the rated one [N·m].
+        progress: Called during the computation.
 
     Raises:
-        ComputationError: If a solve fails or memory will not do.
+        ComputationError: If a solve fails or the model does not fit in memory.
     """
 
     def radial() -> SolidFigures:

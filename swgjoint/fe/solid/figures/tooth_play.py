@@ -1,4 +1,4 @@
-"""Play of the teeth of a deflected flexspline: how far the output turns freely."""
+"""Play of the teeth of a deflected flexspline: the free rotation of the output."""
 
 from __future__ import annotations
 
@@ -12,30 +12,32 @@ from swgjoint.fe.solid.ring import SolidRing
 from swgjoint.typing import Array
 
 REACH = 0.5
-"""Gaps of teeth that count [modules]; without any the teeth pass each other."""
+"""Largest gap of teeth that count [modules]; without such a gap the teeth pass each
+other."""
 FLAT = 0.1
-"""Lever over the pitch radius below which a contact has no side."""
+"""Lever arm over the pitch radius below which a contact belongs to neither side [-]."""
 TURNS = 12
-"""Rotations at most until a tooth touches."""
+"""Largest number of rotations until a tooth touches."""
 TOUCHES = 1e-10
-"""Rotation that counts as none [rad]."""
+"""Rotation below which a tooth touches [rad]."""
 
 
 def play(ring: SolidRing, frame: SolidFrames, load: Array, ratio: float) -> float:
     r"""Rotation of the output between the contacts of its two directions [rad].
 
-    The deflected flexspline turns as a whole until a tooth touches. That turns the
-    lobes, too; for lobes that stand the ratio i makes it :math:`1 - 1/i` times as much.
+    The deflected flexspline is rotated as a whole until a tooth touches. This rotates
+    the lobes as well. For fixed lobes the rotation of the output is :math:`1 - 1/i`
+    times as large.
 
     Args:
-        ring: Half or all of the drive.
-        frame: Frames of its toothed segments, no tooth in contact.
-        load: At their loaded degrees of freedom (N, n_b) [N].
-        ratio: Signed i.
+        ring: Model of half of the drive or of the whole drive.
+        frame: Frames of its toothed segments without tooth contact.
+        load: Forces at their loaded degrees of freedom (N, n_b) [N].
+        ratio: Signed ratio i [-].
 
     Returns:
-        Negative where flanks overlap, inf where none are near; NaN where teeth overlap
-        that no rotation can part.
+        Play [rad]; negative if flanks overlap, infinite if no flanks are close, NaN if
+        teeth overlap that no rotation can separate.
     """
     profile = ring.strip.profile
     reach = REACH * 2.0 * profile.pitch_radius / profile.teeth

@@ -1,4 +1,4 @@
-"""Torsion of the 3D drive under torque with the wave generator locked."""
+"""Torsion of the 3D drive under torque with a locked wave generator."""
 
 from __future__ import annotations
 
@@ -19,36 +19,37 @@ from swgjoint.typing import Array
 from swgjoint.units import mm
 
 SMALL = 0.01
-"""Part of the first torque that takes up the play."""
+"""Part of the first torque that takes up the clearance [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class SolidTorsion:
-    """Equilibria over the torque, at one position with a lobe on a tooth.
+    """Equilibria over the torque at a position with a lobe on a tooth.
 
-    There the drive under the opposite torque is its mirror image (ball 0 stands on the
-    lobe), so the mid-line of a loop begins at zero; with clearance of the teeth the
-    loaded side begins at half the play.
+    At this position the drive under the opposite torque is the mirror image (ball 0 is
+    on the lobe). The mid-line of a loop therefore begins at zero, and with clearance of
+    the teeth the loaded side begins at half of the play.
     """
 
     torque: Array
-    """T, increasing (n,) [N·m]."""
+    """Torques T, increasing (n,) [N·m]."""
     torsion: Array
-    """What is in series with cup and teeth included (n,) [rad]."""
+    """Torsion including that of the springs in series with cup and teeth (n,) [rad]."""
     compliance: Array
-    """Tangent, the same included (n,) [rad/(N·m)]."""
+    """Tangent compliance including the springs in series (n,) [rad/(N·m)]."""
     tooth_centre: Array
-    """Of the normal forces of the teeth along the axis, from the middle of the face
-    width to the closed end, in face widths (n,)."""
+    """Axial centre of the normal forces of the teeth, from the middle of the face width
+    towards the closed end, in face widths (n,) [-]."""
     tooth_force: Array
-    """Sum of these forces (n,) [N]."""
+    """Sum of the normal forces of the teeth (n,) [N]."""
     bore_centre: Array
-    """Of the forces of wave generator or race on the bore, as above (n,)."""
+    """Axial centre of the forces of wave generator or race on the bore, in the same
+    measure (n,) [-]."""
     balls: Array
-    """Balls that carry load; 0 on a rigid wave generator (n,)."""
+    """Number of loaded balls; zero for a rigid wave generator (n,)."""
     half_play: float
-    """Torsion at which the tangent at a hundredth of the first torque meets zero
-    torque [rad]."""
+    """Torsion extrapolated to zero torque by the tangent at 1 % of the first torque
+    [rad]."""
 
 
 def solid_torsion(
@@ -58,17 +59,18 @@ def solid_torsion(
     bearing: Bearing | None = None,
     progress: Progress = silent,
 ) -> SolidTorsion:
-    """Load a drive in space.
+    """Load a 3D drive; the half model is used wherever the symmetry allows it.
 
     Args:
         design: The drive, with a cup.
-        torques: T, positive and increasing [N·m].
-        bearing: As in :func:`swgjoint.fe.solid.drive3d.solid_ring`. Half of the drive
-            is solved where its symmetry allows.
+        torques: Torques T, positive and increasing [N·m].
+        bearing: Axial support of the outer race, see
+            :func:`swgjoint.fe.solid.drive3d.solid_ring`; None for a rigid wave
+            generator.
         progress: Called after every torque.
 
     Raises:
-        DesignError: If the design cannot be built or holds what is not modelled.
+        DesignError: If the design cannot be built or has features that the model lacks.
         ComputationError: If a solve fails.
     """
     ring = solid_ring(design, half="auto", bearing=bearing)
@@ -84,8 +86,8 @@ def solid_torsion(
             state = follow.to_torque(state, torque)
         if not state.outcome.ok:
             raise ComputationError(
-                f"{design.drive.name}: no equilibrium in space at {torque:g} N·m:"
-                f" {state.outcome.value}"
+                f"{design.drive.name}: no equilibrium of the 3d model at {torque:g}"
+                f" N·m: {state.outcome.value}"
             )
         forces = state.tooth_force
         rows.append(
@@ -110,7 +112,7 @@ def solid_torsion(
 
 
 def _tooth_centre(ring: SolidRing, state: SolidState) -> float:
-    """Where the tooth forces act along the axis, on the average [m]."""
+    """Axial centre of the tooth forces [m]."""
     if state.held is None:
         return float("nan")
     z = ring.strip.mesh.teeth.z[state.held.plane]
@@ -118,7 +120,12 @@ def _tooth_centre(ring: SolidRing, state: SolidState) -> float:
 
 
 def bore_centre(ring: SolidRing, state: SolidState) -> float:
-    """Where the forces on the bore act along the axis, on the average [m]."""
+    """Axial centre of the forces on the bore [m].
+
+    Args:
+        ring: The ring.
+        state: The equilibrium.
+    """
     force = state.bore_force.reshape(ring.sectors, -1, 3)
     size = np.linalg.norm(force, axis=2)
     return float(np.sum(size * ring.strip.bore[:, 2]) / np.sum(size))
