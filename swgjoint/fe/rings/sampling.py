@@ -48,6 +48,11 @@ peak torque [-]."""
 UNSEEN_PHASES = 3
 """Positions of the balls for every such torque, between the sampled ones."""
 
+_Rows = dict[float, list[float]]
+"""Rotation, strain energy, compliance and input torque of a position, by torque."""
+_BallPosition = tuple[_Rows, bool]
+"""Rows of a position of the balls, and whether its output is free."""
+
 
 def check_modelled(design: Design) -> None:
     """Reject features that a map of the thin rings lacks.
@@ -121,95 +126,112 @@ def sample_rings(
         ComputationError: If the unloaded drive or small torques cannot be solved.
     """
     check_modelled(design)
-    begin, drive, ratings = time.perf_counter(), design.drive, ratings_of(design)
+    begin, ratings = time.perf_counter(), ratings_of(design)
     model = thin_ring(design)
-    passage = ball_passage(design, model)
-    count = PHASES if angles is None else angles
+    sampler = _Sampler(
+        design=design,
+        model=model,
+        passage=ball_passage(design, model),
+        count=PHASES if angles is None else angles,
+        small=SMALL * ratings.rated_torque,
+        series=series_compliance(design, cup=True),
+        keep=keep,
+        progress=progress,
+    )
     torques = [part * ratings.repeated_peak for part in LEVELS]
-    small = SMALL * ratings.rated_torque
-    theta = 2.0 * pi / passage.carried_as * np.arange(count) / count
-
-    def position(
-        name: str, phase: float, torques: list[float]
-    ) -> tuple[dict[float, list[float]], bool]:
-        found = None if keep is None else keep.read(name, partial(_taken, phase))
-        if found is None:
-            found = _position(model, phase, passage, torques, small)
-            if keep is not None:
-                keep.write(name, _arrays(phase, *found))
-        return found
-
-    rows: list[dict[float, list[float]]] = []
-    free = False
-    for k in range(count):
-        # the cage lags behind the wave generator
-        phase = -2.0 * pi / passage.per_cage_turn * k / count
-        row, alone = position(f"position-{k:04d}", phase, torques)
-        if not row:
-            raise ComputationError(
-                f"{drive.name}: no equilibrium of the rings under {small:g} N·m with"
-                f" the balls at {phase:g} rad"
-            )
-        rows.append(row)
-        free |= alone
-        progress(f"{drive.name}: ball passage", k + 1, count)
-    series = series_compliance(design, cup=True)
-    others: list[tuple[float, float, float, float]] = []
-    for j in range(UNSEEN_PHASES):
-        # off the middle of a step, on another place in each
-        place = count * (j + 0.381966) / UNSEEN_PHASES
-        phase = -2.0 * pi / passage.per_cage_turn * place / count
-        levels = [part * ratings.repeated_peak for part in UNSEEN]
-        row, _ = position(f"unseen-{j:04d}", phase, levels)
-        at = 2.0 * pi / passage.carried_as * place / count
-        others += [
-            (at, t, v[0] - t * series, v[3])
-            for t, v in row.items()
-            if t == 0.0 or t in levels
-        ]
-        progress(f"{drive.name}: unseen positions", j + 1, UNSEEN_PHASES)
-    kept = sorted(set.intersection(*(set(row) for row in rows)))
-    tables = {t: np.array([row[t] for row in rows]).T for t in kept}
-    # the same drive under the opposite torque, seen in a mirror
-    sign = np.array([-1.0, 1.0, 1.0, -1.0])[:, None]
-    found = tables | {
-        -t: np.roll(v[:, ::-1], 1, axis=1) * sign for t, v in tables.items() if t > 0.0
-    }
+    rows, free = sampler.sampled_positions(torques)
+    unseen = sampler.unseen_positions([p * ratings.repeated_peak for p in UNSEEN])
+    reached = sorted(set.intersection(*(set(row) for row in rows)))
+    tables = _both_signs({t: np.array([row[t] for row in rows]).T for t in reached})
     if free:
-        for side in (small, -small):
-            start, onset = across_clearance(found[0.0], found[side], side)
-            found[start] = onset
-        found[0.0][2] = onset[2]
-    used = np.array(sorted(found))
-    error, energy, compliance, input_torque = np.array(
-        [found[t] for t in used]
-    ).swapaxes(0, 1)
-    angle, torque, errors, moments = np.array(others).reshape(-1, 4).T
-    return MapSamples(
-        name=drive.name,
-        level="ring",
-        layout=drive.layout,
-        teeth_flexspline=drive.teeth_flexspline,
-        teeth_circular_spline=drive.teeth_circular_spline,
-        ratings=ratings,
-        damping_ratio=design.joint.damping_ratio,
-        order=(passage.carried_as, 0),
-        input_angle=theta,
-        torque=used,
-        output_error=error - (used * series)[:, None],
-        energy=energy + (0.5 * used**2 * series)[:, None],
-        compliance=compliance + series,
-        input_torque=input_torque,
-        free=free,
-        unseen=FullSolves(
-            input_angle=angle,
+        _add_onsets(tables, sampler.small)
+    record = sampler.record(torques, truncated=len(reached) < len(torques) + 3)
+    record["sampling_wall_s"] = time.perf_counter() - begin
+    return sampler.map_samples(tables, free=free, unseen=unseen, info=record)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Sampler:
+    """Positions of the balls of one drive, solved or read from a store."""
+
+    design: Design
+    model: ThinRing
+    passage: BallPassage
+    count: int
+    """Sampled positions over one passage."""
+    small: float
+    """Torque that takes up the clearance [N·m]."""
+    series: float
+    """Compliance of the springs in series, including the cup [rad/(N·m)]."""
+    keep: Unfinished | None
+    progress: Progress
+
+    def cage_phase(self, place: float) -> float:
+        """Angle of ball 0 [rad] at a place from zero to ``count`` in the passage."""
+        # the cage lags behind the wave generator
+        return -2.0 * pi / self.passage.per_cage_turn * place / self.count
+
+    def position(self, name: str, phase: float, torques: list[float]) -> _BallPosition:
+        """Rows of a position from the store, or solved and stored."""
+        if self.keep is None:
+            return _position(self.model, phase, self.passage, torques, self.small)
+        stored = self.keep.read(name, partial(_taken, phase))
+        if stored is not None:
+            return stored
+        solved = _position(self.model, phase, self.passage, torques, self.small)
+        self.keep.write(name, _arrays(phase, *solved))
+        return solved
+
+    def sampled_positions(self, torques: list[float]) -> tuple[list[_Rows], bool]:
+        """Rows of all sampled positions; whether the output is free at any of them.
+
+        Raises:
+            ComputationError: If a position has no row.
+        """
+        name, positions, any_free = self.design.drive.name, list[_Rows](), False
+        for k in range(self.count):
+            phase = self.cage_phase(k)
+            rows, free = self.position(f"position-{k:04d}", phase, torques)
+            if not rows:
+                raise ComputationError(
+                    f"{name}: no equilibrium of the rings under {self.small:g} N·m with"
+                    f" the balls at {phase:g} rad"
+                )
+            positions.append(rows)
+            any_free |= free
+            self.progress(f"{name}: ball passage", k + 1, self.count)
+        return positions, any_free
+
+    def unseen_positions(self, torques: list[float]) -> FullSolves | None:
+        """Results between the sampled positions and torques; None if all fail."""
+        name = self.design.drive.name
+        solves: list[tuple[float, float, float, float]] = []
+        for j in range(UNSEEN_PHASES):
+            # between the sampled positions, but not in the middle between two of them
+            place = self.count * (j + 0.381966) / UNSEEN_PHASES
+            phase = self.cage_phase(place)
+            rows, _ = self.position(f"unseen-{j:04d}", phase, torques)
+            angle = 2.0 * pi / self.passage.carried_as * place / self.count
+            solves += [
+                (angle, torque, row[0] - torque * self.series, row[3])
+                for torque, row in rows.items()
+                if torque == 0.0 or torque in torques
+            ]
+            self.progress(f"{name}: unseen positions", j + 1, UNSEEN_PHASES)
+        if not solves:
+            return None
+        input_angle, torque, error, input_torque = np.array(solves).reshape(-1, 4).T
+        return FullSolves(
+            input_angle=input_angle,
             torque=torque,
-            output_error=errors,
-            input_torque=moments,
+            output_error=error,
+            input_torque=input_torque,
         )
-        if others
-        else None,
-        info={
+
+    def record(self, torques: list[float], *, truncated: bool) -> dict[str, Any]:
+        """Record of the sampling for the map."""
+        design, passage = self.design, self.passage
+        return {
             "design_hash": design.content_hash(),
             "label": {
                 "model": "ring",
@@ -223,16 +245,73 @@ def sample_rings(
                 "left_out": unmodelled_parts(design, "ring"),
             },
             "ball_passage": {
-                "balls": model.bearing.balls,
+                "balls": self.model.bearing.balls,
                 "per_input_turn": passage.per_input_turn,
                 "carried_as": passage.carried_as,
             },
-            "ratings_source": ratings.source,
-            "truncated": len(kept) < len(torques) + 3,
-            "solves": count * (len(torques) + 4),
-            "sampling_wall_s": time.perf_counter() - begin,
-        },
-    )
+            "ratings_source": ratings_of(design).source,
+            "truncated": truncated,
+            "solves": self.count * (len(torques) + 4),
+        }
+
+    def map_samples(
+        self,
+        tables: Mapping[float, Array],
+        *,
+        free: bool,
+        unseen: FullSolves | None,
+        info: dict[str, Any],
+    ) -> MapSamples:
+        """Samples of the map from tables by torque, with the springs in series."""
+        design, series = self.design, self.series
+        torque = np.array(sorted(tables))
+        error, energy, compliance, input_torque = np.array(
+            [tables[t] for t in torque]
+        ).swapaxes(0, 1)
+        return MapSamples(
+            name=design.drive.name,
+            level="ring",
+            layout=design.drive.layout,
+            teeth_flexspline=design.drive.teeth_flexspline,
+            teeth_circular_spline=design.drive.teeth_circular_spline,
+            ratings=ratings_of(design),
+            damping_ratio=design.joint.damping_ratio,
+            order=(self.passage.carried_as, 0),
+            input_angle=2.0
+            * pi
+            / self.passage.carried_as
+            * np.arange(self.count)
+            / self.count,
+            torque=torque,
+            output_error=error - (torque * series)[:, None],
+            energy=energy + (0.5 * torque**2 * series)[:, None],
+            compliance=compliance + series,
+            input_torque=input_torque,
+            free=free,
+            unseen=unseen,
+            info=info,
+        )
+
+
+def _both_signs(tables: dict[float, Array]) -> dict[float, Array]:
+    """Add tables of negative torques: the mirror image of those of positive torques.
+
+    Args:
+        tables: Rotation, strain energy, compliance and input torque by torque, each
+            (4, count).
+    """
+    sign = np.array([-1.0, 1.0, 1.0, -1.0])[:, None]
+    return tables | {
+        -t: np.roll(v[:, ::-1], 1, axis=1) * sign for t, v in tables.items() if t > 0.0
+    }
+
+
+def _add_onsets(tables: dict[float, Array], small: float) -> None:
+    """Add the torques at which the teeth take up the clearance, in place."""
+    for side in (small, -small):
+        start, onset = across_clearance(tables[0.0], tables[side], side)
+        tables[start] = onset
+    tables[0.0][2] = onset[2]  # compliance at the last onset
 
 
 def _position(
@@ -241,7 +320,7 @@ def _position(
     passage: BallPassage,
     torques: list[float],
     small: float,
-) -> tuple[dict[float, list[float]], bool]:
+) -> _BallPosition:
     """Table rows by torque at one position of the balls; whether the output is free.
 
     The rows are empty if the unloaded drive cannot be solved, and end at the first
@@ -285,9 +364,7 @@ def _position(
     return rows, free
 
 
-def _arrays(
-    phase: float, rows: dict[float, list[float]], free: bool
-) -> dict[str, float | bool | Array]:
+def _arrays(phase: float, rows: _Rows, free: bool) -> dict[str, float | bool | Array]:
     """Results of :func:`_position` as arrays for a file."""
     return {
         "phase": phase,
@@ -297,9 +374,7 @@ def _arrays(
     }
 
 
-def _taken(
-    phase: float, arrays: Mapping[str, Any]
-) -> tuple[dict[float, list[float]], bool]:
+def _taken(phase: float, arrays: Mapping[str, Any]) -> _BallPosition:
     """Results of :func:`_position` from an interrupted run.
 
     Raises:
