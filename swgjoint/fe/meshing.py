@@ -126,19 +126,19 @@ def simulate_meshing(
     for k in range(steps):
         angle = 2.0 * pi * turn * k / steps
         if k == 0:
-            found = state
+            current = state
         elif torque == 0.0:
             tried = follow.turn_unloaded(unloaded, angle)
-            found = tried.state
+            current = tried.state
             # a failed one may be the last good state under the small torque
-            unloaded = tried if found.outcome.ok else unloaded
+            unloaded = tried if current.outcome.ok else unloaded
         else:
-            found = follow.to_angle(state, angle)
+            current = follow.to_angle(state, angle)
         if throw:
-            checked(found, f"the input position {angle / deg:g} deg")
-        if found.outcome.ok:
-            state = found
-        rows.append(_step(ring, follow, found, angle, torque, series))
+            checked(current, f"the input position {angle / deg:g} deg")
+        if current.outcome.ok:
+            state = current
+        rows.append(_step(ring, follow, current, angle, torque, series))
         progress("meshing", k + 1, steps)
     return MeshingRun(
         design=design,

@@ -1,1 +1,1 @@
-"""The drive as thin rings: fast, plane, with the bearing of the wave generator."""
+"""A fast 2D model of thin rings with the ball bearing of the wave generator."""

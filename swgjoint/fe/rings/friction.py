@@ -182,24 +182,24 @@ def _along(
     rows: list[list[float]] = []
     state, middle = rest, 0.0
     for torque in torques.tolist():
-        found = solve_loaded(model, state, torque)
-        if not found.outcome.ok:
-            return rows, found.outcome
+        loaded = solve_loaded(model, state, torque)
+        if not loaded.outcome.ok:
+            return rows, loaded.outcome
         if not rows:
-            middle = 0.5 * (found.rotation + down.rotation)
-        work = sliding_sums(model, state, found) if rows else (0.0, 0.0)
-        assert found.ball_force is not None
-        balls = float((found.ball_force > 0.0).sum())
-        c = found.compliance
+            middle = 0.5 * (loaded.rotation + down.rotation)
+        work = sliding_sums(model, state, loaded) if rows else (0.0, 0.0)
+        assert loaded.ball_force is not None
+        balls = float((loaded.ball_force > 0.0).sum())
+        c = loaded.compliance
         rows.append(
             [
-                middle - found.rotation,
+                middle - loaded.rotation,
                 *work,
                 balls,
-                float(found.loaded_teeth),
+                float(loaded.loaded_teeth),
                 c,
-                *(c * found.shares.get(name, 0.0) for name in PARTS),
+                *(c * loaded.shares.get(name, 0.0) for name in PARTS),
             ]
         )
-        state = found
+        state = loaded
     return rows, Outcome.CONVERGED

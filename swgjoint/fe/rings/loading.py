@@ -76,12 +76,12 @@ def solve_loaded(model: ThinRing, state: RingState, torque: float) -> RingState:
     done, step, halved = 0.0, 1.0, 0
     while done < 1.0:
         goal = min(1.0, done + step)
-        found = solver(model, state, torque=begin + goal * (torque - begin))
-        if found.outcome.ok:
-            state, done = found, goal
+        tried = solver(model, state, torque=begin + goal * (torque - begin))
+        if tried.outcome.ok:
+            state, done = tried, goal
             continue
         halved += 1
         step *= 0.5
         if halved > HALVINGS:
-            return found
+            return tried
     return state

@@ -124,9 +124,9 @@ def thin_ring(design: Design) -> ThinRing:
     bearing = BallBearing.from_design(design)
     flexspline = tooth_profile(design, "flexspline")
     circular_spline = tooth_profile(design, "circular_spline")
-    own = sector(design, "flexspline", flexspline)
-    other = sector(design, "circular_spline", circular_spline)
-    section = rim_section(own)
+    flexspline_sector = sector(design, "flexspline", flexspline)
+    ring_sector = sector(design, "circular_spline", circular_spline)
+    section = rim_section(flexspline_sector)
     count = flexspline.teeth
     per_tooth = max(1, -(-ELEMENTS // count))
     rim = HermiteRing(
@@ -149,7 +149,7 @@ def thin_ring(design: Design) -> ThinRing:
             flexspline=flexspline,
             circular_spline=circular_spline,
             foot_radius=section.neutral_radius,
-            stiffness=tooth_pair_stiffness(own, other),
+            stiffness=tooth_pair_stiffness(flexspline_sector, ring_sector),
             shift=tooth_errors(design, "flexspline").shift,
             ring_shift=ring_errors if ring_errors.any() else None,
         ),

@@ -142,12 +142,12 @@ class RingTeeth:
             return np.asarray(row)
 
         across = moved(tangent)
-        _, _, own = self.flexspline.evaluate(contacts.station)
-        other = self.facing_curvature(contacts, arm + foot[j])
-        both = np.maximum(own + other, 1e-3 * np.abs(own))
+        _, _, curvature = self.flexspline.evaluate(contacts.station)
+        ring_curvature = self.facing_curvature(contacts, arm + foot[j])
+        both = np.maximum(curvature + ring_curvature, 1e-3 * np.abs(curvature))
         form = np.empty((len(j), 2, 2))
-        form[:, 0, 0] = own * other / both
-        form[:, 0, 1] = form[:, 1, 0] = -other / both
+        form[:, 0, 0] = curvature * ring_curvature / both
+        form[:, 0, 1] = form[:, 1, 0] = -ring_curvature / both
         form[:, 1, 1] = -1.0 / both - np.einsum("ni,ni->n", normal, arm)
         pair = np.stack([across, turn], axis=1)
         return moved(normal), np.swapaxes(pair, 1, 2) @ (form @ pair)

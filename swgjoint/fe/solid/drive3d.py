@@ -59,8 +59,10 @@ def solid_ring(
     name = design.drive.name
     check_modelled(design)
     if half == "auto":
-        own = design.wave_generator.bearing
-        even = bearing is None or own is None or own.balls % 2 == 0
+        design_bearing = design.wave_generator.bearing
+        even = (
+            bearing is None or design_bearing is None or design_bearing.balls % 2 == 0
+        )
         half = can_halve(design, bearing=False) and even
     if bearing is not None:
         check_bearing(design, half=half)

@@ -175,9 +175,9 @@ def _solve_linear(
     thorough: bool,
 ) -> _Step:
     """Condense the ring to tooth forces and rotations, solve, and expand the result."""
-    found = None
+    candidates = None
     if load.teeth:
-        found = ring.teeth.find(
+        candidates = ring.teeth.find(
             linear.frames[0],
             ring.loads(state),
             state.ring_force,
@@ -186,9 +186,9 @@ def _solve_linear(
             thorough=thorough,
             ring_rotation=state.ring_rotation,
         )
-    condensed = condense(ring, state, linear, found, load.rotation)
+    condensed = condense(ring, state, linear, candidates, load.rotation)
     system, offset = condensed.system, condensed.offset.copy()
-    n = 0 if found is None else len(found)
+    n = 0 if candidates is None else len(candidates)
     used, output = np.arange(n), n if load.rotation is None else n + 1
     if load.torque is not None:
         offset[output] -= load.torque / ring.copies
@@ -197,8 +197,8 @@ def _solve_linear(
     active = np.zeros(n, dtype=bool)
     if len(used):
         guess = offset[:n] < 0.0
-        if state.held is not None and found is not None and len(state.held):
-            guess = found.contacts.share_flank_with(state.held.contacts)
+        if state.held is not None and candidates is not None and len(state.held):
+            guess = candidates.contacts.share_flank_with(state.held.contacts)
         unknown[used], active = solve_mixed(
             system[np.ix_(used, used)], offset[used], n, 0, guess
         )
@@ -214,15 +214,17 @@ def _solve_linear(
     moved = increment[:, ring.contact_dofs]
     change = np.einsum("spm,sm->sp", bore.rows, moved)
     by_teeth = np.zeros_like(change)
-    if found is not None:
-        np.add.at(by_teeth, found.contacts.sector, force[:, None] * condensed.coupling)
+    if candidates is not None:
+        np.add.at(
+            by_teeth, candidates.contacts.sector, force[:, None] * condensed.coupling
+        )
     free = bore.free_gap + change + by_teeth
     pressure = -np.einsum("spq,sq->sp", bore.inverse, free)
     after = free + np.einsum("spq,sq->sp", bore.compliance, pressure)
     rotation = state.rotation if load.rotation is None else load.rotation
     holding = -ring.copies * float(condensed.offset[n] + system[n] @ unknown)
     return _Step(
-        found=found,
+        found=candidates,
         force=force,
         active=np.flatnonzero(active),
         increment=increment,
@@ -259,8 +261,8 @@ def _advance(
     shared = ~bore.found | apart.any(axis=1)
     size, last = masters.face_size, masters.size - masters.face_size
     moved = damping * step.increment
-    own = ring.dofs(np.arange(masters.size))
-    x = ring.masters(state) + moved[:, own].reshape(len(moved), -1, 3)
+    master_dofs = ring.dofs(np.arange(masters.size))
+    x = ring.masters(state) + moved[:, master_dofs].reshape(len(moved), -1, 3)
     race = state.race
     if race is not None:
         race = race + moved[:, ring.race_dofs[:NODE]].reshape(race.shape)

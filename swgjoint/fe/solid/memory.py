@@ -39,11 +39,13 @@ def required_memory(
     solving = BYTES * sectors * size * (size + CONTACTS) * COPIES
     stresses = BYTES * sectors * nodes * (3 + 2 * 6 + 9)
     if ring is not None:
-        own = ring.teeth.segment.mesh.p.shape[1]
+        ring_nodes = ring.teeth.segment.mesh.p.shape[1]
         flank = 2 * ring.teeth.flank.size
         face = 6 * len(ring.teeth.segment.first)
-        building = 2 * 3 * own * (flank + face) + FILL * (3 * own) ** (4 / 3)
-        held = OFFSETS * (3 * own * flank + flank**2)
+        building = 2 * 3 * ring_nodes * (flank + face) + FILL * (3 * ring_nodes) ** (
+            4 / 3
+        )
+        held = OFFSETS * (3 * ring_nodes * flank + flank**2)
         kept += BYTES * held
         condensing = max(condensing, BYTES * building)
     return float(INTERPRETER + kept + max(condensing, solving + stresses))

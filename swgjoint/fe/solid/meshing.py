@@ -234,14 +234,16 @@ def simulate_solid_meshing(
     rows = []
     for k in range(steps):
         angle = 2.0 * pi * turn * k / steps
-        found = state
+        current = state
         if k:
-            found = reached(f"position-{k:04d}", partial(follow.to_angle, state, angle))
+            current = reached(
+                f"position-{k:04d}", partial(follow.to_angle, state, angle)
+            )
         if throw:
-            checked(found, f"the input position {angle / deg:g} deg")
-        if found.outcome.ok:
-            state = found
-        rows.append(_step(follow, found, angle, series))
+            checked(current, f"the input position {angle / deg:g} deg")
+        if current.outcome.ok:
+            state = current
+        rows.append(_step(follow, current, angle, series))
         progress("meshing", k + 1, steps)
     return SolidRun(
         design=design,

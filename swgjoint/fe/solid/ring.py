@@ -72,10 +72,10 @@ class SolidRing:
     @property
     def face_closure(self) -> Array:
         """Factors of the degrees of freedom of a face that close the ring."""
-        own = np.tile(self.closure, self.strip.masters.face_size)
+        of_masters = np.tile(self.closure, self.strip.masters.face_size)
         if self.race is None:
-            return own
-        return np.concatenate([own, SIGN if self.half else np.ones(NODE)])
+            return of_masters
+        return np.concatenate([of_masters, SIGN if self.half else np.ones(NODE)])
 
     @property
     def copies(self) -> int:

@@ -34,22 +34,22 @@ class RingFactor:
         self._last = last = len(blocks) - 1
         self._insides = Insides(blocks, face)
         schur, one, two = self._insides.schur, slice(0, face), slice(face, None)
-        own = schur[:, one, one] + np.roll(schur[:, two, two], 1, axis=0)
+        diagonal = schur[:, one, one] + np.roll(schur[:, two, two], 1, axis=0)
         ahead = schur[:last, one, two]  # from a face to the next one
         arrow = schur[last, two, one]  # from a face to the last one
-        corner = own[last].copy()
+        corner = diagonal[last].copy()
         self._lu, self._ahead, self._arrow = [], ahead[:-1], []
         for k in range(last):
             if k == last - 1:  # the next face is the last one
                 arrow = arrow + ahead[k]
-            lu = _factor(own[k])
+            lu = _factor(diagonal[k])
             far = lu_solve(lu, arrow, check_finite=False)
             corner -= arrow.T @ far
             self._lu.append(lu)
             self._arrow.append(arrow)
             if k < last - 1:
                 near = lu_solve(lu, ahead[k], check_finite=False)
-                own[k + 1] -= ahead[k].T @ near
+                diagonal[k + 1] -= ahead[k].T @ near
                 arrow = -ahead[k].T @ far
         self._lu.append(_factor(corner))
 

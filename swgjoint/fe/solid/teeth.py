@@ -159,11 +159,11 @@ class SolidTeeth:
             old = None
             if held is not None and len(held):
                 old = held.contacts.chosen(np.flatnonzero(held.plane == p))
-            found = search.search(
+            in_plane = search.search(
                 plane_flank[:, p].reshape(n, -1), reach, old, thorough=thorough
             )
-            parts.append(found)
-            numbers.append(np.full(len(found), p))
+            parts.append(in_plane)
+            numbers.append(np.full(len(in_plane), p))
         contacts = parts[0]
         for part in parts[1:]:
             contacts = Contacts.join(contacts, part)
@@ -238,10 +238,10 @@ class SolidTeeth:
     def compliance(self, found: ToothRows) -> Array:
         """Compliance between candidates through both members' teeth (n, n) [m/N]."""
         flank = self.strip.flank_dofs
-        own = self.strip.teeth.compliance[:flank, :flank]
+        flank_compliance = self.strip.teeth.compliance[:flank, :flank]
         sector = found.contacts.sector
         same = sector[:, None] == sector[None, :]
-        matrix = np.where(same, found.weight @ own @ found.weight.T, 0.0)
+        matrix = np.where(same, found.weight @ flank_compliance @ found.weight.T, 0.0)
         if self.ring_gear is not None:
             matrix += self.ring_gear.contact_compliance(
                 found.contacts.tooth, found.ring_weight, self.ring_teeth

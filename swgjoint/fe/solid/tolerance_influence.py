@@ -44,9 +44,9 @@ def influence(ring: SolidRing, state: SolidState, *, ring_is_output: bool) -> In
             " without errors"
         )
     linear = linearise(ring, state)
-    found, carries = _tooth_contacts(ring, linear, state)
-    n = len(found)
-    condensed = condense(ring, state, linear, found)
+    contacts, carries = _tooth_contacts(ring, linear, state)
+    n = len(contacts)
+    condensed = condense(ring, state, linear, contacts)
     # the other member is fixed: the bore of the diaphragm or the circular spline
     used = np.append(np.arange(n), n + 1 if ring_is_output else n)
     offset = condensed.offset[used]
@@ -54,7 +54,7 @@ def influence(ring: SolidRing, state: SolidState, *, ring_is_output: bool) -> In
     return pivot_system(
         condensed.system[np.ix_(used, used)],
         offset,
-        _gaps(ring, state, found, carries),
+        _gaps(ring, state, contacts, carries),
         closed_supports=np.zeros(0, dtype=bool),
         free=[n],
         output=n,
@@ -66,7 +66,7 @@ def influence(ring: SolidRing, state: SolidState, *, ring_is_output: bool) -> In
 
 def _gaps(ring: SolidRing, state: SolidState, found: ToothRows, carries: Mask) -> Gaps:
     contacts, n = found.contacts, len(found)
-    own = contacts.weight.reshape(n, -1, 2).sum(axis=1)
+    flexspline = contacts.weight.reshape(n, -1, 2).sum(axis=1)
     z = ring.strip.mesh.teeth.z
     by_plane = found.ring_weight.reshape(n, len(z), -1, 2).sum(axis=2)
     place = ring.teeth.ring_place(state.ring_rotation)
@@ -74,7 +74,7 @@ def _gaps(ring: SolidRing, state: SolidState, found: ToothRows, carries: Mask) -
     return Gaps(
         sector=contacts.sector,
         tooth=contacts.tooth,
-        direction=np.stack([own, by_plane.sum(axis=1)]),
+        direction=np.stack([flexspline, by_plane.sum(axis=1)]),
         by_tilt=rotate(leaning, place[contacts.tooth]),
         carries=carries,
     )
@@ -87,7 +87,7 @@ def _tooth_contacts(
     held = state.held
     if held is None or not len(held):
         raise ValueError("the influence needs an equilibrium whose teeth carry force")
-    found = ring.teeth.find(
+    possible = ring.teeth.find(
         linear.frames[0],
         ring.loads(state),
         state.ring_force,
@@ -96,9 +96,9 @@ def _tooth_contacts(
         thorough=True,
         ring_rotation=state.ring_rotation,
     )
-    carries = np.zeros(len(found), dtype=bool)
+    carries = np.zeros(len(possible), dtype=bool)
     for plane in np.unique(held.plane):
-        here = np.flatnonzero(found.plane == plane)
+        here = np.flatnonzero(possible.plane == plane)
         own = held.contacts.chosen(np.flatnonzero(held.plane == plane))
-        carries[here[own.nearest_in(found.contacts.chosen(here))]] = True
-    return found, carries
+        carries[here[own.nearest_in(possible.contacts.chosen(here))]] = True
+    return possible, carries

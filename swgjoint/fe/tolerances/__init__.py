@@ -1,1 +1,1 @@
-"""Drives with manufacturing errors of the teeth, in 2D."""
+"""Drives with manufacturing errors, superposed on linearised equilibria."""

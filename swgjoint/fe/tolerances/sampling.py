@@ -106,25 +106,28 @@ def sample_tolerances(
     for k, (rest, flawless) in enumerate(zip(linear, reference, strict=True)):
         there = _kept(keep, k, (3, loads, pitches.size))
         if there is None:
-            found, count = _over_torque(rest, errors, levels, small, tick)
+            phase_table, count = _over_torque(rest, errors, levels, small, tick)
         else:
-            found, count = there
+            phase_table, count = there
             tick(steps)
-        if not np.isfinite(found).all():
-            lost = np.isnan(found).any(axis=(0, 1)).sum()
+        if not np.isfinite(phase_table).all():
+            lost = np.isnan(phase_table).any(axis=(0, 1)).sum()
             raise ComputationError(
                 f"{drive.name}: no equilibrium with the errors of the teeth at {lost}"
                 f" of {pitches.size} pitches; try smaller tolerances"
             )
         if keep is not None and there is None:
-            keep.write(_PHASE.format(k), {"table": found, "free": count})
+            keep.write(_PHASE.format(k), {"table": phase_table, "free": count})
         alone, _ = _over_torque(flawless, none, levels, small)
         if has_play:
-            found, alone = _with_onsets(found, small), _with_onsets(alone, small)
+            phase_table, alone = (
+                _with_onsets(phase_table, small),
+                _with_onsets(alone, small),
+            )
         ideal = pitch_of(design) * k / phases / design.ratio
-        found[0] -= ideal
+        phase_table[0] -= ideal
         alone[0] -= ideal
-        tables.append(found)
+        tables.append(phase_table)
         perfect.append(alone[:, :, 0])
         free += count
     # (3, n_torques, n_pitches, n_phases)
@@ -183,15 +186,15 @@ def full_solves(
         for torque in torques:
             if torque == 0.0 and rest.opposite is not None:
                 # midway between both ends of the clearance
-                found = [flawed.to_torque(s, at.torque) for s, at in rest.sides]
+                states = [flawed.to_torque(s, at.torque) for s, at in rest.sides]
             else:
                 state = flawed.to_torque(state, torque)
-                found = [state]
+                states = [state]
             angle = np.mean(
-                [flawed.output_angle(s) if s.outcome.ok else np.nan for s in found]
+                [flawed.output_angle(s) if s.outcome.ok else np.nan for s in states]
             )
             error = angle - step * phase[k] / follow.ratio
-            moment = np.mean([flawed.input_torque(s) for s in found])
+            moment = np.mean([flawed.input_torque(s) for s in states])
             rows.append((step * positions[k], torque, error, moment))
         return np.array(rows)
 
@@ -242,12 +245,14 @@ def _over_torque(
         for k in range(0, len(change), CHUNK):
             part = slice(k, k + CHUNK)
             begin = None if start is None else start[part]
-            found = at.respond(change[part], torque, begin)
+            response = at.respond(change[part], torque, begin)
             # the influence counts from the equilibrium at which it is linearised
-            potential = found.potential + state.energy + at.torque * at.angle
-            energy = potential - torque * found.output_angle
-            tables.append(np.stack([found.output_angle, energy, found.compliance]))
-            active.append(found.active)
+            potential = response.potential + state.energy + at.torque * at.angle
+            energy = potential - torque * response.output_angle
+            tables.append(
+                np.stack([response.output_angle, energy, response.compliance])
+            )
+            active.append(response.active)
             tick()
         return np.concatenate(tables, axis=1), np.concatenate(active)
 
@@ -270,8 +275,8 @@ def _over_torque(
     for sign in (-1.0, 1.0):
         active, rows = at_rest, []
         for level in levels:
-            found, active = row(sign * level, slice(None), active, tick)
-            rows.append(found)
+            level_row, active = row(sign * level, slice(None), active, tick)
+            rows.append(level_row)
         sides.append(rows)
     table = [*sides[0][::-1], unloaded, *sides[1]]
     return np.stack(table, axis=1), int(free.sum())

@@ -179,13 +179,13 @@ def fatigue(
 
     state = reached(follow.deflect(), "deflection by the wave generator", 1)
     state = reached(follow.engage(state), "engagement of the teeth", 2)
-    found: list[Fatigue] = []
+    results: list[Fatigue] = []
     for torque in torques:
         state = follow.to_torque(state, torque)
-        reached(state, f"loading to {torque:g} N·m", 3 + len(found))
+        reached(state, f"loading to {torque:g} N·m", 3 + len(results))
         stresses = flexspline_stresses(ring, state)
-        found.append(assess(ring.strip.mesh, stresses, torque, limits, shell))
-    return found
+        results.append(assess(ring.strip.mesh, stresses, torque, limits, shell))
+    return results
 
 
 def assess(
@@ -281,18 +281,20 @@ def root_stress(strip: StripMesh, stress: Array) -> Array:
 
 
 def _amplitudes(strip: StripMesh, stresses: Mapping[str, Array]) -> dict[str, float]:
-    teeth, found = strip.teeth, {}
+    teeth, amplitudes = strip.teeth, {}
     r = np.hypot(*np.asarray(teeth.plane.mesh.p))
     land = r[teeth.plane.face_first]
     root = np.flatnonzero(r < land[0] + 0.3 * (land[0] - land[-1]))
     for name, stress in stresses.items():
         if name != teeth.segment.name:
-            found[name] = float(half_range(stress).max())
+            amplitudes[name] = float(half_range(stress).max())
             continue
-        own = half_range(stress[:, teeth.nodes[:, root]])
-        found["root"] = float(own.max())
-        found["root, mid-face"] = float(own[np.argmin(np.abs(teeth.z))].max())
-    return found
+        half_ranges = half_range(stress[:, teeth.nodes[:, root]])
+        amplitudes["root"] = float(half_ranges.max())
+        amplitudes["root, mid-face"] = float(
+            half_ranges[np.argmin(np.abs(teeth.z))].max()
+        )
+    return amplitudes
 
 
 def half_range(stress: Array) -> Array:

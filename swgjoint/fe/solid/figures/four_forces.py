@@ -89,12 +89,12 @@ def four_forces(cup: PinchedCup, deflection: float) -> FourForces:
     load[np.ix_(meshing, ~bore)] = 0.5 / (TEETH * lever) * around[~bore]
     cases.append(load.reshape(cup.sectors, -1))
 
-    found = [cup.respond(case) for case in cases]
-    radial = np.array([np.einsum("sni,ni->sn", u, out) for u, _ in found])
+    responses = [cup.respond(case) for case in cases]
+    radial = np.array([np.einsum("sni,ni->sn", u, out) for u, _ in responses])
     # mean displacement of each area, weighted as its load
     moved = np.array(
         [
-            [np.sum(case * u[:, nodes].reshape(cup.sectors, -1)) for u, _ in found]
+            [np.sum(case * u[:, nodes].reshape(cup.sectors, -1)) for u, _ in responses]
             for case in cases[:2]
         ]
     )
@@ -105,9 +105,9 @@ def four_forces(cup: PinchedCup, deflection: float) -> FourForces:
     def summed(parts: Array) -> dict[str, Array]:
         return {
             name: np.asarray(
-                sum(f * s[name] for f, (_, s) in zip(parts, found, strict=True))
+                sum(f * s[name] for f, (_, s) in zip(parts, responses, strict=True))
             )
-            for name in found[0][1]
+            for name in responses[0][1]
         }
 
     return FourForces(

@@ -68,12 +68,12 @@ def solid_figures(
         "fatigue_safety_factor": safety,
         "radial_stiffness_N_mm": radial,
     }
-    found = SolidFigures()
+    figures = SolidFigures()
     for key, work in compute.items():
         if key not in keys:
             continue
         if design.cup is None:
-            found.missing[key] = "needs a design with a [cup]"
+            figures.missing[key] = "needs a design with a [cup]"
             continue
         parts: dict[str, Any] = {"figure": key, "design": design.content_hash()}
         if work is safety:
@@ -81,8 +81,8 @@ def solid_figures(
         try:
             one = recall("figures", parts, SolidFigures, work)
         except DesignError as fault:
-            found.missing[key] = "; ".join(str(fault).splitlines())
+            figures.missing[key] = "; ".join(str(fault).splitlines())
         else:
-            found.values.update(one.values)
-            found.details.update(one.details)
-    return found
+            figures.values.update(one.values)
+            figures.details.update(one.details)
+    return figures

@@ -63,12 +63,14 @@ def solid(mesh: MeshHex, youngs_modulus: float, poisson_ratio: float) -> Solid:
     modes = np.asarray(basis.interior_dofs)  # (9, n_elements)
     rows = np.broadcast_to(modes[:, None], (9, *modes.shape))
     columns = np.broadcast_to(modes[None], rows.shape)
-    own = np.asarray(matrix[rows.ravel(), columns.ravel()]).reshape(rows.shape)
-    inverse = np.linalg.inv(np.moveaxis(own, 2, 0))
-    own_inverse = sparse.block_diag(inverse, format="csr")
+    mode_stiffness = np.asarray(matrix[rows.ravel(), columns.ravel()]).reshape(
+        rows.shape
+    )
+    inverse = np.linalg.inv(np.moveaxis(mode_stiffness, 2, 0))
+    mode_inverse = sparse.block_diag(inverse, format="csr")
     order = modes.T.ravel()
     coupling = matrix[order][:, at_nodes]
-    from_nodes = -(own_inverse @ coupling)
+    from_nodes = -(mode_inverse @ coupling)
     reduced = matrix[at_nodes][:, at_nodes] + coupling.T @ from_nodes
     recovery = _stress_operator(basis, mu, lame)
     return Solid(

@@ -142,7 +142,7 @@ def strip_masters(strip: StripMesh, orders: Orders | None = None) -> Masters:
         )
     size = count + face_size
 
-    position, found = np.full((size, 3), np.nan), []
+    position, segment_masters = np.full((size, 3), np.nan), []
     for k, segment in enumerate(segments):
         rows: dict[int, Array] = {}
         for nodes, first in ((segment.first, 0), (segment.last, size - face_size)):
@@ -162,12 +162,12 @@ def strip_masters(strip: StripMesh, orders: Orders | None = None) -> Masters:
             weight=np.ascontiguousarray(weight[:, used]),
         )
         _place(segment, follow, position)
-        found.append(follow)
+        segment_masters.append(follow)
     held = [ends[-1], np.arange(inside, count), size - face_size + ends[-1]]
     return Masters(
         position=position,
         face_size=face_size,
-        segments=tuple(found),
+        segments=tuple(segment_masters),
         held=np.concatenate(held),
     )
 

@@ -212,11 +212,11 @@ def teeth_mesh(
 
 def _joined(mesh: MeshHex, more: MeshHex) -> tuple[MeshHex, Index]:
     """Join two meshes at coincident nodes; new node numbers of the second mesh."""
-    own, other = np.asarray(mesh.p).T, np.asarray(more.p).T
-    apart, nearest = cKDTree(own).query(other)
+    first, second = np.asarray(mesh.p).T, np.asarray(more.p).T
+    apart, nearest = cKDTree(first).query(second)
     new = apart > 1e-9
-    number = np.where(new, len(own) + np.cumsum(new) - 1, nearest)
-    points = np.concatenate([own, other[new]])
+    number = np.where(new, len(first) + np.cumsum(new) - 1, nearest)
+    points = np.concatenate([first, second[new]])
     cells = np.concatenate([np.asarray(mesh.t), number[np.asarray(more.t)]], axis=1)
     return MeshHex(np.ascontiguousarray(points.T), cells), number
 

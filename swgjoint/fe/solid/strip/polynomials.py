@@ -81,12 +81,14 @@ class Patch:
             size: Number of masters of the strip.
             first: Offset added to the numbers of the masters.
         """
-        own = np.array([lobatto(self.degrees[j])[k] for j, k in self.points])
+        stations = np.array([lobatto(self.degrees[j])[k] for j, k in self.points])
         deep = np.array([THROUGH[j] for j, _ in self.points])
         # at the teeth the outside of the wall lies between the masters
         outer = np.array([k == 0 for _, k in self.points]) & (self.narrow > 0.0)
         deep[outer] = (deep[outer] - self.narrow) / (1.0 - self.narrow)
-        values = np.linalg.solve(self._basis(own, deep).T, self._basis(along, depth).T)
+        values = np.linalg.solve(
+            self._basis(stations, deep).T, self._basis(along, depth).T
+        )
         rows = np.zeros((len(along), size))
         rows[:, first + self.masters] = np.where(np.abs(values) > 1e-13, values, 0.0).T
         return rows

@@ -71,12 +71,12 @@ class SolidRace:
             half: Whether to model half of the race.
             axially_free: Whether the grooves leave the race free along the axis.
         """
-        own = RaceOnBalls.from_design(design, design.drive.teeth_flexspline)
+        on_balls = RaceOnBalls.from_design(design, design.drive.teeth_flexspline)
         return cls(
-            on_balls=own,
+            on_balls=on_balls,
             half=half,
             outside=RaceOutside.from_design(design),
-            roll=RaceRoll.from_bearing(own.bearing, own.race),
+            roll=RaceRoll.from_bearing(on_balls.bearing, on_balls.race),
             axially_free=axially_free,
         )
 
@@ -102,12 +102,12 @@ class SolidRace:
             rotation: Rotation of race and flexspline [rad].
             closed: Coordinate z at which the coned bore meets the undeformed one [m].
         """
-        own = self.on_balls
-        w0 = 1.01 * (own.lobe_height + 0.5 * own.bearing.clearance)
+        on_balls = self.on_balls
+        w0 = 1.01 * (on_balls.lobe_height + 0.5 * on_balls.bearing.clearance)
         phi = self.pitch * (np.arange(self.sectors) - 0.5) + rotation
         wave = 2.0 * (phi - alpha)
         race = np.zeros((self.sectors, 2, len(KINDS)))
-        race[..., :2] = own.race.two_lobes(w0, phi, alpha)
+        race[..., :2] = on_balls.race.two_lobes(w0, phi, alpha)
         roll = -0.5 * self.outside.width / closed * w0
         race[:, 0, 2] = roll * np.cos(wave)
         race[:, 1, 2] = -2.0 * self.pitch * roll * np.sin(wave)
@@ -159,11 +159,11 @@ class SolidRace:
             race: Coordinates (N, 2, 4) [m].
             alpha: Wave-generator angle [rad].
         """
-        own, n = self.on_balls.race, self.sectors
+        plane_ring, n = self.on_balls.race, self.sectors
         plane = race[..., :2]
         whole = np.concatenate([plane, -plane]) if self.half else plane
         q = whole.ravel()
-        nodal, blocks = own.forces(q)
+        nodal, blocks = plane_ring.forces(q)
         gradient, hessian = np.zeros((n, 2 * NODE)), np.zeros((n, 2 * NODE, 2 * NODE))
         gradient[:, PLANE[:4]] = nodal.reshape(-1, 4)[:n]
         hessian[:, PLANE[:, None], PLANE] = blocks[:n]
@@ -197,7 +197,9 @@ class SolidRace:
             hessian=hessian,
             fixed=fixed,
             balls=balls,
-            energy=own.energy(q) + balls.energy + (2.0 if self.half else 1.0) * bent,
+            energy=plane_ring.energy(q)
+            + balls.energy
+            + (2.0 if self.half else 1.0) * bent,
         )
 
     def _feet(self, race: Array, alpha: float) -> Array:
@@ -230,10 +232,10 @@ class SolidRace:
             Gap (N, b) [m], derivatives by the points (N, b, 3) and by the coordinates
             of both nodes of the elements (N, b, 16).
         """
-        own = self.elements(race)
-        line = own[:, PLANE].reshape(-1, 4, 2)
+        elements = self.elements(race)
+        line = elements[:, PLANE].reshape(-1, 4, 2)
         gap, by_point, by_line, by_edge = self.outside.gap(
-            line, own[:, ROLL], points, start
+            line, elements[:, ROLL], points, start
         )
         by_race = np.zeros((*gap.shape, 2 * NODE))
         by_race[..., PLANE] = by_line.reshape(*gap.shape, 8)
