@@ -166,6 +166,11 @@ class _Sampler:
     keep: Unfinished | None
     progress: Progress
 
+    @property
+    def period(self) -> float:
+        """Input angle of one passage in the map [rad]."""
+        return 2.0 * pi / self.passage.carried_as
+
     def cage_phase(self, place: float) -> float:
         """Angle of ball 0 [rad] at a place from zero to ``count`` in the passage."""
         # the cage lags behind the wave generator
@@ -211,7 +216,7 @@ class _Sampler:
             place = self.count * (j + 0.381966) / UNSEEN_PHASES
             phase = self.cage_phase(place)
             rows, _ = self.position(f"unseen-{j:04d}", phase, torques)
-            angle = 2.0 * pi / self.passage.carried_as * place / self.count
+            angle = self.period * place / self.count
             solves += [
                 (angle, torque, row[0] - torque * self.series, row[3])
                 for torque, row in rows.items()
@@ -277,11 +282,7 @@ class _Sampler:
             ratings=ratings_of(design),
             damping_ratio=design.joint.damping_ratio,
             order=(self.passage.carried_as, 0),
-            input_angle=2.0
-            * pi
-            / self.passage.carried_as
-            * np.arange(self.count)
-            / self.count,
+            input_angle=self.period * np.arange(self.count) / self.count,
             torque=torque,
             output_error=error - (torque * series)[:, None],
             energy=energy + (0.5 * torque**2 * series)[:, None],
