@@ -121,7 +121,7 @@ def test_status_where_nothing_can_be_computed(file, capsys, monkeypatch):
 @pytest.mark.parametrize(
     ("text", "options", "told"),
     [
-        ("design = 3", (), ("some.toml", "design", "3", "text")),
+        ("design = 3", (), ("some.toml", "design", "3", "string")),
         (
             SHEET.format("[1.0]").replace(
                 'rated_torque_Nm"]\nv', 'rated_torqe_Nm"]\nv'
