@@ -1,20 +1,21 @@
-r"""Contact between the bore of the flexspline and what it lies on.
+r"""Contact between the bore of the flexspline and the surface that supports it.
 
-On a rigid wave generator the bore presses at stations, several between neighbouring
-nodes, each through a thin layer that yields. With the gap g of a station
+On a rigid wave generator the bore makes contact at stations, several between
+neighbouring nodes, each through a thin compliant layer. A station with the gap g has
+the energy and stiffness
 
-.. math:: U = \tfrac12 k \langle -g \rangle^2, \quad k = \frac{2 E b}{h}\,\ell
+.. math:: U = \tfrac12 k \langle -g \rangle^2, \quad k = \frac{2 E b}{h}\,\ell ,
 
-for a station that stands for a length :math:`\ell` of the bore, b wide, between nodes
-that are h apart: the layer is half an interval deep. It yields by some hundredths of a
-micrometre, in proportion to h, and spreads the contact over several stations, whose
-forces begin and end without a jump.
+where :math:`\ell` is the length of bore that the station represents, b is the width of
+the bore and h is the node spacing: the layer is h/2 deep. It is compressed by a few
+hundredths of a micrometre, in proportion to h, and spreads the contact over several
+stations, whose forces start and end continuously.
 
-A station follows the cubic B-spline through the nodes around it, brought back onto the
-circle of the undeformed bore, so that a force between two nodes meets the same
-compliance as a force at a node. (With rigid contact at the nodes alone the input torque
-of a drive with four rollers was a sawtooth of one tooth per node, five times as high as
-its ripple.)
+A station follows the cubic B-spline through the surrounding nodes, corrected to lie on
+the circle of the undeformed bore, so that a force between two nodes sees the same
+compliance as a force at a node. (With rigid contact at the nodes only, the input torque
+of a drive with four rollers was a sawtooth with one period per node, five times as high
+as the true ripple.)
 """
 
 from __future__ import annotations
@@ -30,40 +31,51 @@ from swgjoint.typing import Array
 POINTS = 24
 """Stations between neighbouring nodes."""
 NARROW_POINTS = 48
-"""The same on rollers and parabolas, where a contact is narrower than the nodes are
-apart and its steps from one station to the next are a ripple of the input torque: on
-parabolas at 1 N·m 10 % of all there is with 24 stations (4.7 % rms), 5.6 % (2.2 %) with
-48, most of which is no longer theirs."""
+"""Stations between neighbouring nodes for rollers and parabolas.
+
+There the contact is narrower than the node spacing, and its steps from one station to
+the next show up as a ripple of the input torque. For parabolas at 1 N·m they amount to
+10 % of the total ripple with 24 stations (4.7 % rms) and to 5.6 % (2.2 % rms) with 48,
+most of which has other causes."""
 DEPTH = 0.5
-"""Depth of the layer over the distance of the nodes. The kinematic error of
-``reference-2d`` is 0.1 % off that of a mesh twice as fine, with a depth of two 4 %;
-shallower layers need more stations."""
+"""Depth of the layer divided by the node spacing [-].
+
+With 0.5 the kinematic error of ``reference-2d`` differs by 0.1 % from that of a mesh
+twice as fine; with 2 it differs by 4 %. Shallower layers need more stations."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class BoreStations:
-    """Stations of a sector, p of them in each of i equal intervals: q = i p.
+    """Contact stations of a sector: p in each of i equal intervals, q = i p in total.
 
-    Those of an interval are carried by s neighbouring nodes, of m in all.
+    The stations of an interval follow s neighbouring nodes out of m.
     """
 
     weights: Array
-    """Positions from those of the nodes of an interval (p, 2, 2 s) [-]."""
+    """Weights of an interval's nodes in the positions of its stations (p, 2, 2 s) [-].
+    """
     stiffness: Array
-    """k (q,) [N/m]."""
+    """Stiffness k of each station (q,) [N/m]."""
 
     @property
     def per_interval(self) -> int:
-        """Stations of an interval."""
+        """Number of stations per interval."""
         return len(self.weights)
 
     def positions(self, nodes: Array) -> Array:
-        """Stations of all sectors (N, q, 2) [m] from their nodes (N, m, 2)."""
+        """Station positions of all sectors (N, q, 2) [m] from their nodes (N, m, 2)."""
         by_node = self.weights.reshape(-1, self.weights.shape[2])
         return np.asarray((self._windows(nodes) @ by_node.T).reshape(len(nodes), -1, 2))
 
     def project(self, direction: Array) -> Array:
-        """Displacements along directions (N, q, 2), by the nodes (N, q, 2 m)."""
+        """Rows that give displacements along directions from those of the nodes.
+
+        Args:
+            direction: Direction at each station (N, q, 2).
+
+        Returns:
+            Derivatives by the node displacements (N, q, 2 m) [-].
+        """
         local = self._local(direction)
         count, intervals, p, width = local.shape
         rows = np.zeros((count, intervals, p, width + 2 * (intervals - 1)))
@@ -72,17 +84,20 @@ class BoreStations:
         return rows.reshape(count, intervals * p, -1)
 
     def forces_of(self, forces: Array) -> Array:
-        """Nodal forces (N, m, 2) [N] of forces on the stations (N, q, 2) [N]."""
+        """Nodal forces (N, m, 2) [N] equivalent to station forces (N, q, 2) [N]."""
         by_node = self.weights.reshape(-1, self.weights.shape[2])
         shaped = forces.reshape(len(forces), -1, len(by_node))
         return self._assembled(shaped @ by_node).reshape(len(forces), -1, 2)
 
     def stiffness_of(self, direction: Array, stiffness: Array) -> Array:
-        """Stiffness matrices (N, 2 m, 2 m) [N/m] of springs along directions.
+        """Stiffness matrices of springs at the stations along given directions.
 
         Args:
-            direction: At the stations (N, q, 2).
-            stiffness: Of their springs (N, q) [N/m].
+            direction: Direction of the spring at each station (N, q, 2).
+            stiffness: Stiffness of each spring (N, q) [N/m].
+
+        Returns:
+            Matrices in the node displacements (N, 2 m, 2 m) [N/m].
         """
         local = self._local(direction)
         count, intervals, p, width = local.shape
@@ -91,24 +106,24 @@ class BoreStations:
         size = width + 2 * (intervals - 1)
         matrix = np.zeros((count, size, size))
         for k in range(intervals):
-            own = slice(2 * k, 2 * k + width)
-            matrix[:, own, own] += blocks[:, k]
+            dofs = slice(2 * k, 2 * k + width)
+            matrix[:, dofs, dofs] += blocks[:, k]
         return matrix
 
     def _windows(self, nodes: Array) -> Array:
-        """Coordinates of the nodes of every interval (N, i, 2 s)."""
+        """Node coordinates of every interval (N, i, 2 s) [m]."""
         s = self.weights.shape[2] // 2
         intervals = len(self.stiffness) // len(self.weights)
         return np.concatenate([nodes[:, k : k + intervals] for k in range(s)], axis=2)
 
     def _local(self, direction: Array) -> Array:
-        """Displacements along directions, by their own nodes (N, i, p, 2 s)."""
+        """Rows of :meth:`project` by the nodes of each interval (N, i, p, 2 s)."""
         shaped = direction.reshape(len(direction), -1, len(self.weights), 2)
         x, y = shaped[..., 0, None], shaped[..., 1, None]
         return np.asarray(x * self.weights[:, 0] + y * self.weights[:, 1])
 
     def _assembled(self, local: Array) -> Array:
-        """Sums at the nodes (N, 2 m) of values of every interval (N, i, 2 s)."""
+        """Sum the values of every interval (N, i, 2 s) at the nodes (N, 2 m)."""
         count, intervals, width = local.shape
         total = np.zeros((count, width + 2 * (intervals - 1)))
         for k in range(intervals):
@@ -116,25 +131,25 @@ class BoreStations:
         return total
 
     def nodes_touching(self, touching: NDArray[np.bool_]) -> int:
-        """Touching stations (N, q) in intervals between nodes, rounded up."""
+        """Touching stations (N, q) counted in node intervals, rounded up."""
         return -(-int(touching.sum()) // self.per_interval)
 
     @classmethod
     def from_nodes(cls, stiffness: Array) -> Self:
-        """The nodes themselves, with their stiffnesses (m,) [N/m]."""
+        """Use the nodes themselves as stations, with stiffnesses (m,) [N/m]."""
         return cls(weights=np.eye(2)[None], stiffness=stiffness)
 
     @classmethod
     def subdivide(cls, nodes: Array, *, layer: float, points: int = POINTS) -> Self:
-        """Equal steps through the intervals, all but the first and the last.
+        """Space stations equally in all intervals except the first and the last.
 
         Args:
-            nodes: Undeformed, equally spaced on a circle around the origin, from one
-                before the intervals to one after them (m, 2) [m].
-            layer: E b of the bore [N/m].
-            points: Stations of an interval.
+            nodes: Undeformed nodes, equally spaced on a circle around the origin, from
+                one before the intervals to one after them (m, 2) [m].
+            layer: Product E b of Young's modulus and width of the bore [N/m].
+            points: Stations per interval.
         """
-        # equal shares: those of Gauss points do not add up over a part of an interval
+        # equal shares: Gauss weights do not add up over a part of an interval
         t = (np.arange(points) + 0.5) / points
         splines = np.stack(
             [
@@ -148,14 +163,14 @@ class BoreStations:
         radius, near = float(np.hypot(*nodes[1])), nodes[:4]
         chord = complex(*(near[2] - near[1]))
         weights = np.zeros((points, 2, 4, 2))
-        for own, spline in zip(weights, splines / 6.0, strict=True):
-            own += spline[:, None] * np.eye(2)[:, None, :]
-            # what the spline lacks to the circle, turned and scaled with the chord
+        for by_node, spline in zip(weights, splines / 6.0, strict=True):
+            by_node += spline[:, None] * np.eye(2)[:, None, :]
+            # offset from the spline to the circle, turned and scaled with the chord
             mean = spline @ near
             lack = complex(*mean) * (radius / float(np.hypot(*mean)) - 1.0) / chord
             carried = np.array([[lack.real, -lack.imag], [lack.imag, lack.real]])
-            own[:, 1] -= carried
-            own[:, 2] += carried
+            by_node[:, 1] -= carried
+            by_node[:, 2] += carried
         count = points * (len(nodes) - 3)
         return cls(
             weights=weights.reshape(points, 2, -1),

@@ -1,9 +1,9 @@
 r"""The circular spline: rigid, or elastic with its outer diameter fixed or free.
 
-It strains little, so it is linear: the displacement of the flanks of tooth k under
-forces on the flanks of tooth j is a block :math:`G_{k-j}` of a block-circulant
-compliance, in the frames of the teeth. Where the outer diameter is fixed the blocks
-decay within a few teeth; a free one lets the ring become oval.
+Its strains are small, so the model is linear: the flank displacement of tooth k under
+forces on the flanks of tooth j is the block :math:`G_{k-j}` of a block-circulant
+compliance, in the frames of the teeth. If the outer diameter is fixed, the blocks decay
+within a few teeth; if it is free, the ring can become oval.
 """
 
 from __future__ import annotations
@@ -23,23 +23,27 @@ from swgjoint.gear.teeth.profile import ToothProfile
 from swgjoint.typing import Array, Index
 
 NEGLIGIBLE = 1e-9
-"""Blocks below this part of the largest one are left out."""
+"""Blocks smaller than this fraction of the largest one are dropped [-]."""
 CORNER = 0.05
-"""Part of the flank within which a corner is a candidate for contact."""
+"""Largest distance from a corner at which it is a contact candidate, as a fraction of
+the flank length [-]."""
 BEYOND = 1e-9
-"""Part of the flank by which a foot must miss its end to be a corner."""
+"""Overshoot past the end of the flank from which a foot counts as a corner, as a
+fraction of the flank length [-]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Compliance:
-    """Response of the teeth to flank forces, by the offset k - j of the teeth."""
+    """Response of the teeth to flank forces, by the tooth offset k - j."""
 
     element: Superelement
+    """Condensed sector of the circular spline."""
     offsets: Index
+    """Offsets k - j of the responding tooth k from the loaded tooth j (n_offsets,)."""
     flank: Array
-    """G [m/N]. Shape (n_offsets, 2 n_b, 2 n_b)."""
+    """Flank displacement per flank force, G (n_offsets, 2 n_b, 2 n_b) [m/N]."""
     skeleton: Array
-    """Displacement of the skeleton [m/N]. Shape (n_offsets, 2 n_a, 2 n_b)."""
+    """Skeleton displacement per flank force (n_offsets, 2 n_a, 2 n_b) [m/N]."""
 
     def displacement(self, force: Array) -> Array:
         """Flank displacement (N, 2 n_b) [m] under flank forces (N, 2 n_b) [N]."""
@@ -50,12 +54,15 @@ class Compliance:
         return respond(self.offsets, self.skeleton, force)
 
     def contact_compliance(self, tooth: Index, weight: Array, teeth: int) -> Array:
-        """Compliance between contact points (n, n) [m/N].
+        """Compliance between contact points.
 
         Args:
             tooth: Tooth of each point (n,).
             weight: Derivative of its gap by the flank displacement (n, 2 n_b).
-            teeth: Teeth in the model.
+            teeth: Number of teeth in the model.
+
+        Returns:
+            Matrix (n, n) [m/N].
         """
         return contact_compliance(self.offsets, self.flank, tooth, weight, teeth)
 
@@ -65,14 +72,14 @@ def ring_compliance(element: Superelement, *, free_rim: bool = False) -> Complia
 
     Args:
         element: Condensed sector of the circular spline.
-        free_rim: Whether the outer diameter can deform: held in the mean over its
-            nodes, which carry the load away in equal shares; else it is fixed.
+        free_rim: Whether the outer diameter can deform. If so, only its mean motion is
+            held and its nodes share the reaction equally; otherwise it is fixed.
     """
     n_teeth, size = element.sectors, element.face_size
     n_a = len(element.skeleton)
     pitch = 2.0 * np.pi / n_teeth
-    # degrees of freedom of the last face are those of the next tooth's first face, in
-    # the next tooth's frame
+    # the last face has the degrees of freedom of the next tooth's first face, expressed
+    # in the next tooth's frame
     turn = np.eye(2 * n_a)
     corner = rotate(np.eye(2), np.array(pitch)).T
     for node in range(n_a - size, n_a):
@@ -84,18 +91,18 @@ def ring_compliance(element: Superelement, *, free_rim: bool = False) -> Complia
     scale = float(np.mean(np.diag(element.stiffness)))
     blocks = np.broadcast_to(matrix, (n_teeth, *matrix.shape))
     if free_rim:
-        own = outside[:-1]  # the last corner is the next tooth's first
+        nodes = outside[:-1]  # the last corner is the next tooth's first
         rigid = _rigid_modes(element.skeleton, n_teeth)
-        held = rigid[:, own].reshape(n_teeth, -1, 3)
+        held = rigid[:, nodes].reshape(n_teeth, -1, 3)
         weight = np.einsum("tia,tib->ab", held, held)
-        # the rigid motion that the forces on the flanks do work on, shared out
+        # resultant of the flank forces, reacted in equal shares by the outer nodes
         resultant = (element.flank_from_skeleton @ rigid[0].reshape(-1, 3)).T
         share = -held @ np.linalg.solve(weight, resultant)
-        dofs = (2 * own[:, None] + np.arange(2)).ravel()
+        dofs = (2 * nodes[:, None] + np.arange(2)).ravel()
         rhs[:, dofs] = share
         rhs[0] += load
-        # three springs that carry nothing keep the ring in place
-        blocks, first = blocks.copy(), 2 * own[0]
+        # three springs without load remove the rigid-body motion
+        blocks, first = blocks.copy(), 2 * nodes[0]
         for tooth, dof in ((0, first), (0, first + 1), (n_teeth // 2, first)):
             blocks[tooth, dof, dof] += scale
     else:
@@ -122,7 +129,7 @@ def ring_compliance(element: Superelement, *, free_rim: bool = False) -> Complia
 
 
 def _rigid_modes(skeleton: Array, teeth: int) -> Array:
-    """Two translations and the rotation, in the frames of the teeth (N, n_a, 2, 3)."""
+    """Two translations and a rotation in the frames of the teeth (N, n_a, 2, 3)."""
     angle = np.asarray(2.0 * np.pi / teeth * np.arange(teeth), dtype=np.float64)
     shape = (teeth, *skeleton.shape)
     shifts = [
@@ -135,24 +142,25 @@ def _rigid_modes(skeleton: Array, teeth: int) -> Array:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CircularSpline:
-    """Surface of the circular spline as the flexspline's teeth see it."""
+    """Tooth surface of the circular spline that the flexspline's teeth touch."""
 
     profile: ToothProfile
     compliance: Compliance | None = None
-    """None for a rigid circular spline, and for a plane of one in space."""
+    """Compliance of the teeth; None for a rigid circular spline and for one plane of a
+    3D model."""
     weights: CubicSpline | None = None
-    """Weights of the flank nodes in such a plane."""
+    """Weights of the flank nodes in a plane of a 3D model; None in a 2D model."""
 
     @property
     def flank_dofs(self) -> int:
-        """Degrees of freedom of the flanks of one tooth, 0 if rigid."""
+        """Degrees of freedom of the flanks of one tooth; zero if rigid."""
         if self.compliance is None and self.weights is None:
             return 0
         return 4 * int(self.spline.c.shape[-1])
 
     @property
     def spline(self) -> CubicSpline:
-        """Weights of the flank nodes at an arc length (elastic only)."""
+        """Weights of the flank nodes as functions of the arc length (elastic only)."""
         if self.weights is not None:
             return self.weights
         assert self.compliance is not None
@@ -171,17 +179,19 @@ class CircularSpline:
         """Closest points of a right flank, exact for the deformed curve.
 
         A point whose foot would lie beyond an end of the flank faces the corner there:
-        its gap is the distance of the corner along the normal of the surface on which
-        the point lies. Without that normal, and for a rigid flank, it has none (inf).
+        its gap is the distance to the corner along the normal of the flexspline at the
+        point. The gap is infinite without that normal and for a rigid flank.
 
         Args:
-            points: In the frame of a ring tooth, mirrored to its right flank (n, 2).
+            points: Points in the frame of a ring tooth, mirrored to its right flank
+                (n, 2) [m].
+            flanks: Flank displacements in that frame; None for rigid flanks.
+            index: Flank that each point faces (n,).
             facing: Normals of the flexspline at the points, in that frame (n, 2).
-            flanks: Displacements of flanks in that frame; None for rigid ones.
-            index: Which of the flanks each point faces (n,).
-            start: Stations near the feet (n,); those of the rigid flank if None [m].
-            steps: Newton steps to the foot; each one leaves the share gap times
-                curvature of the error, and the gap is wrong by its square.
+            start: Arc lengths near the feet (n,) [m]; by default the feet on the rigid
+                flank.
+            steps: Newton steps to the foot. Each step multiplies the error of the foot
+                by gap times curvature; the error of the gap is of second order in it.
         """
         outside = np.zeros(len(points), dtype=bool)
         if flanks is None or start is None:
@@ -248,7 +258,7 @@ class CircularSpline:
         return table[order], radius[order]
 
     def _station(self, foot: Array) -> Array:
-        """Arc length of points on the rigid flank, from their distance to the axis."""
+        """Arc lengths [m] of points on the rigid flank, from their radii."""
         table, radius = self._stations_by_radius
         return np.interp(np.hypot(foot[:, 0], foot[:, 1]), radius, table)
 
@@ -258,12 +268,19 @@ class FlankSplines:
     """Displacements of many flanks as cubic splines along the profile."""
 
     breaks: Array
+    """Arc lengths at the ends of the intervals (n_intervals + 1,) [m]."""
     coefficients: Array
-    """Ascending powers of (s - break). Shape (n_flanks, n_intervals, 4, 2)."""
+    """Coefficients of ascending powers of (s - break), (n_flanks, n_intervals, 4, 2).
+    """
 
     @classmethod
     def fit(cls, spline: CubicSpline, nodes: Array) -> FlankSplines:
-        """Splines through node displacements (n_flanks, n_nodes, 2)."""
+        """Splines through the node displacements of many flanks.
+
+        Args:
+            spline: Weights of the flank nodes as functions of the arc length.
+            nodes: Node displacements (n_flanks, n_nodes, 2) [m].
+        """
         cardinal = np.asarray(spline.c)[::-1]  # (4, n_intervals, n_nodes)
         return cls(
             breaks=np.asarray(spline.x),
@@ -271,7 +288,15 @@ class FlankSplines:
         )
 
     def evaluate_at(self, flank: Index, s: Array) -> tuple[Array, Array]:
-        """Displacement and its derivative by s, (n, 2) each."""
+        """Displacement and its derivative by the arc length.
+
+        Args:
+            flank: Number of the flank of each point (n,).
+            s: Arc length of each point (n,) [m].
+
+        Returns:
+            Displacement (n, 2) [m] and derivative (n, 2) [-].
+        """
         j = np.searchsorted(self.breaks, s, side="right") - 1
         j = np.clip(j, 0, len(self.breaks) - 2)
         c, d = self.coefficients[flank, j], (s - self.breaks[j])[:, None]
@@ -284,11 +309,14 @@ class Feet:
     """Feet of points on a flank of the circular spline."""
 
     gap: Array
+    """Signed distance of each point from the flank (n,) [m]."""
     normal: Array
+    """Normal of the flank at the foot (n, 2)."""
     curvature: Array
+    """Curvature of the flank at the foot (n,) [1/m]."""
     corner: NDArray[np.bool_]
-    """Whether the foot is an end of the flank, not a point where it is normal."""
+    """Whether the foot is an end of the flank instead of a perpendicular foot (n,)."""
     rest: Array
-    """From that end to the point, zero where there is none (n, 2) [m]."""
+    """Vector from that end to the point; zero for a perpendicular foot (n, 2) [m]."""
     station: Array | None = None
-    """Arc length on the profile, of an elastic one [m]."""
+    """Arc length of the foot on the profile (n,) [m]; None for a rigid flank."""

@@ -18,24 +18,32 @@ from swgjoint.fe.plane.state import State
 from swgjoint.typing import Array, Index, Mask
 
 REACH = 0.03
-"""Gap up to which a contact may close, in lobe heights."""
+"""Largest gap of a contact that may close, in lobe heights [-]."""
 ALIKE = 1e-5
-"""Distance of points of a flank below which they are one [m]: a tenth of the half
+"""Distance below which two points of a flank count as one [m]: a tenth of the half
 length of a patch."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CondensedRing:
-    """A ring linearised at an equilibrium, solved for forces on its contacts."""
+    """A ring linearised at an equilibrium and solved for unit forces at its contacts.
+
+    The system of the teeth has n + 3 unknowns: n contact forces, the force of the
+    anchor, the multiplier of the flexspline's rotation and the rotation of the circular
+    spline.
+    """
 
     model: RingModel
     state: State
+    """The equilibrium."""
     ring: Linearised
+    """The model linearised there."""
     ring_is_output: bool
+    """Whether the circular spline is the output."""
     contacts: Contacts
-    """Contacts of teeth, n of them."""
+    """Tooth contacts, n of them."""
     carries: Mask
-    """Which of them carry force (n,)."""
+    """Whether each contact carries force (n,)."""
 
     @cached_property
     def _factor(self) -> CyclicFactor:
@@ -48,7 +56,7 @@ class CondensedRing:
 
     @cached_property
     def _loads(self) -> Array:
-        """Forces on teeth, anchor and rotation of the flexspline (N, n_dofs, n + 2)."""
+        """Unit loads on teeth, anchor and flexspline rotation (N, n_dofs, n + 2)."""
         ring, n = self.ring, len(self.contacts)
         loads = np.zeros((*ring.gradient.shape, n + 2))
         loads[self.contacts.sector, :, np.arange(n)] = self._rows
@@ -57,7 +65,7 @@ class CondensedRing:
 
     @cached_property
     def _response(self) -> Array:
-        """To these loads and to the gradient (N, n_dofs, n + 3)."""
+        """Displacements under these loads and the gradient (N, n_dofs, n + 3)."""
         return self._solved(
             np.concatenate([self._loads, -self.ring.gradient[:, :, None]], axis=2)
         )
@@ -67,7 +75,7 @@ class CondensedRing:
         return self._factor.solve(right)
 
     def torque_response(self) -> Array:
-        """Displacements per torque on the output of the whole drive (N, n_dofs)."""
+        """Displacements per output torque of the whole drive (N, n_dofs) [m/(N·m)]."""
         system, _ = self._teeth
         n = len(self.contacts)
         free = [n, n + 1, n + 2] if self.ring_is_output else [n]
@@ -83,10 +91,10 @@ class CondensedRing:
 
     @cached_property
     def _teeth(self) -> tuple[Array, Array]:
-        """Gaps of the teeth and three equations, linear in as many unknowns.
+        """Linear system of the tooth gaps and three more equations.
 
-        Behind the teeth come the anchor that keeps the rotation regular, the rotation
-        of the flexspline and that of the circular spline.
+        After the teeth come the anchor that keeps the rotation regular, the rotation of
+        the flexspline and that of the circular spline.
 
         Returns:
             Matrix (n + 3, n + 3) and offset (n + 3,).
@@ -105,10 +113,10 @@ class CondensedRing:
                 contacts.tooth, contacts.ring_weight, model.ring_teeth
             )
         system[n, n] -= 1.0 / ring.anchor_stiffness
-        # the circular spline turns towards the teeth with a lever arm
+        # rotation of the circular spline towards the teeth closes gaps by a lever arm
         arm = np.einsum("ki,ki->k", rotate_right_angle(contacts.point), contacts.normal)
         system[:n, n + 2] = system[n + 2, :n] = -arm
-        # gaps as if the tooth forces of the state were gone
+        # gaps without the tooth forces of the state
         old = np.einsum("kb,kb->k", local, state.flank_force[contacts.sector])
         old += np.einsum(
             "kb,kb->k", contacts.ring_weight, ring.ring_elastic[contacts.tooth]
@@ -126,7 +134,7 @@ class CondensedRing:
         return system, offset
 
     def _answers(self, response: Array) -> Array:
-        """Gaps of teeth, anchor, rotation under displacements (n + 2, n_columns)."""
+        """Tooth gaps, anchor and rotation under displacements (n + 2, n_columns)."""
         n = len(self.contacts)
         return np.concatenate(
             [
@@ -136,26 +144,30 @@ class CondensedRing:
         )
 
     def _system(self, supports: Supports) -> tuple[Array, Array]:
-        """As :attr:`_teeth`, with k supports after the teeth (n + k + 3 unknowns)."""
+        """System :attr:`_teeth` with k supports inserted after the teeth.
+
+        Returns:
+            Matrix (n + k + 3, n + k + 3) and offset (n + k + 3,).
+        """
         n, sector = len(self.contacts), supports.intervals.sector
         k = len(sector)
         m = n + k
         load = np.zeros((*self.ring.gradient.shape, k))
         load[sector, :, np.arange(k)] = supports.loads
-        own = self._solved(load)
+        supported = self._solved(load)
         teeth = np.r_[0:n, m : m + 3]
         system, offset = np.zeros((m + 3, m + 3)), np.zeros(m + 3)
         system[np.ix_(teeth, teeth)], offset[teeth] = self._teeth
-        system[np.ix_(teeth[:-1], np.arange(n, m))] = self._answers(own)
+        system[np.ix_(teeth[:-1], np.arange(n, m))] = self._answers(supported)
         answers = supports.answers(self._response)
         system[n:m, teeth[:-1]], offset[n:m] = answers[:, :-1], answers[:, -1]
-        system[n:m, n:m] = supports.answers(own)
+        system[n:m, n:m] = supports.answers(supported)
         system[np.arange(n, m), np.arange(n, m)] += supports.own
         offset[n:m] += supports.start
         return system, offset
 
     def influence(self, supports: Supports) -> Influence:
-        """Complementarity problem of teeth and of supports that may change sides."""
+        """Complementarity problem of the teeth and of supports that may switch."""
         model, state, contacts = self.model, self.state, self.contacts
         system, offset = self._system(supports)
         n, m = len(contacts), len(contacts) + len(supports.intervals.sector)
@@ -168,7 +180,7 @@ class CondensedRing:
                 direction=np.stack(
                     [_by_shift(contacts.weight), _by_shift(contacts.ring_weight)]
                 ),
-                by_tilt=np.zeros((n, 2)),  # a plane has no axis
+                by_tilt=np.zeros((n, 2)),  # a 2D model has no axis to tilt
                 carries=self.carries,
             ),
             closed_supports=supports.closed,
@@ -181,15 +193,22 @@ class CondensedRing:
 
 
 def _by_shift(weight: Array) -> Array:
-    """Derivative by a common shift of all flank nodes (n, 2)."""
+    """Derivatives of the gaps by a common shift of all flank nodes (n, 2)."""
     return np.asarray(weight.reshape(len(weight), -1, 2).sum(axis=1))
 
 
 def distinct(contacts: Contacts, state: State) -> tuple[Contacts, Mask]:
-    """Contacts that are not almost the same point, and which of them carry force.
+    """Drop contacts that almost coincide, and report which of the others carry force.
 
-    Of two points of a flank closer than :data:`ALIKE` the one with the larger force
-    stays: two nearly dependent contacts would make the system ill-conditioned.
+    Of two points of a flank closer than :data:`ALIKE` the one with the larger force is
+    kept: two nearly dependent contacts would make the system ill-conditioned.
+
+    Args:
+        contacts: Candidates.
+        state: Equilibrium whose tooth forces the candidates inherit.
+
+    Returns:
+        The remaining contacts, and whether each carries force.
     """
     held = state.contacts
     force = np.zeros(len(contacts))
@@ -209,13 +228,17 @@ def distinct(contacts: Contacts, state: State) -> tuple[Contacts, Mask]:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Intervals:
-    """Intervals of the bore between nodes, some of their stations; k of them."""
+    """Intervals of the bore between nodes, k of them, with weights of their stations.
+
+    Each interval has p stations.
+    """
 
     sector: Index
+    """Sector of each interval (k,)."""
     number: Index
-    """In its sector."""
+    """Number of each interval within its sector (k,)."""
     share: Array
-    """Share of the stations of the interval in a mean (k, p)."""
+    """Weights of the stations in the mean over their interval (k, p)."""
 
     def mean(self, values: Array) -> Array:
         """Means (k, ...) of values at the stations (N, q, ...)."""
@@ -229,23 +252,31 @@ class _Intervals:
 class Supports:
     """Intervals of the bore that touch the wave generator or may do so; k of them.
 
-    Stations of an interval share one force F and one mean gap g, K is their stiffness.
-    With the slack s = g + F/K of the layer below them F s = 0: an open support takes F
-    and answers with s, a closed one takes s and answers with F = K (s - g).
+    The stations of an interval share one force F and one mean gap g; K is their
+    stiffness. The slack s = g + F/K of the layer below them satisfies F s = 0. An open
+    support has the unknown F and the response s; a closed one has the unknown s and the
+    response F = K (s - g).
     """
 
     intervals: _Intervals
     closed: Mask
+    """Whether each support touches the wave generator (k,)."""
     rows: Array
     """Derivative of g by the degrees of freedom of the sector (k, n)."""
     stiffness: Array
-    """K (k,) [N/m]."""
+    """Stiffness K (k,) [N/m]."""
     start: Array
-    """F at the state where closed, elsewhere g (k,) [N], [m]."""
+    """Response at the state: F [N] of closed supports, g [m] of open ones (k,)."""
 
     @classmethod
     def from_state(cls, ring: Linearised, state: State, used: Mask) -> Supports:
-        """Supports of the intervals marked in ``used`` (N, intervals)."""
+        """Supports of selected intervals.
+
+        Args:
+            ring: The model linearised at the state.
+            state: The equilibrium.
+            used: Whether to use each interval (N, intervals).
+        """
         p = ring.stations.per_interval
         touching = state.touching.reshape(len(used), -1, p)
         sector, interval = np.nonzero(used)
@@ -267,15 +298,15 @@ class Supports:
 
     @property
     def loads(self) -> Array:
-        """Forces of what the supports take (k, n)."""
+        """Nodal forces per unit of the unknown of each support (k, n)."""
         return np.where(self.closed, self.stiffness, 1.0)[:, None] * self.rows
 
     @property
     def own(self) -> Array:
-        """Answers of the layer itself to what the supports take (k,)."""
+        """Response of the layer itself per unit of each support's unknown (k,)."""
         return np.where(self.closed, self.stiffness, 1.0 / self.stiffness)
 
     def answers(self, response: Array) -> Array:
-        """Answers to displacements (N, n, n_columns), the layer's left out."""
+        """Responses to displacements (N, n, n_columns), without the layer's own."""
         moved = np.einsum("kn,knl->kl", self.rows, response[self.intervals.sector])
         return np.asarray(np.where(self.closed, -self.stiffness, 1.0)[:, None] * moved)

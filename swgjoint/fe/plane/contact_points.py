@@ -15,40 +15,47 @@ class Contacts:
     """Candidate contact points; n of them."""
 
     sector: Index
+    """Sector (tooth) of the flexspline (n,)."""
     side: Index
-    """0 for the right (clockwise) flank of the flexspline tooth, 1 for the left."""
+    """Flank of the flexspline tooth: 0 right (clockwise), 1 left (n,)."""
     station: Array
-    """Arc length on the flexspline profile [m]."""
+    """Arc length on the flexspline profile (n,) [m]."""
     gap: Array
-    """Distance to the circular spline, positive when apart [m]."""
+    """Distance to the circular spline, positive when apart (n,) [m]."""
     normal: Array
-    """Out of the circular spline's steel, in the sector frame. Shape (n, 2)."""
+    """Normal out of the circular spline's material, in the sector frame (n, 2)."""
     point: Array
-    """Position in the sector frame [m]. Shape (n, 2)."""
+    """Position in the sector frame (n, 2) [m]."""
     weight: Array
-    """Derivative of the gap by the flank displacements. Shape (n, 2 n_b)."""
+    """Derivative of the gap by the flank displacements (n, 2 n_b)."""
     tooth: Index
-    """Tooth of the circular spline."""
+    """Tooth of the circular spline (n,)."""
     ring_weight: Array
-    """Derivative of the gap by that tooth's flank displacements; no columns if it is
-    rigid. Shape (n, 2 n_c)."""
+    """Derivative of the gap by the flank displacements of that tooth (n, 2 n_c); no
+    columns if the circular spline is rigid."""
     tangent: Array
-    """Along the flank from tip to root, in the sector frame. Shape (n, 2)."""
+    """Tangent of the flank from tip to root, in the sector frame (n, 2)."""
     sliding: Array
-    """Derivative of the motion along the tangent by the flank displacements, as
-    ``weight``; no columns without friction. Shape (n, 2 n_b)."""
+    """Derivative of the motion along the tangent by the flank displacements (n, 2 n_b);
+    no columns without friction."""
     ring_sliding: Array
-    """The same by the flank displacements of the circular spline. Shape (n, 2 n_c)."""
+    """Derivative of the motion along the tangent by the flank displacements of the
+    circular spline (n, 2 n_c)."""
     slip: Array
-    """Sum of the arc lengths of the two material points, tips to roots; NaN on a rigid
-    circular spline [m]. Shape (n,)."""
+    """Sum of the arc lengths of the two material points, each counted from tip to root
+    (n,) [m]; NaN on a rigid circular spline."""
 
     def __len__(self) -> int:
         return len(self.sector)
 
     @classmethod
     def none(cls, flank_dofs: int, ring_dofs: int) -> Contacts:
-        """No contact at all."""
+        """An empty set of contacts.
+
+        Args:
+            flank_dofs: Columns of ``weight``, 2 n_b.
+            ring_dofs: Columns of ``ring_weight``, 2 n_c; zero if rigid.
+        """
         empty, index = np.zeros(0), np.zeros(0, dtype=np.int64)
         return cls(
             sector=index,
@@ -68,7 +75,12 @@ class Contacts:
 
     @classmethod
     def join(cls, first: Contacts, second: Contacts) -> Contacts:
-        """The points of both, one after the other."""
+        """Concatenate two sets of contacts.
+
+        Args:
+            first: Contacts that come first.
+            second: Contacts that follow.
+        """
         return cls(
             **{
                 key: np.concatenate([getattr(first, key), getattr(second, key)])
@@ -77,7 +89,7 @@ class Contacts:
         )
 
     def tangential(self, gap: Array) -> Contacts:
-        """The same points with the tangent in place of the normal."""
+        """The same points with tangents in place of normals, and new gaps (n,) [m]."""
         return replace(
             self,
             gap=gap,
@@ -87,7 +99,7 @@ class Contacts:
         )
 
     def nearest_in(self, others: Contacts) -> Index:
-        """The nearest of others on the same pair of flanks, -1 without one (n,)."""
+        """Index of the nearest of ``others`` on the same flank pair, else -1 (n,)."""
         result = np.full(len(self), -1, dtype=np.int64)
         if len(others) and len(self):
             same = (
@@ -103,7 +115,7 @@ class Contacts:
         return result
 
     def share_flank_with(self, others: Contacts) -> NDArray[np.bool_]:
-        """Which points lie on a flank on which others lie. Shape (n,)."""
+        """Whether each point is on a flank that also carries one of ``others`` (n,)."""
         key, other = 2 * self.sector + self.side, 2 * others.sector + others.side
         return np.isin(key, other)
 

@@ -12,28 +12,29 @@ from swgjoint.fe.plane.state import State
 from swgjoint.typing import Mask
 
 MOST_SUPPORTS = 80
-"""Intervals of the bore of a prediction that may change sides."""
+"""Largest number of bore intervals that may open or close in a prediction."""
 FAR = 5.0
-"""Change of the torque within which they seem to do so at first, in the range of the
-prediction: other changes of contact come between."""
+"""Torque range for the first selection of these intervals, in ranges of the prediction
+[-]. It is wider because other contact changes shift the torque at which they switch."""
 
 
 def predicted_changes(
     model: RingModel, state: State, *, ring_is_output: bool, low: float, high: float
 ) -> ContactChanges | None:
-    """Changes of contact that the drive condensed at an equilibrium predicts.
+    """Contact changes that the drive condensed at an equilibrium predicts.
 
-    Supports that seem to change sides far outside the range are left as they are.
+    Supports that seem to open or close far outside the range keep their state.
 
     Args:
-        model: Without friction.
+        model: The ring, without friction.
         state: The equilibrium.
         ring_is_output: Whether the circular spline is the output.
         low: Smallest torque of interest [N·m].
         high: Largest one [N·m].
 
     Returns:
-        None where no tooth carries force, or a single contact holds the output.
+        The changes; None if no tooth carries force or if a single contact holds the
+        output.
     """
     if state.contacts is None or not len(state.contacts):
         return None
@@ -61,18 +62,18 @@ def predicted_changes(
     try:
         return drive.influence(supports).changes(low, high, numbers)
     except np.linalg.LinAlgError:
-        # a contact without which nothing holds the flexspline
+        # without one of the contacts nothing holds the flexspline
         return None
 
 
 def _supports_within(drive: CondensedRing, torque: float) -> Mask:
-    """Intervals of the bore that change sides within a change of the torque.
+    """Intervals of the bore that open or close within a change of torque [N·m].
 
-    As predicted without any other change of contact, at most :data:`MOST_SUPPORTS`
-    of them, the nearest ones.
+    The prediction ignores all other contact changes; at most the :data:`MOST_SUPPORTS`
+    intervals that switch first are marked.
 
     Returns:
-        Shape (N, intervals).
+        Mask (N, intervals).
     """
     ring, state = drive.ring, drive.state
     p = ring.stations.per_interval

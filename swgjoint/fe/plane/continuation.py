@@ -21,13 +21,14 @@ from swgjoint.typing import Array
 class Continuation(Follower[State]):
     """Follows equilibria of the 2D model.
 
-    With the circular spline fixed the flexspline is the output and turns freely. In the
-    other layouts the circular spline is the output; the rotation of the flexspline is
-    prescribed: zero, or, with the wave generator fixed, the input.
+    With the circular spline fixed, the flexspline is the output and turns freely. In
+    the other layouts the circular spline is the output and the rotation of the
+    flexspline is prescribed: it is zero or, with the wave generator fixed, the input.
     """
 
     model: RingModel
     ratio: float
+    """Signed gear ratio i [-]."""
     layout: Layout = "circular_spline_fixed"
     solver: NewtonSolver = field(default_factory=NewtonSolver)
 
@@ -42,7 +43,7 @@ class Continuation(Follower[State]):
         return self.model.element.sectors
 
     def input_angle(self, state: State) -> float:
-        """Theta [rad]."""
+        """Input angle theta [rad]."""
         if self.layout == "wave_generator_fixed":
             return state.rotation
         return state.wave_generator_angle
@@ -54,11 +55,11 @@ class Continuation(Follower[State]):
         return state.wave_generator_torque
 
     def output_angle(self, state: State) -> float:
-        """Psi [rad]."""
+        """Output angle psi [rad]."""
         return state.ring_rotation if self.ring_is_output else state.rotation
 
     def deflect(self, angle: float = 0.0) -> State:
-        """Wave generator in place, members at the ideal ratio, no tooth contact."""
+        """Deflect the rim at the ideal member angles, without tooth contact."""
         alpha, rotation, ring_rotation = self._ideal(angle)
         start = self.model.initial_guess(alpha, rotation)
         load = Load(rotation=rotation, teeth=False)
@@ -66,28 +67,44 @@ class Continuation(Follower[State]):
         return replace(state, ring_rotation=ring_rotation)
 
     def load(self, start: State, torque: float, angle: float) -> State:
-        """Equilibrium under a torque, from a start with its input at that angle."""
+        """Equilibrium under an output torque.
+
+        Args:
+            start: Start of the search, with its input at ``angle``.
+            torque: Output torque T [N·m].
+            angle: Input angle [rad].
+        """
         if not self.ring_is_output:
             return self.solver(self.model, start, Load(torque=torque))
         held = angle if self.layout == "wave_generator_fixed" else 0.0
         return self.solver(self.model, start, Load(torque=torque, rotation=held))
 
     def hold_output(self, state: State) -> State:
-        """Equilibrium with the output where it is; the torque is what that takes."""
-        found = self.solver(self.model, state, Load(rotation=state.rotation))
+        """Equilibrium with the output held in place; the torque is a result."""
+        held = self.solver(self.model, state, Load(rotation=state.rotation))
         if self.ring_is_output:
-            return replace(found, torque=-found.tooth_moment)
-        return found
+            return replace(held, torque=-held.tooth_moment)
+        return held
 
     def rotate_output(self, state: State, output: float) -> State:
-        """Predictor: the output turned at a fixed input."""
+        """Predictor that turns the output at a fixed input.
+
+        Args:
+            state: State to start from.
+            output: New output angle [rad].
+        """
         alpha = state.wave_generator_angle
         if self.ring_is_output:
             return self.model.predict_field(state, alpha, state.rotation, output)
         return self.model.predict_field(state, alpha, output, state.ring_rotation)
 
     def predict(self, state: State, angle: float) -> State:
-        """Predictor: input and output turned by the ideal ratio."""
+        """Predictor that turns input and output by the ideal ratio.
+
+        Args:
+            state: State to start from.
+            angle: New input angle [rad].
+        """
         was, now = self._ideal(self.input_angle(state)), self._ideal(angle)
         alpha, rotation, ring_rotation = (y - x for x, y in zip(was, now, strict=True))
         return self.model.predict_field(
@@ -100,19 +117,32 @@ class Continuation(Follower[State]):
     def predicted_changes(
         self, state: State, low: float, high: float
     ) -> ContactChanges | None:
-        """Changes of contact over the torque that an equilibrium predicts."""
+        """Contact changes over a torque range, as an equilibrium predicts them.
+
+        Args:
+            state: The equilibrium.
+            low: Smallest torque of interest [N·m].
+            high: Largest torque of interest [N·m].
+        """
         return predicted_changes(
             self.model, state, ring_is_output=self.ring_is_output, low=low, high=high
         )
 
     def influence(self, state: State) -> Influence:
-        """How the gap of every tooth acts on the output, at an equilibrium."""
+        """Influence of every tooth gap on the output, linearised at an equilibrium."""
         return influence(self.model, state, ring_is_output=self.ring_is_output)
 
     def with_errors(
         self, flexspline: Array, circular_spline: Array, tilt: Array
     ) -> Continuation:
-        """The same drive with errors of its teeth; a plane has no axis to tilt."""
+        """The same drive with manufacturing errors of its teeth.
+
+        Args:
+            flexspline: Shifts of its teeth in their frames (N, 2) [m].
+            circular_spline: Shifts of its teeth in their frames (N_c, 2) [m].
+            tilt: Slope of the axis of the circular spline (2,) [rad]; must be zero,
+                because a 2D model has no axis to tilt.
+        """
         assert not tilt.any()
         model = replace(
             self.model, tooth_shift=flexspline, ring_tooth_shift=circular_spline
@@ -120,7 +150,7 @@ class Continuation(Follower[State]):
         return replace(self, model=model)
 
     def _ideal(self, theta: float) -> tuple[float, float, float]:
-        """Angles of wave generator, flexspline and circular spline."""
+        """Ideal angles of wave generator, flexspline and circular spline [rad]."""
         output = theta / self.ratio
         if self.layout == "circular_spline_fixed":
             return theta, output, 0.0

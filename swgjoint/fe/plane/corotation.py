@@ -1,16 +1,17 @@
 r"""Corotational sectors: large rotations, small strains within a sector.
 
-Each sector s has one frame, rotated by :math:`\varphi_s` against its place in the
-undeformed ring; :math:`\varphi_s` is the best-fit rotation of its two faces. With y the
-node positions seen in that frame, the energy is
+Each sector s has one frame, rotated by :math:`\varphi_s` from its place in the
+undeformed ring; :math:`\varphi_s` is the best-fit rotation of its two faces. With the
+node positions y in that frame, the energy is
 
 .. math:: E = \tfrac12 \tilde d^T \hat K \tilde d - F^T A d - \tfrac12 F^T C F
     + \dots, \quad d = y - X, \quad \tilde d = d + \tfrac12 (d^T Q d)\, p .
 
-The last term is what the rim turns within a sector: slopes :math:`\omega` against the
-frame lengthen it by :math:`\tfrac12 \int \omega^2 ds = \tfrac12 d^T Q d`, which a hoop
-tension resists; p is a uniform elongation by one unit of length. (Without it the
-reference ring is off by 0.2 micrometre on its ellipse, under a hoop tension of 180 N.)
+The last term accounts for rotations of the rim within a sector: slopes :math:`\omega`
+relative to the frame lengthen the rim by :math:`\tfrac12 \int \omega^2 ds = \tfrac12
+d^T Q d`, which a hoop tension resists; p is a uniform elongation by one unit of length.
+(Without this term the reference ring on its ellipse, under a hoop tension of 180 N, has
+an error of 0.2 micrometre.)
 
 The gradient and the tangent below are exact for dead forces F in the sector frame.
 """
@@ -26,14 +27,19 @@ from swgjoint.typing import Array
 
 
 def rotate(vectors: Array, angle: Array | float) -> Array:
-    """Rotate plane vectors (..., 2) counter-clockwise by angles (...)."""
+    """Rotate 2D vectors counter-clockwise.
+
+    Args:
+        vectors: Vectors (..., 2).
+        angle: Angles that broadcast against the leading axes [rad].
+    """
     cos, sin = np.cos(angle), np.sin(angle)
     x, y = vectors[..., 0], vectors[..., 1]
     return np.stack([cos * x - sin * y, sin * x + cos * y], axis=-1)
 
 
 def rotate_right_angle(vectors: Array) -> Array:
-    """Rotate plane vectors by a right angle: J v."""
+    """Rotate 2D vectors (..., 2) counter-clockwise by a right angle: J v."""
     return np.stack([-vectors[..., 1], vectors[..., 0]], axis=-1)
 
 
@@ -42,21 +48,22 @@ class Frames:
     """Kinematics of all sectors at one state; n = 2 n_a."""
 
     angle: Array
-    """Rotation from the tooth frame to the global frame [rad]. Shape (N,)."""
+    """Rotation from the tooth frame to the global frame (N,) [rad]."""
     position: Array
-    """y, skeleton positions in the sector frames [m]. Shape (N, n)."""
+    """Skeleton positions y in the sector frames (N, n) [m]."""
     displacement: Array
-    """d = y - X [m]. Shape (N, n)."""
+    """Displacement d = y - X (N, n) [m]."""
     deformation: Array
-    """d with its second-order elongation and without its mean: sectors travel a
-    thousand times farther than they deform, and the digits of the travel would drown
-    those of the energy [m]. Shape (N, n)."""
+    """Displacement d plus its second-order elongation, minus its mean (N, n) [m].
+
+    Sectors travel a thousand times farther than they deform; the round-off of the
+    travel would swamp the energy."""
     elongating: Array
-    """Q d, derivative of that elongation [m]. Shape (N, n); zero if linear."""
+    """Derivative Q d of that elongation (N, n) [m]; zero if linear."""
     spin: Array
-    """Gamma, derivative of the frame angle by y [rad/m]. (N, n); zero if linear."""
+    """Derivative Gamma of the frame angle by y (N, n) [rad/m]; zero if linear."""
     gyration: Array
-    """Sum X_c . y_c over the face nodes, C [m^2]. Shape (N,)."""
+    """Sum C of X_c . y_c over the face nodes (N,) [m^2]."""
 
 
 def sector_frames(
@@ -72,7 +79,7 @@ def sector_frames(
         element: The condensed sector.
         positions: Skeleton nodes in the global frame (N, n_a, 2) [m].
         place: Angle of each sector in the undeformed ring (N,) [rad].
-        fixed: Frame rotations to keep instead of fitting them (linear level) [rad].
+        fixed: Frame rotations to use instead of fitted ones (linear model) (N,) [rad].
     """
     reference = element.skeleton
     size = element.face_size
@@ -112,10 +119,18 @@ def sector_frames(
 
 
 def elastic_energy(element: Superelement, frames: Frames, flank_force: Array) -> Array:
-    """Strain energy of each sector, flank forces included (N,) [J].
+    """Strain energy of each sector, flank forces included.
 
     1/2 d_a K d_a + 1/2 F C F: the flank displacement d_b = A d_a + C F splits the
     energy of the uncondensed sector into these two parts.
+
+    Args:
+        element: The condensed sector.
+        frames: Kinematics from :func:`sector_frames`.
+        flank_force: Forces F on the flanks (N, 2 n_b) [N].
+
+    Returns:
+        Energies (N,) [J].
     """
     d = frames.deformation
     return np.asarray(
@@ -126,11 +141,18 @@ def elastic_energy(element: Superelement, frames: Frames, flank_force: Array) ->
 
 
 def elastic_force(element: Superelement, frames: Frames) -> Array:
-    r"""Derivative of the first part by d (N, n) [N].
+    r"""Derivative by d of the first part of the energy.
 
     .. math:: f = \hat K \tilde d + N\, Q d, \quad N = p^T \hat K \tilde d
 
-    with N the hoop force of the sector.
+    with the hoop force N of the sector.
+
+    Args:
+        element: The condensed sector.
+        frames: Kinematics from :func:`sector_frames`.
+
+    Returns:
+        Nodal forces (N, n) [N].
     """
     force = frames.deformation @ element.stiffness
     hoop = force @ element.elongation
@@ -138,9 +160,16 @@ def elastic_force(element: Superelement, frames: Frames) -> Array:
 
 
 def project_to_frames(frames: Frames, force: Array) -> Array:
-    r"""Gradient by the positions seen in the sector frame: P^T f.
+    r"""Gradient by the node positions, from forces in the sector frame: P^T f.
 
     .. math:: P = I - (J y)\,\Gamma^T
+
+    Args:
+        frames: Kinematics from :func:`sector_frames`.
+        force: Nodal forces f in the sector frames (N, n) [N].
+
+    Returns:
+        Gradient, still in the axes of the sector frames (N, n) [N].
     """
     j_y = rotate_right_angle(frames.position.reshape(*force.shape[:-1], -1, 2)).reshape(
         force.shape
@@ -160,8 +189,8 @@ def tangent(element: Superelement, frames: Frames, force: Array) -> Array:
 
     Args:
         element: The condensed sector.
-        frames: From :func:`sector_frames`.
-        force: f, nodal forces in the sector frames (N, n) [N].
+        frames: Kinematics from :func:`sector_frames`.
+        force: Nodal forces f in the sector frames (N, n) [N].
 
     Returns:
         Symmetric matrices (N, n, n) [N/m].
@@ -188,7 +217,7 @@ def tangent(element: Superelement, frames: Frames, force: Array) -> Array:
 
 
 def _elastic_tangent(element: Superelement, frames: Frames) -> Array:
-    """K of :func:`tangent` (N, n, n) [N/m]."""
+    """Matrix K of :func:`tangent` (N, n, n) [N/m]."""
     stretched = element.stiffness @ element.elongation
     hoop = frames.deformation @ stretched
     # Qd (K p)^T + (K p) Qd^T + (p K p) Qd Qd^T

@@ -33,23 +33,27 @@ from swgjoint.typing import Array
 from swgjoint.units import mm
 
 NARROW = ("parabolic", "asymmetric_parabolic", "four_roller")
-"""Wave generators whose contact with the bore is narrower than its nodes are apart."""
+"""Wave generators whose contact with the bore is narrower than the node spacing."""
 
 
 Half = bool | Literal["auto"]
-"""Whether a model is half of the drive; ``auto``: where its symmetry allows it."""
+"""Whether to model half of the drive; ``auto`` does so if its symmetry allows it."""
 
 
 def can_halve(design: Design, *, bearing: bool = True) -> bool:
-    """Whether half a turn maps the drive onto itself: lobes, even teeth, no errors.
+    """Whether a rotation by 180 deg maps the drive onto itself.
+
+    This takes a wave generator with that symmetry, even numbers of teeth and no
+    manufacturing errors.
 
     Args:
         design: The drive.
-        bearing: Whether the model is plane and carries the bearing of the wave
-            generator where :func:`carries_bearing`: then of even balls.
+        bearing: Whether the model is 2D and includes the bearing of the wave generator
+            if :func:`carries_bearing`; the number of balls must then be even.
     """
-    drive, own = design.drive, design.wave_generator.bearing
-    odd = bearing and carries_bearing(design) and own is not None and own.balls % 2
+    drive, fitted = design.drive, design.wave_generator.bearing
+    carried = bearing and carries_bearing(design)
+    odd = carried and fitted is not None and fitted.balls % 2
     return (
         drive.teeth_flexspline % 2 == 0
         and drive.teeth_circular_spline % 2 == 0
@@ -60,10 +64,10 @@ def can_halve(design: Design, *, bearing: bool = True) -> bool:
 
 
 def carries_bearing(design: Design) -> bool:
-    """Whether the plane model has the ball bearing of a design's wave generator.
+    """Whether the 2D model includes the ball bearing of the wave generator.
 
-    It needs two lobes of an outline without corners or straights, that turns
-    against a circular spline at rest: the balls roll as the flexspline then does.
+    This requires a two-lobe outline without corners or straight segments that turns
+    relative to a fixed circular spline: the balls then roll with the flexspline.
     """
     generator = design.wave_generator
     return (
@@ -75,19 +79,23 @@ def carries_bearing(design: Design) -> bool:
 
 
 def check_modelled(design: Design, model: str) -> None:
-    """Refuse what the 2D model does not contain, and what is no such model.
+    """Reject unknown models and design features that the 2D model does not contain.
+
+    Args:
+        design: The drive.
+        model: Name of the model; only ``2d`` is accepted.
 
     Raises:
-        DesignError: One line per key.
+        DesignError: If there are any; the message has one line per fault.
     """
     drive, tolerances = design.drive, design.tolerances
     faults = []
     if model != "2d":
-        faults.append(f"model {model!r} gives no map; available: 'ring', '2d', '3d'")
+        faults.append(f"model = {model!r}: expected 'ring', '2d' or '3d'")
     if tolerances.misalignment_arcmin:
         faults.append(
-            f"tolerances.misalignment_arcmin = {tolerances.misalignment_arcmin:g}: the"
-            " 2d model is a plane section, without an axis to tilt; accepted: 0"
+            f"tolerances.misalignment_arcmin = {tolerances.misalignment_arcmin:g}: "
+            "expected 0, because the 2d model has no axis to tilt"
         )
     if faults:
         raise DesignError("\n".join(f"{drive.name}: {fault}" for fault in faults))
@@ -96,12 +104,15 @@ def check_modelled(design: Design, model: str) -> None:
 def unmodelled_parts(
     design: Design, model: str = "2d", *, bearing: bool = True
 ) -> str | None:
-    """Parts of the design that the model cannot see, for the validity label.
+    """Parts of the design that the model does not represent, for the validity label.
 
     Args:
         design: The drive.
-        model: Its fidelity.
-        bearing: Whether the plane model was built with the bearing.
+        model: Fidelity of the model: ``ring``, ``2d`` or ``3d``.
+        bearing: Whether the 2D model was built with the bearing.
+
+    Returns:
+        Their names, joined by "and"; None if the model represents all parts.
     """
     carried = bearing and carries_bearing(design)
     shapes = design.micro_geometry.model_dump(exclude={"crowning_kind"})
@@ -127,20 +138,22 @@ def ring_model(
     cage_held: bool = False,
     profiles: Mapping[MemberName, ToothProfile] | None = None,
 ) -> RingModel:
-    """2D model of a design.
+    """Build the 2D model of a design.
 
     Args:
         design: The drive.
-        half: Half of the drive, closed by its symmetry; ``auto``: where it applies.
-        nonlinear: Large rotations of the sectors.
-        elastic_circular_spline: Whether the circular spline deforms; its outer
-            diameter is fixed or free as the design says.
-        friction: Whether the flanks rub, with the coefficient of the design; False for
-            the conservative part alone.
-        bearing: Whether the wave generator carries the rim on its ball bearing, if the
-            design has one that the plane can carry; False for its rigid surface.
-        cage_held: Whether the balls stand still on the cam instead of rolling.
-        profiles: Flanks to use instead of those of the design, by member.
+        half: Whether to model half of the drive, closed by its symmetry; ``auto`` does
+            so if the symmetry allows it.
+        nonlinear: Whether sectors undergo large rotations.
+        elastic_circular_spline: Whether the circular spline deforms; the design sets
+            whether its outer diameter is fixed or free.
+        friction: Whether the flanks have the friction coefficient of the design; False
+            gives the conservative model.
+        bearing: Whether to support the rim on the ball bearing of the wave generator,
+            if the design has one that the 2D model can represent; False uses a rigid
+            surface.
+        cage_held: Whether the balls are held on the cam instead of rolling.
+        profiles: Flanks that replace those of the design, by member.
 
     Raises:
         DesignError: If the design cannot be built or the half model does not apply.
@@ -148,15 +161,16 @@ def ring_model(
     if half == "auto":
         half = can_halve(design, bearing=bearing)
     elif half and not can_halve(design, bearing=bearing):
-        drive, own = design.drive, design.wave_generator.bearing
+        drive, fitted = design.drive, design.wave_generator.bearing
         balls = ""
-        if bearing and carries_bearing(design) and own is not None and own.balls % 2:
-            balls = f" on {own.balls} balls; accepted: an even number"
+        carried = bearing and carries_bearing(design)
+        if carried and fitted is not None and fitted.balls % 2:
+            balls = f" on {fitted.balls} balls (expected an even number)"
         raise DesignError(
-            f"{drive.name}: a half model needs even tooth counts and a wave generator "
-            "that half a turn maps onto itself, without tolerances, not "
-            f"{drive.teeth_flexspline}/{drive.teeth_circular_spline} teeth and "
-            f"{design.wave_generator.kind}{balls}"
+            f"{drive.name}: a half model needs even tooth counts, no tolerances and a "
+            "wave generator that is symmetric under a rotation by 180 deg; the design "
+            f"has {drive.teeth_flexspline}/{drive.teeth_circular_spline} teeth and the "
+            f"wave generator {design.wave_generator.kind}{balls}"
         )
     flanks: dict[MemberName, ToothProfile] = dict(profiles or {})
     members: tuple[MemberName, ...] = ("flexspline", "circular_spline")
@@ -174,7 +188,7 @@ def ring_model(
         if ring.compliance is None:
             raise DesignError(
                 f"{design.drive.name}: friction.tooth_coefficient = {coefficient:g} "
-                "needs an elastic circular spline; accepted with a rigid one: 0"
+                "needs an elastic circular spline; expected 0 with a rigid one"
             )
         modulus = design.material_of("flexspline").youngs_modulus
         width = design.drive.face_width_mm * mm
@@ -219,26 +233,38 @@ def ring_model(
 def indentation(
     design: Design, element: Superelement, ring: CircularSpline
 ) -> Indentation:
-    """Indentation of the flanks of both members, of the elastic ones among them."""
+    """Indentation law of the flanks of the elastic members.
+
+    Args:
+        design: The drive.
+        element: Condensed sector of the flexspline.
+        ring: The circular spline, elastic or rigid.
+    """
     members: list[tuple[MemberName, Superelement]] = [("flexspline", element)]
     if ring.compliance is not None:
         members.append(("circular_spline", ring.compliance.element))
     softness, patch = [], []
-    for name, own in members:
+    for name, tooth in members:
         material = design.material_of(name)
-        # E' of the plane, see in_plane_constants
+        # in-plane modulus E', see in_plane_constants
         modulus = material.youngs_modulus / (
-            1.0 - own.axial_stress * material.poisson_ratio
+            1.0 - tooth.axial_stress * material.poisson_ratio
         )
         softness.append(softness_of(modulus, design.drive.face_width_mm * mm))
-        patch.append(half_length(own.spline.x))
+        patch.append(half_length(tooth.spline.x))
     return Indentation.from_members(
         tuple(softness), tuple(patch), (element.profile, ring.profile)
     )
 
 
 def sector(design: Design, member: MemberName, profile: ToothProfile) -> Superelement:
-    """Condensed sector of one tooth of a member."""
+    """Condense the sector of one tooth of a member.
+
+    Args:
+        design: The drive.
+        member: Flexspline or circular spline.
+        profile: Tooth profile of that member.
+    """
     material = design.material_of(member)
     rim = getattr(design, member).rim_mm * mm
     return condense(

@@ -1,6 +1,6 @@
-"""Plane linear elasticity on quadrilaterals: forms and stress recovery.
+"""2D linear elasticity on quadrilaterals: stiffness and stress recovery.
 
-Plane stress, plane strain, or a stated share of the way between them.
+The section is in plane stress, in plane strain or in a given state between the two.
 """
 
 from __future__ import annotations
@@ -24,20 +24,20 @@ def plane_basis(mesh: MeshQuad) -> Basis:
 def in_plane_constants(
     youngs_modulus: float, poisson_ratio: float, confinement: float
 ) -> tuple[float, float]:
-    r"""Constants with which the equations of plane stress hold for a confined section.
+    r"""Elastic constants that make the plane-stress equations valid for confinement.
 
-    The axial stress is a share c of what plane strain demands,
+    The axial stress is the fraction c of its value in plane strain,
     :math:`\sigma_{zz} = c\nu(\sigma_{xx} + \sigma_{yy})`. Hooke's law in the plane
-    then has
+    then has the constants
 
     .. math:: E' = \frac{E}{1 - c\nu^2}, \quad
         \nu' = \frac{\nu(1 + c\nu)}{1 - c\nu^2}, \quad
         \frac{E'}{2(1 + \nu')} = \frac{E}{2(1 + \nu)} .
 
     Args:
-        youngs_modulus: E [Pa].
-        poisson_ratio: nu [-].
-        confinement: c [-]; 0 is plane stress, 1 plane strain.
+        youngs_modulus: Young's modulus E [Pa].
+        poisson_ratio: Poisson's ratio nu [-].
+        confinement: Confinement c [-]; 0 is plane stress, 1 plane strain.
 
     Returns:
         E' [Pa] and nu' [-].
@@ -54,7 +54,7 @@ def stiffness_matrix(
     width: float,
     confinement: float = 0.0,
 ) -> sparse.csr_matrix:
-    r"""Stiffness of a disc of the given width.
+    r"""Stiffness matrix of a disc of constant width.
 
     .. math:: a(u, v) = w \int \sigma(u) : \varepsilon(v), \quad
         \sigma = 2\mu\varepsilon + \lambda^*\,\mathrm{tr}\,\varepsilon\,I, \quad
@@ -63,11 +63,14 @@ def stiffness_matrix(
     In plane stress :math:`\lambda^* = 2\mu\lambda/(\lambda + 2\mu)`.
 
     Args:
-        basis: From :func:`plane_basis`.
-        youngs_modulus: [Pa].
-        poisson_ratio: [-].
-        width: [m].
-        confinement: See :func:`in_plane_constants` [-].
+        basis: Basis from :func:`plane_basis`.
+        youngs_modulus: Young's modulus of the material [Pa].
+        poisson_ratio: Poisson's ratio of the material [-].
+        width: Width w of the disc [m].
+        confinement: Confinement of :func:`in_plane_constants` [-].
+
+    Returns:
+        Sparse matrix (n_dofs, n_dofs) [N/m].
     """
     youngs_modulus, poisson_ratio = in_plane_constants(
         youngs_modulus, poisson_ratio, confinement
@@ -93,11 +96,18 @@ def nodal_stress_operator(
     """Stress at the nodes as a linear operator on the degrees of freedom.
 
     The stress is evaluated at the 2 x 2 Gauss points, extrapolated bilinearly to the
-    corners of each element and averaged over the elements of a node with equal weight.
+    corners of each element and averaged with equal weights over the elements that share
+    a node.
+
+    Args:
+        basis: Basis from :func:`plane_basis`.
+        youngs_modulus: Young's modulus of the material [Pa].
+        poisson_ratio: Poisson's ratio of the material [-].
+        confinement: Confinement of :func:`in_plane_constants` [-].
 
     Returns:
-        Matrix (3 n_nodes, n_dofs); rows 3 i to 3 i + 2 are xx, yy and xy of node i [Pa
-        per metre].
+        Matrix (3 n_nodes, n_dofs) [Pa/m]; rows 3 i to 3 i + 2 are xx, yy and xy of
+        node i.
     """
     mesh = basis.mesh
     n_elements = mesh.t.shape[1]
@@ -142,11 +152,14 @@ def nodal_stress_operator(
 def stress_maxima(stress: Array) -> tuple[Array, Array, Array]:
     """Tensile, compressive (as a magnitude) and von Mises stress.
 
-    The axial stress of a confined section lies between the principal stresses of the
-    plane and zero, so it decides neither maximum.
+    The tensile and compressive maxima are those of the in-plane principal stresses: the
+    axial stress of a confined section exceeds neither them nor zero.
 
     Args:
-        stress: xx, yy, xy and, unless it is zero, zz in the last axis [Pa].
+        stress: Components xx, yy, xy and, unless it is zero, zz in the last axis [Pa].
+
+    Returns:
+        Tensile, compressive and von Mises stress (...) [Pa].
     """
     xx, yy, xy = stress[..., 0], stress[..., 1], stress[..., 2]
     middle, radius = 0.5 * (xx + yy), np.hypot(0.5 * (xx - yy), xy)

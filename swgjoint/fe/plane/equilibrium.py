@@ -1,8 +1,8 @@
 """Equilibrium of the flexspline between wave generator and circular spline.
 
-Newton's method on the corotational ring. Contact with the wave generator is a
-primal-dual active set of stations of the bore; tooth contact is a
-small complementarity problem on the frozen tangent, in contact forces alone.
+The solver applies Newton's method to the corotational ring. Contact with the wave
+generator is a primal-dual active set of bore stations; tooth contact is a small
+complementarity problem in the contact forces, solved at the current tangent.
 """
 
 from __future__ import annotations
@@ -28,40 +28,49 @@ from swgjoint.fe.plane.ring import RingModel
 from swgjoint.fe.plane.state import State
 
 RING_RANGE = 0.2
-"""Displacement of the circular spline, in lobe heights, at which its linear model ends:
-at a half of it the input torque still agrees with the energy to seven digits."""
+"""Largest displacement of the circular spline for which its linear model is accepted,
+in lobe heights [-]. At half of it the input torque still agrees with the derivative of
+the energy to seven digits."""
 
 TOUCH = 1e-15
-"""Gap that counts as none [m]."""
+"""Largest gap that counts as zero [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class NewtonSolver:
-    """Settings of the iteration."""
+    """Newton solver for equilibria, with its settings."""
 
     max_iterations: int = 120
     step_tolerance: float = 2e-12
     """Displacement increment at which the iteration ends [m]; about 1e-5 of the
     smallest effect of interest, a tenth of a micrometre."""
     thorough_below: float = 1e-7
-    """Increment below which contact is searched between the nodes, too [m]."""
+    """Increment below which the contact search also covers the flanks between nodes
+    [m]."""
     exchanges: int = 6
-    """Exchanges of stations of the bore at one linearisation: most iterations would
-    serve nothing else, and search for contact again."""
+    """Most updates of the bore contact at one linearisation. Without them most
+    iterations would change nothing but the bore contact, yet repeat the contact search
+    of the teeth."""
     exchange_below: float = 1e-5
-    """Increment below which a linearisation is good enough for that [m]."""
+    """Increment below which a linearisation is accurate enough for such updates [m]."""
     stride: float = 0.1
-    """Longest move of one iteration, in lobe heights: contact changes on the way."""
+    """Largest increment of one iteration, in lobe heights [-]; contact changes along a
+    longer one."""
     largest_step: float = 0.1
-    """Displacement increment beyond which the search has left the drive [m]."""
+    """Increment beyond which the search is abandoned as diverged [m]."""
     ring_range: float = RING_RANGE
-    """Displacement of the circular spline, in lobe heights, that is taken [-]."""
+    """Largest accepted displacement of the circular spline, in lobe heights [-]."""
 
     def __call__(self, model: RingModel, start: State, load: Load) -> State:
-        """Equilibrium at the wave-generator angle of ``start``.
+        """Find the equilibrium at the wave-generator angle of ``start``.
+
+        Args:
+            model: The ring.
+            start: Start of the search.
+            load: Prescribed torque or rotation.
 
         Returns:
-            The state with its outcome; states that did not converge come back too.
+            The last state with its outcome, whether or not it converged.
         """
         state, history = start, list[float]()
         settled = False
@@ -70,7 +79,7 @@ class NewtonSolver:
             for iteration in range(self.max_iterations):
                 ring = linearise(model, state, load.on_flexspline)
                 thorough = bool(history) and history[-1] < self.thorough_below
-                # after the first steps, or a short one, only close candidates matter
+                # after three steps, or a short one, only close candidates matter
                 close = thorough or iteration > 2
                 reach = (0.02 if close else 0.1) * model.lobe_height
                 contacts = ring.no_contacts
@@ -93,7 +102,7 @@ class NewtonSolver:
                         state, outcome=Outcome.DIVERGED, history=tuple(history)
                     )
                 damping = min(1.0, self.stride * model.lobe_height / step.largest)
-                # a set that comes back would come back for ever
+                # a contact state that repeats would repeat forever
                 repeats = state.touching.tobytes() in tried
                 tried.add(state.touching.tobytes())
                 state, settled = _advance(
@@ -106,7 +115,7 @@ class NewtonSolver:
                 )
                 small = step.largest < self.step_tolerance and damping == 1.0
                 if settled and small and thorough:
-                    # an output that no tooth holds stays where the search left it
+                    # without tooth contact the output angle is arbitrary
                     free = load.torque is not None and load.teeth
                     free &= len(state.tooth_force) == 0
                     outcome = Outcome.SINGULAR if free else Outcome.CONVERGED
@@ -122,11 +131,11 @@ class NewtonSolver:
 def _exchanged(
     state: State, ring: Linearised, step: NewtonStep, below: float
 ) -> tuple[State, Linearised] | None:
-    """Invert the contact state of the bore stations that a step closes or opens.
+    """Switch the contact state of the bore stations that a step closes or opens.
 
     Returns:
-        None without such stations, after too large a step, or on a race, whose tangent
-        depends on more than the stations.
+        State and linearisation after the switch; None if no station switches, after too
+        large a step, or on a race, whose tangent depends on more than the stations.
     """
     if ring.race_rows is not None or not step.largest < below:
         return None
@@ -147,11 +156,15 @@ def _advance(
     *,
     one_at_a_time: bool,
 ) -> tuple[State, bool]:
-    """Move, exchange tooth forces, update the wave generator's active set."""
+    """Apply a step: move the nodes, set the tooth forces, update the bore contact.
+
+    Returns:
+        The new state, and whether the bore contact stayed the same.
+    """
     after = ring.gap_after(damping * step.increment)
     wrong = wrong_stations(state, after)
     bad = wrong > TOUCH
-    # without any contact the rim springs back: let go of the worst node only
+    # without any contact the rim would spring back: release the worst station only
     if bad.any() and (one_at_a_time or not (state.touching ^ bad).any()):
         bad = wrong == wrong.max()
     lines, force, m = step.lines, step.line_force[:, None], len(step.contacts)
@@ -160,7 +173,7 @@ def _advance(
     ring_force = np.zeros_like(state.ring_force)
     np.add.at(ring_force, lines.tooth, force * lines.ring_weight)
     friction = step.line_force[m:] if len(lines) > m else np.zeros(m)
-    # faces and bores of each sector; a shared face appears once
+    # first face and bore nodes of each sector; a shared face appears once
     size, inside = model.element.face_size, model.element.bore_size
     moved = model.skeleton(state) + damping * step.shift
     new = replace(
@@ -194,7 +207,7 @@ def _finished(
     history: list[float],
     ring_range: float,
 ) -> State:
-    """Moments and energy of the whole drive at the last positions."""
+    """Complete a state with the moments and the energy of the whole drive."""
     frames = model.frames(state)
     nodes = model.skeleton(state)[:, model.bore_nodes]
     rotation, _ = model.best_fit_rotation(nodes)
@@ -212,7 +225,7 @@ def _finished(
     energy += 0.5 * float(np.sum(state.ring_force * moved))
     if model.indentation is not None:
         energy += strain_energy(model.indentation, state.contacts, state.tooth_force)
-    # the circular spline is linear: it must stay near its place
+    # the model of the circular spline is linear: its displacement must stay small
     if outcome.ok and np.abs(moved).max(initial=0.0) > ring_range * model.lobe_height:
         outcome = Outcome.DIVERGED
     energy, balls = model.copies * energy, None

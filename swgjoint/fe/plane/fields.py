@@ -1,7 +1,7 @@
-"""Fields of equilibria as plain arrays, for tables and pictures; always whole drives.
+"""Fields of equilibria of the whole drive as plain arrays, for tables and pictures.
 
-Everything in the frame of the circular spline's outside, which does not turn. A half
-model is completed by its own rotation of 180 deg.
+All positions are in the frame of the outside of the circular spline, which does not
+turn. A half model is completed by a copy rotated by 180 deg.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ from swgjoint.typing import Array, Index
 Arc = tuple[float, float]
 
 ARC_GAP = 1.5
-"""Tooth pitches between nodes that belong to one contact arc: a rim touches its wave
-generator once per tooth, in the middle below it or beside it, as the teeth stiffen it.
-"""
+"""Largest distance between nodes of one contact arc, in tooth pitches [-]. The teeth
+stiffen the rim, so that it touches the wave generator only once per tooth, below the
+tooth or between two teeth."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -40,20 +40,26 @@ class MemberField:
     points: Array
     """Deformed positions of the nodes of every sector (N, n_nodes, 2) [m]."""
     stress: Array
-    """xx, yy, xy in the global frame (N, n_nodes, 3) [Pa]."""
+    """Stress components xx, yy, xy in the global frame (N, n_nodes, 3) [Pa]."""
     quads: Index
-    """Corners of the elements of a sector, counter-clockwise (4, n_elements)."""
+    """Corner nodes of the elements of a sector, counter-clockwise (4, n_elements)."""
     outline: Index
-    """Nodes along the tooth of a sector, clockwise root to counter-clockwise root."""
+    """Nodes along the tooth of a sector, from its clockwise to its counter-clockwise
+    root."""
 
     @property
     def maxima(self) -> tuple[Array, Array, Array]:
-        """Tensile, compressive (as a magnitude) and von Mises (N, n_nodes) [Pa]."""
+        """Tensile, compressive (magnitude) and von Mises stress (N, n_nodes) [Pa]."""
         return stress_maxima(self.stress)
 
 
 def flexspline_field(model: RingModel, state: State) -> MemberField:
-    """Deformed flexspline and its stress."""
+    """Deformed flexspline and its stress.
+
+    Args:
+        model: The ring.
+        state: An equilibrium.
+    """
     frames = model.frames(state)
     return _field(
         model,
@@ -66,12 +72,20 @@ def flexspline_field(model: RingModel, state: State) -> MemberField:
 
 
 def circular_spline_field(model: RingModel, state: State) -> MemberField | None:
-    """Deformed circular spline and its stress; None while it is rigid."""
+    """Deformed circular spline and its stress.
+
+    Args:
+        model: The ring.
+        state: An equilibrium.
+
+    Returns:
+        The field; None for a rigid circular spline.
+    """
     stress = circular_spline_stress(model, state)
     compliance = model.circular_spline.compliance
     if stress is None or compliance is None:
         return None
-    # space 0 faces tooth 0 of the flexspline; tooth 0 stands half a pitch beside it
+    # space 0 faces tooth 0 of the flexspline; tooth 0 is half a pitch from it
     pitch = 2.0 * pi / model.circular_spline.profile.teeth
     return _field(
         model,
@@ -108,14 +122,21 @@ def _field(
 
 
 def _turns(model: RingModel) -> Array:
-    """Rotations that complete the drive from the model [rad]."""
+    """Rotations of the copies of the model that form the drive [rad]."""
     return np.asarray(2.0 * pi / model.copies * np.arange(model.copies), float)
 
 
 def tooth_angles(model: RingModel, state: State) -> Array:
-    """Where the flexspline's teeth stand, from the first lobe (N,) [rad].
+    """Angles of the flexspline's teeth from the first lobe.
 
-    Of the undeformed, turned flexspline; counter-clockwise, from -pi to pi.
+    The teeth are those of the undeformed, turned flexspline.
+
+    Args:
+        model: The ring.
+        state: An equilibrium.
+
+    Returns:
+        Angles (N,) [rad], counter-clockwise, from -pi to pi.
     """
     teeth = model.element.sectors
     place = np.asarray(2.0 * pi / teeth * np.arange(teeth), float)
@@ -123,9 +144,16 @@ def tooth_angles(model: RingModel, state: State) -> Array:
 
 
 def tooth_forces(model: RingModel, state: State) -> Array:
-    """Normal force on the right and on the left flank of every tooth (N, 2) [N].
+    """Normal force on the right and on the left flank of every tooth.
 
     The right flank is the clockwise one; seen from the axis, teeth point outwards.
+
+    Args:
+        model: The ring.
+        state: An equilibrium.
+
+    Returns:
+        Forces of the whole drive (N, 2) [N].
     """
     force = np.zeros((model.sectors, 2))
     if state.contacts is not None:
@@ -137,19 +165,19 @@ def tooth_forces(model: RingModel, state: State) -> Array:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class WaveGeneratorContact:
-    """Where the wave generator carries the flexspline."""
+    """Contact between wave generator and flexspline at the stations of the bore."""
 
     angle: Array
-    """Of the stations of the bore, from the first lobe, increasing, -pi to pi (n,)
+    """Angles of the stations from the first lobe, increasing from -pi to pi (n,)
     [rad]."""
     force: Array
-    """Normal force at each of them (n,) [N]."""
+    """Normal force at each station (n,) [N]."""
     line_load: Array
     """Force per length of the bore, averaged over two tooth pitches with triangular
     weights (n,) [N/m]."""
     arcs: tuple[tuple[Arc, ...], ...]
-    """Per lobe, contact arcs as angles from that lobe [rad]. A contact that reaches
-    from lobe to lobe ends half-way between them."""
+    """Contact arcs of each lobe as angles from that lobe [rad]. A contact that extends
+    from lobe to lobe is split half-way between them."""
 
 
 def wave_generator_contact(
@@ -160,7 +188,7 @@ def wave_generator_contact(
     Args:
         model: The ring.
         state: An equilibrium.
-        lobes: Lobes of the wave generator.
+        lobes: Number of lobes of the wave generator.
     """
     points = model.bore_points(state).reshape(-1, 2)
     polar = np.arctan2(-points[:, 0], points[:, 1]) - state.wave_generator_angle
@@ -199,20 +227,20 @@ def _arcs(angles: Array, gap: float) -> tuple[Arc, ...]:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RootStress:
-    """Stress at one node of every tooth root, over a turn (n_states, N)."""
+    """Stress at one node of every tooth root over a turn; arrays are (n_states, N)."""
 
     lobe_position: Array
-    """Angle of the nearest lobe from the node; grows as the input turns forward [rad].
+    """Angle from the node to the nearest lobe; grows as the input turns forward [rad].
     """
     tensile: Array
-    """[Pa]."""
+    """Tensile stress [Pa]."""
     compressive: Array
-    """As a magnitude [Pa]."""
+    """Compressive stress as a magnitude [Pa]."""
     von_mises: Array
-    """[Pa]."""
+    """Von Mises stress [Pa]."""
     tooth: int
-    """The tooth that stands farthest behind a lobe at the first state, so that in half
-    a turn of two lobes one of them passes below it."""
+    """Tooth that is farthest from its approaching lobe at the first state. In half a
+    turn of a two-lobe wave generator a lobe passes below it."""
 
 
 def root_stress(
@@ -226,7 +254,7 @@ def root_stress(
     Args:
         model: The ring.
         states: Equilibria over a turn, at least one.
-        lobes: Lobes of the wave generator.
+        lobes: Number of lobes of the wave generator.
     """
     mesh, profile = model.element.mesh, model.element.profile
     radius = np.hypot(*mesh.mesh.p[:, mesh.flank_right])
@@ -252,5 +280,5 @@ def root_stress(
 
 
 def _wrapped(angle: Array, period: float) -> Array:
-    """Into -period/2 to period/2."""
+    """Angles wrapped into the range from -period/2 to period/2."""
     return np.asarray((angle + 0.5 * period) % period - 0.5 * period)

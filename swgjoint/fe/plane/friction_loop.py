@@ -1,4 +1,4 @@
-"""Torque loops at a locked input with friction of the teeth, for the hysteresis."""
+"""Torque loops with tooth friction at a locked input, for the hysteresis."""
 
 from __future__ import annotations
 
@@ -23,19 +23,27 @@ from swgjoint.typing import Array
 
 POSITIONS = 4
 """Input positions over one pitch, half a step from its ends. With a symmetric wave
-generator two of them are solved, for the others are their mirror images. From position
-to position width and work vary by half; the mean of eight is within 2 %."""
+generator only two of them are solved, because the others are their mirror images. Width
+and work of the loop vary by half between positions; the mean of four is within 2 % of
+the mean of eight."""
 STEPS = 12
-"""Torques from zero to the largest, closer together at small ones."""
+"""Torque steps from zero to the largest torque, smaller at small torques."""
 FIRST_STEPS = 4
-"""The same in the first loading and unloading, which the drive has to forget."""
+"""Torque steps of the first loading and unloading, which serve to erase the initial
+state."""
 _LOOP, _FIELDS = "friction-loop-{:04d}", fields(FrictionLoop)
 
 
 def loop_torques(top: float, steps: int = STEPS) -> Array:
-    """0 -> T -> 0 -> -T in few steps, then -T -> T -> -T -> T [N·m].
+    """Torques 0 -> T -> 0 -> -T in few steps, then -T -> T -> -T -> T.
 
-    Shape (3 FIRST_STEPS + 6 steps + 1,).
+    Args:
+        top: Largest torque T [N·m].
+        steps: Steps from zero to the largest torque, a multiple of
+            :data:`FIRST_STEPS`.
+
+    Returns:
+        Torques (3 FIRST_STEPS + 6 steps + 1,) [N·m].
     """
     up = top * (np.arange(steps + 1) / steps) ** 1.5
     few = up[:: steps // FIRST_STEPS]
@@ -53,15 +61,17 @@ def friction_loops(
     progress: Progress = silent,
     keep: Unfinished | None = None,
 ) -> tuple[FrictionLoop, ...]:
-    """Loops of the drive with perfect teeth, friction carried from step to step.
+    """Torque loops of the drive with perfect teeth and history-dependent friction.
 
     Args:
         design: The drive; its friction coefficient may be zero.
         top: Largest torque [N·m].
-        positions: Over one pitch of the fixed member.
-        steps: Torques from zero to the largest, a multiple of :data:`FIRST_STEPS`.
+        positions: Input positions over one pitch of the fixed member.
+        steps: Steps from zero to the largest torque, a multiple of
+            :data:`FIRST_STEPS`.
         progress: Called with the stage, the loops done and their number.
-        keep: Where solved loops are kept and taken up again; None keeps none.
+        keep: Store of solved loops, from which an interrupted run resumes; None stores
+            none.
 
     Raises:
         ComputationError: If an equilibrium cannot be solved.
@@ -119,7 +129,7 @@ def friction_loops(
 def _kept(
     keep: Unfinished | None, number: int, theta: float, torque: Array
 ) -> FrictionLoop | None:
-    """A loop of an interrupted run."""
+    """A loop from the store of an interrupted run; None if it has none."""
 
     def taken(arrays: dict[str, Any]) -> FrictionLoop:
         numbers = {
@@ -128,14 +138,14 @@ def _kept(
         }
         loop = FrictionLoop(**arrays | numbers)
         if loop.input_angle != theta or not np.array_equal(loop.torque, torque):
-            raise ValueError("a loop along other torques")
+            raise ValueError("stored loop has another input angle or other torques")
         return loop
 
     return None if keep is None else keep.read(_LOOP.format(number), taken)
 
 
 def _along(follow: Continuation, theta: float, torques: Array) -> list[State]:
-    """Equilibria along a path of the torque that begins at zero, input locked."""
+    """Equilibria with the input locked along a torque path that starts at zero."""
     state = follow.engage(follow.deflect(theta))
     states: list[State] = []
     for torque in torques.tolist():
@@ -143,8 +153,8 @@ def _along(follow: Continuation, theta: float, torques: Array) -> list[State]:
             state = follow.to_torque(state, torque)
         if not state.outcome.ok and not states:
             raise ComputationError(
-                f"no equilibrium without torque at input angle {theta:.4g} rad; an"
-                " output that clearance leaves free is not led through a loop"
+                f"no equilibrium without torque at input angle {theta:.4g} rad; a drive"
+                " with backlash has no friction loop"
             )
         if not state.outcome.ok:
             raise ComputationError(
