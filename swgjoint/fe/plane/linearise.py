@@ -1,4 +1,4 @@
-"""Gradient and tangent of the ring at one state, in the bases of its nodes."""
+"""Gradient and tangent of the ring at one state, by the positions of its nodes."""
 
 from __future__ import annotations
 
@@ -23,56 +23,60 @@ from swgjoint.fe.plane.tooth_contact import ToothContact
 from swgjoint.typing import Array, Index, Mask
 
 FAR = 0.03
-"""Gap, in lobe heights, from which the stations of an interval of the bore count as
-one: on parabolas they are within 0.006 of their middle, on arcs within 0.011."""
+"""Gap above which all stations of a bore interval share the values of its middle, in
+lobe heights [-]. The gaps of an interval are within 0.006 of the middle one for
+parabolas and within 0.011 for arcs."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Linearised:
-    """Per sector, n degrees of freedom, see :attr:`RingModel.sector_dofs`.
+    """The ring linearised at one state, with n degrees of freedom per sector.
 
-    Vectors are in the global frame. Where half a ring ends they have the opposite sign,
-    so that unknowns agree with those of the first sector.
+    :attr:`RingModel.sector_dofs` counts them. Vectors are in the global frame; at the
+    end of a half ring they have the opposite sign, so that the shared unknowns agree
+    with those of the first sector.
     """
 
     element: Superelement
     frames: Frames
     dofs: Index
-    """Those of the skeleton (2 n_a,)."""
+    """Degrees of freedom of the skeleton within a sector (2 n_a,)."""
     face_dofs: int
-    """Shared by neighbours."""
+    """Number of degrees of freedom that neighbouring sectors share."""
     sign: Array
-    """-1 where half a ring ends, 1 elsewhere (N, n)."""
+    """-1 at the end of a half ring, 1 elsewhere (N, n)."""
     gradient: Array
-    """Derivative of energy and load potential (N, n) [N]."""
+    """Gradient of energy and load potential (N, n) [N]."""
     hessian: Array
-    """Second derivative (N, n, n) [N/m]."""
+    """Second derivative of energy and load potential (N, n, n) [N/m]."""
     gap: Array
-    """Gap of the stations of the bore (N, q) [m]."""
+    """Gap at the stations of the bore (N, q) [m]."""
     gap_dofs: Index
-    """Degrees of freedom that move them (k,)."""
+    """Degrees of freedom of a sector that move its stations (k,)."""
     stations: BoreStations
     """Stations of the bore."""
     normal: Array
-    """Out of what it lies on, at the stations (N, q, 2)."""
+    """Outward normal of the surface below the bore, at the stations (N, q, 2)."""
     race_rows: Array | None
-    """Derivative of the gaps to a race by ``gap_dofs`` (N, q, k)."""
+    """Derivative of the gaps to a race by ``gap_dofs`` (N, q, k); None without a race.
+    """
     fixed: Mask
-    """Coordinates of a race that do not move (N, n)."""
+    """Fixed coordinates of a race (N, n)."""
     rotation: float
     """Best-fit rotation of the bore [rad]."""
     rotation_gradient: Array
-    """(N, n) [rad/m]."""
+    """Gradient of that rotation (N, n) [rad/m]."""
     anchor: Array
-    """Tangential direction at one node (N, n)."""
+    """Direction of the anchor: tangential at one node (N, n)."""
     anchor_stiffness: float
-    """[N/m]."""
+    """Stiffness of the anchor spring [N/m]."""
     flank: Array
-    """Displacement of the flank nodes in the sector frames, manufacturing errors
-    included (N, 2 n_b) [m]."""
+    """Displacement of the flank nodes in the sector frames, including manufacturing
+    errors (N, 2 n_b) [m]."""
     ring_elastic: Array
     """Elastic displacement of the circular spline's flanks (N_c, 2 n_c) [m]."""
     search: ToothContact
+    """Search for tooth contacts at the state."""
 
     @property
     def no_contacts(self) -> Contacts:
@@ -81,7 +85,7 @@ class Linearised:
         return Contacts.none(self.flank.shape[1], ring.flank_dofs)
 
     def anchor_tangent(self) -> Array:
-        """Tangent with the anchor spring, fixed components replaced by identity."""
+        """Tangent with the anchor spring; fixed components get a diagonal stiffness."""
         matrix = self.hessian.copy()
         matrix[0] += self.anchor_stiffness * np.outer(self.anchor[0], self.anchor[0])
         matrix[self.fixed] = 0.0
@@ -90,7 +94,7 @@ class Linearised:
         return matrix
 
     def gap_gradient(self, contacts: Contacts) -> Array:
-        """Derivative of the gaps of teeth (n_contacts, n)."""
+        """Derivatives of tooth gaps by the degrees of freedom (n_contacts, n)."""
         s, frames = contacts.sector, self.frames
         count, n = len(s), frames.spin.shape[1]
         carried = contacts.weight @ self.element.flank_from_skeleton
@@ -105,12 +109,12 @@ class Linearised:
         return np.asarray(rows * self.sign[s])
 
     def rotate_to_global(self, increment: Array) -> Array:
-        """Increment of the skeletons as vectors (N, n_a, 2)."""
-        own = (increment * self.sign)[:, self.dofs]
-        return np.asarray(own.reshape(len(own), -1, 2))
+        """Shifts of the skeleton nodes (N, n_a, 2) [m] from an increment (N, n)."""
+        skeleton = (increment * self.sign)[:, self.dofs]
+        return np.asarray(skeleton.reshape(len(skeleton), -1, 2))
 
     def gap_after(self, increment: Array) -> Array:
-        """Gaps of the stations after an increment (N, q) [m]."""
+        """Gaps of the stations (N, q) [m] after an increment (N, n)."""
         moved = (increment * self.sign)[:, self.gap_dofs]
         if self.race_rows is not None:
             return np.asarray(self.gap + (self.race_rows @ moved[..., None])[..., 0])
@@ -118,10 +122,14 @@ class Linearised:
         return np.asarray(self.gap + np.einsum("sqi,sqi->sq", shift, self.normal))
 
     def exchange(self, stations: Mask, touching: Mask) -> Linearised:
-        """The tangent with the contact state of some stations (N, q) inverted.
+        """The linearisation with the contact state of some stations inverted.
 
-        For a rigid wave generator. Its curvature is neglected there, because the gap of
-        a station that changes sides is almost zero.
+        Applies to a rigid wave generator. Its curvature is neglected, because the gap
+        of a station that opens or closes is almost zero.
+
+        Args:
+            stations: Stations to switch (N, q).
+            touching: Stations that touched before (N, q).
         """
         sectors = np.flatnonzero(stations.any(axis=1))
         change = np.where(touching, -1.0, 1.0) * stations * self.stations.stiffness
@@ -138,7 +146,7 @@ class Linearised:
         return replace(self, gradient=gradient, hessian=hessian)
 
     def gap_gradients(self) -> Array:
-        """Derivative of the gaps of the stations by ``gap_dofs`` (N, q, k)."""
+        """Derivatives of the station gaps by ``gap_dofs`` (N, q, k)."""
         rows = self.race_rows
         if rows is None:
             rows = self.stations.project(self.normal)
@@ -147,7 +155,7 @@ class Linearised:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Bore:
-    """What the bore lies on, by the k degrees of freedom of ``contact_dofs``."""
+    """Contact of the bore, by the k degrees of freedom ``contact_dofs``."""
 
     gap: Array
     normal: Array
@@ -158,12 +166,13 @@ class _Bore:
 
 
 def linearise(model: RingModel, state: State, torque: float | None) -> Linearised:
-    """Linearise the ring.
+    """Linearise the ring at a state.
 
     Args:
         model: The ring.
         state: Positions, active set and tooth forces.
-        torque: T on the load, whole drive, None if the rotation is prescribed [N·m].
+        torque: Torque T on the load of the whole drive [N·m]; None if the rotation of
+            the flexspline is prescribed.
     """
     element, sign, dofs = model.element, model.signs, model.dofs
     frames, x = model.frames(state), model.skeleton(state)
@@ -247,10 +256,10 @@ def linearise(model: RingModel, state: State, torque: float | None) -> Linearise
 
 
 def _on_surface(model: RingModel, state: State) -> _Bore:
-    """The layer between the bore and a rigid wave generator."""
+    """Compress the layer between the bore and a rigid wave generator."""
     stations = model.stations
     gap, normal, curvature = _gaps(model, state)
-    # only sectors that touch push back
+    # only sectors that touch exert a force
     on = np.flatnonzero(state.touching.any(axis=1))
     k = np.where(state.touching[on], stations.stiffness, 0.0)
     # sliding over a curved outline turns the contact force
@@ -266,10 +275,10 @@ def _on_surface(model: RingModel, state: State) -> _Bore:
 
 
 def _gaps(model: RingModel, state: State) -> tuple[Array, Array, Array]:
-    """Gap, normal and curvature of the stations, see ``wave_generator_gap``.
+    """Gap, normal and curvature at the stations, see ``wave_generator_gap``.
 
-    Where no station of an interval touches and its middle is :data:`FAR` off, all of
-    them get the values of the middle, which decide no more than that they stay apart.
+    If no station of an interval touches and the gap in its middle exceeds :data:`FAR`,
+    all its stations get the values of the middle: they stay apart in any case.
     """
     stations, alpha = model.stations, state.wave_generator_angle
     points = model.bore_points(state)
@@ -288,7 +297,7 @@ def _gaps(model: RingModel, state: State) -> tuple[Array, Array, Array]:
 
 
 def _in_global_frame(matrices: Array, angle: Array) -> Array:
-    """Matrices of sectors (N, n, n), given in frames turned by angles (N,)."""
+    """Transform sector matrices (N, n, n) from frames turned by angles (N,) [rad]."""
     count, n, _ = matrices.shape
     cos, sin = np.cos(angle), np.sin(angle)
     turn = np.stack([np.stack([cos, -sin], -1), np.stack([sin, cos], -1)], -2)

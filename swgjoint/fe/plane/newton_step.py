@@ -22,31 +22,31 @@ from swgjoint.typing import Array, Mask
 
 @dataclass(frozen=True, kw_only=True)
 class Load:
-    """What is prescribed.
+    """Prescribed output torque, rotation of the flexspline, or both.
 
-    The torque alone: the flexspline is the output. The rotation alone: the flexspline
-    is held. Both: the flexspline is held and the circular spline is the output.
+    With a torque alone the flexspline is the output; with a rotation alone the
+    flexspline is held; with both it is held and the circular spline is the output.
     """
 
     torque: float | None = None
-    """T that the output exerts on its load, whole drive [N·m]."""
+    """Torque T of the output on its load, whole drive [N·m]."""
     rotation: float | None = None
     """Best-fit rotation of the flexspline's bore [rad]."""
     teeth: bool = True
-    """Whether the teeth touch."""
+    """Whether the teeth can touch."""
 
     def __post_init__(self) -> None:
         if self.torque is None and self.rotation is None:
-            raise ValueError("give a torque, a rotation, or both")
+            raise ValueError("torque = None, rotation = None: expected at least one")
 
     @property
     def on_flexspline(self) -> float | None:
-        """Torque that the flexspline exerts on a load [N·m]."""
+        """Torque of the flexspline on a load [N·m]; None if its rotation is given."""
         return self.torque if self.rotation is None else None
 
     @property
     def on_ring(self) -> float | None:
-        """Torque that the circular spline exerts on a load [N·m]."""
+        """Torque of the circular spline on a load [N·m]; None if it has no load."""
         return self.torque if self.rotation is not None else None
 
 
@@ -55,28 +55,32 @@ class NewtonStep:
     """Solution of one linearised problem."""
 
     lines: Contacts
-    """Normals of the candidates, then, with friction, their tangents."""
+    """Lines of force: normals of the candidates, then, with friction, their tangents.
+    """
     line_force: Array
-    """Forces along them [N]."""
+    """Force along each line [N]."""
     contacts: Contacts
-    """The candidates."""
+    """Contact candidates."""
     active: NDArray[np.int64]
-    """Those that carry force."""
+    """Indices of the candidates that carry force."""
     torque: float
+    """Torque T of the output on its load, whole drive [N·m]."""
     holding_torque: float
+    """External torque on the flexspline, whole drive [N·m]."""
     compliance: float
+    """Tangent compliance -d(output rotation)/dT, whole drive [rad/(N·m)]."""
     ring_turn: float
     """Increment of the circular spline's rotation [rad]."""
     increment: Array
-    """Increment of every sector (N, n) [m]."""
+    """Increment of the degrees of freedom of every sector (N, n) [m]."""
     shift: Array
-    """Shift of the skeleton in the global frame (N, n_a, 2) [m]."""
+    """Shift of the skeleton nodes in the global frame (N, n_a, 2) [m]."""
     race_shift: Array
-    """Shift of the race's nodes (N, m, 2, 2) [m]; empty without a race."""
+    """Shift of the race nodes (N, m, 2, 2) [m]; empty without a race."""
     pressure: Array
     """Force of the wave generator at each station of the bore (N, q) [N]."""
     strip_error: float
-    """Error of the approach of the flanks, whose law is linearised [m]."""
+    """Error of the linearised indentation law [m]."""
 
     @property
     def largest(self) -> float:
@@ -225,20 +229,32 @@ def solve_newton_step(
 
 
 def wrong_stations(state: State, gap: Array) -> Array:
-    """How far the stations are on the wrong side (N, q) [m]."""
+    """Violation of the assumed contact state at each station.
+
+    Args:
+        state: State whose bore contact is assumed.
+        gap: Gap at each station (N, q) [m].
+
+    Returns:
+        Gap of stations assumed in contact, overlap of the others (N, q) [m]; positive
+        values are violations.
+    """
     return np.asarray(np.where(state.touching, gap, -gap))
 
 
 def output_compliance(
     matrix: Array, held: NDArray[np.int64], k: int, load: Load
 ) -> float:
-    """Rotation of the output against its load, per torque of the model.
+    """Tangent compliance of the output, per torque of the model.
 
     Args:
-        matrix: Of k force unknowns, then anchor, ring and multiplier.
+        matrix: Matrix of k force unknowns, anchor, ring rotation and multiplier.
         held: Unknowns that are not zero.
-        k: Force unknowns.
-        load: What is prescribed.
+        k: Number of force unknowns.
+        load: Prescribed torque or rotation.
+
+    Returns:
+        Rotation of the output against its load per torque [rad/(N·m)].
     """
     system = matrix[np.ix_(held, held)]
     if load.on_ring is not None:

@@ -1,16 +1,17 @@
-r"""Ratcheting torque: the largest that the teeth hold with the wave generator locked.
+r"""Ratcheting torque: the largest torque of the teeth with the wave generator locked.
 
-The output is turned against the locked wave generator, so that torque is a result and
-may fall; where it is largest the teeth begin to pass. Under that torque
+The output is turned against the locked wave generator, so that the torque is a result
+and may fall; at its maximum the teeth begin to ratchet. There
 
 .. math:: \frac{dT}{d\psi} = 0,
 
-and above it no equilibrium is left. In the plane the wave generator is rigid and there
-is no bearing; the torsion of a cup is in series and changes nothing, but the radial
-softness of cup and bearing, which are not there, lets teeth pass earlier. What does
-give way is the circular spline: with its outside fixed teeth jam, and the torque at
-which the search ends is a lower bound of that model, far above what steel bears; with
-its outside free (:attr:`CircularSpline.outer_rim`) it becomes oval and lets go.
+and no equilibrium exists at a larger torque. In the 2D model the wave generator is
+rigid and has no bearing. The torsion of a cup is in series and has no effect, but the
+radial compliance of cup and bearing, which the model lacks, would let the teeth ratchet
+earlier. The circular spline is what yields: if its outside is fixed, the teeth jam, and
+the torque at which the search ends is a lower bound of that model, far above the
+strength of steel; if its outside is free (:attr:`CircularSpline.outer_rim`), it becomes
+oval and releases the teeth.
 """
 
 from __future__ import annotations
@@ -35,18 +36,20 @@ from swgjoint.progress import Progress, silent
 from swgjoint.typing import Array
 
 STEP = 0.04
-"""Of the output, parts of a pitch."""
+"""Step of the output, in tooth pitches [-]."""
 SHORTEST = 1e-3
-"""Step at which the search is given up, parts of a pitch."""
+"""Step below which the search is abandoned, in tooth pitches [-]."""
 RING_RANGE = 2.0
-"""Displacement of the circular spline that is taken, in lobe heights. Its linear model
-errs by the square of its rotation: a lobe height on the pitch radius turns it by 0.02
-to 0.04 rad, of which the square is a few percent of the depth of a tooth."""
+"""Largest accepted displacement of the circular spline, in lobe heights [-]. The error
+of its linear model is of second order in its rotation: a displacement of one lobe
+height at the pitch radius is a rotation of 0.02 to 0.04 rad, and its square amounts to
+a few percent of the tooth depth."""
 ITERATIONS = 200
-"""Near the limit contact changes slowly; 120 do for a map."""
+"""Most iterations per equilibrium. Near the limit contact changes slowly; 120 suffice
+for a map."""
 TOLERANCE = 1e-4
-"""Increment at which the iteration ends, in lobe heights: flanks that conform change
-points of contact below it for many iterations, while the torque moves by as little."""
+"""Increment at which the iteration ends, in lobe heights [-]. Below it conforming
+flanks exchange contact points for many iterations while the torque hardly changes."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -54,17 +57,17 @@ class RatchetingPath:
     """Equilibria while the output is turned back against the locked wave generator."""
 
     turned: Array
-    """By which the output was turned, growing from zero [rad]. Shape (n,)."""
+    """Angle by which the output was turned, increasing from zero (n,) [rad]."""
     torque: Array
-    """T at the output [N·m]. Shape (n,)."""
+    """Output torque T (n,) [N·m]."""
     energy: Array
-    """Strain energy of the whole drive [J]. Shape (n,)."""
+    """Strain energy of the whole drive (n,) [J]."""
     pairs: NDArray[np.int64]
-    """Teeth of the flexspline in contact, whole drive. Shape (n,)."""
+    """Number of flexspline teeth in contact, whole drive (n,)."""
     pitch: float
-    """Pitch of the flexspline [rad]."""
+    """Tooth pitch of the flexspline [rad]."""
     outcome: Outcome
-    """Outcome of the solve that ended the path, converged where none failed."""
+    """Outcome of the solve that ended the path; converged if none failed."""
 
     def __post_init__(self) -> None:
         turned = frozen_array(self.turned, "turned [rad]", ndim=1)
@@ -75,9 +78,9 @@ class RatchetingPath:
 
     @property
     def passed(self) -> bool:
-        """Whether the path goes beyond the largest torque that teeth carry.
+        """Whether the path goes beyond the largest torque that the teeth carry.
 
-        Within the backlash torque is round-off, and its falls say nothing.
+        Within the backlash the torque is round-off, so its maximum does not count.
         """
         k = int(self.torque.argmax())
         return bool(self.pairs[k] > 0 and self.torque[-1] < self.torque[k])
@@ -86,7 +89,7 @@ class RatchetingPath:
     def limit(self) -> float:
         """Largest torque of the path; a lower bound unless :attr:`passed` [N·m].
 
-        The top of the parabola through the largest value and its neighbours.
+        It is the vertex of the parabola through the largest value and its neighbours.
         """
         k = int(self.torque.argmax())
         if not 0 < k < self.torque.size - 1:
@@ -96,7 +99,7 @@ class RatchetingPath:
         return float(c - b**2 / (4.0 * a)) if a < 0.0 else float(y[1])
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain values."""
+        """The path as a JSON-compatible dictionary."""
         parts, k = self.turned / self.pitch, int(self.torque.argmax())
         return {
             "limit_Nm": self.limit,
@@ -118,16 +121,17 @@ def ratcheting_path(
     upto: float = 1.0,
     progress: Progress = silent,
 ) -> RatchetingPath:
-    """Turn the output until the torque that teeth carry falls, at most so far.
+    """Turn the output until the torque of the teeth falls, or up to a given angle.
 
-    Teeth are perfect and without friction.
+    The teeth have neither errors nor friction.
 
     Args:
-        design: The drive; what the circular spline sits in decides, see above.
-        input_angle: Where the wave generator is locked [rad].
-        step: Of the output, parts of a pitch.
-        upto: Where to end in any case, parts of a pitch.
-        progress: Called with the stage and the part of the pitch in percent.
+        design: The drive. The support of its circular spline decides, see above.
+        input_angle: Angle at which the wave generator is locked [rad].
+        step: Step of the output, in tooth pitches [-].
+        upto: Output rotation at which the search ends at the latest, in tooth pitches
+            [-].
+        progress: Called with the stage, the part of the pitch in percent, and 100.
 
     Raises:
         DesignError: If the design cannot be built.
@@ -169,7 +173,7 @@ def ratcheting_path(
 
 
 def path_follower(design: Design) -> Continuation:
-    """The 2D drive, perfect and smooth, far from its map's torques."""
+    """The 2D drive without errors and friction, with a solver for large torques."""
     perfect = without_errors(design)
     small = TOLERANCE * lobe_height(design)
     solver = NewtonSolver(
@@ -187,6 +191,7 @@ def path_follower(design: Design) -> Continuation:
 
 
 def _pairs(state: State) -> int:
+    """Number of flexspline teeth in contact, in the model."""
     if state.contacts is None:
         return 0
     return int(np.unique(state.contacts.sector).size)

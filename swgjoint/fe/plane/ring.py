@@ -1,6 +1,6 @@
-"""The ring of sectors between wave generator and circular spline: its geometry.
+"""Geometry of the ring of sectors between wave generator and circular spline.
 
-Everything in the frame of the circular spline, whose outside is fixed.
+All positions are in the frame of the outside of the circular spline, which is fixed.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ from swgjoint.gear.wave_generators.wave_generator import WaveGenerator
 from swgjoint.typing import Array, Index
 
 AT_LOBE = 0.9
-"""Cosine of twice the angle from the major axis, above which nodes of the bore lie on
-the race where a search begins."""
+"""Cosine of twice the angle from the major axis above which bore nodes touch the race
+at the start of a search [-]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class RingModel:
-    """Flexspline ring, wave generator and rigid circular spline."""
+    """Flexspline ring, wave generator and circular spline of a drive."""
 
     element: Superelement
     wave_generator: WaveGenerator
@@ -43,48 +43,50 @@ class RingModel:
     lobe_height: float
     """Radial deflection at the lobes [m]."""
     half: bool = False
-    """Half of the ring, closed by a rotation of 180 deg."""
+    """Whether the model is half of the ring, closed by a rotation of 180 deg."""
     nonlinear: bool = True
+    """Whether sectors undergo large rotations."""
     friction: CoulombFriction | None = None
-    """Between the flanks; None without."""
+    """Friction between the flanks; None for frictionless flanks."""
     indentation: Indentation | None = None
-    """Indentation of the flanks; None gives them the patch of a contact alone."""
+    """Indentation of the flanks; None uses the compliance of the contact patch only."""
     tooth_shift: Array | None = None
     """Manufacturing errors of the flexspline's teeth in their frames (N, 2) [m]."""
     ring_tooth_shift: Array | None = None
-    """The same of the circular spline, which must be elastic (N_c, 2) [m]."""
+    """Manufacturing errors of the circular spline's teeth in their frames (N_c, 2) [m];
+    they need an elastic circular spline."""
     wave_generator_offset: Array | None = None
     """Centre of the outline in the frame of the wave generator (2,) [m]."""
     layer: float = 0.0
-    """E b of the bore's layer that a rigid wave generator presses [N/m]."""
+    """Product E b for the contact layer between bore and rigid wave generator [N/m]."""
     points: int = POINTS
     """Stations of the bore between neighbouring nodes."""
     race: PlaneRace | None = None
-    """Outer race on balls in place of the rigid wave generator."""
+    """Outer race on balls that replaces the rigid wave generator; None without."""
 
     @property
     def sectors(self) -> int:
-        """Sectors in the model."""
+        """Number of sectors in the model."""
         return self.element.sectors // (2 if self.half else 1)
 
     @property
     def ring_teeth(self) -> int:
-        """Teeth of the circular spline in the model."""
+        """Number of teeth of the circular spline in the model."""
         return self.circular_spline.profile.teeth // self.copies
 
     @property
     def copies(self) -> int:
-        """How many times the model repeats in the drive."""
+        """Number of copies of the model in the drive."""
         return 2 if self.half else 1
 
     @property
     def closure(self) -> float:
-        """Sign that closes the ring: the half model continues as its opposite."""
+        """Sign that closes the ring: a half model continues with the opposite sign."""
         return -1.0 if self.half else 1.0
 
     @cached_property
     def place(self) -> Array:
-        """Angles of the sectors in the undeformed ring [rad]."""
+        """Angles of the sectors in the undeformed ring (N,) [rad]."""
         return np.asarray(
             2.0 * pi / self.element.sectors * np.arange(self.sectors), float
         )
@@ -99,21 +101,21 @@ class RingModel:
 
     @cached_property
     def bore_nodes(self) -> NDArray[np.int64]:
-        """Skeleton nodes of a sector that face the wave generator, one corner."""
+        """Skeleton nodes of a sector at the bore, with its first corner only."""
         size = self.element.face_size
         return np.arange(size - 1, size + self.element.bore_size)
 
     @cached_property
     def stations(self) -> BoreStations:
-        """Where the bore presses: between its nodes, on a race at them."""
+        """Contact stations of the bore: between its nodes, or at them on a race."""
         if self.race is not None:
             return BoreStations.from_nodes(self.race.press)
         skeleton = self.element.skeleton
-        own = skeleton[np.append(self.bore_nodes, len(skeleton) - 1)]
+        bore = skeleton[np.append(self.bore_nodes, len(skeleton) - 1)]
         pitch = 2.0 * pi / self.element.sectors
-        before, after = rotate(own[-2], -pitch), rotate(own[1], pitch)
+        before, after = rotate(bore[-2], -pitch), rotate(bore[1], pitch)
         return BoreStations.subdivide(
-            np.stack([before, *own, after]), layer=self.layer, points=self.points
+            np.stack([before, *bore, after]), layer=self.layer, points=self.points
         )
 
     @cached_property
@@ -122,12 +124,12 @@ class RingModel:
         nodes = self.bore_nodes
         if self.race is not None:
             return np.concatenate([self.dofs[_pairs(nodes)], self.race_dofs])
-        # one node of either neighbour; the last corner ends the skeleton
+        # one node of each neighbour; the last corner is the last skeleton node
         last = len(self.element.skeleton)
         return _pairs(np.concatenate([[0], nodes + 1, [last, last + 1]]))
 
     def station_nodes(self, skeleton: Array) -> Array:
-        """The nodes that carry the stations (N, m, 2) [m] from skeletons."""
+        """Nodes that move the stations (N, m, 2) [m], from skeletons (N, n_a, 2)."""
         nodes = skeleton[:, self.bore_nodes]
         if self.race is not None:
             return nodes
@@ -138,15 +140,15 @@ class RingModel:
         return np.concatenate([before, nodes, skeleton[:, -1:], after], axis=1)
 
     def bore_points(self, state: State) -> Array:
-        """Stations of the bore (N, q, 2) [m]."""
+        """Positions of the stations of the bore (N, q, 2) [m]."""
         return self.stations.positions(self.station_nodes(self.skeleton(state)))
 
     @property
     def face_dofs(self) -> int:
-        """Degrees of freedom that neighbours share.
+        """Number of degrees of freedom that neighbouring sectors share.
 
-        Those of a face and of the bore nodes next to its corner; on a race those of a
-        face and of its node of the race.
+        They belong to a face and to the two bore nodes next to its corner or, with a
+        race, to a face and the race node there.
         """
         if self.race is None:
             return 2 * (self.element.face_size + 2)
@@ -154,37 +156,38 @@ class RingModel:
 
     @cached_property
     def dofs(self) -> Index:
-        """Those of the skeleton among the degrees of freedom of a sector (2 n_a,)."""
-        own, face = 2 * len(self.element.skeleton), 2 * self.element.face_size
+        """Degrees of freedom of a sector that belong to its skeleton (2 n_a,)."""
+        size, face = 2 * len(self.element.skeleton), 2 * self.element.face_size
         if self.race is None:
-            return 2 + np.arange(own)
+            return 2 + np.arange(size)
         inside = self.race.size - 2 * NODE
         return np.concatenate(
             [
-                np.arange(own - face) + NODE * (np.arange(own - face) >= face),
-                np.arange(own - face, own) + NODE + inside,
+                np.arange(size - face) + NODE * (np.arange(size - face) >= face),
+                np.arange(size - face, size) + NODE + inside,
             ]
         )
 
     @property
     def sector_dofs(self) -> int:
-        """Degrees of freedom of a sector.
+        """Number of degrees of freedom n of a sector.
 
-        Those of its skeleton and of the race below it, or of the bore nodes next to it.
+        They belong to its skeleton and to the race below it or, without a race, to one
+        bore node of each neighbour.
         """
         beside = 2 * 2 if self.race is None else self.race.size
         return 2 * len(self.element.skeleton) + beside
 
     @cached_property
     def signs(self) -> Array:
-        """-1 where half a ring ends and its start follows, 1 elsewhere (N, n)."""
+        """Signs (N, n): -1 at the end of a half ring, which joins its start, else 1."""
         signs = np.ones((self.sectors, self.sector_dofs))
         signs[-1, -self.face_dofs :] = self.closure
         return signs
 
     @cached_property
     def race_dofs(self) -> Index:
-        """Those of the race's nodes, first face to last; empty without."""
+        """Degrees of freedom of the race nodes in a sector; empty without a race."""
         if self.race is None:
             return np.zeros(0, dtype=np.int64)
         return np.setdiff1d(np.arange(self.sector_dofs), self.dofs)
@@ -196,7 +199,7 @@ class RingModel:
         return np.concatenate([state.faces, state.bores, last], axis=1)
 
     def frames(self, state: State) -> Frames:
-        """Sector frames; at the linear level they turn with the flexspline only."""
+        """Sector frames; in the linear model they turn with the flexspline only."""
         fixed = None
         if not self.nonlinear:
             fixed = np.full(self.sectors, state.rotation)
@@ -207,8 +210,12 @@ class RingModel:
     def initial_guess(self, alpha: float = 0.0, rotation: float = 0.0) -> State:
         """Start of a search: the inextensional two-lobe shape of a thin ring.
 
-        Radial w0 cos 2 phi, tangential -w0/2 sin 2 phi, cross-sections turned by
-        3 w0 sin 2 phi/(2 r); phi from the major axis.
+        The radial displacement is w0 cos 2 phi, the tangential one -w0/2 sin 2 phi, and
+        cross-sections turn by 3 w0 sin 2 phi/(2 r), with phi from the major axis.
+
+        Args:
+            alpha: Wave-generator angle [rad].
+            rotation: Rotation of the flexspline [rad].
         """
         element = self.element
         x = self.reference
@@ -234,7 +241,7 @@ class RingModel:
             touching = gap < 0.01 * w0
         else:
             race = self.race.initial_guess(alpha, rotation)
-            # nothing but the rim keeps the race on its balls
+            # the rim alone keeps the race on its balls
             touching = np.cos(2.0 * phi[:, self.bore_nodes]) > AT_LOBE
         return State(
             race=race,
@@ -256,6 +263,9 @@ class RingModel:
         Args:
             nodes: Positions (..., 2) [m].
             alpha: Wave-generator angle [rad].
+
+        Returns:
+            Gap (...) [m], normal (..., 2) and curvature (...) [1/m].
         """
         flat = rotate(nodes.reshape(-1, 2), -alpha)
         if self.wave_generator_offset is not None:
@@ -268,7 +278,7 @@ class RingModel:
         )
 
     def wave_generator_normal(self, state: State) -> Array:
-        """Outward normal of what the bore lies on, at its stations (N, q, 2)."""
+        """Outward normal of the surface below the bore, at its stations (N, q, 2)."""
         points, alpha = self.bore_points(state), state.wave_generator_angle
         if self.race is None or state.race is None:
             return self.wave_generator_gap(points, alpha)[1]
@@ -278,18 +288,18 @@ class RingModel:
         """Force of a rigid wave generator on the bore nodes (N, n_bore + 1, 2) [N]."""
         vectors = state.pressure[..., None] * self.wave_generator_normal(state)
         nodal = self.stations.forces_of(vectors)
-        # what stations exert on the neighbours: their last inner node, the shared
-        # corner and the first inner node
-        found = nodal[:, 1:-2].copy()
+        # add the forces that stations exert on nodes of the neighbours: their last
+        # inner node, the shared corner and the first inner node
+        force = nodal[:, 1:-2].copy()
         before, after = np.roll(nodal[:, 0], -1, axis=0), np.roll(nodal[:, -2:], 1, 0)
         before[-1] *= self.closure
         after[0] *= self.closure
-        found[:, -1] += before
-        found[:, :2] += after
-        return np.asarray(found)
+        force[:, -1] += before
+        force[:, :2] += after
+        return np.asarray(force)
 
     def best_fit_rotation(self, nodes: Array) -> tuple[float, Array]:
-        """Best-fit rotation of the bore nodes and its gradient (N, n_bore + 1, 2)."""
+        """Best-fit rotation [rad] of bore nodes (N, n_bore + 1, 2) and its gradient."""
         x0 = self.reference[:, self.bore_nodes]
         sine = float(np.einsum("sni,sni->", rotate_right_angle(x0), nodes))
         cosine = float(np.einsum("sni,sni->", x0, nodes))
@@ -299,10 +309,16 @@ class RingModel:
     def predict_field(
         self, state: State, alpha: float, rotation: float, ring_rotation: float
     ) -> State:
-        """Predictor: the field turned with the wave generator and the members.
+        """Predictor that turns the fields with the wave generator and the members.
 
-        Displacements in polar components travel with the wave generator through the
-        teeth, interpolated between sectors; the flexspline turns rigidly.
+        Displacements in the tooth frames travel with the wave generator from tooth to
+        tooth, interpolated between sectors; the flexspline turns rigidly.
+
+        Args:
+            state: State to start from.
+            alpha: New wave-generator angle [rad].
+            rotation: New rotation of the flexspline [rad].
+            ring_rotation: New rotation of the circular spline [rad].
         """
         pitch = 2.0 * pi / self.element.sectors
         ring_pitch = 2.0 * pi / self.circular_spline.profile.teeth
@@ -341,7 +357,12 @@ class RingModel:
         )
 
     def shift_flank(self, flank: Array, shift: Array | None) -> Array:
-        """Displacements of flank nodes (N, 2 n) [m] with the errors of their teeth."""
+        """Add the errors of the teeth to the displacements of their flank nodes.
+
+        Args:
+            flank: Displacements of the flank nodes (N, 2 n) [m].
+            shift: Shift of each tooth in its frame (N, 2) [m]; None for no errors.
+        """
         if shift is None:
             return flank
         return flank + np.tile(shift, flank.shape[1] // 2)
@@ -355,12 +376,17 @@ class RingModel:
 
 
 def _pairs(nodes: Index) -> Index:
-    """Degrees of freedom x, y of nodes."""
+    """Degrees of freedom x, y of every node, one after the other."""
     return np.asarray((2 * nodes[:, None] + np.arange(2)).ravel())
 
 
 def shift_rows(values: Array, shift: float) -> Array:
-    """Rows moved on by a fraction of the ring, cubic between four neighbours."""
+    """Shift rows around the ring, interpolated by the cubic through four neighbours.
+
+    Args:
+        values: One row per sector (N, ...).
+        shift: Shift in sectors, not necessarily an integer [-].
+    """
     whole = int(np.floor(shift))
     t = shift - whole
     return np.asarray(

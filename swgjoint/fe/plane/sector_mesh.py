@@ -11,13 +11,14 @@ from skfem import MeshQuad
 from swgjoint.gear.teeth.profile import ToothProfile
 from swgjoint.typing import Array, Index
 
-# elements of the thesis mesh per half tooth: along the flank, in depth below it, on the
-# inner (outer) diameter, and through the lower rim; 181 nodes and 146 elements a tooth
+# elements of the thesis mesh per half tooth: along the flank, in depth below it, along
+# the inner (outer) diameter and through the lower rim; a tooth has 181 nodes and 146
+# elements
 FLANK, LAYERS, BORE, LOWER_RIM = 21, 3, 5, 2
-# depth of the centre point of the tooth mesh in halves of the rim (thesis Table 4.4)
+# depth of the centre point of the tooth mesh in half rim thicknesses (thesis table 4.4)
 POSITIONING_FACTOR = 1.1
-# each of the three layers is this much thicker than the one above it: bending stress
-# peaks at the surface of the fillet ("finer elements near the tooth flanks", 4.3)
+# thickness ratio of a layer to the one above it: bending stress peaks at the surface of
+# the fillet ("finer elements near the tooth flanks", thesis section 4.3)
 LAYER_GROWTH = 1.5
 
 
@@ -25,28 +26,35 @@ LAYER_GROWTH = 1.5
 class SectorMesh:
     """Mesh of the sector of one tooth, the tooth centred on the +y axis.
 
-    The faces lie at half a pitch either side; "first" is the clockwise one (x > 0).
+    The faces are half a pitch to either side; "first" is the clockwise one (x > 0).
     Node sets hold indices into the columns of ``mesh.p``.
     """
 
     mesh: MeshQuad
     half_pitch: float
+    """Half of the tooth pitch [rad]."""
     face_first: Index
     """Nodes of the clockwise face, from the root land to the bore."""
     face_last: Index
     """Nodes of the counter-clockwise face, in the same order."""
     bore: Index
-    """Nodes of the inner (outer) diameter, clockwise to counter-clockwise, ends too."""
+    """Nodes of the inner (outer) diameter from the clockwise to the counter-clockwise
+    corner, both included."""
     flank_right: Index
     """Nodes of the right flank from the end of the top land to the root land."""
     flank_left: Index
-    """The mirror images, in the same order."""
+    """Nodes of the left flank, mirror images in the same order."""
     flank_stations: Array
     """Arc length of the flank nodes on the profile [m]."""
 
 
 def refine_count(elements: int, refinement: float) -> int:
-    """Elements along an edge that has so many in the mesh of the thesis."""
+    """Number of elements along an edge of the refined mesh.
+
+    Args:
+        elements: Number of elements in the mesh of the thesis.
+        refinement: Factor on the number of elements [-].
+    """
     return ceil(elements * refinement)
 
 
@@ -57,21 +65,23 @@ def sector_mesh(
     *,
     lower_rim: float | None = None,
 ) -> SectorMesh:
-    """Mesh a tooth sector with the topology of the thesis.
+    """Mesh a tooth sector with the topology of the thesis mesh.
 
-    Each half tooth is one block of 21 elements along the flank (end of the top land to
-    the middle of the root land) and 3 below it, whose inner edge follows the tooth axis
-    to the middle of the rim and then turns into the rim; below lies the lower rim.
+    Each half tooth is one block of 21 elements along the flank (from the end of the top
+    land to the middle of the root land) and 3 elements below it. Its inner edge follows
+    the tooth axis to the middle of the rim and then turns into the rim. The lower rim
+    is a second block below it.
 
     Args:
-        profile: Flank of the member.
+        profile: Tooth profile of the member.
         rim: Thickness between root circle and inner (outer) diameter [m].
-        refinement: Multiplies the elements per direction, see :func:`refine_count`.
-        lower_rim: Thickness of the lower rim, to which a cup connects; that of the
-            thesis for a plane model if None [m].
+        refinement: Factor on the number of elements per direction [-], see
+            :func:`refine_count`.
+        lower_rim: Thickness of the lower rim, to which a cup connects [m]; by default
+            that of the 2D mesh of the thesis.
 
     Returns:
-        The sector; both halves are mirror images.
+        The sector; its halves are mirror images.
     """
     n, layers = refine_count(FLANK, refinement), refine_count(LAYERS, refinement)
     bore, lower = refine_count(BORE, refinement), refine_count(LOWER_RIM, refinement)

@@ -1,7 +1,7 @@
-"""Fields of solved positions for the map: surface, stress and contact forces by place.
+"""Fields of equilibria for a map: surface, stress and contact forces by tooth place.
 
-Rows of nodes across a sector, from its clockwise face to the other one, make the
-surface that is shown; one more row is the image of another, the mirrored one.
+Rows of nodes across a sector, from its clockwise to its counter-clockwise face, span
+the displayed surface.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ from swgjoint.maps.fields import DriveFields
 from swgjoint.typing import Array, Index
 
 PHASES = 4
-"""Positions within a pitch that are kept."""
+"""Most input positions within a pitch that are stored."""
 EVERY = 2
-"""Of the nodes along outline and bore are shown."""
+"""Stride of the displayed nodes along outline and bore."""
 OUTLINE = 200
-"""Points of the wave generator's outline."""
+"""Number of points of the wave generator's outline."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -39,40 +39,40 @@ class SectorFields:
     """One equilibrium by sector, in the frames of the turned, undeformed teeth."""
 
     displacement: Array
-    """(N, n_nodes, 3) [m]."""
+    """Displacement of the surface nodes (N, n_nodes, 3) [m]."""
     von_mises: Array
-    """(N, n_nodes) [Pa]."""
+    """Von Mises stress at the surface nodes (N, n_nodes) [Pa]."""
     tooth_force: Array
-    """(N, 3) [N]."""
+    """Contact force on each tooth (N, 3) [N]."""
     wave_generator_force: Array
-    """(N, 3) [N]."""
+    """Force of the wave generator on each sector (N, 3) [N]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ShapeSurface:
-    """What is shown of a sector."""
+    """Displayed surface of a sector."""
 
     nodes: Index
-    """Nodes of the mesh (n,)."""
+    """Mesh nodes of the surface (n,)."""
     points: Array
-    """Undeformed (n, 3) [m]."""
+    """Undeformed positions (n, 3) [m]."""
     triangles: Index
-    """By their place in ``nodes`` (n_triangles, 3)."""
+    """Triangles as indices into ``nodes`` (n_triangles, 3)."""
 
     @property
     def mirrored(self) -> Index:
-        """Where the mirror image of each node is (n,)."""
+        """Index of the mirror image of each node (n,)."""
         image = self.points * np.array([-1.0, 1.0, 1.0])
         apart = np.linalg.norm(self.points[:, None] - image, axis=2)
         return np.asarray(apart.argmin(axis=0), dtype=np.int64)
 
 
 def surface_of(points: Array, rows: Sequence[Index]) -> ShapeSurface:
-    """A surface through rows of nodes.
+    """Triangulate a surface through rows of nodes.
 
     Args:
-        points: Of the mesh (n_nodes, 3) [m].
-        rows: Nodes from face to face, row after row.
+        points: Positions of the mesh nodes (n_nodes, 3) [m].
+        rows: Rows of nodes, each from face to face.
     """
     triangles = np.concatenate([_between(a, b) for a, b in pairwise(rows)])
     nodes, number = np.unique(triangles, return_inverse=True)
@@ -96,7 +96,7 @@ def _between(one: Index, other: Index) -> Index:
 
 
 def outline_rows(plane: SectorMesh) -> tuple[Index, Index]:
-    """Bore and outline of a plane section, clockwise face first."""
+    """Node rows of bore and outline of a 2D section, clockwise face first."""
     right = plane.flank_right[::-1]
     half = np.unique(np.r_[0 : len(right) : EVERY, len(right) - 1])
     left = plane.flank_left[::-1][half][::-1]
@@ -104,7 +104,7 @@ def outline_rows(plane: SectorMesh) -> tuple[Index, Index]:
 
 
 def plane_surface(model: RingModel) -> ShapeSurface:
-    """The section of the flexspline's tooth."""
+    """Displayed surface of a sector of the 2D flexspline."""
     mesh = model.element.mesh
     flat = np.asarray(mesh.mesh.p).T
     points = np.concatenate([flat, np.zeros((len(flat), 1))], axis=1)
@@ -112,14 +112,20 @@ def plane_surface(model: RingModel) -> ShapeSurface:
 
 
 def plane_fields(model: RingModel, state: State, surface: ShapeSurface) -> SectorFields:
-    """An equilibrium of the 2D model."""
+    """Fields of an equilibrium of the 2D model.
+
+    Args:
+        model: The ring.
+        state: The equilibrium.
+        surface: Displayed surface of a sector.
+    """
     element, frames = model.element, model.frames(state)
     size = len(element.displacement_from_skeleton)
     u = frames.displacement @ element.displacement_from_skeleton.reshape(2 * size, -1).T
     u += state.flank_force @ element.displacement_from_flank.reshape(2 * size, -1).T
     rest = np.asarray(element.mesh.mesh.p).T[surface.nodes]
     u = u.reshape(len(u), size, 2)[:, surface.nodes]
-    # from the frames of the sectors to those of the teeth where they stood
+    # from the sector frames to the frames of the turned, undeformed teeth
     back = frames.angle - model.place - state.rotation
     points = rotate(rest + u, back[:, None])
     pressed = np.einsum(
@@ -137,7 +143,7 @@ def plane_fields(model: RingModel, state: State, surface: ShapeSurface) -> Secto
 
 
 def _flat(values: Array) -> Array:
-    """Plane vectors as 3D vectors."""
+    """2D vectors as 3D vectors with z = 0."""
     return np.concatenate([values, np.zeros((*values.shape[:-1], 1))], axis=-1)
 
 
@@ -153,10 +159,10 @@ def drive_fields(
 
     Args:
         design: The drive.
-        states: By torque [N·m], over one pitch.
-        fields: Of one of them.
-        surface: What is shown of a sector.
-        symmetric: Whether the opposite torques are the mirror image.
+        states: Equilibria over one pitch, by torque [N·m].
+        fields: Function that returns the fields of an equilibrium.
+        surface: Displayed surface of a sector.
+        symmetric: Whether to add the opposite torques as mirror images.
     """
     teeth = design.drive.teeth_flexspline
     tables: dict[float, SectorFields] = {}
@@ -165,7 +171,7 @@ def drive_fields(
         phases = gcd(len(row), PHASES)
         used_states = row[:: len(row) // phases]
         kept = [fields(state) for state in used_states]
-        # a position farther on, a tooth's place has fallen by a part of a pitch
+        # from one position to the next the place of a tooth falls by pitch / phases
         fallen = 2.0 * pi / teeth * np.arange(phases) / phases
         at = [state.rotation - state.wave_generator_angle for state in used_states]
         place[torque] = float(np.mean(at + fallen))
@@ -197,7 +203,7 @@ _KEYS = ("displacement", "von_mises", "tooth_force", "wave_generator_force")
 
 
 def _by_place(phases: list[Array]) -> Array:
-    """Sectors of positions within a pitch, sorted by their place."""
+    """Interleave the sectors of all positions within a pitch, ordered by place."""
     n, count = len(phases), len(phases[0])
     table = np.empty((count * n, *phases[0].shape[1:]))
     for k, values in enumerate(phases):
@@ -206,7 +212,7 @@ def _by_place(phases: list[Array]) -> Array:
 
 
 def _mirrored(fields: SectorFields, surface: ShapeSurface) -> SectorFields:
-    """The same under the opposite torque, seen in a mirror."""
+    """Fields under the opposite torque, as the mirror image."""
     flip = np.array([-1.0, 1.0, 1.0])
 
     def back(values: Array) -> Array:

@@ -1,4 +1,4 @@
-"""One equilibrium of the drive, as the solver leaves it."""
+"""State of the drive at one equilibrium."""
 
 from __future__ import annotations
 
@@ -17,16 +17,17 @@ class StateFigures:
     """Results that equilibria of 2D and 3D models share."""
 
     wave_generator_angle: float = 0.0
-    """In the frame of the solver [rad]."""
+    """Wave-generator angle in the frame of the solver [rad]."""
     rotation: float = 0.0
-    """Best-fit rotation of the bore, in space of the bore of the diaphragm [rad]."""
+    """Best-fit rotation of the flexspline's bore [rad]; of the bore of the diaphragm in
+    a 3D model."""
     ring_rotation: float = 0.0
     """Rotation of the circular spline [rad]."""
     torque: float = 0.0
-    """Torque T that the output exerts on its load, whole drive [N·m]."""
+    """Torque T of the output on its load, whole drive [N·m]."""
     holding_torque: float = 0.0
-    """External torque on the flexspline, in space on the bore of its diaphragm, whole
-    drive [N·m]."""
+    """External torque on the flexspline, whole drive [N·m]; on the bore of its
+    diaphragm in a 3D model."""
     wave_generator_torque: float = 0.0
     """External torque on the wave generator, whole drive [N·m]."""
     tooth_moment: float = 0.0
@@ -34,44 +35,46 @@ class StateFigures:
     energy: float = 0.0
     """Strain energy, whole drive [J]."""
     compliance: float = 0.0
-    """Tangent -d(output rotation)/dT at the active contacts [rad/(N·m)], NaN where no
-    torque is prescribed."""
+    """Tangent compliance -d(output rotation)/dT at the active contacts [rad/(N·m)]; NaN
+    in a 3D model whose torque is not prescribed."""
     outcome: Outcome = Outcome.CONVERGED
     history: tuple[float, ...] = ()
-    """Largest displacement increment of every iteration [m]."""
+    """Largest displacement increment of each iteration [m]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class State(StateFigures):
-    """One equilibrium, or the start of the search for one. Global frame, SI."""
+    """One equilibrium, or the start of the search for one, in the global frame."""
 
     faces: Array
     """Positions of the first face of each sector (N, n_face, 2) [m]."""
     bores: Array
     """Positions of the bore nodes inside the sectors (N, n_bore, 2) [m]."""
     pressure: Array
-    """Normal force of the wave generator on the stations of the bore (N, q) [N], see
+    """Normal force of the wave generator at the stations of the bore (N, q) [N], see
     :mod:`swgjoint.fe.plane.bore_contact`."""
     touching: Mask
-    """Which of those stations touch."""
+    """Whether each of these stations touches (N, q)."""
     flank_force: Array
     """Tooth forces as nodal forces in the sector frames (N, 2 n_b) [N]."""
     ring_force: Array
-    """The same on the circular spline, in the frames of its teeth (N_c, 2 n_c) [N]."""
+    """Tooth forces on the circular spline as nodal forces in the frames of its teeth
+    (N_c, 2 n_c) [N]."""
     race: Array | None = None
-    """Nodes of the wave generator's outer race (N, m, 2, 2), see
-    :class:`swgjoint.fe.plane.race.PlaneRace` [m]; None for a rigid wave generator."""
+    """Coordinates of the wave generator's outer race (N, m, 2, 2) [m], see
+    :class:`swgjoint.fe.plane.race.PlaneRace`; None for a rigid wave generator."""
     ball_force: Array | None = None
-    """Force of the balls of the whole drive (balls,) [N]."""
+    """Forces of the balls of the whole drive (balls,) [N]; None without balls."""
     contacts: Contacts | None = None
-    """Points that carry force."""
+    """Contact points that carry force."""
     tooth_force: Array = field(default_factory=lambda: np.zeros(0))
-    """Normal force of every contact [N]. Shape (n_contacts,)."""
+    """Normal force at each contact (n_contacts,) [N]."""
     friction_force: Array = field(default_factory=lambda: np.zeros(0))
-    """Friction on the flexspline at every contact, tip to root [N]. (n_contacts,)."""
+    """Friction on the flexspline at each contact, from tip to root (n_contacts,) [N].
+    """
     slip: SlipHistory | None = None
     """Candidates and friction forces at the end of the step; None without friction."""
     candidates: SlipHistory | None = None
-    """The same of the running iteration; None at its end."""
+    """Candidates and friction forces of the current iteration; None after the last."""
     friction_work: float = 0.0
-    """Work of friction since the deflection, whole drive [J]."""
+    """Work dissipated by friction since the deflection, whole drive [J]."""

@@ -1,4 +1,4 @@
-"""Stress recovery at the nodes of all sectors."""
+"""Recovery of the nodal stresses of all sectors of the 2D model."""
 
 from __future__ import annotations
 
@@ -14,7 +14,15 @@ from swgjoint.typing import Array
 
 
 def flexspline_stress(model: RingModel, state: State) -> Array:
-    """Stress xx, yy, xy, zz at the nodes, sector frames (N, n_nodes, 4) [Pa]."""
+    """Nodal stresses of the flexspline.
+
+    Args:
+        model: The ring.
+        state: An equilibrium.
+
+    Returns:
+        Components xx, yy, xy, zz in the sector frames (N, n_nodes, 4) [Pa].
+    """
     frames = model.frames(state)
     return _nodal_stress(
         model.element, frames.deformation, state.flank_force, frames.angle
@@ -22,7 +30,16 @@ def flexspline_stress(model: RingModel, state: State) -> Array:
 
 
 def circular_spline_stress(model: RingModel, state: State) -> Array | None:
-    """The same in the frames of the circular spline's teeth; None if it is rigid."""
+    """Nodal stresses of the circular spline.
+
+    Args:
+        model: The ring.
+        state: An equilibrium.
+
+    Returns:
+        Components xx, yy, xy, zz in the frames of its teeth (N_c, n_nodes, 4) [Pa];
+        None for a rigid circular spline.
+    """
     compliance = model.circular_spline.compliance
     if compliance is None:
         return None
@@ -38,13 +55,13 @@ def circular_spline_stress(model: RingModel, state: State) -> Array | None:
 def _nodal_stress(
     element: Superelement, deformation: Array, flank_force: Array, angle: Array
 ) -> Array:
-    """Stress of every sector; nodes on the faces get the mean of their two sectors."""
+    """Stress of all sectors; nodes on a face get the mean of their two sectors."""
     nodes = len(element.stress_from_skeleton)
     stress = deformation @ element.stress_from_skeleton.reshape(nodes * 3, -1).T
     stress += flank_force @ element.stress_from_flank.reshape(nodes * 3, -1).T
     stress = stress.reshape(len(angle), nodes, 3)
     first, last = element.mesh.face_first, element.mesh.face_last
-    # angle of each sector's frame seen from the one before it
+    # angle from each sector's frame to the next one
     step = (np.roll(angle, -1) - angle)[:, None]
     after = np.roll(stress[:, first], -1, axis=0)
     mean = 0.5 * (stress[:, last] + turned_stress(after, step))
@@ -55,9 +72,12 @@ def _nodal_stress(
 
 
 def turned_stress(stress: Array, angle: Array) -> Array:
-    """Components in a frame from which the given one is turned by ``angle``.
+    """Transform stresses to a frame from which the given frame is turned by an angle.
 
-    What follows xx, yy and xy in the last axis, the axial stress, stays as it is.
+    Args:
+        stress: Components xx, yy, xy in the last axis [Pa]. Further components, the
+            axial stress, stay unchanged.
+        angle: Angle from the new frame to the given one, counter-clockwise [rad].
     """
     xx, yy, xy = stress[..., 0], stress[..., 1], stress[..., 2]
     middle, half = 0.5 * (xx + yy), 0.5 * (xx - yy)
@@ -69,11 +89,14 @@ def turned_stress(stress: Array, angle: Array) -> Array:
 
 @dataclass(frozen=True, kw_only=True)
 class StressMaxima:
-    """Largest nodal stresses of one member [Pa]; compression as a magnitude."""
+    """Largest nodal stresses of one member."""
 
     tensile: float
+    """Largest tensile stress [Pa]."""
     compressive: float
+    """Largest compressive stress as a magnitude [Pa]."""
     von_mises: float
+    """Largest von Mises stress [Pa]."""
 
     @classmethod
     def from_stress(cls, stress: Array) -> StressMaxima:
@@ -99,11 +122,16 @@ class MemberMaxima:
 
     flexspline: StressMaxima
     circular_spline: StressMaxima | None
-    """None while it is rigid."""
+    """Stresses of the circular spline; None if it is rigid."""
 
     @classmethod
     def from_state(cls, model: RingModel, state: State) -> MemberMaxima:
-        """Recover the stresses of a state."""
+        """Recover the largest stresses of a state.
+
+        Args:
+            model: The ring.
+            state: An equilibrium.
+        """
         ring = circular_spline_stress(model, state)
         return cls(
             flexspline=StressMaxima.from_stress(flexspline_stress(model, state)),

@@ -1,4 +1,4 @@
-"""Static condensation of one tooth sector to the nodes that a drive model needs."""
+"""Static condensation of one tooth sector to the nodes that the drive model uses."""
 
 from __future__ import annotations
 
@@ -24,64 +24,69 @@ from swgjoint.typing import Array, Index
 class Superelement:
     r"""Condensed sector, in the frame of its tooth (tooth centred on +y).
 
-    Skeleton nodes (a): first face, inner bore nodes, last face. Flank nodes (b): right
-    then left flank, without those on the faces. With the flanks loaded by forces F,
+    Skeleton nodes (a) are those of the first face, the inner bore and the last face.
+    Flank nodes (b) are those of the right and then the left flank, without those on the
+    faces. With forces F on the flanks,
 
     .. math:: d_b = A d_a + C F, \quad
         f_a = \hat K d_a - A^T F, \quad
         \sigma = M_a d_a + M_F F .
 
-    Vectors list x and y of node after node.
+    Vectors contain x and y of one node after the other.
     """
 
     sectors: int
+    """Number of sectors of the whole member."""
     skeleton: Array
-    """Reference positions of the skeleton nodes [m]. Shape (n_a, 2)."""
+    """Reference positions of the skeleton nodes (n_a, 2) [m]."""
     face_size: int
+    """Number of nodes of a face."""
     stiffness: Array
-    """K hat [N/m]. Shape (2 n_a, 2 n_a)."""
+    """Condensed stiffness K hat (2 n_a, 2 n_a) [N/m]."""
     flank_from_skeleton: Array
-    """A. Shape (2 n_b, 2 n_a)."""
+    """Flank displacement per skeleton displacement, A (2 n_b, 2 n_a) [-]."""
     flank_compliance: Array
-    """C [m/N]. Shape (2 n_b, 2 n_b)."""
+    """Flank displacement per flank force, C (2 n_b, 2 n_b) [m/N]."""
     stress_from_skeleton: Array
-    """M_a [Pa/m]. Shape (n_nodes, 3, 2 n_a)."""
+    """Stress per skeleton displacement, M_a (n_nodes, 3, 2 n_a) [Pa/m]."""
     stress_from_flank: Array
-    """M_F [Pa/N]. Shape (n_nodes, 3, 2 n_b)."""
+    """Stress per flank force, M_F (n_nodes, 3, 2 n_b) [Pa/N]."""
     displacement_from_skeleton: Array
-    """Of all nodes, like the stress [-]. Shape (n_nodes, 2, 2 n_a)."""
+    """Displacement of all nodes per skeleton displacement (n_nodes, 2, 2 n_a) [-]."""
     displacement_from_flank: Array
-    """[m/N]. Shape (n_nodes, 2, 2 n_b)."""
+    """Displacement of all nodes per flank force (n_nodes, 2, 2 n_b) [m/N]."""
     axial_stress: float = 0.0
-    """Axial stress over the sum of the normal stresses in the plane, c nu [-]; see
+    """Axial stress divided by the sum of the in-plane normal stresses, c nu [-]; see
     :func:`swgjoint.fe.plane.elasticity.in_plane_constants`."""
     mesh: SectorMesh
     profile: ToothProfile
     spline: CubicSpline
-    """Weights of the flank nodes in the displacement of a patch at an arc length."""
+    """Weights of the flank nodes in the mean displacement of a contact patch, as
+    functions of the arc length [m] of its centre."""
 
     @property
     def flank_size(self) -> int:
-        """Nodes of one flank."""
+        """Number of nodes of one flank."""
         return int(self.flank_compliance.shape[0]) // 4
 
     @property
     def bore_size(self) -> int:
-        """Bore nodes inside the sector, faces excluded."""
+        """Number of bore nodes inside the sector, without its corners."""
         return len(self.skeleton) - 2 * self.face_size
 
     @cached_property
     def rim_slopes(self) -> Array:
-        r"""Rows B of the rotations of the rim against the frame, at the bore.
+        r"""Rows B that give the rotations of the bore relative to the frame.
 
-        One row per interval between bore nodes, times the root of its length:
-        :math:`\int \omega^2 ds = d^T B^T B d` [m^(-1/2)]. Shape (n_bore + 1, 2 n_a).
+        There is one row per interval between bore nodes, scaled by the square root of
+        its length: :math:`\int \omega^2 ds = d^T B^T B d`.
+        Shape (n_bore + 1, 2 n_a) [m^(-1/2)].
         """
         size, count = self.face_size, len(self.skeleton)
         along = np.r_[size - 1 : size + self.bore_size, count - 1]
         chord = np.diff(self.skeleton[along], axis=0)
         length = np.hypot(chord[:, 0], chord[:, 1])
-        # rotation of a chord: its ends apart along its normal, over its length
+        # rotation of a chord: relative normal motion of its ends divided by its length
         row = np.stack([-chord[:, 1], chord[:, 0]], axis=-1) / length[:, None] ** 1.5
         rows, interval = np.zeros((len(chord), count, 2)), np.arange(len(chord))
         rows[interval, along[1:]] = row
@@ -90,7 +95,7 @@ class Superelement:
 
     @cached_property
     def elongation(self) -> Array:
-        """Uniform elongation of the sector by a unit of its bore's length (2 n_a,)."""
+        """Uniform elongation of the sector by one unit of its bore length (2 n_a,)."""
         size = self.face_size
         x = self.skeleton[:, 0]
         moved = np.zeros_like(self.skeleton)
@@ -99,7 +104,7 @@ class Superelement:
 
     @property
     def flank_range(self) -> tuple[float, float]:
-        """Arc length over which a flank can touch: between the lands [m]."""
+        """Arc lengths [m] between which a flank can touch: the ends of the lands."""
         low, high = self.profile.contact_range
         return max(low, float(self.spline.x[0])), min(high, float(self.spline.x[-1]))
 
@@ -113,15 +118,15 @@ def condense(
     width: float,
     confinement: float = 0.0,
 ) -> Superelement:
-    """Condense a sector mesh, in real arithmetic, once per member.
+    """Condense the mesh of a tooth sector.
 
     Args:
         mesh: Sector of one tooth.
-        profile: Its flank.
-        youngs_modulus: [Pa].
-        poisson_ratio: [-].
+        profile: Its tooth profile.
+        youngs_modulus: Young's modulus of the material [Pa].
+        poisson_ratio: Poisson's ratio of the material [-].
         width: Face width [m].
-        confinement: 0 in plane stress, 1 in plane strain [-].
+        confinement: Confinement [-]; 0 is plane stress, 1 plane strain.
     """
     basis = plane_basis(mesh.mesh)
     matrix = stiffness_matrix(basis, youngs_modulus, poisson_ratio, width, confinement)
@@ -161,8 +166,8 @@ def condense(
     operator = nodal_stress_operator(basis, youngs_modulus, poisson_ratio, confinement)
     from_a, from_flank = operator @ all_from_a, operator @ all_from_flank
     at_nodes = basis.nodal_dofs.T.ravel()
-    # sectors travel a thousand times farther than they strain: make rigid translation
-    # free of force and stress to the last digit, not only to the solver's
+    # sectors travel a thousand times farther than they strain: make rigid translations
+    # free of force and stress to machine precision, beyond that of the solver
     move = np.tile(np.eye(2), (len(skeleton), 1)) / np.sqrt(len(skeleton))
     strain = np.eye(n) - move @ move.T
     stiffness = strain @ stiffness @ strain

@@ -1,8 +1,8 @@
 """Closest points between the deformed flexspline flanks and the circular spline.
 
-Both flanks are smooth: analytic profiles that carry displacements interpolated by cubic
-splines and averaged over the patch of a contact. Facets would leak their chord error,
-about a micrometre, into a kinematic error that is itself a matter of micrometres.
+Both flanks are smooth: analytic profiles displaced by cubic splines that are averaged
+over the contact patch. Facets would add their chord error, about a micrometre, to a
+kinematic error of a few micrometres.
 """
 
 from __future__ import annotations
@@ -22,11 +22,15 @@ from swgjoint.gear.teeth.profile import ToothProfile
 from swgjoint.typing import Array, Index
 
 SAMPLES_PER_NODE = 2
+"""Gap samples per flank node of a fast search."""
 DENSE_SAMPLES = 8
+"""Gap samples per flank node of a thorough search."""
 REFINEMENTS = 6
+"""Most Newton iterations of the refinement of a contact point."""
 REFINED = 1e-12
-"""Change of the stations at which a refinement ends [m]."""
-MERGE = 1e-6  # of the flank: points closer than that are one contact
+"""Change of the arc lengths at which a refinement ends [m]."""
+MERGE = 1e-6
+"""Distance below which two points are one contact, as a fraction of the flank [-]."""
 
 
 _MIRROR = np.array([[1.0, 1.0], [-1.0, 1.0]])  # by side, into the right flank's frame
@@ -37,7 +41,7 @@ class Flanks(Protocol):
 
     @property
     def profile(self) -> ToothProfile:
-        """The right flank."""
+        """Profile of the right flank."""
 
     @property
     def spline(self) -> CubicSpline:
@@ -45,11 +49,11 @@ class Flanks(Protocol):
 
     @property
     def flank_size(self) -> int:
-        """Nodes of one flank."""
+        """Number of nodes of one flank."""
 
     @property
     def flank_range(self) -> tuple[float, float]:
-        """Arc length over which a flank can touch [m]."""
+        """Arc lengths between which a flank can touch [m]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -60,19 +64,21 @@ class ToothContact:
     circular_spline: CircularSpline
     ring_flank: Array
     """Displacement of the circular spline's flank nodes in the frames of its teeth,
-    manufacturing errors included, one row per tooth of the model; no columns if rigid
-    [m]. Shape (N_c, 2 n_c)."""
+    including manufacturing errors (N_c, 2 n_c) [m]; no columns if rigid."""
     angle: Array
-    """Angles of the sector frames against the circular spline (N,) [rad]."""
+    """Angles of the sector frames relative to the circular spline (N,) [rad]."""
     bearing: Array
-    """Polar angles of the teeth against the circular spline, which tell the tooth space
-    that they enter (N,) [rad]."""
+    """Polar angles of the teeth relative to the circular spline (N,) [rad]; they decide
+    which tooth space each tooth enters."""
     rubs: bool = False
-    """Whether the candidates need their rows along the flanks."""
+    """Whether the candidates need derivatives along the flanks, for friction."""
 
     @cached_property
     def _ring_flanks(self) -> FlankSplines | None:
-        """Displacements of the ring's flanks, mirrored; flank 2 tooth + side."""
+        """Displacements of the circular spline's flanks in their mirrored frames.
+
+        Flank 2 tooth + side; None for rigid flanks.
+        """
         ring = self.circular_spline
         if not ring.flank_dofs:
             return None
@@ -88,19 +94,22 @@ class ToothContact:
         *,
         thorough: bool = True,
     ) -> Contacts:
-        """Local minima of the gap along every flank, and the points that held before.
+        """Local minima of the gap along every flank, plus the points that carry force.
 
-        The gap must not be negative anywhere on a flank: a condition on a continuum.
-        Where flanks conform (straight on straight) its minimum jumps from end to end of
-        the contact, so points that carry force stay in the working set beside the new
+        The gap must not be negative anywhere on a flank, a condition on a continuum. On
+        conforming flanks (straight on straight) its minimum jumps from end to end of
+        the contact, so points that carry force stay in the working set next to the new
         minima (exchange method of semi-infinite programming).
 
         Args:
             flank: Displacement of the flank nodes in the sector frames (N, 2 n_b) [m].
-            reach: Candidates with a larger gap are left out [m].
-            held: Points of the last iteration that carry force.
-            thorough: Whether to look between the nodes with the displaced circular
+            reach: Largest gap of a candidate [m].
+            held: Points of the last iteration that carry force; None if there are none.
+            thorough: Whether to search between the nodes, with the displaced circular
                 spline; conforming flanks have minima less than a node apart.
+
+        Returns:
+            The candidates.
         """
         element = self.element
         size = element.flank_size
@@ -142,17 +151,19 @@ class ToothContact:
     def _sampled(
         self, per_node: int, sides: Array, sector: Index, side: Index, *, rigid: bool
     ) -> tuple[Array, Array, Index, Index]:
-        """Gaps at equal steps along those flanks that reach into the circular spline.
+        """Gaps at equal steps along the flanks that reach into the circular spline.
 
         Args:
             per_node: Samples per flank node.
-            sides: Displacements of the flanks in their mirrored frames (n, size, 2).
+            sides: Displacements of the flanks in their mirrored frames (n, size, 2)
+                [m].
             sector: Sector of each flank (n,).
             side: Side of each flank (n,).
-            rigid: Whether to leave the circular spline's own micrometres out.
+            rigid: Whether to neglect the displacement of the circular spline.
 
         Returns:
-            Stations (n_samples,), gaps (n_deep, n_samples), sectors and sides.
+            Arc lengths (n_samples,) [m], gaps (n_deep, n_samples) [m], sectors and
+            sides (n_deep,).
         """
         element = self.element
         s = np.linspace(*element.flank_range, per_node * element.flank_size)
@@ -186,25 +197,25 @@ class ToothContact:
         """Feet on the circular spline of points in the mirrored sector frames.
 
         Args:
-            points: On the displaced flanks (n, 2) [m].
-            outward: Normals of the flexspline there (n, 2).
+            points: Points on the displaced flanks (n, 2) [m].
+            outward: Outward normals of the flexspline there (n, 2).
             sector: Sector of each point (n,).
             side: Side of each point (n,).
-            rigid: Whether to leave the circular spline's own micrometres out.
-            start: Stations near the feet (n,) [m].
+            rigid: Whether to neglect the displacement of the circular spline.
+            start: Arc lengths near the feet (n,) [m].
             steps: Newton steps to the foot.
         """
         ring = self.circular_spline
         teeth = ring.profile.teeth
         pitch = 2.0 * pi / teeth
         sign = np.where(side == 0, 1.0, -1.0)
-        # mirrored global frame: the tooth stands at sign * angle; a right flank faces
-        # the left flank of the next ring tooth clockwise, half a pitch from the space
+        # mirrored global frame: the tooth is at sign * angle; a right flank faces the
+        # left flank of the next ring tooth clockwise, half a pitch from the space
         space = np.round(sign * self.bearing[sector] / pitch)
         turn = sign * self.angle[sector] - (space - 0.5) * pitch
         seen = rotate(points, turn) * _MIRROR[1]
         facing = rotate(outward, turn) * _MIRROR[1]
-        # ring tooth j stands half a pitch counter-clockwise from space j
+        # ring tooth j is half a pitch counter-clockwise from space j
         tooth = np.where(side == 0, space - 1, -space).astype(np.int64)
         tooth %= len(self.ring_flank)
         flanks = None if rigid else self._ring_flanks
@@ -224,7 +235,7 @@ class ToothContact:
         )
 
     def _displaced(self, s: Array, mirrored: Array) -> tuple[Array, Array, Array]:
-        """Points of displaced flanks, their tangents from tip to root, curvatures."""
+        """Points of displaced flanks, tangents from tip to root, profile curvatures."""
         element = self.element
         base, outward, curvature = element.profile.evaluate(s)
         point = base + np.einsum("ks,ksi->ki", element.spline(s), mirrored)
@@ -241,7 +252,18 @@ class ToothContact:
         side: Index,
         spacing: float,
     ) -> Array:
-        """Newton's method on the slope of the gap along the flank."""
+        """Refine minima by Newton's method on the slope of the gap along the flank.
+
+        Args:
+            station: Arc lengths near the minima (n,) [m].
+            mirrored: Displacements of the flanks in mirrored frames (n, size, 2) [m].
+            sector: Sector of each point (n,).
+            side: Side of each point (n,).
+            spacing: Distance of the samples, half the width of the brackets [m].
+
+        Returns:
+            Arc lengths of the minima (n,) [m].
+        """
         element = self.element
         low, high = element.flank_range
         low_s = np.maximum(station - spacing, low)
@@ -266,7 +288,7 @@ class ToothContact:
                 slope = np.where(corner, beside, slope)
                 depth = np.einsum("ki,ki->k", seen.rest, seen.normal)
                 relative = np.where(corner, 1.0 + curvature * depth, relative)
-            # the bracket holds the minimum: shrink it, and stay inside
+            # shrink the bracket around the minimum and stay inside
             high_s = np.where(slope > 0.0, s, high_s)
             low_s = np.where(slope <= 0.0, s, low_s)
             newton = s - slope / np.where(np.abs(relative) > 1e-3, relative, 1e-3)
@@ -284,6 +306,7 @@ class ToothContact:
         flank: Array,
         reach: float,
     ) -> Contacts:
+        """Candidates with all their derivatives at given points of the flanks."""
         element = self.element
         size = element.flank_size
         n = len(sector)
@@ -296,7 +319,7 @@ class ToothContact:
         normal = seen.normal * mirror
         # in the mirrored frame the flexspline's normal is -n: its tangent is J n
         tangent = np.stack([-seen.normal[:, 1], seen.normal[:, 0]], axis=-1) * mirror
-        # the mirror between a flank and the one that it faces turns tangents over
+        # the mirror between a flank and the one that it faces reverses tangents
         facing, out = _MIRROR[1 - side], seen.feet.normal
         ring_normal = out * facing
         ring_tangent = np.stack([out[:, 1], -out[:, 0]], axis=-1) * facing
@@ -305,7 +328,7 @@ class ToothContact:
         if seen.feet.station is not None:
             ring_spline = self.circular_spline.spline(seen.feet.station)
             slip = station + seen.feet.station
-        found = Contacts(
+        contacts = Contacts(
             sector=sector,
             side=side,
             station=station,
@@ -322,28 +345,30 @@ class ToothContact:
             else none,
             slip=slip,
         )
-        return found.chosen(np.flatnonzero(found.gap < reach))
+        return contacts.chosen(np.flatnonzero(contacts.gap < reach))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Seen:
-    """Feet of points, with their normals back in the mirrored sector frames."""
+    """Feet of points, with vectors transformed back to the mirrored sector frames."""
 
     feet: Feet
     normal: Array
+    """Normals of the circular spline (n, 2)."""
     rest: Array
-    """From a corner to the point (n, 2) [m]."""
+    """Vectors from a corner to the point (n, 2) [m]."""
     tooth: Index
+    """Teeth of the circular spline (n,)."""
 
 
 def _outward(tangent: Array) -> Array:
-    """Unit normals out of the flexspline, tangents from tip to root."""
+    """Unit normals out of the flexspline from tangents from tip to root (n, 2)."""
     size = np.hypot(tangent[:, 0], tangent[:, 1])
     return np.asarray(np.stack([-tangent[:, 1], tangent[:, 0]], -1) / size[:, None])
 
 
 def _on_flank(side: Index, spline: Array, direction: Array) -> Array:
-    """Rows over both flanks of a tooth (n, 4 n_nodes) that act on one of them."""
+    """Rows over both flanks of a tooth (n, 4 n_nodes), nonzero on one of them."""
     n, nodes = spline.shape
     rows = np.zeros((n, 2, nodes, 2))
     rows[np.arange(n), side] = spline[:, :, None] * direction[:, None, :]

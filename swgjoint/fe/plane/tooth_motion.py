@@ -1,9 +1,9 @@
-"""Motion of the teeth as the finite elements find it, for conjugate profiles.
+"""Motion of the teeth by finite elements, for conjugate profiles.
 
 The neutral line of :mod:`swgjoint.gear.teeth.neutral_line` follows the wave generator
-and does not stretch; a real rim also bends between its teeth, lifts where nothing
-carries it and holds some tension. Here every tooth goes where its flanks go when the
-wave generator deflects the flexspline.
+and does not stretch. A real rim also bends between its teeth, lifts off where it is not
+supported and carries some tension. Here every tooth follows the rigid-body motion of
+its flanks when the wave generator deflects the flexspline.
 """
 
 from __future__ import annotations
@@ -32,28 +32,32 @@ from swgjoint.units import mm
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DeflectedRim:
-    """Poses of the teeth on a deflected rim, smooth between the teeth."""
+    """Poses of the teeth on a deflected rim, interpolated smoothly between teeth."""
 
     lobes: int
+    """Number of lobes of the wave generator."""
     radius: float
-    """Radius of the point of the tooth that is followed [m]."""
+    """Radius of the reference point of a tooth [m]."""
     place: Array
     """Angles of the teeth on the undeflected rim, from a lobe (n + 1,) [rad]; the last
-    is the first again, a period later."""
+    entry is the first one a period later."""
     moved: Array
-    """Tangential and radial displacement of that point [m] and rotation of the tooth
-    [rad], in the frame of its place (n + 1, 3)."""
+    """Tangential and radial displacement of the reference point [m] and rotation of the
+    tooth [rad], in the frame of its undeflected place (n + 1, 3)."""
 
     @cached_property
     def _spline(self) -> CubicSpline:
         return CubicSpline(self.place, self.moved, bc_type="periodic")
 
     def pose(self, theta: ArrayLike) -> Pose:
-        """Pose of a tooth at the rim angle theta, frame of the wave generator.
+        """Pose of a tooth at rim angles theta, in the frame of the wave generator.
 
         Args:
             theta: Angles of the undeflected rim from a lobe, counter-clockwise (n,)
                 [rad].
+
+        Returns:
+            Positions [m], angles [rad] and their derivatives by theta.
         """
         theta = np.asarray(theta, dtype=float)
         value, slope = self._spline(theta), self._spline(theta, 1)
@@ -70,7 +74,7 @@ class DeflectedRim:
 
 
 def deflected_rim(design: Design) -> DeflectedRim:
-    """Deflect the flexspline and follow its teeth, each by its flanks.
+    """Deflect the flexspline and determine the motion of each tooth from its flanks.
 
     Raises:
         DesignError: If the design cannot be built.
@@ -116,7 +120,11 @@ def deflected_rim(design: Design) -> DeflectedRim:
 
 
 def conjugate_by_fe(design: Design, member: MemberName) -> ToothProfile:
-    """Profile of ``member`` conjugate to the other one under the true motion.
+    """Profile of a member conjugate to the other one under the motion of the teeth.
+
+    Args:
+        design: The drive.
+        member: Member whose profile is wanted.
 
     Raises:
         DesignError: If there is no such tooth, in one line that names the key.
@@ -124,5 +132,5 @@ def conjugate_by_fe(design: Design, member: MemberName) -> ToothProfile:
     """
     motions = tooth_motions(design, line=deflected_rim(design))
     other = "circular_spline" if member == "flexspline" else "flexspline"
-    given = tooth_profile(design, other)
-    return conjugate_profile(design, member, given, motions=motions)
+    generating = tooth_profile(design, other)
+    return conjugate_profile(design, member, generating, motions=motions)
