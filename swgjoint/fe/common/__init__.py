@@ -1,1 +1,1 @@
-"""What the 2D and 3D models share: contact, linear algebra, load paths, sampling."""
+"""Common parts of the 2D and 3D models: contact, algebra, load paths, sampling."""

@@ -1,4 +1,4 @@
-"""Columns of equilibria at one input angle each: how they are solved and kept."""
+"""Columns of equilibria at one input angle each: solution and storage."""
 
 from __future__ import annotations
 
@@ -24,31 +24,33 @@ _SOLVE, _STATE = "solve-{:04d}", "state"
 
 @dataclass(kw_only=True, eq=False)
 class AngleColumn(Generic[AnyState]):
-    """Equilibria at one angle."""
+    """Equilibria at one input angle."""
 
     theta: float
+    """Input angle [rad]."""
     rest: Unloaded[AnyState]
+    """Equilibrium without torque."""
     states: dict[float, AnyState] = field(default_factory=dict)
-    """By torque, that without torque excluded."""
+    """Equilibria by nonzero torque [N·m]."""
     failed: set[float] = field(default_factory=set)
-    """Torques that were tried in vain."""
+    """Torques whose solve failed [N·m]."""
     changes: dict[tuple[float, float], ContactChanges | None] = field(
         default_factory=dict
     )
-    """Changes of contact that an equilibrium predicts, by its torque and the sign."""
+    """Contact changes that an equilibrium predicts, by its torque and the sign."""
     paths: dict[float, tuple[LoadPath, tuple[Array, Array]]] = field(
         default_factory=dict
     )
-    """The last curve of each sign, see :meth:`ColumnGrid.path`."""
+    """Latest curve of each sign, see :meth:`ColumnGrid.path`."""
 
     def start_towards(self, torque: float) -> AnyState:
-        """Where a torque of this sign begins."""
+        """State at which loading by a torque of this sign starts."""
         if self.rest.sides is None:
             return self.rest.state
         return self.rest.sides[0 if torque > 0.0 else 1]
 
     def nearest(self, torque: float) -> AnyState:
-        """The equilibrium of the same sign at the nearest torque."""
+        """The equilibrium at the nearest torque of the same sign."""
         near = {t: s for t, s in self.states.items() if t * torque > 0.0}
         near[0.0] = self.start_towards(torque)
         return near[min(near, key=lambda t: abs(t - torque))]
@@ -56,30 +58,40 @@ class AngleColumn(Generic[AnyState]):
 
 @dataclass(kw_only=True, eq=False)
 class SolvedColumns(Generic[AnyState]):
-    """Columns of equilibria at neighbouring angles, solved in turn and kept.
+    """Columns of equilibria at neighbouring angles, solved in sequence and stored.
 
-    Angles are numbers on the finest grid of the pitch. All solves come in an order that
-    the results alone decide: an interrupted run repeats it and reads what it has.
+    Angles are identified by their index on the finest grid of the pitch. The order of
+    all solves depends on the results only, so that an interrupted run repeats it and
+    reads the stored results.
     """
 
     follow: Follower[AnyState]
+    """The drive."""
     period: float
+    """Period of the pattern in the input angle [rad]."""
     finest: int
+    """Number of angles of the finest grid."""
     levels: list[float]
-    """Torques of every column; those that fail, and those beyond, are taken out."""
+    """Torques of every column [N·m]; torques that fail, and larger ones of the same
+    sign, are removed."""
     small: float
+    """Torque that takes up a clearance [N·m]."""
     tick: Callable[[], None]
+    """Called after every solve."""
     keep: Unfinished | None
+    """Store of solved equilibria; None stores none."""
     columns: dict[float, AngleColumn[AnyState]] = field(default_factory=dict)
+    """Columns by the index of their angle."""
     failed: list[float] = field(default_factory=list)
-    """Torques between the levels that were tried in vain."""
+    """Torques between the levels whose solves failed [N·m]."""
     beyond: list[float] = field(default_factory=list)
-    """Torques of every column beyond the levels, at most one of each sign."""
+    """Torques of every column beyond the levels, at most one of each sign [N·m]."""
     solves: int = 0
+    """Number of counted solves."""
     tried: int = 0
-    """Solves and those that failed."""
+    """Number of all attempted solves, which numbers the stored results."""
     like: AnyState | None = None
-    """The first state; an interrupted run holds none of another shape."""
+    """First state; stored states of another type or shape are rejected."""
 
     @property
     def free(self) -> bool:
@@ -88,42 +100,47 @@ class SolvedColumns(Generic[AnyState]):
 
     @property
     def signs(self) -> list[float]:
-        """Signs of the torques."""
+        """Signs of the torque levels, 1.0 and -1.0 or one of them."""
         return [s for s in (1.0, -1.0) if any(t * s > 0.0 for t in self.levels)]
 
     def angles(self, count: int) -> Array:
-        """Input positions of so many columns (count,) [rad]."""
+        """Input angles of ``count`` equally spaced columns (count,) [rad]."""
         return self.period * np.arange(count) / count
 
     def chosen(self, count: int) -> Iterator[tuple[int, AngleColumn[AnyState]]]:
-        """So many columns, equally spaced, with their numbers."""
+        """Iterate over ``count`` equally spaced columns with their numbers."""
         for k in range(count):
             yield k, self.columns[k * (self.finest // count)]
 
     def states(
         self, count: int, torques: Iterable[float]
     ) -> dict[float, list[AnyState]]:
-        """Without torque, and at those of some torques that all columns have."""
+        """Equilibria by torque, without torque and at levels that all columns have.
+
+        Args:
+            count: Number of equally spaced columns.
+            torques: Torques of interest [N·m]; those that are no levels are ignored.
+        """
         columns = [column for _, column in self.chosen(count)]
-        found = {0.0: [one.rest.state for one in columns]}
+        rest = {0.0: [one.rest.state for one in columns]}
         levels = [t for t in torques if t in self.levels]
-        return found | {t: [one.states[t] for one in columns] for t in levels}
+        return rest | {t: [one.states[t] for one in columns] for t in levels}
 
     # -- solving -----------------------------------------------------------------------
 
     def solve_columns(self, count: int) -> None:
-        """Make sure of so many columns, equally spaced."""
+        """Solve the missing ones of ``count`` equally spaced columns."""
         step = self.finest // count
         for place in range(0, self.finest, step):
             if place not in self.columns:
                 self.columns[place] = self._column(place)
 
     def unseen_column(self, place: float) -> AngleColumn[AnyState]:
-        """A column between those of the samples; it is none of them."""
+        """Solve a column between those of the samples without adding it to them."""
         return self._column(place)
 
     def _column(self, place: float) -> AngleColumn[AnyState]:
-        """Rest and the common torques, from the column before, if there is one."""
+        """Solve a column at all levels, starting from the column before if any."""
         theta = self.period * place / self.finest
         before = max((p for p in self.columns if p < place), default=None)
         if before is None:
@@ -137,7 +154,7 @@ class SolvedColumns(Generic[AnyState]):
         return column
 
     def _first(self) -> AngleColumn[AnyState]:
-        """Load the first position from zero torque outwards until a solve fails."""
+        """Load the first column from zero torque outwards until a solve fails."""
 
         def unloaded() -> Unloaded[AnyState]:
             state = self.follow.engage(self.follow.deflect())
@@ -149,19 +166,19 @@ class SolvedColumns(Generic[AnyState]):
         for sign in (1.0, -1.0):
             state = column.start_towards(sign)
             for torque in sorted((t for t in self.levels if t * sign > 0.0), key=abs):
-                found = self.solve_at(
+                loaded = self.solve_at(
                     0.0, torque, partial(self.follow.to_torque, state, torque)
                 )
-                if found is None:
+                if loaded is None:
                     break
-                column.states[torque] = state = found
+                column.states[torque] = state = loaded
                 self.count()
         return column
 
     def _beside(
         self, before: AngleColumn[AnyState], theta: float
     ) -> AngleColumn[AnyState]:
-        """The same torques a step on; none beyond one that fails."""
+        """Solve the same torques one angle on, up to the first that fails."""
         column = self._rest(
             theta, partial(self.follow.turn_unloaded, before.rest, theta)
         )
@@ -187,6 +204,8 @@ class SolvedColumns(Generic[AnyState]):
     def _rest(
         self, theta: float, solve: Callable[[], Unloaded[AnyState]]
     ) -> AngleColumn[AnyState]:
+        """Start a column with its equilibrium without torque."""
+
         def sound() -> Unloaded[AnyState]:
             unloaded = solve()
             if not unloaded.state.outcome.ok:
@@ -204,10 +223,10 @@ class SolvedColumns(Generic[AnyState]):
         torques: list[float],
         beside: Sequence[AngleColumn[AnyState]] = (),
     ) -> None:
-        """Solve other torques of a column, each from the nearest equilibrium.
+        """Solve other torques of a column, each from a nearby equilibrium.
 
-        That is one at the same torque in a column beside, from which it takes half the
-        iterations, or else one at the same angle.
+        The start is the equilibrium at the same torque in a neighbouring column, which
+        halves the iterations, or else the nearest one at the same angle.
         """
         for torque in sorted(torques, key=lambda t: (t < 0.0, abs(t))):
             there = [one.states[torque] for one in beside if torque in one.states]
@@ -224,7 +243,7 @@ class SolvedColumns(Generic[AnyState]):
             self.count()
 
     def count(self) -> None:
-        """One more solve is done."""
+        """Count one more solve and report it."""
         self.solves += 1
         self.tick()
 
@@ -233,7 +252,16 @@ class SolvedColumns(Generic[AnyState]):
     def solve_at(
         self, theta: float, torque: float, solve: Callable[[], AnyState]
     ) -> AnyState | None:
-        """An equilibrium, solved now or before an interruption; None if that fails."""
+        """An equilibrium, solved now or read from the store of an interrupted run.
+
+        Args:
+            theta: Input angle [rad].
+            torque: Output torque [N·m].
+            solve: Function that solves for it.
+
+        Returns:
+            The equilibrium; None if the solve failed.
+        """
 
         def sound() -> AnyState | None:
             state = solve()
@@ -242,41 +270,50 @@ class SolvedColumns(Generic[AnyState]):
         return self._recalled(theta, torque, sound)
 
     def _recalled(self, theta: float, torque: float, solve: Callable[[], T]) -> T:
-        """What is solved, or was by an interrupted run; a failure is kept, too."""
+        """Result of a solve or of its failure, from the store if it has one."""
         name, self.tried = _SOLVE.format(self.tried), self.tried + 1
         if self.keep is not None:
-            there = self.keep.read(name, partial(self._taken, theta, torque))
-            if there is not None:
-                return cast(T, there[0])
-        found = copy_contiguous(solve())
+            stored = self.keep.read(name, partial(self._taken, theta, torque))
+            if stored is not None:
+                return cast(T, stored[0])
+        result = copy_contiguous(solve())
         if self.keep is not None:
             at = {"theta": theta, "torque": torque}
-            self.keep.write(name, at | pack(found, _STATE))
-        return found
+            self.keep.write(name, at | pack(result, _STATE))
+        return result
 
     def _taken(
         self, theta: float, torque: float, arrays: Mapping[str, Any]
     ) -> tuple[Unloaded[AnyState] | AnyState | None]:
-        """An equilibrium from its arrays.
+        """A stored equilibrium from its arrays.
 
         Raises:
-            ValueError: If it does not follow those before.
+            ValueError: If it is not the equilibrium that comes next.
         """
         if (float(arrays["theta"]), float(arrays["torque"])) != (theta, torque):
-            raise ValueError("an equilibrium at another angle or torque")
-        found: Any = unpack(arrays, _STATE)
-        if isinstance(found, Unloaded) != (torque == 0.0):
-            raise ValueError("no equilibrium of this torque")
-        states = [found] if torque else [found.state, *(found.sides or ())]
+            raise ValueError("stored equilibrium has another angle or torque")
+        stored: Any = unpack(arrays, _STATE)
+        if isinstance(stored, Unloaded) != (torque == 0.0):
+            raise ValueError("stored equilibrium has another torque")
+        states = [stored] if torque else [stored.state, *(stored.sides or ())]
         for state in states:
             if state is not None:
                 _check_like(state, self.like)
-        return (found,)
+        return (stored,)
 
     # -- figures -----------------------------------------------------------------------
 
     def figures(self, state: AnyState, theta: float) -> Array:
-        """Output error, energy, compliance, input torque (4,)."""
+        """Figures of an equilibrium that enter the tables.
+
+        Args:
+            state: The equilibrium.
+            theta: Its input angle [rad].
+
+        Returns:
+            Output error [rad], energy [J], compliance [rad/(N·m)] and input torque
+            [N·m] (4,).
+        """
         follow = self.follow
         error = follow.output_angle(state) - theta / follow.ratio
         return np.array(
@@ -285,16 +322,17 @@ class SolvedColumns(Generic[AnyState]):
 
 
 def _check_like(state: Any, like: Any) -> None:
-    """Refuse a state that is not an equilibrium of the same model."""
+    """Reject a stored state that is not an equilibrium of the same model."""
     if like is not None and (
         type(state) is not type(like) or state.faces.shape != like.faces.shape
     ):
-        raise ValueError("a state of another model")
+        raise ValueError("stored state belongs to another model")
     if not np.isfinite(state.faces).all():
-        raise ValueError("positions that are not finite")
+        raise ValueError("stored positions are not finite")
 
 
 def _no_rest(theta: float, state: AnyState) -> ComputationError:
+    """Error for an input angle at which the unloaded drive cannot be solved."""
     return ComputationError(
         f"no equilibrium without torque at input angle {theta:g} rad:"
         f" {state.outcome.value}"

@@ -1,4 +1,4 @@
-"""Compliance of the teeth of a ring: blocks that depend on the offset of the teeth."""
+"""Block-circulant compliance of the teeth of a ring: one block per tooth offset."""
 
 from __future__ import annotations
 
@@ -8,12 +8,16 @@ from swgjoint.typing import Array, Index
 
 
 def respond(offsets: Index, blocks: Array, force: Array) -> Array:
-    """Displacement of all teeth (N, n_rows) [m].
+    """Displacement of all teeth under forces on their flanks.
 
     Args:
-        offsets: k - j of the responding and the loaded tooth (n_offsets,).
+        offsets: Offsets k - j of the responding tooth k from the loaded tooth j
+            (n_offsets,).
         blocks: Response in the frames of the teeth (n_offsets, n_rows, n_b) [m/N].
-        force: On the flanks of every tooth (N, n_b) [N].
+        force: Forces on the flanks of every tooth (N, n_b) [N].
+
+    Returns:
+        Displacements (N, n_rows) [m].
     """
     result = np.zeros((len(force), blocks.shape[1]))
     loaded = np.flatnonzero(force.any(axis=1))
@@ -25,20 +29,23 @@ def respond(offsets: Index, blocks: Array, force: Array) -> Array:
 def contact_compliance(
     offsets: Index, blocks: Array, tooth: Index, weight: Array, teeth: int
 ) -> Array:
-    """Compliance between contact points (n, n) [m/N].
+    """Compliance between contact points.
 
     Args:
-        offsets: As in :func:`respond`.
-        blocks: Of the flanks (n_offsets, n_b, n_b) [m/N].
+        offsets: Offsets of the teeth as in :func:`respond` (n_offsets,).
+        blocks: Response of the flanks (n_offsets, n_b, n_b) [m/N].
         tooth: Tooth of each point (n,).
         weight: Derivative of its gap by the flank displacement (n, n_b).
-        teeth: Teeth in the model.
+        teeth: Number of teeth in the model.
+
+    Returns:
+        Matrix (n, n) [m/N].
     """
     apart = (tooth[:, None] - tooth[None, :]) % teeth
     result = np.zeros((len(tooth), len(tooth)))
     for offset, block in zip(offsets, blocks, strict=True):
         i, j = np.nonzero(apart == offset % teeth)
         if i.size:
-            # few pairs are that far apart: no products of all points
+            # few pairs have this offset: multiply only those
             result[i, j] += np.einsum("kb,kb->k", weight[i] @ block, weight[j])
     return result

@@ -1,4 +1,4 @@
-"""Rows of a map across a clearance that leaves the output free without torque."""
+"""Rows of a map across a clearance in which the output is free without torque."""
 
 from __future__ import annotations
 
@@ -7,27 +7,29 @@ import numpy as np
 from swgjoint.typing import Array
 
 FAINT = 1e-8
-"""Part of the torque that takes up a clearance, that acts at its ends: no stiffness is
-zero."""
+"""Torque at the ends of a clearance as a fraction of the torque that takes it up [-];
+it is not zero, so that no stiffness is zero."""
 
 
 def across_clearance(
     rest: Array, taken_up: Array, torque: float
 ) -> tuple[float, Array]:
-    r"""Where the teeth begin to hold an output that is free without torque.
+    r"""Point at which the teeth begin to hold an output that is free without torque.
 
-    From the middle of the clearance the torque rises to the :data:`FAINT` part of the
-    one that takes it up; there the stiffness begins to grow, to K under that torque at
-    :math:`\ell = 3 T / 2 K`. A linear spring would begin at T/K with the energy
-    :math:`T^2 / 2 K`; a stiffness that grows steadily stores nearly that on this way.
+    From the middle of the clearance the torque rises to the fraction :data:`FAINT` of
+    the torque T that takes up the clearance. There the stiffness begins to grow; it
+    reaches K under T after a further rotation :math:`\ell = 3 T / 2 K`. A linear spring
+    would begin T/K before and store the energy :math:`T^2 / 2 K`; the growing stiffness
+    stores nearly the same energy over :math:`\ell`.
 
     Args:
         rest: Output error, energy, compliance and input torque in the middle (4, n).
-        taken_up: The same under ``torque`` (4, n).
-        torque: A small one [N·m].
+        taken_up: Output error, energy, compliance and input torque under ``torque``
+            (4, n).
+        torque: Small torque T that takes up the clearance [N·m].
 
     Returns:
-        Torque [N·m] and table (4, n) of the begin.
+        Torque [N·m] and table (4, n) of that point.
     """
     begin = FAINT * torque
     apart = taken_up[0] - rest[0]  # against the sign of the torque

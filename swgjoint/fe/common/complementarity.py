@@ -10,7 +10,7 @@ from swgjoint.typing import Array, Mask
 
 
 class ActiveSetError(ArithmeticError):
-    """No active set was found, or the system of the active set is singular."""
+    """No active set was found, or the system of an active set is singular."""
 
     def __init__(
         self, message: str, outcome: Outcome = Outcome.ACTIVE_SET_CYCLES
@@ -26,24 +26,24 @@ def solve_mixed(
 
     .. math:: 0 \le z_i \perp g_i \ge 0 \quad (i < m), \qquad g_i = 0 \quad (i \ge m)
 
-    Primal-dual active set, a handful of small solves; where it cycles (nearly equal
+    A primal-dual active-set method needs a few small solves. If it cycles (nearly equal
     contact points), the free unknowns are eliminated and the rest is solved as a
     non-negative least-squares problem.
 
     Args:
-        matrix: M, symmetric, positive definite after elimination of the free unknowns.
-            Shape (n, n).
-        offset: q. Shape (n,).
-        inequalities: m.
-        multipliers: How many of the last unknowns are multipliers of equations; the
-            other free ones are displacements, whose diagonal is negative or vanishes.
-        start: Guess of the active set, booleans (m,).
+        matrix: Matrix M (n, n), symmetric, positive definite after elimination of the
+            free unknowns.
+        offset: Offset q (n,).
+        inequalities: Number m of unilateral unknowns.
+        multipliers: Number of the last unknowns that are multipliers of equations; the
+            other free unknowns have a negative or zero diagonal.
+        start: Guess of the active set (m,).
 
     Returns:
-        z (n,) and the active set (m,).
+        Solution z (n,) and active set (m,).
 
     Raises:
-        ActiveSetError: If no set is found or the matrix is singular.
+        ActiveSetError: If no active set is found or its system is singular.
 
     >>> import numpy as np
     >>> M, q = np.array([[2.0, 0.0], [0.0, 1.0]]), np.array([-1.0, 3.0])
@@ -75,6 +75,7 @@ def solve_mixed(
 
 
 def _solve_active(matrix: Array, offset: Array, active: Mask) -> Array:
+    """Solution z (n,) with the unilateral unknowns outside the active set zero."""
     n, m = len(offset), len(active)
     index = np.concatenate([np.flatnonzero(active), np.arange(m, n)])
     z = np.zeros(n)
@@ -87,9 +88,9 @@ def _solve_active(matrix: Array, offset: Array, active: Mask) -> Array:
 
 
 def _least_squares(matrix: Array, offset: Array, m: int, multipliers: int) -> Mask:
-    """Active set of a minimum of z.Mz/2 + q.z under z >= 0.
+    """Active set of a minimum of z.Mz/2 + q.z subject to z >= 0.
 
-    Multipliers are eliminated; a free displacement becomes a weighted equation.
+    Multipliers are eliminated; the other free unknowns become weighted equations.
     """
     reduced, q = matrix, offset
     for k in range(len(offset) - 1, len(offset) - 1 - multipliers, -1):

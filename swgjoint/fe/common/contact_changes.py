@@ -1,4 +1,4 @@
-"""Changes of contact over the torque, as a drive linearised at one state predicts."""
+"""Contact changes over the torque, as predicted by a drive linearised at one state."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from swgjoint.arrays import frozen_array
 from swgjoint.typing import Array, Index
 
 LONE = 0.3
-"""Uncertainty of the place of a step that only one end predicts, as part of the
-interval."""
+"""Uncertainty of the place of a step that only one end predicts, as a fraction of the
+interval [-]."""
 FITS = 3
-"""Linearisations of a fit."""
+"""Number of linearisations in a fit."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -21,11 +21,12 @@ class ContactChanges:
     """Torques at which contacts open or close, and the compliance between them."""
 
     torque: Array
-    """Increasing [N·m]. Shape (k,)."""
+    """Torques of the changes, increasing (k,) [N·m]."""
     contact: Index
-    """Number of the contact that changes, the same in predictions at other states."""
+    """Number of the contact that changes, the same for predictions at all states (k,).
+    """
     compliance: Array
-    """Before, between and after the changes [rad/(N·m)]. Shape (k + 1,)."""
+    """Compliance before, between and after the changes (k + 1,) [rad/(N·m)]."""
 
     def __post_init__(self) -> None:
         torque = frozen_array(self.torque, "torque [N·m]", ndim=1)
@@ -37,7 +38,7 @@ class ContactChanges:
         object.__setattr__(self, "compliance", compliance)
 
     def mirror(self) -> ContactChanges:
-        """Those of the mirrored drive, under the opposite torque."""
+        """Changes of the mirrored drive, under the opposite torque."""
         return ContactChanges(
             torque=-self.torque[::-1],
             contact=self.contact[::-1],
@@ -45,7 +46,12 @@ class ContactChanges:
         )
 
     def steps_between(self, low: float, high: float) -> Steps:
-        """Steps of the compliance in a range of the torque, as parts of its length."""
+        """Steps of the compliance within a torque range, scaled to length 1.
+
+        Args:
+            low: Lower end of the range [N·m].
+            high: Upper end of the range [N·m].
+        """
         inside = (self.torque > low) & (self.torque < high)
         return Steps(
             place=(self.torque[inside] - low) / (high - low),
@@ -60,18 +66,24 @@ class Steps:
     """Steps of the compliance in an interval of length 1."""
 
     place: Array
+    """Places of the steps, in [0, 1] (n,)."""
     jump: Array
-    """[rad/(N·m)]."""
+    """Jumps of the compliance (n,) [rad/(N·m)]."""
     contact: Index
+    """Number of the contact that changes (n,)."""
     doubt: Array
-    """Uncertainty of the places."""
+    """Uncertainties of the places, as fractions of the interval (n,)."""
 
     @classmethod
     def merge(cls, first: Steps, last: Steps) -> Steps:
-        """From predictions at both ends, which err by the square of the distance.
+        """Merge predictions at both ends, whose errors grow with distance squared.
 
-        A change that both predict is one step between the two; one that an end predicts
-        alone is a part of a step.
+        A change that both ends predict becomes one step between the two predictions; a
+        change that only one end predicts becomes a fraction of a step.
+
+        Args:
+            first: Steps that the equilibrium at the start of the interval predicts.
+            last: Steps that the equilibrium at its end predicts.
         """
         here, there = _pairs(first.contact, last.contact)
         a, b = first.place[here], last.place[there]
@@ -98,16 +110,17 @@ class Steps:
         )
 
     def fit_moments(self, mean: float, moment: float, smooth: float) -> Steps:
-        """Moved so that C has a given mean and first moment.
+        """Move the steps so that the compliance C has a given mean and first moment.
 
-        Both are linear in small shifts of the steps and in the coefficients of a cubic.
-        Of all that meet them, the least squares of the shifts in their doubts and of
-        the cubic in its usual size.
+        Both are linear in small shifts of the steps and in the coefficients of a cubic
+        correction. The solution has the least sum of squares of the shifts, relative to
+        their uncertainties, and of the cubic, relative to its usual size.
 
         Args:
-            mean: Of C above the begin of the interval, a linear change taken out.
-            moment: Of (1 - x) C, the same.
-            smooth: Usual deviation of C from such a change [rad/(N·m)].
+            mean: Mean of C minus its value at the start and a linear change
+                [rad/(N·m)].
+            moment: Mean of (1 - x) C minus the same two terms [rad/(N·m)].
+            smooth: Usual deviation of C from a linear change [rad/(N·m)].
         """
         if not self.place.size:
             return self
@@ -126,14 +139,14 @@ class Steps:
             cubic = smooth * np.array([[1 / 6, 1 / 12], [1 / 12, 1 / 30]])
             scaled = np.concatenate([rows * size, cubic], axis=1)
             wanted = lack + rows @ (place - self.place)
-            found = scaled.T @ np.linalg.solve(scaled @ scaled.T, wanted)
-            shift = np.clip(size * found[: place.size], -size, size)
+            scales = scaled.T @ np.linalg.solve(scaled @ scaled.T, wanted)
+            shift = np.clip(size * scales[: place.size], -size, size)
             place = np.clip(self.place + shift, 0.0, 1.0)
         return replace(self, place=place)
 
 
 def _pairs(first: Index, last: Index) -> tuple[Index, Index]:
-    """Where equal numbers are, the k-th of the one with the k-th of the other."""
+    """Indices of equal numbers in both arrays, paired in order of occurrence."""
     here, there = list[int](), list[int]()
     for number in np.unique(first):
         one, two = np.flatnonzero(first == number), np.flatnonzero(last == number)

@@ -13,10 +13,18 @@ class SingularRingError(ArithmeticError):
 
 
 class Insides:
-    """Insides of all sectors, eliminated before the faces that they couple."""
+    """Interior unknowns of all sectors, eliminated before those of the faces."""
 
     def __init__(self, blocks: Array, face: int) -> None:
-        """Eliminate; arguments and errors as of :class:`CyclicFactor`."""
+        """Eliminate the interior unknowns.
+
+        Args:
+            blocks: Sector matrices (N, n, n) as in :class:`CyclicFactor`.
+            face: Number of degrees of freedom of a face.
+
+        Raises:
+            SingularRingError: If an interior block is singular.
+        """
         n = blocks.shape[1]
         self._face = face
         self._inner = inner = slice(face, n - face)
@@ -25,11 +33,11 @@ class Insides:
             self._inverse = np.linalg.inv(blocks[:, inner, inner])
         except np.linalg.LinAlgError as error:
             raise SingularRingError from error
-        # sector by sector: products of all at once would not stay in the cache
+        # sector by sector: products of all sectors at once would not fit in the cache
         size = 2 * face
         self._reach = np.empty((len(blocks), n - size, size))
         self.schur = np.empty((len(blocks), size, size))
-        """What is left between both faces of a sector (N, 2 face, 2 face)."""
+        """Schur complements between both faces of a sector (N, 2 face, 2 face)."""
         for block, inverse, reach, schur in zip(
             blocks, self._inverse, self._reach, self.schur, strict=True
         ):
@@ -40,14 +48,22 @@ class Insides:
     def face_loads(self, rhs: Array) -> Array:
         """Right-hand sides of the faces (N, face, k) from those of sectors (N, n, k).
 
-        Contributions of both sectors to a face add up.
+        The contributions of both sectors to a face are added.
         """
         face, inside = self._face, rhs[:, self._inner]
         outer = rhs[:, self._outer] - self._reach.transpose(0, 2, 1) @ inside
         return np.asarray(outer[:, :face] + np.roll(outer[:, face:], 1, axis=0))
 
     def with_faces(self, faces: Array, rhs: Array) -> Array:
-        """Solution of the sectors (N, n, k) from that of the faces (N, face, k)."""
+        """Solution of the sectors from that of the faces.
+
+        Args:
+            faces: Solution at the faces (N, face, k).
+            rhs: Right-hand sides of the sectors (N, n, k).
+
+        Returns:
+            Solution of the sectors (N, n, k).
+        """
         result = np.empty_like(rhs)
         result[:, : self._face] = faces
         result[:, rhs.shape[1] - self._face :] = np.roll(faces, -1, axis=0)
@@ -57,21 +73,21 @@ class Insides:
 
 
 class CyclicFactor:
-    """Factorised ring: each sector couples its first face, its inside, its last face.
+    """Factorised ring of sectors that couple first face, interior and last face.
 
-    The insides are eliminated sector by sector; the faces form a cyclic block
+    The interior unknowns are eliminated sector by sector; the faces form a cyclic block
     tridiagonal matrix, which becomes banded when the ring is folded (order 0, N-1, 1,
     N-2, ...) and is factorised by LAPACK.
     """
 
     def __init__(self, blocks: Array, face: int) -> None:
-        """Factorise.
+        """Factorise the ring.
 
         Args:
             blocks: Sector matrices (N, n, n), degrees of freedom in the order first
-                face, inside, last face; the last face of a sector is the first of the
-                next, of the last sector that of sector 0.
-            face: Degrees of freedom of a face.
+                face, interior, last face. The last face of a sector is the first face
+                of the next one; that of the last sector is the first face of sector 0.
+            face: Number of degrees of freedom of a face.
 
         Raises:
             SingularRingError: If a pivot vanishes.
@@ -101,16 +117,16 @@ class CyclicFactor:
         )
 
         def place(rows: Index, columns: Index) -> tuple[Index, Index]:
-            """Where the entries of blocks are in the packed band (N, rows, columns)."""
+            """Indices of block entries in the packed band (N, rows, columns)."""
             down, across = rows[:, :, None], columns[:, None, :]
             across = np.broadcast_to(across, (n_sectors, face, face))
             return 2 * band + down - across, across
 
         begin, end = dofs[:, :face], dofs[:, face:]
-        # a face gets a block of either sector; the blocks beside it are one sector's
+        # both sectors contribute to the diagonal block of a face, one to the others
         both = schur[:, :face, :face] + np.roll(schur[:, face:, face:], 1, axis=0)
         packed[place(begin, begin)] = both
-        # in rings of one or two sectors those blocks coincide, too
+        # in rings of one or two sectors the off-diagonal blocks coincide as well
         np.add.at(packed, place(begin, end), schur[:, :face, face:])
         np.add.at(packed, place(end, begin), schur[:, face:, :face])
         self._band = band
@@ -119,10 +135,11 @@ class CyclicFactor:
             raise SingularRingError
 
     def solve(self, rhs: Array) -> Array:
-        """Solve for many right-hand sides given per sector.
+        """Solve for many right-hand sides.
 
         Args:
-            rhs: Contributions of each sector (N, n, k); those of a shared face add up.
+            rhs: Contributions of each sector (N, n, k); contributions to a shared face
+                are added.
 
         Returns:
             Solution at the degrees of freedom of each sector (N, n, k).

@@ -12,8 +12,8 @@ from skfem.element import DiscreteField
 class IncompatibleModes:
     r"""Adds the modes :math:`4x(1-x)`, one per direction, to a linear element.
 
-    They are interior degrees of freedom. Their gradients are taken with the Jacobian of
-    the element centre,
+    The modes are interior degrees of freedom. Their gradients use the Jacobian at the
+    element centre,
 
     .. math:: \nabla\phi = \frac{\det J_0}{\det J} J_0^{-T} \hat\nabla\phi,
 
@@ -28,7 +28,15 @@ class IncompatibleModes:
     corners: ClassVar[int]
 
     def lbasis(self, X: Any, i: int) -> tuple[Any, Any]:
-        """Functions of the corners, then the modes."""
+        """Local shape functions: those of the corners, then the incompatible modes.
+
+        Args:
+            X: Points in the reference element (dim, ...).
+            i: Number of the shape function.
+
+        Returns:
+            Value and gradient.
+        """
         if i < self.corners:
             return super().lbasis(X, i)  # type: ignore[misc, no-any-return]
         x = X[i - self.corners]
@@ -39,7 +47,17 @@ class IncompatibleModes:
     def gbasis(
         self, mapping: Any, X: Any, i: int, tind: Any = None
     ) -> tuple[DiscreteField, ...]:
-        """Map to the global element, the modes with the Jacobian of the centre."""
+        """Global shape functions; the modes use the Jacobian at the element centre.
+
+        Args:
+            mapping: Mapping of the mesh.
+            X: Points in the reference element.
+            i: Number of the shape function.
+            tind: Elements to map; all if None.
+
+        Returns:
+            Discrete field with value and gradient.
+        """
         if i < self.corners:
             return super().gbasis(mapping, X, i, tind)  # type: ignore[misc, no-any-return]
         phi, dphi = self.lbasis(X, i)

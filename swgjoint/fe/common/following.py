@@ -1,4 +1,4 @@
-"""Continuation of equilibria in torque and input angle, for 2D and 3D models."""
+"""Continuation of equilibria over torque and input angle, for 2D and 3D models."""
 
 from __future__ import annotations
 
@@ -19,30 +19,33 @@ if TYPE_CHECKING:
 
 
 HALVINGS = 5
+"""Most halvings of an increment that fails."""
 TAKE_UP = 150
-"""Hundredths of a pitch over which contact is sought before the output is free."""
+"""Rotation over which the output is turned in search of contact, in hundredths of a
+pitch [-]."""
 
 AnyState = TypeVar("AnyState", "State", "SolidState")
 
 
 def follow(state: AnyState, step: Callable[[AnyState, float], AnyState]) -> AnyState:
-    """Go from part 0 to 1 of a change; a failed try halves the increment.
+    """Follow a change from fraction 0 to 1; a failure halves the increment.
 
     Args:
-        state: At the start.
-        step: From a state to that at a part of the change.
+        state: State at the start.
+        step: Function from a state and a fraction of the change to the state there.
 
     Returns:
-        The state at the end; the last good one with the outcome of the next if stuck.
+        The state at the end, or, if the search is stuck, the last converged state with
+        the outcome of the failed attempt.
     """
     current, done, increment = state, 0.0, 1.0
     while done < 1.0:
         target = min(1.0, done + increment)
-        tried = step(current, target)
-        if tried.outcome.ok:
-            current, done = tried, target
+        reached = step(current, target)
+        if reached.outcome.ok:
+            current, done = reached, target
         elif increment <= 0.5**HALVINGS:
-            return replace(current, outcome=tried.outcome, history=tried.history)
+            return replace(current, outcome=reached.outcome, history=reached.history)
         else:
             increment *= 0.5
     return replace(current, outcome=Outcome.CONVERGED)
@@ -50,20 +53,20 @@ def follow(state: AnyState, step: Callable[[AnyState, float], AnyState]) -> AnyS
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Unloaded(Generic[AnyState]):
-    """The drive without torque."""
+    """Equilibrium of the drive without torque."""
 
     state: AnyState
     small: float
     """Torque that takes up the clearance [N·m]."""
     sides: tuple[AnyState, AnyState] | None = None
-    """States under that torque and its opposite, where the output is free."""
+    """States under that torque and its opposite; None if the output is not free."""
 
 
 class Follower(ABC, Generic[AnyState]):
-    """Follows equilibria; halves a step that fails."""
+    """Follows equilibria and halves steps that fail."""
 
     ratio: float
-    """Signed i."""
+    """Signed gear ratio i [-]."""
 
     @property
     @abstractmethod
@@ -72,7 +75,7 @@ class Follower(ABC, Generic[AnyState]):
 
     @abstractmethod
     def input_angle(self, state: AnyState) -> float:
-        """Theta [rad]."""
+        """Input angle theta [rad]."""
 
     @abstractmethod
     def input_torque(self, state: AnyState) -> float:
@@ -80,65 +83,91 @@ class Follower(ABC, Generic[AnyState]):
 
     @abstractmethod
     def output_angle(self, state: AnyState) -> float:
-        """Psi [rad]."""
+        """Output angle psi [rad]."""
 
     @abstractmethod
     def deflect(self, angle: float = 0.0) -> AnyState:
-        """Wave generator in place, members at the ideal ratio, no tooth contact."""
+        """Deflect the rim at the ideal member angles, without tooth contact."""
 
     @abstractmethod
     def load(self, start: AnyState, torque: float, angle: float) -> AnyState:
-        """Equilibrium under a torque, from a start with its input at that angle."""
+        """Equilibrium under an output torque.
+
+        Args:
+            start: Start of the search, with its input at ``angle``.
+            torque: Output torque T [N·m].
+            angle: Input angle [rad].
+        """
 
     @abstractmethod
     def hold_output(self, state: AnyState) -> AnyState:
-        """Equilibrium with the output where it is; the torque is what that takes."""
+        """Equilibrium with the output held in place; the torque is a result."""
 
     @abstractmethod
     def predict(self, state: AnyState, angle: float) -> AnyState:
-        """Predictor: input and output turned by the ideal ratio."""
+        """Predictor that turns input and output by the ideal ratio.
+
+        Args:
+            state: State to start from.
+            angle: New input angle [rad].
+        """
 
     @abstractmethod
     def rotate_output(self, state: AnyState, output: float) -> AnyState:
-        """Predictor: the output turned at a fixed input."""
+        """Predictor that turns the output at a fixed input.
+
+        Args:
+            state: State to start from.
+            output: New output angle [rad].
+        """
 
     def predicted_changes(
         self, state: AnyState, low: float, high: float
     ) -> ContactChanges | None:
-        """Changes of contact over the torque that an equilibrium predicts, if any.
+        """Contact changes over a torque range, as an equilibrium predicts them.
 
         Args:
             state: The equilibrium.
             low: Smallest torque of interest [N·m].
-            high: Largest one [N·m].
+            high: Largest torque of interest [N·m].
+
+        Returns:
+            The changes; None without a prediction.
         """
         return None
 
     @abstractmethod
     def influence(self, state: AnyState) -> Influence:
-        """How the gap of every tooth acts on the output, at an equilibrium."""
+        """Influence of every tooth gap on the output, linearised at an equilibrium."""
 
     @abstractmethod
     def with_errors(
         self, flexspline: Array, circular_spline: Array, tilt: Array
     ) -> Follower[AnyState]:
-        """The same drive with errors of its teeth and of its axis.
+        """The same drive with manufacturing errors of its teeth and its axis.
 
         Args:
             flexspline: Shifts of its teeth in their frames (N, 2) [m].
-            circular_spline: The same of the other member (N_c, 2) [m].
+            circular_spline: Shifts of its teeth in their frames (N_c, 2) [m].
             tilt: Slope of the axis of the circular spline over z (2,) [rad].
         """
 
     def engage(self, deflected: AnyState) -> AnyState:
-        """Teeth in contact, no member rotated; the torque is what that takes."""
+        """Bring the teeth into contact at the given angles; the torque is a result."""
         return self.hold_output(deflected)
 
     def to_torque(self, state: AnyState, torque: float) -> AnyState:
-        """Change the torque at a fixed input; the last good state if stuck.
+        """Change the torque at a fixed input.
 
-        Where torque control fails (a load through the clearance of the teeth, or far
-        from contact), the output is turned against the teeth first.
+        If torque control fails (across the clearance of the teeth, or far from
+        contact), the output is first turned until the teeth resist.
+
+        Args:
+            state: Equilibrium to start from.
+            torque: New output torque [N·m].
+
+        Returns:
+            The equilibrium, or the last state with the outcome of the failed attempt.
         """
         angle = self.input_angle(state)
 
@@ -150,17 +179,24 @@ class Follower(ABC, Generic[AnyState]):
             return follow(start, step)
 
         if torque == 0.0 or not is_free(state):
-            found = loaded(state)
-            if found.outcome.ok or torque == 0.0:
-                return found
+            direct = loaded(state)
+            if direct.outcome.ok or torque == 0.0:
+                return direct
         against = self._taken_up(state, torque)
         return loaded(against) if against.outcome.ok else against
 
     def to_angle(self, state: AnyState, angle: float) -> AnyState:
         """Turn the input at constant torque.
 
-        An output that is free in the clearance of the teeth keeps its place in it; a
-        position that is out of reach is approached again from the undeformed drive.
+        An output that is free in the clearance of the teeth keeps its place in it. If
+        an angle cannot be reached, it is approached again from the undeformed drive.
+
+        Args:
+            state: Equilibrium to start from.
+            angle: New input angle [rad].
+
+        Returns:
+            The equilibrium, or the last state with the outcome of the failed attempt.
         """
         first = self.input_angle(state)
 
@@ -170,58 +206,68 @@ class Follower(ABC, Generic[AnyState]):
 
         if is_free(state):
             return self.hold_output(self.predict(state, angle))
-        found = follow(state, step)
-        if found.outcome.ok:
-            return found
-        if state.torque == 0.0 and found.outcome is Outcome.SINGULAR:
+        turned = follow(state, step)
+        if turned.outcome.ok:
+            return turned
+        if state.torque == 0.0 and turned.outcome is Outcome.SINGULAR:
             return self.hold_output(self.predict(state, angle))
         again = self.hold_output(self.deflect(angle))
         if again.outcome.ok:
             again = self.to_torque(again, state.torque)
-        return again if again.outcome.ok else found
+        return again if again.outcome.ok else turned
 
     def unload(self, state: AnyState, small: float) -> Unloaded[AnyState]:
         """Equilibrium without torque at a fixed input.
 
-        Where clearance leaves the output free it stands in the middle of its positions
-        at the torques +-``small`` [N·m].
+        An output that is free in a clearance is placed midway between its positions at
+        the torques +-``small``.
+
+        Args:
+            state: Equilibrium to start from.
+            small: Torque that takes up the clearance [N·m].
         """
         if not is_free(state):
-            found = self.to_torque(state, 0.0)
-            if found.outcome is not Outcome.SINGULAR:
-                return Unloaded(state=found, small=small)
+            unloaded = self.to_torque(state, 0.0)
+            if unloaded.outcome is not Outcome.SINGULAR:
+                return Unloaded(state=unloaded, small=small)
         sides = self.to_torque(state, small), self.to_torque(state, -small)
         return self._between(sides, small)
 
     def turn_unloaded(
         self, unloaded: Unloaded[AnyState], angle: float
     ) -> Unloaded[AnyState]:
-        """Turn the input without torque."""
+        """Turn the input without torque.
+
+        Args:
+            unloaded: Equilibrium without torque to start from.
+            angle: New input angle [rad].
+        """
         small = unloaded.small
         if unloaded.sides is not None:
             up, down = unloaded.sides
             return self._between(
                 (self.to_angle(up, angle), self.to_angle(down, angle)), small
             )
-        found = self.to_angle(unloaded.state, angle)
-        if found.outcome.ok and is_free(found):
-            return self.unload(found, small)
-        return Unloaded(state=found, small=small)
+        turned = self.to_angle(unloaded.state, angle)
+        if turned.outcome.ok and is_free(turned):
+            return self.unload(turned, small)
+        return Unloaded(state=turned, small=small)
 
     def _between(
         self, sides: tuple[AnyState, AnyState], small: float
     ) -> Unloaded[AnyState]:
+        """Equilibrium midway between the states at both ends of the clearance."""
         for side in sides:
             if not side.outcome.ok:
                 return Unloaded(state=side, small=small)
         middle = 0.5 * sum(self.output_angle(side) for side in sides)
-        found = replace(
+        centred = replace(
             self.hold_output(self.rotate_output(sides[0], middle)), torque=0.0
         )
-        return Unloaded(state=found, small=small, sides=sides)
+        return Unloaded(state=centred, small=small, sides=sides)
 
     def _taken_up(self, state: AnyState, torque: float) -> AnyState:
-        """Turn the output until the teeth resist with a part of a torque."""
+        """Turn the output until the teeth resist with at most a given torque."""
         pitch = 2.0 * pi / self.teeth
         first = self.output_angle(state)
         direction = -1.0 if torque > 0.0 else 1.0

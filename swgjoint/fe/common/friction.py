@@ -1,16 +1,16 @@
-r"""Coulomb friction between the flanks, with a soft stick spring.
+r"""Coulomb friction between the flanks, regularised by a soft stick spring.
 
-The material points of both flanks that face each other have the arc lengths s_f and
-s_c, both counted from tip to root, in opposite directions. Rolling leaves their sum
-unchanged; sliding changes it: :math:`\sigma = s_f + s_c`. With the friction force t on
-the flexspline counted from tip to root, a step from :math:`(\sigma_0, t_0)` ends at
+The facing material points of both flanks have the arc lengths s_f and s_c, both counted
+from tip to root and hence in opposite directions. Rolling leaves their sum
+:math:`\sigma = s_f + s_c` unchanged; sliding changes it. With the friction force t on
+the flexspline, positive from tip to root, a step from :math:`(\sigma_0, t_0)` ends at
 
 .. math:: t = \mathrm{clip}(t_0 + k (\sigma - \sigma_0), -\mu F, \mu F) ,
 
 the implicit Euler step of a spring k and a slider in series, whose dissipation
-:math:`t\,(\sigma - \sigma_0 - (t - t_0)/k)` is never negative. Points that are close
-but do not touch yet carry :math:`\sigma` along, so that a new contact knows which way
-it slides.
+:math:`t\,(\sigma - \sigma_0 - (t - t_0)/k)` is never negative. The history includes
+:math:`\sigma` of points that are close but not yet in contact, so that the sliding
+direction of a new contact is known.
 """
 
 from __future__ import annotations
@@ -24,57 +24,66 @@ from swgjoint.fe.plane.contact_points import Contacts
 from swgjoint.typing import Array, Index
 
 STICK_STIFFNESS = 0.05
-"""k in face width times Young's modulus: a tooth sticks within some ten nanometres,
-far below its sliding of micrometres, and the spring is no stiffer than the tooth."""
+"""Stick stiffness k divided by face width and Young's modulus [-].
+
+A tooth sticks over a few tens of nanometres, far less than its sliding of micrometres,
+and the spring is no stiffer than the tooth."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class CoulombFriction:
-    """Law of the flanks."""
+    """Friction law of the flanks."""
 
     coefficient: float
-    """mu [-]."""
+    """Friction coefficient mu [-]."""
     stiffness: float
-    """k of the stick spring [N/m]."""
+    """Stiffness k of the stick spring [N/m]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class SlipHistory:
-    """Pairs of flanks close to contact at the end of a step or iteration."""
+    """Flank pairs close to contact at the end of a step or iteration."""
 
     contacts: Contacts
-    """Their candidates."""
+    """Contact candidates of these pairs."""
     normal: Array
-    """Normal forces of the candidates (n,) [N]."""
+    """Normal force at each candidate (n,) [N]."""
     force: Array
-    """Friction on the flexspline at the candidates, tip to root (n,) [N]."""
+    """Friction on the flexspline at each candidate, from tip to root (n,) [N]."""
 
     @cached_property
     def pairs(self) -> Pairs:
-        """The pairs of flanks of the candidates."""
+        """Flank pairs of the candidates."""
         return Pairs.from_contacts(self.contacts, self.normal)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Pairs:
-    """Contacts gathered by the two flanks that touch; one stick spring each.
+    """Contacts grouped by the two flanks that touch; each pair has one stick spring.
 
     The points of a pair share its friction in proportion to their normal forces: on
-    conforming flanks the force hops between points that slide alike.
+    conforming flanks the force jumps between points that slide alike.
     """
 
     key: Index
-    """Sector, side and tooth (n_pairs, 3)."""
+    """Sector, side and tooth of each pair (n_pairs, 3)."""
     pair: Index
     """Pair of each contact (n,)."""
     share: Array
-    """Share of each contact in its pair (n_pairs, n)."""
+    """Share of each contact in the force of its pair (n_pairs, n) [-]."""
     slip: Array
-    """sigma (n_pairs,) [m]."""
+    """Sum of arc lengths sigma of each pair (n_pairs,) [m]."""
 
     @classmethod
     def from_contacts(cls, contacts: Contacts, normal: Array) -> Pairs:
-        """Gather contacts; where none carries force the closest one stands for all."""
+        """Group contacts by flank pair.
+
+        In a pair without force the closest contact gets the whole share.
+
+        Args:
+            contacts: Contact candidates.
+            normal: Their normal forces (n,) [N].
+        """
         keys = np.stack([contacts.sector, contacts.side, contacts.tooth], axis=-1)
         key, pair = np.unique(keys, axis=0, return_inverse=True)
         pair = pair.ravel()
@@ -88,16 +97,16 @@ class Pairs:
         return cls(key=key, pair=pair, share=share, slip=share @ contacts.slip)
 
     def find_in(self, others: Pairs) -> Index:
-        """Index of the same pair in others, -1 without it (n_pairs,)."""
-        found = np.full(len(self.key), -1, dtype=np.int64)
+        """Index of each pair in ``others``; -1 if it is not there (n_pairs,)."""
+        index = np.full(len(self.key), -1, dtype=np.int64)
         same = (self.key[:, None] == others.key).all(axis=-1)
         mine, theirs = np.nonzero(same)
-        found[mine] = theirs
-        return found
+        index[mine] = theirs
+        return index
 
 
 def _since(history: SlipHistory | None, pairs: Pairs) -> tuple[Array, Array, Index]:
-    """Slip of pairs since the last step, their friction then, and their index there."""
+    """Slip of pairs since the last step, their friction and their index in it."""
     slip, force = np.zeros(len(pairs.key)), np.zeros(len(pairs.key))
     if history is None:
         return slip, force, np.full(len(pairs.key), -1, dtype=np.int64)
@@ -114,18 +123,19 @@ class Sliding:
     """Contacts of one iteration as lines of force: normal, then tangential."""
 
     lines: Contacts
-    """All normal lines, then all tangential ones; the gap of a tangential line is that
-    of its stick condition."""
+    """All normal lines, then all tangential lines. The gap of a tangential line is the
+    offset of its stick condition."""
     stick: Array
-    """Shares of the contacts in the pairs that stick (n_stick, n)."""
+    """Shares of the contacts in the pairs that stick (n_stick, n) [-]."""
     push: Array
-    """t over the normal force where a contact slides, else zero (n,)."""
+    """Ratio of friction t to normal force at sliding contacts, zero elsewhere (n,) [-].
+    """
     fixed: Array
-    """t where it is prescribed (n,) [N]."""
+    """Prescribed friction t (n,) [N]."""
     limit: Array
-    """Friction that the normal forces of the last iteration allow (n,) [N]."""
+    """Friction limit under the normal forces of the last iteration (n,) [N]."""
     softness: float
-    """1/k [m/N]."""
+    """Compliance 1/k of the stick spring [m/N]."""
 
     @classmethod
     def from_trial(
@@ -135,20 +145,21 @@ class Sliding:
         history: SlipHistory | None,
         last: SlipHistory | None,
     ) -> Sliding:
-        """Which pairs stick and which slide, from the trial force of the spring.
+        """Decide which pairs stick and which slide, from the trial force of the spring.
 
-        A pair whose direction of sliding turned over since the last iteration is taken
-        to stick: between the two directions there is a place where it does.
+        A pair whose sliding direction has reversed since the last iteration is assumed
+        to stick, because it sticks somewhere between the two directions.
 
         Args:
-            friction: The law.
+            friction: Friction law.
             contacts: Candidates of this iteration.
-            history: Of the last step; None where contact begins: no friction yet.
-            last: Forces of the last iteration.
+            history: History at the end of the last step; None at the first contact,
+                which has no friction yet.
+            last: Forces of the last iteration; None in the first one.
         """
         normal, before = np.zeros(len(contacts)), np.zeros(len(contacts))
         if last is not None:
-            # every force goes to the one candidate that is closest
+            # each force is assigned to the closest candidate
             heir = last.contacts.nearest_in(contacts)
             left = heir >= 0
             np.add.at(normal, heir[left], last.normal[left])
@@ -174,18 +185,18 @@ class Sliding:
         )
 
     def lag(self) -> Sliding:
-        """Sliding under the normal forces of the last iteration: symmetric."""
+        """Friction limits from the last iteration, which makes the system symmetric."""
         fixed = self.limit * np.sign(self.push)
         return replace(self, push=np.zeros_like(self.push), fixed=fixed)
 
     def forces(self, unknowns: Array) -> Array:
-        """Forces of the lines (2 n,) [N]."""
+        """Forces of all lines (2 n,) [N] from the unknowns (n + n_stick,) [N]."""
         result = self._carried() @ unknowns
         result[len(self.push) :] += self.fixed
         return np.asarray(result)
 
     def _carried(self) -> Array:
-        """Forces of the lines by the unknowns (normal forces, sticking forces).
+        """Matrix from the unknowns (normal, then sticking forces) to line forces.
 
         Shape (2 n, n + n_stick).
         """
@@ -194,11 +205,14 @@ class Sliding:
         return np.concatenate([top, np.hstack([np.diag(self.push), self.stick.T])])
 
     def reduce(self, matrix: Array, offset: Array) -> tuple[Array, Array]:
-        """Conditions of gaps and sticking, in the unknowns.
+        """Reduce the system of all lines to normal and sticking forces.
 
         Args:
-            matrix: Of the lines, then the other unknowns (2 n + p, 2 n + p).
-            offset: (2 n + p,).
+            matrix: Matrix of the lines, then p other unknowns (2 n + p, 2 n + p).
+            offset: Offset of the same rows (2 n + p,).
+
+        Returns:
+            Matrix (n + n_stick + p, n + n_stick + p) and offset (n + n_stick + p,).
         """
         n, lines = len(self.push), len(self.lines)
 
@@ -219,12 +233,12 @@ class Sliding:
 def dissipated_work(
     friction: CoulombFriction, history: SlipHistory | None, now: SlipHistory
 ) -> float:
-    """Work of friction over a step [J]; never negative.
+    """Work dissipated by friction over a step [J]; never negative.
 
     Args:
-        friction: The law.
-        history: At the start of the step.
-        now: At its end.
+        friction: Friction law.
+        history: History at the start of the step; None at the first contact.
+        now: History at its end.
     """
     if history is None:
         return 0.0
@@ -234,13 +248,18 @@ def dissipated_work(
     known = index >= 0
     slid = slip - (force - before) / k
     work = float(np.sum(force[known] * slid[known]))
-    # the spring of a pair that parted snaps back
+    # the spring of a pair that separated loses its energy
     old = (history.pairs.share > 0.0) @ history.force
     parted = np.setdiff1d(np.arange(len(old)), index)
     return work + float(np.sum(old[parted] ** 2)) / (2.0 * k)
 
 
 def spring_energy(friction: CoulombFriction, now: SlipHistory) -> float:
-    """Energy of the stick springs [J]."""
+    """Energy of the stick springs [J].
+
+    Args:
+        friction: Friction law.
+        now: History with the friction forces.
+    """
     force = (now.pairs.share > 0.0) @ now.force
     return 0.5 * float(np.sum(force**2)) / friction.stiffness

@@ -153,8 +153,8 @@ def _along(follow: Continuation, theta: float, torques: Array) -> list[State]:
             state = follow.to_torque(state, torque)
         if not state.outcome.ok and not states:
             raise ComputationError(
-                f"no equilibrium without torque at input angle {theta:.4g} rad; a drive"
-                " with backlash has no friction loop"
+                f"no equilibrium without torque at input angle {theta:.4g} rad; a"
+                " friction loop needs an output that is not free in a clearance"
             )
         if not state.outcome.ok:
             raise ComputationError(
