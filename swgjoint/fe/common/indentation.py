@@ -1,27 +1,28 @@
-r"""Indentation of two flanks by the strip of their contact, closer than a patch sees.
+r"""Local indentation of two flanks by the narrow strip of their contact.
 
-The flanks of :mod:`swgjoint.fe.common.contact_patch` give way as if a contact force
-were spread over a patch of half length a, a tenth of a millimetre. The real strip is
-ten times narrower. On top of the patch the flanks therefore approach by the closed form
-of an elastic half-plane: under a force F the centre of a strip of half width b with the
-pressure of Hertz lies deeper than the average over the patch by
+The flanks of :mod:`swgjoint.fe.common.contact_patch` deform as if a contact force were
+spread over a patch of half length a, a tenth of a millimetre. The real contact strip is
+ten times narrower. The additional approach of the flanks follows from the closed form
+of an elastic half-plane: under a force F the centre of a strip of half width b with
+Hertzian pressure is deeper than the average over the patch by
 
 .. math:: h = k F \left(\ln\frac{a}{b} + c\right), \quad
     k = \frac{2}{\pi w} \sum_j \frac{1}{E'_j}, \quad
     b^2 = 2 k F R, \quad
     c = 2 \ln 2 + \tfrac{1}{2} - \tfrac{1727}{840} ,
 
-with the face width w, the moduli :math:`E'` of the plane and the radius R of relative
+with the face width w, the in-plane moduli :math:`E'` and the radius R of relative
 curvature (K. L. Johnson, *Contact Mechanics*, Cambridge 1985, section 2.3 for the
-surface displacement under a strip, eq. (4.43) for b). The two terms ln 2 + 1/2 belong
-to the centre of the strip, 1727/840 - ln 2 to the weights of the patch. A strip as wide
-as the patch, or wider, needs no correction, and the slope must stay finite where the
-force vanishes:
+surface displacement under a strip, eq. (4.43) for b). The terms ln 2 + 1/2 come from
+the centre of the strip, 1727/840 - ln 2 from the weights of the patch. A strip as wide
+as the patch, or wider, needs no correction, and the slope must stay finite at zero
+force. The model therefore uses
 
 .. math:: h(F) = \frac{k F}{2} \ln\left(1 + \frac{A}{b_0^2 + 2 k R F}\right), \quad
     A = (a e^c)^2 .
 
-The law follows the force alone, so that it has a potential: R is one number of a drive.
+The law depends on the force alone and thus has a potential: R is a constant of the
+drive.
 """
 
 from __future__ import annotations
@@ -36,31 +37,31 @@ from swgjoint.gear.teeth.profile import ToothProfile
 from swgjoint.typing import Array, Index
 
 CENTRE_OVER_PATCH = 2.0 * log(2.0) + 0.5 - 1727.0 / 840.0
-"""c: of the weights (1 - x^2)^3 of a patch."""
+"""Constant c for patch weights (1 - x^2)^3 [-]."""
 NARROWEST = 0.01
-"""Half width b_0 of the strip without force, in half lengths of the patch."""
+"""Half width b_0 of the strip without force, in half lengths of the patch [-]."""
 ABOUT_PITCH_POINT = 0.5
-"""Modules along the flanks, on either side of the pitch point, whose curvatures count:
-teeth meet there."""
+"""Length of flank on either side of the pitch point whose curvatures count, in modules
+[-]: teeth make contact there."""
 STRAIGHT = 1e-4
-"""Relative curvature, over the module, that counts as none."""
+"""Relative curvature times module below which a pair of points is conforming [-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Indentation:
-    """Law of the flanks of a drive."""
+    """Indentation law of the flanks of a drive."""
 
     softness: float
-    """k [m/N]."""
+    """Compliance factor k [m/N]."""
     patch: float
     """Half length a of a patch [m]."""
     radius: float
-    """R of relative curvature [m]; infinite where flanks conform."""
+    """Radius R of relative curvature [m]; infinite for conforming flanks."""
 
     def __post_init__(self) -> None:
         for key in ("softness", "patch", "radius"):
             if not getattr(self, key) > 0.0:
-                raise ValueError(f"{key} = {getattr(self, key)!r}; accepted: above 0")
+                raise ValueError(f"{key} = {getattr(self, key)!r}: expected above 0")
 
     @classmethod
     def from_members(
@@ -69,15 +70,15 @@ class Indentation:
         patch: tuple[float, ...],
         profiles: tuple[ToothProfile, ToothProfile],
     ) -> Indentation:
-        """That of a drive.
+        """Law of a drive from the properties of its members.
 
         Args:
-            softness: 2 / (pi w E') of every elastic member [m/N].
+            softness: Contributions 2 / (pi w E') of the elastic members to k [m/N].
             patch: Half length of a patch on each of them [m].
-            profiles: Of flexspline and circular spline.
+            profiles: Tooth profiles of flexspline and circular spline.
         """
         total = sum(softness)
-        parts = [own * log(a) for own, a in zip(softness, patch, strict=True)]
+        parts = [k * log(a) for k, a in zip(softness, patch, strict=True)]
         return cls(
             softness=total,
             patch=exp(sum(parts) / total),
@@ -86,21 +87,21 @@ class Indentation:
 
     @property
     def _widest(self) -> float:
-        """A [m^2]."""
+        """Constant A of the law [m^2]."""
         return (self.patch * exp(CENTRE_OVER_PATCH)) ** 2
 
     @property
     def _narrowest(self) -> float:
-        """The square of b_0 [m^2]."""
+        """Square of b_0 [m^2]."""
         return (NARROWEST * self.patch) ** 2
 
     @property
     def _growth(self) -> float:
-        """Growth of the square of b with the force [m^2/N]."""
+        """Derivative of b^2 by the force [m^2/N]."""
         return 2.0 * self.softness * self.radius
 
     def approach(self, force: Array) -> Array:
-        """Approach h [m] under forces that are not negative [N]."""
+        """Approach h [m] under non-negative forces [N]."""
         if np.isinf(self.radius):
             return np.zeros_like(force)
         width = self._narrowest + self._growth * force
@@ -124,16 +125,16 @@ class Indentation:
         return np.asarray(force * self.approach(force) - 0.5 * self.softness * area)
 
     def _under(self, force: Array, start: float) -> Array:
-        r""":math:`\int_0^F t \ln(b_s^2 + \gamma t)\,dt`, gamma the growth of b^2.
+        r"""Integral :math:`\int_0^F t \ln(b_s^2 + \gamma t)\,dt`, gamma = d(b^2)/dF.
 
         Args:
-            force: F [N].
-            start: The square of b_s [m^2].
+            force: Force F [N].
+            start: Square of b_s [m^2].
         """
         at = start / self._growth
         x = force / at
         exact = 0.5 * (x**2 - 1.0) * np.log1p(x) - 0.25 * x**2 + 0.5 * x
-        # the terms cancel where x is small: there by the series
+        # for small x the terms cancel: use the series
         n = np.arange(3.0, 14.0)
         terms = np.power.outer(np.minimum(x, 0.05), n) * -((-1.0) ** n)
         series = (terms / (n * (n - 2.0))).sum(axis=-1)
@@ -142,12 +143,20 @@ class Indentation:
 
 
 def relative_radius(own: ToothProfile, other: ToothProfile) -> float:
-    """R of relative curvature of two flanks near the pitch point [m].
+    """Radius R of relative curvature of two flanks near the pitch point.
 
-    Any point of one flank may meet any point of the other: it is the geometric mean
+    Any point of one flank may meet any point of the other, so R is the geometric mean
     over all pairs of points within half a module of the pitch point that can touch,
-    those whose relative curvature is positive. The contact width follows the root of R
-    and the approach the logarithm of the width: a factor of two in R is a tenth of h.
+    those with positive relative curvature. The contact width varies with the square
+    root of R and the approach with the logarithm of the width: a factor of two in R
+    changes h by a tenth.
+
+    Args:
+        own: Profile of one member.
+        other: Profile of the other member.
+
+    Returns:
+        Radius R [m]; infinite for conforming flanks.
     """
     module = 2.0 * own.pitch_radius / own.teeth
     one, two = (_curvatures(p, ABOUT_PITCH_POINT * module) for p in (own, other))
@@ -159,7 +168,7 @@ def relative_radius(own: ToothProfile, other: ToothProfile) -> float:
 
 
 def _curvatures(profile: ToothProfile, reach: float) -> Array:
-    """Curvatures at equal steps about the pitch point (n,) [1/m]."""
+    """Curvatures at equal steps around the pitch point (n,) [1/m]."""
     stations = np.linspace(*profile.contact_range, 501)
     points, _, curvature = profile.evaluate(stations)
     radius = np.hypot(points[:, 0], points[:, 1])
@@ -168,35 +177,45 @@ def _curvatures(profile: ToothProfile, reach: float) -> Array:
 
 
 def softness_of(modulus: float, width: float) -> float:
-    """A member's part of k [m/N]; ``modulus`` is that of its plane, E' [Pa]."""
+    """Contribution of a member to the compliance factor k.
+
+    Args:
+        modulus: In-plane modulus E' [Pa].
+        width: Face width w [m].
+
+    Returns:
+        Contribution 2 / (pi w E') [m/N].
+    """
     return 2.0 / (pi * width * modulus)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Strips:
-    """Contacts gathered by their two flanks: all points of a pair are one strip.
+    """Contacts grouped by their two flanks: all points of a pair form one strip.
 
-    Where flanks conform the force wanders between points that are closer than a patch;
-    each by itself would indent as if the others were far away.
+    On conforming flanks the force moves between points that are closer than a patch;
+    treated separately, each would indent as if the others were far away.
     """
 
     law: Indentation
+    """Indentation law of the drive."""
     strip: Index
     """Strip of each contact (n,)."""
     force: Array
-    """Force of each strip, about which the law is linearised (n_strips,) [N]."""
+    """Force of each strip at which the law is linearised (n_strips,) [N]."""
 
     @classmethod
     def from_contacts(
         cls, law: Indentation, contacts: Contacts, held: Contacts | None, force: Array
     ) -> Strips:
-        """Gather candidates under the forces of contacts that may be others.
+        """Group candidates into strips under the forces of earlier contacts.
 
         Args:
-            law: Of the drive.
-            contacts: The candidates.
-            held: Points that carry force.
-            force: Their normal forces (n_held,) [N].
+            law: Indentation law of the drive.
+            contacts: Contact candidates.
+            held: Points that carry force, not necessarily the candidates; None if
+                there are none.
+            force: Normal forces of these points (n_held,) [N].
         """
         keys = _keys(contacts)
         known, strip = np.unique(keys, axis=0, return_inverse=True)
@@ -207,24 +226,24 @@ class Strips:
         return cls(law=law, strip=strip.ravel(), force=total)
 
     def sums(self, force: Array) -> Array:
-        """Forces of the strips (n_strips,) from those of the contacts (n,)."""
-        found = np.bincount(self.strip, weights=force, minlength=self.force.size)
-        return np.asarray(found, dtype=np.float64)
+        """Forces of the strips (n_strips,) [N] from those of the contacts (n,) [N]."""
+        total = np.bincount(self.strip, weights=force, minlength=self.force.size)
+        return np.asarray(total, dtype=np.float64)
 
     @property
     def compliance(self) -> Array:
-        """Approach of each contact by the force on each other (n, n) [m/N]."""
+        """Approach of each contact per force on each other contact (n, n) [m/N]."""
         same = self.strip[:, None] == self.strip
         return np.where(same, self.law.slope(self.force)[self.strip], 0.0)
 
     def linearise(self) -> tuple[Array, Array]:
-        """Linear law for a drive that is linearised once, to superpose tooth errors.
+        """Linear law for a drive that is linearised once to superpose tooth errors.
 
-        A strip under force keeps its tangent. A strip without force may come to carry
-        about as much as the others, so it gets the secant up to their mean force.
+        A loaded strip gets its tangent. An unloaded strip may later carry about as much
+        as the others, so it gets the secant up to their mean force.
 
         Returns:
-            The compliance (n, n) [m/N] and the approach without force (n,) [m].
+            Compliance (n, n) [m/N] and approach at zero force (n,) [m].
         """
         law, force = self.law, self.force
         usual = force[force > 0.0].mean()
@@ -235,20 +254,29 @@ class Strips:
 
     @property
     def offset(self) -> Array:
-        """Approach of each contact as if linear in the force, at zero (n,) [m]."""
+        """Approach of each contact at zero force by the linearised law (n,) [m]."""
         law, force = self.law, self.force
         return (law.approach(force) - law.slope(force) * force)[self.strip]
 
     def error(self, force: Array) -> float:
-        """Largest error of the linear law under forces of the contacts [m]."""
-        found, law = self.sums(force), self.law
-        linear = law.approach(self.force) + law.slope(self.force) * (found - self.force)
-        wrong = linear - law.approach(np.maximum(found, 0.0))
+        """Largest error [m] of the linearised law under contact forces (n,) [N]."""
+        total, law = self.sums(force), self.law
+        linear = law.approach(self.force) + law.slope(self.force) * (total - self.force)
+        wrong = linear - law.approach(np.maximum(total, 0.0))
         return float(np.abs(wrong).max(initial=0.0))
 
 
 def strain_energy(law: Indentation, contacts: Contacts | None, force: Array) -> float:
-    """Energy of the strips under the forces of their contacts [J]."""
+    """Strain energy of the indentation.
+
+    Args:
+        law: Indentation law of the drive.
+        contacts: Points that carry force; None if there are none.
+        force: Their normal forces (n,) [N].
+
+    Returns:
+        Energy of all strips [J].
+    """
     if contacts is None or not len(contacts):
         return 0.0
     strips = Strips.from_contacts(law, contacts, None, force)
@@ -256,5 +284,5 @@ def strain_energy(law: Indentation, contacts: Contacts | None, force: Array) -> 
 
 
 def _keys(contacts: Contacts) -> Index:
-    """Sector, side and tooth (n, 3)."""
+    """Sector, side and tooth of each contact (n, 3)."""
     return np.stack([contacts.sector, contacts.side, contacts.tooth], axis=-1)

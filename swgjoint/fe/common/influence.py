@@ -1,16 +1,17 @@
-r"""How the gap of every tooth acts on the output: the drive linearised at one state.
+r"""Influence of every tooth gap on the output: the drive linearised at one state.
 
-A perfect drive at equilibrium is condensed to its unilateral contacts, those of the
-teeth and those of the wave generator. An unknown v is the force of a contact that is
-open there, and the opening of one that is closed. With errors of the teeth that change
+A perfect drive at equilibrium is condensed to its unilateral contacts: those of the
+teeth and those of the wave generator. The unknown v of a contact is its force if it is
+open at the equilibrium and its opening if it is closed. With tooth errors that change
 the gaps by :math:`\delta g`, and with another torque,
 
 .. math:: 0 \le v \perp w = w_0 + Q\,\delta g + r\,(T - T_0) + M v \ge 0 , \quad
     \psi = \psi_0 + a^T v + b^T \delta g + c\,(T - T_0) .
 
-Without errors v is zero. To first order in the gaps the answer would be the forces of
-the perfect drive, but errors of a few micrometres change which teeth carry and where
-the rim lifts off: the influences are superposed in this problem, not in its solution.
+Without errors v is zero. To first order in the gaps the response would follow from the
+forces of the perfect drive, but errors of a few micrometres change which teeth carry
+load and where the rim lifts off. The influences are therefore superposed in this
+problem and not in its solution.
 """
 
 from __future__ import annotations
@@ -24,67 +25,69 @@ from swgjoint.fe.common.pivoting import exchange, solve_active, solve_many
 from swgjoint.typing import Array, Index, Mask
 
 MOST_CHANGES = 60
-"""Changes of contact on one side of a torque that are followed."""
+"""Most contact changes that are followed on one side of a torque."""
 SOFTEST = 3e-6
-"""Least stiffness of a motion that opens contacts, in that of a single one."""
+"""Smallest stiffness of a motion that opens contacts, relative to that of a single
+contact [-]."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Response:
-    """Equilibria with errors, one entry per set of errors; NaN where there is none."""
+    """Equilibria with errors, one entry per set of errors; NaN if not solved."""
 
     output_angle: Array
-    """psi [rad]."""
+    """Output angle psi (n_sets,) [rad]."""
     potential: Array
-    """U + T psi, up to a constant of the influence [J]."""
+    """Potential U + T psi, up to a constant of the influence (n_sets,) [J]."""
     compliance: Array
-    """-d(psi)/dT at fixed input [rad/(N·m)]."""
+    """Compliance -d(psi)/dT at fixed input (n_sets,) [rad/(N·m)]."""
     active: Mask
-    """Contacts that differ from the perfect drive; a start for other torques."""
+    """Contacts whose state differs from the perfect drive, a start for other torques
+    (n_sets, m)."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Influence:
-    """The condensed drive at one equilibrium; m contacts, the first n of teeth."""
+    """The drive condensed at one equilibrium to m contacts, the first n at teeth."""
 
     sector: Index
-    """Tooth of the flexspline of every tooth contact (n,)."""
+    """Flexspline tooth of each tooth contact (n,)."""
     tooth: Index
-    """Tooth of the circular spline (n,)."""
+    """Circular-spline tooth of each tooth contact (n,)."""
     direction: Array
-    """Derivatives of its gap by the shifts of these teeth (2, n, 2)."""
+    """Derivatives of the tooth gaps by the shifts of these teeth (2, n, 2) [-]."""
     by_tilt: Array
-    """The same by the slope of the circular spline's axis (n, 2) [m/rad]."""
+    """Derivatives of the tooth gaps by the slope of the circular spline's axis (n, 2)
+    [m/rad]."""
     closed: Mask
-    """Contacts that carry force in the perfect drive (m,)."""
+    """Whether each contact carries force in the perfect drive (m,)."""
     torque: float
-    """T_0 [N·m]."""
+    """Torque T_0 of the equilibrium [N·m]."""
     matrix: Array
-    """M (m, m)."""
+    """Matrix M (m, m)."""
     slack: Array
-    """w_0 (m,)."""
+    """Slacks w_0 at the equilibrium (m,)."""
     by_gap: Array
-    """Q (m, n)."""
+    """Derivatives Q of the slacks by the gap changes (m, n)."""
     by_torque: Array
-    """r (m,)."""
+    """Derivatives r of the slacks by the torque (m,)."""
     angle: float
-    """psi_0 [rad]."""
+    """Output angle psi_0 of the equilibrium [rad]."""
     angle_by_value: Array
-    """a (m,)."""
+    """Derivatives a of the output angle by the unknowns v (m,)."""
     angle_by_gap: Array
-    """b (n,)."""
+    """Derivatives b of the output angle by the gap changes (n,) [rad/m]."""
     angle_by_torque: float
-    """c [rad/(N·m)]."""
+    """Derivative c of the output angle by the torque [rad/(N·m)]."""
     supports: Array | None = None
-    """Where the other contacts lie, in the frame of the wave generator (m - n, 2) [m];
-    in the plane only."""
+    """Positions of the other contacts in the frame of the wave generator (m - n, 2)
+    [m]; 2D models only."""
 
     def with_supports(self) -> Influence:
-        """The same, gap changes of the wave generator behind those of the teeth.
+        """Append gap changes of the wave generator to those of the teeth.
 
-        Such a change adds to the gap of an open contact. A closed one has its opening
-        as the unknown: an outline that recedes is an opening that the node has not
-        made.
+        Such a change adds to the gap of an open contact. The unknown of a closed
+        contact is its opening; a receding outline opens it without motion of the node.
         """
         n = len(self.sector)
         closed = self.closed[n:]
@@ -100,20 +103,22 @@ class Influence:
     def gap_change(
         self, flexspline: Array, circular_spline: Array, tilt: Array | None = None
     ) -> Array:
-        """Change of the gaps by shifts of the teeth in their frames.
+        """Change of the tooth gaps by shifts of the teeth in their frames.
 
         Args:
-            flexspline: Shape (..., N, 2) [m].
-            circular_spline: Shape (..., N_c, 2) [m].
+            flexspline: Shifts of the flexspline's teeth (..., N, 2) [m].
+            circular_spline: Shifts of the circular spline's teeth (..., N_c, 2) [m].
             tilt: Slope of the circular spline's axis (..., 2) [rad].
 
         Returns:
-            Shape (..., n) [m].
+            Gap changes (..., n) [m].
         """
-        own, other = self.direction
-        change = np.einsum("...ki,ki->...k", flexspline[..., self.sector, :], own)
+        by_flexspline, by_ring = self.direction
+        change = np.einsum(
+            "...ki,ki->...k", flexspline[..., self.sector, :], by_flexspline
+        )
         change += np.einsum(
-            "...ki,ki->...k", circular_spline[..., self.tooth, :], other
+            "...ki,ki->...k", circular_spline[..., self.tooth, :], by_ring
         )
         if tilt is not None:
             change += tilt @ self.by_tilt.T
@@ -122,18 +127,18 @@ class Influence:
     def respond(
         self, gap_change: Array, torque: float, start: Mask | None = None
     ) -> Response:
-        """Equilibria of the linearised drive with errors.
+        """Equilibria of the linearised drive with tooth errors.
 
         Args:
-            gap_change: One set of errors per row (n_sets, n) [m].
-            torque: T [N·m].
-            start: Active sets of a solution nearby.
+            gap_change: Gap changes, one set of errors per row (n_sets, n) [m].
+            torque: Torque T [N·m].
+            start: Active sets of a nearby solution (n_sets, m).
         """
         load = torque - self.torque
         dg = gap_change
         offset = self.slack + dg @ self.by_gap.T + load * self.by_torque
-        found = solve_many(self.matrix, offset, start)
-        v = found.value
+        solution = solve_many(self.matrix, offset, start)
+        v = solution.value
         angle = self.angle + v @ self.angle_by_value + dg @ self.angle_by_gap
         angle += load * self.angle_by_torque
 
@@ -146,23 +151,23 @@ class Influence:
         sign = np.where(self.closed, 0.5, -0.5)
         potential = unchanged + np.sum(sign * v * offset, axis=1)
 
-        moves = solve_active(self.matrix, self.by_torque, found.active)
+        moves = solve_active(self.matrix, self.by_torque, solution.active)
         slope = self.angle_by_torque + moves @ self.angle_by_value
-        ok = found.solved
+        ok = solution.solved
         return Response(
             output_angle=np.where(ok, angle, np.nan),
             potential=np.where(ok, potential, np.nan),
             compliance=np.where(ok, -slope, np.nan),
-            active=found.active,
+            active=solution.active,
         )
 
     def changes(self, low: float, high: float, contact: Index) -> ContactChanges:
-        """Changes of contact over the torque, without errors of the teeth.
+        """Contact changes over a torque range, without errors of the teeth.
 
         Args:
             low: Smallest torque [N·m].
-            high: Largest one [N·m].
-            contact: Numbers of the contacts (m,).
+            high: Largest torque [N·m].
+            contact: Numbers that identify the contacts (m,).
         """
         below, c_below = self._followed(-1.0, self.torque - low)
         above, c_above = self._followed(1.0, high - self.torque)
@@ -178,18 +183,18 @@ class Influence:
     def _followed(
         self, sign: float, reach: float
     ) -> tuple[list[tuple[int, float]], list[float]]:
-        """Follow the solution over the torque, linear between changes of contact.
+        """Follow the solution over the torque; it is linear between contact changes.
 
-        Each change is the exchange of one unknown: principal pivots in a single
-        parameter. More than :data:`MOST_CHANGES` of them end the path.
+        Each change exchanges one unknown (parametric principal pivoting). The path ends
+        after :data:`MOST_CHANGES` changes.
 
         Args:
-            sign: Of the change of the torque.
-            reach: Its size [N·m].
+            sign: Sign of the change of torque.
+            reach: Magnitude of the change of torque [N·m].
 
         Returns:
-            Contacts that change, with the change of the torque [N·m]; compliances
-            before, between and after them [rad/(N·m)].
+            Contacts that change, each with the change of torque [N·m], and the
+            compliances before, between and after the changes [rad/(N·m)].
         """
         offset = np.stack([self.slack, sign * self.by_torque], axis=1)
         active = np.zeros(len(offset), bool)
@@ -198,11 +203,11 @@ class Influence:
             inside = np.flatnonzero(active)
             block = self.matrix[np.ix_(inside, inside)]
             moves = np.linalg.solve(block, -offset[inside])
-            found = offset + self.matrix[:, inside] @ moves
-            found[inside] = moves
+            solution = offset + self.matrix[:, inside] @ moves
+            solution[inside] = moves
             slope = sign * moves[:, 1] @ self.angle_by_value[inside]
             compliances.append(-float(self.angle_by_torque + slope))
-            value, rate = found.T
+            value, rate = solution.T
             falling = np.flatnonzero(rate < 0.0)
             if not falling.size or len(changes) == MOST_CHANGES:
                 return changes, compliances
@@ -217,18 +222,19 @@ class Influence:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Gaps:
-    """Tooth contacts of a condensed drive and how errors of the teeth change them."""
+    """Tooth contacts of a condensed drive, with derivatives by errors of the teeth."""
 
     sector: Index
-    """Tooth of the flexspline (n,)."""
+    """Flexspline tooth of each contact (n,)."""
     tooth: Index
-    """Tooth of the circular spline (n,)."""
+    """Circular-spline tooth of each contact (n,)."""
     direction: Array
-    """Derivatives of the gap by the shifts of these teeth (2, n, 2)."""
+    """Derivatives of the gaps by the shifts of these teeth (2, n, 2) [-]."""
     by_tilt: Array
-    """The same by the slope of the circular spline's axis (n, 2) [m/rad]."""
+    """Derivatives of the gaps by the slope of the circular spline's axis (n, 2)
+    [m/rad]."""
     carries: Mask
-    """Which carry force (n,)."""
+    """Whether each contact carries force (n,)."""
 
 
 def pivot_system(
@@ -243,19 +249,21 @@ def pivot_system(
     angle: float,
     torque: float,
 ) -> Influence:
-    """The complementarity problem of a condensed drive, seen from its equilibrium.
+    """The complementarity problem of a condensed drive, relative to its equilibrium.
 
     Args:
-        system: Gaps of the teeth, then of other supports by the forces there (by their
-            openings where these are closed), then equations of further unknowns (k, k).
-        offset: The same at zero unknowns (k,).
-        gaps: Of the teeth, the first n rows.
-        closed_supports: Of the next rows (m - n,).
+        system: Matrix (k, k). Its rows are the tooth gaps, the responses of the other
+            supports and equations of further unknowns. Its columns are the tooth
+            forces, the unknowns of the supports (forces, or openings of those that are
+            closed) and the further unknowns.
+        offset: Values of the rows at zero unknowns (k,).
+        gaps: Tooth contacts, the first n rows.
+        closed_supports: Whether each support in the next rows is closed (m - n,).
         free: Further unknowns that their equations determine.
-        output: Row of the output angle or, where it is free, of its torque.
-        sign: Of T in that row.
+        output: Row of the output angle or, if that is an unknown, of its torque.
+        sign: Sign and factor of T in that row.
         angle: Output angle of the equilibrium [rad].
-        torque: T there [N·m].
+        torque: Torque T of the equilibrium [N·m].
     """
     n = len(gaps.carries)
     m = n + len(closed_supports)
@@ -284,11 +292,11 @@ def pivot_system(
 
 
 def _stiffening(block: Array) -> Array:
-    """What makes the stiffness against openings positive (n,).
+    """Diagonal that makes the stiffness against openings positive definite (n,).
 
-    Where all contacts open the flexspline moves freely, and under preload the stiffness
-    of that motion may be negative, by a millionth; no equilibrium is there, but the
-    search for one passes.
+    If all contacts open, the flexspline moves freely, and under preload the stiffness
+    of that motion may be slightly negative, by a millionth. No equilibrium has this
+    contact state, but the search may pass through it.
     """
     size = np.diag(block)
     if not (size > 0.0).all():

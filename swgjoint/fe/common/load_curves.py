@@ -16,17 +16,23 @@ class Curves:
     """Compliance over intervals of length 1: a cubic plus jumps."""
 
     power: Array
-    """Ascending coefficients (n, 4)."""
+    """Coefficients of the cubic in ascending powers (n, 4) [rad/(N·m)]."""
     place: Array
-    """Place of the jumps, in [0, 1] (n, m)."""
+    """Places of the jumps, in [0, 1] (n, m)."""
     jump: Array
-    """(n, m)."""
+    """Jumps of the compliance (n, m) [rad/(N·m)]."""
     feasible: NDArray[np.bool_]
-    """Whether the explanation exists (n,)."""
+    """Whether a curve of this form exists (n,)."""
 
     @classmethod
     def where(cls, mask: Mask, one: Curves, other: Curves) -> Curves:
-        """One of two by interval (n,)."""
+        """Choose between two sets of curves by interval.
+
+        Args:
+            mask: Where to take ``one`` (n,).
+            one: Curves where the mask is true.
+            other: Curves elsewhere.
+        """
         place, jump = [
             np.concatenate([mask[:, None] * a, ~mask[:, None] * b], axis=1)
             for a, b in ((one.place, other.place), (one.jump, other.jump))
@@ -40,14 +46,14 @@ class Curves:
 
     @property
     def bend(self) -> Curves:
-        """Deviation of the cubic from a straight line, without the steps."""
+        """Deviation of the cubic from a straight line, without the jumps."""
         power = self.power.copy()
         power[:, 1] = -power[:, 2:].sum(axis=1)
         power[:, 0] = 0.0
         return replace(self, power=power, jump=np.zeros_like(self.jump))
 
     def select(self, k: NDArray[np.intp]) -> Curves:
-        """Those of some intervals."""
+        """Curves of the intervals with indices ``k``."""
         return Curves(
             power=self.power[k],
             place=self.place[k],
@@ -56,7 +62,7 @@ class Curves:
         )
 
     def integrals(self, x: Array) -> tuple[Array, Array, Array]:
-        """C and what it integrates to once and twice from 0 to x (n,)."""
+        """C at x (n,), and its first and second integrals from 0 to x."""
         k = np.arange(4)
         powers = x[:, None] ** k
         after = np.maximum(x[:, None] - self.place, 0.0)
@@ -69,7 +75,7 @@ class Curves:
         return c, once, twice
 
     def integrals_on(self, grid: Array) -> tuple[Array, Array]:
-        """Both integrals at places of every interval (n, m)."""
+        """First and second integrals at places of every interval (n, m)."""
         n, m = grid.shape
         k = np.repeat(np.arange(n), m)
         _, once, twice = self.select(k).integrals(grid.ravel())
@@ -77,11 +83,17 @@ class Curves:
 
 
 def one_jump(c0: Array, change: Array, mean: Array, moment: Array) -> Curves:
-    r"""C0 + g x + (Delta - g) H(x - a) with the given mean and moment.
+    r"""Curves C0 + g x + (Delta - g) H(x - a) with given mean and moment.
 
     With p = 1 - a the mean is g/2 + (Delta - g) p and the moment g/6 + (Delta - g)
-    p^2/2; without p a quadratic for the slope g is left, of which the flatter root
-    counts.
+    p^2/2. Eliminating p leaves a quadratic for the slope g; the root with the smaller
+    magnitude is used.
+
+    Args:
+        c0: Compliance C0 at the start of each interval (n,) [rad/(N·m)].
+        change: Change Delta of C over the interval (n,) [rad/(N·m)].
+        mean: Mean of C - C0 (n,) [rad/(N·m)].
+        moment: Mean of (1 - x) (C - C0) (n,) [rad/(N·m)].
     """
     b = mean - 2.0 * moment - change / 3.0
     k = 2.0 * moment * change - mean**2
@@ -107,7 +119,14 @@ def one_jump(c0: Array, change: Array, mean: Array, moment: Array) -> Curves:
 
 
 def two_jumps(c0: Array, change: Array, mean: Array, moment: Array) -> Curves:
-    """C0, then two jumps of a half of the change each."""
+    """Curves with constant C0 and two jumps of half the change each.
+
+    Args:
+        c0: Compliance C0 at the start of each interval (n,) [rad/(N·m)].
+        change: Change of C over the interval (n,) [rad/(N·m)].
+        mean: Mean of C - C0 (n,) [rad/(N·m)].
+        moment: Mean of (1 - x) (C - C0) (n,) [rad/(N·m)].
+    """
     scale = np.abs(c0) + np.abs(mean)
     flat = np.abs(change) <= 1e-12 * scale
     by = np.where(flat, 1.0, change)
@@ -115,7 +134,7 @@ def two_jumps(c0: Array, change: Array, mean: Array, moment: Array) -> Curves:
     total, squares = 2.0 * mean / by, 4.0 * moment / by
     apart = 2.0 * squares - total**2
     half = np.sqrt(np.maximum(apart, 0.0))
-    # where the jumps are one, round-off may part them the wrong way
+    # if the jumps coincide, round-off may make the discriminant negative
     slack = 1e-9 * scale / np.abs(by)
     after = 0.5 * np.stack([total + half, total - half], axis=1)
     inside = (after >= -1e-9).all(axis=1) & (after <= 1.0 + 1e-9).all(axis=1)
@@ -130,11 +149,19 @@ def two_jumps(c0: Array, change: Array, mean: Array, moment: Array) -> Curves:
 def steps_on_cubic(
     c0: Array, change: Array, mean: Array, moment: Array, steps: list[Steps]
 ) -> Curves:
-    """Given steps in every interval, plus the cubic that meets all four figures."""
-    most = max((own.place.size for own in steps), default=0)
+    """Curves with given steps, plus the cubic that meets the four figures.
+
+    Args:
+        c0: Compliance C0 at the start of each interval (n,) [rad/(N·m)].
+        change: Change of C over the interval (n,) [rad/(N·m)].
+        mean: Mean of C - C0 (n,) [rad/(N·m)].
+        moment: Mean of (1 - x) (C - C0) (n,) [rad/(N·m)].
+        steps: Steps of each interval, n of them.
+    """
+    most = max((one.place.size for one in steps), default=0)
     place, jump = np.zeros((c0.size, most)), np.zeros((c0.size, most))
-    for k, own in enumerate(steps):
-        place[k, : own.place.size], jump[k, : own.jump.size] = own.place, own.jump
+    for k, one in enumerate(steps):
+        place[k, : one.place.size], jump[k, : one.jump.size] = one.place, one.jump
     after = 1.0 - place
     cubic = fit_cubic(
         c0,
@@ -146,7 +173,14 @@ def steps_on_cubic(
 
 
 def fit_cubic(c0: Array, change: Array, mean: Array, moment: Array) -> Curves:
-    """C0 + Delta x + x (1 - x) (a + b x): the quintic Hermite curve of G."""
+    """Curves C0 + Delta x + x (1 - x) (a + b x): the quintic Hermite curve of G.
+
+    Args:
+        c0: Compliance C0 at the start of each interval (n,) [rad/(N·m)].
+        change: Change Delta of C over the interval (n,) [rad/(N·m)].
+        mean: Mean of C - C0 (n,) [rad/(N·m)].
+        moment: Mean of (1 - x) (C - C0) (n,) [rad/(N·m)].
+    """
     mean, moment = mean - 0.5 * change, moment - change / 6.0
     b = 60.0 * mean - 120.0 * moment
     a = 6.0 * mean - 0.5 * b

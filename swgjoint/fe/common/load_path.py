@@ -1,17 +1,18 @@
-r"""The curve of a drive over its torque at a fixed angle, from few equilibria.
+r"""Load curve of a drive over its torque at a fixed input angle, from few equilibria.
 
 Tooth pairs come into contact one by one: the tangent compliance C over the torque T is
-nearly constant between such events and jumps at them. An equilibrium gives output error
-e, strain energy U and C, and with the complementary potential
+nearly constant between such events and jumps at them. An equilibrium gives the output
+error e, the strain energy U and C. With the complementary potential
 
 .. math:: G = U + T e, \quad \frac{dG}{dT} = e, \quad \frac{de}{dT} = -C
 
-two of them give for the interval between them C at both ends, its mean (from e) and its
-first moment (from G). Where both equilibria predict which contacts change between them,
-see :mod:`swgjoint.fe.plane.contact_prediction`, the curve has those jumps and a cubic
-that meets the four figures. Elsewhere these determine one jump on a common slope, and
-two equal jumps. Where the predictions of both ends, or both explanations, agree the
-curve is known; where they differ the difference estimates what is not known.
+two equilibria give C at both ends of the interval between them, its mean (from e) and
+its first moment (from G). If both equilibria predict which contacts change between
+them, see :mod:`swgjoint.fe.plane.contact_prediction`, the curve has those jumps plus a
+cubic that meets the four figures. Otherwise the four figures determine two candidate
+curves: one jump on a common slope, and two equal jumps. If the predictions of both
+ends, or both candidates, agree, the curve is known; otherwise their difference
+estimates its error.
 """
 
 from __future__ import annotations
@@ -35,43 +36,46 @@ from swgjoint.fe.common.load_curves import (
 from swgjoint.typing import Array, Mask
 
 CHANCE = 0.01
-"""Part of the length of an interval times the change of its compliance that counts as
-unknown: several jumps may happen to look like one."""
+"""Error that is always assumed for an interval, as a fraction of its length times the
+change of its compliance [-]: several jumps may look like one."""
 AGREED = 0.5
-"""Estimated error of the merged prediction, as part of the difference between the
-predictions of both ends. Measured on five designs: true errors are 0.5 to 1.6 of it."""
+"""Estimated error of the merged prediction, as a fraction of the difference between the
+predictions of both ends [-]. On five designs the true errors are 0.5 to 1.6 times the
+estimate."""
 BENT = 0.1
-"""Estimated error of the cubic correction, as part of its deviation from a line."""
+"""Estimated error of the cubic correction, as a fraction of its deviation from a line
+[-]."""
 SMOOTH = 0.4
-"""Typical smooth variation of the compliance between two steps, as part of its size."""
+"""Typical smooth variation of the compliance between two steps, as a fraction of the
+compliance [-]."""
 STRONG = 0.02
-"""Smallest step of the compliance that the torques of a table follow, as part of the
-largest compliance."""
+"""Smallest step of the compliance that the torques of a table follow, as a fraction of
+the largest compliance [-]."""
 _GRID = np.linspace(0.0, 1.0, 17)
-"""Where explanations are compared in an interval."""
+"""Places in an interval where candidate curves are compared."""
 _NEAR_END = 0.1
-"""Intervals are not divided closer to an end than this part of them."""
+"""Smallest distance of a division from the ends of an interval, as a fraction of it."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LoadPath:
-    """Equilibria of a drive at one angle over its torque, and their curve."""
+    """Equilibria of a drive over its torque at one angle, and their load curve."""
 
     torque: Array
-    """T, increasing [N·m]. Shape (n,)."""
+    """Torque T, increasing (n,) [N·m]."""
     output_error: Array
-    """psi - theta/i [rad]. Shape (n,)."""
+    """Output error e = psi - theta/i (n,) [rad]."""
     energy: Array
-    """Strain energy [J]. Shape (n,)."""
+    """Strain energy U (n,) [J]."""
     compliance: Array
-    """Tangent -de/dT [rad/(N·m)]. Shape (n,)."""
+    """Tangent compliance C = -de/dT (n,) [rad/(N·m)]."""
     changes: tuple[ContactChanges | None, ...] = ()
-    """Changes of contact that each equilibrium predicts, n of them or none at all."""
+    """Contact changes that each equilibrium predicts: n entries, or empty."""
 
     def __post_init__(self) -> None:
         torque = frozen_array(self.torque, "torque [N·m]", ndim=1)
         if torque.size < 2 or (np.diff(torque) <= 0).any():
-            raise ValueError("torque [N·m] must increase, two of them at least")
+            raise ValueError("torque [N·m]: expected two or more values that increase")
         object.__setattr__(self, "torque", torque)
         for key, unit in (
             ("output_error", "rad"),
@@ -84,22 +88,25 @@ class LoadPath:
 
     @property
     def length(self) -> Array:
-        """Length of the intervals [N·m]. Shape (n - 1,)."""
+        """Length of the intervals (n - 1,) [N·m]."""
         return np.diff(self.torque)
 
     def evaluate_at(self, torque: ArrayLike) -> Array:
-        """Output error [rad], strain energy [J], compliance [rad/(N·m)] on the curve.
+        """Output error, strain energy and compliance on the curve.
 
         Args:
-            torque: Inside the range of the equilibria [N·m]. Shape (m,).
+            torque: Torques inside the range of the equilibria (m,) [N·m].
 
         Returns:
-            Shape (3, m).
+            Output error [rad], strain energy [J] and compliance [rad/(N·m)] (3, m).
+
+        Raises:
+            ValueError: If a torque is outside the range.
         """
         wanted = np.asarray(torque, float)
         if wanted.min() < self.torque[0] or wanted.max() > self.torque[-1]:
             raise ValueError(
-                f"torques {wanted.min():g} to {wanted.max():g} N·m; accepted:"
+                f"torque = {wanted.min():g} to {wanted.max():g} N·m: expected"
                 f" {self.torque[0]:g} to {self.torque[-1]:g} N·m"
             )
         last = self.torque.size - 2
@@ -109,13 +116,13 @@ class LoadPath:
         compliance, once, twice = self._curves.select(k).integrals(x)
         e0, e = self.output_error[k], self.output_error[k] - h * once
         potential = self._potential[k] + h * (x * e0 - h * twice)
-        found = np.stack([e, potential - wanted * e, compliance])
-        # an equilibrium itself, not the end of its interval with its round-off
+        values = np.stack([e, potential - wanted * e, compliance])
+        # at an equilibrium return its exact values, without round-off of the curve
         exact = np.searchsorted(self.torque, wanted)
         hit = self.torque[exact] == wanted
-        own = np.stack([self.output_error, self.energy, self.compliance])
-        found[:, hit] = own[:, exact[hit]]
-        return found
+        solved = np.stack([self.output_error, self.energy, self.compliance])
+        values[:, hit] = solved[:, exact[hit]]
+        return values
 
     @property
     def doubt(self) -> tuple[Array, Array]:
@@ -127,9 +134,10 @@ class LoadPath:
 
     @property
     def division(self) -> Array:
-        """Where one more equilibrium tells most in each interval [N·m] (n - 1,).
+        """Torque of the most informative next equilibrium in each interval [N·m].
 
-        Where the explanations differ most, in the middle if they agree.
+        It is where the candidate curves differ most, or in the middle if they agree.
+        Shape (n - 1,).
         """
         once, _ = self._differences
         worst = _GRID[once.argmax(axis=1)]
@@ -139,32 +147,34 @@ class LoadPath:
 
     @property
     def events(self) -> Array:
-        """Torques at which the compliance jumps as the curve has it [N·m]. (m,)."""
+        """Torques at which the compliance of the curve jumps (m,) [N·m]."""
         one, (known, _, _, both) = self._explained[0], self._predicted
         strong = one.feasible & (np.abs(one.jump[:, 0]) > 0.5 * np.abs(self._jump))
-        found = (self.torque[:-1] + one.place[:, 0] * self.length)[strong & ~known]
-        # steps that matter; a cubic has none
+        jumps = (self.torque[:-1] + one.place[:, 0] * self.length)[strong & ~known]
+        # only steps that matter; a cubic has none
         size = np.abs(both.jump) > STRONG * self.compliance.max()
         places = self.torque[:-1, None] + both.place * self.length[:, None]
-        return np.sort(np.concatenate([found, places[known[:, None] & size]]))
+        return np.sort(np.concatenate([jumps, places[known[:, None] & size]]))
 
     @property
     def _jump(self) -> Array:
-        """Change of the compliance over each interval [rad/(N·m)] (n - 1,)."""
+        """Change of the compliance over each interval (n - 1,) [rad/(N·m)]."""
         return np.diff(self.compliance)
 
     @cached_property
     def _potential(self) -> Array:
-        """G [J] (n,)."""
+        """Complementary potential G (n,) [J]."""
         return self.energy + self.torque * self.output_error
 
     @cached_property
     def _known(self) -> tuple[Array, Array, Array, Array]:
-        """What the equilibria tell of every interval, its length 1.
+        """The four figures of C that the equilibria give for each interval.
+
+        The interval is scaled to length 1.
 
         Returns:
-            C at its begin and its change; mean of C, and of (1 - x) C, less those of C
-            at the begin (n - 1,).
+            C0 at its start, change of C, mean of C - C0 and mean of (1 - x) (C - C0),
+            each (n - 1,) [rad/(N·m)].
         """
         h, e = self.length, self.output_error
         c0 = self.compliance[:-1]
@@ -174,7 +184,7 @@ class LoadPath:
 
     @cached_property
     def _explained(self) -> tuple[Curves, Curves, Curves]:
-        """One jump on a slope, two equal jumps, a cubic."""
+        """Candidate curves: one jump on a slope, two equal jumps, a cubic."""
         c0, change, mean, moment = self._known
         return (
             one_jump(c0, change, mean, moment),
@@ -184,11 +194,11 @@ class LoadPath:
 
     @cached_property
     def _predicted(self) -> tuple[Mask, Curves, Curves, Curves]:
-        """Curves by the changes of contact that the ends of an interval predict.
+        """Curves from the contact changes that the ends of an interval predict.
 
         Returns:
-            Where both ends do (n - 1,); curves by the first end, by the last one and by
-            both.
+            Whether both ends predict them (n - 1,); curves by the first end, by the
+            last end and by both.
         """
         n = self.torque.size - 1
         empty = np.zeros(0)
@@ -207,22 +217,22 @@ class LoadPath:
                 mean[k] - change[k] / 2.0, moment[k] - change[k] / 6.0, smooth
             )
         curves = [
-            steps_on_cubic(c0, change, mean, moment, [own[which] for own in steps])
+            steps_on_cubic(c0, change, mean, moment, [three[which] for three in steps])
             for which in range(3)
         ]
         return known, curves[0], curves[1], curves[2]
 
     @cached_property
     def _curves(self) -> Curves:
-        """By predictions of both ends, elsewhere by what explains the equilibria."""
+        """Curves by the predictions of both ends, else by the candidate curves."""
         known, _, _, predicted = self._predicted
         return Curves.where(known, predicted, self._by_jumps)
 
     @cached_property
     def _by_jumps(self) -> Curves:
-        """The mean of both explanations by jumps, one of them, or the cubic."""
+        """Mean of the feasible candidates with jumps, or the cubic without any."""
         one, two, cubic = self._explained
-        # one jump without a slope is exact, and two at its place up to a square root
+        # one jump without a slope is exact; two jumps there are so up to a square root
         sharp = one.feasible & (np.abs(one.power[:, 1]) <= 1e-6 * np.abs(self._jump))
         weight = np.stack([one.feasible, two.feasible & ~sharp], axis=1).astype(float)
         total = weight.sum(axis=1, keepdims=True)
@@ -240,26 +250,26 @@ class LoadPath:
 
     @cached_property
     def _differences(self) -> tuple[Array, Array]:
-        """Differences of the explanations, integrated once and twice (n - 1, grid)."""
+        """Differences of the candidates, integrated once and twice (n - 1, grid)."""
         one, two, cubic = self._explained
         grid = np.broadcast_to(_GRID, (self.length.size, _GRID.size))
         values = [curves.integrals_on(grid) for curves in (one, two, cubic)]
         both = one.feasible & two.feasible
         neither = ~one.feasible & ~two.feasible
-        # without a jump that explains them: what bends the curve at all
+        # without a feasible jump: deviation of the cubic from a straight line
         h, c0 = self.length[:, None], self.compliance[:-1, None]
         mean = -np.diff(self.output_error)[:, None] / h
         straight = (grid * mean, c0 * 0.5 * grid**2 + (mean - c0) * grid**3 / 6.0)
-        found = []
+        differences = []
         for a, b, c, line in zip(*values, straight, strict=True):
             apart = np.where(one.feasible[:, None], a - c, b - c)
             apart = np.where(both[:, None], a - b, apart)
-            found.append(np.abs(np.where(neither[:, None], c - line, apart)))
+            differences.append(np.abs(np.where(neither[:, None], c - line, apart)))
         known, first, last, merged = self._predicted
         predictions = (
             curves.integrals_on(grid) for curves in (first, last, merged.bend)
         )
-        for own, a, b, bend in zip(found, *predictions, strict=True):
+        for difference, a, b, bend in zip(differences, *predictions, strict=True):
             apart = AGREED * np.abs(a - b) + BENT * np.abs(bend)
-            own[known] = apart[known]
-        return found[0], found[1]
+            difference[known] = apart[known]
+        return differences[0], differences[1]

@@ -1,4 +1,4 @@
-"""Equilibria of a drive over torque and input angle, torques as each angle asks."""
+"""Adaptive sampling of equilibria of a drive over torque and input angle."""
 
 from __future__ import annotations
 
@@ -19,65 +19,68 @@ from swgjoint.maps.unfinished import Unfinished
 from swgjoint.typing import Array
 
 EVERY = 4
-"""Of the first positions are solved in the second pitch, too."""
+"""Stride of the input positions that are solved again in the second pitch."""
 ANGLE_GOAL = 0.02
-"""Difference at unseen angles, in the peak to peak, at which the first angles suffice;
-it grows with the root of their number: each doubling takes solves from the torques."""
+"""Goal for the error at unseen angles with the first number of angles, as a fraction of
+the peak-to-peak value [-]. It grows with the square root of the number of angles,
+because each doubling leaves fewer solves for the torques."""
 GOAL = 0.04
-"""The same difference at unseen torques, where those of the samples count, too."""
+"""Goal for the error at unseen angles and torques, as a fraction of the peak-to-peak
+value [-]."""
 STALLED = 0.7
-"""Part of a difference which is left after a doubling that was worth it: more angles
-do not cure what comes from the mesh."""
+"""Fraction of the error that may remain after doubling the angles if they are to be
+doubled again [-]: more angles do not remove errors of the mesh."""
 TORQUE_GOAL = 0.04
-"""Estimated error between torques, in the same, at which they suffice."""
+"""Goal for the estimated error between torques, as a fraction of the peak-to-peak value
+[-]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Effort:
-    """How many equilibria a map may take."""
+    """Budget of equilibria of a map."""
 
     angles: int
-    """Input positions over one pitch to begin with."""
+    """Initial number of input positions over one pitch."""
     most_angles: int
-    """To which they may be doubled; ``angles`` times a power of two."""
+    """Largest number of input positions, ``angles`` times a power of two."""
     solves: int
-    """Equilibria of the samples and of those that judge the map."""
+    """Largest number of equilibria for sampling and validation together."""
     unseen: tuple[int, int]
-    """Torques of one sign, and angles of each, that judge the map."""
+    """Validation torques of one sign, and validation angles."""
     torques: int
-    """Most torques of one sign in the table."""
+    """Largest number of torques of one sign in the table."""
     beyond: bool = False
-    """Whether one torque of each sign beyond the largest one is solved at the end."""
+    """Whether to solve one torque of each sign beyond the largest one at the end."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Pattern(Generic[AnyState]):
-    """Equilibria over one pitch, torques of either sign."""
+    """Equilibria over one pitch and torques of both signs."""
 
     theta: Array
-    """Input positions, equally spaced over the pitch [rad]. Shape (n_angles,)."""
+    """Input positions, equally spaced over the pitch (n_angles,) [rad]."""
     torque: Array
-    """T, increasing, zero included [N·m]. Shape (n_torques,)."""
+    """Torques T, increasing, including zero (n_torques,) [N·m]."""
     table: Array
-    """Output error, energy, tangent compliance, input torque. Shape (4, n_torques,
-    n_angles)."""
+    """Output error [rad], energy [J], tangent compliance [rad/(N·m)] and input torque
+    [N·m] (4, n_torques, n_angles)."""
     solved: NDArray[np.bool_]
-    """Torques that were solved at every angle; the others lie on the load paths, their
-    input torque on a straight line. Shape (n_torques,)."""
+    """Whether each torque was solved at every angle (n_torques,). The other rows are
+    interpolated along the load paths, their input torque linearly."""
     unseen: FullSolves
-    """Equilibria at other angles and torques."""
+    """Validation equilibria at other angles and torques."""
     shortfall: str
-    """What the solves did not suffice for; empty if they did."""
+    """Goals that the budget of solves did not reach; empty if it reached all."""
     free: bool
-    """Whether clearance leaves the output free without torque; the torques next to zero
-    are then added, see :func:`across_clearance`."""
+    """Whether clearance leaves the output free without torque. If so, the torques next
+    to zero are added, see :func:`across_clearance`."""
     truncated: bool
-    """Whether torques are left out at which a solve failed, and those beyond."""
+    """Whether torques are missing because a solve failed at them or at a smaller one.
+    """
     states: dict[float, list[AnyState]]
-    """Positions at the torques that were solved everywhere, that without torque
-    included."""
+    """Equilibria by torque that was solved everywhere, including zero."""
     info: dict[str, Any]
-    """How well the pattern repeats and is its own mirror image, and what was solved."""
+    """Results of the checks of periodicity and mirror symmetry, and of the sampling."""
 
 
 def solve_pattern(
@@ -92,25 +95,30 @@ def solve_pattern(
     tick: Callable[[], None],
     keep: Unfinished | None = None,
 ) -> Pattern[AnyState]:
-    """Solve as many angles and torques as the drive asks for.
+    """Solve as many angles and torques as the drive needs, within a budget.
 
-    First the given torques at every angle. Angles are doubled until they predict others
-    at these torques; then torques are added where the estimated error of the load paths
-    is largest, see :class:`swgjoint.fe.common.load_path.LoadPath`, and angles where
-    others are still missed. Last comes a torque beyond the largest one, see
-    :meth:`ColumnGrid.go_beyond`. The claims that the map rests on are checked at one
-    torque.
+    The initial torques are solved at every angle. Angles are doubled until they predict
+    other angles at these torques, and torques are added where the estimated error of
+    the load paths is largest, see :class:`swgjoint.fe.common.load_path.LoadPath`. Then
+    angles are doubled while the validation torques are predicted too poorly. Finally a
+    torque beyond the largest one is solved, see :meth:`ColumnGrid.go_beyond`.
+    Periodicity and mirror symmetry, on which the map relies, are checked at one torque.
 
     Args:
         follow: The drive.
-        period: Of the pattern [rad].
-        torques: To begin with, zero excluded; positive ones if ``symmetric`` [N·m].
-        effort: Angles and solves.
+        period: Period of the pattern in the input angle [rad].
+        torques: Initial torques without zero, positive ones only if ``symmetric``
+            [N·m].
+        effort: Budget of angles, torques and solves.
         small: Torque that takes up a clearance [N·m].
-        rated: Next to it the claims are checked [N·m].
+        rated: Rated torque; the checks are made at the closest torque [N·m].
         symmetric: Whether the negative torques are the mirror image.
         tick: Called after every solve.
-        keep: Where equilibria are kept, and taken up again; None keeps none.
+        keep: Store of equilibria, from which an interrupted run resumes; None stores
+            none.
+
+    Returns:
+        The sampled pattern.
 
     Raises:
         ComputationError: If the unloaded drive or all torques cannot be solved.
@@ -131,12 +139,12 @@ def solve_pattern(
             "no torque can be solved; the smallest is"
             f" {min(torques, key=abs):g} N·m of {max(torques, key=abs):g} N·m"
         )
-    # the claims, at the angles that every map has
+    # check periodicity and mirror symmetry at the angles that every map has
     check = min(grid.levels, key=lambda t: abs(t - rated))
     info: dict[str, Any] = {"second_pitch": _second_pitch(grid, check, count)}
     if symmetric:
         info["mirror"] = _mirror(grid, check, count)
-    # angles that no sample has, first at the torques that all have
+    # validate at angles that are not sampled, first at the torques of all columns
     places = unseen_places(effort.unseen[1], effort.most_angles)
     others = [grid.unseen_column(place) for place in places]
     first = [0.0, *grid.levels]
@@ -144,12 +152,12 @@ def solve_pattern(
     reserved = len(others) * effort.unseen[0] * len(grid.signs)
 
     def budget() -> int:
-        """What the samples may take; a torque beyond the largest one comes last."""
+        """Solves left for samples, less those of the torque beyond the largest one."""
         last = count * len(grid.signs) if effort.beyond else 0
         return effort.solves - reserved - last
 
     def doubles(goal: float) -> bool:
-        """Whether more angles are wanted, and a torque for them all still fits."""
+        """Whether to double the angles, with one more torque within the budget."""
         fits = grid.solves + grid.cost(count) + count <= budget()
         return missed > goal and 2 * count <= effort.most_angles and fits
 
@@ -157,7 +165,7 @@ def solve_pattern(
         return float(ANGLE_GOAL * np.sqrt(count / effort.angles))
 
     while True:
-        # no better between the torques than between the angles
+        # torques need not be resolved better than angles
         doubt = grid.divide(count, budget(), max(TORQUE_GOAL, missed))
         if not doubles(angle_goal()):
             break
@@ -167,7 +175,7 @@ def solve_pattern(
         if missed > STALLED * before:
             break
     doubt = grid.divide(count, budget(), TORQUE_GOAL)
-    # contacts may change between the angles under other torques alone
+    # contact changes between the angles may occur at other torques only
     unseen = grid.unseen(others, effort.unseen[0])
     reserved = 0
     missed = grid.largest_miss(count, others, np.unique(unseen.torque))
@@ -220,15 +228,15 @@ def solve_pattern(
 def _second_pitch(
     grid: ColumnGrid[AnyState], torque: float, count: int
 ) -> dict[str, float]:
-    """How well the pattern repeats at some angles of the next pitch."""
+    """Difference of the output error at some angles between this and the next pitch."""
     follow, theta = grid.follow, grid.angles(count)
     columns = [column for _, column in grid.chosen(count)]
     state, again = columns[-1].states[torque], []
     for angle in grid.period + theta[::EVERY]:
         solve = partial(follow.to_angle, state, float(angle))
-        found = grid.solve_at(float(angle), torque, solve)
-        again.append(np.nan if found is None else follow.output_angle(found))
-        state = state if found is None else found
+        turned = grid.solve_at(float(angle), torque, solve)
+        again.append(np.nan if turned is None else follow.output_angle(turned))
+        state = state if turned is None else turned
         grid.count()
     first = np.array([grid.figures(c.states[torque], c.theta)[0] for c in columns])
     apart = np.array(again) - (grid.period + theta[::EVERY]) / follow.ratio
@@ -240,23 +248,27 @@ def _second_pitch(
 
 
 def _mirror(grid: ColumnGrid[AnyState], torque: float, count: int) -> dict[str, Any]:
-    """How well the drive is its own mirror image, at the second angle."""
+    """Difference of the output error between the drive and its mirror image.
+
+    It is evaluated at the second angle.
+    """
     step = grid.finest // count
     one, image = grid.columns[step], grid.columns[grid.finest - step]
     solve = partial(grid.follow.to_torque, one.rest.state, -torque)
-    found = grid.solve_at(one.theta, -torque, solve)
+    opposite = grid.solve_at(one.theta, -torque, solve)
     difference = None
-    if found is not None:
+    if opposite is not None:
         wanted = -grid.figures(image.states[torque], image.theta)[0]
-        difference = float(grid.figures(found, one.theta)[0] - wanted)
+        difference = float(grid.figures(opposite, one.theta)[0] - wanted)
     return {"torque_Nm": -torque, "difference_rad": difference}
 
 
 def with_mirrored_torques(tables: dict[float, Array]) -> dict[float, Array]:
-    """Tables of positive torques and their mirror images, around one rest.
+    """Add the mirror images of the tables of positive torques.
 
-    Without load the drive is its own mirror image but for round-off, which exceeds the
-    energy of the smallest torques: both sides count from the mean of the two.
+    Without load the drive equals its mirror image except for round-off, which exceeds
+    the energy of the smallest torques. The tables of both signs are therefore shifted
+    to the mean of the unloaded table and its mirror image.
     """
     rest = tables[0.0]
     middle = 0.5 * (rest + _mirrored(rest))
@@ -267,9 +279,10 @@ def with_mirrored_torques(tables: dict[float, Array]) -> dict[float, Array]:
 
 
 def _mirrored(values: Array) -> Array:
-    """The same drive under the opposite torque, seen in a mirror.
+    """Table of the mirrored drive, under the opposite torque.
 
-    At -T and -theta: opposite error and input torque, same energy and compliance.
+    At -T and -theta output error and input torque are opposite, energy and compliance
+    equal.
     """
     back = np.roll(values[:, ::-1], 1, axis=1)
     return np.asarray(back * np.array([-1.0, 1.0, 1.0, -1.0])[:, None])

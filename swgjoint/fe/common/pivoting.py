@@ -1,4 +1,4 @@
-"""Many small complementarity problems that share one matrix."""
+"""Solution of many small complementarity problems that share one matrix."""
 
 from __future__ import annotations
 
@@ -11,18 +11,20 @@ import numpy as np
 from swgjoint.typing import Array, Index, Mask
 
 TOLERANCE = 1e-9
-"""Part of the largest offset of a problem that counts as zero."""
+"""Values below this fraction of the largest offset of a problem count as zero [-]."""
 TRIES = 20
-"""Exchanges of whole blocks without progress before single ones: with 3 of them a
-quarter more systems are solved."""
+"""Block exchanges without progress before single exchanges start; with 3 of them a
+quarter more systems must be solved."""
 SINGLES = 60
-"""Single exchanges without progress before a problem is solved alone."""
+"""Single exchanges without progress before a problem is solved on its own."""
 PIVOTS = 10
-"""Most pivots of a problem alone, over its size; contacts take a fifth of its size."""
+"""Most pivots of such a problem divided by its size; contact problems take a fifth of
+their size."""
 TIE = 1e-12
-"""Part of the largest offset within which rows leave Lemke's basis together."""
+"""Tolerance of ties in the ratio test of Lemke's method, as a fraction of the largest
+offset [-]."""
 BATCH = 32
-"""Problems with active sets of similar size that are solved at once."""
+"""Number of problems with active sets of similar size that are solved at once."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -30,25 +32,27 @@ class Pivoted:
     """Solutions of :func:`solve_many`; rows are problems."""
 
     value: Array
-    """v, zero where not active."""
+    """Unknowns v, zero where not active (n_problems, n)."""
     slack: Array
-    """w, zero where active."""
+    """Slacks w, zero where active (n_problems, n)."""
     active: Mask
+    """Active sets (n_problems, n)."""
     solved: Mask
-    """Which problems were solved; the others, also those whose active set leaves the
-    system singular, are NaN. Shape (n_problems,)."""
+    """Whether each problem was solved (n_problems,). The others, including those whose
+    active set gives a singular system, are NaN."""
 
 
 def solve_many(matrix: Array, offset: Array, start: Mask | None = None) -> Pivoted:
     r"""Solve :math:`0 \le v \perp w = q + M v \ge 0` for every row q of the offset.
 
-    Most unknowns are zero in every solution: the problem is solved in the others alone,
-    those that were negative at first, and again with those that are negative then.
+    Most unknowns are zero in every solution. The problems are therefore solved in the
+    unknowns whose slack is negative at first, and again with those whose slack becomes
+    negative.
 
     Args:
-        matrix: M, positive definite; symmetry is not required. Shape (n, n).
-        offset: Shape (n_problems, n).
-        start: Guess of the active sets; empty ones if None.
+        matrix: Matrix M (n, n), positive definite; symmetry is not required.
+        offset: Offsets q (n_problems, n).
+        start: Guess of the active sets (n_problems, n); by default empty.
     """
     scale = np.sqrt(np.diag(matrix))
     q = offset / scale
@@ -83,16 +87,17 @@ def solve_many(matrix: Array, offset: Array, start: Mask | None = None) -> Pivot
 def _all_unknowns(
     scaled: Array, q: Array, tolerance: Array, active: Mask
 ) -> tuple[Array, Mask]:
-    """V where active, else w, and the active sets, searched among all unknowns.
+    """Solve in all given unknowns; returns v where active, else w, and active sets.
 
-    Block principal pivoting: all wrong members of the active set change sides; where
-    that makes no progress only the last one does (Murty), which may take long. Where
-    that makes none either the problem is solved alone, see :func:`lemke`.
+    The method is block principal pivoting: all infeasible unknowns switch between
+    active and inactive. If that makes no progress, only the last one does (Murty),
+    which may take many steps. If that makes no progress either, the problem is solved
+    on its own, see :func:`lemke`.
 
     Args:
-        scaled: M with a diagonal of one (n, n).
-        q: Shape (n_problems, n).
-        tolerance: What counts as zero (n_problems,).
+        scaled: Matrix M scaled to a unit diagonal (n, n).
+        q: Scaled offsets (n_problems, n).
+        tolerance: Magnitude that counts as zero (n_problems,).
         active: Guess of the active sets (n_problems, n).
 
     Source:
@@ -115,7 +120,7 @@ def _all_unknowns(
             def solve(part: Index) -> Array:
                 return _at_active(scaled, q[part], active[part])
 
-            # the last few problems: a thread costs more than it saves
+            # for a single batch a thread costs more than it saves
             solve_all = pool.map if len(parts) > 1 else map
             for part, found in zip(parts, solve_all(solve, parts), strict=True):
                 result[part] = found
@@ -149,16 +154,19 @@ def _all_unknowns(
 
 
 def lemke(matrix: Array, offset: Array, start: Mask) -> Mask | None:
-    """Active set of one problem; None where its search ends without any.
+    """Active set of one problem by Lemke's method.
 
-    An artificial unknown that makes all others positive is driven out: each pivot lets
-    the complement of what has just left enter. For a positive definite matrix that
-    ends at the only solution.
+    An artificial unknown that makes all others positive is driven out of the basis: in
+    each pivot the complement of the unknown that has just left enters. For a positive
+    definite matrix this ends at the unique solution.
 
     Args:
-        matrix: M with a diagonal of one (n, n).
-        offset: q (n,).
+        matrix: Matrix M scaled to a unit diagonal (n, n).
+        offset: Offset q (n,).
         start: Guess of the active set (n,).
+
+    Returns:
+        Active set (n,); None if the search ends without a solution.
 
     Source:
         Lemke (1965), "Bimatrix equilibrium points and mathematical programming",
@@ -173,7 +181,8 @@ def lemke(matrix: Array, offset: Array, start: Mask) -> Mask | None:
     begin = forward @ offset
     if begin.min() >= 0.0:
         return start
-    # basic unknowns by the others: w are 0 to n - 1, v n to 2 n - 1, one artificial
+    # basic unknowns in terms of the others: w are 0 to n - 1, v are n to 2 n - 1, and
+    # 2 n is the artificial unknown
     table = np.concatenate([-exchanged, -np.ones((n, 1)), begin[:, None]], axis=1)
     basis = np.arange(n) + n * start
     others = np.append(np.arange(n) + n * ~start, 2 * n)
@@ -210,14 +219,14 @@ def lemke(matrix: Array, offset: Array, start: Mask) -> Mask | None:
 
 
 def exchange(system: Array, inside: Index) -> tuple[Array, Array]:
-    """Exchange unknowns and rows of a linear map y = A z + q.
+    """Exchange unknowns and results of a linear map y = A z + q.
 
     Args:
-        system: A (k, k).
-        inside: Where the row becomes the unknown.
+        system: Matrix A (k, k).
+        inside: Rows whose result becomes the unknown.
 
     Returns:
-        The exchanged map (k, k), and the factor that q gets (k, k).
+        Matrix of the exchanged map (k, k), and the matrix that multiplies q (k, k).
     """
     k = len(system)
     outside = np.setdiff1d(np.arange(k), inside)
@@ -237,12 +246,15 @@ def exchange(system: Array, inside: Index) -> tuple[Array, Array]:
 
 
 def solve_active(matrix: Array, right: Array, active: Mask) -> Array:
-    """Solve :math:`M v + r = 0` within every active set, v zero elsewhere.
+    """Solve :math:`M v + r = 0` within every active set, with v zero elsewhere.
 
     Args:
-        matrix: M (n, n).
-        right: r, the same for all (n,).
-        active: Shape (n_problems, n).
+        matrix: Matrix M (n, n).
+        right: Vector r, the same for all problems (n,).
+        active: Active sets (n_problems, n).
+
+    Returns:
+        Solutions v (n_problems, n); NaN where a system is singular.
     """
     inside = np.flatnonzero(active.any(axis=0))
     scale = np.sqrt(np.diag(matrix))[inside]
@@ -259,11 +271,11 @@ def solve_active(matrix: Array, right: Array, active: Mask) -> Array:
 
 
 def _at_active(matrix: Array, q: Array, active: Mask) -> Array:
-    """V where active, w elsewhere, for given active sets."""
+    """Values v where active and w elsewhere, for given active sets."""
     size = int(active.sum(axis=1).max(initial=0))
     if size == 0:
         return q
-    # the active indices first; padded by equations that say v = 0
+    # active indices first, padded by equations v = 0
     index = np.argsort(~active, axis=1, kind="stable")[:, :size]
     rows = np.arange(len(q))[:, None]
     real = active[rows, index]

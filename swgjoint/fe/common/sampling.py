@@ -1,4 +1,4 @@
-"""Equilibria of a design over torque and input angle, for its map."""
+"""Sampling of the equilibria of a design over torque and input angle, for its map."""
 
 from __future__ import annotations
 
@@ -30,33 +30,40 @@ from swgjoint.maps.unfinished import Unfinished
 from swgjoint.progress import Progress, silent
 
 ANGLES = 24
-"""Input positions over one pitch to begin with, doubled up to :data:`MOST_ANGLES`:
-contact events leave corners in the error, which some wave generators pass in a few
-torques and others at every angle."""
+"""Initial number of input positions over one pitch in a 2D map. It is doubled up to
+:data:`MOST_ANGLES` as needed: contact events leave corners in the error, with some wave
+generators at a few torques only and with others at every angle."""
 MOST_ANGLES = 96
+"""Largest number of input positions over one pitch in a 2D map."""
 SOLVES = 1050
-"""Largest number of equilibria of a 2D map; an ellipse takes half of it."""
+"""Largest number of equilibria of a 2D map; an elliptical wave generator takes half."""
 UNSEEN = (16, 7)
-"""Torques of one sign and angles of each that judge the map."""
+"""Validation torques of one sign, and validation angles, of a 2D map."""
 SOLID_ANGLES = 16
-"""The same for a 3D map, whose equilibria take fifty times longer."""
+"""Initial number of input positions in a 3D map. An equilibrium of the 3D model takes
+fifty times as long as one of the 2D model."""
 SOLID_MOST_ANGLES = 16
+"""Largest number of input positions over one pitch in a 3D map."""
 SOLID_SOLVES = 220
+"""Largest number of equilibria of a 3D map."""
 SOLID_UNSEEN = (2, 2)
+"""Validation torques of one sign, and validation angles, of a 3D map."""
 TORQUES = 100
-"""Most torques of one sign in the table of a map."""
+"""Largest number of torques of one sign in the table of a map."""
 TOLERANCED_TORQUES = 24
-"""The same with errors of the teeth, which give it ten times the harmonics."""
+"""Largest number of torques of one sign in a map with tooth errors, which has ten times
+as many harmonics."""
 FIXED_SOLVES = 14
-"""Equilibria per angle where the number of angles is given."""
+"""Equilibria per angle if the number of angles is prescribed."""
 LEVELS = (0.05, 0.15, 0.35, 0.65, 1.0)
-"""Torques of every angle, of both signs, as parts of the repeated peak torque; others
-are added for all of them."""
+"""Initial torques of both signs at every angle, as fractions of the repeated peak
+torque; more are added at all angles."""
 SOLVER = NewtonSolver(step_tolerance=1e-9, thorough_below=1e-6)
-"""A map needs no more: the output error moves by 1e-9 rad and the input torque by 2e-6
-N·m, in little more than half the iterations."""
+"""Solver of 2D maps. Its tolerances change the output error by 1e-9 rad and the input
+torque by 2e-6 N·m compared with the defaults, and save almost half of the iterations.
+"""
 SYMMETRIC = ("elliptical", "simplified", "parabolic", "four_roller", "cosine")
-"""Wave generators that are their own mirror image; the teeth always are."""
+"""Wave generators that are their own mirror image, as the teeth always are."""
 
 
 def sample_map(
@@ -67,30 +74,34 @@ def sample_map(
     progress: Progress = silent,
     keep: Unfinished | None = None,
 ) -> MapSamples:
-    """Equilibria over one pitch and both signs of torque, by the nonlinear models.
+    """Sample equilibria over one pitch and both signs of torque.
 
-    Angles and torques are added until they predict others, as far as the budget of
-    equilibria goes, see :func:`swgjoint.fe.common.pattern.solve_pattern`; a few
-    equilibria at other angles and torques are left to judge the map. One pitch suffices
-    with perfect teeth, and with a symmetric wave generator the negative torques are the
-    mirror image of the positive ones; both claims are checked at rated torque and
-    recorded. Torques at which a solve fails, and those beyond, are left out, and the
-    record says so. Manufacturing errors are superposed, see
+    Angles and torques of the nonlinear model are added until they predict others,
+    within a budget of equilibria, see
+    :func:`swgjoint.fe.common.pattern.solve_pattern`. A few equilibria at other angles
+    and torques are reserved for the validation of the map. With perfect teeth one pitch
+    suffices, and with a symmetric wave generator the negative torques are the mirror
+    image of the positive ones; both properties are checked at rated torque and
+    recorded. Torques at which a solve fails, and larger ones, are omitted, and the
+    samples are marked as truncated. Manufacturing errors are superposed, see
     :mod:`swgjoint.fe.tolerances.sampling`; a map with them has a rigid wave generator.
 
-    In the plane the balls of a bearing stand still on the cam, the first one on the
-    major axis: they pass at another rate than teeth, and what repeats after a pitch and
-    is its own mirror image is the drive without that passage.
+    In the 2D model the balls of a bearing are held on the cam, the first one on the
+    major axis. Balls pass at another rate than teeth, and only the drive without their
+    passage repeats after a pitch and is its own mirror image.
 
     Args:
         design: The drive.
         model: Fidelity, ``2d`` or ``3d``.
         angles: Input positions over one pitch of the fixed member, with
-            :data:`FIXED_SOLVES` equilibria each; by default as many as the drive asks
-            for, from :data:`ANGLES`, in space :data:`SOLID_ANGLES`.
+            :data:`FIXED_SOLVES` equilibria each. By default as many as the drive needs,
+            starting from :data:`ANGLES` (2D) or :data:`SOLID_ANGLES` (3D).
         progress: Called with the stage, the solves done and their number.
-        keep: Where every equilibrium is kept and taken up again after an interruption;
-            the samples are the same, bit for bit. None keeps none.
+        keep: Store of all equilibria, from which an interrupted run resumes with the
+            same samples bit for bit. None stores none.
+
+    Returns:
+        Samples of the map.
 
     Raises:
         ComputationError: If the unloaded drive or small torques cannot be solved.
@@ -125,7 +136,7 @@ def sample_map(
         # two calls, because states of 2D and 3D models have different types
         found: Pattern[Any]
         if model == "3d":
-            solid = _in_space(design)
+            solid = _follower_3d(design)
             found = solve_pattern(solid, period, torques, effort, **settings)
             surface = solid_surface(solid.ring)
             shown = partial(solid_fields, solid.ring, surface=surface)
@@ -143,7 +154,7 @@ def sample_map(
             f"{parts[0]:g} N·m of {parts[-1]:g} N·m repeated peak"
         )
     error, energy, compliance, input_torque = found.table
-    # a cup that the plane lacks, boss and housing springs
+    # springs in series: the cup that the 2D model lacks, boss and housing
     series = series_compliance(design, cup=model == "2d")
     error = error - (used * series)[:, None]
     energy = energy + (0.5 * used**2 * series)[:, None]
@@ -152,7 +163,7 @@ def sample_map(
         found.unseen,
         output_error=found.unseen.output_error - found.unseen.torque * series,
     )
-    # progress may have counted more solves than were needed
+    # fewer solves may have been needed than progress announced
     progress(stage, total, total)
     tolerances = None
     if has_errors(design):
@@ -165,8 +176,8 @@ def sample_map(
             keep=keep,
         )
         tolerances = tolerances.in_series(series)
-    # the pattern follows the gear angle that depends on the input alone, written so
-    # that its phase grows with theta
+    # the pattern follows the gear angle that depends on the input only, with the sign
+    # that makes its phase grow with theta
     alpha, beta = angle_coefficients(drive.layout)
     cycles = design.periodicity
     return MapSamples(
@@ -225,18 +236,18 @@ def sample_map(
 def effort_of(
     model: str, angles: int | None, *, both_signs: bool, errors: bool
 ) -> Effort:
-    """Equilibria that a map may take.
+    """Budget of equilibria of a map.
 
     Args:
-        model: Fidelity.
-        angles: Input positions over one pitch; as many as the drive asks for if None.
-        both_signs: Whether negative torques are sampled, too.
-        errors: Whether errors of the teeth are superposed.
+        model: Fidelity, ``2d`` or ``3d``.
+        angles: Input positions over one pitch; None for as many as the drive needs.
+        both_signs: Whether negative torques are sampled as well.
+        errors: Whether tooth errors are superposed.
     """
     solid = model == "3d"
     unseen = SOLID_UNSEEN if solid else UNSEEN
     if angles is not None:
-        # a quick map is judged by as many torques at fewer angles
+        # a quick map is validated at the same number of torques but at fewer angles
         unseen = unseen[0], min(unseen[1], max(2, angles // 4))
         solves = angles * FIXED_SOLVES + unseen[0] * unseen[1]
         most = angles
@@ -252,14 +263,14 @@ def effort_of(
         solves=solves * (2 if both_signs else 1),
         unseen=unseen,
         torques=TOLERANCED_TORQUES if errors else TORQUES,
-        # in space a torque costs as much as the map gains from it elsewhere, and with
-        # errors of the teeth a map is continued beyond its samples anyway
+        # in 3D these solves are better spent on other torques, and a map with tooth
+        # errors is extrapolated beyond its samples anyway
         beyond=not solid and not errors,
     )
 
 
 def follower_in_plane(design: Design) -> Continuation:
-    """The 2D drive with perfect teeth, as maps sample it."""
+    """The 2D drive with perfect, frictionless teeth, as it is sampled for maps."""
     perfect, bearing = without_errors(design), maps_bearing(design)
     return Continuation(
         model=ring_model(
@@ -275,7 +286,8 @@ def follower_in_plane(design: Design) -> Continuation:
     )
 
 
-def _in_space(design: Design) -> SolidContinuation:
+def _follower_3d(design: Design) -> SolidContinuation:
+    """The 3D drive with perfect teeth, as it is sampled for maps."""
     perfect = without_errors(design)
     return SolidContinuation(
         ring=solid_ring(perfect, half="auto"),
@@ -285,14 +297,15 @@ def _in_space(design: Design) -> SolidContinuation:
 
 
 def maps_bearing(design: Design) -> bool:
-    """Whether a 2D map models the bearing of the wave generator.
+    """Whether a 2D map includes the bearing of the wave generator.
 
-    Errors are superposed on a rigid wave generator: a map with them is of that drive.
+    A map with manufacturing errors does not: they are superposed on a drive with a
+    rigid wave generator.
     """
     return carries_bearing(design) and not has_errors(design)
 
 
 def _named(design: Design) -> dict[str, float] | None:
-    """Errors of the drive, for the validity label."""
+    """Nonzero tolerances of the drive, for the validity label."""
     values = design.tolerances.model_dump()
     return {k: v for k, v in values.items() if v} if has_errors(design) else None

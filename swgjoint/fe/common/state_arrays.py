@@ -1,4 +1,4 @@
-"""Equilibria as named arrays, for files from which a run goes on bit for bit."""
+"""Equilibria as named arrays, for files from which a run resumes bit for bit."""
 
 from __future__ import annotations
 
@@ -27,31 +27,41 @@ T = TypeVar("T")
 
 
 def pack(value: Any, name: str) -> dict[str, Any]:
-    """Arrays of a state, or of what is part of one; its type by name with them.
+    """Flatten a state or a part of it into named arrays, with the names of its types.
 
     Args:
         value: A state, an array, a number, an outcome, a tuple of these, or None.
-        name: First part of the name of every array.
+        name: Prefix of all array names.
+
+    Returns:
+        Arrays by name.
     """
     if value is None:
         return {}
     if isinstance(value, Outcome):
         return {name: value.name}
     if isinstance(value, tuple) and any(is_dataclass(one) for one in value):
-        found: dict[str, Any] = {f"{name}.{_KIND}": f"tuple {len(value)}"}
+        arrays: dict[str, Any] = {f"{name}.{_KIND}": f"tuple {len(value)}"}
         for k, one in enumerate(value):
-            found |= pack(one, f"{name}.{k}")
-        return found
+            arrays |= pack(one, f"{name}.{k}")
+        return arrays
     if is_dataclass(value):
-        found = {f"{name}.{_KIND}": type(value).__name__}
+        arrays = {f"{name}.{_KIND}": type(value).__name__}
         for item in fields(value):
-            found |= pack(getattr(value, item.name), f"{name}.{item.name}")
-        return found
+            arrays |= pack(getattr(value, item.name), f"{name}.{item.name}")
+        return arrays
     return {name: value}
 
 
 def unpack(arrays: Mapping[str, Any], name: str) -> Any:
-    """What :func:`pack` was given; None where nothing of that name is there.
+    """Rebuild the value that :func:`pack` flattened.
+
+    Args:
+        arrays: Arrays by name.
+        name: Prefix of their names.
+
+    Returns:
+        The value; None if there is no array of that name.
 
     Raises:
         KeyError: If the arrays are not those of a state.
@@ -65,7 +75,7 @@ def unpack(arrays: Mapping[str, Any], name: str) -> Any:
         count = int(str(kind).removeprefix("tuple "))
         return tuple(unpack(arrays, f"{name}.{k}") for k in range(count))
     cls = _KINDS[str(kind)]
-    given = {}
+    values = {}
     for item in fields(cls):
         value = unpack(arrays, f"{name}.{item.name}")
         if value is None:
@@ -76,15 +86,15 @@ def unpack(arrays: Mapping[str, Any], name: str) -> Any:
             value = Outcome[str(value)]
         elif item.type == "tuple[float, ...]":
             value = tuple(float(one) for one in value)
-        given[item.name] = value
-    return cls(**given)
+        values[item.name] = value
+    return cls(**values)
 
 
 def copy_contiguous(value: T) -> T:
-    """The same with arrays that lie in memory as those of a file do.
+    """Copy a value with the memory layout of arrays that were read from a file.
 
-    Sums may depend on the order in memory in their last digit; a run that goes on from
-    a file shall not differ from one that never stopped.
+    The last digit of a sum may depend on the memory layout; a run that resumes from a
+    file must not differ from one that was never interrupted.
     """
     changed: Any = value
     if isinstance(value, np.ndarray):

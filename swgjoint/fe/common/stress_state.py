@@ -1,4 +1,4 @@
-"""Stress across the width of a member of the plane models: none, full or between."""
+"""Stress state of the 2D models: plane stress, plane strain or in between."""
 
 from __future__ import annotations
 
@@ -16,19 +16,21 @@ from swgjoint.gear.wide_ring import RimAcross, edge_confinement, rim_confinement
 from swgjoint.units import mm
 
 COARSE = 0.5
-"""Refinement of the sector whose stiffness decides: the same for every mesh of a drive,
-so that refining the mesh changes nothing else. Within 1 % in the stiffness."""
+"""Mesh refinement of the sector that determines the rim stiffness [-]. It is the same
+for every mesh of a drive, so that refining the mesh changes nothing else. Its stiffness
+is within 1 % of the converged one."""
 
 
 def confinement(design: Design, member: MemberName, profile: ToothProfile) -> float:
-    """Confinement of a member, 0 in plane stress and 1 in plane strain [-].
+    """Confinement of a member: 0 in plane stress, 1 in plane strain [-].
 
     Args:
-        design: The drive; ``mesh.stress_state`` chooses. With ``auto`` a rim that can
-            bend follows :func:`swgjoint.gear.wide_ring.rim_confinement`; a circular
-            spline whose outside is fixed does not bend, and only its edges are free.
+        design: The drive; its ``mesh.stress_state`` selects the state. With ``auto`` a
+            rim that can bend follows :func:`swgjoint.gear.wide_ring.rim_confinement`; a
+            circular spline whose outside is fixed cannot bend, and only its edges are
+            free.
         member: Flexspline or circular spline.
-        profile: Its flank.
+        profile: Its tooth profile.
     """
     chosen = design.mesh.stress_state
     if chosen != "auto":
@@ -41,7 +43,13 @@ def confinement(design: Design, member: MemberName, profile: ToothProfile) -> fl
 
 
 def rim_across(design: Design, member: MemberName, profile: ToothProfile) -> RimAcross:
-    """Stiffness of a toothed rim around the axis and across the width."""
+    """Stiffness of a toothed rim around the axis and across the width.
+
+    Args:
+        design: The drive.
+        member: Flexspline or circular spline.
+        profile: Its tooth profile.
+    """
     material = design.material_of(member)
     mesh = sector_mesh(profile, getattr(design, member).rim_mm * mm, COARSE)
     section = rim_section(
@@ -65,7 +73,7 @@ def rim_across(design: Design, member: MemberName, profile: ToothProfile) -> Rim
 def second_moment(mesh: SectorMesh) -> float:
     """Second moment of area of a sector about the tangent through its centroid [m^4].
 
-    That of one pitch of the rim with its tooth, bent across the width.
+    It governs the bending of one pitch of the toothed rim across the width.
     """
     # two triangles per quadrilateral, exact for the polygon of the mesh
     corners = np.concatenate([mesh.mesh.t[[0, 1, 2]], mesh.mesh.t[[0, 2, 3]]], axis=1)
@@ -77,14 +85,14 @@ def second_moment(mesh: SectorMesh) -> float:
 
 
 def stress_state_label(design: Design) -> str:
-    """What the plane models of a design assume across the width, for its label."""
+    """Stress state that the 2D models of a design assume, for the validity label."""
     chosen = design.mesh.stress_state
     if chosen != "auto":
         return chosen.replace("_", " ")
     members: tuple[MemberName, ...] = ("flexspline", "circular_spline")
-    told = " and ".join(
+    values = " and ".join(
         f"{confinement(design, name, tooth_profile(design, name)):.2f}"
         f" ({name.replace('_', ' ')})"
         for name in members
     )
-    return f"{told} of the way from plane stress to plane strain"
+    return f"{values} of the way from plane stress to plane strain"

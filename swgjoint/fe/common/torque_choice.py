@@ -1,4 +1,4 @@
-"""Which torques and angles a map samples, and at which it is judged."""
+"""Choice of the torques and angles that a map samples and at which it is validated."""
 
 from __future__ import annotations
 
@@ -8,19 +8,22 @@ from swgjoint.fe.common.load_path import LoadPath
 from swgjoint.typing import Array
 
 FEWEST_TORQUES = 40
-"""Of one sign in the table."""
+"""Smallest number of torques of one sign in a table."""
 
 
 def common_torques(
     paths: list[LoadPath], own: set[float], least: float, most: int
 ) -> Array:
-    """Torques of the table, closer together where the load paths have their events.
+    """Torques of the table, denser where the load paths have their events.
 
     Args:
-        paths: Of all angles.
-        own: Torques that all of them solved [N·m].
-        least: Torque that all must exceed [N·m].
-        most: Torques at most, next to those.
+        paths: Load paths of all angles.
+        own: Torques that were solved at all angles [N·m].
+        least: Lower bound of the added torques [N·m].
+        most: Largest number of added torques.
+
+    Returns:
+        Solved and added torques, increasing (n,) [N·m].
     """
     top = max(own)
     pool = np.concatenate([np.concatenate([p.torque, p.events]) for p in paths])
@@ -31,25 +34,25 @@ def common_torques(
     fine = np.linspace(least, top, 4001)
     rank = np.searchsorted(pool, fine, side="right") / pool.size
     share = (fine - least) / (top - least)
-    # a half follows the events, a half is spread out, small torques a little closer
+    # half follows the events; half is spread out, slightly denser at small torques
     measure = 0.5 * rank + 0.25 * share + 0.25 * np.sqrt(share)
     spread = np.interp((np.arange(count) + 0.5) / count, measure, fine)
     levels = np.array(sorted(own))
-    # torques that nearly are one of those that were solved give way to it
+    # drop torques that almost coincide with a solved one
     gap = np.abs(spread[:, None] - levels).min(axis=1)
     near = gap < 0.35 * np.gradient(spread)
     return np.sort(np.concatenate([spread[~near], levels]))
 
 
 def periodic(values: Array, parts: Array) -> tuple[Array, Array]:
-    """Trigonometric interpolation over a period, and its slope by the part of it.
+    """Trigonometric interpolation over a period, and its derivative.
 
     Args:
-        values: At equal steps (n, ...).
-        parts: Of the period (m,).
+        values: Values at equal steps over the period (n, ...).
+        parts: Positions as fractions of the period (m,) [-].
 
     Returns:
-        Two of (m, ...).
+        Values and derivatives by the fraction of the period, each (m, ...).
     """
     n = len(values)
     modes = np.fft.rfft(values, axis=0)[: (n + 1) // 2] / n
@@ -60,15 +63,23 @@ def periodic(values: Array, parts: Array) -> tuple[Array, Array]:
 
 
 def unseen_places(count: int, finest: int) -> list[float]:
-    """Angles on the finest grid that no grid has, spread over the pitch."""
-    # the golden section of a step, so that no grid comes near all of them
+    """Angles between those of all grids, spread over the pitch.
+
+    Args:
+        count: Number of angles.
+        finest: Number of steps of the finest grid.
+
+    Returns:
+        Places in steps of the finest grid.
+    """
+    # offset by the golden section of a step, so that no grid comes near all of them
     return [finest * (k + 0.381966) / count for k in range(count)]
 
 
 def unseen_parts(count: int) -> Array:
-    """Unseen torques in parts of the largest one, a half of them small ones.
+    """Validation torques as fractions of the largest one, half of them small.
 
-    None is next to a torque at which all maps begin.
+    None of them is close to the initial torques of a map.
     """
     small = count // 2
     parts = [np.geomspace(0.021, 0.28, small), np.linspace(0.37, 0.97, count - small)]

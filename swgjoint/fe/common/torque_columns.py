@@ -1,4 +1,4 @@
-"""Which torques and angles a map needs, from columns of equilibria."""
+"""Adaptive choice of the torques and angles of a map, from columns of equilibria."""
 
 from __future__ import annotations
 
@@ -18,38 +18,48 @@ from swgjoint.maps.samples import FullSolves
 from swgjoint.typing import Array
 
 POTENTIAL_WAVES = 1.0
-"""Waves in a pitch of the estimated error of the complementary potential, whose
-derivative by the angle is one of the input torque."""
+"""Assumed waves per pitch of the error of the complementary potential [-]; the
+derivative of this error by the angle is an error of the input torque."""
 LEAST_PEAK = 0.05
-"""Peak to peak that counts at least, in the largest one over the torques."""
+"""Lower bound of the peak-to-peak values that errors are divided by, as a fraction of
+the largest one over the torques [-]."""
 WORST = 0.5
-"""Part of the largest estimated error from which intervals are divided next."""
+"""Intervals with more than this fraction of the largest estimated error are divided
+next [-]."""
 REACH = 1.1
-"""Torque beyond the largest one at which the stiffest angle is turned as far as the
-softest one at the largest torque, in parts of the linear estimate."""
+"""Safety factor on the linear estimate of the additional torque at which the stiffest
+angle turns as far as the softest one does at the largest torque [-]."""
 BEYOND = (0.02, 0.15)
-"""Least and most of that torque, in parts of the largest one."""
+"""Bounds of this additional torque, as fractions of the largest torque [-]."""
 AHEAD = 0.4
-"""Reach of a prediction of contact changes, in parts of the largest torque: above the
-distance of any two common torques."""
+"""Range of a prediction of contact changes, as a fraction of the largest torque [-]. It
+exceeds the distance between any two common torques."""
 
 
 @dataclass(kw_only=True, eq=False)
 class ColumnGrid(SolvedColumns[AnyState]):
-    """Columns of equilibria, added to until they suffice."""
+    """Columns of equilibria that are refined until they suffice."""
 
     def path(
         self, column: AngleColumn[AnyState], sign: float
     ) -> tuple[LoadPath, tuple[Array, Array]]:
-        """The curve of one sign, and torque and input torque that were solved.
+        """Load curve of one sign of the torque.
 
-        Of negative torques it is the curve of the mirrored drive.
+        For negative torques it is the curve of the mirrored drive.
+
+        Args:
+            column: Column of equilibria.
+            sign: Sign of the torques, 1.0 or -1.0.
+
+        Returns:
+            The curve, and the solved torques and input torques [N·m] of the (mirrored)
+            drive.
         """
         common = [*self.levels, *self.beyond]
         outward: list[float] = sorted(
             (t for t in common if t * sign > 0.0 and t in column.states), key=abs
         )
-        # a free output has no curve before its clearance is taken up
+        # the curve of a free output starts when its clearance is taken up
         first = 0.0 if column.rest.sides is None else sign * self.small
         torque = sign * np.array([first, *outward])
         known = column.paths.get(sign)
@@ -73,23 +83,28 @@ class ColumnGrid(SolvedColumns[AnyState]):
     def _changes(
         self, column: AngleColumn[AnyState], state: AnyState, sign: float, top: float
     ) -> ContactChanges | None:
-        """Changes of contact that a state of a column predicts, see :meth:`path`."""
+        """Contact changes that a state of a column predicts, see :meth:`path`."""
         key = (state.torque, sign)
         if key not in column.changes:
             low, high = state.torque - AHEAD * top, state.torque + AHEAD * top
-            found = self.follow.predicted_changes(state, low, high)
-            if found is not None and sign < 0.0:
-                found = found.mirror()
-            column.changes[key] = found
+            changes = self.follow.predicted_changes(state, low, high)
+            if changes is not None and sign < 0.0:
+                changes = changes.mirror()
+            column.changes[key] = changes
         return column.changes[key]
 
     def largest_miss(
         self, count: int, others: list[AngleColumn[AnyState]], torques: Iterable[float]
     ) -> float:
-        """Largest part of the peak to peak that other angles are off by.
+        """Largest error at other angles, as a fraction of the peak-to-peak value.
 
-        Output error, and input torque as the derivative of the complementary potential
-        by the angle.
+        Both the output error and the input torque count; the latter is predicted as the
+        derivative of the complementary potential by the angle.
+
+        Args:
+            count: Number of columns from which the others are predicted.
+            others: Columns at other angles.
+            torques: Torques at which to compare [N·m].
         """
         worst, columns = 0.0, [column for _, column in self.chosen(count)]
         parts = np.array([one.theta for one in others]) / self.period
@@ -106,18 +121,18 @@ class ColumnGrid(SolvedColumns[AnyState]):
             )
             moments = slope / self.period + torque / self.follow.ratio
             predicted_moment, own_moment = np.split(moments, [len(parts)])
-            for own, truth, found in (
+            for sampled, truth, estimate in (
                 (error, there, predicted),
                 (own_moment, moment, predicted_moment),
             ):
-                height = np.ptp(np.concatenate([own, truth]))
-                worst = max(worst, float(np.abs(found - truth).max() / height))
+                height = np.ptp(np.concatenate([sampled, truth]))
+                worst = max(worst, float(np.abs(estimate - truth).max() / height))
         return worst
 
     def _curves_at(
         self, columns: list[AngleColumn[AnyState]], torque: float
     ) -> tuple[Array, Array]:
-        """Output error and energy of some columns at any torque, by their curves."""
+        """Output error and energy of columns at any torque, by their curves (n,)."""
         if torque == 0.0:
             error, energy, _, _ = self._row(columns, 0.0)
             return error, energy
@@ -128,10 +143,11 @@ class ColumnGrid(SolvedColumns[AnyState]):
 
     @staticmethod
     def _parts(count: int) -> Array:
+        """Angles of the columns as fractions of the period (count,)."""
         return np.arange(count) / count
 
     def _row(self, columns: list[AngleColumn[AnyState]], torque: float) -> Array:
-        """Figures of some columns at a torque that all of them have (4, n)."""
+        """Figures of columns at a torque that all of them have (4, n)."""
         return np.array(
             [
                 self.figures(c.states[torque] if torque else c.rest.state, c.theta)
@@ -140,9 +156,15 @@ class ColumnGrid(SolvedColumns[AnyState]):
         ).T
 
     def peaks(self, count: int, sign: float) -> tuple[Array, Array, Array]:
-        """Torques, peak to peak over the angle of e and of the input torque there.
+        """Peak-to-peak values over the angle of output error and input torque.
 
-        Positive torques also where ``sign`` is negative.
+        Args:
+            count: Number of columns.
+            sign: Sign of the torques, 1.0 or -1.0.
+
+        Returns:
+            Magnitudes of the torques [N·m], peak to peak of the output error [rad] and
+            of the input torque [N·m] at them, each (n,).
         """
         curves = [self.path(column, sign)[0] for _, column in self.chosen(count)]
         first = max(curve.torque[0] for curve in curves)
@@ -157,28 +179,29 @@ class ColumnGrid(SolvedColumns[AnyState]):
         for table in (errors, moments):
             height = np.ptp(table, axis=0)
             height = np.maximum(height, LEAST_PEAK * height.max())
-            # two angles alone have no slope to be off from
+            # with two angles the derivative vanishes: no reference for its error
             heights.append(np.where(height > 0.0, height, np.inf))
         return torque, heights[0], heights[1]
 
     def cost(self, count: int) -> int:
-        """Solves of so many columns at the common torques."""
+        """Number of solves for ``count`` columns at the common torques."""
         return count * (1 + len(self.levels))
 
     def divide(self, count: int, most: int, goal: float) -> float:
         """Add common torques until the estimated errors between them meet a goal.
 
-        All angles get the same torques: what the curves between them miss then changes
-        slowly from angle to angle, which leaves the input torque, a derivative by the
-        angle, alone.
+        All angles get the same torques. The error of the curves between them then
+        changes slowly from angle to angle and hardly affects the input torque, a
+        derivative by the angle.
 
         Args:
-            count: Of the columns.
-            most: Solves in all.
-            goal: Largest estimated error, in the peak to peak.
+            count: Number of columns.
+            most: Largest number of solves in total.
+            goal: Goal for the largest estimated error, as a fraction of the
+                peak-to-peak value [-].
 
         Returns:
-            The largest estimate that is left, in the peak to peak.
+            Largest remaining estimate, as a fraction of the peak-to-peak value [-].
         """
         while True:
             wanted = self._doubts(count)
@@ -195,7 +218,8 @@ class ColumnGrid(SolvedColumns[AnyState]):
         """Estimate the error of every interval between common torques.
 
         Returns:
-            Estimated error, in the peak to peak, and where to divide it [N·m].
+            For each interval the estimated error, as a fraction of the peak-to-peak
+            value, and the torque at which to divide it [N·m].
         """
         wanted: list[tuple[float, float]] = []
         for sign in self.signs:
@@ -229,7 +253,7 @@ class ColumnGrid(SolvedColumns[AnyState]):
         """Solve one more torque in every column, unless it fails in one."""
         columns = [column for _, column in self.chosen(count)]
         for k, column in enumerate(columns):
-            # no turn of the input by a whole pitch
+            # start from the previous angle; none is a whole pitch away
             self._more(column, [torque], columns[max(0, k - 1) : k])
             if torque in column.failed:
                 self.failed.append(torque)
@@ -239,10 +263,10 @@ class ColumnGrid(SolvedColumns[AnyState]):
     def go_beyond(self, count: int) -> None:
         """Solve one torque of each sign beyond the largest one in every column.
 
-        A map ends at the torsion that the stiffest angle reaches. With this torque that
-        is as far as the softest angle turns under the largest torque, so that no angle
-        leaves the map below it. Where one of the solves fails, the map ends at the
-        largest torque as before.
+        A map ends at the torsion that the stiffest angle reaches. With the additional
+        torque the stiffest angle turns as far as the softest angle does at the largest
+        torque, so that no angle leaves the map below the largest torque. If one of the
+        solves fails, the map ends at the largest torque.
         """
         columns = [column for _, column in self.chosen(count)]
         for sign in self.signs:
@@ -260,11 +284,11 @@ class ColumnGrid(SolvedColumns[AnyState]):
                 self.beyond.append(torque)
 
     def unseen(self, others: list[AngleColumn[AnyState]], count: int) -> FullSolves:
-        """Equilibria at other angles, without torque and at so many other torques.
+        """Validation equilibria at other angles, without torque and at other torques.
 
         Args:
             others: Columns at these angles.
-            count: Torques of one sign.
+            count: Number of torques of one sign.
         """
         rows = []
         for column in others:
@@ -289,15 +313,20 @@ class ColumnGrid(SolvedColumns[AnyState]):
         )
 
     def tables(self, count: int, most: int) -> tuple[dict[float, Array], set[float]]:
-        """Figures (4, count) by torque, and the torques that all columns solved.
-
-        At most so many torques of one sign, next to those that all columns solved.
+        """Tables of the map by torque.
 
         Clearance adds rows, see :func:`across_clearance`.
+
+        Args:
+            count: Number of columns.
+            most: Largest number of torques of one sign in addition to the solved ones.
+
+        Returns:
+            Figures (4, count) by torque [N·m], and the torques that all columns solved.
         """
         columns = [column for _, column in self.chosen(count)]
         rest = np.array([self.figures(c.rest.state, c.theta) for c in columns]).T
-        found = {0.0: rest}
+        table = {0.0: rest}
         for sign in self.signs:
             paths = [self.path(column, sign) for column in columns]
             own = {abs(t) for t in [*self.levels, *self.beyond] if t * sign > 0.0}
@@ -312,11 +341,11 @@ class ColumnGrid(SolvedColumns[AnyState]):
                 ]
             )  # (count, 4, n)
             values *= np.array([sign, 1.0, 1.0, sign])[:, None]
-            found |= {sign * float(t): values[:, :, j].T for j, t in enumerate(torque)}
+            table |= {sign * float(t): values[:, :, j].T for j, t in enumerate(torque)}
             if self.free:
-                taken_up = found[sign * self.small]
+                taken_up = table[sign * self.small]
                 begin, onset = across_clearance(rest, taken_up, sign * self.small)
-                found[begin] = onset
+                table[begin] = onset
                 # the same stiffness on both sides of the middle
                 rest[2] = onset[2]
-        return found, {0.0, *self.levels, *self.beyond}
+        return table, {0.0, *self.levels, *self.beyond}
