@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from swgjoint.fe.common.complementarity import ActiveSetError, solve_mixed
 from swgjoint.fe.common.cyclic import CyclicFactor
@@ -17,7 +16,7 @@ from swgjoint.fe.plane.linearise import Linearised
 from swgjoint.fe.plane.race import NODE
 from swgjoint.fe.plane.ring import RingModel
 from swgjoint.fe.plane.state import State
-from swgjoint.typing import Array, Mask
+from swgjoint.typing import Array, Index, Mask
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -61,7 +60,7 @@ class NewtonStep:
     """Force along each line [N]."""
     contacts: Contacts
     """Contact candidates."""
-    active: NDArray[np.int64]
+    active: Index
     """Indices of the candidates that carry force."""
     torque: float
     """Torque T of the output on its load, whole drive [N·m]."""
@@ -89,50 +88,148 @@ class NewtonStep:
         return max(float(np.abs(self.shift).max()), of_race, self.strip_error)
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Condensed:
+    """The ring condensed to its n lines of force; n_dofs components per sector."""
+
+    lines: Contacts
+    """Lines of force."""
+    strips: Strips | None
+    """Indentation strips of the m candidates; None without indentation."""
+    rows: Array
+    """Derivatives of the gaps of the lines (n, n_dofs)."""
+    constraints: Array
+    """Directions of the anchor and gradient of the rotation (N, n_dofs, 2)."""
+    base: Array
+    """Displacement under the gradient without line forces (N, n_dofs) [m]."""
+    response: Array
+    """Displacement per line force, anchor force and multiplier (N, n_dofs, n + 2)."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Solution:
+    """Unknowns of the condensed system, see :func:`solve_newton_step`."""
+
+    force: Array
+    """Forces on the lines (n,) [N]."""
+    active: Mask
+    """Whether each candidate carries force (m,)."""
+    anchor: float
+    """Force of the anchor [N]."""
+    ring_turn: float
+    """Rotation increment of the circular spline [rad]."""
+    multiplier: float
+    """Multiplier of the flexspline's rotation [N·m]."""
+    compliance: float
+    """Tangent compliance of the output, per torque of the model [rad/(N·m)]."""
+
+
 def solve_newton_step(
     model: RingModel,
     state: State,
     ring: Linearised,
     load: Load,
     contacts: Contacts,
-    pressing: NDArray[np.int64] | None = None,
+    pressing: Index | None = None,
 ) -> NewtonStep:
-    """Condense the ring to its contact forces, solve for them, go back.
+    """Condense a ring to its contact forces, solve for them and find the increment.
 
-    The contacts that are ``pressing``, if given, are the first guess of those that
-    carry force.
+    The condensed system g = q + M z has n + 3 unknowns z and as many rows:
 
-    Columns of the ring's inverse: the load, every contact candidate, a soft anchor that
-    keeps the rotation of the whole ring regular and is taken out again as an unknown,
-    and the gradient of the output rotation.
+    ========== ========================================= ===========================
+    entry      unknown                                   row
+    ========== ========================================= ===========================
+    0 to n - 1 forces on the lines [N]: normals of the   gaps of the lines [m]
+               m candidates, then, with friction, their
+               m tangents
+    n          force of the anchor [N]                   misfit of its spring [m]
+    n + 1      rotation of the circular spline [rad]     its residual moment [N·m]
+    n + 2      multiplier of the flexspline's rotation   rotation error [rad]
+               [N·m]
+    ========== ========================================= ===========================
+
+    The anchor is a soft spring that keeps the rotation of the whole ring regular; its
+    force removes it again. With friction the line forces are reduced to k unknowns: the
+    m normal forces and one friction force per sticking pair, so that the last three
+    entries are k to k + 2. Without friction k = n = m. The last two unknowns are used
+    only if the circular spline has a torque and if the rotation of the flexspline is
+    prescribed, respectively.
+
+    Args:
+        model: The ring.
+        state: State at which the ring was linearised.
+        ring: The linearised ring.
+        load: Prescribed torque or rotation.
+        contacts: Candidates for tooth contact, m of them.
+        pressing: Candidates that carry force in the first guess; by default those on
+            flanks that carry force in the state, or else those that overlap.
+
+    Raises:
+        ActiveSetError: If no set of active contacts is found.
+        SingularRingError: If the tangent of the ring is singular.
     """
-    element = model.element
-    # lines of force: the normals and, with friction, the tangents of the contacts
-    m, lines, sliding = len(contacts), contacts, None
-    if model.friction is not None and m:
-        last = state.candidates or state.slip
-        sliding = Sliding.from_trial(model.friction, contacts, state.slip, last)
-        lines = sliding.lines
+    sliding = _friction_lines(model, state, contacts)
+    lines = contacts if sliding is None else sliding.lines
+    strips = _strips(model, state, contacts)
+    condensed = _condense(ring, lines, strips)
+    matrix = _condensed_matrix(model, ring, condensed)
+    offset = _condensed_offset(model, state, ring, load, condensed)
+    guess = _first_guess(state, contacts, offset, pressing)
+    solution = _solve_condensed(matrix, offset, sliding, guess, load)
+    return _substituted(model, state, ring, load, contacts, condensed, solution)
+
+
+def _friction_lines(
+    model: RingModel, state: State, contacts: Contacts
+) -> Sliding | None:
+    """Normal and tangential lines of force; None without friction or candidates."""
+    if model.friction is None or not len(contacts):
+        return None
+    last = state.candidates or state.slip
+    return Sliding.from_trial(model.friction, contacts, state.slip, last)
+
+
+def _strips(model: RingModel, state: State, contacts: Contacts) -> Strips | None:
+    """Indentation strips of the candidates; None without indentation or candidates."""
+    if model.indentation is None or not len(contacts):
+        return None
+    held, force = state.contacts, state.tooth_force
+    return Strips.from_contacts(model.indentation, contacts, held, force)
+
+
+def _condense(ring: Linearised, lines: Contacts, strips: Strips | None) -> _Condensed:
+    """Solve the ring for its gradient and for unit loads on lines and constraints."""
     n, rows = len(lines), ring.gap_gradient(lines)
     levers = np.zeros((*ring.gradient.shape, n + 2))
     levers[lines.sector, :, np.arange(n)] = rows
     levers[:, :, n] = ring.anchor
     levers[:, :, n + 1] = ring.rotation_gradient
-
-    rhs = -ring.gradient
-    columns = np.concatenate([rhs[:, :, None], levers], axis=2)
+    columns = np.concatenate([-ring.gradient[:, :, None], levers], axis=2)
     columns[ring.fixed] = 0.0
     solved = CyclicFactor(ring.anchor_tangent(), ring.face_dofs).solve(columns)
-    base, response = solved[:, :, 0], solved[:, :, 1:]
-
-    # forces on the lines, displacement of the anchor, rotation of the circular spline,
-    # multiplier of the flexspline's rotation
-    matrix, offset = np.zeros((n + 3, n + 3)), np.zeros(n + 3)
-    own = np.r_[0 : n + 1, n + 2]
-    matrix[np.ix_(np.arange(n), own)] = np.einsum(
-        "kn,knl->kl", rows, response[lines.sector]
+    return _Condensed(
+        lines=lines,
+        strips=strips,
+        rows=rows,
+        constraints=levers[:, :, n:],
+        base=solved[:, :, 0],
+        response=solved[:, :, 1:],
     )
-    local = lines.weight @ element.flank_compliance
+
+
+def _condensed_matrix(
+    model: RingModel, ring: Linearised, condensed: _Condensed
+) -> Array:
+    """Matrix M of the condensed system (n + 3, n + 3)."""
+    lines, strips, response = condensed.lines, condensed.strips, condensed.response
+    n, matrix = len(lines), np.zeros((len(lines) + 3, len(lines) + 3))
+    # lines: compliance of the ring, of the loaded tooth, of the circular spline and
+    # of the indentation
+    driven = np.r_[0 : n + 1, n + 2]
+    matrix[np.ix_(np.arange(n), driven)] = np.einsum(
+        "kn,knl->kl", condensed.rows, response[lines.sector]
+    )
+    local = lines.weight @ model.element.flank_compliance
     same = lines.sector[:, None] == lines.sector[None, :]
     matrix[:n, :n] += np.where(same, local @ lines.weight.T, 0.0)
     ring_compliance = model.circular_spline.compliance
@@ -140,91 +237,130 @@ def solve_newton_step(
         matrix[:n, :n] += ring_compliance.contact_compliance(
             lines.tooth, lines.ring_weight, model.ring_teeth
         )
-    strips = None
-    if model.indentation is not None and m:
-        strips = Strips.from_contacts(
-            model.indentation, contacts, state.contacts, state.tooth_force
-        )
+    if strips is not None:
+        m = len(strips.strip)
         matrix[:m, :m] += strips.compliance
-    last_two = np.array([n, n + 2])
-    matrix[np.ix_(last_two, own)] = np.einsum("snf,snl->fl", levers[:, :, n:], response)
-    matrix[:n, last_two] = matrix[last_two, :n].T
+    # anchor and rotation of the flexspline
+    constrained = np.array([n, n + 2])
+    matrix[np.ix_(constrained, driven)] = np.einsum(
+        "snf,snl->fl", condensed.constraints, response
+    )
+    matrix[:n, constrained] = matrix[constrained, :n].T
     matrix[n, n] -= 1.0 / ring.anchor_stiffness
     # turning the circular spline towards the teeth closes the gap by the lever arm
     arm = np.einsum("ki,ki->k", rotate_right_angle(lines.point), lines.normal)
     matrix[:n, n + 1] = matrix[n + 1, :n] = -arm
-    offset[n + 1] = -(load.on_ring or 0.0) / model.copies
-    # gaps as if the old tooth forces were gone; the new ones bring their own share
+    return matrix
+
+
+def _condensed_offset(
+    model: RingModel, state: State, ring: Linearised, load: Load, condensed: _Condensed
+) -> Array:
+    """Offset q of the condensed system (n + 3,)."""
+    lines, strips, base = condensed.lines, condensed.strips, condensed.base
+    n, offset = len(lines), np.zeros(len(lines) + 3)
+    # gaps without the old tooth forces; the new forces bring their own share
+    local = lines.weight @ model.element.flank_compliance
     old = np.einsum("kb,kb->k", local, state.flank_force[lines.sector])
     old += np.einsum("kb,kb->k", lines.ring_weight, ring.ring_elastic[lines.tooth])
-    moved = np.einsum("kn,kn->k", rows, base[lines.sector])
+    moved = np.einsum("kn,kn->k", condensed.rows, base[lines.sector])
     offset[:n] = lines.gap - old + moved
     if strips is not None:
+        m = len(strips.strip)
         offset[:m] += strips.offset
-    offset[last_two] = np.einsum("snf,sn->f", levers[:, :, n:], base)
+    # anchor and rotation of the flexspline, torque on the circular spline
+    constrained = np.array([n, n + 2])
+    offset[constrained] = np.einsum("snf,sn->f", condensed.constraints, base)
+    offset[n + 1] = -(load.on_ring or 0.0) / model.copies
     offset[n + 2] += ring.rotation - (load.rotation or 0.0)
+    return offset
 
+
+def _first_guess(
+    state: State, contacts: Contacts, offset: Array, pressing: Index | None
+) -> Mask:
+    """Candidates that carry force in the first guess (m,)."""
+    m = len(contacts)
+    if pressing is not None:
+        return np.isin(np.arange(m), pressing)
+    if state.contacts is not None and len(state.contacts):
+        return contacts.share_flank_with(state.contacts)
+    return np.asarray(offset[:m] < 0.0)
+
+
+def _solve_condensed(
+    matrix: Array, offset: Array, sliding: Sliding | None, guess: Mask, load: Load
+) -> _Solution:
+    """Solve the condensed system for its unknowns, friction reduced to k - m forces."""
+    m = len(guess)
     k = m if sliding is None else m + len(sliding.stick)
     used = np.arange(k + 1)
     if load.on_ring is not None:
         used = np.append(used, k + 1)
     if load.rotation is not None:
         used = np.append(used, k + 2)
-    guess = offset[:m] < 0.0
-    if state.contacts is not None and len(state.contacts):
-        guess = contacts.share_flank_with(state.contacts)
-    if pressing is not None:
-        guess = np.isin(np.arange(m), pressing)
+    multipliers = int(load.rotation is not None)
 
     def solved_for(matrix: Array, offset: Array) -> tuple[Array, Mask]:
-        return solve_mixed(
-            matrix[np.ix_(used, used)],
-            offset[used],
-            m,
-            int(load.rotation is not None),
-            guess,
-        )
+        system = matrix[np.ix_(used, used)]
+        return solve_mixed(system, offset[used], m, multipliers, guess)
 
     if sliding is None:
-        found, active = solved_for(matrix, offset)
+        values, active = solved_for(matrix, offset)
     else:
         full = matrix, offset
         try:
             matrix, offset = sliding.reduce(*full)
-            found, active = solved_for(matrix, offset)
+            values, active = solved_for(matrix, offset)
         except ActiveSetError:
-            # without friction in proportion to the normal forces it is symmetric
+            # friction from the last normal forces makes the system symmetric
             sliding = sliding.lag()
             matrix, offset = sliding.reduce(*full)
-            found, active = solved_for(matrix, offset)
+            values, active = solved_for(matrix, offset)
     z = np.zeros(k + 3)
-    z[used] = found
+    z[used] = values
     held = np.concatenate([np.flatnonzero(active), used[m:]])
-    compliance = output_compliance(matrix, held, k, load)
-    force = z[:k] if sliding is None else sliding.forces(z[:k])
     anchor, ring_turn, multiplier = z[k:]
+    return _Solution(
+        force=z[:k] if sliding is None else sliding.forces(z[:k]),
+        active=active,
+        anchor=float(anchor),
+        ring_turn=float(ring_turn),
+        multiplier=float(multiplier),
+        compliance=output_compliance(matrix, held, k, load),
+    )
 
-    solution = np.concatenate([force, [anchor, multiplier]])
-    increment = base + response @ solution
-    holding = model.copies * float(multiplier)
+
+def _substituted(
+    model: RingModel,
+    state: State,
+    ring: Linearised,
+    load: Load,
+    contacts: Contacts,
+    condensed: _Condensed,
+    solution: _Solution,
+) -> NewtonStep:
+    """Displacements, torques and bore forces that follow from the unknowns."""
+    force, strips = solution.force, condensed.strips
+    loads = np.concatenate([force, [solution.anchor, solution.multiplier]])
+    increment = condensed.base + condensed.response @ loads
+    race_shift = increment[:, model.race_dofs[:-NODE]]
+    push = -model.stations.stiffness * ring.gap_after(increment)
+    holding = model.copies * solution.multiplier
     return NewtonStep(
-        lines=lines,
+        lines=condensed.lines,
         line_force=force,
         contacts=contacts,
-        active=np.flatnonzero(active),
+        active=np.flatnonzero(solution.active),
         torque=-holding if load.torque is None else load.torque,
         holding_torque=holding if load.on_flexspline is None else -load.on_flexspline,
-        compliance=compliance / model.copies,
-        ring_turn=float(ring_turn),
+        compliance=solution.compliance / model.copies,
+        ring_turn=solution.ring_turn,
         increment=increment,
         shift=ring.rotate_to_global(increment),
-        race_shift=increment[:, model.race_dofs[:-NODE]].reshape(
-            model.sectors, -1, 2, 2
-        ),
-        pressure=np.where(
-            state.touching, -model.stations.stiffness * ring.gap_after(increment), 0.0
-        ),
-        strip_error=0.0 if strips is None else strips.error(force[:m]),
+        race_shift=race_shift.reshape(model.sectors, -1, 2, 2),
+        pressure=np.where(state.touching, push, 0.0),
+        strip_error=0.0 if strips is None else strips.error(force[: len(contacts)]),
     )
 
 
@@ -242,9 +378,7 @@ def wrong_stations(state: State, gap: Array) -> Array:
     return np.asarray(np.where(state.touching, gap, -gap))
 
 
-def output_compliance(
-    matrix: Array, held: NDArray[np.int64], k: int, load: Load
-) -> float:
+def output_compliance(matrix: Array, held: Index, k: int, load: Load) -> float:
     """Tangent compliance of the output, per torque of the model.
 
     Args:
