@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from swgjoint.errors import ComputationError
+from swgjoint.fe.common.angle_columns import AngleColumn
 from swgjoint.fe.common.following import AnyState, Follower
 from swgjoint.fe.common.torque_choice import unseen_places
 from swgjoint.fe.common.torque_columns import ColumnGrid
@@ -132,97 +133,175 @@ def solve_pattern(
         tick=tick,
         keep=keep,
     )
-    count = effort.angles
-    grid.solve_columns(count)
+    grid.solve_columns(effort.angles)
     if not grid.levels:
         raise ComputationError(
             "no torque can be solved; the smallest is"
             f" {min(torques, key=abs):g} N·m of {max(torques, key=abs):g} N·m"
         )
-    # check periodicity and mirror symmetry at the angles that every map has
-    check = min(grid.levels, key=lambda t: abs(t - rated))
-    info: dict[str, Any] = {"second_pitch": _second_pitch(grid, check, count)}
-    if symmetric:
-        info["mirror"] = _mirror(grid, check, count)
-    # validate at angles that are not sampled, first at the torques of all columns
+    info = _checks(grid, effort.angles, rated, symmetric=symmetric)
+    # angles that are not sampled, for the validation
     places = unseen_places(effort.unseen[1], effort.most_angles)
     others = [grid.unseen_column(place) for place in places]
-    first = [0.0, *grid.levels]
-    missed = grid.largest_miss(count, others, first)
+    reached = _refine_at_levels(grid, effort, others)
+    unseen = grid.unseen(others, effort.unseen[0])
+    reached = _refine_at_unseen(grid, effort, others, unseen, reached)
+    if effort.beyond:
+        grid.go_beyond(reached.count)
+    used, table, solved = _table(grid, reached.count, effort, symmetric=symmetric)
+    return Pattern(
+        theta=grid.angles(reached.count),
+        torque=used,
+        table=table,
+        solved=solved,
+        unseen=unseen,
+        shortfall=_shortfall(reached),
+        free=grid.free,
+        truncated=not {*torques} <= {*grid.levels},
+        states=grid.states(reached.count, torques),
+        info=info | {"sampling": _record(grid, reached)},
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Reached:
+    """Number of angles and accuracy that the refinement has reached."""
+
+    count: int
+    """Number of angles."""
+    missed: float
+    """Error at the validation angles, as a fraction of the peak-to-peak value [-]."""
+    doubt: float
+    """Estimated error between the torques, as a fraction of the peak-to-peak value [-].
+    """
+
+
+def _checks(
+    grid: ColumnGrid[AnyState], count: int, rated: float, *, symmetric: bool
+) -> dict[str, Any]:
+    """Check periodicity and mirror symmetry at the angles that every map has."""
+    torque = min(grid.levels, key=lambda t: abs(t - rated))
+    info: dict[str, Any] = {"second_pitch": _second_pitch(grid, torque, count)}
+    if symmetric:
+        info["mirror"] = _mirror(grid, torque, count)
+    return info
+
+
+def _refine_at_levels(
+    grid: ColumnGrid[AnyState], effort: Effort, others: list[AngleColumn[AnyState]]
+) -> _Reached:
+    """Double the angles and add torques, judged at the initial torques of all columns.
+
+    Args:
+        grid: Columns at the initial angles.
+        effort: Budget; the solves of the validation are reserved.
+        others: Columns at the validation angles.
+    """
     reserved = len(others) * effort.unseen[0] * len(grid.signs)
-
-    def budget() -> int:
-        """Solves left for samples, less those of the torque beyond the largest one."""
-        last = count * len(grid.signs) if effort.beyond else 0
-        return effort.solves - reserved - last
-
-    def doubles(goal: float) -> bool:
-        """Whether to double the angles, with one more torque within the budget."""
-        fits = grid.solves + grid.cost(count) + count <= budget()
-        return missed > goal and 2 * count <= effort.most_angles and fits
-
-    def angle_goal() -> float:
-        return float(ANGLE_GOAL * np.sqrt(count / effort.angles))
-
+    count, levels = effort.angles, [0.0, *grid.levels]
+    missed = grid.largest_miss(count, others, levels)
     while True:
         # torques need not be resolved better than angles
-        doubt = grid.divide(count, budget(), max(TORQUE_GOAL, missed))
-        if not doubles(angle_goal()):
+        most = _budget(grid, effort, count, reserved)
+        grid.divide(count, most, max(TORQUE_GOAL, missed))
+        goal = float(ANGLE_GOAL * np.sqrt(count / effort.angles))
+        if missed <= goal or not _can_double(grid, effort, count, reserved):
             break
         count, before = 2 * count, missed
         grid.solve_columns(count)
-        missed = grid.largest_miss(count, others, first)
+        missed = grid.largest_miss(count, others, levels)
         if missed > STALLED * before:
             break
-    doubt = grid.divide(count, budget(), TORQUE_GOAL)
-    # contact changes between the angles may occur at other torques only
-    unseen = grid.unseen(others, effort.unseen[0])
-    reserved = 0
-    missed = grid.largest_miss(count, others, np.unique(unseen.torque))
-    while doubles(GOAL):
+    most = _budget(grid, effort, count, reserved)
+    doubt = grid.divide(count, most, TORQUE_GOAL)
+    return _Reached(count=count, missed=missed, doubt=doubt)
+
+
+def _refine_at_unseen(
+    grid: ColumnGrid[AnyState],
+    effort: Effort,
+    others: list[AngleColumn[AnyState]],
+    unseen: FullSolves,
+    reached: _Reached,
+) -> _Reached:
+    """Double the angles further while the validation torques are predicted too poorly.
+
+    Contact changes between the angles may occur at torques other than the initial ones.
+
+    Args:
+        grid: Columns so far.
+        effort: Budget of solves.
+        others: Columns at the validation angles.
+        unseen: Equilibria at these angles and the validation torques.
+        reached: Number of angles and accuracy so far.
+    """
+    torques = np.unique(unseen.torque)
+    count, doubt = reached.count, reached.doubt
+    missed = grid.largest_miss(count, others, torques)
+    while missed > GOAL and _can_double(grid, effort, count, 0):
         count, before = 2 * count, missed
         grid.solve_columns(count)
-        doubt = grid.divide(count, budget(), TORQUE_GOAL)
-        missed = grid.largest_miss(count, others, np.unique(unseen.torque))
+        doubt = grid.divide(count, _budget(grid, effort, count, 0), TORQUE_GOAL)
+        missed = grid.largest_miss(count, others, torques)
         if missed > STALLED * before:
             break
-    if effort.beyond:
-        grid.go_beyond(count)
-    shortfall = []
-    if missed > GOAL:
-        shortfall.append(
-            f"other torques and angles are off by up to {100.0 * missed:.2g} %"
+    return _Reached(count=count, missed=missed, doubt=doubt)
+
+
+def _budget(
+    grid: ColumnGrid[AnyState], effort: Effort, count: int, reserved: int
+) -> int:
+    """Solves for samples, without those reserved or beyond the largest torque."""
+    last = count * len(grid.signs) if effort.beyond else 0
+    return effort.solves - reserved - last
+
+
+def _can_double(
+    grid: ColumnGrid[AnyState], effort: Effort, count: int, reserved: int
+) -> bool:
+    """Whether twice as many angles, with one more torque, are within the budget."""
+    solves = grid.solves + grid.cost(count) + count
+    fits = solves <= _budget(grid, effort, count, reserved)
+    return 2 * count <= effort.most_angles and fits
+
+
+def _shortfall(reached: _Reached) -> str:
+    """Goals that the refinement has not reached; empty if it has reached all."""
+    parts = []
+    if reached.missed > GOAL:
+        parts.append(
+            f"other torques and angles are off by up to {100.0 * reached.missed:.2g} %"
         )
-    if doubt > TORQUE_GOAL:
-        shortfall.append(
-            f"torques between the samples by an estimated {100.0 * doubt:.2g} %"
+    if reached.doubt > TORQUE_GOAL:
+        parts.append(
+            f"torques between the samples by an estimated {100.0 * reached.doubt:.2g} %"
         )
+    return ", ".join(parts)
+
+
+def _table(
+    grid: ColumnGrid[AnyState], count: int, effort: Effort, *, symmetric: bool
+) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Torques, table and marks of the solved torques, as in :class:`Pattern`."""
     tables, solved = grid.tables(count, effort.torques)
     if symmetric:
         tables = with_mirrored_torques(tables)
         solved |= {-t for t in solved}
     used = np.array(sorted(tables))
-    info["sampling"] = {
-        "angles": count,
+    table = np.array([tables[t] for t in used]).swapaxes(0, 1)
+    return used, table, np.isin(used, sorted(solved))
+
+
+def _record(grid: ColumnGrid[AnyState], reached: _Reached) -> dict[str, Any]:
+    """Numbers of angles and solves, and the remaining errors, for the record."""
+    columns = [column for _, column in grid.chosen(reached.count)]
+    return {
+        "angles": reached.count,
         "solves": grid.solves,
-        "solves_per_angle": [
-            len(column.states) + 1 for _, column in grid.chosen(count)
-        ],
-        "missed_at_unseen_angles": missed,
-        "estimated_between_torques": doubt,
+        "solves_per_angle": [len(column.states) + 1 for column in columns],
+        "missed_at_unseen_angles": reached.missed,
+        "estimated_between_torques": reached.doubt,
     }
-    return Pattern(
-        theta=grid.angles(count),
-        torque=used,
-        table=np.array([tables[t] for t in used]).swapaxes(0, 1),
-        solved=np.isin(used, sorted(solved)),
-        unseen=unseen,
-        shortfall=", ".join(shortfall),
-        free=grid.free,
-        truncated=not {*torques} <= {*grid.levels},
-        states=grid.states(count, torques),
-        info=info,
-    )
 
 
 def _second_pitch(
