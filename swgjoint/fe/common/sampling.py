@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from math import pi
@@ -14,7 +15,13 @@ from swgjoint.fe.common.stress_state import stress_state_label
 from swgjoint.fe.plane.continuation import Continuation
 from swgjoint.fe.plane.drive2d import carries_bearing, ring_model, unmodelled_parts
 from swgjoint.fe.plane.equilibrium import NewtonSolver
-from swgjoint.fe.plane.shape_fields import drive_fields, plane_fields, plane_surface
+from swgjoint.fe.plane.shape_fields import (
+    SectorFields,
+    ShapeSurface,
+    drive_fields,
+    plane_fields,
+    plane_surface,
+)
 from swgjoint.fe.solid.continuation import SolidContinuation
 from swgjoint.fe.solid.drive3d import solid_ring
 from swgjoint.fe.solid.shape_fields import solid_fields, solid_surface
@@ -28,6 +35,7 @@ from swgjoint.gear.mounting import series_compliance, springs_of
 from swgjoint.maps.samples import MapSamples
 from swgjoint.maps.unfinished import Unfinished
 from swgjoint.progress import Progress, silent
+from swgjoint.typing import Array
 
 ANGLES = 24
 """Initial number of input positions over one pitch in a 2D map. It is doubled up to
@@ -109,14 +117,10 @@ def sample_map(
     begin = time.perf_counter()
     drive, ratings = design.drive, ratings_of(design)
     symmetric = design.wave_generator.kind in SYMMETRIC
-    parts = [part * ratings.repeated_peak for part in LEVELS]
-    torques = parts if symmetric else [-t for t in parts[::-1]] + parts
-    period = 2.0 * pi / design.periodicity
     effort = effort_of(
         model, angles, both_signs=not symmetric, errors=has_errors(design)
     )
     total, done = effort.solves, 0
-
     stages = len(STAGES) if has_errors(design) else 1
     stage = f"{drive.name}: equilibria" + (f", part 1 of {stages}" * (stages > 1))
 
@@ -125,62 +129,26 @@ def sample_map(
         done += 1
         progress(stage, min(done, total), total)
 
-    settings: dict[str, Any] = {
-        "small": SMALL * ratings.rated_torque,
-        "rated": ratings.rated_torque,
-        "symmetric": symmetric,
-        "tick": tick,
-        "keep": keep,
-    }
-    try:
-        # two calls, because states of 2D and 3D models have different types
-        found: Pattern[Any]
-        if model == "3d":
-            solid = _follower_3d(design)
-            found = solve_pattern(solid, period, torques, effort, **settings)
-            surface = solid_surface(solid.ring)
-            shown = partial(solid_fields, solid.ring, surface=surface)
-        else:
-            plane = follower_in_plane(design)
-            found = solve_pattern(plane, period, torques, effort, **settings)
-            surface = plane_surface(plane.model)
-            shown = partial(plane_fields, plane.model, surface=surface)
-    except ComputationError as failure:
-        raise ComputationError(f"{drive.name}: {failure}") from failure
-    used = found.torque
-    if used[0] >= 0.0 or used[-1] <= 0.0 or used.size < 5:
-        raise ComputationError(
-            f"{drive.name}: too few torques can be solved; the smallest is "
-            f"{parts[0]:g} N·m of {parts[-1]:g} N·m repeated peak"
-        )
-    error, energy, compliance, input_torque = found.table
-    # springs in series: the cup that the 2D model lacks, boss and housing
-    series = series_compliance(design, cup=model == "2d")
-    error = error - (used * series)[:, None]
-    energy = energy + (0.5 * used**2 * series)[:, None]
-    compliance = compliance + series
-    unseen = replace(
-        found.unseen,
-        output_error=found.unseen.output_error - found.unseen.torque * series,
-    )
+    pattern, shown, surface = _solved(design, model, effort, tick, keep)
+    _check_torques(design, pattern)
     # fewer solves may have been needed than progress announced
     progress(stage, total, total)
+    # springs in series: the cup that the 2D model lacks, boss and housing
+    series = series_compliance(design, cup=model == "2d")
     tolerances = None
     if has_errors(design):
         tolerances = sample_tolerances(
             design,
-            repeated_peak=float(used[-1]),
+            repeated_peak=float(pattern.torque[-1]),
             rated_torque=ratings.rated_torque,
             model=model,
             progress=progress,
             keep=keep,
         )
         tolerances = tolerances.in_series(series)
-    # the pattern follows the gear angle that depends on the input only, with the sign
-    # that makes its phase grow with theta
-    alpha, beta = angle_coefficients(drive.layout)
-    cycles = design.periodicity
+    unseen, states = pattern.unseen, pattern.states
     return MapSamples(
+        **_in_series(pattern, series),
         name=drive.name,
         level=model,
         layout=drive.layout,
@@ -188,49 +156,134 @@ def sample_map(
         teeth_circular_spline=drive.teeth_circular_spline,
         ratings=ratings,
         damping_ratio=design.joint.damping_ratio,
-        order=(cycles, 0) if alpha == (1, 0) else (0, cycles * beta[0]),
-        input_angle=found.theta,
-        torque=used,
-        output_error=error,
-        energy=energy,
-        compliance=compliance,
-        input_torque=input_torque,
+        order=_order(design),
+        input_angle=pattern.theta,
+        torque=pattern.torque,
         tolerances=tolerances,
-        free=found.free,
-        solved=found.solved,
-        unseen=unseen,
-        shortfall=found.shortfall,
-        fields=drive_fields(design, found.states, shown, surface, symmetric=symmetric),
-        info=found.info
+        free=pattern.free,
+        solved=pattern.solved,
+        unseen=replace(
+            unseen, output_error=unseen.output_error - unseen.torque * series
+        ),
+        shortfall=pattern.shortfall,
+        fields=drive_fields(design, states, shown, surface, symmetric=symmetric),
+        info=pattern.info
         | {
             "design_hash": design.content_hash(),
-            "label": {
-                "model": model,
-                "level": "nonlinear",
-                "circular_spline": "elastic, outside "
-                + design.circular_spline.outer_rim,
-                "cup": "closed-form torsion in series"
-                if model == "2d" and design.cup is not None
-                else None,
-                "bearing": "balls at rest on the cam, their passage left out"
-                if model == "2d" and maps_bearing(design)
-                else None,
-                "stress_state": stress_state_label(design) if model == "2d" else None,
-                "springs_Nm_rad": springs_of(design),
-                "friction": "left out of the potential"
-                if design.friction.tooth_coefficient
-                else None,
-                "tolerances": _named(design),
-                "left_out": unmodelled_parts(
-                    design, model, bearing=maps_bearing(design)
-                ),
-            },
+            "label": _label(design, model),
             "ratings_source": ratings.source,
-            "truncated": found.truncated,
+            "truncated": pattern.truncated,
             "solves": done,
             "sampling_wall_s": time.perf_counter() - begin,
         },
     )
+
+
+def _solved(
+    design: Design,
+    model: str,
+    effort: Effort,
+    tick: Callable[[], None],
+    keep: Unfinished | None,
+) -> tuple[Pattern[Any], Callable[[Any], SectorFields], ShapeSurface]:
+    """Equilibria of a drive by one of the two models.
+
+    Returns:
+        The pattern, the function that returns the fields of one of its equilibria, and
+        the displayed surface.
+
+    Raises:
+        ComputationError: If the unloaded drive or all torques cannot be solved.
+    """
+    ratings, period = ratings_of(design), 2.0 * pi / design.periodicity
+    torques = _initial_torques(design)
+    settings: dict[str, Any] = {
+        "small": SMALL * ratings.rated_torque,
+        "rated": ratings.rated_torque,
+        "symmetric": design.wave_generator.kind in SYMMETRIC,
+        "tick": tick,
+        "keep": keep,
+    }
+    try:
+        # two calls, because states of 2D and 3D models have different types
+        pattern: Pattern[Any]
+        if model == "3d":
+            solid = _follower_3d(design)
+            pattern = solve_pattern(solid, period, torques, effort, **settings)
+            surface = solid_surface(solid.ring)
+            return pattern, partial(solid_fields, solid.ring, surface=surface), surface
+        plane = follower_in_plane(design)
+        pattern = solve_pattern(plane, period, torques, effort, **settings)
+        surface = plane_surface(plane.model)
+        return pattern, partial(plane_fields, plane.model, surface=surface), surface
+    except ComputationError as failure:
+        raise ComputationError(f"{design.drive.name}: {failure}") from failure
+
+
+def _initial_torques(design: Design) -> list[float]:
+    """Torques of every angle at the start [N·m]; positive ones only if symmetric."""
+    peak = ratings_of(design).repeated_peak
+    parts = [part * peak for part in LEVELS]
+    if design.wave_generator.kind in SYMMETRIC:
+        return parts
+    return [-t for t in parts[::-1]] + parts
+
+
+def _check_torques(design: Design, pattern: Pattern[Any]) -> None:
+    """Reject a pattern with too few torques for a map."""
+    used = pattern.torque
+    if used[0] >= 0.0 or used[-1] <= 0.0 or used.size < 5:
+        peak = ratings_of(design).repeated_peak
+        raise ComputationError(
+            f"{design.drive.name}: too few torques can be solved; the smallest is "
+            f"{LEVELS[0] * peak:g} N·m of {LEVELS[-1] * peak:g} N·m repeated peak"
+        )
+
+
+def _in_series(pattern: Pattern[Any], series: float) -> dict[str, Array]:
+    """Tables of a pattern with a compliance in series [rad/(N·m)], by their names."""
+    torque = pattern.torque
+    error, energy, compliance, input_torque = pattern.table
+    return {
+        "output_error": error - (torque * series)[:, None],
+        "energy": energy + (0.5 * torque**2 * series)[:, None],
+        "compliance": compliance + series,
+        "input_torque": input_torque,
+    }
+
+
+def _order(design: Design) -> tuple[int, int]:
+    """Numbers p and q, for a pattern that is a function of p alpha + q beta.
+
+    The pattern follows the gear angle that depends on the input only, with the sign
+    that makes its phase grow with the input angle theta.
+    """
+    alpha, beta = angle_coefficients(design.drive.layout)
+    cycles = design.periodicity
+    return (cycles, 0) if alpha == (1, 0) else (0, cycles * beta[0])
+
+
+def _label(design: Design, model: str) -> dict[str, Any]:
+    """Validity label: what the samples of a model represent and neglect."""
+    plane = model == "2d"
+    return {
+        "model": model,
+        "level": "nonlinear",
+        "circular_spline": "elastic, outside " + design.circular_spline.outer_rim,
+        "cup": "closed-form torsion in series"
+        if plane and design.cup is not None
+        else None,
+        "bearing": "balls at rest on the cam, their passage left out"
+        if plane and maps_bearing(design)
+        else None,
+        "stress_state": stress_state_label(design) if plane else None,
+        "springs_Nm_rad": springs_of(design),
+        "friction": "left out of the potential"
+        if design.friction.tooth_coefficient
+        else None,
+        "tolerances": _named(design),
+        "left_out": unmodelled_parts(design, model, bearing=maps_bearing(design)),
+    }
 
 
 def effort_of(
