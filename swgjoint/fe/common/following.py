@@ -271,33 +271,35 @@ class Follower(ABC, Generic[AnyState]):
         pitch = 2.0 * pi / self.teeth
         first = self.output_angle(state)
         direction = -1.0 if torque > 0.0 else 1.0
+        # step by hundredths of a pitch until the teeth resist
         apart = 0.0
-        found = state
+        resisted = state
         for k in range(1, TAKE_UP + 1):
-            found = self.hold_output(
-                self.rotate_output(found, first + direction * k * pitch / 100)
+            resisted = self.hold_output(
+                self.rotate_output(resisted, first + direction * k * pitch / 100)
             )
-            if not found.outcome.ok:
-                return found
-            if not is_free(found) and found.torque * torque > 0.0:
+            if not resisted.outcome.ok:
+                return resisted
+            if not is_free(resisted) and resisted.torque * torque > 0.0:
                 break
             apart = k * pitch / 100
         else:
-            return replace(found, outcome=Outcome.SINGULAR)
-        reached = abs(self.output_angle(found) - first)
+            return replace(resisted, outcome=Outcome.SINGULAR)
+        # bisect until the torque is not larger than required
+        reached = abs(self.output_angle(resisted) - first)
         for _ in range(HALVINGS):
-            if abs(found.torque) <= abs(torque):
+            if abs(resisted.torque) <= abs(torque):
                 break
             middle = 0.5 * (apart + reached)
-            tried = self.hold_output(
-                self.rotate_output(found, first + direction * middle)
+            nearer = self.hold_output(
+                self.rotate_output(resisted, first + direction * middle)
             )
-            held = tried.outcome.ok and not is_free(tried)
-            if held and tried.torque * torque > 0.0:
-                found, reached = tried, middle
+            held = nearer.outcome.ok and not is_free(nearer)
+            if held and nearer.torque * torque > 0.0:
+                resisted, reached = nearer, middle
             else:
                 apart = middle
-        return found
+        return resisted
 
 
 def is_free(state: AnyState) -> bool:

@@ -65,22 +65,22 @@ def solve_many(matrix: Array, offset: Array, start: Mask | None = None) -> Pivot
         inside = np.flatnonzero(unknown)
         part = np.ix_(open_, inside)
         block = matrix[np.ix_(inside, inside)] / scale[inside, None] / scale[inside]
-        found, ends = _all_unknowns(block, q[part], tolerance[open_], active[part])
+        solved, ends = _all_unknowns(block, q[part], tolerance[open_], active[part])
         active[part] = ends
-        value = np.where(ends, found, 0.0) / scale[inside]
+        value = np.where(ends, solved, 0.0) / scale[inside]
         result[open_] = q[open_] + value @ matrix[:, inside].T / scale
-        result[part] = found
+        result[part] = solved
         bad = result[open_] < -tolerance[open_, None]
         bad[:, unknown] = False
         unknown |= bad.any(axis=0)
         open_ = open_[bad.any(axis=1)]
-    solved = np.asarray(np.isfinite(result).all(axis=1))
-    result[~solved] = np.nan
+    finite = np.asarray(np.isfinite(result).all(axis=1))
+    result[~finite] = np.nan
     return Pivoted(
         value=np.where(active, result, 0.0) / scale,
         slack=np.where(active, 0.0, result) * scale,
         active=active,
-        solved=solved,
+        solved=finite,
     )
 
 
@@ -122,8 +122,8 @@ def _all_unknowns(
 
             # for a single batch a thread costs more than it saves
             solve_all = pool.map if len(parts) > 1 else map
-            for part, found in zip(parts, solve_all(solve, parts), strict=True):
-                result[part] = found
+            for part, solved in zip(parts, solve_all(solve, parts), strict=True):
+                result[part] = solved
             bad = result[open_] < -tolerance[open_, None]
             wrong = bad.sum(axis=1)
             better = wrong < fewest[open_]
@@ -260,13 +260,13 @@ def solve_active(matrix: Array, right: Array, active: Mask) -> Array:
     scale = np.sqrt(np.diag(matrix))[inside]
     scaled = matrix[np.ix_(inside, inside)] / scale[:, None] / scale
     q, there = right[inside] / scale, active[:, inside]
-    found = np.zeros(there.shape)
+    values = np.zeros(there.shape)
     order = np.argsort(there.sum(axis=1))
     for k in range(0, order.size, BATCH):
         part = order[k : k + BATCH]
-        found[part] = _at_active(scaled, np.tile(q, (part.size, 1)), there[part])
+        values[part] = _at_active(scaled, np.tile(q, (part.size, 1)), there[part])
     result = np.zeros(active.shape)
-    result[:, inside] = np.where(there, found, 0.0) / scale
+    result[:, inside] = np.where(there, values, 0.0) / scale
     return result
 
 

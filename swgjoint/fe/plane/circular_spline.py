@@ -250,6 +250,7 @@ class CircularSpline:
 
     @cached_property
     def _stations_by_radius(self) -> tuple[Array, Array]:
+        """Arc lengths and radii [m] along the rigid flank, radii increasing."""
         stations = self.spline.x
         table = np.linspace(float(stations[0]), float(stations[-1]), 400)
         points, _, _ = self.profile.evaluate(table)

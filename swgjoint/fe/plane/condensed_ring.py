@@ -47,6 +47,7 @@ class CondensedRing:
 
     @cached_property
     def _factor(self) -> CyclicFactor:
+        """Factorised tangent with the anchor spring."""
         return CyclicFactor(self.ring.anchor_tangent(), self.ring.face_dofs)
 
     @cached_property
@@ -71,6 +72,7 @@ class CondensedRing:
         )
 
     def _solved(self, right: Array) -> Array:
+        """Displacements (N, n_dofs, k) under right-hand sides of that shape."""
         right[self.ring.fixed] = 0.0
         return self._factor.solve(right)
 

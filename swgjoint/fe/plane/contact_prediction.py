@@ -40,8 +40,8 @@ def predicted_changes(
         return None
     ring = linearise(model, state, None if ring_is_output else state.torque)
     reach = REACH * model.lobe_height
-    found = ring.search.search(ring.flank, reach, state.contacts, thorough=False)
-    contacts, carries = distinct(found, state)
+    candidates = ring.search.search(ring.flank, reach, state.contacts, thorough=False)
+    contacts, carries = distinct(candidates, state)
     drive = CondensedRing(
         model=model,
         state=state,

@@ -41,6 +41,7 @@ class NewtonSolver:
     """Newton solver for equilibria, with its settings."""
 
     max_iterations: int = 120
+    """Most Newton iterations."""
     step_tolerance: float = 2e-12
     """Displacement increment at which the iteration ends [m]; about 1e-5 of the
     smallest effect of interest, a tenth of a micrometre."""

@@ -106,6 +106,7 @@ def _field(
     angle: Array,
     stress: Array,
 ) -> MemberField:
+    """Field of a member from skeleton displacements and stresses in its frames."""
     n, mesh = len(angle), element.mesh
     nodes = len(element.displacement_from_skeleton)
     moved = skeleton @ element.displacement_from_skeleton.reshape(2 * nodes, -1).T
@@ -261,10 +262,10 @@ def root_stress(
     low = radius < 0.5 * (profile.pitch_radius + profile.dedendum_radius)
     nodes = np.concatenate([mesh.flank_right[low], mesh.flank_left[low]])
     stress = np.array([flexspline_stress(model, state)[:, nodes] for state in states])
-    found = stress_maxima(stress)  # three times (n_states, sectors, n_nodes)
-    worst = int(np.argmax(found[2].max(axis=(0, 1))))
+    maxima = stress_maxima(stress)  # three times (n_states, sectors, n_nodes)
+    worst = int(np.argmax(maxima[2].max(axis=(0, 1))))
     tensile, compressive, mises = (
-        np.tile(values[..., worst], (1, model.copies)) for values in found
+        np.tile(values[..., worst], (1, model.copies)) for values in maxima
     )
     x, y = mesh.mesh.p[:, nodes[worst]]
     from_lobe = np.array([tooth_angles(model, state) for state in states])

@@ -167,5 +167,6 @@ def _along(follow: Continuation, theta: float, torques: Array) -> list[State]:
 
 
 def _coefficient(follow: Continuation) -> float:
+    """Friction coefficient of the flanks [-]."""
     law = follow.model.friction
     return 0.0 if law is None else law.coefficient

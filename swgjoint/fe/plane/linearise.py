@@ -287,13 +287,13 @@ def _gaps(model: RingModel, state: State) -> tuple[Array, Array, Array]:
     middle = model.wave_generator_gap(shaped[:, :, p // 2], alpha)
     near = middle[0] < FAR * model.lobe_height
     near |= state.touching.reshape(shaped.shape[:3]).any(axis=2)
-    found = []
+    gaps = []
     exact = model.wave_generator_gap(shaped[near], alpha)
     for coarse, fine in zip(middle, exact, strict=True):
         values = np.repeat(coarse[:, :, None], p, axis=2)
         values[near] = fine
-        found.append(values.reshape(*points.shape[:2], *coarse.shape[2:]))
-    return found[0], found[1], found[2]
+        gaps.append(values.reshape(*points.shape[:2], *coarse.shape[2:]))
+    return gaps[0], gaps[1], gaps[2]
 
 
 def _in_global_frame(matrices: Array, angle: Array) -> Array:

@@ -38,6 +38,7 @@ class StateFigures:
     """Tangent compliance -d(output rotation)/dT at the active contacts [rad/(N·m)]; NaN
     in a 3D model whose torque is not prescribed."""
     outcome: Outcome = Outcome.CONVERGED
+    """Outcome of the solve."""
     history: tuple[float, ...] = ()
     """Largest displacement increment of each iteration [m]."""
 
